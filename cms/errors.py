@@ -1,0 +1,39 @@
+"""Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
+
+__all__ = [
+    "BodyError",
+    "CmsError",
+    "FactorizationError",
+    "JobError",
+    "ModalFileError",
+    "ModeSetError",
+    "UnitsError",
+]
+
+
+class CmsError(Exception):
+    """Root of every error that `cms` raises on purpose; its text is meant for the user."""
+
+
+class BodyError(CmsError, ValueError):
+    """A finite element body, coupling or interface is not what it claims to be."""
+
+
+class UnitsError(CmsError, ValueError):
+    """An unknown unit system, or units that do not fit together."""
+
+
+class ModeSetError(CmsError, ValueError):
+    """A mode set cannot be made from this body with these options."""
+
+
+class FactorizationError(CmsError, RuntimeError):
+    """A sparse matrix could not be factorised: singular, indefinite or too large."""
+
+
+class ModalFileError(CmsError, ValueError):
+    """A file is not a readable modal file."""
+
+
+class JobError(CmsError, ValueError):
+    """A job file is not valid; the text names the key, the value and the choices."""

@@ -1,0 +1,39 @@
+"""A mode set: displacement columns that span a reduction basis, each with its origin in words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from cms.arrays import Array, frozen, require_finite
+from cms.errors import ModeSetError
+
+__all__ = ["ModeSet"]
+
+
+@dataclass(frozen=True, eq=False)
+class ModeSet:
+    """Columns over all dofs of a coupled body, before the finishing step of `reduce`."""
+
+    name: str  #: key in the registry, such as "craig-bampton"
+    columns: Array  #: displacement columns, (n_dof, n_columns)
+    labels: tuple[str, ...]  #: one per column, such as "constraint big_end ux", "fixed-interface 3"
+    frequencies: Array  #: of the column's own vibration problem, (n_columns,) [Hz]; NaN for static columns
+    options: Mapping[str, str] = field(default_factory=dict)  #: what was asked for and which solver ran
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", frozen(self.columns))
+        object.__setattr__(self, "labels", tuple(self.labels))
+        object.__setattr__(self, "frequencies", frozen(self.frequencies))
+        object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
+        n_columns = self.columns.shape[1]
+        if len(self.labels) != n_columns or self.frequencies.shape != (n_columns,):
+            raise ModeSetError(f"mode set {self.name!r}: {n_columns} columns need as many labels and frequencies, got "
+                               f"{len(self.labels)} and {self.frequencies.shape}")
+        require_finite(f"mode set {self.name!r}", self.columns)
+
+    @property
+    def is_static(self) -> np.ndarray:
+        """Which columns are static ones, (n_columns,) bool."""
+        return np.isnan(self.frequencies)

@@ -1,0 +1,19 @@
+"""Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
+
+__all__ = ["FeModelsError", "InterfaceError", "MaterialError", "MeshError"]
+
+
+class FeModelsError(Exception):
+    """Root of every error that `fe_models` raises on purpose; its text is meant for the user."""
+
+
+class MeshError(FeModelsError, ValueError):
+    """A mesh cannot be read truthfully, or is not fit for a finite element model."""
+
+
+class MaterialError(FeModelsError, ValueError):
+    """A material is impossible, or cells have none or two."""
+
+
+class InterfaceError(FeModelsError, ValueError):
+    """An interface selects nothing, too little, or what another interface has."""
