@@ -8,7 +8,7 @@ from cms.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh"]
 
-SOLID_TYPES = ("tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27", "wedge")  #: meshio names and node order
+SOLID_TYPES = ("tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27", "wedge")  #: meshio names, node order
 FACE_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")
 
 
