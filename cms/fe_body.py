@@ -145,11 +145,14 @@ class FEBody:
         if len(self.dofs) == 0:
             raise BodyError(f"{where}: dofs: expected at least one dof, got none")
         if self.dofs[:, 0].min() < 0 or self.dofs[:, 0].max() >= len(self.nodes):
-            raise BodyError(f"{where}: dofs: expected nodes 0..{len(self.nodes) - 1}, got "
-                            f"{self.dofs[:, 0].min()}..{self.dofs[:, 0].max()}")
+            raise BodyError(
+                f"{where}: dofs: expected nodes 0..{len(self.nodes) - 1}, got "
+                f"{self.dofs[:, 0].min()}..{self.dofs[:, 0].max()}"
+            )
         if self.dofs[:, 1].min() < MULTIPLIER or self.dofs[:, 1].max() > 5:
-            raise BodyError(f"{where}: dofs: expected components 0..5, got "
-                            f"{self.dofs[:, 1].min()}..{self.dofs[:, 1].max()}")
+            raise BodyError(
+                f"{where}: dofs: expected components 0..5, got {self.dofs[:, 1].min()}..{self.dofs[:, 1].max()}"
+            )
         n_dof = len(self.dofs)
         put(self, "M", symmetric_csc(f"{where}: M", self.M, n_dof))
         put(self, "K", symmetric_csc(f"{where}: K", self.K, n_dof))
@@ -203,7 +206,9 @@ class FEBody:
         """Raise `BodyError` unless every interface has its boundary dofs."""
         if not self.is_coupled:
             missing = ", ".join(interface.name for interface in self.interfaces if interface.dofs is None)
-            raise BodyError(f"body {self.name!r}: interfaces {missing} have no boundary dofs yet; call cms.couple(body)")
+            raise BodyError(
+                f"body {self.name!r}: interfaces {missing} have no boundary dofs yet; call cms.couple(body)"
+            )
 
     def mesh_displacement(self, u: Array) -> Array:
         """Return displacement columns over the dofs of the mesh, (n_mesh_dof, k), of columns u, (n_dof, k)."""

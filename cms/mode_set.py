@@ -21,16 +21,23 @@ class ModeSet:
     labels: tuple[str, ...]  #: one per column, such as "constraint big_end ux", "fixed-interface 3"
     frequencies: Array  #: of the column's own vibration problem, (n_columns,) [Hz]; NaN for static columns
     options: Mapping[str, str] = field(default_factory=dict)  #: what was asked for and which solver ran
+    groups: tuple[
+        str, ...
+    ] = ()  #: one per column, such as "constraint big_end"; by default the label but its last word
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", frozen(self.columns))
         object.__setattr__(self, "labels", tuple(self.labels))
+        groups = tuple(self.groups) or tuple(label.rsplit(" ", 1)[0] for label in self.labels)
+        object.__setattr__(self, "groups", groups)
         object.__setattr__(self, "frequencies", frozen(self.frequencies))
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
         n_columns = self.columns.shape[1]
-        if len(self.labels) != n_columns or self.frequencies.shape != (n_columns,):
-            raise ModeSetError(f"mode set {self.name!r}: {n_columns} columns need as many labels and frequencies, got "
-                               f"{len(self.labels)} and {self.frequencies.shape}")
+        if not len(self.labels) == len(self.groups) == n_columns or self.frequencies.shape != (n_columns,):
+            raise ModeSetError(
+                f"mode set {self.name!r}: {n_columns} columns need as many labels and frequencies, got "
+                f"{len(self.labels)} and {self.frequencies.shape}"
+            )
         require_finite(f"mode set {self.name!r}", self.columns)
 
     @property

@@ -1,4 +1,4 @@
-"""The reduced body: what the modal file holds and the multibody engine needs, free of any mesh-sized data but pictures."""
+"""The reduced body: what the modal file holds and the multibody engine needs, but for pictures free of mesh size."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -95,8 +95,13 @@ class ReducedBody:
         put(self, "provenance", MappingProxyType(dict(self.provenance)))
         n, n_kept = self.n_q, len(self.nodes)
         for name, shape in {
-            "M": (n, n), "K": (n, n), "D": (n, n), "nodes": (n_kept, 3), "Phi": (n_kept, 3, n),
-            "node_ids": (n_kept,), "energy_shares": (n, len(self.sources)),
+            "M": (n, n),
+            "K": (n, n),
+            "D": (n, n),
+            "nodes": (n_kept, 3),
+            "Phi": (n_kept, 3, n),
+            "node_ids": (n_kept,),
+            "energy_shares": (n, len(self.sources)),
         }.items():
             require_shape(f"{where}: {name}", getattr(self, name), shape)
         if len(self.labels) != n:
@@ -117,7 +122,7 @@ class ReducedBody:
 
     @property
     def frequencies(self) -> Array:
-        """Frequencies of the modes in this frame (its origin and axes held), (n_q,) [Hz]; infinite for massless ones."""
+        """Frequencies of the modes in this frame (its origin and axes held), (n_q,) [Hz]; massless: inf."""
         mass = np.diag(self.M)
         omega2 = np.divide(np.diag(self.K), mass, out=np.full(self.n_q, np.inf), where=mass > 0)
         return np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi)

@@ -3,7 +3,10 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-__all__ = ["nearest"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["nearest", "node_list"]
 
 
 def nearest(name: str, choices: Iterable[str]) -> str:
@@ -14,3 +17,8 @@ def nearest(name: str, choices: Iterable[str]) -> str:
     close = get_close_matches(str(name), names, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ";"
     return f"{hint} choices: {', '.join(names)}"
+
+
+def node_list(nodes: Iterable[int], positions: NDArray[np.float64]) -> str:
+    """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message."""
+    return ", ".join(f"node {n} at ({', '.join(f'{x:.6g}' for x in positions[n])})" for n in nodes)

@@ -1,0 +1,107 @@
+"""The body with all boundary dofs held: its interior stiffness, factorised once, serves many columns (DESIGN 3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.arrays import Array, IntArray
+from cms.errors import BodyError, FactorizationError, ModeSetError
+from cms.factorization import Factorization, factorize
+from cms.fe_body import MULTIPLIER, FEBody
+from cms.words import node_list
+
+__all__ = ["FixedInterfaceBody", "fix_interfaces", "principal_block"]
+
+ZERO_ENERGY = 1e-8  #: |K u| / (|K|_max |u|) below which u is a motion without energy
+
+
+@dataclass(frozen=True, eq=False)
+class FixedInterfaceBody:
+    """Interior partition of a coupled body and the factorisation of K_II; use as a context manager to free it."""
+
+    body: FEBody
+    i: IntArray  #: interior dofs, (n_i,)
+    b: IntArray  #: boundary dofs, (n_b,)
+    K_ii: sp.csc_array  #: (n_i, n_i) [N/m]
+    M_ii: sp.csc_array  #: (n_i, n_i) [kg]
+    factorization: Factorization  #: of K_ii
+
+    def __enter__(self) -> "FixedInterfaceBody":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.factorization.close()
+
+    @property
+    def n_multipliers(self) -> int:
+        """Number of multiplier dofs: interior dofs without mass that make K_ii indefinite."""
+        return int((self.body.dofs[:, 1] == MULTIPLIER).sum())
+
+
+def fix_interfaces(body: FEBody) -> FixedInterfaceBody:
+    """Hold all boundary dofs of a coupled body and factorise its interior stiffness.
+
+    Raises
+    ------
+    ModeSetError
+        If the body has no interface, or no interior dof is left.
+    BodyError
+        If it moves without energy while its interfaces are held: a mechanism; the text says where.
+    """
+    body.require_coupled()
+    b, i = body.b, body.i
+    if len(b) == 0:
+        raise ModeSetError(f"body {body.name!r} has no interface; give it at least one, or take free modes")
+    if len(i) == 0:
+        raise ModeSetError(f"body {body.name!r}: all {body.n_dof} dofs are boundary dofs; nothing is left to reduce")
+    K_ii = principal_block(body.K, i)
+    M_ii = principal_block(body.M, i)
+    is_definite = not (body.dofs[:, 1] == MULTIPLIER).any()
+    try:
+        factorization = factorize(K_ii, definite=is_definite)
+    except FactorizationError as error:
+        raise BodyError(_mechanism_message(body, i, K_ii, M_ii)) from error
+    return FixedInterfaceBody(body, i, b, K_ii, M_ii, factorization)
+
+
+def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
+    """Return A[index][:, index] for ascending indices; a leading block is cut without index look-ups."""
+    n = len(index)
+    if n == A.shape[0]:
+        return A
+    if index[-1] == n - 1:
+        return sp.csc_array(A[:n, :n])
+    return sp.csc_array(A[:, index][index])
+
+
+def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array) -> str:
+    """Say which nodes move without energy while the interfaces are held."""
+    from cms.eigen import eigenmodes
+
+    start = f"body {body.name!r}: with all interfaces held its stiffness is singular"
+    try:
+        modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1))
+    except Exception:  # the message about the mechanism matters more than why its picture failed
+        return f"{start}; it has a mechanism, or a part that no interface holds"
+    energy = np.abs(K_ii @ modes.Phi).max(axis=0) / (np.abs(K_ii.data).max() * np.abs(modes.Phi).max(axis=0))
+    is_free = energy < ZERO_ENERGY
+    if not is_free.any():
+        return f"{start}; its smallest energy is {energy.min():.1e} of the largest stiffness"
+    return (
+        f"{start}: {int(is_free.sum())}{'+' if is_free.all() else ''} motions without energy, largest at "
+        f"{moving_nodes(body, i, modes.Phi[:, is_free])}; hold these nodes by an interface, join the parts, or "
+        "mend the mesh"
+    )
+
+
+def moving_nodes(body: FEBody, rows: IntArray, Phi: Array) -> str:
+    """Name the nodes that move most in these motions over the given dofs, with their positions."""
+    size = np.abs(Phi).max(axis=1)
+    nodes = []
+    for k in np.argsort(size)[::-1]:
+        if body.dofs[rows[k], 0] not in nodes:
+            nodes.append(int(body.dofs[rows[k], 0]))
+        if len(nodes) == 3:
+            break
+    return node_list(nodes, body.nodes)

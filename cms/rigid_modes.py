@@ -1,0 +1,103 @@
+"""Rigid-body modes of a free body by three routes that must span the same space (THEORY §2)."""
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.arrays import Array, IntArray
+from cms.errors import BodyError
+from cms.fe_body import FEBody
+
+__all__ = [
+    "determinate_dofs",
+    "geometric_rigid_modes",
+    "null_space_rigid_modes",
+    "rigid_motion_of_points",
+    "static_rigid_modes",
+]
+
+RANK_TOLERANCE = 1e-8  #: of rigid-body modes restricted to some dofs, rotations scaled by the body length
+
+
+def rigid_motion_of_points(points: Array, origin: Array) -> Array:
+    """Translations of points under the six unit rigid-body motions about the origin, (n_points, 3, 6).
+
+    u = d + theta × (c - origin); columns d_x d_y d_z theta_x theta_y theta_z.
+    """
+    motion = np.zeros((len(points), 3, 6))
+    motion[:, :, :3] = np.eye(3)
+    x, y, z = (np.asarray(points) - origin).T
+    motion[:, 1, 3], motion[:, 2, 3] = -z, y
+    motion[:, 0, 4], motion[:, 2, 4] = z, -x
+    motion[:, 0, 5], motion[:, 1, 5] = -y, x
+    return motion
+
+
+def geometric_rigid_modes(body: FEBody, *, origin: Array | None = None) -> Array:
+    """Rigid-body modes from the positions of the nodes: u = d + theta × c, rotations theta, multipliers 0.
+
+    Parameters
+    ----------
+    origin
+        Point the rotations are about, (3,) [m]; the origin of the mesh by default.
+
+    Returns
+    -------
+    Array
+        (n_dof, 6); columns d_x d_y d_z [-] and theta_x theta_y theta_z [m].
+    """
+    motion = rigid_motion_of_points(body.nodes, np.zeros(3) if origin is None else origin)
+    node, component = body.dofs.T
+    Psi_R = np.zeros((body.n_dof, 6))
+    is_translation = (component >= 0) & (component < 3)
+    is_rotation = component >= 3
+    Psi_R[is_translation] = motion[node[is_translation], component[is_translation]]
+    Psi_R[is_rotation, component[is_rotation]] = 1.0
+    return Psi_R
+
+
+def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
+    """Choose six of the candidate dofs that just prevent rigid-body motion (the set R of THEORY §1).
+
+    Pivoted QR of the rigid-body modes restricted to the candidates, rotations scaled by the body length.
+
+    Raises
+    ------
+    BodyError
+        If the candidates leave a rigid-body motion free.
+    """
+    Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))[candidates]
+    Psi_R[:, 3:] /= body.length  # theta of one per body length: comparable to a unit translation
+    Psi_R[body.dofs[candidates, 1] >= 3] *= body.length  # a rotation dof counts as the translation at that length
+    _, R, pivots = la.qr(Psi_R.T, mode="economic", pivoting=True)
+    pivot_sizes = np.abs(np.diag(R))
+    rank = int((pivot_sizes > RANK_TOLERANCE * max(pivot_sizes.max(initial=0.0), 1.0)).sum())
+    if rank < 6:
+        raise BodyError(
+            f"body {body.name!r}: {len(candidates)} dofs hold only {rank} of the 6 rigid-body motions; "
+            "take an interface with six dofs, or more nodes that are not on one line"
+        )
+    return np.sort(candidates[pivots[:6]])
+
+
+def static_rigid_modes(body: FEBody, r: IntArray) -> Array:
+    """Rigid-body modes as static solutions for a unit displacement of each of the determinate dofs r, (n_dof, 6).
+
+    Interior part -K_ff⁻¹ K_fr with f all dofs but r: a route through the stiffness matrix only.
+    """
+    from cms.factorization import factorize
+
+    f = np.setdiff1d(np.arange(body.n_dof), r)
+    columns = body.K[:, r].toarray()
+    Psi_R = np.zeros((body.n_dof, len(r)))
+    Psi_R[r, np.arange(len(r))] = 1.0
+    with factorize(sp.csc_array(body.K[f][:, f]), definite=not (body.dofs[:, 1] < 0).any()) as factorization:
+        Psi_R[f] = -factorization.solve(columns[f])
+    return Psi_R
+
+
+def null_space_rigid_modes(body: FEBody) -> Array:
+    """Rigid-body modes as the zero-frequency vibration modes of the free body, (n_dof, 6), M-orthonormal."""
+    from cms.eigen import eigenmodes
+
+    return eigenmodes(body.K, body.M, n_modes=6).Phi
