@@ -1,0 +1,76 @@
+"""Stress of a displacement field at the nodes of a solid mesh."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from cms.arrays import Array, IntArray
+from fe_models.elements import reference_element
+from fe_models.material import Material
+from fe_models.mesh import Mesh
+from fe_models.threads import n_threads
+
+__all__ = ["nodal_stress", "stiffest_at_nodes"]
+
+
+def nodal_stress(
+    mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray], of_node: IntArray, u: Array
+) -> Array:
+    """Return the stress at the nodes, (n_nodes, 6, k) [Pa], of displacement columns u, (3 n_nodes, k) [m].
+
+    (1) sigma = lam tr(eps) 1 + 2 mu eps at the sampling points of each element;
+    (2) carried to the element's nodes by the shape functions of its low-order relative (`ReferenceElement`);
+    (3) at each node the mean, weighted by element volume, over the elements of the node's material.
+    The result is linear in u. Components xx, yy, zz, yz, xz, xy.
+
+    Parameters
+    ----------
+    mesh, materials
+        The solid cells, and the materials that `of_cell` counts.
+    of_cell
+        Cell type -> material of each cell, (n_cells,).
+    of_node
+        The material whose stress each node shows, (n_nodes,); see `stiffest_at_nodes`.
+    u
+        Displacement columns, dof 3 i + c is component c of node i, (3 n_nodes, k).
+    """
+    from fe_models.stress_kernels import add_element_stress, volume_at_nodes
+
+    lame = np.array([[material.lam, material.mu] for material in materials])
+    volume = np.zeros(len(mesh.nodes))
+    columns = [np.ascontiguousarray(u[:, k]).reshape(-1, 3) for k in range(u.shape[1])]
+    stress = np.zeros((u.shape[1], len(mesh.nodes), 6))
+    with ThreadPoolExecutor(n_threads()) as pool:  # a thread owns a column: no two write to one entry
+        for kind, cells in mesh.cells.items():
+            if not len(cells):
+                continue
+            element = reference_element(kind)
+            table = element.stress
+            volume_at_nodes(mesh.nodes, cells, of_cell[kind], of_node, table.dN, table.weights, volume)
+            futures = [
+                pool.submit(
+                    add_element_stress, mesh.nodes, cells, of_cell[kind], of_node, lame, table.dN, table.weights,
+                    element.extrapolation, column, out,
+                )
+                for column, out in zip(columns, stress, strict=True)
+            ]
+            for future in futures:
+                future.result()
+    stress /= volume[:, None]
+    return np.ascontiguousarray(stress.transpose(1, 2, 0))
+
+
+def stiffest_at_nodes(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray]) -> IntArray:
+    """Return for each node the material with the largest modulus among its elements, (n_nodes,); ties: the first.
+
+    Stress jumps where materials meet; one number a node can show one side only. The stiffer side carries the larger
+    stress as a rule, and a fixed choice keeps the stress linear in the displacement.
+    """
+    order = np.argsort([-material.E for material in materials], kind="stable")
+    rank = np.empty(len(materials), np.int64)
+    rank[order] = np.arange(len(materials))
+    best = np.full(len(mesh.nodes), len(materials), np.int64)
+    for kind, cells in mesh.cells.items():
+        np.minimum.at(best, cells.ravel(), np.repeat(rank[of_cell[kind]], cells.shape[1]))
+    return order[np.minimum(best, len(materials) - 1)]
