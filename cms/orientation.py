@@ -26,7 +26,8 @@ def orientation(Phi: Array, omega2: Array) -> Array:
     """
     k = Phi.shape[1]
     Z = np.zeros((k, k))
-    starts = np.flatnonzero(np.diff(omega2, prepend=-np.inf) > MULTIPLE * np.abs(omega2))
+    gaps = np.abs(np.diff(omega2, prepend=-np.inf))
+    starts = np.flatnonzero(gaps > MULTIPLE * np.abs(omega2))
     for first, last in zip(starts, [*starts[1:], k], strict=True):
         Z[first:last, first:last] = _standard_rotation(Phi[:, first:last])
     return Z
