@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
+from cms.arrays import Array, IntArray, frozen
 
 __all__ = ["CELL_SHAPES", "CellShape", "cell_jacobians", "facet_tables", "quadrature", "shape_values"]
 
@@ -143,20 +143,22 @@ def quadrature(kind: str) -> tuple[Array, Array]:
     Jacobian s). Faces use the same rules: their area integrand is smooth but no polynomial when the face is curved.
     """
     shape = CELL_SHAPES[kind]
-    x, w = np.polynomial.legendre.leggauss(4 if shape.name.startswith("triangle") else 3)
+    gauss = np.polynomial.legendre.leggauss
+    x, w = gauss(4 if shape.name.startswith("triangle") else 3)
     x, w = (x + 1) / 2, w / 2
     if len(shape.corners) == 2**shape.dim:
-        cube = np.stack(np.meshgrid(*[x] * shape.dim, indexing="ij"), -1).reshape(-1, shape.dim)
-        return cube, np.prod(np.stack(np.meshgrid(*[w] * shape.dim, indexing="ij"), -1).reshape(-1, shape.dim), axis=1)
+        points = np.stack(np.meshgrid(*[x] * shape.dim, indexing="ij"), -1).reshape(-1, shape.dim)
+        weights = np.stack(np.meshgrid(*[w] * shape.dim, indexing="ij"), -1).reshape(-1, shape.dim).prod(axis=1)
+        return frozen(points), frozen(weights)
     s, t = (a.ravel() for a in np.meshgrid(x, x, indexing="ij"))
     triangle, weight = np.column_stack([1 - s, s * t]), np.outer(w, w).ravel() * s
     if shape.dim == 2:
-        return triangle, weight
+        return frozen(triangle), frozen(weight)
     if kind == "wedge":
-        return (np.column_stack([np.repeat(triangle, len(x), axis=0), np.tile(x, len(triangle))]),
-                np.outer(weight, w).ravel())
+        points = np.column_stack([np.repeat(triangle, len(x), axis=0), np.tile(x, len(triangle))])
+        return frozen(points), frozen(np.outer(weight, w).ravel())
     points = np.column_stack([np.repeat(1 - x, len(triangle)), np.kron(x[:, None], triangle)])
-    return points, np.kron(w * x**2, weight)
+    return frozen(points), frozen(np.kron(w * x**2, weight))
 
 
 def cell_jacobians(kind: str, coordinates: Array, points: Array) -> Array:

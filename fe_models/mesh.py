@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+import numpy as np
+
 from cms.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh"]
@@ -24,11 +26,16 @@ class Mesh:
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
     source: str = ""  #: file it was read from, or how it was made
     digest: str = ""  #: sha256 of that file
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
+    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
+    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
-        for name in ("cells", "faces"):
+        put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "notes", tuple(self.notes))
+        for name in ("cells", "faces", "cell_numbers"):
             put(self, name, MappingProxyType({kind: frozen_int(c) for kind, c in getattr(self, name).items()}))
         for name in ("cell_sets", "face_sets"):
             sets = {
@@ -37,3 +44,8 @@ class Mesh:
             }
             put(self, name, MappingProxyType(sets))
         put(self, "node_sets", MappingProxyType({group: frozen_int(n) for group, n in self.node_sets.items()}))
+
+    @property
+    def n_cells(self) -> int:
+        """Number of solid cells."""
+        return sum(len(cells) for cells in self.cells.values())

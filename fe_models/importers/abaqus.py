@@ -1,0 +1,254 @@
+"""The mesh of an Abaqus or CalculiX deck: nodes, elements and sets.
+
+Read here and not by meshio, which replaces repeated *NODE, *NSET and *ELSET blocks instead of appending, ends a block
+at a comment line, ignores sets of sets, the coordinate system of *NODE and instance transformations, and mixes up the
+sets of *ELEMENT blocks. Loads, sections and materials are not read. Keywords that make or move nodes or elements, and
+that are not understood here, are refused.
+"""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from cms.arrays import Array, IntArray
+from cms.words import nearest
+from fe_models.errors import MeshError
+from fe_models.importers.abaqus_deck import DeckBlock, mesh_blocks
+from fe_models.importers.raw_mesh import RawBlock, RawMesh
+
+__all__ = ["read_abaqus"]
+
+_SOLIDS = {4: "tetra", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
+_SOLID = re.compile(r"C3D(\d+)[A-Z]*$")
+_FACES = {"3": ("triangle", 3), "4": ("quad", 4), "6": ("triangle6", 6), "65": ("triangle6", 6), "8": ("quad8", 8),
+          "9": ("quad9", 9)}
+_FACE = re.compile(r"(?:STRI|S|DS|CPS|CPE|CPEG|M3D|SFM3D|R3D)(\d+)(?:R|RS|RSW|5|R5|H|I|T|RT)?$")
+_LINES = {"B31": 2, "B32": 3, "B33": 2, "T3D2": 2, "T3D3": 3, "T2D2": 2, "B21": 2, "B22": 3, "R2D2": 2}
+_IGNORED = ("MASS", "ROTARYI", "SPRING", "DASHPOT", "CONN3D", "DCOUP3D", "GAPUNI", "JOINTC")
+
+
+@dataclass(frozen=True)
+class _OfElements:
+    """The nodes of a set of elements, as a member of a node set."""
+
+    elements: str
+
+
+_Entry = IntArray | str | _OfElements  #: numbers, the name of another set, or the nodes of a set of elements
+
+
+@dataclass
+class _Sets:
+    """Sets under construction; names are compared in upper case and keep their first spelling."""
+
+    where: str
+    kind: str  #: "NSET" or "ELSET"
+    spelling: dict[str, str] = field(default_factory=dict)
+    entries: dict[str, list[_Entry]] = field(default_factory=dict)
+
+    def add(self, name: str | None, entry: _Entry) -> None:
+        if name:
+            self.spelling.setdefault(name.upper(), name)
+            self.entries.setdefault(name.upper(), []).append(entry)
+
+    def resolve(self, nodes_of: Callable[[str], IntArray]) -> dict[str, IntArray]:
+        """Return name -> numbers of its members and of the sets it names, ascending."""
+        return {self.spelling[key]: self._members(key, nodes_of, ()) for key in self.entries}
+
+    def _members(self, key: str, nodes_of: Callable[[str], IntArray], seen: tuple[str, ...]) -> IntArray:
+        here = f"{self.where}: {self.kind} {self.spelling.get(key, key)!r}"
+        if key in seen:
+            raise MeshError(f"{here} contains itself")
+        parts = [np.zeros(0, np.int64)]
+        for entry in self.entries[key]:
+            if isinstance(entry, np.ndarray):
+                parts.append(entry)
+            elif isinstance(entry, _OfElements):
+                parts.append(nodes_of(entry.elements))
+            elif entry in self.entries:
+                parts.append(self._members(entry, nodes_of, (*seen, key)))
+            else:
+                raise MeshError(f"{here} names an unknown set {entry!r}{nearest(entry, self.entries)}")
+        return np.unique(np.concatenate(parts))
+
+
+@dataclass
+class _Content:
+    """Nodes and elements as listed."""
+
+    node_numbers: list[IntArray] = field(default_factory=list)
+    coordinates: list[Array] = field(default_factory=list)
+    elements: list[tuple[str, IntArray]] = field(default_factory=list)  #: kind, rows of number and nodes
+    ignored: dict[str, int] = field(default_factory=dict)  #: element type -> how many
+
+
+def read_abaqus(path: Path, data: bytes) -> RawMesh:
+    """Return the nodes, elements and sets of a deck.
+
+    Sets keep the spelling of their first appearance; names are compared without regard to case, as Abaqus does.
+    Repeated sets are joined. A deck of one part with one instance that is not moved reads like a flat deck.
+
+    Parameters
+    ----------
+    path
+        File name, for messages.
+    data
+        Content of the file.
+
+    Raises
+    ------
+    MeshError
+        If the deck makes or moves nodes or elements in a way that is not understood here, or is damaged.
+    """
+    where = f"mesh {path}"
+    blocks, notes = mesh_blocks(where, data.decode("utf-8", "replace"))
+    node_sets, element_sets = _Sets(where, "NSET"), _Sets(where, "ELSET")
+    content = _Content()
+    for block in blocks:
+        _take(f"{where}, line {block.line_number}: *{block.keyword}", block, content, node_sets, element_sets)
+    if not content.coordinates:
+        raise MeshError(f"{where}: expected nodes (*NODE), got none")
+    numbers = np.concatenate(content.node_numbers)
+    _require_unique(where, "node", numbers)
+    tables = [table for _, table in content.elements]
+    known = np.concatenate([table[:, 0] for table in tables]) if tables else np.zeros(0, np.int64)
+    _require_unique(where, "element", known[known > 0])
+    groups = element_sets.resolve(lambda name: np.zeros(0, np.int64))
+    if not content.ignored:
+        for name, members in groups.items():
+            _require_known(where, f"ELSET {name!r}", "elements", members[~np.isin(members, known)])
+
+    def nodes_of(name: str) -> IntArray:
+        if name not in element_sets.spelling:
+            raise MeshError(f"{where}: a node set names an unknown ELSET {name!r}{nearest(name, element_sets.entries)}")
+        members = groups[element_sets.spelling[name]]
+        return np.concatenate([table[np.isin(table[:, 0], members), 1:].ravel() for table in tables])
+
+    order = np.argsort(numbers, kind="stable")
+    sets = {}
+    for name, members in node_sets.resolve(nodes_of).items():
+        sets[name] = _rows(numbers, order, members)
+        _require_known(where, f"NSET {name!r}", "nodes", members[sets[name] < 0])
+    raw_blocks = []
+    for kind, table in content.elements:
+        rows = {name: np.flatnonzero(np.isin(table[:, 0], members)) for name, members in groups.items()}
+        rows = {name: found for name, found in rows.items() if found.size}
+        raw_blocks.append(RawBlock(kind, _rows(numbers, order, table[:, 1:]), rows, table[:, 0]))
+    notes += [f"{count} {name} elements were left out: no part of the solid" for name, count in content.ignored.items()]
+    return RawMesh(np.concatenate(content.coordinates), tuple(raw_blocks), sets, numbers, notes=tuple(notes))
+
+
+def _take(here: str, block: DeckBlock, content: _Content, node_sets: _Sets, element_sets: _Sets) -> None:
+    """Add one block to the content and the sets."""
+    if block.keyword == "NODE":
+        numbers, points = _nodes(here, block)
+        content.node_numbers.append(numbers)
+        content.coordinates.append(points)
+        node_sets.add(block.parameters.get("NSET"), numbers)
+    elif block.keyword == "ELEMENT":
+        if "TYPE" not in block.parameters:
+            raise MeshError(f"{here}: expected TYPE=..., got none")
+        name = block.parameters["TYPE"].upper()
+        kind, n_nodes = _element_type(name)
+        if kind == "ignored":
+            content.ignored[name] = content.ignored.get(name, 0) + len(block.lines)
+            return
+        table = _elements(here, block, kind, n_nodes)
+        content.elements.append((kind, table))
+        element_sets.add(block.parameters.get("ELSET"), table[:, 0])
+    elif block.keyword in ("NSET", "ELSET"):
+        sets = node_sets if block.keyword == "NSET" else element_sets
+        name = block.parameters.get(block.keyword, "")
+        if not name:
+            raise MeshError(f"{here}: expected {block.keyword}=name, got none")
+        for entry in _set_entries(here, block):
+            sets.add(name, entry)
+        if block.keyword == "NSET" and "ELSET" in block.parameters:
+            sets.add(name, _OfElements(block.parameters["ELSET"].upper()))
+
+
+def _nodes(here: str, block: DeckBlock) -> tuple[IntArray, Array]:
+    rows = [[word.strip() for word in line.rstrip(", ").split(",")] for line in block.lines]
+    if not rows:
+        return np.zeros(0, np.int64), np.zeros((0, 3))
+    try:
+        width = max(len(row) for row in rows)
+        if width == min(len(row) for row in rows) and width >= 4:
+            table = np.array([row[:4] for row in rows], dtype=float)
+        else:  # coordinates left out are zero
+            table = np.array([[float(word or 0) for word in (*row, "0", "0", "0")[:4]] for row in rows])
+    except ValueError as error:
+        raise MeshError(f"{here}: expected number, x, y, z on each line below; {error}") from error
+    return table[:, 0].astype(np.int64), table[:, 1:]
+
+
+def _element_type(name: str) -> tuple[str, int]:
+    """Return meshio name and nodes per element; ("ignored", 0) for what is no part of a solid."""
+    upper = name.upper()
+    if match := _SOLID.match(upper):
+        n_nodes = int(match[1])
+        return _SOLIDS.get(n_nodes, upper), n_nodes
+    if match := _FACE.match(upper):
+        digits = match[1] if match[1] in _FACES else match[1][0]
+        if digits in _FACES:
+            return _FACES[digits]
+    if upper in _LINES:
+        return {2: "line", 3: "line3"}[_LINES[upper]], _LINES[upper]
+    if upper.startswith(_IGNORED):
+        return "ignored", 0
+    return upper, 0
+
+
+def _elements(here: str, block: DeckBlock, kind: str, n_nodes: int) -> IntArray:
+    if n_nodes == 0:  # unknown type: counted by its lines, and refused by name later
+        return np.zeros((len(block.lines), 2), dtype=np.int64)
+    try:
+        values = np.array(",".join(line.rstrip(", ") for line in block.lines).split(","), dtype=np.int64)
+    except ValueError as error:
+        raise MeshError(f"{here}: expected element and node numbers below; {error}") from error
+    if values.size % (n_nodes + 1):
+        raise MeshError(f"{here}: {kind} elements have {n_nodes} nodes: expected a multiple of {n_nodes + 1} numbers "
+                        f"below, got {values.size}")
+    return values.reshape(-1, n_nodes + 1)
+
+
+def _set_entries(here: str, block: DeckBlock) -> Iterator[_Entry]:
+    """Yield arrays of numbers, and the upper-case names of other sets."""
+    if "GENERATE" in block.parameters:
+        for line in block.lines:
+            limits = [int(word) for word in line.rstrip(", ").split(",")]
+            if len(limits) not in (2, 3) or (len(limits) == 3 and limits[2] <= 0):
+                raise MeshError(f"{here}, GENERATE: expected first, last, increment, got {line!r}")
+            yield np.arange(limits[0], limits[1] + 1, limits[2] if len(limits) == 3 else 1)
+        return
+    words = block.words
+    numeric = [word for word in words if word.lstrip("+").isdigit()]
+    if numeric:
+        yield np.array(numeric, dtype=np.int64)
+    for word in words:
+        if not word.lstrip("+").isdigit():
+            if "." in word:
+                word = word.rpartition(".")[2]  # instance.set
+            yield word.strip('"').upper()
+
+
+def _require_unique(where: str, what: str, numbers: IntArray) -> None:
+    values, count = np.unique(numbers, return_counts=True)
+    if (count > 1).any():
+        raise MeshError(f"{where}: {(count > 1).sum()} {what} numbers are defined twice, first "
+                        f"{values[count > 1][0]}; keep one of each")
+
+
+def _require_known(where: str, name: str, what: str, missing: IntArray) -> None:
+    if missing.size:
+        raise MeshError(f"{where}: {name} names {missing.size} {what} that are not in the deck, first {missing[0]}")
+
+
+def _rows(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:
+    """Return the rows of node numbers, -1 where there is none."""
+    ordered = numbers[order]
+    at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
+    return np.where(ordered[at] == wanted, order[at], -1)

@@ -1,0 +1,86 @@
+"""One door for mesh files: the format by its suffix, one error for everything that can be wrong with a file."""
+
+from collections.abc import Callable
+from hashlib import sha256
+from pathlib import Path
+
+from cms.words import nearest
+from fe_models.errors import MeshError
+from fe_models.importers.abaqus import read_abaqus
+from fe_models.importers.gmsh import read_gmsh
+from fe_models.importers.med import read_med
+from fe_models.importers.nastran import read_nastran
+from fe_models.importers.raw_mesh import RawMesh, mesh_from_raw
+from fe_models.importers.vtk import read_vtk
+from fe_models.mesh import Mesh
+
+__all__ = ["MESH_FORMATS", "read_mesh"]
+
+MESH_FORMATS: dict[str, tuple[str, Callable[[Path, bytes], RawMesh]]] = {
+    ".msh": ("Gmsh", read_gmsh),
+    ".vtk": ("VTK", read_vtk),
+    ".vtu": ("VTK", read_vtk),
+    ".inp": ("Abaqus", read_abaqus),
+    ".bdf": ("Nastran", read_nastran),
+    ".nas": ("Nastran", read_nastran),
+    ".dat": ("Nastran", read_nastran),
+    ".fem": ("Nastran", read_nastran),
+    ".med": ("MED", read_med),
+}  #: suffix -> format and its reader (path, content)
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read the mesh of one body from a file.
+
+    The suffix names the format: Gmsh 2.2 and 4.1 (.msh), VTK (.vtk, .vtu), Abaqus and CalculiX (.inp), Nastran
+    (.bdf, .nas, .dat, .fem), MED (.med). Cells of two dimensions become faces, those of one or none become node
+    sets; they select interfaces and are no part of the body. `Mesh.notes` says what was left out.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    Mesh
+        With the sha256 of the file as `digest`.
+
+    Raises
+    ------
+    MeshError
+        If the file is missing, unreadable, damaged, of an unknown or unsupported kind, or could only be read with
+        another meaning than its own program gives it.
+    """
+    path = Path(path)
+    where = f"mesh {path}"
+    suffix = path.suffix.lower()
+    if not path.exists():
+        raise MeshError(f"{where}: there is no such file{_neighbours(path)}")
+    if path.is_dir():
+        raise MeshError(f"{where}: expected a file, got a directory")
+    if suffix not in MESH_FORMATS:
+        raise MeshError(f"{where}: unknown suffix {suffix!r}{nearest(suffix, MESH_FORMATS)}")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"{where}: cannot be read: {error.strerror or error}") from error
+    if not data.strip():
+        raise MeshError(f"{where}: the file is empty")
+    name, reader = MESH_FORMATS[suffix]
+    try:
+        return mesh_from_raw(reader(path, data), path, sha256(data).hexdigest())
+    except MeshError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
+        text = str(error).strip().splitlines()
+        raise MeshError(f"{where}: could not be read as a {name} file: it is damaged or of another kind "
+                        f"({type(error).__name__}{': ' + text[0][:200] if text else ''})") from error
+
+
+def _neighbours(path: Path) -> str:
+    """Name the meshes beside a missing file."""
+    if not path.parent.is_dir():
+        return f"; the directory {path.parent} does not exist"
+    files = [p.name for p in path.parent.iterdir() if p.suffix.lower() in MESH_FORMATS]
+    return nearest(path.name, files[:20]) if files else ""

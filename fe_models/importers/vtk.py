@@ -1,0 +1,90 @@
+"""VTK meshes, legacy (.vtk) and XML (.vtu), through meshio; whole-number cell data become groups."""
+
+import contextlib
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+
+from cms.arrays import IntArray
+from fe_models.errors import MeshError
+from fe_models.importers.node_order import mirrored_cells, mirrored_order
+from fe_models.importers.raw_mesh import RawBlock, RawMesh
+
+__all__ = ["read_vtk"]
+
+_SUPPORTED = "supported are linear and quadratic tetrahedra and hexahedra, and linear wedges; mesh the part again"
+_MOST_GROUPS = 1000  #: cell data with more distinct values are numbers of cells, not groups
+
+
+def read_vtk(path: Path, data: bytes) -> RawMesh:
+    """Return the nodes and cells, with a group `<array>_<value>` for every value of whole-number cell data.
+
+    Whole-number point data that hold only 0 and 1 become node sets. Linear wedges are taken inside out where the
+    program that wrote them did not follow VTK's own definition of their orientation.
+
+    Parameters
+    ----------
+    path
+        File, read by meshio.
+    data
+        Its content, for what meshio would pass over.
+
+    Raises
+    ------
+    MeshError
+        If meshio cannot read the file, would drop cells of it, or it has several pieces (meshio keeps the last).
+    """
+    import meshio
+
+    where = f"mesh {path}"
+    if path.suffix.lower() == ".vtu":
+        pieces = len(re.findall(rb"<Piece[\s>]", data))
+        if pieces > 1:
+            raise MeshError(f"{where}: the file has {pieces} pieces; expected one. Merge them (in ParaView: Merge "
+                            f"Blocks, then save again)")
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            mesh = meshio.read(path)
+    except KeyError as error:
+        raise MeshError(f"{where}: unsupported cells of type {error.args[0]}; {_SUPPORTED}") from error
+    except (Exception, SystemExit) as error:
+        words = " ".join(f"{said.getvalue()} {error if not isinstance(error, SystemExit) else ''}".split())
+        raise MeshError(f"{where}: could not be read as a VTK file: it is damaged or of another kind "
+                        f"({words[:200] or type(error).__name__})") from error
+    if "cannot handle" in said.getvalue():
+        words = " ".join(said.getvalue().split())
+        raise MeshError(f"{where}: unsupported cells would be dropped ({words[:200]}); {_SUPPORTED}")
+    nodes = np.asarray(mesh.points, dtype=float)
+    blocks = []
+    for k, block in enumerate(mesh.cells):
+        cells = np.asarray(block.data, dtype=np.int64)
+        inside = cells.size and cells.min() >= 0 and cells.max() < len(nodes)
+        if block.type == "wedge" and inside and np.isfinite(nodes).all() and mirrored_cells("wedge", nodes, cells):
+            cells = cells[:, mirrored_order("wedge")]
+        groups: dict[str, IntArray] = {}
+        for name, values in mesh.cell_data.items():
+            groups |= _groups(name, np.asarray(values[k]))
+        blocks.append(RawBlock(block.type, cells, groups))
+    node_sets = {
+        name: np.flatnonzero(values)
+        for name, values in mesh.point_data.items()
+        if np.ndim(values) == 1 and np.asarray(values).dtype.kind in "iub" and set(np.unique(values)) == {0, 1}
+    }
+    return RawMesh(nodes, tuple(blocks), node_sets)
+
+
+def _groups(name: str, values: np.ndarray) -> dict[str, IntArray]:
+    """Return group -> rows for whole-number data, one group for each value."""
+    if values.ndim == 2 and values.shape[1] == 1:
+        values = values[:, 0]
+    if values.ndim != 1 or values.dtype.kind not in "iub":
+        return {}
+    found, which = np.unique(values, return_inverse=True)
+    if len(found) > _MOST_GROUPS:
+        return {}
+    order = np.argsort(which, kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(which))[:-1])
+    return {f"{name}_{int(value)}": rows for value, rows in zip(found, parts, strict=True)}
