@@ -15,6 +15,7 @@ from cms.arrays import Array, IntArray
 from cms.errors import BodyError
 from cms.fe_body import MULTIPLIER, FEBody, Interface, Recovery
 from cms.rigid_modes import rigid_motion_of_points
+from cms.submatrix import principal_block
 
 __all__ = ["couple", "mean_motion"]
 
@@ -177,26 +178,30 @@ def _recovery_matrix(
 def _congruence(A: sp.csc_array, keep: IntArray, slave_rows: IntArray, T_s: sp.csr_array, n_more: int) -> sp.csc_array:
     """Return Tᵀ A T of T = [1 0; 0 T_s] with n_more empty rows and columns at the end.
 
-    Block by block: the product with the whole T would walk all of A three times for a handful of new columns.
+    The kept block is cut out in one pass and the few new rows and columns are added: the product with the whole T
+    would walk all of A three times.
     """
-    A_keep = A[:, keep]
-    A_kk = A_keep[keep] if len(slave_rows) else A_keep
+    n_kept, n_new = len(keep), len(keep) + T_s.shape[1] + n_more
+    A_kk = principal_block(A, keep)
+    A_kk = sp.csc_array((A_kk.data, A_kk.indices, _longer(A_kk.indptr, n_new)), shape=(n_new, n_new))
     if not len(slave_rows):
-        return _padded(A_kk, n_more)
-    A_slave = A[:, slave_rows] @ T_s  # (n_dof, 6 n_rigid)
-    A_kr = sp.csc_array(A_slave[keep])
-    A_rr = sp.csc_array(T_s.T @ A_slave[slave_rows])
-    A_rr = (A_rr + A_rr.T) / 2  # symmetric by definition, rounded apart by the two products
-    return _padded(sp.csc_array(sp.block_array([[A_kk, A_kr], [A_kr.T, A_rr]], format="csc")), n_more)
+        return A_kk
+    A_slave = sp.csr_array(A[:, slave_rows] @ T_s)  # (n_dof, 6 n_rigid)
+    A_kr = sp.coo_array(A_slave[keep])
+    A_rr = sp.coo_array(T_s.T @ A_slave[slave_rows])
+    half = sp.coo_array(
+        (
+            np.concatenate([A_kr.data, A_rr.data / 2]),
+            (np.concatenate([A_kr.row, n_kept + A_rr.row]), n_kept + np.concatenate([A_kr.col, A_rr.col])),
+        ),
+        shape=(n_new, n_new),
+    ).tocsc()
+    return sp.csc_array(A_kk + (half + half.T))
 
 
-def _padded(A: sp.csc_array, n_more: int) -> sp.csc_array:
-    """Return A with n_more empty rows and columns at the end."""
-    if not n_more:
-        return A
-    n = A.shape[0] + n_more
-    indptr = np.concatenate([A.indptr, np.full(n_more, A.indptr[-1], A.indptr.dtype)])
-    return sp.csc_array((A.data, A.indices, indptr), shape=(n, n))
+def _longer(indptr: IntArray, n: int) -> IntArray:
+    """Return the column pointers with empty columns added up to n."""
+    return np.concatenate([indptr, np.full(n + 1 - len(indptr), indptr[-1], indptr.dtype)])
 
 
 def _multiplier_rows(

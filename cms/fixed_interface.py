@@ -9,9 +9,10 @@ from cms.arrays import Array, IntArray
 from cms.errors import BodyError, FactorizationError, ModeSetError
 from cms.factorization import Factorization, factorize
 from cms.fe_body import MULTIPLIER, FEBody
+from cms.submatrix import principal_block
 from cms.words import node_list
 
-__all__ = ["FixedInterfaceBody", "fix_interfaces", "principal_block"]
+__all__ = ["FixedInterfaceBody", "fix_interfaces"]
 
 ZERO_ENERGY = 1e-8  #: |K u| / (|K|_max |u|) below which u is a motion without energy
 
@@ -63,16 +64,6 @@ def fix_interfaces(body: FEBody) -> FixedInterfaceBody:
     except FactorizationError as error:
         raise BodyError(_mechanism_message(body, i, K_ii, M_ii)) from error
     return FixedInterfaceBody(body, i, b, K_ii, M_ii, factorization)
-
-
-def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
-    """Return A[index][:, index] for ascending indices; a leading block is cut without index look-ups."""
-    n = len(index)
-    if n == A.shape[0]:
-        return A
-    if index[-1] == n - 1:
-        return sp.csc_array(A[:n, :n])
-    return sp.csc_array(A[:, index][index])
 
 
 def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array) -> str:
