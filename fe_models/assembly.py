@@ -11,13 +11,14 @@
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from cms.arrays import Array, IntArray
-from fe_models.elements import reference_element
+from fe_models.elements import ReferenceElement, reference_element
 from fe_models.errors import MeshError
 from fe_models.mesh import Mesh
 from fe_models.threads import n_threads
@@ -76,6 +77,9 @@ def assemble(
     kinds = [kind for kind, cells in mesh.cells.items() if len(cells)]
     if not kinds:
         raise MeshError("assembly: the mesh has no solid cells; expected tetrahedra, hexahedra or wedges")
+    if not np.isfinite(mesh.nodes).all():
+        raise MeshError(f"assembly: {(~np.isfinite(mesh.nodes)).any(axis=1).sum()} nodes have coordinates that are not "
+                        f"finite numbers")
     for kind in kinds:
         require_known_nodes(kind, mesh.cells[kind], len(mesh.nodes))
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
@@ -145,8 +149,7 @@ def assembled_data(
     first_place = 0
     for kind, cells in lists.items():
         element = reference_element(kind)
-        rule_K, rule_M = element.stiffness, element.mass
-        tables = (rule_K.dN, rule_K.weights, rule_M.N, rule_M.dN, rule_M.weights)
+        tables = kernel_tables(element)
         n_a = element.n_nodes
         n_batch = min(len(cells), max(n_parts, int(BATCH_BYTES / (80 * n_a**2))))  # 9 + 1 numbers for each pair
         K_e, M_e = np.empty((n_batch, 3 * n_a, 3 * n_a)), np.empty((n_batch, n_a, n_a))
@@ -155,7 +158,7 @@ def assembled_data(
         for begin in range(0, len(cells), n_batch):
             batch = cells[begin : begin + n_batch]
             cuts = [len(batch) * part // n_parts for part in range(n_parts + 1)]
-            shares = [(slice(a, b), slice(begin + a, begin + b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+            shares = [(slice(a, b), slice(begin + a, begin + b)) for a, b in pairwise(cuts)]
             run(pool, [
                 (element_matrices, nodes, cells[rows], properties, materials[rows], *tables, K_e[at], M_e[at],
                  is_inverted[rows])
@@ -171,6 +174,13 @@ def assembled_data(
                 progress(first_place / len(graph.places))
         require_upright(kind, is_inverted)
     return K_data, M_data
+
+
+def kernel_tables(element: ReferenceElement) -> tuple[tuple[Array, ...], ...]:
+    """Return what the kernel needs for affine elements, for the stiffness and for the mass of curved ones."""
+    affine = (element.nodes, element.axis_nodes, element.stiffness_integrals, element.mass_integrals)
+    stiffness = (element.stiffness.gradients, element.stiffness.weights)
+    return affine, stiffness, (element.mass.values, element.mass.gradients, element.mass.weights)
 
 
 def expanded_stiffness(graph: NodeGraph, K_data: Array, pool: ThreadPoolExecutor) -> sp.csc_array:

@@ -8,7 +8,7 @@ The orders are chosen so that, on an isoparametric (curved) element,
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from fe_models.mesh import SOLID_TYPES
 
 __all__ = ["ReferenceElement", "ShapeTable", "reference_element", "shape_table"]
 
+Degree = int | tuple[int, int]
+
 SKFEM_ELEMENTS = {
     "tetra": "ElementTetP1",
     "tetra10": "ElementTetP2",
@@ -30,7 +32,7 @@ SKFEM_ELEMENTS = {
 }
 # scikit-fem 12 labels its tetrahedron tables 5 to 8 one degree too high (measured; a test holds them to what is used
 # here), so label 8 gives degree 7. Degrees: stiffness, mass; per direction for hexahedra, (triangle, line) for wedges.
-RULES = {
+RULES: dict[str, tuple[str, Degree, Degree]] = {
     "tetra": ("tet", 1, 2),  # mass: N N = 2
     "tetra10": ("tet", 5, 8),  # stiffness: 14 positive weights, degree 4; mass: 2 + 2 + 3 for the Jacobian = 7
     "hexahedron": ("hex", 3, 5),  # mass: 1 + 1 + 2 = 4
@@ -40,7 +42,7 @@ RULES = {
 }
 # Stress is sampled where it is most accurate (the points of reduced integration for quadratic elements) and carried to
 # the nodes by the shape functions of the low-order element, which fit those points exactly.
-STRESS_RULES = {
+STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
     "tetra": (("tet", 1), None),
     "tetra10": (("tet", 2), "tetra"),
     "hexahedron": (("hex", 3), "hexahedron"),
@@ -56,8 +58,8 @@ class ShapeTable:
 
     points: Array  #: (n_points, 3)
     weights: Array  #: (n_points,); their sum is the volume of the reference cell
-    N: Array  #: values, (n_points, n_nodes)
-    dN: Array  #: derivatives by the reference coordinates, (n_points, n_nodes, 3)
+    values: Array  #: N_a, (n_points, n_nodes)
+    gradients: Array  #: ∂N_a/∂xi_j, derivatives by the reference coordinates, (n_points, n_nodes, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +73,35 @@ class ReferenceElement:
     extrapolation: Array  #: from the sampling points to the nodes, (n_nodes, n_points)
 
     @property
+    def nodes(self) -> Array:
+        """Positions of the nodes in the reference cell, (n_nodes, 3)."""
+        return CELL_SHAPES[self.kind].nodes
+
+    @property
     def n_nodes(self) -> int:
         """Nodes per element."""
         return CELL_SHAPES[self.kind].n_nodes
 
+    @cached_property
+    def axis_nodes(self) -> IntArray:
+        """The nodes at e_1, e_2, e_3 of the reference cell; node 0 is at its origin, (3,)."""
+        return np.array([int(np.flatnonzero((self.nodes == axis).all(axis=1))[0]) for axis in np.eye(3)])
 
-def quadrature(cell: str, degree: int | tuple[int, int]) -> tuple[Array, Array]:
+    @cached_property
+    def stiffness_integrals(self) -> Array:
+        """∫ ∂N_a/∂xi_k ∂N_b/∂xi_l over the reference cell, row 3 k + l, pairs b >= a by rows, (9, n_pairs)."""
+        a, b = np.triu_indices(self.n_nodes)
+        gradients = self.stiffness.gradients
+        return np.einsum("q,qpk,qpl->klp", self.stiffness.weights, gradients[:, a], gradients[:, b]).reshape(9, -1)
+
+    @cached_property
+    def mass_integrals(self) -> Array:
+        """∫ N_a N_b over the reference cell, pairs b >= a by rows, (n_pairs,)."""
+        a, b = np.triu_indices(self.n_nodes)
+        return np.einsum("q,qp,qp->p", self.mass.weights, self.mass.values[:, a], self.mass.values[:, b])
+
+
+def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
     """Return points (n_points, 3) and weights (n_points,) of a rule of scikit-fem on "tet", "hex" or "wedge".
 
     The wedge is the product of the triangle and the line made here: scikit-fem 12 repeats the triangle's points with
@@ -137,8 +162,8 @@ def reference_element(kind: str) -> ReferenceElement:
         extrapolation = np.ones((CELL_SHAPES[kind].n_nodes, len(stress_points)))
     else:
         nodes = CELL_SHAPES[kind].nodes
-        at_nodes = shape_table(low_order, nodes, np.ones(len(nodes))).N
-        extrapolation = at_nodes @ np.linalg.inv(shape_table(low_order, stress_points, stress_weights).N)
+        at_nodes = shape_table(low_order, nodes, np.ones(len(nodes))).values
+        extrapolation = at_nodes @ np.linalg.inv(shape_table(low_order, stress_points, stress_weights).values)
     return ReferenceElement(
         kind=kind,
         stiffness=shape_table(kind, *quadrature(cell, degree_stiffness)),

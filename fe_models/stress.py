@@ -47,10 +47,10 @@ def nodal_stress(
                 continue
             element = reference_element(kind)
             table = element.stress
-            volume_at_nodes(mesh.nodes, cells, of_cell[kind], of_node, table.dN, table.weights, volume)
+            volume_at_nodes(mesh.nodes, cells, of_cell[kind], of_node, table.gradients, table.weights, volume)
             futures = [
                 pool.submit(
-                    add_element_stress, mesh.nodes, cells, of_cell[kind], of_node, lame, table.dN, table.weights,
+                    add_element_stress, mesh.nodes, cells, of_cell[kind], of_node, lame, table.gradients, table.weights,
                     element.extrapolation, column, out,
                 )
                 for column, out in zip(columns, stress, strict=True)

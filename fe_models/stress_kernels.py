@@ -3,11 +3,11 @@
 import numpy as np
 from numba import njit
 
-from fe_models.assembly_kernels import inverse_jacobian
+from fe_models.assembly_kernels import jacobian
 
 __all__ = ["add_element_stress", "volume_at_nodes"]
 
-jit = njit(cache=True, nogil=True, boundscheck=False)
+jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @jit
@@ -15,14 +15,14 @@ def volume_at_nodes(nodes, cells, of_cell, of_node, dN, w, volume):
     """Add to volume, (n_nodes,), that of the elements which adjoin the node and have its material."""
     n_a = cells.shape[1]
     x = np.empty((n_a, 3))
-    inverse = np.empty((3, 3))
+    J, Q = np.empty((3, 3)), np.empty((3, 3))
     for e in range(cells.shape[0]):
         for a in range(n_a):
             for i in range(3):
                 x[a, i] = nodes[cells[e, a], i]
         total = 0.0
         for q in range(w.size):
-            total += w[q] * inverse_jacobian(x, dN[q], n_a, inverse)
+            total += w[q] * jacobian(x, dN[q], J, Q)
         for a in range(n_a):
             if of_cell[e] == of_node[cells[e, a]]:
                 volume[cells[e, a]] += total
@@ -36,7 +36,7 @@ def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolatio
     """
     n_a = cells.shape[1]
     x = np.empty((n_a, 3))
-    inverse = np.empty((3, 3))
+    J, Q = np.empty((3, 3)), np.empty((3, 3))
     H = np.empty((3, 3))
     sigma = np.empty((w.size, 6))
     for e in range(cells.shape[0]):
@@ -46,12 +46,12 @@ def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolatio
                 x[a, i] = nodes[cells[e, a], i]
         total = 0.0
         for q in range(w.size):
-            det = inverse_jacobian(x, dN[q], n_a, inverse)
+            det = jacobian(x, dN[q], J, Q)
             total += w[q] * det
             H[:] = 0.0  # displacement gradient, H_ij = ∂u_i / ∂x_j
             for a in range(n_a):
                 for j in range(3):
-                    g = (dN[q, a, 0] * inverse[0, j] + dN[q, a, 1] * inverse[1, j] + dN[q, a, 2] * inverse[2, j]) / det
+                    g = (dN[q, a, 0] * Q[0, j] + dN[q, a, 1] * Q[1, j] + dN[q, a, 2] * Q[2, j]) / det
                     for i in range(3):
                         H[i, j] += u[cells[e, a], i] * g
             pressure = lam * (H[0, 0] + H[1, 1] + H[2, 2])

@@ -38,8 +38,9 @@ def box_mesh(nx=2, ny=2, nz=2, lx=1.0, ly=1.0, lz=1.0, kind="hexahedron") -> Mes
     inside = np.rint(2 * np.array([to_nodes @ part for part in parts])).astype(int)  # on the half-step lattice
     bricks = np.array(list(itertools.product(range(nx), range(ny), range(nz))))
     lattice = (2 * bricks[:, None, None] + inside[None]).reshape(-1, 3)
-    points, cells = np.unique(lattice, axis=0, return_inverse=True)
-    cells = cells.reshape(-1, len(reference))
+    sizes = (2 * nx + 1, 2 * ny + 1, 2 * nz + 1)
+    keys, cells = np.unique(np.ravel_multi_index(lattice.T, sizes), return_inverse=True)
+    points, cells = np.stack(np.unravel_index(keys, sizes), axis=1), cells.reshape(-1, len(reference))
     nodes = points * np.array([lx / nx, ly / ny, lz / nz]) / 2
     is_left = np.repeat(2 * bricks[:, 0] + 1 < nx, len(parts))
     halves = {"left half": is_left, "right half": ~is_left, "all": np.ones(len(cells), bool)}
