@@ -1,15 +1,25 @@
 """The boundary of a solid mesh: facets that belong to one cell only, oriented outward."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
+from cms.arrays import Array, IntArray, frozen_int
 from fe_models.cell_shapes import facet_tables, quadrature, shape_values
 from fe_models.mesh import Mesh
 
-__all__ = ["all_facets", "boundary_facets", "boundary_nodes", "boundary_triangles", "face_triangles", "facet_weights",
-           "first_of_equal_rows"]
+__all__ = [
+    "all_facets",
+    "area_centroid",
+    "boundary_facets",
+    "boundary_nodes",
+    "boundary_triangles",
+    "face_triangles",
+    "facet_weights",
+    "first_of_equal_rows",
+]
 
 _TRIANGLES = {
     "triangle": ((0, 1, 2),),
@@ -19,7 +29,9 @@ _TRIANGLES = {
     "quad9": ((0, 4, 8), (4, 1, 8), (1, 5, 8), (5, 2, 8), (2, 6, 8), (6, 3, 8), (3, 7, 8), (7, 0, 8)),
 }  # flat triangles over the nodes of a face, turning the same way as the face
 
-_CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
+CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  #: corner nodes of a face
+
+_known: WeakKeyDictionary[Mesh, Mapping[str, IntArray]] = WeakKeyDictionary()  # boundaries of meshes still in use
 
 
 def all_facets(mesh: Mesh) -> dict[str, IntArray]:
@@ -34,15 +46,22 @@ def all_facets(mesh: Mesh) -> dict[str, IntArray]:
     return {face_kind: np.concatenate(blocks) for face_kind, blocks in parts.items()}
 
 
-def boundary_facets(mesh: Mesh) -> dict[str, IntArray]:
+def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
     """Return face type -> facets that belong to one cell only, (n_facets, nodes per facet), oriented outward.
 
     Facets are compared by their corner nodes. Rows are complete faces in meshio order (corners, middles, centre).
+    The result is kept as long as the mesh is.
     """
+    if mesh not in _known:
+        _known[mesh] = MappingProxyType({kind: frozen_int(f) for kind, f in _single_facets(mesh).items()})
+    return _known[mesh]
+
+
+def _single_facets(mesh: Mesh) -> dict[str, IntArray]:
     facets = all_facets(mesh)
     boundary = {}
     for n_corners in (3, 4):
-        kinds = [kind for kind in facets if _CORNERS[kind] == n_corners]
+        kinds = [kind for kind in facets if CORNERS[kind] == n_corners]
         if not kinds:
             continue
         corners = np.concatenate([facets[kind][:, :n_corners] for kind in kinds])
@@ -102,11 +121,7 @@ def facet_weights(nodes: Array, faces: Mapping[str, IntArray]) -> Array:
     """
     weights = np.zeros(len(nodes))
     for kind, rows in faces.items():
-        points, w = quadrature(kind)
-        N, dN = shape_values(kind, points)
-        X = nodes[rows]
-        tangents = np.einsum("fna,pnd->fpda", X, dN)
-        dA = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2) * w
+        N, dA = _area_elements(nodes, kind, rows)
         if kind == "quad8":
             share = dA @ N**2
             share *= (dA.sum(axis=1) / share.sum(axis=1))[:, None]
@@ -115,3 +130,21 @@ def facet_weights(nodes: Array, faces: Mapping[str, IntArray]) -> Array:
         share[np.abs(share) < 1e-12 * np.abs(share).max(initial=0.0)] = 0.0
         np.add.at(weights, rows, share)
     return weights
+
+
+def area_centroid(nodes: Array, faces: Mapping[str, IntArray]) -> tuple[float, Array]:
+    """Return the area of faces [m²] and its centroid ∫x dA / A, (3,) [m]."""
+    area, moment = 0.0, np.zeros(3)
+    for kind, rows in faces.items():
+        N, dA = _area_elements(nodes, kind, rows)
+        area += float(dA.sum())
+        moment += np.einsum("fn,fnd->d", dA @ N, nodes[rows])
+    return area, moment / area if area else moment
+
+
+def _area_elements(nodes: Array, kind: str, rows: IntArray) -> tuple[Array, Array]:
+    """Return shape functions (n_points, n_local) and weighted area elements (n_faces, n_points)."""
+    points, weights = quadrature(kind)
+    N, dN = shape_values(kind, points)
+    tangents = np.einsum("fnd,pna->fpad", nodes[rows], dN)
+    return N, np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2) * weights

@@ -127,7 +127,7 @@ def shape_values(kind: str, points: Array) -> tuple[Array, Array]:
         lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
         columns.append(exponents[:, axis] * _monomials(points, lowered))
     values = [np.linalg.solve(vandermonde.T, column.T).T for column in columns]
-    return values[0], np.stack(values[1:], axis=2)
+    return frozen(values[0]), frozen(np.stack(values[1:], axis=2))
 
 
 def _monomials(points: Array, exponents: IntArray) -> Array:
