@@ -1,0 +1,156 @@
+"""The commands of `cms`; each imports what it needs when it runs, so that `cms --help` answers at once."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Optional
+
+import typer
+
+from cms.cli.console import commands, guarded, out, output_path, print_table, stages
+
+if TYPE_CHECKING:
+    from cms.cli.console import Stages
+    from cms.job import Job
+    from cms.reduced_body import ReducedBody
+
+__all__ = ["app"]
+
+app = commands("cms", "Component mode synthesis: a meshed part becomes a small, exact, portable flexible body.")
+
+ModalFile = Annotated[Path, typer.Argument(help="A modal file, as `cms reduce` writes it.")]
+Output = Annotated[Optional[Path], typer.Option("--output", "-o", help="File to write.")]  # noqa: UP045 - typer < 0.15
+
+
+@app.command("reduce")
+@guarded
+def reduce_command(
+    job: Annotated[Path, typer.Argument(help="Job file (TOML), see docs/job_file.md.")],
+    output: Output = None,
+) -> None:
+    """Reduce a finite element body to a modal file.
+
+    Without -o the modal file stands beside the job file: rod.toml gives rod.h5.
+
+    Example: `cms reduce rod.toml -o rod.h5`
+    """
+    from cms.errors import JobError
+    from cms.job import read_job
+
+    read = read_job(job)
+    inputs = (job, *(path for path in (read.body.mesh, read.body.matrices) if path is not None))
+    path = output_path(output, job.with_suffix(".h5"), JobError, overwrite_of=inputs)
+    reduce_and_write(read, path)
+
+
+def reduce_and_write(job: "Job", path: Path) -> "ReducedBody":
+    """Run a job, write its modal file, and print what was done."""
+    from cms.cli.reduce_job import reduce_job
+    from cms.modal_file import write
+
+    reports: list[Any] = []
+    try:
+        with stages() as clock:
+            reduced = reduce_job(job, clock, on_report=reports.append)
+            with clock("write"):
+                write(reduced, path)
+    finally:  # a mesh that is refused is better understood with its numbers
+        for report in reports:
+            print_table("Mesh", ("", ""), report.rows())
+    print_body(reduced)
+    print_times(clock)
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    return reduced
+
+
+@app.command("info")
+@guarded
+def info_command(
+    file: ModalFile,
+    json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
+) -> None:
+    """Show what is in a modal file: mass, inertia, units, frame, modes, interfaces, provenance.
+
+    Example: `cms info rod.h5 --json`
+    """
+    from cms.modal_file import digest, read
+
+    reduced = read(file)
+    if json:
+        import json as json_module
+
+        from cms.cli.record import body_record
+
+        typer.echo(json_module.dumps({**body_record(reduced), "digest": digest(file)}, indent=2, ensure_ascii=True))
+        return
+    print_body(reduced, everything=True)
+    say(f"digest {digest(file)}")
+
+
+def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
+    """Print mass properties, modes and interfaces of a body; provenance too if everything is wanted."""
+    from cms.cli.record import body_record
+
+    record = body_record(body)
+    length, mass, inertia = (
+        body.units.length_symbol, body.units.mass_symbol, f"{body.units.mass_symbol} {body.units.length_symbol}²"
+    )  # fmt: skip
+    frame = record["frame"]
+    tensor = record["inertia_about_center_of_mass"]
+    rows = [
+        ("name", record["name"]),
+        ("units", f"{body.units.name} (force {body.units.force_symbol}, stress {body.units.stress_symbol})"),
+        ("frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
+        ("origin of B", f"{vector(frame['origin'])} {length} (mesh coordinates)"),
+        ("mass", f"{record['mass']:.6g} {mass}"),
+        ("centre of mass", f"{vector(record['center_of_mass']['B'])} {length} (in B)"),
+        ("", f"{vector(record['center_of_mass']['mesh'])} {length} (mesh coordinates)"),
+        ("inertia about it", f"{vector(tensor[0])} {inertia} (axes of B)"),
+        ("", vector(tensor[1])),
+        ("", vector(tensor[2])),
+        ("principal moments", f"{vector(record['principal_moments'])} {inertia}"),
+        ("mass moments", "exact" if record["moments_are_exact"] else "approximate (from bare matrices)"),
+        ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
+    ]
+    print_table("Body", ("", ""), rows)
+    print_table(
+        "Modes (the frame B held)",
+        ("mode>", "Hz>", "damping>", "energy from"),
+        [
+            (mode["number"], hertz(mode["frequency_hz"]), percent(mode["damping_ratio"]), mode["label"])
+            for mode in record["modes"]
+        ],
+    )
+    free = ", ".join(hertz(f) for f in record["free_frequencies_hz"])
+    say(f"Free-free frequencies [Hz]: {free or 'none'}\n")
+    print_table(
+        "Interfaces",
+        ("name", "kind", "nodes>", f"position in B [{length}]"),
+        [(i["name"], i["kind"], i["nodes"], vector(i["position"])) for i in record["interfaces"]],
+    )
+    if everything:
+        print_table("Provenance", ("", ""), list(record["provenance"].items()))
+
+
+def print_times(clock: "Stages") -> None:
+    """Print the time of each stage."""
+    rows = [(name, f"{seconds:.2f}") for name, seconds in clock.seconds.items()]
+    print_table("Time", ("stage", "s>"), [*rows, ("all", f"{sum(clock.seconds.values()):.2f}")])
+
+
+def say(text: str) -> None:
+    """Print a line on standard output, as it is."""
+    out().print(text, markup=False, soft_wrap=True)
+
+
+def vector(values: Any) -> str:
+    """Return numbers in one line."""
+    return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"
+
+
+def hertz(value: float | None) -> str:
+    """Return a frequency with six digits; a shape without mass has none."""
+    return "static" if value is None else f"{value:.6g}"
+
+
+def percent(value: float | None) -> str:
+    """Return a damping ratio in percent."""
+    return "" if not value else f"{100 * value:.3g} %"

@@ -1,0 +1,246 @@
+"""What the command lines share: one way to fail, progress, tables that read well on every terminal and in a pipe.
+
+Exit codes: 0 done, 1 a fault of the program, 2 something the user can put right, 130 interrupted.
+"""
+
+import functools
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from importlib import metadata
+from typing import Any, ParamSpec, TypeVar
+
+import typer
+
+__all__ = [
+    "Stages",
+    "bug",
+    "commands",
+    "guarded",
+    "output_path",
+    "print_error",
+    "print_table",
+    "run",
+    "stages",
+    "version_option",
+]
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+FAULT, USER_ERROR, INTERRUPTED = 1, 2, 130
+show_tracebacks = ContextVar("show_tracebacks", default=False)  #: the option --debug
+PIPE_WIDTH = 160  #: columns of tables that are not written to a terminal
+
+
+# Failing -------------------------------------------------------------------------------------------------------------
+
+
+def run(app: typer.Typer, name: str) -> None:
+    """Run an application; text that the terminal's encoding cannot show is replaced, never a reason to fail."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="replace")
+    try:
+        app(prog_name=name)
+    except KeyboardInterrupt:
+        print_error("interrupted")
+        sys.exit(INTERRUPTED)
+
+
+def commands(name: str, help: str) -> typer.Typer:
+    """Return an application with the options --version and --debug."""
+    app = typer.Typer(
+        name=name, help=help, no_args_is_help=True, add_completion=False, rich_markup_mode="markdown",
+        pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
+    )  # fmt: skip
+
+    @app.callback()
+    def options(
+        version: bool = version_option(name),
+        debug: bool = typer.Option(False, "--debug", help="Show the traceback of a fault of the program."),
+    ) -> None:
+        show_tracebacks.set(debug)
+
+    options.__doc__ = help
+    return app
+
+
+def version_option(name: str) -> Any:
+    """Return the option --version, which prints and ends."""
+
+    def show(value: bool) -> None:
+        if value:
+            try:
+                version = metadata.version("floatframe")
+            except metadata.PackageNotFoundError:  # a checkout that is not installed
+                version = "(not installed)"
+            print(f"{name} {version}")
+            raise typer.Exit
+
+    return typer.Option(False, "--version", callback=show, is_eager=True, help="Show the version and exit.")
+
+
+def guarded(command: Callable[P, R]) -> Callable[P, R]:
+    """Decorate a command: errors become one message on standard error and an exit code."""
+
+    @functools.wraps(command)
+    def safe(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return command(*args, **kwargs)
+        except KeyboardInterrupt:
+            print_error("interrupted; no output was left half written")
+            raise typer.Exit(INTERRUPTED) from None
+        except (typer.Exit, typer.Abort):
+            raise
+        except BrokenPipeError:  # the reader of our output (head, less) has seen enough
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(0) from None
+        except Exception as error:
+            if isinstance(error, expected_errors()):
+                print_error(str(error))
+                raise typer.Exit(USER_ERROR) from None
+            if isinstance(error, OSError) and error.filename is not None:
+                print_error(f"{error.filename}: {error.strerror}")
+                raise typer.Exit(USER_ERROR) from None
+            print_error(bug(error))
+            if show_tracebacks.get():
+                traceback.print_exc()
+            raise typer.Exit(FAULT) from None
+
+    return safe
+
+
+def expected_errors() -> tuple[type[Exception], ...]:
+    """Return the roots of the errors whose text is meant for the user."""
+    from cms.errors import CmsError
+    from fe_models.errors import FeModelsError
+    from floatframe.errors import FloatframeError
+
+    return CmsError, FeModelsError, FloatframeError
+
+
+def bug(error: BaseException) -> str:
+    """Return a short text about an error that nobody expected."""
+    if isinstance(error, MemoryError):
+        return "not enough memory; close other programs, take a coarser mesh or fewer modes"
+    text = f"{type(error).__name__}: {error}".strip().removesuffix(":")
+    return f"this is a fault of the program, not of the input: {text}\nRun it again with --debug before the command "\
+           "to see where, and report it with that text."  # fmt: skip
+
+
+def print_error(text: str) -> None:
+    """Print a message on standard error as it is: no wrapping, no markup."""
+    typer.secho("error: ", fg=typer.colors.RED, bold=True, nl=False, err=True)
+    typer.echo(text, err=True)
+
+
+def output_path(given: Any, default: Any, error: type[Exception], *, overwrite_of: Iterable[Any] = ()) -> Any:
+    """Return where to write, after checking before any work that this is possible.
+
+    Raises
+    ------
+    error
+        If the folder does not exist, the path is a folder, or the path is one of the inputs.
+    """
+    from pathlib import Path
+
+    path = Path(default if given is None else given)
+    if path.is_dir():
+        raise error(f"--output {path}: this is a folder; expected the name of a file")
+    if not path.parent.is_dir():
+        raise error(f"--output {path}: the folder {path.parent} does not exist; make it first")
+    if not os.access(path.parent, os.W_OK):
+        raise error(f"--output {path}: the folder {path.parent} is not writable")
+    for source in overwrite_of:
+        if path.exists() and Path(source).exists() and path.samefile(source):
+            raise error(f"--output {path}: this is the input; choose another name")
+    return path
+
+
+# Tables --------------------------------------------------------------------------------------------------------------
+
+
+def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Print a table on standard output; a column whose heading ends in '>' is aligned to the right."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, title_style="bold")
+    for column in columns:
+        right = column.endswith(">")
+        table.add_column(column.removesuffix(">"), justify="right" if right else "left", no_wrap=right, overflow="fold")
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    console = out()
+    console.print(table)
+
+
+def escape(cell: Any) -> str:
+    """Return a cell as text that rich prints as it is."""
+    from rich.markup import escape as escaped
+
+    return escaped(cell if isinstance(cell, str) else f"{cell:.6g}" if isinstance(cell, float) else str(cell))
+
+
+def out() -> Any:
+    """Return the console of standard output: as wide as the terminal, or wide enough for a pipe."""
+    from rich.console import Console
+
+    width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else PIPE_WIDTH
+    return Console(width=width, highlight=False, emoji=False)
+
+
+# Progress ------------------------------------------------------------------------------------------------------------
+
+
+class Stages:
+    """The stages of a job: a bar for the one that runs, seconds for those that are done."""
+
+    def __init__(self, show: Any = None) -> None:
+        self.seconds: dict[str, float] = {}
+        self._show = show
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[Callable[[float], None]]:
+        """Run a stage; the value is a function that takes the finished fraction, 0 to 1."""
+        begin = time.perf_counter()
+        task = self._show.add_task(name, total=None) if self._show is not None else None
+
+        def advance(fraction: float) -> None:
+            if self._show is not None:
+                self._show.update(task, total=1.0, completed=fraction)
+
+        try:
+            yield advance
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+        if self._show is not None:
+            self._show.update(task, total=1.0, completed=1.0)
+
+
+@contextmanager
+def stages(*, remaining: bool = False) -> Iterator[Stages]:
+    """Show progress bars on standard error, if that is a terminal."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield Stages()
+        return
+    columns = [TextColumn("{task.description:<28}"), BarColumn(bar_width=30), TaskProgressColumn(), TimeElapsedColumn()]
+    with Progress(*columns, *([TimeRemainingColumn()] if remaining else []), console=console, transient=True) as show:
+        yield Stages(show)

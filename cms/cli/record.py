@@ -1,0 +1,72 @@
+"""What is in a reduced body, as one record: `cms info` prints it, `--json` writes it, reports may read it."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.invariants import Moments
+from cms.reduced_body import ReducedBody
+
+__all__ = ["body_record", "central_inertia", "in_hertz"]
+
+
+def central_inertia(moments: Moments) -> Array:
+    """Return the inertia tensor of the undeformed body about its centre of mass, axes of B, (3, 3) [kg m²]."""
+    c = moments.center_of_mass
+    return moments.J0 - moments.m * (c @ c * np.eye(3) - np.outer(c, c))
+
+
+def in_hertz(body: ReducedBody, frequencies: Array) -> Array:
+    """Return frequencies in Hz that are in cycles per time unit of the body."""
+    return np.asarray(frequencies) / body.units.time
+
+
+def body_record(body: ReducedBody) -> dict[str, Any]:
+    """Return name, units, mass properties, frame, modes, interfaces and provenance, in plain types.
+
+    Numbers are in the units of the body, but frequencies are in Hz; infinite ones (massless shapes) are None. The
+    centre of mass is given in B and in mesh coordinates, the inertia tensor about it in axes of B.
+    """
+    moments, frame = body.moments, body.frame
+    center = moments.center_of_mass
+    damping = np.diag(body.D)
+    omega = 2 * np.pi * body.frequencies
+    return {
+        "name": body.name,
+        "units": asdict(body.units),
+        "mass": moments.m,
+        "center_of_mass": {"B": center.tolist(), "mesh": (frame.origin + frame.axes @ center).tolist()},
+        "inertia_about_center_of_mass": central_inertia(moments).tolist(),
+        "principal_moments": np.linalg.eigvalsh(central_inertia(moments)).tolist(),
+        "moments_are_exact": moments.is_exact,
+        "frame": {"kind": frame.kind, "at": frame.at, "origin": frame.origin.tolist(), "axes": frame.axes.tolist()},
+        "modes": [
+            {
+                "number": k + 1,
+                "frequency_hz": _finite(in_hertz(body, f)),
+                "damping_ratio": _finite(damping[k] / (2 * omega[k])) if omega[k] > 0 else None,
+                "label": body.labels[k],
+            }
+            for k, f in enumerate(body.frequencies)
+        ],
+        "free_frequencies_hz": in_hertz(body, body.free_frequencies).tolist(),
+        "interfaces": [
+            {
+                "name": interface.name,
+                "kind": interface.kind,
+                "position": interface.position.tolist(),
+                "position_mesh": (frame.origin + frame.axes @ interface.position).tolist(),
+                "nodes": len(interface.members),
+            }
+            for interface in body.interfaces
+        ],
+        "kept_nodes": len(body.nodes),
+        "surface_triangles": len(body.surface),
+        "provenance": dict(body.provenance),
+    }
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,163 @@
+"""The whole line of a reduction job: mesh or matrices, interfaces, mode set, reduced body."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cms.cli.console import Stages
+from cms.errors import JobError
+from cms.fe_body import FEBody, Interface
+from cms.job import InterfaceSection, Job, mode_set_options
+from cms.reduced_body import ReducedBody
+from cms.units import unit_system
+
+if TYPE_CHECKING:
+    from fe_models.material import Material
+    from fe_models.mesh import Mesh
+
+__all__ = ["reduce_job"]
+
+
+def reduce_job(
+    job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None
+) -> ReducedBody:
+    """Run a job up to the reduced body.
+
+    Parameters
+    ----------
+    job
+        A checked job.
+    stages
+        Takes the time of each stage and shows its progress; none by default.
+    on_report
+        Called with the mesh report, before it is judged.
+
+    Raises
+    ------
+    CmsError, FeModelsError
+        If the mesh, a material, an interface or the mode set does not do.
+    """
+    from cms.couplings import couple
+    from cms.mode_sets import MODE_SETS
+    from cms.reduction import reduce
+
+    stages = stages or Stages()
+    if job.body.mesh is not None:
+        body = body_of_mesh(job, job.body.mesh, stages, on_report)
+    elif job.body.matrices is not None:
+        body = body_of_matrices(job, job.body.matrices, stages)
+    else:
+        raise JobError("job: expected either mesh or matrices, got neither")
+    with stages("couple interfaces"):
+        coupled = couple(body)
+    reduction = job.reduction
+    asked = {
+        "n_modes": reduction.n_modes,
+        "cutoff": None if reduction.cutoff is None else reduction.cutoff * body.units.time,  # cycles per time unit
+        "verify": reduction.verify,
+    }
+    options = {key: asked[key] for key in mode_set_options(reduction.set) if asked[key] is not None}
+    with stages(f"mode set {reduction.set}"):
+        modes = MODE_SETS[reduction.set](coupled, **options)
+    with stages("reduce"):
+        return reduce(coupled, modes, frame=frame_of(job), damping=damping_of(job))
+
+
+def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
+    """Read and check the mesh, and assemble it with the materials and interfaces of the job."""
+    from fe_models.importers import read_mesh
+    from fe_models.mesh_report import mesh_report
+    from fe_models.solid import solid_body
+    from fe_models.unused_nodes import drop_unused_nodes
+
+    units = unit_system(job.body.units)
+    materials = materials_of(job)
+    with stages("read mesh"):
+        mesh = read_mesh(path)
+    with stages("check mesh"):
+        report = mesh_report(mesh, materials, units=units)
+        if on_report is not None:
+            on_report(report)
+        report.raise_for_errors(accept=job.body.accept)
+        mesh = drop_unused_nodes(mesh)
+        interfaces = interfaces_of(job, mesh)
+    name = str(job.body.name)
+    with stages("assemble") as advance:
+        return solid_body(mesh, materials, name=name, units=units, interfaces=interfaces, progress=advance)
+
+
+def body_of_matrices(job: Job, path: Path, stages: Stages) -> FEBody:
+    """Read a body of bare matrices, which brings its interfaces along."""
+    from fe_models.matrices import body_from_npz
+
+    with stages("read matrices"):
+        return body_from_npz(path, name=job.body.name, units=unit_system(job.body.units))
+
+
+def materials_of(job: Job) -> "Material | dict[str, Material]":
+    """Return one material for all cells, or group of cells -> material."""
+    from fe_models.material import Material
+
+    made = {
+        name: Material(name, E=section.young, nu=section.poisson, rho=section.density)
+        for name, section in job.materials.items()
+    }
+    if [section.cells for section in job.materials.values()] == [("all",)]:
+        return next(iter(made.values()))
+    return {group: made[name] for name, section in job.materials.items() for group in section.cells}
+
+
+def interfaces_of(job: Job, mesh: "Mesh") -> tuple[Interface, ...]:
+    """Return the interfaces of the job on this mesh; no two may share a node."""
+    from fe_models.interfaces import check_overlap
+
+    interfaces = tuple(interface_of(name, section, mesh) for name, section in job.interfaces.items())
+    check_overlap(interfaces)
+    return interfaces
+
+
+def interface_of(name: str, section: InterfaceSection, mesh: "Mesh") -> Interface:
+    """Return one interface: its selection, kind, reference point and axes."""
+    from fe_models import interfaces, selections
+
+    makers = {
+        "rigid": interfaces.rigid_interface,
+        "distributing": interfaces.distributing_interface,
+        "nodes": interfaces.nodes_interface,
+    }
+    types = {
+        "faces": selections.FaceGroup,
+        "nodes": selections.NodeSet,
+        "plane": selections.Plane,
+        "cylinder": selections.Cylinder,
+        "box": selections.Box,
+        "nearest": selections.NearestNode,
+    }
+    given = getattr(section, section.selection)
+    selection: Any = types[section.selection]
+    chosen = selection(given) if isinstance(given, str) else selection(**given.model_dump())
+    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+    return makers[section.kind](mesh, name, chosen, reference=section.reference, triad=triad)
+
+
+def frame_of(job: Job) -> Any:
+    """Return the body frame of the job."""
+    from cms.frames import NodalFrame, TisserandFrame
+
+    reduction = job.reduction
+    if reduction.frame == "nodal":
+        return NodalFrame(reduction.at, reduction.origin)
+    return TisserandFrame(reduction.origin)
+
+
+def damping_of(job: Job) -> Any:
+    """Return the damping of the job, or None."""
+    from cms.reduction import ModalDamping, RayleighDamping
+
+    if job.damping is None:
+        return None
+    if job.damping.ratio is not None:
+        return ModalDamping(job.damping.ratio)
+    return RayleighDamping(job.damping.alpha or 0.0, job.damping.beta or 0.0)

@@ -1,0 +1,245 @@
+"""The reduction job: what `cms reduce` reads (docs/job_file.md)."""
+
+import inspect
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+
+from cms.errors import JobError
+from cms.fe_body import INTERFACE_KINDS
+from cms.mode_sets import MODE_SETS
+from cms.toml_file import Matrix3, Range, Table, Vector3, choice, near_file, read_toml, validated
+from cms.units import UNIT_SYSTEMS
+from cms.words import nearest
+
+__all__ = ["SELECTIONS", "Job", "mode_set_options", "read_job"]
+
+SELECTIONS = ("faces", "nodes", "plane", "cylinder", "box", "nearest")  #: keys that select the nodes of an interface
+ACCEPTABLE = ("overlap", "parts", "transition", "units")  #: errors of the mesh report that may be meant
+FRAMES = ("nodal", "tisserand")
+
+Name = Annotated[str, StringConstraints(min_length=1)]
+Positive = Annotated[float, Field(gt=0)]
+
+
+def names(value: Any) -> Any:
+    """Return one name or a list of names as a tuple of names."""
+    words = [value] if isinstance(value, str) else value
+    if not isinstance(words, list | tuple) or not words or not all(isinstance(w, str) and w for w in words):
+        raise ValueError('expected the name of a group, or a list of names: "a" or ["a", "b"]')
+    return tuple(words)
+
+
+def accepted(value: Any) -> tuple[str, ...]:
+    """Return kinds of findings of the mesh report that the user has looked at and accepts."""
+    words = names(value)
+    for word in words:
+        if word not in ACCEPTABLE:
+            raise ValueError(f"{word!r} is not a finding that can be accepted{nearest(word, ACCEPTABLE)}")
+    return words
+
+
+Names = Annotated[tuple[str, ...], BeforeValidator(names)]
+Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted)]
+
+
+class BodySection(Table):
+    """[body]: where the model comes from."""
+
+    name: Name | None = Field(None, description="the name of the body, text; default: the name of the job file")
+    mesh: Path | None = Field(None, description="the path of a mesh file, relative to the job file")
+    matrices: Path | None = Field(None, description="the path of an .npz file with M, K, nodes, dofs")
+    units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
+        description=f"the unit system of the numbers, one of {', '.join(UNIT_SYSTEMS)}"
+    )
+    accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
+
+    @field_validator("mesh", "matrices", mode="before")
+    @classmethod
+    def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
+        if not isinstance(value, str) or not value:
+            raise ValueError("expected the path of a file, text")
+        path = Path(info.context or ".") / value
+        if not path.is_file():
+            raise ValueError(f"no such file: {path}{near_file(path)}")
+        return path
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "BodySection":
+        if (self.mesh is None) == (self.matrices is None):
+            raise ValueError(f"expected either mesh or matrices, got {'both' if self.mesh else 'neither'}")
+        return self
+
+
+class MaterialSection(Table):
+    """[materials.NAME]: an isotropic material and the cells that have it."""
+
+    young: Positive = Field(description="a number above 0, Young's modulus [stress unit]")
+    poisson: Annotated[float, Field(gt=-1, lt=0.5)] = Field(description="a number between -1 and 0.5, Poisson's ratio")
+    density: Positive = Field(description="a number above 0, the density [mass / length^3]")
+    cells: Names = Field(("all",), description='"all", the name of a group of cells, or a list of names')
+
+
+class PlaneSection(Table):
+    """Nodes on a plane."""
+
+    point: Vector3 = Field(description="a point of the plane, [x, y, z]")
+    normal: Vector3 = Field(description="a direction normal to the plane, [x, y, z]")
+    tolerance: Positive | None = Field(None, description="a number above 0, the largest distance of a node")
+
+
+class CylinderSection(Table):
+    """Nodes on the surface of a cylinder."""
+
+    point: Vector3 = Field(description="a point on the axis, [x, y, z]")
+    axis: Vector3 = Field(description="the direction of the axis, [x, y, z]")
+    radius: Positive = Field(description="a number above 0, the radius")
+    span: Range | None = Field(None, description="two numbers, [from, to] along the axis, measured from point")
+    tolerance: Positive | None = Field(None, description="a number above 0, the largest distance from the surface")
+
+
+class BoxSection(Table):
+    """Nodes in a box along the axes."""
+
+    lo: Vector3 = Field(description="the corner with the least coordinates, [x, y, z]")
+    hi: Vector3 = Field(description="the corner with the greatest coordinates, [x, y, z]")
+
+
+class NearestSection(Table):
+    """The node nearest to a point."""
+
+    point: Vector3 = Field(description="a point, [x, y, z]")
+
+
+class InterfaceSection(Table):
+    """[interfaces.NAME]: a place where the body meets its neighbours."""
+
+    kind: choice("kind", lambda: INTERFACE_KINDS) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(INTERFACE_KINDS)}"
+    )
+    faces: Name | None = Field(None, description="the name of a group of faces")
+    nodes: Name | None = Field(None, description="the name of a group of nodes")
+    plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
+    cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
+    box: BoxSection | None = Field(None, description="a table {lo, hi}")
+    nearest: NearestSection | None = Field(None, description="a table {point}")
+    reference: Vector3 | None = Field(None, description="the reference point, [x, y, z]")
+    triad: Matrix3 | None = Field(None, description="the axes of the interface, [x axis, y axis, z axis]")
+
+    @property
+    def selection(self) -> str:
+        """The key of the selection that is given."""
+        return next(key for key in SELECTIONS if getattr(self, key) is not None)
+
+    @model_validator(mode="after")
+    def _one_selection(self) -> "InterfaceSection":
+        given = [key for key in SELECTIONS if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected exactly one of {', '.join(SELECTIONS)}; got {', '.join(given) or 'none'}")
+        return self
+
+
+class ReductionSection(Table):
+    """[reduction]: the mode set, its options, and the body frame."""
+
+    set: choice("mode set", lambda: tuple(MODE_SETS)) = Field(  # type: ignore[valid-type]
+        "craig-bampton", description="the name of a mode set"
+    )
+    n_modes: Annotated[int, Field(ge=0)] | None = Field(
+        None, description="a whole number, 0 or more, of vibration modes"
+    )
+    cutoff: Positive | None = Field(None, description="a number above 0, the highest frequency of the modes [Hz]")
+    verify: bool | None = Field(None, description="true or false: prove that no mode was missed")
+    frame: choice("frame", lambda: FRAMES) = Field(  # type: ignore[valid-type]
+        "tisserand", description=f"one of {', '.join(FRAMES)}"
+    )
+    at: Name | None = Field(None, description="the name of an interface, which carries a nodal frame")
+    origin: Vector3 | None = Field(None, description="the origin of the body frame in mesh coordinates, [x, y, z]")
+
+    @model_validator(mode="after")
+    def _options_of_the_set(self) -> "ReductionSection":
+        allowed = mode_set_options(self.set)
+        for key in ("n_modes", "cutoff", "verify"):
+            if getattr(self, key) is not None and key not in allowed:
+                raise ValueError(f"mode set {self.set!r} has no option {key}{nearest(key, allowed)}")
+        if {"n_modes", "cutoff"} <= set(allowed) and (self.n_modes is None) == (self.cutoff is None):
+            given = "neither" if self.n_modes is None else "both"
+            raise ValueError(f"expected either n_modes (how many) or cutoff (up to which frequency in Hz), got {given}")
+        if self.at is not None and self.frame != "nodal":
+            raise ValueError(f'at = "{self.at}" belongs to frame = "nodal"; got frame = "{self.frame}"')
+        return self
+
+
+class DampingSection(Table):
+    """[damping]: modal ratio or Rayleigh."""
+
+    ratio: Annotated[float, Field(ge=0)] | None = Field(
+        None, description="a number, 0 or more, of critical damping (0.01 is 1 %)"
+    )
+    alpha: Annotated[float, Field(ge=0)] | None = Field(
+        None, description="a number, 0 or more, of D = alpha M + beta K"
+    )
+    beta: Annotated[float, Field(ge=0)] | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> "DampingSection":
+        rayleigh = [key for key in ("alpha", "beta") if getattr(self, key) is not None]
+        if (self.ratio is None) == (not rayleigh):
+            got = "none of them" if self.ratio is None else f"ratio and {', '.join(rayleigh)}"
+            raise ValueError(f"expected either ratio, or alpha and beta; got {got}")
+        return self
+
+
+class Job(Table):
+    """A reduction job: one body, its materials, its interfaces, and how to reduce it."""
+
+    body: BodySection = Field(description="a table [body] with mesh and units")
+    materials: dict[str, MaterialSection] = Field({}, description="tables [materials.NAME]")
+    interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")
+    reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
+    damping: DampingSection | None = Field(None, description="a table [damping] with ratio, or alpha and beta")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> "Job":
+        if self.body.mesh and not self.materials:
+            raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
+        if self.body.matrices and self.materials:
+            raise ValueError("materials: matrices have their material inside; remove the tables [materials.NAME]")
+        if self.body.matrices and self.interfaces:
+            raise ValueError(
+                "interfaces: matrices bring their interfaces in the .npz file (interface/NAME/nodes); remove the tables"
+            )
+        if len(self.materials) > 1:
+            everywhere = [name for name, material in self.materials.items() if material.cells == ("all",)]
+            if everywhere:
+                raise ValueError(
+                    f'materials.{everywhere[0]}: cells = "all", but there are {len(self.materials)} materials; '
+                    "name the group of cells of each"
+                )
+        at = self.reduction.at
+        if self.body.mesh and at is not None and at not in self.interfaces:
+            raise ValueError(f'reduction.at = "{at}": there is no such interface{nearest(at, self.interfaces)}')
+        return self
+
+
+def mode_set_options(name: str) -> tuple[str, ...]:
+    """Return the options of a mode set that a job can give."""
+    takes = inspect.signature(MODE_SETS[name]).parameters
+    return tuple(key for key in ("n_modes", "cutoff", "verify") if key in takes)
+
+
+def read_job(path: str | os.PathLike[str]) -> Job:
+    """Read and check a job file.
+
+    Raises
+    ------
+    JobError
+        With every problem: key path, value, what was expected, choices and the nearest name.
+    """
+    path = Path(path)
+    job = validated(Job, read_toml(path, JobError), path, JobError, context=path.parent)
+    if job.body.name is None:
+        job = job.model_copy(update={"body": job.body.model_copy(update={"name": path.stem})})
+    return job

@@ -1,0 +1,150 @@
+from pathlib import Path
+
+import pytest
+
+from cms.errors import JobError
+from cms.job import BodySection, DampingSection, InterfaceSection, Job, MaterialSection, ReductionSection, read_job
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "job_file.md"
+
+GOOD = """
+[body]
+mesh = "rod.msh"
+units = "mm-t-s"
+[materials.steel]
+young = 210000
+poisson = 0.3
+density = 7.85e-9
+[interfaces.big_end]
+kind = "rigid"
+plane = {point = [0, 0, 0], normal = [0, 0, 1]}
+[interfaces.small_end]
+kind = "nodes"
+nodes = "left"
+triad = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+[reduction]
+n_modes = 12
+frame = "nodal"
+at = "big_end"
+[damping]
+ratio = 0.01
+"""
+
+
+@pytest.fixture
+def job_file(tmp_path):
+    (tmp_path / "rod.msh").touch()
+
+    def write(text: str) -> Path:
+        (tmp_path / "rod.toml").write_text(text, encoding="utf-8")
+        return tmp_path / "rod.toml"
+
+    return write
+
+
+def test_a_good_job_is_read(job_file):
+    path = job_file(GOOD)
+    job = read_job(path)
+    assert job.body.name == "rod"
+    assert job.body.mesh == path.parent / "rod.msh"
+    assert job.materials["steel"].young == 210000.0
+    assert job.materials["steel"].cells == ("all",)
+    assert [i.selection for i in job.interfaces.values()] == ["plane", "nodes"]
+    assert job.interfaces["small_end"].triad == ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    assert (job.reduction.set, job.reduction.n_modes, job.reduction.cutoff) == ("craig-bampton", 12, None)
+    assert (job.damping.ratio, job.damping.alpha) == (0.01, None)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("units = ", "unit = ", 'body.unit: unknown key; did you mean \'units\'?'),
+    ('"mm-t-s"', '"mm-t"', "body.units = \"mm-t\": unknown unit system; did you mean 'mm-t-s'? choices: cm-g-s"),
+    ('"rod.msh"', '"rot.msh"', "rot.msh; did you mean 'rod.msh'?"),
+    ('"rod.msh"', '"no/rod.msh"', "does not exist"),
+    ('mesh = "rod.msh"', "", "body: expected either mesh or matrices, got neither"),
+    ("young = 210000", "young = 0", "materials.steel.young = 0: expected a number above 0"),
+    ("young = 210000", 'young = "2e5"', "expected a number above 0"),
+    ("young = 210000", "young = inf", "expected a number above 0"),
+    ("young = 210000", "young = true", "materials.steel.young = true: expected a number above 0"),
+    ("density = 7.85e-9", "density = -7.85e-9", "materials.steel.density = -7.85e-09: expected a number above 0"),
+    ("density = 7.85e-9", "", "materials.steel.density: missing; expected a number above 0"),
+    ("poisson = 0.3", "poisson = 0.5", "materials.steel.poisson = 0.5: expected a number between -1 and 0.5"),
+    ("poisson = 0.3", "poisson = nan", "expected a number between -1 and 0.5"),
+    ('kind = "rigid"', 'kind = "rigit"', "interfaces.big_end.kind = \"rigit\": unknown kind; did you mean 'rigid'?"),
+    ('nodes = "left"', "", "interfaces.small_end: expected exactly one of faces, nodes, plane"),
+    ('nodes = "left"', 'nodes = "left"\nfaces = "left"', "got faces, nodes"),
+    ("normal = [0, 0, 1]", "normal = [0, 0]", "interfaces.big_end.plane.normal = [0, 0]: expected three numbers"),
+    ("normal = [0, 0, 1]", "norml = [0, 0, 1]", "interfaces.big_end.plane.norml: unknown key; did you mean 'normal'?"),
+    ("[[0, 1, 0], [-1, 0, 0], [0, 0, 1]]", "[[0, 1, 0], [-1, 0], [0, 0, 1]]", "expected three rows of three numbers"),
+    ("n_modes = 12", "n_modes = 12.5", "reduction.n_modes = 12.5: expected a whole number"),
+    ("n_modes = 12", "n_modes = -1", "reduction.n_modes = -1: expected a whole number, 0 or more"),
+    ("n_modes = 12", "n_modes = 12\ncutoff = 100.0", "reduction: expected either n_modes"),
+    ("n_modes = 12", "", "or cutoff (up to which frequency in Hz), got neither"),
+    ("n_modes = 12", 'n_modes = 12\nset = "craig-bamton"', "did you mean 'craig-bampton'? choices: craig-b"),
+    ("n_modes = 12", 'n_modes = 12\nset = "guyan"', "mode set 'guyan' has no option n_modes"),
+    ('at = "big_end"', 'at = "big_ent"', "\"big_ent\": there is no such interface; did you mean 'big_end'?"),
+    ('frame = "nodal"', 'frame = "tisserand"', 'belongs to frame = "nodal"'),
+    ('frame = "nodal"', 'frame = "modal"', "unknown frame; did you mean 'nodal'?"),
+    ("ratio = 0.01", "ratio = 0.01\nalpha = 1.0", "expected either ratio, or alpha and beta; got ratio and alpha"),
+    ("[damping]", "[dampning]", "dampning: unknown key; did you mean 'damping'?"),
+    ("[reduction]", "[reductio]", "reductio: unknown key; did you mean 'reduction'?"),
+    ("[damping]", "[interfaces.x]\nkind='rigid'\nbox=3\n[damping]", "interfaces.x.box = 3: expected a table {lo, hi}"),
+    ("[damping]", "[materials.b]\nyoung=1\npoisson=0\ndensity=1\n[damping]", "there are 2 materials; name the group"),
+    ('[body]', '[body]\naccept = ["part"]', "'part' is not a finding that can be accepted; did you mean 'parts'?"),
+    ('[body]', '[body]\nname = 3', "body.name = 3: expected the name of the body"),
+    ('[body]', "body = 3\n[bodi]", "body = 3: expected a table [body]"),
+])  # fmt: skip
+def test_a_bad_job_is_refused_with_key_value_and_choices(job_file, old, new, words):
+    assert GOOD.count(old) >= 1
+    with pytest.raises(JobError) as caught:
+        read_job(job_file(GOOD.replace(old, new, 1)))
+    text = str(caught.value)
+    assert words in text
+    for jargon in ("pydantic", "http", "Value error", "type=", "Traceback"):
+        assert jargon not in text
+
+
+def test_all_problems_are_told_at_once(job_file):
+    bad = GOOD.replace("young", "yuong").replace("rigid", "rigit").replace("= 12", "= -1")
+    with pytest.raises(JobError) as caught:
+        read_job(job_file(bad))
+    lines = str(caught.value).splitlines()
+    assert lines[0].endswith("rod.toml: 4 problems:")
+    assert len(lines) == 5
+
+
+def test_a_file_that_is_no_toml_is_refused_with_its_place(job_file, tmp_path):
+    with pytest.raises(JobError, match=r"not valid TOML: .*line 3"):
+        read_job(job_file("[body]\nname = 'x'\nmesh = = 3\n"))
+    (tmp_path / "rod.toml").write_bytes(b"\x89HDF\xff\xfe")
+    with pytest.raises(JobError, match="expected a text file"):
+        read_job(tmp_path / "rod.toml")
+    with pytest.raises(JobError, match=r"no such file; did you mean 'rod\.toml'"):
+        read_job(tmp_path / "rot.toml")
+    with pytest.raises(JobError, match="cannot be read"):
+        read_job(tmp_path)
+
+
+def test_matrices_bring_their_interfaces_and_no_material(job_file, tmp_path):
+    (tmp_path / "rod.npz").touch()
+    matrices = GOOD.replace("mesh", "matrices").replace("rod.msh", "rod.npz")
+    with pytest.raises(JobError, match="matrices have their material inside"):
+        read_job(job_file(matrices))
+    text = '[body]\nmatrices = "rod.npz"\nunits = "m-kg-s"\n[reduction]\ncutoff = 100\n'
+    assert read_job(job_file(text)).reduction.cutoff == 100.0
+    with pytest.raises(JobError, match="matrices bring their interfaces"):
+        read_job(job_file(text + '[interfaces.a]\nkind = "nodes"\nnodes = "left"\n'))
+
+
+def test_every_key_is_documented():
+    text = DOCUMENT.read_text(encoding="utf-8")
+    for table in (BodySection, MaterialSection, InterfaceSection, ReductionSection, DampingSection):
+        for key in table.model_fields:
+            assert f"| `{key}` |" in text, f"{table.__name__}: {key}"
+    for key in Job.model_fields:
+        assert f"## [{key}" in text
+
+
+def test_the_documented_job_is_valid(job_file):
+    text = DOCUMENT.read_text(encoding="utf-8")
+    block = "\n".join(line.removeprefix("    ") for line in text.splitlines() if line.startswith("    "))
+    assert read_job(job_file(block)).interfaces["small_end"].cylinder.radius == 10.0
