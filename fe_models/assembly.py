@@ -176,7 +176,7 @@ def assembled_data(
     return K_data, M_data
 
 
-def kernel_tables(element: ReferenceElement) -> tuple[tuple[Array, ...], ...]:
+def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ...]:
     """Return what the kernel needs for affine elements, for the stiffness and for the mass of curved ones."""
     affine = (element.nodes, element.axis_nodes, element.stiffness_integrals, element.mass_integrals)
     stiffness = (element.stiffness.gradients, element.stiffness.weights)

@@ -76,7 +76,7 @@ def chain(n=6, stiffness=1000.0, mass=2.0) -> FEBody:
     springs = sp.diags_array([-np.ones(n - 1), np.r_[1, 2 * np.ones(n - 2), 1], -np.ones(n - 1)], offsets=[-1, 0, 1])
     nodes = np.stack([np.arange(n, dtype=float), np.zeros(n), np.zeros(n)], axis=1)
     dofs = np.stack([np.arange(n), np.zeros(n, int)], axis=1)
-    ends = [Interface(name, "nodes", [node], nodes[node]) for name, node in (("left", 0), ("right", n - 1))]
+    ends = [Interface(name, "nodes", np.array([node]), nodes[node]) for name, node in (("left", 0), ("right", n - 1))]
     return FEBody("chain", sp.csc_array(mass * sp.eye_array(n)), sp.csc_array(stiffness * springs), nodes, dofs,
                   tuple(ends))
 
@@ -112,7 +112,7 @@ def beam(n=8, length=1.0, **section) -> FEBody:
         M[at, at] += M_e
     nodes = np.stack([np.linspace(0, length, n + 1), np.zeros(n + 1), np.zeros(n + 1)], axis=1)
     dofs = np.stack([np.repeat(np.arange(n + 1), 6), np.tile(np.arange(6), n + 1)], axis=1)
-    ends = [Interface(name, "nodes", [node], nodes[node]) for name, node in (("left", 0), ("right", n))]
+    ends = [Interface(name, "nodes", np.array([node]), nodes[node]) for name, node in (("left", 0), ("right", n))]
     return FEBody("beam", sp.csc_array(M), sp.csc_array(K), nodes, dofs, tuple(ends))
 
 

@@ -1,0 +1,281 @@
+"""Bodies from the matrices of another program: plain arrays, or an .npz file."""
+
+import hashlib
+import zipfile
+import zlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.arrays import Array, IntArray
+from cms.errors import BodyError
+from cms.fe_body import FEBody, Interface, put_translations
+from cms.units import Units, unit_system
+from cms.words import nearest
+from fe_models.errors import MeshError
+from fe_models.solid import scalar_mass_gram
+
+__all__ = ["ScalarMassModel", "body_from_matrices", "body_from_npz", "scalar_mass_of"]
+
+PATTERN_TOLERANCE = 1e-10  #: largest |M - M_s ⊗ 1₃| / |M| that is taken for rounding of the other program
+INTERFACE_KEYS = ("kind", "nodes", "reference", "triad", "weights")
+
+
+@dataclass(frozen=True, eq=False)
+class ScalarMassModel:
+    """Exact integrals over mass of a body whose mass matrix is M_s ⊗ 1₃ (`cms.fe_body.ElementModel`)."""
+
+    name: str
+    M_s: sp.csr_array  #: scalar mass, (n_nodes, n_nodes) [kg]
+    nodes: Array  #: (n_nodes, 3) [m]
+    dofs: IntArray  #: (node, component) of every dof, (n_dof, 2)
+
+    def mass_gram(self, u: Array) -> Array:
+        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k); u is (n_dof, k)."""
+        translations = np.zeros((len(self.nodes), 3, u.shape[1]))
+        put_translations(translations, self.dofs, u)
+        return scalar_mass_gram(self.M_s, self.nodes, translations)
+
+    def nodal_stress(self, u: Array) -> Array:
+        """Refuse: matrices do not know the elements."""
+        raise BodyError(f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "
+                        f"(fe_models.solid.solid_body) for stresses")
+
+
+def body_from_matrices(
+    M: Any,
+    K: Any,
+    nodes: Any,
+    dofs: Any,
+    *,
+    name: str,
+    units: Units,
+    interfaces: Iterable[Interface] = (),
+    D: Any = None,
+    surface: Any = None,
+    provenance: Mapping[str, str] | None = None,
+) -> FEBody:
+    """Make a body of mass and stiffness from any program.
+
+    Where M is M_s ⊗ 1₃ on the translations and nothing else (solid elements, lumped masses), the body gets an element
+    model that gives every mass moment exactly; else it has none, and what then is approximate is labelled so.
+
+    Parameters
+    ----------
+    M, K, D
+        Mass, stiffness and optional viscous damping, dense or sparse, both triangles, (n_dof, n_dof).
+    nodes
+        Positions, (n_nodes, 3) [m].
+    dofs
+        Node and component (0-2 translation, 3-5 rotation, mesh axes) of every row, in any order, (n_dof, 2).
+    name, units, interfaces, surface, provenance
+        As in `FEBody`.
+
+    Raises
+    ------
+    BodyError
+        If shapes do not fit, a matrix is not symmetric or finite, or two rows are the same dof.
+    """
+    where = f"body {name!r}"
+    nodes, dofs = np.asarray(nodes, dtype=float), np.asarray(dofs)
+    if not (dofs.dtype.kind in "iu" or (dofs.dtype.kind == "f" and np.array_equal(dofs, np.rint(dofs)))):
+        raise BodyError(f"{where}: dofs: expected whole numbers (node, component), got {dofs.dtype}")
+    matrices = {"M": M, "K": K} | ({} if D is None else {"D": D})
+    sparse = {key: sp.csc_array(matrix, dtype=float) for key, matrix in matrices.items()}
+    for key, matrix in sparse.items():
+        require_both_triangles(f"{where}: {key}", matrix)
+    record = dict(provenance or {}) | {"mesh": (provenance or {}).get("mesh", "matrices")}
+    body = FEBody(
+        name=name, M=sparse["M"], K=sparse["K"], D=sparse.get("D"), nodes=nodes, dofs=dofs.astype(np.int64),
+        interfaces=tuple(interfaces), units=units, surface=np.zeros((0, 3), np.int64) if surface is None else surface,
+    )
+    unique, count = np.unique(body.dofs, axis=0, return_counts=True)
+    if len(unique) < len(body.dofs):
+        node, component = unique[count > 1][0]
+        raise BodyError(f"{where}: dofs: component {component} of node {node} is listed {count.max()} times")
+    M_s = scalar_mass_of(body)
+    record["mass moments"] = "approximate: M is not M_s ⊗ 1" if M_s is None else "exact: M = M_s ⊗ 1"
+    model = None if M_s is None else ScalarMassModel(name, M_s, body.nodes, body.dofs)
+    return replace(body, element_model=model, provenance=record)
+
+
+def scalar_mass_of(body: FEBody) -> sp.csr_array | None:
+    """Return M_s, (n_nodes, n_nodes), if the mass of the body is M_s ⊗ 1₃ on its translations and zero elsewhere.
+
+    None if it is not: rotations carry mass, directions differ or are coupled, or a node lacks a direction.
+    """
+    M = sp.coo_array(body.M)
+    node, component = body.dofs[M.row, 0], body.dofs[M.row, 1]
+    node_2, component_2 = body.dofs[M.col, 0], body.dofs[M.col, 1]
+    largest = np.abs(M.data).max(initial=0.0)
+    in_pattern = (component == component_2) & (component >= 0) & (component < 3)
+    if largest == 0 or np.abs(M.data[~in_pattern]).max(initial=0.0) > PATTERN_TOLERANCE * largest:
+        return None
+    shape = 2 * (len(body.nodes),)
+    directions = [
+        sp.csr_array((M.data[at], (node[at], node_2[at])), shape=shape)
+        for at in (in_pattern & (component == c) for c in range(3))
+    ]
+    for other in directions[1:]:
+        difference = (directions[0] - other).data
+        if np.abs(difference).max(initial=0.0) > PATTERN_TOLERANCE * largest:
+            return None
+    return directions[0]
+
+
+def require_both_triangles(where: str, matrix: sp.csc_array) -> None:
+    """Raise `BodyError` if the matrix is square and holds one triangle only."""
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        return  # `FEBody` says what it expects
+    column = np.repeat(np.arange(matrix.shape[1]), np.diff(matrix.indptr))
+    below = np.count_nonzero(matrix.data[matrix.indices > column])
+    above = np.count_nonzero(matrix.data[matrix.indices < column])
+    if max(below, above) > 0 and min(below, above) == 0:
+        raise BodyError(f"{where}: expected both triangles, got the {'lower' if below else 'upper'} one only; "
+                        f"pass A + A.T - diag(A)")
+
+
+def body_from_npz(path: str | Path, *, name: str | None = None, units: Units | None = None) -> FEBody:
+    """Read a body from an .npz archive of plain arrays (`numpy.savez`); pickled objects are refused.
+
+    =================================  ==============================================================================
+    key                                array
+    =================================  ==============================================================================
+    M, K, D (optional)                 dense, (n_dof, n_dof); or in its place the parts of a sparse matrix:
+    M_row, M_col, M_data               triplets, numbered from 0, duplicates added; or
+    M_indptr, M_indices, M_data        compressed columns or rows, which is the same for a symmetric matrix
+    nodes                              (n_nodes, 3)
+    dofs                               (n_dof, 2): node, from 0, and component, 0-2 translation and 3-5 rotation
+    units (or the argument `units`)    name of the unit system, such as "mm-t-s"
+    surface (optional)                 triangles of nodes for drawing, (n_tri, 3)
+    interface/<name>/nodes             members; and for the same <name>, optional:
+    interface/<name>/kind              "rigid" (default), "distributing" or "nodes"
+    interface/<name>/reference         (3,), default: the mean of the members
+    interface/<name>/triad             (3, 3), axes as columns, default: mesh axes
+    interface/<name>/weights           (n_members,), default: equal
+    =================================  ==============================================================================
+
+    Raises
+    ------
+    MeshError
+        If the file is missing, is no such archive, lacks a key, has unknown ones, or names no units.
+    BodyError
+        If the arrays do not make a body.
+    """
+    path = Path(path)
+    arrays = read_arrays(path)
+    known = {"nodes", "dofs", "units", "surface"}
+    known |= {key + part for key in "MKD" for part in ("", "_row", "_col", "_data", "_indptr", "_indices")}
+    for key in arrays:
+        if key not in known and not key.startswith("interface/"):
+            raise MeshError(f"{path}: unknown array {key!r}{nearest(key, known)}")
+    for key in ("nodes", "dofs"):
+        require_key(path, arrays, key)
+    nodes = arrays["nodes"]
+    if nodes.ndim != 2 or nodes.shape[1] != 3 or nodes.dtype.kind not in "fiu":
+        raise MeshError(f"{path}: nodes: expected numbers (n_nodes, 3), got {nodes.dtype} {nodes.shape}")
+    n_dof = len(arrays["dofs"]) if arrays["dofs"].ndim else 0
+    has_damping = any(key == "D" or key.startswith("D_") for key in arrays)
+    return body_from_matrices(
+        sparse_of(path, arrays, "M", n_dof),
+        sparse_of(path, arrays, "K", n_dof),
+        nodes,
+        arrays["dofs"],
+        name=name or path.stem,
+        units=units_of(path, arrays, units),
+        interfaces=interfaces_of(path, arrays),
+        D=sparse_of(path, arrays, "D", n_dof) if has_damping else None,
+        surface=arrays.get("surface"),
+        provenance={"mesh": str(path), "mesh sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
+    )
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Read all arrays of the archive."""
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file; expected an .npz archive of matrices")
+    try:
+        with path.open("rb") as stream:  # ours to close: np.load leaves it open when the archive is broken
+            archive = np.load(stream, allow_pickle=False)
+            arrays = {} if isinstance(archive, np.ndarray) else {key: archive[key] for key in archive.files}
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
+        raise MeshError(f"{path}: not a readable .npz archive of plain arrays ({error}); write it with "
+                        f"numpy.savez(path, M=..., K=..., nodes=..., dofs=..., units=...)") from error
+    if isinstance(archive, np.ndarray):
+        raise MeshError(f"{path}: expected an .npz archive with M, K, nodes and dofs, got a single array")
+    return arrays
+
+
+def require_key(path: Path, arrays: Mapping[str, np.ndarray], key: str) -> None:
+    """Raise `MeshError` unless the key is there."""
+    if key not in arrays:
+        raise MeshError(f"{path}: the array {key!r} is missing; got {', '.join(arrays) or 'none'}")
+
+
+def sparse_of(path: Path, arrays: Mapping[str, np.ndarray], key: str, n_dof: int) -> sp.csc_array:
+    """Return a matrix from its dense array, its triplets or its compressed parts."""
+    parts = [part for part in ("data", "row", "col", "indptr", "indices") if f"{key}_{part}" in arrays]
+    forms = {"triplets": {"data", "row", "col"}, "compressed": {"data", "indptr", "indices"}}
+    form = next((form for form, needed in forms.items() if set(parts) == needed), "dense" if not parts else "")
+    if (parts and key in arrays) or (key not in arrays and form not in forms):
+        raise MeshError(f"{path}: {key}: expected {key} alone, or {key}_row, {key}_col, {key}_data, or {key}_indptr, "
+                        f"{key}_indices, {key}_data; got "
+                        f"{', '.join(name for name in arrays if name.split('_')[0] == key) or 'none of these'}")
+    try:
+        if form == "dense":
+            return sp.csc_array(arrays[key], dtype=float)
+        data = np.asarray(arrays[f"{key}_data"], dtype=float)
+        if form == "triplets":
+            place = (arrays[f"{key}_row"], arrays[f"{key}_col"])
+            return sp.csc_array(sp.coo_array((data, place), shape=(n_dof, n_dof)))
+        matrix = sp.csc_array((data, arrays[f"{key}_indices"], arrays[f"{key}_indptr"]), shape=(n_dof, n_dof))
+        matrix.check_format(full_check=True)
+        return matrix
+    except (ValueError, TypeError, IndexError) as error:
+        raise MeshError(f"{path}: {key}: the {form} parts do not make a matrix of {n_dof} dofs: {error}") from error
+
+
+def units_of(path: Path, arrays: Mapping[str, np.ndarray], units: Units | None) -> Units:
+    """Return the units asked for, or those the file names; refuse none and two that differ."""
+    if "units" not in arrays:
+        if units is None:
+            raise MeshError(f"{path}: the file names no units; pass units=unit_system(...) or add a key 'units'")
+        return units
+    named = unit_system(str(arrays["units"].item() if arrays["units"].size == 1 else arrays["units"]))
+    if units is not None and units != named:
+        raise MeshError(f"{path}: the file is in {named.name}, but {units.name} was asked for")
+    return named
+
+
+def interfaces_of(path: Path, arrays: Mapping[str, np.ndarray]) -> list[Interface]:
+    """Return the interfaces of the archive in the order of its keys."""
+    groups: dict[str, dict[str, np.ndarray]] = {}
+    for key in arrays:
+        if key.startswith("interface/"):
+            name, _, part = key.removeprefix("interface/").rpartition("/")
+            if not name or part not in INTERFACE_KEYS:
+                raise MeshError(f"{path}: {key!r}: expected interface/<name>/<part>{nearest(part, INTERFACE_KEYS)}")
+            groups.setdefault(name, {})[part] = arrays[key]
+    interfaces = []
+    for name, parts in groups.items():
+        require_key(path, arrays, f"interface/{name}/nodes")
+        members = parts["nodes"]
+        if members.dtype.kind not in "iu" or members.ndim != 1 or not members.size:
+            raise MeshError(f"{path}: interface/{name}/nodes: expected node numbers, (n_members,), got {members.dtype} "
+                            f"{members.shape}")
+        if members.min() < 0 or members.max() >= len(arrays["nodes"]):
+            raise MeshError(f"{path}: interface/{name}/nodes: expected 0..{len(arrays['nodes']) - 1}, got "
+                            f"{members.min()}..{members.max()}")
+        interfaces.append(Interface(
+            name=name,
+            kind=str(parts["kind"].item()) if "kind" in parts and parts["kind"].size == 1 else "rigid",
+            nodes=members,
+            reference=parts.get("reference", arrays["nodes"][members].mean(axis=0)),
+            triad=parts.get("triad", np.eye(3)),
+            weights=parts.get("weights"),
+        ))
+    return interfaces
