@@ -1,0 +1,13 @@
+"""Errors of the parametric parts."""
+
+from fe_models.errors import FeModelsError, MeshError
+
+__all__ = ["MeshError", "MeshingError", "PartError"]
+
+
+class PartError(FeModelsError, ValueError):
+    """The dimensions of a part do not fit together."""
+
+
+class MeshingError(FeModelsError, RuntimeError):
+    """The mesher is missing or cannot be loaded."""

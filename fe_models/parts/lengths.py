@@ -1,0 +1,26 @@
+"""Checks of the lengths that describe a part."""
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from fe_models.parts.errors import PartError
+
+__all__ = ["require", "require_lengths"]
+
+
+def require_lengths(part: Any, *, zero_allowed: tuple[str, ...] = ()) -> None:
+    """Raise `PartError` unless every field of the part is a finite positive length (or zero where that is allowed)."""
+    for field in fields(part):
+        value = getattr(part, field.name)
+        low_ok = value >= 0 if field.name in zero_allowed else value > 0
+        if not (np.isfinite(value) and low_ok):
+            wanted = "zero or a positive length" if field.name in zero_allowed else "a positive length"
+            raise PartError(f"{type(part).__name__}: {field.name}: expected {wanted}, got {value}")
+
+
+def require(part: Any, holds: bool, rule: str, advice: str) -> None:
+    """Raise `PartError` with the rule that is broken and what to do, unless it holds."""
+    if not holds:
+        raise PartError(f"{type(part).__name__}: expected {rule}; {advice}")

@@ -1,0 +1,27 @@
+"""Meshes that come with the package."""
+
+from importlib.resources import files
+from pathlib import Path
+
+from fe_models.parts.errors import PartError
+
+__all__ = ["SHIPPED_MESHES", "shipped_mesh"]
+
+SHIPPED_MESHES = {"connecting_rod": "connecting_rod.msh"}  #: name -> file; default dimensions, in mm
+
+
+def shipped_mesh(name: str) -> Path:
+    """Return the path of a shipped mesh, such as "connecting_rod" (tet10, in mm, groups as its mesher names them).
+
+    Raises
+    ------
+    PartError
+        If there is no such mesh, with the choices; or if the package was installed in a form without plain files.
+    """
+    if name not in SHIPPED_MESHES:
+        raise PartError(f"shipped_mesh: no mesh {name!r}; choices: {', '.join(SHIPPED_MESHES)}")
+    resource = files("fe_models.parts") / "data" / SHIPPED_MESHES[name]
+    path = Path(str(resource))
+    if not path.is_file():
+        raise PartError(f"shipped_mesh: {path} is missing; install the package unpacked, with pip")
+    return path
