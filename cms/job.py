@@ -10,7 +10,8 @@ from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, 
 from cms.errors import JobError
 from cms.fe_body import INTERFACE_KINDS
 from cms.mode_sets import MODE_SETS
-from cms.toml_file import Matrix3, Range, Table, Vector3, choice, near_file, read_toml, validated
+from cms.paths import near_file
+from cms.toml_file import Matrix3, Range, Table, Vector3, choice, read_toml, validated
 from cms.units import UNIT_SYSTEMS
 from cms.words import nearest
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from cms.errors import ModalFileError
-from cms.words import nearest
+from cms.paths import near_file
 
 __all__ = ["SEAL_SIZE", "Content", "Dataset", "read_sealed", "write_sealed"]
 
@@ -97,9 +97,7 @@ def check_seal(path: Path, format: str, version: int) -> bool:
             sha256 = hashlib.file_digest(file, "sha256").hexdigest()
             n_bytes = file.tell()
     except FileNotFoundError:
-        siblings = [p.name for p in path.parent.glob("*")] if path.parent.is_dir() else []
-        hint = nearest(path.name, siblings).split("; choices")[0].removesuffix(";") if siblings else ""
-        raise ModalFileError(f"{path}: no such file{hint}") from None
+        raise ModalFileError(f"{path}: no such file{near_file(path)}") from None
     except OSError as error:
         raise ModalFileError(f"{path}: cannot be read: {reason(error)}") from error
     magic = f"floatframe {format} ".encode("ascii")

@@ -12,6 +12,7 @@ from typing import Annotated, Any, TypeVar, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
+from cms.paths import near_file
 from cms.words import nearest
 
 __all__ = ["Matrix3", "Range", "Table", "Vector3", "choice", "read_toml", "validated"]
@@ -40,14 +41,6 @@ def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
         ) from None
     except tomllib.TOMLDecodeError as problem:
         raise error(f"{path}: not valid TOML: {problem}") from None
-
-
-def near_file(path: Path) -> str:
-    """Return '; did you mean ...?' if the folder has a file with a name like it, or say that there is no folder."""
-    if not path.parent.is_dir():
-        return f"; the folder {path.parent} does not exist"
-    hint = nearest(path.name, [p.name for p in path.parent.iterdir()])
-    return hint.split("?")[0] + "?" if "did you mean" in hint else ""
 
 
 def validated(

@@ -16,7 +16,7 @@ __all__ = ["app"]
 
 app = commands("cms", "Component mode synthesis: a meshed part becomes a small, exact, portable flexible body.")
 
-ModalFile = Annotated[Path, typer.Argument(help="A modal file, as `cms reduce` writes it.")]
+ModalFile = Annotated[Path, typer.Argument(help="A modal file, as cms reduce writes it.")]
 Output = Annotated[Optional[Path], typer.Option("--output", "-o", help="File to write.")]  # noqa: UP045 - typer < 0.15
 
 
@@ -30,7 +30,7 @@ def reduce_command(
 
     Without -o the modal file stands beside the job file: rod.toml gives rod.h5.
 
-    Example: `cms reduce rod.toml -o rod.h5`
+    Example: cms reduce rod.toml -o rod.h5
     """
     from cms.errors import JobError
     from cms.job import read_job
@@ -69,7 +69,7 @@ def info_command(
 ) -> None:
     """Show what is in a modal file: mass, inertia, units, frame, modes, interfaces, provenance.
 
-    Example: `cms info rod.h5 --json`
+    Example: cms info rod.h5 --json
     """
     from cms.modal_file import digest, read
 
@@ -87,25 +87,26 @@ def info_command(
 
 def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     """Print mass properties, modes and interfaces of a body; provenance too if everything is wanted."""
-    from cms.cli.record import body_record
+    from cms.cli.record import body_record, body_size
 
     record = body_record(body)
     length, mass, inertia = (
         body.units.length_symbol, body.units.mass_symbol, f"{body.units.mass_symbol} {body.units.length_symbol}²"
     )  # fmt: skip
     frame = record["frame"]
-    tensor = record["inertia_about_center_of_mass"]
+    tensor, largest = record["inertia_about_center_of_mass"], record["principal_moments"][-1]
+    size = body_size(body)
     rows = [
         ("name", record["name"]),
         ("units", f"{body.units.name} (force {body.units.force_symbol}, stress {body.units.stress_symbol})"),
         ("frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
-        ("origin of B", f"{vector(frame['origin'])} {length} (mesh coordinates)"),
+        ("origin of B", f"{vector(frame['origin'], size)} {length} (mesh coordinates)"),
         ("mass", f"{record['mass']:.6g} {mass}"),
-        ("centre of mass", f"{vector(record['center_of_mass']['B'])} {length} (in B)"),
-        ("", f"{vector(record['center_of_mass']['mesh'])} {length} (mesh coordinates)"),
-        ("inertia about it", f"{vector(tensor[0])} {inertia} (axes of B)"),
-        ("", vector(tensor[1])),
-        ("", vector(tensor[2])),
+        ("centre of mass", f"{vector(record['center_of_mass']['B'], size)} {length} (in B)"),
+        ("", f"{vector(record['center_of_mass']['mesh'], size)} {length} (mesh coordinates)"),
+        ("inertia about it", f"{vector(tensor[0], largest)} {inertia} (axes of B)"),
+        ("", vector(tensor[1], largest)),
+        ("", vector(tensor[2], largest)),
         ("principal moments", f"{vector(record['principal_moments'])} {inertia}"),
         ("mass moments", "exact" if record["moments_are_exact"] else "approximate (from bare matrices)"),
         ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
@@ -124,7 +125,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     print_table(
         "Interfaces",
         ("name", "kind", "nodes>", f"position in B [{length}]"),
-        [(i["name"], i["kind"], i["nodes"], vector(i["position"])) for i in record["interfaces"]],
+        [(i["name"], i["kind"], i["nodes"], vector(i["position"], size)) for i in record["interfaces"]],
     )
     if everything:
         print_table("Provenance", ("", ""), list(record["provenance"].items()))
@@ -141,9 +142,10 @@ def say(text: str) -> None:
     out().print(text, markup=False, soft_wrap=True)
 
 
-def vector(values: Any) -> str:
-    """Return numbers in one line."""
-    return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"
+def vector(values: Any, scale: float | None = None) -> str:
+    """Return numbers in one line; what is rounding beside the scale (default: the greatest of them) reads 0."""
+    scale = max((abs(value) for value in values), default=0.0) if scale is None else scale
+    return "(" + ", ".join(f"{value if abs(value) > 1e-12 * scale else 0:.6g}" for value in values) + ")"
 
 
 def hertz(value: float | None) -> str:

@@ -11,7 +11,6 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from importlib import metadata
 from typing import Any, ParamSpec, TypeVar
 
 import typer
@@ -56,7 +55,7 @@ def run(app: typer.Typer, name: str) -> None:
 def commands(name: str, help: str) -> typer.Typer:
     """Return an application with the options --version and --debug."""
     app = typer.Typer(
-        name=name, help=help, no_args_is_help=True, add_completion=False, rich_markup_mode="markdown",
+        name=name, help=help, no_args_is_help=True, add_completion=False, rich_markup_mode="rich",
         pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
     )  # fmt: skip
 
@@ -76,6 +75,8 @@ def version_option(name: str) -> Any:
 
     def show(value: bool) -> None:
         if value:
+            from importlib import metadata
+
             try:
                 version = metadata.version("floatframe")
             except metadata.PackageNotFoundError:  # a checkout that is not installed
@@ -167,18 +168,21 @@ def output_path(given: Any, default: Any, error: type[Exception], *, overwrite_o
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Print a table on standard output; a column whose heading ends in '>' is aligned to the right."""
+    """Print a table on standard output; a heading that ends in '>' aligns to the right, none at all: no header."""
     from rich import box
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, title_style="bold")
+    table = Table(
+        title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD if any(columns) else box.SIMPLE,
+        show_header=any(columns), pad_edge=False,
+    )  # fmt: skip
     for column in columns:
         right = column.endswith(">")
-        table.add_column(column.removesuffix(">"), justify="right" if right else "left", no_wrap=right, overflow="fold")
+        heading = escape(column.removesuffix(">"))
+        table.add_column(heading, justify="right" if right else "left", no_wrap=right, overflow="fold")
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
-    console = out()
-    console.print(table)
+    out().print(table)
 
 
 def escape(cell: Any) -> str:

@@ -9,13 +9,18 @@ from cms.arrays import Array
 from cms.invariants import Moments
 from cms.reduced_body import ReducedBody
 
-__all__ = ["body_record", "central_inertia", "in_hertz"]
+__all__ = ["body_record", "body_size", "central_inertia", "in_hertz"]
 
 
 def central_inertia(moments: Moments) -> Array:
     """Return the inertia tensor of the undeformed body about its centre of mass, axes of B, (3, 3) [kg m²]."""
     c = moments.center_of_mass
     return moments.J0 - moments.m * (c @ c * np.eye(3) - np.outer(c, c))
+
+
+def body_size(body: ReducedBody) -> float:
+    """Return the diagonal of the bounding box of the kept nodes [m]."""
+    return float(np.linalg.norm(np.ptp(body.nodes, axis=0))) if len(body.nodes) else 0.0
 
 
 def in_hertz(body: ReducedBody, frequencies: Array) -> Array:

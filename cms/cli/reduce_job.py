@@ -68,7 +68,7 @@ def reduce_job(
 def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
     """Read and check the mesh, and assemble it with the materials and interfaces of the job."""
     from fe_models.importers import read_mesh
-    from fe_models.mesh_report import mesh_report
+    from fe_models.mesh_report import report_mesh
     from fe_models.solid import solid_body
     from fe_models.unused_nodes import drop_unused_nodes
 
@@ -77,7 +77,7 @@ def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
     with stages("read mesh"):
         mesh = read_mesh(path)
     with stages("check mesh"):
-        report = mesh_report(mesh, materials, units=units)
+        report = report_mesh(mesh, materials, units=units)
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=job.body.accept)
