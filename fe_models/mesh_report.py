@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -179,30 +180,46 @@ def report_mesh(
 
 def cell_geometry(mesh: Mesh, kind: str) -> CellGeometry:
     """Return volumes, first moments and least Jacobians of all cells of one type."""
-    shape = CELL_SHAPES[kind]
-    points, weights = quadrature(kind)
-    N, _ = shape_values(kind, points)
-    everywhere = np.vstack([points, shape.nodes])
     cells = mesh.cells[kind]
-    parts = []
-    for start in range(0, len(cells), _CHUNK):
-        X = mesh.nodes[cells[start : start + _CHUNK]]
-        jacobians = cell_jacobians(kind, X, everywhere)
-        inside = jacobians[:, : len(points)]
-        size = np.abs(inside) @ weights  # volume without regard to sign
-        mean = np.where(size > 0, size, 1.0) / weights.sum()
-        extent = np.ptp(X, axis=1).max(axis=1)
-        parts.append((
-            inside @ weights,
-            np.einsum("en,end->ed", (inside * weights) @ N, X),
-            inside.min(axis=1) / mean,
-            jacobians[:, len(points) :].min(axis=1) / mean,
-            size / np.where(extent > 0, extent, 1.0) ** 3,
-        ))
+    measure = _measure_tetra10 if kind == "tetra10" else partial(_measure, kind)
+    parts = [measure(mesh.nodes[cells[start : start + _CHUNK]]) for start in range(0, len(cells), _CHUNK)]
     return CellGeometry(*(frozen(np.concatenate(part)) for part in zip(*parts, strict=True)))
 
 
-def _select(geometry: Mapping[str, CellGeometry], test: Callable[[CellGeometry], NDArray[np.bool_]]) -> Mapping[str, IntArray]:
+def _measure(kind: str, X: Array) -> tuple[Array, ...]:
+    """Return the fields of `CellGeometry` of cells with these nodes, (n_cells, n_nodes, 3)."""
+    points, weights = quadrature(kind)
+    N, _ = shape_values(kind, points)
+    jacobians = cell_jacobians(kind, X, np.vstack([points, CELL_SHAPES[kind].nodes]))
+    inside = jacobians[:, : len(points)]
+    size = np.abs(inside) @ weights  # volume without regard to sign
+    mean = np.where(size > 0, size, 1.0) / weights.sum()
+    extent = (X.max(axis=1) - X.min(axis=1)).max(axis=1)
+    return (
+        inside @ weights,
+        np.einsum("en,end->ed", (inside * weights) @ N, X),
+        inside.min(axis=1) / mean,
+        jacobians[:, len(points) :].min(axis=1) / mean,
+        size / np.where(extent > 0, extent, 1.0) ** 3,
+    )
+
+
+def _measure_tetra10(X: Array) -> tuple[Array, ...]:
+    """Measure ten-node tetrahedra; those with straight edges, mostly all, by their corners (constant Jacobian)."""
+    middles = np.array(CELL_SHAPES["tetra10"].middles)
+    extent = (X.max(axis=1) - X.min(axis=1)).max(axis=1)
+    bend = np.abs(2 * X[:, 4:] - X[:, middles[:, 0]] - X[:, middles[:, 1]]).max(axis=(1, 2))
+    curved = bend > ROUNDING * extent
+    fields = _measure("tetra", X[:, :4])
+    if curved.any():
+        for straight, exact in zip(fields, _measure("tetra10", X[curved]), strict=True):
+            straight[curved] = exact
+    return fields
+
+
+def _select(
+    geometry: Mapping[str, CellGeometry], test: Callable[[CellGeometry], NDArray[np.bool_]]
+) -> Mapping[str, IntArray]:
     chosen = {kind: frozen_int(np.flatnonzero(test(g))) for kind, g in geometry.items()}
     return MappingProxyType({kind: rows for kind, rows in chosen.items() if rows.size})
 

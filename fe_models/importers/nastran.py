@@ -34,11 +34,12 @@ _TYPES: dict[str, dict[int, tuple[str, list[int] | None]]] = {
     "CBEAM": {2: ("line", None)},
 }  # card -> number of nodes -> meshio name and order
 _SOLID_CARDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRA", "CPYRAM")
-_NOTED = ("RBE1", "RBE2", "RBE3", "RBAR", "MPC", "CONM1", "CONM2", "CELAS1", "CELAS2", "CBUSH", "CGAP", "CONROD")
+_SOLID_PREFIXES = ("CTET", "CHEX", "CPEN", "CPYR")
+_NOTED = ("RBE", "RBAR", "RROD", "MPC", "CON", "CEL", "CBU", "CGA", "CMA", "CDA", "CTR", "CQU", "CSH", "CWE", "CTU")
 
 
 def read_nastran(path: Path, data: bytes) -> RawMesh:
-    """Return grid points and elements; the elements of property n are group `pid_n`.
+    """Return grid points and elements; the elements of property n are group `pid_n`, those without one in none.
 
     A deck may start with its bulk data. Displacement coordinate systems (CD) do not move nodes and are not read.
 
@@ -80,12 +81,14 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
             given = [*fields[3 : n_fields + 1], *[""] * (n_fields + 1 - len(fields))]
             count, nodes = _nodes_of(here, card, given)
             number = _integer(here, fields, 1)
-            numbers, rows = cells.setdefault((card, count, fields[2] or str(number)), ([], []))
-            numbers.append(number)  # a blank property number is the number of the element
+            numbers, rows = cells.setdefault((card, count, fields[2]), ([], []))
+            numbers.append(number)
             rows.append(nodes)
         elif card == "GRDSET":
             default_cp = fields[2] if len(fields) > 2 else ""
-        elif card in _NOTED:
+        elif card.startswith(_SOLID_PREFIXES):
+            raise MeshError(f"{here}: unknown solid element; expected {', '.join(_SOLID_CARDS)}")
+        elif card.startswith(_NOTED):
             noted[card] = noted.get(card, 0) + 1
     if default_cp not in ("", "0") and without_cp:
         raise MeshError(f"{where}: GRDSET puts {len(without_cp)} grid points into coordinate system {default_cp}, "
@@ -109,8 +112,8 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
         nodes_of_cells: IntArray = np.where(ordered[at] == wanted, order[at], -1)
         if local is not None:
             nodes_of_cells = nodes_of_cells[:, local]
-        everything = {f"pid_{pid}": np.arange(len(rows))}
-        blocks.append(RawBlock(kind, nodes_of_cells, everything, np.array(element_numbers, dtype=np.int64)))
+        group = {f"pid_{pid}": np.arange(len(rows))} if pid else {}
+        blocks.append(RawBlock(kind, nodes_of_cells, group, np.array(element_numbers, dtype=np.int64)))
     _require_unique(where, blocks)
     notes = tuple(f"{times} {card} cards were left out" for card, times in noted.items())
     return RawMesh(np.array(coordinates), tuple(blocks), node_numbers=numbers_of_nodes, notes=notes)
