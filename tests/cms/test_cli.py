@@ -1,0 +1,384 @@
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+from cms.cli.app import app
+from cms.cli.record import body_record, central_inertia
+from cms.cli.reduce_job import reduce_job
+from cms.job import read_job
+from cms.modal_file import read, write
+from cms.sealed_hdf5 import Content, write_sealed
+from tests.bodies import box_mesh
+from tests.decks import JOB, write_deck
+from tests.synthetic import synthetic_reduced_body
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = [sys.executable, "-c", "from cms.cli import main; main()"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+
+
+def bar():
+    return box_mesh(6, 2, 2, 100.0, 10.0, 10.0, "hexahedron")
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    """A folder with a good job and its mesh."""
+    write_deck(tmp_path / "bar.inp", bar())
+    (tmp_path / "bar.toml").write_text(JOB)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def modal_file(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("modal") / "bar.h5"
+    write(synthetic_reduced_body(), path)
+    return path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() for p in sorted(folder.iterdir())}
+
+
+def assert_refused(result, *words):
+    """Exit code 2, one message on standard error with these words, no traceback."""
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith("error: ")
+    assert result.stderr.count("error: ") == 1
+    assert "Traceback" not in result.output
+    for word in words:
+        assert word in result.stderr
+
+
+# Good input ----------------------------------------------------------------------------------------------------------
+
+
+def test_reduce_writes_the_body_that_the_job_describes(folder):
+    result = run("reduce", folder / "bar.toml", "-o", folder / "out.h5")
+    assert result.exit_code == 0, result.output
+    body = read(folder / "out.h5")
+    assert_allclose(body.moments.m, 7.85e-9 * 100 * 10 * 10, rtol=1e-12)
+    assert_allclose(body.frame.origin, [0, 5, 5], rtol=0, atol=1e-9)
+    assert (body.frame.kind, body.frame.at) == ("nodal", "left")
+    assert [(i.name, i.kind) for i in body.interfaces] == [("left", "rigid"), ("right", "distributing")]
+    assert_allclose(body.D, np.diag(2 * 0.01 * np.sqrt(np.diag(body.K))), rtol=1e-12, atol=0)
+    assert body.units.name == "mm-t-s"
+    for word in ("Mesh", "Modes", "Interfaces", "Time", "assemble", "24 hexahedron", "wrote"):
+        assert word in result.stdout
+    assert sorted(contents(folder)) == ["bar.inp", "bar.toml", "out.h5"]
+
+
+def test_the_default_output_stands_beside_the_job(folder):
+    assert run("reduce", folder / "bar.toml").exit_code == 0
+    assert (folder / "bar.h5").is_file()
+
+
+def test_file_line_and_memory_line_agree_bit_for_bit(folder):
+    body = reduce_job(read_job(folder / "bar.toml"))
+    write(body, folder / "a.h5")
+    again = read(folder / "a.h5")
+    assert again.Phi.tobytes() == body.Phi.tobytes()
+    assert again.moments.S_kl.tobytes() == body.moments.S_kl.tobytes()
+
+
+def test_cutoff_is_in_hertz_in_every_unit_system(folder):
+    """The bar in mm-kg-ms has frequencies in kHz; the cut-off keeps the same modes."""
+    job = JOB.replace("n_modes = 3", "cutoff = 150000.0")
+    (folder / "bar.toml").write_text(job)
+    body = reduce_job(read_job(folder / "bar.toml"))
+    ms = job.replace("mm-t-s", "mm-kg-ms").replace("210000", "210").replace("7.85e-9", "7.85e-6")
+    (folder / "bar.toml").write_text(ms)
+    body_ms = reduce_job(read_job(folder / "bar.toml"))
+    assert body.n_q > 6
+    hertz = [[mode["frequency_hz"] for mode in body_record(b)["modes"]] for b in (body, body_ms)]
+    assert_allclose(hertz[0], hertz[1], rtol=1e-6)
+
+
+def test_two_materials_by_group_of_cells(folder):
+    light = '[materials.light]\nyoung = 70000\npoisson = 0.3\ndensity = 2.7e-9\ncells = ["right half"]\n'
+    job = JOB.replace("density = 7.85e-9", 'density = 7.85e-9\ncells = "left half"').replace(
+        "[interfaces.left]", light + "[interfaces.left]"
+    )
+    (folder / "bar.toml").write_text(job)
+    body = reduce_job(read_job(folder / "bar.toml"))
+    assert_allclose(body.moments.m, (7.85e-9 + 2.7e-9) * 5000, rtol=1e-12)
+
+
+def test_a_triad_lists_the_axes_of_the_interface(folder):
+    rows = "triad = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]"
+    (folder / "bar.toml").write_text(JOB.replace('nodes = "left"', f'nodes = "left"\n{rows}'))
+    body = reduce_job(read_job(folder / "bar.toml"))
+    assert_allclose(body.interface("left").triad[:, 0], [0, 1, 0], rtol=0, atol=1e-15)
+
+
+def test_matrices_reduce_without_a_mesh(folder):
+    from tests.bodies import bar as bar_body
+
+    body = bar_body(nx=4)
+    M, K = body.M.tocoo(), body.K.tocoo()
+    np.savez(folder / "bar.npz", M_row=M.row, M_col=M.col, M_data=M.data, K_row=K.row, K_col=K.col, K_data=K.data,
+             nodes=body.nodes, dofs=body.dofs, **{f"interface/{i.name}/nodes": i.nodes for i in body.interfaces})
+    (folder / "bar.toml").write_text('[body]\nmatrices = "bar.npz"\nunits = "m-kg-s"\n[reduction]\nn_modes = 2\n')
+    result = run("reduce", folder / "bar.toml")
+    assert result.exit_code == 0, result.output
+    assert_allclose(read(folder / "bar.h5").moments.m, 7850 * 0.05 * 0.04, rtol=1e-12)
+
+
+def test_info_prints_what_is_in_the_file(modal_file):
+    result = run("info", modal_file)
+    assert result.exit_code == 0, result.output
+    for word in ("synthetic", "mm-t-s", "nodal at big_end", "kleines Auge/2 µ", "fixed-interface", "rod.msh", "digest"):
+        assert word in result.stdout
+
+
+def test_info_json_is_the_record(modal_file):
+    result = run("info", modal_file, "--json")
+    assert result.exit_code == 0
+    record = json.loads(result.stdout)
+    body = synthetic_reduced_body()
+    assert record["mass"] == body.moments.m
+    assert record["modes"][0]["frequency_hz"] == body.frequencies[0]
+    assert_allclose(record["modes"][1]["damping_ratio"], 0.01, rtol=1e-12)
+    assert len(record["digest"]) == 64
+
+
+def test_central_inertia_is_that_of_the_point_masses():
+    rng = np.random.default_rng(0)
+    mass, c = rng.uniform(1, 2, 7), rng.normal(size=(7, 3))
+    body = synthetic_reduced_body(n_q=1)
+    moments = type(body.moments)(mass.sum(), mass @ c, (c.T * mass) @ c, body.moments.C1, body.moments.P,
+                                 body.moments.S_kl)
+    d = c - mass @ c / mass.sum()
+    expected = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(mass, d, strict=True))
+    assert_allclose(central_inertia(moments), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_the_record_gives_the_centre_of_mass_in_mesh_coordinates(folder):
+    body = reduce_job(read_job(folder / "bar.toml"))
+    assert_allclose(body_record(body)["center_of_mass"]["mesh"], [50, 5, 5], rtol=1e-12)
+    assert_allclose(body_record(body)["center_of_mass"]["B"], [50, 0, 0], rtol=0, atol=1e-9)
+
+
+# Bad input -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('mesh = "bar.inp"', 'mesh = "baz.inp"', ["body.mesh", "no such file", "did you mean 'bar.inp'?"]),
+    ('units = "mm-t-s"', 'unit = "mm-t-s"', ["body.unit: unknown key; did you mean 'units'?"]),
+    ('units = "mm-t-s"', 'units = "m-kg-s"', ["unit", "7.85e-09"]),
+    ("n_modes = 3", 'n_modes = 3\nset = "craig-bamton"', ["did you mean 'craig-bampton'?"]),
+    ("young = 210000", "young = 0", ["materials.steel.young = 0: expected a number above 0"]),
+    ("density = 7.85e-9", "density = -1", ["materials.steel.density = -1"]),
+    ("poisson = 0.3", "poisson = 0.5", ["materials.steel.poisson = 0.5"]),
+    ("young = 210000", "young = nan", ["materials.steel.young = nan"]),
+    ('nodes = "left"', 'nodes = "lefd"', ["interface 'left'", "'lefd'", "did you mean 'left'?"]),
+    ('nodes = "left"', 'faces = "left"', ["no face group 'left'", "is a node set"]),
+    ("density = 7.85e-9", 'density = 7.85e-9\ncells = "al"', ["group of cells 'al'", "did you mean 'all'?"]),
+    ("density = 7.85e-9", 'density = 7.85e-9\ncells = "left half"', ["cells without a material", "right half"]),
+    ("point = [100, 0, 0]", "point = [101, 0, 0]", ["interface 'right'", "no surface node"]),
+    ("plane = {point = [100, 0, 0], normal = [1, 0, 0]}", 'nodes = "top"', ["'left' and 'right' share"]),
+    ('nodes = "left"', "box = {lo = [0, 0, 0], hi = [100, 0, 0]}", ["interface 'left'", "on one line"]),
+    ('nodes = "left"', "nearest = {point = [0, 0, 0]}", ["interface 'left'", "at least 3 nodes"]),
+    ("n_modes = 3", "n_modes = 3000", ["n_modes = 3000", "interior dofs"]),
+])  # fmt: skip
+def test_a_bad_job_ends_in_one_message_and_leaves_nothing(folder, old, new, words):
+    assert JOB.count(old) == 1
+    (folder / "bar.toml").write_text(JOB.replace(old, new))
+    before = contents(folder)
+    assert_refused(run("reduce", folder / "bar.toml"), *words)
+    assert contents(folder) == before
+
+
+def bad_meshes():
+    mesh = bar()
+    cells = mesh.cells["hexahedron"]
+    inverted = cells.copy()
+    inverted[3] = inverted[3][[4, 5, 6, 7, 0, 1, 2, 3]]
+    apart = np.concatenate([mesh.nodes, mesh.nodes + np.array([0, 50, 0])])
+    nan = mesh.nodes.copy()
+    nan[5, 1] = np.nan
+    replaced = {"nodes": mesh.nodes, "cells": {"hexahedron": cells}, "node_sets": mesh.node_sets}
+    return {
+        "inverted": ({**replaced, "cells": {"hexahedron": inverted}}, ["inverted"]),
+        "unconnected": (
+            {**replaced, "nodes": apart, "cells": {"hexahedron": np.concatenate([cells, cells + len(mesh.nodes)])}},
+            ["2 ", "parts"],
+        ),
+        "nan": ({**replaced, "nodes": nan}, ["nan"]),
+    }
+
+
+@pytest.mark.parametrize("kind", ["inverted", "unconnected", "nan"])
+def test_a_bad_mesh_ends_in_one_message_and_leaves_nothing(folder, kind):
+    from fe_models.mesh import Mesh
+
+    arrays, words = bad_meshes()[kind]
+    write_deck(folder / "bar.inp", Mesh(**arrays))
+    before = contents(folder)
+    result = run("reduce", folder / "bar.toml")
+    assert_refused(result)
+    assert all(word in result.stderr.lower() for word in words), result.stderr
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89HDF\r\n\x1a\n" + bytes(range(256)) * 8, b"*NODE\n1, 0, 0\n",
+                                     b"PK\x03\x04" + b"\0" * 100])  # fmt: skip
+@pytest.mark.parametrize("suffix", [".inp", ".msh", ".vtu", ".bdf", ".xyz"])
+def test_a_mesh_that_is_no_mesh_is_refused(folder, content, suffix):
+    (folder / f"garbage{suffix}").write_bytes(content)
+    (folder / "bar.toml").write_text(JOB.replace("bar.inp", f"garbage{suffix}"))
+    before = contents(folder)
+    assert_refused(run("reduce", folder / "bar.toml"), f"garbage{suffix}")
+    assert contents(folder) == before
+
+
+def test_a_mechanism_is_named(folder):
+    """Two blocks that share one edge: a hinge, which no solid mesh report may miss and no reduction may swallow."""
+    from fe_models.mesh import Mesh
+
+    one = box_mesh(1, 1, 1, 10.0, 10.0, 10.0, "hexahedron")
+    other = one.nodes + np.array([10, 10, 0])
+    nodes = np.unique(np.concatenate([one.nodes, other]), axis=0)
+    cells = one.cells["hexahedron"]
+    number = {tuple(x): k for k, x in enumerate(nodes.tolist())}
+    place = [[number[tuple(x)] for x in block[cells[0]].tolist()] for block in (one.nodes, other)]
+    mesh = Mesh(nodes, {"hexahedron": np.array(place)}, node_sets={"left": np.flatnonzero(nodes[:, 0] == 0)})
+    write_deck(folder / "bar.inp", mesh)
+    job = re.sub(r"\[interfaces.right\].*?\n\n", "", JOB, flags=re.DOTALL).replace("n_modes = 3", 'set = "guyan"')
+    (folder / "bar.toml").write_text(job)
+    before = contents(folder)
+    assert_refused(run("reduce", folder / "bar.toml"))
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize(("damage", "words"), [
+    (lambda b: b[: len(b) // 2], "truncated"),
+    (lambda b: b[:100], "truncated"),
+    (lambda b: b[:5000] + bytes([b[5000] ^ 1]) + b[5001:], "altered"),
+    (lambda b: b"", "not a modal-file"),
+    (lambda b: b"some text", "not a modal-file"),
+])
+@pytest.mark.parametrize("command", [["info"], ["info", "--json"]])
+def test_a_damaged_modal_file_is_refused(modal_file, tmp_path, damage, words, command):
+    path = tmp_path / "bad.h5"
+    path.write_bytes(damage(modal_file.read_bytes()))
+    result = run(command[0], path, *command[1:])
+    assert_refused(result, words)
+    assert result.stdout == ""
+
+
+def test_other_and_newer_and_missing_files_are_refused(tmp_path, modal_file):
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1.0
+    assert_refused(run("info", tmp_path / "other.h5"), "HDF5 of another program")
+    write_sealed(Content("modal-file", 2, {}), tmp_path / "new.h5")
+    assert_refused(run("info", tmp_path / "new.h5"), "format version 2", "update")
+    assert_refused(run("info", modal_file.with_name("baz.h5")), "did you mean 'bar.h5'?")
+
+
+def test_the_output_is_checked_before_the_work(folder):
+    before = contents(folder)
+    for output, words in [("nowhere/out.h5", "does not exist"), ("bar.toml", "this is the input"),
+                          ("bar.inp", "this is the input"), (".", "this is a folder")]:
+        assert_refused(run("reduce", folder / "bar.toml", "-o", folder / output), words)
+    assert contents(folder) == before
+
+
+def test_a_fault_of_the_program_has_exit_code_1_and_a_traceback_only_with_debug(folder, monkeypatch):
+    def fail(*_, **__):
+        raise ZeroDivisionError("unlucky")
+
+    monkeypatch.setattr("cms.cli.reduce_job.reduce_job", fail)
+    result = run("reduce", folder / "bar.toml")
+    assert result.exit_code == 1
+    assert "ZeroDivisionError: unlucky" in result.stderr
+    assert "Traceback" not in result.output
+    assert "Traceback" in run("--debug", "reduce", folder / "bar.toml").stderr
+    assert sorted(contents(folder)) == ["bar.inp", "bar.toml"]
+
+
+def test_an_interrupt_has_exit_code_130(folder, monkeypatch):
+    def fail(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cms.cli.reduce_job.reduce_job", fail)
+    result = run("reduce", folder / "bar.toml")
+    assert result.exit_code == 130
+    assert result.stderr.startswith("error: interrupted")
+
+
+# The program itself --------------------------------------------------------------------------------------------------
+
+
+def test_a_full_disk_leaves_the_old_file_and_one_message(folder):
+    (folder / "out.h5").write_bytes(b"the old file")
+    before = contents(folder)
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
+    program = [sys.executable, "-c", limit + PROGRAM[2]]
+    result = subprocess.run([*program, "reduce", "bar.toml", "-o", "out.h5"], cwd=folder, env=ENVIRONMENT,
+                            capture_output=True, text=True)
+    assert result.returncode == 2, result.stderr
+    assert result.stderr.startswith("error: ")
+    assert "cannot be written" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert contents(folder) == before
+
+
+def test_a_killed_run_leaves_the_old_file(folder):
+    """Ctrl-C while the job runs, from outside."""
+    (folder / "out.h5").write_bytes(b"the old file")
+    before = contents(folder)
+    slow = "import cms.modal_file as m, time; m.write = lambda *_: (print('ready', flush=True), time.sleep(60)); "
+    program = [sys.executable, "-c", slow + PROGRAM[2]]
+    with subprocess.Popen([*program, "reduce", "bar.toml", "-o", "out.h5"], cwd=folder, env=ENVIRONMENT, text=True,
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert error.startswith("error: interrupted")
+    assert "Traceback" not in error
+    assert contents(folder) == before
+
+
+def test_help_names_the_commands_and_loads_nothing_heavy():
+    script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
+    result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    for command in ("reduce", "info"):
+        assert command in result.stdout
+    loaded = result.stdout[result.stdout.rindex("[") :]
+    for heavy in ("numpy", "scipy", "h5py", "pydantic", "meshio", "skfem", "pyvista", "numba", "matplotlib"):
+        assert f"'{heavy}'" not in loaded
+
+
+def test_output_survives_a_terminal_without_unicode(modal_file):
+    environment = {**ENVIRONMENT, "PYTHONIOENCODING": "ascii", "TERM": "dumb", "NO_COLOR": "1"}
+    result = subprocess.run([*PROGRAM, "info", str(modal_file)], env=environment, capture_output=True)
+    assert result.returncode == 0, result.stderr
+    assert b"\x1b" not in result.stdout
+    assert result.stdout.isascii()
+
+
+def test_version_and_unknown_commands():
+    assert run("--version").stdout.startswith("cms ")
+    result = run("reduse")
+    assert result.exit_code == 2
+    assert "reduse" in result.stderr
+    assert run().exit_code in (0, 2)
