@@ -7,7 +7,7 @@ from cms.matrix_moments import gram_from_matrices
 
 
 def test_nodal_masses_with_isotropic_inertia_are_exact():
-    """Each node stands for six points at ± rho on its axes, moving rigidly with it: the sum over points is the truth."""
+    """Each node stands for six points at ± rho on its axes, moving rigidly with it: their sum is the truth."""
     rng = np.random.default_rng(4)
     n_nodes, n_q, rho = 5, 3, 0.3
     nodes, mass = rng.normal(size=(n_nodes, 3)), rng.uniform(1, 2, n_nodes)
