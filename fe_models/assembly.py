@@ -121,7 +121,7 @@ def node_graph(lists: list[np.ndarray], n_nodes: int, pool: ThreadPoolExecutor) 
     unused = np.flatnonzero(np.diff(start) == 0)
     if unused.size:
         raise MeshError(f"assembly: {unused.size} of {n_nodes} nodes belong to no solid cell (first: {unused[0]}); "
-                        f"drop them first: fe_models.mesh_report.drop_unused_nodes(mesh)")
+                        f"drop them first: fe_models.unused_nodes.drop_unused_nodes(mesh)")
     counts = np.zeros(n_nodes, np.int64)
     in_parts(pool, row_counts, (members, first, n_members, start, places), (counts,))
     row_start = np.concatenate([[0], np.cumsum(counts)])

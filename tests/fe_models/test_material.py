@@ -55,7 +55,7 @@ def test_unknown_group_names_the_nearest():
 
 
 def test_cells_without_material_are_counted_and_their_group_named():
-    with pytest.raises(MaterialError, match=r"without a material: 8 hexahedron; they are in the groups right half, all"):
+    with pytest.raises(MaterialError, match=r"material: 8 hexahedron; they are in the groups right half, all"):
         assign_materials(box_mesh(4, 2, 2), {"left half": STEEL})
 
 
