@@ -65,6 +65,8 @@ def test_the_same_body_gives_the_same_file_and_another_body_another_digest(body,
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
     assert digest(tmp_path / "a.h5") == digest(tmp_path / "b.h5")
     assert digest(tmp_path / "a.h5") != digest(tmp_path / "c.h5")
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert not file["modes/K"].id.get_create_plist().get_obj_track_times()
 
 
 def test_every_flipped_byte_is_detected(path):
@@ -174,6 +176,9 @@ def test_a_newer_version_is_refused_by_its_number(body, tmp_path, monkeypatch):
     for file in (tmp_path / "new.h5", repacked(tmp_path / "new.h5")):
         with pytest.raises(ModalFileError, match="format version 2, this program reads versions up to 1"):
             read(file)
+    (tmp_path / "new.h5").write_bytes(b"floatframe modal-file 12\nbytes 9\nof a kind that does not exist yet")
+    with pytest.raises(ModalFileError, match="format version 12"):
+        read(tmp_path / "new.h5")
 
 
 def written_with(content, path):
