@@ -45,18 +45,22 @@ def read_vtk(path: Path, data: bytes) -> RawMesh:
             raise MeshError(f"{where}: the file has {pieces} pieces; expected one. Merge them (in ParaView: Merge "
                             f"Blocks, then save again)")
     said = io.StringIO()
+    mesh, failure = None, None
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             mesh = meshio.read(path)
-    except KeyError as error:
-        raise MeshError(f"{where}: unsupported cells of type {error.args[0]}; {_SUPPORTED}") from error
     except (Exception, SystemExit) as error:
-        words = " ".join(f"{said.getvalue()} {error if not isinstance(error, SystemExit) else ''}".split())
+        failure = error
+    words = " ".join(said.getvalue().split())
+    if "cannot handle" in words:
+        kind = re.search(r"type (\d+)", words)
+        raise MeshError(f"{where}: unsupported cells{f' of VTK type {kind[1]}' if kind else ''}; {_SUPPORTED}")
+    if isinstance(failure, KeyError):
+        raise MeshError(f"{where}: unsupported cells of type {failure.args[0]}; {_SUPPORTED}") from failure
+    if mesh is None:
+        reason = words if isinstance(failure, SystemExit) else f"{words} {failure}".strip()
         raise MeshError(f"{where}: could not be read as a VTK file: it is damaged or of another kind "
-                        f"({words[:200] or type(error).__name__})") from error
-    if "cannot handle" in said.getvalue():
-        words = " ".join(said.getvalue().split())
-        raise MeshError(f"{where}: unsupported cells would be dropped ({words[:200]}); {_SUPPORTED}")
+                        f"({' '.join(reason.split())[:200] or type(failure).__name__})") from failure
     nodes = np.asarray(mesh.points, dtype=float)
     blocks = []
     for k, block in enumerate(mesh.cells):

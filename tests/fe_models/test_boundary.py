@@ -85,7 +85,7 @@ def test_boundary_facets_keep_middle_nodes_between_their_corners(kind):
 
 def test_boundary_of_a_mixed_mesh_hides_the_facets_between_cell_types():
     hexes, wedges = faced_box("hexahedron", (1, 1, 1), (1, 1, 1)), faced_box("wedge", (1, 1, 1), (1, 1, 1))
-    nodes = np.concatenate([hexes.nodes, wedges.nodes + [1, 0, 0]])
+    nodes = np.concatenate([hexes.nodes, wedges.nodes + np.array([1, 0, 0])])
     unique, number = np.unique(np.rint(nodes), axis=0, return_inverse=True)
     mesh = Mesh(unique, {"hexahedron": number[hexes.cells["hexahedron"]],
                          "wedge": number[wedges.cells["wedge"] + len(hexes.nodes)]})
