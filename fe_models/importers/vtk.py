@@ -15,6 +15,7 @@ from fe_models.importers.raw_mesh import RawBlock, RawMesh
 __all__ = ["read_vtk"]
 
 _SUPPORTED = "supported are linear and quadratic tetrahedra and hexahedra, and linear wedges; mesh the part again"
+_WITHOUT_SIZE = ("wedge12", "wedge15", "wedge18", "pyramid13", "hexahedron24", "quad6", "triangle7")  # in meshio
 _MOST_GROUPS = 1000  #: cell data with more distinct values are numbers of cells, not groups
 
 
@@ -55,7 +56,7 @@ def read_vtk(path: Path, data: bytes) -> RawMesh:
     if "cannot handle" in words:
         kind = re.search(r"type (\d+)", words)
         raise MeshError(f"{where}: unsupported cells{f' of VTK type {kind[1]}' if kind else ''}; {_SUPPORTED}")
-    if isinstance(failure, KeyError):
+    if isinstance(failure, KeyError) and failure.args[0] in _WITHOUT_SIZE:
         raise MeshError(f"{where}: unsupported cells of type {failure.args[0]}; {_SUPPORTED}") from failure
     if mesh is None:
         reason = words if isinstance(failure, SystemExit) else f"{words} {failure}".strip()

@@ -464,7 +464,7 @@ def test_vtk_cells_that_meshio_would_drop_are_refused(tmp_path, capsys):
     text = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n"
     text += "0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1\nCELLS 2 14\n8 0 1 2 3 4 5 6 7\n4 0 1 2 4\n"
     text += "CELL_TYPES 2\n11\n10\n"
-    assert "unsupported cells of VTK type 11" in refusal(tmp_path, "rod.vtk", text, capsys)
+    assert "unsupported cells;" in refusal(tmp_path, "rod.vtk", text, capsys)  # meshio does not say which
     mesh = faced_box("tetra")
     content = written(tmp_path / "good.vtu", meshio.Mesh(mesh.nodes, list(mesh.cells.items())), binary=False)
     at = content.index(b"types")
