@@ -262,7 +262,7 @@ def test_a_mechanism_is_named(folder):
     job = re.sub(r"\[interfaces.right\].*?\n\n", "", JOB, flags=re.DOTALL).replace("n_modes = 3", 'set = "guyan"')
     (folder / "bar.toml").write_text(job)
     before = contents(folder)
-    assert_refused(run("reduce", folder / "bar.toml"))
+    assert_refused(run("reduce", folder / "bar.toml"), "1 motions without energy", "at (20, 20, 0)")
     assert contents(folder) == before
 
 
