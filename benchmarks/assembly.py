@@ -3,9 +3,9 @@
     python -m benchmarks.assembly                # 0.1 and 0.5 million dofs
     python -m benchmarks.assembly 0.1 1.0        # others
 
-Every measurement is a process of its own. Time: from the mesh in memory to K and M in compressed columns, warm: compiled
-code comes from the cache; loading it, and the first compilation into an empty cache, are printed apart (they include
-importing the libraries). Memory: peak of the process above what it held before.
+Every measurement is a process of its own. Time: from the mesh in memory to K and M in compressed columns, warm:
+compiled code comes from the cache; loading it, and the first compilation into an empty cache, are printed apart
+(they include importing the libraries). Memory: peak of the process above what it held before.
 """
 
 import json

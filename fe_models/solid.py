@@ -121,12 +121,13 @@ def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
     A = np.hstack([np.ones((n_nodes, 1)), nodes, u.reshape(n_nodes, -1)])
     n_rows = max(1, int(GRAM_BYTES / (8 * A.shape[1])))
 
-    def block(begin: int) -> Array:
-        rows = slice(begin, begin + n_rows)
-        return np.asarray(A[rows].T @ (M_s[rows] @ A))
-
-    with ThreadPoolExecutor(n_threads()) as pool:
-        gram = sum(pool.map(block, range(0, n_nodes, n_rows)), start=np.zeros(2 * (A.shape[1],)))
+    blocks = [slice(begin, begin + n_rows) for begin in range(0, n_nodes, n_rows)]
+    gram, n_parts = np.zeros(2 * (A.shape[1],)), n_threads()
+    with ThreadPoolExecutor(n_parts) as pool:
+        for begin in range(0, len(blocks), n_parts):  # sparse products in threads; the dense one has threads of its own
+            group = blocks[begin : begin + n_parts]
+            for rows, product in zip(group, pool.map(lambda rows: M_s[rows] @ A, group), strict=True):
+                gram += A[rows].T @ product
     return np.asarray((gram + gram.T) / 2)  # symmetric by definition; the blocks round the halves apart
 
 

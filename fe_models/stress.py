@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,9 +40,11 @@ def nodal_stress(
 
     lame = np.array([[material.lam, material.mu] for material in materials])
     volume = np.zeros(len(mesh.nodes))
-    columns = [np.ascontiguousarray(u[:, k]).reshape(-1, 3) for k in range(u.shape[1])]
-    stress = np.zeros((u.shape[1], len(mesh.nodes), 6))
-    with ThreadPoolExecutor(n_threads()) as pool:  # a thread owns a column: no two write to one entry
+    fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
+    n_columns = fields.shape[2]
+    stress = np.zeros((len(mesh.nodes), 6, n_columns))
+    cuts = np.linspace(0, n_columns, min(n_threads(), n_columns) + 1).astype(int) if n_columns else np.zeros(1, int)
+    with ThreadPoolExecutor(n_threads()) as pool:  # a thread owns its columns: no two write to one entry
         for kind, cells in mesh.cells.items():
             if not len(cells):
                 continue
@@ -50,15 +53,15 @@ def nodal_stress(
             volume_at_nodes(mesh.nodes, cells, of_cell[kind], of_node, table.gradients, table.weights, volume)
             futures = [
                 pool.submit(
-                    add_element_stress, mesh.nodes, cells, of_cell[kind], of_node, lame, table.gradients, table.weights,
-                    element.extrapolation, column, out,
+                    add_element_stress, mesh.nodes, cells, of_cell[kind], of_node, lame, table.gradients,
+                    table.weights, element.extrapolation, fields, first, last, stress,
                 )
-                for column, out in zip(columns, stress, strict=True)
+                for first, last in pairwise(cuts.tolist())
             ]
             for future in futures:
                 future.result()
-    stress /= volume[:, None]
-    return np.ascontiguousarray(stress.transpose(1, 2, 0))
+    stress /= volume[:, None, None]
+    return stress
 
 
 def stiffest_at_nodes(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray]) -> IntArray:

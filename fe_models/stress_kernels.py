@@ -29,16 +29,18 @@ def volume_at_nodes(nodes, cells, of_cell, of_node, dN, w, volume):
 
 
 @jit
-def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolation, u, stress):
-    """Add to stress, (n_nodes, 6), volume times stress of every element at its nodes; u: displacements, (n_nodes, 3).
+def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolation, u, first, last, stress):
+    """Add to the columns first..last of stress, (n_nodes, 6, k), volume times stress of every element at its nodes.
 
-    lame: lam and mu of every material, (n_materials, 2); of_cell, of_node: materials of elements and nodes.
+    u: displacement columns, (n_nodes, 3, k); lame: lam and mu of every material, (n_materials, 2); of_cell, of_node:
+    materials of elements and nodes. Columns are the inner loop: the geometry is worked out once for all of them.
     """
     n_a = cells.shape[1]
+    n_k = last - first
     x = np.empty((n_a, 3))
     J, Q = np.empty((3, 3)), np.empty((3, 3))
-    H = np.empty((3, 3))
-    sigma = np.empty((w.size, 6))
+    H = np.empty((3, 3, n_k))
+    sigma = np.empty((w.size, 6, n_k))
     for e in range(cells.shape[0]):
         lam, mu = lame[of_cell[e], 0], lame[of_cell[e], 1]
         for a in range(n_a):
@@ -50,21 +52,27 @@ def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolatio
             total += w[q] * det
             H[:] = 0.0  # displacement gradient, H_ij = ∂u_i / ∂x_j
             for a in range(n_a):
-                for j in range(3):
+                for j in range(J.shape[0]):  # a size unknown to the compiler: no unrolling, faster to compile
                     g = (dN[q, a, 0] * Q[0, j] + dN[q, a, 1] * Q[1, j] + dN[q, a, 2] * Q[2, j]) / det
-                    for i in range(3):
-                        H[i, j] += u[cells[e, a], i] * g
-            pressure = lam * (H[0, 0] + H[1, 1] + H[2, 2])
-            for i in range(3):
-                sigma[q, i] = pressure + 2.0 * mu * H[i, i]
-            sigma[q, 3] = mu * (H[1, 2] + H[2, 1])
-            sigma[q, 4] = mu * (H[0, 2] + H[2, 0])
-            sigma[q, 5] = mu * (H[0, 1] + H[1, 0])
+                    for i in range(J.shape[0]):
+                        row, column = H[i, j], u[cells[e, a], i, first:last]
+                        for k in range(n_k):
+                            row[k] += column[k] * g
+            for k in range(n_k):
+                pressure = lam * (H[0, 0, k] + H[1, 1, k] + H[2, 2, k])
+                sigma[q, 0, k] = pressure + 2.0 * mu * H[0, 0, k]
+                sigma[q, 1, k] = pressure + 2.0 * mu * H[1, 1, k]
+                sigma[q, 2, k] = pressure + 2.0 * mu * H[2, 2, k]
+                sigma[q, 3, k] = mu * (H[1, 2, k] + H[2, 1, k])
+                sigma[q, 4, k] = mu * (H[0, 2, k] + H[2, 0, k])
+                sigma[q, 5, k] = mu * (H[0, 1, k] + H[1, 0, k])
         for a in range(n_a):
             node = cells[e, a]
             if of_cell[e] != of_node[node]:
                 continue
             for q in range(w.size):
                 factor = total * extrapolation[a, q]
-                for i in range(6):
-                    stress[node, i] += factor * sigma[q, i]
+                for i in range(sigma.shape[1]):
+                    row, column = stress[node, i, first:last], sigma[q, i]
+                    for k in range(n_k):
+                        row[k] += factor * column[k]
