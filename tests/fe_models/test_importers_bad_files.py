@@ -158,6 +158,27 @@ def test_gmsh_file_truncated_anywhere_is_refused(version, binary, tmp_path, caps
         refusal(tmp_path, "rod.msh", content[:end], capsys)
 
 
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".inp", ".msh", ".bdf", ".med"])
+def test_damaged_file_is_read_or_refused_but_never_breaks(suffix, tmp_path, capsys):
+    content = good_files(tmp_path)[suffix]
+    capsys.readouterr()
+    rng = np.random.default_rng(11)
+    path = tmp_path / f"rod{suffix}"
+    n_refused = 0
+    for _ in range(60):
+        damaged = bytearray(content)
+        at = rng.integers(len(damaged))
+        damaged[at : at + 8] = rng.integers(0, 256, 8, dtype=np.uint8).tobytes()
+        path.write_bytes(bytes(damaged))
+        try:
+            read_mesh(path)
+        except MeshError:
+            n_refused += 1
+    assert n_refused > 0
+    printed = capsys.readouterr()
+    assert printed.out + printed.err == ""
+
+
 # --- content -------------------------------------------------------------------------------------------------------
 
 
@@ -305,6 +326,7 @@ def test_groups_of_one_name_and_two_dimensions_and_cells_without_a_group(tmp_pat
     ("1 4 2 1 1 1 2 3 4", "1 44 2 1 1 1 2 3 4", "Gmsh type 44"),
     ("$Elements\n1\n", "$Elements\n7\n", "7 cells announced, 1 lines found"),
     ("3 0 1 0", "3 0 one 0", "expected numbers only"),
+    ("$Nodes\n4", "$Nodes\nfour", "could not be read as a Gmsh file: it is damaged or of another kind (ValueError"),
     ("$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n", "", "expected a section $Elements"),
     ("$EndNodes", "$EndNodes\n$Nodes\n0\n$EndNodes", "section $Nodes is there twice"),
 ])

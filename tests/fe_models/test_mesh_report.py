@@ -158,7 +158,7 @@ def test_coincident_nodes_of_a_crack_warn():
     assert kinds(report) == {"coincident"}
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0])
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_coincidence_is_relative_to_the_size(scale):
     mesh = faced_box("tetra")
     near = np.vstack([mesh.nodes, mesh.nodes[0] + [0, 0, 1e-7]]) * scale
