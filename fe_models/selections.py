@@ -14,6 +14,8 @@ from fe_models.mesh import Mesh
 
 __all__ = ["Box", "Cylinder", "FaceGroup", "NearestNode", "NodeSet", "Plane", "Selection", "selected_facets"]
 
+_WHY_EMPTY = "nodes that belong to no solid cell, such as reference nodes, are dropped: select nodes of the solid"
+
 Vector = tuple[float, float, float]
 
 
@@ -45,7 +47,7 @@ class FaceGroup:
                                  f"{nearest(self.name, mesh.face_sets)}")
         faces = {kind: mesh.faces[kind][rows] for kind, rows in mesh.face_sets[self.name].items() if rows.size}
         if not faces:
-            raise InterfaceError(f"face group {self.name!r} is empty")
+            raise InterfaceError(f"face group {self.name!r} is empty; {_WHY_EMPTY}")
         _require_on_solid(mesh, f"face group {self.name!r}", np.concatenate([f.ravel() for f in faces.values()]))
         return _complete(mesh, faces)
 
@@ -63,7 +65,7 @@ class NodeSet:
                                  f"{nearest(self.name, mesh.node_sets)}")
         nodes = np.unique(mesh.node_sets[self.name])
         if nodes.size == 0:
-            raise InterfaceError(f"node set {self.name!r} is empty")
+            raise InterfaceError(f"node set {self.name!r} is empty; {_WHY_EMPTY}")
         _require_on_solid(mesh, f"node set {self.name!r}", nodes)
         return nodes
 

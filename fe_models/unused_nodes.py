@@ -21,8 +21,8 @@ def used_nodes(mesh: Mesh) -> np.ndarray:
 def drop_unused_nodes(mesh: Mesh) -> Mesh:
     """Return the mesh without the nodes that belong to no solid cell, everything renumbered.
 
-    Faces with such a node go too, and groups that become empty. `Mesh.notes` says how many. A mesh without unused
-    nodes is returned as it is.
+    Faces with such a node go too; groups that become empty stay, empty. `Mesh.notes` says how many. A
+    mesh without unused nodes is returned as it is.
     """
     used = used_nodes(mesh)
     n_unused = int((~used).sum())
@@ -40,16 +40,15 @@ def drop_unused_nodes(mesh: Mesh) -> Mesh:
     face_sets: dict[str, dict[str, IntArray]] = {}
     for group, by_type in mesh.face_sets.items():
         kept = {kind: face_place[kind][rows] for kind, rows in by_type.items()}
-        kept = {kind: rows[rows >= 0] for kind, rows in kept.items() if (rows >= 0).any()}
-        if kept:
-            face_sets[group] = kept
+        face_sets[group] = {kind: rows[rows >= 0] for kind, rows in kept.items() if (rows >= 0).any()}
     node_sets = {group: place[nodes] for group, nodes in mesh.node_sets.items()}
-    node_sets = {group: nodes[nodes >= 0] for group, nodes in node_sets.items() if (nodes >= 0).any()}
+    node_sets = {group: nodes[nodes >= 0] for group, nodes in node_sets.items()}
     n_faces = sum(len(rows) for rows in mesh.faces.values()) - sum(len(rows) for rows in faces.values())
-    gone = sorted({*mesh.face_sets, *mesh.node_sets} - {*face_sets, *node_sets})
+    empty = [group for group, by_type in face_sets.items() if not by_type and mesh.face_sets[group]]
+    empty += [group for group, nodes in node_sets.items() if not nodes.size and mesh.node_sets[group].size]
     note = f"{n_unused} nodes that belong to no solid cell were dropped"
     note += f", with {n_faces} faces on them" if n_faces else ""
-    note += f"; groups {', '.join(gone)} became empty and went too" if gone else ""
+    note += f"; groups that became empty: {', '.join(empty)}" if empty else ""
     return replace(
         mesh,
         nodes=mesh.nodes[used],
