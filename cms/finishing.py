@@ -139,14 +139,17 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
 
 
 def free_elastic(Q: Columns, G_K: Array, condition: FrameCondition, omega2_1: float) -> Array:
-    """Squared elastic frequencies of the unsupported reduced body, ascending [1/s²]: its Tisserand pencil."""
-    rigid = condition.M_Psi_R.T @ Q.X
+    """Squared elastic frequencies of the unsupported reduced body, ascending [1/s²]: its pencil in mean axes.
+
+    The mean-axis mass QᵀMQ - Yᵀ (Psi_RᵀMPsi_R)⁻¹ Y, Y = Psi_RᵀMQ, from Gram matrices alone.
+    """
+    Y = condition.M_Psi_R.T @ Q.X
     rigid_mass = condition.Psi_R.T @ condition.M_Psi_R
-    if np.linalg.cond(rigid_mass) > 1e14:  # a body without inertia about some axis has no mean axes
-        return np.zeros(0)
-    C = np.linalg.solve(rigid_mass, rigid)
-    G_M = gram(Q.X - condition.Psi_R @ C, Q.MX - condition.M_Psi_R @ C)
-    Z, is_massive, _ = elastic_eigenvectors(G_K, G_M, omega2_1)
+    scale = np.sqrt(np.diag(rigid_mass))
+    if not scale.all() or np.linalg.cond(rigid_mass / np.outer(scale, scale)) > 1e12:
+        return np.zeros(0)  # a body without inertia about some axis has no mean axes
+    G_M = gram(Q.X, Q.MX) - Y.T @ np.linalg.solve(rigid_mass, Y)
+    Z, is_massive, _ = elastic_eigenvectors(G_K, (G_M + G_M.T) / 2, omega2_1)
     return np.sort(np.einsum("kq,kl,lq->q", Z, G_K, Z)[is_massive])
 
 
@@ -157,4 +160,3 @@ def _shares(A: Array, K_V: Array) -> Array:
     """
     work = np.abs(A * (K_V @ A))
     return (work / work.sum(axis=0)).T
-

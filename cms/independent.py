@@ -70,41 +70,48 @@ def independent_columns(columns: Columns, body: FEBody, omega2: float) -> tuple[
     redundant
         Indices of columns whose remainder against the others is below the tolerance, ascending.
     """
-    length = np.sqrt(np.maximum(np.einsum("nk,nk->k", columns.X, columns.KX + omega2 * columns.MX), 0.0))
+    length = _length(columns, omega2)
     is_zero = length <= np.finfo(float).tiny
     redundant = list(np.flatnonzero(is_zero))
     index = np.flatnonzero(~is_zero)
-    rest = _scaled(columns if not is_zero.any() else columns[index], 1 / length[index])
-    tolerance = np.maximum(RANK_TOLERANCE, ROUNDING_MARGIN * _rounding_noise(rest, body, omega2))
-    remainder = np.ones(len(index))  # W-length of what is left of each unit column
+    rest = columns[index] if is_zero.any() else columns
+    tolerance = np.maximum(RANK_TOLERANCE, ROUNDING_MARGIN * _rounding_noise(rest, body, omega2) / length[index])
+    size, remainder = length[index], np.ones(len(index))  # remainder: W-length of what is left of each unit column
     basis: Columns | None = None
     while len(index):
-        G = rest.inner(rest, omega2)
+        # tall arrays stay as they are: lengths and the order of pivots go into the small matrices
+        G = rest.inner(rest, omega2) / np.outer(size, size)
         factor, pivots, rank, _ = dpstrf((G + G.T) / 2, tol=TRUSTED_PIVOT**2, lower=0)
-        pivots = pivots - 1
-        taken, left = pivots[:rank], pivots[rank:]
+        taken, left = pivots[:rank] - 1, pivots[rank:] - 1
         U = np.triu(factor[:rank, :rank])
-        new = rest[taken] @ la.solve_triangular(U, np.eye(rank))
-        new = _orthonormalized(new, body, omega2, well_conditioned=len(left) == 0 and _is_tame(U))
+        Z = np.zeros((len(index), rank))
+        Z[taken] = la.solve_triangular(U, np.eye(rank)) / size[taken, None]
+        new = _orthonormalized(rest @ Z, body, omega2, well_conditioned=len(left) == 0 and _is_tame(U))
         basis = new if basis is None else basis.beside(new)
         if not len(left):
             break
-        rest = rest[left]
+        rest = _unit(rest[left], size[left])
         for _ in range(2):  # twice is enough
             rest = rest - basis @ basis.inner(rest, omega2)
             rest.KX, rest.MX = body.K @ rest.X, body.M @ rest.X  # fresh: the difference lost their leading digits
-        size = np.sqrt(np.maximum(np.einsum("nk,nk->k", rest.X, rest.KX + omega2 * rest.MX), 0.0))
+        size = _length(rest, omega2)
         remainder = remainder[left] * size
         is_kept = remainder > tolerance[left]
         redundant += list(index[left[~is_kept]])
         index, tolerance, remainder = index[left[is_kept]], tolerance[left[is_kept]], remainder[is_kept]
-        rest = _scaled(rest[np.flatnonzero(is_kept)], 1 / size[is_kept])
+        rest, size = rest[np.flatnonzero(is_kept)], size[is_kept]
     assert basis is not None  # at least one column has a length
     return basis, np.sort(np.asarray(redundant, dtype=np.int64))
 
 
-def _scaled(columns: Columns, factors: Array) -> Columns:
-    return Columns(columns.X * factors, columns.KX * factors, columns.MX * factors, columns.T * factors)
+def _length(columns: Columns, omega2: float) -> Array:
+    """W-length of every column, (k,)."""
+    stiff = np.einsum("nk,nk->k", columns.X, columns.KX)
+    return np.sqrt(np.maximum(stiff + omega2 * np.einsum("nk,nk->k", columns.X, columns.MX), 0.0))
+
+
+def _unit(columns: Columns, size: Array) -> Columns:
+    return Columns(columns.X / size, columns.KX / size, columns.MX / size, columns.T / size)
 
 
 def _is_tame(U: Array) -> bool:
@@ -120,7 +127,7 @@ def _orthonormalized(new: Columns, body: FEBody, omega2: float, *, well_conditio
     return new @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
 
 
-def _rounding_noise(unit: Columns, body: FEBody, omega2: float) -> Array:
-    """W-length of independent rounding errors eps |x_k| in columns of unit W-length, (k,)."""
+def _rounding_noise(columns: Columns, body: FEBody, omega2: float) -> Array:
+    """W-length of independent rounding errors eps |x_k| in every column, (k,)."""
     diagonal = np.abs(body.K.diagonal()) + omega2 * body.M.diagonal()
-    return np.finfo(float).eps * np.sqrt(diagonal @ unit.X**2)
+    return np.finfo(float).eps * np.sqrt(np.einsum("n,nk,nk->k", diagonal, columns.X, columns.X))
