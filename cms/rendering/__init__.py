@@ -1,0 +1,17 @@
+"""Pictures and films of surfaces, off-screen: describe a `Scene`, then `render_picture` or `render_animation`."""
+
+from cms.rendering.errors import RenderError, SceneError
+from cms.rendering.render import Drawing, render_animation, render_picture
+from cms.rendering.scene import Lines, Scene, Surface, Triad
+
+__all__ = [
+    "Drawing",
+    "Lines",
+    "RenderError",
+    "Scene",
+    "SceneError",
+    "Surface",
+    "Triad",
+    "render_animation",
+    "render_picture",
+]

@@ -1,0 +1,132 @@
+"""Views drawn by matplotlib, where there is no OpenGL: faces sorted from far to near, each with one shade."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.rendering.camera import Camera
+from cms.rendering.film import Image, average_of_blocks
+from cms.rendering.scene import Lines, Scene, Surface, frame_of
+from cms.rendering.shape import colormap, smooth_neighbours, surface_edges, triangle_normals
+
+__all__ = ["matplotlib_view"]
+
+OVERSAMPLING = 2  #: drawn so much larger without smoothing, then averaged: smoothed neighbours would show seams
+LIGHTS = ((np.array([-0.4, 0.65, -1.0]), 0.68), (np.array([0.9, 0.1, -0.9]), 0.3))  #: right, up, forward; strength
+AMBIENT = 0.28
+
+
+def matplotlib_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
+    """Return the function that draws a frame: frame -> (height, width, 3) uint8."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.colors import to_rgb
+    from matplotlib.figure import Figure
+
+    width, height = camera.size
+    dpi = 100.0
+    figure = Figure(figsize=(OVERSAMPLING * width / dpi, OVERSAMPLING * height / dpi), dpi=dpi)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
+    drawn = [DrawnSurface(surface, scene) for surface in scene.surfaces]
+
+    def draw(frame: int) -> Image:
+        axes.clear()
+        axes.set(xlim=(0, width), ylim=(height, 0))
+        axes.axis("off")
+        figure.set_facecolor(to_rgb(scene.background))
+        for lines in scene.lines:
+            if lines.is_backdrop:
+                axes.add_collection(line_collection(LineCollection, lines, camera, frame))
+        parts = [surface.polygons(camera, frame) for surface in drawn]
+        depth = np.concatenate([part[0] for part in parts]) if parts else np.zeros(0)
+        if len(depth):
+            polygons, faces, edges, widths = (np.concatenate([part[k] for part in parts]) for k in range(1, 5))
+            order = np.argsort(-depth)
+            axes.add_collection(PolyCollection(
+                list(polygons[order]), facecolors=faces[order], edgecolors=edges[order],
+                linewidths=OVERSAMPLING * widths[order], antialiaseds=False,
+            ))  # fmt: skip
+        for lines in scene.lines:
+            if not lines.is_backdrop:
+                axes.add_collection(line_collection(LineCollection, lines, camera, frame))
+        canvas.draw()
+        return average_of_blocks(np.asarray(canvas.buffer_rgba()), OVERSAMPLING)
+
+    return draw
+
+
+class DrawnSurface:
+    """A surface with what does not change from frame to frame: which edges are sharp, which faces are smoothed."""
+
+    def __init__(self, surface: Surface, scene: Scene) -> None:
+        from matplotlib.colors import to_rgb
+
+        self.surface = surface
+        rest = frame_of(surface.nodes, 0, 2)
+        self.smoothing = smooth_neighbours(rest, surface.triangles)
+        self.edges, self.beside, self.is_sharp = surface_edges(rest, surface.triangles)
+        self.is_closed = bool((self.beside[:, 0] != self.beside[:, 1]).all())  # then the inside is never seen
+        self.limits = scene.color_limits if surface.scalars is not None else (0.0, 1.0)
+        self.color = np.array(to_rgb(surface.color))
+
+    def polygons(self, camera: Camera, frame: int) -> tuple[Array, Array, Array, Array, Array]:
+        """Return depth (n,), corners (n, 3, 2), face and edge colours (n, 4), edge widths (n,) of faces and edges.
+
+        A translucent surface is an outline here: seams between translucent faces would show.
+        """
+        surface, triangles = self.surface, self.surface.triangles
+        nodes = frame_of(surface.nodes, frame, 2)
+        seen = camera.project(nodes)
+        normals = triangle_normals(nodes, triangles)
+        faces_eye = np.einsum("ta,ta->t", normals, camera.eye - nodes[triangles[:, 0]]) > 0
+        is_solid = surface.opacity == 1
+        edge_shown = self.is_sharp & surface.has_edges
+        if is_solid:
+            edge_shown = edge_shown & faces_eye[self.beside].any(axis=1)
+        else:
+            edge_shown = edge_shown | (faces_eye[self.beside[:, 0]] != faces_eye[self.beside[:, 1]])
+        shown = np.flatnonzero(is_solid & (faces_eye | (not self.is_closed)))
+        ends = self.edges[edge_shown]
+        rgba = self.shaded(normals, faces_eye, camera, frame)[shown]
+        edge_depth = seen[ends, 2].mean(axis=1) - 0.004 * camera.distance  # before the faces they bound
+        edge_color = np.tile([0.13, 0.18, 0.22, 0.75 if is_solid else 0.32], (len(ends), 1))
+        return (
+            np.concatenate([seen[triangles[shown], 2].mean(axis=1), edge_depth]),
+            np.concatenate([seen[triangles[shown], :2], seen[ends[:, [0, 1, 1]], :2]]),
+            np.concatenate([rgba, np.zeros((len(ends), 4))]),
+            np.concatenate([rgba, edge_color]),
+            np.concatenate([np.full(len(rgba), 0.35), np.full(len(ends), 1.0)]),
+        )
+
+    def shaded(self, normals: Array, faces_eye: Array, camera: Camera, frame: int) -> Array:
+        """Return the colours of all triangles in the light, (n_triangles, 4)."""
+        shading = self.smoothing @ normals
+        shading /= np.maximum(np.linalg.norm(shading, axis=1, keepdims=True), 1e-300)
+        shading = np.where(faces_eye[:, None], shading, -shading) @ camera.axes.T
+        light = AMBIENT + sum(strength * np.clip(shading @ unit(towards), 0, 1) for towards, strength in LIGHTS)
+        gloss = 0.18 * np.clip(shading @ unit(np.array([-0.3, 0.5, -0.85])), 0, 1) ** 24
+        rgb = np.clip(self.face_colors(frame) * light[:, None] + gloss[:, None], 0, 1)
+        return np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)
+
+    def face_colors(self, frame: int) -> Array:
+        """Return the colour of each triangle before light, (n_triangles, 3)."""
+        if self.surface.scalars is None:
+            return np.tile(self.color, (len(self.surface.triangles), 1))
+        low, high = self.limits
+        values = frame_of(self.surface.scalars, frame, 1)[self.surface.triangles].mean(axis=1)
+        return colormap()[np.clip((values - low) / (high - low) * 255.999, 0, 255).astype(int)]
+
+
+def line_collection(kind: Any, lines: Lines, camera: Camera, frame: int) -> Any:
+    """Return the segments of a frame as a collection; those that start behind the eye are left out."""
+    seen = camera.project(frame_of(lines.points, frame, 2))[lines.segments]
+    seen = seen[(seen[..., 2] > 0).all(axis=1)]
+    return kind(seen[..., :2], colors=lines.color, linewidths=OVERSAMPLING * lines.width * 0.72, alpha=lines.opacity)
+
+
+def unit(vector: Array) -> Array:
+    """Return the vector at length 1."""
+    return np.asarray(vector / np.linalg.norm(vector))

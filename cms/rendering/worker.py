@@ -1,0 +1,33 @@
+"""The process that draws with pyvista: `python -m cms.rendering.worker scene.npz out.png [fps]`.
+
+It is a process of its own because VTK ends the one it is in where there is no OpenGL. It prints one line a frame, by
+which `cms.rendering.render` knows that it is alive.
+"""
+
+import sys
+from pathlib import Path
+
+from cms.rendering.drawing import draw_animation, draw_picture
+from cms.rendering.pyvista_view import pyvista_view
+from cms.rendering.scene_file import read_scene
+
+__all__ = ["main"]
+
+
+def main(scene_path: str, out: str, fps: str = "") -> None:
+    """Draw the scene of a file into another: a film if fps is given, else a picture."""
+    scene = read_scene(Path(scene_path))
+    if fps:
+        draw_animation(scene, Path(out), pyvista_view, fps=float(fps), on_frame=report)
+    else:
+        draw_picture(scene, Path(out), pyvista_view)
+
+
+def report(done: int, all_: int) -> None:
+    """Tell the parent process how far it is."""
+    sys.stdout.write(f"{done} {all_}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
