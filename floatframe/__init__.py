@@ -1,0 +1,53 @@
+"""Flexible multibody dynamics in floating frames of reference.
+
+rod = cms.read("rod.h5")
+system = System(
+[FlexibleBody("rod", rod)],
+[RevoluteJoint("pin", GROUND, Marker("rod", "big_end"), axis=(0, 1, 0))],
+[Gravity((0, 0, -9810.0))],
+units=rod.units,
+)
+trajectory = integrate(system, GeneralizedAlpha(rho_inf=0.8), t_end=1.0, h=1e-3)
+"""
+
+from floatframe.errors import ConvergenceError, FloatframeError, ModelError, ResultsError, SystemFileError
+from floatframe.flexible_body import FlexibleBody
+from floatframe.forces import Gravity, PointForce, SpringDamper
+from floatframe.ground import GROUND, Ground
+from floatframe.initial import ConsistentState, consistent_state
+from floatframe.integration import Progress, integrate
+from floatframe.integrators import GeneralizedAlpha
+from floatframe.joints import FixedJoint, RevoluteJoint, SphericalJoint
+from floatframe.markers import Marker
+from floatframe.rigid_body import RigidBody
+from floatframe.state import State
+from floatframe.system import System
+from floatframe.trajectory import Trajectory, read_results
+
+__all__ = [
+    "GROUND",
+    "ConsistentState",
+    "ConvergenceError",
+    "FixedJoint",
+    "FlexibleBody",
+    "FloatframeError",
+    "GeneralizedAlpha",
+    "Gravity",
+    "Ground",
+    "Marker",
+    "ModelError",
+    "PointForce",
+    "Progress",
+    "ResultsError",
+    "RevoluteJoint",
+    "RigidBody",
+    "SphericalJoint",
+    "SpringDamper",
+    "State",
+    "System",
+    "SystemFileError",
+    "Trajectory",
+    "consistent_state",
+    "integrate",
+    "read_results",
+]

@@ -1,0 +1,91 @@
+"""Types of bodies as flat arrays: instances of one reduced body share one."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cms.arrays import Array, IntArray
+from cms.reduced_body import ReducedBody
+from floatframe.flexible_body import FlexibleBody
+from floatframe.kernels.model import N_BLOCKS
+from floatframe.rigid_body import RigidBody
+from floatframe.system import Body
+
+__all__ = ["body_n_q", "body_types", "integers", "offsets", "stacked", "type_arrays"]
+
+
+def integers(values: list[int]) -> IntArray:
+    """Return an integer array, empty ones included."""
+    return np.array(values, dtype=np.int64)
+
+
+def offsets(sizes: IntArray) -> IntArray:
+    """Return where each of consecutive parts begins, and the end, (n + 1,)."""
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+
+def stacked(arrays: list, shape: tuple[int, ...]) -> Array:
+    """Return arrays of one shape as one, (n, *shape), writeable so that the kernels see one type."""
+    return np.array(arrays, dtype=float).reshape(len(arrays), *shape)
+
+
+def body_n_q(body: Body) -> int:
+    """Return the number of modes of a body."""
+    return body.reduced.n_q if isinstance(body, FlexibleBody) else 0
+
+
+def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], IntArray]:
+    """Return the distinct bodies, instances of one reduced body counted once, and the type of each body."""
+    types: list[RigidBody | ReducedBody] = []
+    kind = []
+    for body in bodies:
+        data = body.reduced if isinstance(body, FlexibleBody) else body
+        known = [k for k, other in enumerate(types) if other is data]
+        if not known:
+            types.append(data)
+        kind.append(known[0] if known else len(types) - 1)
+    return types, integers(kind)
+
+
+def type_arrays(types: list[RigidBody | ReducedBody]) -> dict[str, Any]:
+    """Return the constant arrays of the types of bodies."""
+    blocks: list[Array] = []
+    block0 = np.zeros((len(types), N_BLOCKS), np.int64)
+    is_diagonal = np.ones((len(types), 3), np.int64)
+    mass, S, J0 = [], [], []
+    n = 0
+    for t, body in enumerate(types):
+        if isinstance(body, RigidBody):
+            mass.append(body.mass)
+            S.append(body.mass * body.center_of_mass)
+            J0.append(body.inertia_about_origin)
+            continue
+        moments = body.moments
+        mass.append(moments.m)
+        S.append(moments.S)
+        J0.append(moments.J0)
+        square = []
+        for k, matrix in enumerate((body.M, body.K, body.D)):
+            is_diagonal[t, k] = int(not np.any(matrix - np.diag(np.diag(matrix))))
+            square.append(np.diag(matrix) if is_diagonal[t, k] else matrix)
+        parts = [
+            moments.C1,
+            moments.C2,
+            np.moveaxis(moments.C3, 0, 2),
+            np.moveaxis(moments.S_kl, 3, 0),  # [l, a, b, k]
+            np.transpose(moments.C4, (1, 2, 0)),  # [l, a, k]
+            *square,
+        ]
+        for k, part in enumerate(parts):
+            block0[t, k] = n
+            blocks.append(np.ascontiguousarray(part, dtype=float).ravel())
+            n += part.size
+    return {
+        "mass": np.array(mass, dtype=float),
+        "S": stacked(S, (3,)),
+        "J0": stacked(J0, (3, 3)),
+        "blocks": np.concatenate([*blocks, np.zeros(0)]),
+        "block0": block0,
+        "is_diagonal": is_diagonal,
+    }

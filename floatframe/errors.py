@@ -1,0 +1,42 @@
+"""Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
+
+from typing import Any
+
+__all__ = ["ConvergenceError", "FloatframeError", "ModelError", "ResultsError", "SystemFileError"]
+
+
+class FloatframeError(Exception):
+    """Root of every error that `floatframe` raises on purpose; its text is meant for the user."""
+
+
+class ModelError(FloatframeError, ValueError):
+    """A body, marker, joint, force or system is not what it claims to be."""
+
+
+class SystemFileError(FloatframeError, ValueError):
+    """A system file is not valid; the text names the key, the value and the choices."""
+
+
+class ResultsError(FloatframeError, ValueError):
+    """A file is not a readable results file, or cannot be written."""
+
+
+class ConvergenceError(FloatframeError, RuntimeError):
+    """Newton's method failed; what was computed before is kept.
+
+    Attributes
+    ----------
+    t, h
+        Time at the beginning of the failed step and its size [s].
+    residual
+        Size of the last correction relative to what would have been accepted.
+    trajectory
+        The motion up to the last good step, or None if there was none.
+    """
+
+    def __init__(self, message: str, *, t: float, h: float, residual: float, trajectory: Any = None) -> None:
+        super().__init__(message)
+        self.t = t
+        self.h = h
+        self.residual = residual
+        self.trajectory = trajectory

@@ -1,0 +1,18 @@
+"""Gravity: a uniform field."""
+
+from dataclasses import dataclass
+
+from cms.arrays import Array
+from floatframe.arrays import array_of_shape
+
+__all__ = ["Gravity"]
+
+
+@dataclass(frozen=True, eq=False)
+class Gravity:
+    """A uniform acceleration of free fall; it acts on every particle of the deformed bodies."""
+
+    acceleration: Array  #: ground axes, (3,) [m/s²], such as (0, 0, -9.81)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "acceleration", array_of_shape("gravity", self.acceleration, (3,)))

@@ -1,0 +1,27 @@
+"""A constant force and torque at a marker, fixed in space or in the body."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.arrays import array_of_shape
+from floatframe.markers import Marker
+
+__all__ = ["PointForce"]
+
+
+@dataclass(frozen=True, eq=False)
+class PointForce:
+    """A force and a torque that act on a marker."""
+
+    name: str
+    marker: Marker
+    force: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N]
+    torque: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N m]
+    is_follower: bool = False  #: True: components in the axes of the (deformed) marker; False: in ground axes
+
+    def __post_init__(self) -> None:
+        for name in ("force", "torque"):
+            value = array_of_shape(f"force {self.name!r}: {name}", getattr(self, name), (3,))
+            object.__setattr__(self, name, value)

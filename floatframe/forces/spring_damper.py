@@ -1,0 +1,36 @@
+"""A spring and a damper in parallel along the line between two markers."""
+
+from dataclasses import dataclass
+
+from floatframe.arrays import number
+from floatframe.errors import ModelError
+from floatframe.markers import Marker
+
+__all__ = ["SpringDamper"]
+
+
+@dataclass(frozen=True, eq=False)
+class SpringDamper:
+    """Tension k (l - l_0) + c l_dot + preload along the line of length l from marker A to marker B.
+
+    A spring whose markers coincide has no direction: give free_length = 0 and no preload there, or keep them apart.
+    """
+
+    name: str
+    marker_a: Marker
+    marker_b: Marker
+    stiffness: float = 0.0  #: k [N/m]
+    damping: float = 0.0  #: c [N s/m]
+    free_length: float | None = None  #: l_0 [m]; None: the distance as placed
+    preload: float = 0.0  #: constant part of the tension [N]
+
+    def __post_init__(self) -> None:
+        where = f"force {self.name!r}"
+        for name in ("stiffness", "damping"):
+            object.__setattr__(self, name, number(f"{where}: {name}", getattr(self, name), at_least=0.0))
+        object.__setattr__(self, "preload", number(f"{where}: preload", self.preload))
+        if self.free_length is not None:
+            value = number(f"{where}: free_length", self.free_length, at_least=0.0)
+            object.__setattr__(self, "free_length", value)
+        if self.stiffness == 0 and self.damping == 0 and self.preload == 0:
+            raise ModelError(f"{where}: expected stiffness, damping or preload above zero, got none")

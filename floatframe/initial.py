@@ -1,0 +1,221 @@
+"""Consistent initial conditions: assembled positions, compatible velocities, accelerations and reactions.
+
+All three solve the same system with the mass matrix M of the bodies and the rows G of the joints (P, V as in
+joints/rows.py; unknown reactions w, their lines GAUGE and SPRING included):
+
+    (1) positions       W dx - Jᵀ w = 0,       G dx = -g           W = M + (s K)²-like weight, Newton until g = 0
+    (2) velocities      W du - Jᵀ w = 0,       G du = -G u
+    (3) accelerations   M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u
+
+W adds the stiffness, scaled, to the mass, so that (1) and (2) move bodies rather than deform them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from cms.arrays import Array
+from floatframe.compiled import CompiledSystem
+from floatframe.errors import ModelError
+from floatframe.joints.rows import DOT, GAUGE, POINT, SPRING
+from floatframe.kernels.model import STIFFNESS, Work, new_work
+from floatframe.linearization import (
+    displaced,
+    highest_frequency,
+    in_ground_axes,
+    linearized,
+    modal_matrix,
+    set_iterate,
+    solve,
+    with_mass_for_all,
+    with_modal_weight,
+)
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = [
+    "ConsistentState",
+    "acceleration_rates",
+    "consistent_state",
+    "solve_accelerations",
+    "velocity_correction",
+]
+
+ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
+MOST_ITERATIONS = 30
+REDUNDANT = 1e-10  #: smallest eigenvalue of G M⁻¹ Gᵀ, scaled to a unit diagonal, of independent constraints
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentState:
+    """A state that fulfils the joints, with the accelerations and reactions that go with it."""
+
+    state: State
+    u_dot: Array  #: (n_u,)
+    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+
+
+def consistent_state(system: System, state: State | None = None) -> ConsistentState:
+    """Return a consistent state near a given one, or near the bodies as placed.
+
+    Raises
+    ------
+    ModelError
+        If the joints cannot be closed from these positions, or some constraints repeat others.
+    """
+    compiled = system.compiled
+    state = compiled.placed if state is None else state
+    work = new_work(compiled.model)
+    state = assembled(compiled, work, state)
+    require_independent_constraints(compiled, work, state)
+    state = with_compatible_velocities(compiled, work, state)
+    return ConsistentState(state, *solve_accelerations(compiled, work, state))
+
+
+def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
+    """(1): return the state with all joints closed."""
+    model = compiled.model
+    holds = np.isin(model.row_kind, (POINT, DOT))
+    if not holds.any():
+        return state
+    scale = np.where(model.row_kind == POINT, compiled.length, 1.0)
+    for _ in range(MOST_ITERATIONS):
+        set_iterate(work, state)
+        parts = linearized(model, work, 1.0, 0.0, 0.0)
+        error = np.where(holds, work.g, 0.0)
+        if np.abs(error / scale).max() <= ASSEMBLED:
+            return state
+        try:
+            y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.u)), -error)
+        except RuntimeError:
+            break
+        if not np.isfinite(y).all():
+            break
+        state = displaced(model, state, in_ground_axes(model, state, y))
+    if np.abs(error / scale).max() <= 1e-9:
+        return state
+    raise ModelError(
+        f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the "
+        "bodies nearer to their joints, or check lengths and axes"
+    )
+
+
+def open_joints(compiled: CompiledSystem, error: Array) -> str:
+    """Return the joints that are open most, in words."""
+    model = compiled.model
+    words = []
+    for c, name in enumerate(compiled.joint_names):
+        rows = slice(int(model.c_w0[c]), int(model.c_w0[c + 1]))
+        kind, g = model.row_kind[rows], error[rows]
+        gap, angle = np.linalg.norm(g[kind == POINT]), np.linalg.norm(g[kind == DOT])
+        words.append((gap / compiled.length + angle, f"joint {name!r} is open by {gap:.4g} and {angle:.4g} rad"))
+    words.sort(reverse=True)
+    return ", ".join(text for size, text in words[:3] if size > 1e-9)
+
+
+def require_independent_constraints(compiled: CompiledSystem, work: Work, state: State) -> None:
+    """Raise `ModelError` naming the joints if some constraints repeat others (rank of G M⁻¹ Gᵀ)."""
+    model = compiled.model
+    holds = np.isin(model.row_kind, (POINT, DOT))
+    if not holds.any():
+        return
+    set_iterate(work, state)
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    G = parts.G[np.flatnonzero(holds)]
+    S = np.zeros((G.shape[0], G.shape[0]))
+    for i, block in enumerate(with_mass_for_all(model, parts.H)):
+        G_i = G[:, model.u0[i] : model.u0[i + 1]]
+        used = np.unique(G_i.nonzero()[0])
+        dense = G_i.toarray()[used]
+        S[np.ix_(used, used)] += dense @ scipy.linalg.solve(block, dense.T, assume_a="sym")
+    size = np.sqrt(np.diag(S))
+    if (size == 0).any():
+        raise ModelError("a joint acts on the ground alone")
+    values, vectors = np.linalg.eigh(S / np.outer(size, size))
+    n_redundant = int((values < REDUNDANT).sum())
+    if n_redundant == 0:
+        return
+    share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
+    owner = np.repeat(np.arange(len(model.c_size)), model.c_size)[holds]
+    involved = [name for c, name in enumerate(compiled.joint_names) if share[owner == c].sum() > 1e-6]
+    raise ModelError(
+        f"{n_redundant} of {int(holds.sum())} constraints repeat others, so that reactions are not "
+        f"unique: see joints {', '.join(repr(name) for name in involved)}; replace one of them by a joint "
+        "that holds less (a fixed joint by a revolute, a revolute by a spherical one)"
+    )
+
+
+def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: State) -> State:
+    """(2): return the state with velocities that keep the joints closed."""
+    from floatframe.kernels.entry import rates_of_constraints
+
+    model = compiled.model
+    if len(work.w) == 0:
+        return state
+    set_iterate(work, state)
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    rate, _ = rates_of_constraints(model, work)
+    if not np.any(rate):
+        return state
+    y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.u)), -rate)
+    return State(state.r, state.p, state.q, state.u + in_ground_axes(model, state, y))
+
+
+def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> tuple[Array, Array]:
+    """(3): return u_dot, (n_u,), and w, (n_w,), at a state."""
+    from floatframe.kernels.entry import rates_of_constraints
+
+    model = compiled.model
+    set_iterate(work, state)
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    _, bias = rates_of_constraints(model, work)
+    rows = -np.where(np.isin(model.row_kind, (GAUGE, SPRING)), work.g, bias)
+    y, w = solve(with_mass_for_all(model, parts.H), parts, -work.residual, rows)
+    return in_ground_axes(model, state, y), w
+
+
+def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState) -> Array:
+    """Return d(u_dot)/dt at a consistent state, (n_u,), by a central difference along the motion.
+
+    The step is a thousandth of the shortest time in the system, so that its error is 1e-6 of the fastest rate.
+    """
+    model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
+    work = new_work(model)
+    turning = max((float(np.linalg.norm(state.u[k + 3 : k + 6])) for k in model.u0[:-1]), default=0.0)
+    falling = max(float(np.linalg.norm(u_dot[k : k + 3])) / compiled.length for k in model.u0[:-1])
+    swinging = max(float(np.linalg.norm(u_dot[k + 3 : k + 6])) for k in model.u0[:-1])
+    fastest = max(highest_frequency(model), turning, np.sqrt(falling), np.sqrt(swinging))
+    if fastest == 0.0:
+        return np.zeros_like(u_dot)
+    s = 1e-3 / fastest
+    sides = []
+    for step in (s, -s):
+        moved = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
+        moved = State(moved.r, moved.p, moved.q, state.u + step * u_dot)
+        sides.append(solve_accelerations(compiled, work, moved)[0])
+    return (sides[0] - sides[1]) / (2 * s)
+
+
+def velocity_correction(compiled: CompiledSystem, state: State, after: State, h: float, beta: float) -> Array:
+    """Return the change of u, (n_u,), with which one step of size h from `state` closes the joints open in `after`.
+
+    G du = -g(after)/h, with the weights of one step, M + beta h² K.
+    """
+    model = compiled.model
+    work = new_work(model)
+    holds = np.isin(model.row_kind, (POINT, DOT))
+    if not holds.any():
+        return np.zeros(len(work.u))
+    set_iterate(work, after)
+    linearized(model, work, 1.0, 0.0, 0.0)
+    gap = np.where(holds, work.g, 0.0)
+    set_iterate(work, state)
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    H = []
+    for i, block in enumerate(parts.H):
+        block = block.copy()
+        block[6:, 6:] += beta * h**2 * modal_matrix(model, i, STIFFNESS)
+        H.append(block)
+    y, _ = solve(tuple(H), parts, np.zeros(len(work.u)), -gap / h)
+    return in_ground_axes(model, state, y)

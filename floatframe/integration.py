@@ -1,0 +1,209 @@
+"""The time loop: an integrator advanced in compiled batches, with output, progress and errors."""
+
+import logging
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from math import ceil
+
+import numpy as np
+
+from floatframe.arrays import number
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.flexible_body import FlexibleBody
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.kernels.model import Rows, new_work
+from floatframe.results import BodyEntry, Head, MemorySource, ResultsWriter, arrays_of
+from floatframe.state import State
+from floatframe.system import System
+from floatframe.trajectory import Trajectory, read_results
+
+__all__ = ["Progress", "integrate"]
+
+log = logging.getLogger(__name__)
+
+BATCH_STEPS = 200  #: steps per call of the compiled loop
+SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run is."""
+
+    t: float  #: time reached [s]
+    t_end: float
+    n_steps: int  #: done
+    n_total: int
+    n_iterations: int  #: of Newton's method, so far
+
+
+def integrate(
+    system: System,
+    integrator: GeneralizedAlpha,
+    t_end: float,
+    h: float,
+    *,
+    t_start: float = 0.0,
+    state: State | None = None,
+    output: str | os.PathLike[str] | None = None,
+    output_every: int = 1,
+    batch_steps: int = BATCH_STEPS,
+    progress: Callable[[Progress], None] | None = None,
+) -> Trajectory:
+    """Compute a motion from t_start to t_end.
+
+    Parameters
+    ----------
+    system
+        The system; its bodies as placed are made consistent first.
+    integrator
+        The method, such as `GeneralizedAlpha(rho_inf=0.8)`.
+    t_end
+        End time [s].
+    h
+        Step size [s]; made smaller by less than one step in the whole run where it does not divide it.
+    t_start
+        Time at the beginning [s].
+    state
+        State to begin from, instead of the bodies as placed.
+    output
+        Results file; None keeps the motion in memory.
+    output_every
+        Write the results of every so many steps; the start is always written.
+    batch_steps
+        Steps per call of the compiled loop; the motion does not depend on it, bit for bit.
+    progress
+        Called after every batch. What it raises ends the run; closed results stay.
+
+    Returns
+    -------
+    Trajectory
+        The motion; with `output` it is read from the file when asked for.
+
+    Raises
+    ------
+    ModelError
+        If an argument or the system is impossible.
+    ConvergenceError
+        If a step fails; it carries the trajectory so far.
+    ResultsError
+        If the results cannot be written.
+    """
+    t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
+    h = number("integrate: h", h, above=0.0)
+    if t_end <= t_start:
+        raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
+    if output_every < 1 or batch_steps < 1:
+        raise ModelError(
+            f"integrate: expected output_every and batch_steps of at least 1, got {output_every} and {batch_steps}"
+        )
+    n_total = max(1, ceil((t_end - t_start) / h * (1 - 1e-12) - 1e-9))
+    step = (t_end - t_start) / n_total
+    if abs(step - h) > 1e-9 * h:
+        log.info("h = %g does not divide the time from %g to %g: h = %.9g is used", h, t_start, t_end, step)
+    head = head_of(system, integrator, t_start, t_end, step, output_every)
+    carry = integrator.start(system, t_start, state)
+    work = new_work(system.compiled.model)
+    carry, rows = integrator.observe(system, t_start, carry, work)
+    writer = None if output is None else ResultsWriter(output, head)
+    kept = [rows]
+    if writer is not None:
+        writer.append(rows)
+    n_done, closed = 0, time.monotonic()
+    failure = None
+    try:
+        while n_done < n_total and failure is None:
+            n_batch = min(batch_steps, n_total - n_done)
+            carry, rows, n_good, failure = integrator.advance(
+                system, carry, work, t0=t_start, h=step, first=n_done, n_steps=n_batch, every=output_every
+            )
+            n_done += n_good
+            if writer is None:
+                kept.append(rows)
+            else:
+                writer.append(rows)
+                if time.monotonic() - closed > SEGMENT_SECONDS:
+                    writer.close_segment()
+                    closed = time.monotonic()
+            if progress is not None:
+                progress(Progress(t_start + n_done * step, t_end, n_done, n_total, carry.n_iterations))
+    except BaseException:
+        if writer is not None:
+            writer.close_segment()
+        raise
+    if failure is not None:
+        raise stopped(system, head, kept, writer, failure, t_start + n_done * step, step)
+    if writer is None:
+        return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=True)
+    writer.finish()
+    return read_results(writer.path)
+
+
+def stopped(system, head, kept, writer, failure, t: float, h: float) -> ConvergenceError:
+    """Return the error of a failed step, with the motion so far."""
+    words = f"system {system.name!r}: the step of {h:g} from t = {t:.9g} failed: {failure.words}"
+    if writer is None:
+        trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False)
+    else:
+        writer.close_segment()
+        trajectory = read_results(writer.folder)
+        words += f"; the motion so far is in {str(writer.folder)!r}"
+    return ConvergenceError(words, t=t, h=h, residual=failure.residual, trajectory=trajectory)
+
+
+def joint_rows(system: System, kept: list[Rows]) -> dict[str, np.ndarray]:
+    """Return the datasets of a motion in memory."""
+    arrays = arrays_of(kept)
+    arrays["drift"] = arrays["drift"][:, : len(system.compiled.joint_names)]
+    return arrays
+
+
+def head_of(system: System, integrator: GeneralizedAlpha, t_start: float, t_end: float, h: float, every: int) -> Head:
+    """Return the head of the results of a run."""
+    compiled = system.compiled
+    entries = []
+    for i, body in enumerate(system.bodies):
+        source = body.source if isinstance(body, FlexibleBody) else ""
+        entries.append(
+            BodyEntry(
+                body.name,
+                int(compiled.model.n_q[i]),
+                int(compiled.model.q0[i]),
+                int(compiled.model.u0[i]),
+                source,
+                digest_of(source),
+            )
+        )
+    try:
+        release = version("floatframe")
+    except PackageNotFoundError:
+        release = "unknown"
+    run = {
+        "integrator": type(integrator).__name__,
+        **asdict(integrator),
+        "t_start": t_start,
+        "t_end": t_end,
+        "h": h,
+        "output_every": every,
+        "floatframe": release,
+    }
+    return Head(
+        system.name,
+        system.units.name,
+        tuple(entries),
+        compiled.joint_names,
+        compiled.spring_names,
+        tuple(int(k) for k in compiled.model.c_w0),
+        run,
+    )
+
+
+def digest_of(source: str) -> str:
+    """Return the digest of a modal file, "" for a body made in memory."""
+    if not source:
+        return ""
+    from cms.modal_file import digest
+
+    return digest(source)

@@ -1,0 +1,409 @@
+"""Equations of motion of one body, complete in the deformation (THEORY §6), and their tangent.
+
+Components in body axes; a: acceleration of the frame origin minus gravity, alpha: angular acceleration. From
+W_ab = S_ab q and s = S + 1C q:
+
+    D_k    = 3C_k + delta_ab Σ_c W_cc,k - W_ab,k               (= 3C_k + Σ_l 5C_lk q_l)
+    B_k    = 2C_k + (W_zy - W_yz, W_xz - W_zx, W_yx - W_xy)_k  (= 2C_k + Σ_l 4C_kl q_l)
+    J      = J0 + C + Cᵀ + E,  C = Σ q_k 3C_k,  E_ab = delta_ab Σ_c q·W_cc - q·W_ab
+    Y_k    = Σ_l 4C_kl q_dot_l
+    (1) m a + alpha × s + 1C q_ddot + 2 omega × (1C q_dot) + omega × (omega × s)                     = f
+    (2) s × a + J alpha + Σ B_k q_ddot_k + 2 (Σ q_dot_k D_k) omega + omega × (J omega)               = tau
+    (3) 1C_k·a + B_k·alpha + (M q_ddot)_k + 2 Y_k·omega - omegaᵀ D_k omega + (D q_dot + K q)_k       = h_k
+
+One pass over S_ab (9 n² numbers) and one over 4C (3 n²) carry the cost.
+"""
+
+from numba import njit
+
+from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, MASS, S_AB, STIFFNESS
+from floatframe.kernels.rotation import cross
+
+__all__ = ["body_forces", "body_mass_product", "body_tangent", "first_moment", "modal_term"]
+
+
+@njit
+def block(model, i, which, size):
+    """Return a constant block of body i as a view of the flat store."""
+    start = model.block0[model.kind[i], which]
+    return model.blocks[start : start + size]
+
+
+@njit
+def modal_term(model, i, which, x, out):
+    """Add M x, K x or D x of body i to out, (n_q,)."""
+    n = model.n_q[i]
+    if model.is_diagonal[model.kind[i], which - MASS]:
+        diagonal = block(model, i, which, n)
+        for k in range(n):
+            out[k] += diagonal[k] * x[k]
+    else:
+        matrix = block(model, i, which, n * n)
+        for k in range(n):
+            total = 0.0
+            for j in range(n):
+                total += matrix[k * n + j] * x[j]
+            out[k] += total
+
+
+@njit
+def first_moment(model, i, q):
+    """Return s = S + 1C q as three numbers."""
+    t, n = model.kind[i], model.n_q[i]
+    s0, s1, s2 = model.S[t, 0], model.S[t, 1], model.S[t, 2]
+    if n > 0:
+        c1 = block(model, i, C1, 3 * n)
+        for k in range(n):
+            s0 += c1[k] * q[k]
+            s1 += c1[n + k] * q[k]
+            s2 += c1[2 * n + k] * q[k]
+    return s0, s1, s2
+
+
+@njit
+def shape_moment(model, i, x):
+    """Return 1C x as three numbers."""
+    n = model.n_q[i]
+    s0, s1, s2 = 0.0, 0.0, 0.0
+    if n > 0:
+        c1 = block(model, i, C1, 3 * n)
+        for k in range(n):
+            s0 += c1[k] * x[k]
+            s1 += c1[n + k] * x[k]
+            s2 += c1[2 * n + k] * x[k]
+    return s0, s1, s2
+
+
+@njit
+def body_forces(model, work, i):
+    """Write the left sides of (1) to (3) of body i into `work.residual`, and W, Y, J, D_q_dot into their places."""
+    t, n, u0, q0 = model.kind[i], model.n_q[i], model.u0[i], model.q0[i]
+    R, g = work.R[i], model.gravity
+    ud, u = work.u_dot, work.u
+    b0, b1, b2 = ud[u0] - g[0], ud[u0 + 1] - g[1], ud[u0 + 2] - g[2]
+    a0 = R[0, 0] * b0 + R[1, 0] * b1 + R[2, 0] * b2
+    a1 = R[0, 1] * b0 + R[1, 1] * b1 + R[2, 1] * b2
+    a2 = R[0, 2] * b0 + R[1, 2] * b1 + R[2, 2] * b2
+    work.a_B[i, 0] = a0
+    work.a_B[i, 1] = a1
+    work.a_B[i, 2] = a2
+    o0, o1, o2 = u[u0 + 3], u[u0 + 4], u[u0 + 5]
+    e0, e1, e2 = ud[u0 + 3], ud[u0 + 4], ud[u0 + 5]
+    q = work.q[q0 : q0 + n]
+    qd = u[u0 + 6 : u0 + 6 + n]
+    qdd = ud[u0 + 6 : u0 + 6 + n]
+    J, Dd = work.J[i], work.D_q_dot[i]
+    for a in range(3):
+        for b in range(3):
+            J[a, b] = model.J0[t, a, b]
+            Dd[a, b] = 0.0
+    s0, s1, s2 = first_moment(model, i, q)
+    res = work.residual[u0 : u0 + 6 + n]
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    f0, f1, f2 = 0.0, 0.0, 0.0
+    if n > 0:
+        W = work.W[9 * q0 : 9 * (q0 + n)]
+        Y = work.Y[3 * q0 : 3 * (q0 + n)]
+        products(model, i, q, qd, W, Y)
+        c2 = block(model, i, C2, 3 * n)
+        c1 = block(model, i, C1, 3 * n)
+        c3 = block(model, i, C3, 9 * n)
+        h = res[6:]
+        for k in range(n):
+            # B_k, in place of nothing: three numbers a mode
+            B0 = c2[k] + W[7 * n + k] - W[5 * n + k]
+            B1 = c2[n + k] + W[2 * n + k] - W[6 * n + k]
+            B2 = c2[2 * n + k] + W[3 * n + k] - W[n + k]
+            t0 += B0 * qdd[k]
+            t1 += B1 * qdd[k]
+            t2 += B2 * qdd[k]
+            h[k] = (
+                c1[k] * a0
+                + c1[n + k] * a1
+                + c1[2 * n + k] * a2
+                + B0 * e0
+                + B1 * e1
+                + B2 * e2
+                + 2 * (Y[k] * o0 + Y[n + k] * o1 + Y[2 * n + k] * o2)
+            )
+        for a in range(3):
+            oa = u[u0 + 3 + a]
+            for b in range(3):
+                oo = oa * u[u0 + 3 + b]
+                o = (3 * a + b) * n
+                total, total_C, total_E = 0.0, 0.0, 0.0
+                for k in range(n):
+                    D_ab = c3[o + k] - W[o + k]
+                    h[k] -= oo * D_ab
+                    total += qd[k] * D_ab
+                    total_C += q[k] * c3[o + k]
+                    total_E += q[k] * W[o + k]
+                Dd[a, b] += total
+                J[a, b] += total_C - total_E
+                J[b, a] += total_C
+        square = o0 * o0 + o1 * o1 + o2 * o2
+        trace, trace_dot = 0.0, 0.0
+        for k in range(n):
+            Mq = W[k] + W[4 * n + k] + W[8 * n + k]
+            h[k] -= square * Mq
+            trace += q[k] * Mq
+            trace_dot += qd[k] * Mq
+        for a in range(3):
+            J[a, a] += trace
+            Dd[a, a] += trace_dot
+        modal_term(model, i, MASS, qdd, h)
+        modal_term(model, i, DAMPING, qd, h)
+        modal_term(model, i, STIFFNESS, q, h)
+        v0, v1, v2 = shape_moment(model, i, qd)
+        w0, w1, w2 = shape_moment(model, i, qdd)
+        f0, f1, f2 = cross(2 * o0, 2 * o1, 2 * o2, v0, v1, v2)
+        f0 += w0
+        f1 += w1
+        f2 += w2
+        for b in range(3):
+            ob = 2 * u[u0 + 3 + b]
+            t0 += Dd[0, b] * ob
+            t1 += Dd[1, b] * ob
+            t2 += Dd[2, b] * ob
+    # (1)
+    m = model.mass[t]
+    x0, x1, x2 = cross(e0, e1, e2, s0, s1, s2)
+    y0, y1, y2 = cross(o0, o1, o2, s0, s1, s2)
+    y0, y1, y2 = cross(o0, o1, o2, y0, y1, y2)
+    res[0] = m * a0 + x0 + y0 + f0
+    res[1] = m * a1 + x1 + y1 + f1
+    res[2] = m * a2 + x2 + y2 + f2
+    # (2)
+    x0, x1, x2 = cross(s0, s1, s2, a0, a1, a2)
+    L0 = J[0, 0] * o0 + J[0, 1] * o1 + J[0, 2] * o2
+    L1 = J[1, 0] * o0 + J[1, 1] * o1 + J[1, 2] * o2
+    L2 = J[2, 0] * o0 + J[2, 1] * o1 + J[2, 2] * o2
+    y0, y1, y2 = cross(o0, o1, o2, L0, L1, L2)
+    res[3] = x0 + y0 + t0 + J[0, 0] * e0 + J[0, 1] * e1 + J[0, 2] * e2
+    res[4] = x1 + y1 + t1 + J[1, 0] * e0 + J[1, 1] * e1 + J[1, 2] * e2
+    res[5] = x2 + y2 + t2 + J[2, 0] * e0 + J[2, 1] * e1 + J[2, 2] * e2
+
+
+@njit
+def products(model, i, q, qd, W, Y):
+    """Write W_ab = S_ab q and Y = 4C q_dot; the inner loops run over contiguous numbers."""
+    n = model.n_q[i]
+    S = block(model, i, S_AB, 9 * n * n)
+    A = block(model, i, C4, 3 * n * n)
+    for j in range(9 * n):
+        W[j] = 0.0
+    for j in range(3 * n):
+        Y[j] = 0.0
+    for k in range(n):
+        x, y = q[k], qd[k]
+        row = S[9 * n * k : 9 * n * (k + 1)]
+        for j in range(9 * n):
+            W[j] += row[j] * x
+        row = A[3 * n * k : 3 * n * (k + 1)]
+        for j in range(3 * n):
+            Y[j] += row[j] * y
+
+
+@njit
+def body_mass_product(model, work, i, v, out):
+    """Write generalised momenta M u of body i into out, (6 + n_q,), for v, (6 + n_q,), with v_GO in body axes.
+
+    `body_forces` has been called for this configuration.
+    """
+    t, n, q0 = model.kind[i], model.n_q[i], model.q0[i]
+    J, m = work.J[i], model.mass[t]
+    q = work.q[q0 : q0 + n]
+    s0, s1, s2 = first_moment(model, i, q)
+    x0, x1, x2 = cross(v[3], v[4], v[5], s0, s1, s2)
+    y0, y1, y2 = cross(s0, s1, s2, v[0], v[1], v[2])
+    c0, c1, c2 = shape_moment(model, i, v[6:])
+    out[0] = m * v[0] + x0 + c0
+    out[1] = m * v[1] + x1 + c1
+    out[2] = m * v[2] + x2 + c2
+    out[3] = y0 + J[0, 0] * v[3] + J[0, 1] * v[4] + J[0, 2] * v[5]
+    out[4] = y1 + J[1, 0] * v[3] + J[1, 1] * v[4] + J[1, 2] * v[5]
+    out[5] = y2 + J[2, 0] * v[3] + J[2, 1] * v[4] + J[2, 2] * v[5]
+    if n > 0:
+        W = work.W[9 * q0 : 9 * (q0 + n)]
+        first = block(model, i, C1, 3 * n)
+        second = block(model, i, C2, 3 * n)
+        for k in range(n):
+            B0 = second[k] + W[7 * n + k] - W[5 * n + k]
+            B1 = second[n + k] + W[2 * n + k] - W[6 * n + k]
+            B2 = second[2 * n + k] + W[3 * n + k] - W[n + k]
+            out[3] += B0 * v[6 + k]
+            out[4] += B1 * v[6 + k]
+            out[5] += B2 * v[6 + k]
+            out[6 + k] = (
+                first[k] * v[0] + first[n + k] * v[1] + first[2 * n + k] * v[2] + B0 * v[3] + B1 * v[4] + B2 * v[5]
+            )
+        modal_term(model, i, MASS, v[6:], out[6:])
+
+
+@njit
+def put_tilde(H, row, column, factor, x, y, z):
+    """Add factor * tilde((x, y, z)) to H at (row, column)."""
+    H[row, column + 1] -= factor * z
+    H[row + 1, column] += factor * z
+    H[row, column + 2] += factor * y
+    H[row + 2, column] -= factor * y
+    H[row + 1, column + 2] -= factor * x
+    H[row + 2, column + 1] += factor * x
+
+
+@njit
+def put_tilde_product(H, row, column, factor, a0, a1, a2, b0, b1, b2):
+    """Add factor * tilde(a) tilde(b) = factor * (b aᵀ - (a·b) 1) to H at (row, column)."""
+    a, b = (a0, a1, a2), (b0, b1, b2)
+    dot = a0 * b0 + a1 * b1 + a2 * b2
+    for i in range(3):
+        for j in range(3):
+            H[row + i, column + j] += factor * b[i] * a[j]
+        H[row + i, column + i] -= factor * dot
+
+
+@njit
+def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
+    """Write the derivative of (1) to (3) into H, (6 + n, 6 + n), with weights of mass, damping, stiffness parts.
+
+    Columns are (dx, dtheta, dq) with da = c_m dx, dalpha = c_m dtheta, dq_ddot = c_m dq, domega = c_d dtheta,
+    dq_dot = c_d dq, dq: c_k dq. The derivative by the rotation of the body itself (da = a × dphi) goes
+    unweighted into turn, (6 + n, 3). `body_forces` has been called for this iterate.
+    """
+    t, n, u0, q0 = model.kind[i], model.n_q[i], model.u0[i], model.q0[i]
+    m = model.mass[t]
+    u, ud, J, Dd = work.u, work.u_dot, work.J[i], work.D_q_dot[i]
+    a0, a1, a2 = work.a_B[i, 0], work.a_B[i, 1], work.a_B[i, 2]
+    o0, o1, o2 = u[u0 + 3], u[u0 + 4], u[u0 + 5]
+    e0, e1, e2 = ud[u0 + 3], ud[u0 + 4], ud[u0 + 5]
+    q = work.q[q0 : q0 + n]
+    qd = u[u0 + 6 : u0 + 6 + n]
+    qdd = ud[u0 + 6 : u0 + 6 + n]
+    H[:, :] = 0.0
+    turn[:, :] = 0.0
+    s0, s1, s2 = first_moment(model, i, q)
+    v0, v1, v2 = shape_moment(model, i, qd)
+    # by a
+    for k in range(3):
+        H[k, k] = c_m * m
+    put_tilde(H, 3, 0, c_m, s0, s1, s2)
+    put_tilde(turn, 0, 0, m, a0, a1, a2)
+    put_tilde_product(turn, 3, 0, 1.0, s0, s1, s2, a0, a1, a2)
+    # by alpha and omega
+    put_tilde(H, 0, 3, -c_m, s0, s1, s2)
+    put_tilde(H, 0, 3, -2 * c_d, v0, v1, v2)
+    x0, x1, x2 = cross(o0, o1, o2, s0, s1, s2)
+    put_tilde(H, 0, 3, -c_d, x0, x1, x2)
+    put_tilde_product(H, 0, 3, -c_d, o0, o1, o2, s0, s1, s2)
+    L0 = J[0, 0] * o0 + J[0, 1] * o1 + J[0, 2] * o2
+    L1 = J[1, 0] * o0 + J[1, 1] * o1 + J[1, 2] * o2
+    L2 = J[2, 0] * o0 + J[2, 1] * o1 + J[2, 2] * o2
+    put_tilde(H, 3, 3, -c_d, L0, L1, L2)
+    for b in range(3):
+        y0, y1, y2 = cross(o0, o1, o2, J[0, b], J[1, b], J[2, b])
+        H[3, 3 + b] += c_m * J[0, b] + c_d * (2 * Dd[0, b] + y0)
+        H[4, 3 + b] += c_m * J[1, b] + c_d * (2 * Dd[1, b] + y1)
+        H[5, 3 + b] += c_m * J[2, b] + c_d * (2 * Dd[2, b] + y2)
+    if n == 0:
+        return
+    modal_tangent(model, work, i, c_m, c_d, c_k, H, turn, qd, qdd, (a0, a1, a2), (o0, o1, o2), (e0, e1, e2))
+
+
+@njit
+def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn, qd, qdd, a, o, e):
+    """Write the rows and columns of the modes; see `body_tangent`."""
+    n, q0 = model.n_q[i], model.q0[i]
+    W = work.W[9 * q0 : 9 * (q0 + n)]
+    Y = work.Y[3 * q0 : 3 * (q0 + n)]
+    c1 = block(model, i, C1, 3 * n)
+    c2 = block(model, i, C2, 3 * n)
+    c3 = block(model, i, C3, 9 * n)
+    S = block(model, i, S_AB, 9 * n * n)
+    A = block(model, i, C4, 3 * n * n)
+    square = o[0] * o[0] + o[1] * o[1] + o[2] * o[2]
+    for k in range(n):
+        x0, x1, x2 = c1[k], c1[n + k], c1[2 * n + k]
+        Mq = W[k] + W[4 * n + k] + W[8 * n + k]
+        B = (
+            c2[k] + W[7 * n + k] - W[5 * n + k],
+            c2[n + k] + W[2 * n + k] - W[6 * n + k],
+            c2[2 * n + k] + W[3 * n + k] - W[n + k],
+        )
+        # D_k omega and D_kᵀ omega
+        D_o, Dt_o, dJ_e, dJ_o = [0.0] * 3, [0.0] * 3, [0.0] * 3, [0.0] * 3
+        for r in range(3):
+            D_o[r] = Mq * o[r]
+            Dt_o[r] = Mq * o[r]
+            dJ_e[r] = 2 * Mq * e[r]
+            for b in range(3):
+                D_rb = c3[(3 * r + b) * n + k] - W[(3 * r + b) * n + k]
+                D_br = c3[(3 * b + r) * n + k] - W[(3 * b + r) * n + k]
+                D_o[r] += D_rb * o[b]
+                Dt_o[r] += D_br * o[b]
+                dJ_e[r] += (D_rb + D_br) * e[b]
+        for r in range(3):
+            dJ_o[r] = D_o[r] + Dt_o[r]
+        x = (x0, x1, x2)
+        z0, z1, z2 = cross(o[0], o[1], o[2], x0, x1, x2)
+        zz0, zz1, zz2 = cross(o[0], o[1], o[2], z0, z1, z2)
+        ex0, ex1, ex2 = cross(e[0], e[1], e[2], x0, x1, x2)
+        # (1) by q
+        H[0, 6 + k] = c_m * x0 + 2 * c_d * z0 + c_k * (ex0 + zz0)
+        H[1, 6 + k] = c_m * x1 + 2 * c_d * z1 + c_k * (ex1 + zz1)
+        H[2, 6 + k] = c_m * x2 + 2 * c_d * z2 + c_k * (ex2 + zz2)
+        # (2) by q, but for the sums over modes below
+        xa0, xa1, xa2 = cross(x0, x1, x2, a[0], a[1], a[2])
+        w0, w1, w2 = cross(o[0], o[1], o[2], dJ_o[0], dJ_o[1], dJ_o[2])
+        H[3, 6 + k] = c_m * B[0] + 2 * c_d * D_o[0] + c_k * (xa0 + dJ_e[0] + w0)
+        H[4, 6 + k] = c_m * B[1] + 2 * c_d * D_o[1] + c_k * (xa1 + dJ_e[1] + w1)
+        H[5, 6 + k] = c_m * B[2] + 2 * c_d * D_o[2] + c_k * (xa2 + dJ_e[2] + w2)
+        # (3) by a, alpha, omega
+        for r in range(3):
+            H[6 + k, r] = c_m * x[r]
+            H[6 + k, 3 + r] = c_m * B[r] + c_d * (2 * Y[r * n + k] - dJ_o[r])
+        t0, t1, t2 = cross(x0, x1, x2, a[0], a[1], a[2])
+        turn[6 + k, 0], turn[6 + k, 1], turn[6 + k, 2] = t0, t1, t2
+    for j in range(n):  # column of mode j
+        row4 = A[3 * n * j : 3 * n * (j + 1)]  # 4C_kj over [a, k]
+        rows = S[9 * n * j : 9 * n * (j + 1)]  # ∫ phi_a,k phi_b,j over [ab, k]
+        g0, g1, g2 = 0.0, 0.0, 0.0  # Σ_k 4C_kj q_ddot_k
+        d = [0.0] * 3  # Σ_k q_dot_k 5C_jk omega
+        for k in range(n):
+            g0 += row4[k] * qdd[k]
+            g1 += row4[n + k] * qdd[k]
+            g2 += row4[2 * n + k] * qdd[k]
+            gyro = row4[k] * o[0] + row4[n + k] * o[1] + row4[2 * n + k] * o[2]
+            euler = row4[k] * e[0] + row4[n + k] * e[1] + row4[2 * n + k] * e[2]
+            centrifugal = square * (rows[k] + rows[4 * n + k] + rows[8 * n + k])
+            for r in range(3):
+                for b in range(3):
+                    centrifugal -= o[r] * o[b] * rows[(3 * r + b) * n + k]
+            H[6 + k, 6 + j] = 2 * c_d * gyro + c_k * (euler - centrifugal)
+        for r in range(3):
+            for b in range(3):  # 5C_jk = delta_rb trace - ∫ phi_r,k phi_b,j
+                total, trace = 0.0, 0.0
+                for k in range(n):
+                    total += rows[(3 * r + b) * n + k] * qd[k]
+                    trace += rows[4 * b * n + k] * qd[k]
+                d[r] += trace * o[r] - total * o[b]
+        H[3, 6 + j] += c_k * (g0 + 2 * d[0])
+        H[4, 6 + j] += c_k * (g1 + 2 * d[1])
+        H[5, 6 + j] += c_k * (g2 + 2 * d[2])
+    modal_block(model, i, MASS, c_m, H)
+    modal_block(model, i, DAMPING, c_d, H)
+    modal_block(model, i, STIFFNESS, c_k, H)
+
+
+@njit
+def modal_block(model, i, which, factor, H):
+    """Add factor * M, K or D to the modal block of H."""
+    n = model.n_q[i]
+    if model.is_diagonal[model.kind[i], which - MASS]:
+        diagonal = block(model, i, which, n)
+        for k in range(n):
+            H[6 + k, 6 + k] += factor * diagonal[k]
+    else:
+        matrix = block(model, i, which, n * n)
+        for k in range(n):
+            for j in range(n):
+                H[6 + k, 6 + j] += factor * matrix[k * n + j]

@@ -1,0 +1,104 @@
+"""Energies, momenta and constraint drift of the iterate; all on the deformed bodies."""
+
+import math
+
+from numba import njit
+
+from floatframe.joints.rows import DOT, POINT
+from floatframe.kernels.body import body_mass_product, first_moment, modal_term
+from floatframe.kernels.connection import row_rate, spring_tension
+from floatframe.kernels.marker import rotate, rotate_back
+from floatframe.kernels.model import DAMPING, N_DRIFTS, STIFFNESS
+from floatframe.kernels.rotation import cross
+
+__all__ = ["diagnose", "power"]
+
+
+@njit
+def quadratic(model, work, i, which, x):
+    """Return xᵀ M x, xᵀ K x or xᵀ D x of body i."""
+    n = model.n_q[i]
+    product = work.scratch[:n]
+    for k in range(n):
+        product[k] = 0.0
+    modal_term(model, i, which, x, product)
+    total = 0.0
+    for k in range(n):
+        total += x[k] * product[k]
+    return total
+
+
+@njit
+def diagnose(model, work, out, drift):
+    """Write energies and momenta into out[:10], and the drift of each joint into drift, (n_c, N_DRIFTS).
+
+    T = 1/2 uᵀ M u; strain 1/2 qᵀ K q; gravity -g·(m r + R s). `evaluate` has been called for this iterate.
+    """
+    for k in range(10):
+        out[k] = 0.0
+    g = model.gravity
+    for i in range(model.kind.shape[0]):
+        n, u0, q0, R = model.n_q[i], model.u0[i], model.q0[i], work.R[i]
+        m = model.mass[model.kind[i]]
+        v = work.scratch[: 6 + n]
+        momentum = work.scratch[6 + n : 2 * (6 + n)]
+        v[0], v[1], v[2] = rotate_back(R, work.u[u0], work.u[u0 + 1], work.u[u0 + 2])
+        for k in range(3, 6 + n):
+            v[k] = work.u[u0 + k]
+        body_mass_product(model, work, i, v, momentum)
+        for k in range(6 + n):
+            out[0] += 0.5 * v[k] * momentum[k]
+        p0, p1, p2 = rotate(R, momentum[0], momentum[1], momentum[2])
+        l0, l1, l2 = rotate(R, momentum[3], momentum[4], momentum[5])
+        r0, r1, r2 = work.r[i, 0], work.r[i, 1], work.r[i, 2]
+        x0, x1, x2 = cross(r0, r1, r2, p0, p1, p2)
+        out[4] += p0
+        out[5] += p1
+        out[6] += p2
+        out[7] += l0 + x0
+        out[8] += l1 + x1
+        out[9] += l2 + x2
+        q = work.q[q0 : q0 + n]
+        s0, s1, s2 = first_moment(model, i, q)
+        s0, s1, s2 = rotate(R, s0, s1, s2)
+        out[2] -= g[0] * (m * r0 + s0) + g[1] * (m * r1 + s1) + g[2] * (m * r2 + s2)
+        if n > 0:
+            out[1] += 0.5 * quadratic(model, work, i, STIFFNESS, q)
+    for c in range(model.c_size.shape[0]):
+        for k in range(N_DRIFTS):
+            drift[c, k] = 0.0
+        if model.c_spring[c] >= 0:
+            k, _, free, preload = model.springs[model.c_spring[c]]
+            _, length, _ = spring_tension(model, work, c)
+            out[3] += 0.5 * k * (length - free) ** 2 + preload * length
+            continue
+        a, b = model.c_a[c], model.c_b[c]
+        for k in range(model.c_w0[c], model.c_w0[c + 1]):
+            if model.row_kind[k] == POINT:
+                drift[c, 0] += work.g[k] ** 2
+                drift[c, 2] += row_rate(model, work, k, a, b) ** 2
+            elif model.row_kind[k] == DOT:
+                drift[c, 1] += work.g[k] ** 2
+                drift[c, 3] += row_rate(model, work, k, a, b) ** 2
+        for k in range(N_DRIFTS):
+            drift[c, k] = math.sqrt(drift[c, k])
+
+
+@njit
+def power(model, work):
+    """Return the power of the point forces, and that taken by dampers and modal damping (positive)."""
+    loads, dissipated = 0.0, 0.0
+    for k in range(model.l_marker.shape[0]):
+        m = model.l_marker[k]
+        for a in range(3):
+            loads += work.m_wrench[m, a] * work.m_v[m, a] + work.m_wrench[m, 3 + a] * work.m_omega[m, a]
+    for c in range(model.c_size.shape[0]):
+        if model.c_spring[c] >= 0:
+            _, damping, _, _ = model.springs[model.c_spring[c]]
+            _, _, rate = spring_tension(model, work, c)
+            dissipated += damping * rate * rate
+    for i in range(model.kind.shape[0]):
+        n, u0 = model.n_q[i], model.u0[i]
+        if n > 0:
+            dissipated += quadratic(model, work, i, DAMPING, work.u[u0 + 6 : u0 + 6 + n])
+    return loads, dissipated

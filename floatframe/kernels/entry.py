@@ -1,0 +1,147 @@
+"""The one compiled entry, and a plain function for each thing it does.
+
+One entry, since numba compiles and links everything below an entry once more for each of them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from cms.arrays import Array
+from floatframe.kernels import source_digest
+from floatframe.kernels.connection import constraint_rates
+from floatframe.kernels.diagnostics import power
+from floatframe.kernels.evaluation import evaluate, linearize
+from floatframe.kernels.generalized_alpha import DONE, SINGULAR_BODY, SINGULAR_CONNECTION, advance, write_row
+from floatframe.kernels.model import Memory, Model, Rows, Work, new_rows
+from floatframe.kernels.schur import correction, factorize_bodies
+from floatframe.kernels.structure import pack_memory, pack_model, pack_rows, pack_work
+
+__all__ = [
+    "Outcome",
+    "advance_steps",
+    "evaluate_and_linearize",
+    "newton_correction",
+    "observe_state",
+    "rates_of_constraints",
+]
+
+LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE = range(5)
+
+
+class Outcome(NamedTuple):
+    """What an entry reports."""
+
+    status: int  #: DONE, DIVERGED, SINGULAR_BODY or SINGULAR_CONNECTION
+    n_steps: int  #: done
+    n_rows: int  #: written
+    singular: int  #: number of the body or connection that is
+    excess: float  #: size of the last correction by the allowed one
+
+
+def make_entry(digest):
+    """Return the cached entry; the digest of the sources enters its key, see the package docstring."""
+
+    @njit(cache=True)
+    def run(what, model_data, work_data, memory_data, rows_data, numbers, integers, out):
+        if digest == 0:
+            return DONE, 0, 0, -1, 0.0
+        model, work = pack_model(model_data), pack_work(work_data)
+        memory, rows = pack_memory(memory_data), pack_rows(rows_data)
+        if what == ADVANCE:
+            return advance(
+                model,
+                work,
+                memory,
+                numbers[0],
+                numbers[1],
+                integers[0],
+                integers[1],
+                integers[2],
+                numbers[4:8],
+                numbers[2],
+                integers[3],
+                numbers[3],
+                rows,
+            )
+        if what == OBSERVE:
+            write_row(model, work, memory, numbers[0], rows, 0)
+            memory.power[0], memory.power[1] = power(model, work)
+        else:
+            c_m, c_d, c_k = numbers[0], numbers[1], numbers[2]
+            evaluate(model, work, c_k if c_k > 0.0 else 1.0)
+            if what == LINEARIZE:
+                linearize(model, work, c_m, c_d, c_k)
+            elif what == RATES:
+                constraint_rates(model, work, out[0], out[1])
+            else:
+                body = factorize_bodies(model, work, c_m, c_d, c_k)
+                if body >= 0:
+                    return SINGULAR_BODY, 0, 0, body, 0.0
+                connection = correction(model, work, c_k, True)
+                if connection >= 0:
+                    return SINGULAR_CONNECTION, 0, 0, connection, 0.0
+        return DONE, 0, 0, -1, 0.0
+
+    return run
+
+
+run = make_entry(source_digest())
+
+NOTHING = np.zeros(0)
+NO_INTEGERS = np.zeros(0, np.int64)
+NO_OUT = np.zeros((0, 0))
+
+
+def no_memory(model: Model) -> Memory:
+    """Return an empty memory, for entries that need none."""
+    return Memory(np.zeros((0, 3)), np.zeros((0, 4)), *(np.zeros(0) for _ in range(7)))
+
+
+def evaluate_and_linearize(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> None:
+    """Write residuals and derivatives for the iterate in `work`; rows of wrenches weighted by c_k if above 0."""
+    numbers = np.array([c_m, c_d, c_k])
+    run(LINEARIZE, model, work, no_memory(model), new_rows(model, 0), numbers, NO_INTEGERS, NO_OUT)
+
+
+def rates_of_constraints(model: Model, work: Work) -> tuple[Array, Array]:
+    """Return for every row the rate of the held quantity, and its second rate at zero u_dot, both (n_w,)."""
+    out = np.zeros((2, len(work.w)))
+    run(RATES, model, work, no_memory(model), new_rows(model, 0), np.zeros(3), NO_INTEGERS, out)
+    return out[0], out[1]
+
+
+def newton_correction(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> Outcome:
+    """Write the Newton correction (y, mu) for the iterate in `work`."""
+    numbers = np.array([c_m, c_d, c_k])
+    return Outcome(*run(CORRECT, model, work, no_memory(model), new_rows(model, 0), numbers, NO_INTEGERS, NO_OUT))
+
+
+def observe_state(model: Model, work: Work, memory: Memory, t: float) -> Rows:
+    """Return the results at the state in the memory; the power at it goes into the memory."""
+    rows = new_rows(model, 1)
+    run(OBSERVE, model, work, memory, rows, np.array([t]), NO_INTEGERS, NO_OUT)
+    return rows
+
+
+def advance_steps(
+    model: Model,
+    work: Work,
+    memory: Memory,
+    rows: Rows,
+    *,
+    t0: float,
+    h: float,
+    first: int,
+    n_steps: int,
+    every: int,
+    coefficients: tuple[float, float, float, float],
+    tolerance: float,
+    max_iterations: int,
+    length: float,
+) -> Outcome:
+    """Advance the memory by n_steps of the generalized-alpha method; see `kernels.generalized_alpha.advance`."""
+    numbers = np.array([t0, h, tolerance, length, *coefficients])
+    integers = np.array([first, n_steps, every, max_iterations], np.int64)
+    return Outcome(*run(ADVANCE, model, work, memory, rows, numbers, integers, NO_OUT))

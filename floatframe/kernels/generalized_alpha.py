@@ -1,0 +1,239 @@
+"""Time loop of the generalized-alpha method on R³ × SO(3) × Rⁿ; see `floatframe.integrators.generalized_alpha`."""
+
+import math
+
+from numba import njit
+
+from floatframe.kernels.diagnostics import diagnose, power
+from floatframe.kernels.evaluation import evaluate
+from floatframe.kernels.model import MASS, STIFFNESS
+from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
+from floatframe.kernels.schur import correction, factorize_bodies
+
+__all__ = ["DIVERGED", "DONE", "SINGULAR_BODY", "SINGULAR_CONNECTION", "advance", "write_row"]
+
+DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION = 0, 1, 2, 3
+SLOW = 0.2  # ratio of corrections above which the factors are made anew
+MANY = 4  # iterations of a step after which the next one starts with new factors
+ROUNDOFF = 2e-15  # of a position
+
+
+@njit
+def put_weights(model, work, c_k):
+    """Write the weights of the norm: mass, inertia, M + c_k K."""
+    for i in range(model.kind.shape[0]):
+        t, u0, n = model.kind[i], model.u0[i], model.n_q[i]
+        for k in range(3):
+            work.weight[u0 + k] = model.mass[t]
+            work.weight[u0 + 3 + k] = model.J0[t, k, k]
+        for which in (MASS, STIFFNESS):
+            start = model.block0[t, which]
+            step = 1 if model.is_diagonal[t, which - MASS] else n + 1
+            factor = 1.0 if which == MASS else c_k
+            for k in range(n):
+                if which == MASS:
+                    work.weight[u0 + 6 + k] = 0.0
+                work.weight[u0 + 6 + k] += factor * model.blocks[start + k * step]
+
+
+@njit
+def load_state(model, work, memory):
+    """Copy the memory of the integrator into the iterate; rotation since the beginning of the step is zero."""
+    work.r[:, :] = memory.r
+    work.q[:] = memory.q
+    work.u[:] = memory.u
+    work.u_dot[:] = memory.u_dot
+    work.w[:] = memory.w
+    work.theta[:, :] = 0.0
+    for i in range(model.kind.shape[0]):
+        matrix_of_euler_parameters(memory.p[i], work.R[i])
+
+
+@njit
+def turn_body(work, memory, i, step):
+    """Write R of body i: that of the beginning of the step, turned by theta. step, (3, 3), is overwritten."""
+    exp_matrix(work.theta[i], step)
+    start = work.turning[i]
+    matrix_of_euler_parameters(memory.p[i], start)
+    R = work.R[i]
+    for a in range(3):
+        for b in range(3):
+            R[a, b] = start[a, 0] * step[0, b] + start[a, 1] * step[1, b] + start[a, 2] * step[2, b]
+
+
+@njit
+def predict(model, work, memory, h, alpha_f):
+    """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
+    size, size_x = 0.0, 0.0
+    step = work.scratch[:9].reshape((3, 3))
+    for i in range(model.kind.shape[0]):
+        n, u0, q0 = model.n_q[i], model.u0[i], model.q0[i]
+        for k in range(u0, u0 + 6 + n):
+            a, u = memory.a[k], memory.u[k]
+            x = h * (u + 0.5 * h * a)
+            work.u[k] = u + h * a
+            work.u_dot[k] = (a - alpha_f * memory.u_dot[k]) / (1 - alpha_f)
+            size += work.weight[k] * work.u_dot[k] ** 2
+            size_x += work.weight[k] * x * x
+            j = k - u0
+            if j < 3:
+                work.r[i, j] = memory.r[i, j] + x
+            elif j < 6:
+                work.theta[i, j - 3] = x
+            else:
+                work.q[q0 + j - 6] = memory.q[q0 + j - 6] + x
+        turn_body(work, memory, i, step)
+    return size, size_x
+
+
+@njit
+def update(model, work, memory, by_rate, by_acceleration, c_k):
+    """Add the correction (y, mu) to the iterate; return its squared norm."""
+    total = 0.0
+    step = work.scratch[:9].reshape((3, 3))
+    for i in range(model.kind.shape[0]):
+        n, u0, q0 = model.n_q[i], model.u0[i], model.q0[i]
+        R, y = work.R[i], work.y[u0 : u0 + 6 + n]
+        for k in range(6 + n):
+            total += work.weight[u0 + k] * y[k] * y[k]
+        x0, x1, x2 = y[0], y[1], y[2]
+        for k in range(3):
+            dx = R[k, 0] * x0 + R[k, 1] * x1 + R[k, 2] * x2
+            work.r[i, k] += dx
+            work.u[u0 + k] += by_rate * dx
+            work.u_dot[u0 + k] += by_acceleration * dx
+            work.theta[i, k] += y[3 + k]
+        for k in range(3, 6 + n):
+            work.u[u0 + k] += by_rate * y[k]
+            work.u_dot[u0 + k] += by_acceleration * y[k]
+        for k in range(n):
+            work.q[q0 + k] += y[6 + k]
+        turn_body(work, memory, i, step)
+    for k in range(work.mu.shape[0]):
+        work.w[k] += work.mu[k] / c_k
+    return total
+
+
+@njit
+def roundoff_floor(model, work, length):
+    """Return the squared norm of rounding errors of the positions."""
+    total = 0.0
+    for i in range(model.kind.shape[0]):
+        size = length
+        for k in range(3):
+            size += abs(work.r[i, k])
+        total += model.mass[model.kind[i]] * size * size
+    return total * ROUNDOFF * ROUNDOFF
+
+
+@njit
+def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length):
+    """Advance the memory by one step.
+
+    Return (status, index of what is singular, last correction by the allowed one).
+    """
+    alpha_m, alpha_f, beta, gamma = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    c_k = beta * h * h
+    c_d = gamma * h
+    c_m = (1 - alpha_m) / (1 - alpha_f)
+    size, size_x = predict(model, work, memory, h, alpha_f)
+    g = model.gravity
+    mass = 0.0
+    for i in range(model.kind.shape[0]):
+        mass += model.mass[model.kind[i]]
+    size += mass * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    allowed = tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
+    allowed += math.sqrt(roundoff_floor(model, work, length))
+    if work.factors[0] != c_m or work.factors[1] != c_d or work.factors[2] != c_k:
+        work.counts[3] = 1
+    last = math.inf
+    excess = math.inf
+    for iteration in range(max_iterations):
+        evaluate(model, work, c_k)
+        is_new = iteration == 0
+        if work.counts[3] == 1:
+            body = factorize_bodies(model, work, c_m, c_d, c_k)
+            if body >= 0:
+                return SINGULAR_BODY, body, excess
+            work.factors[0], work.factors[1], work.factors[2] = c_m, c_d, c_k
+            work.counts[3] = 0
+            is_new = True
+        connection = correction(model, work, c_k, is_new)
+        if connection >= 0:
+            work.counts[3] = 1
+            return SINGULAR_CONNECTION, connection, excess
+        norm = math.sqrt(update(model, work, memory, c_d / c_k, c_m / c_k, c_k))
+        work.counts[2] += 1
+        if not math.isfinite(norm):
+            work.counts[3] = 1
+            return DIVERGED, -1, math.inf
+        excess = norm / allowed if allowed > 0.0 else math.inf
+        if norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2):
+            if iteration >= MANY:
+                work.counts[3] = 1
+            accept(model, work, memory, h, alpha_m, alpha_f)
+            return DONE, -1, excess
+        if norm > SLOW * last or iteration >= MANY:
+            work.counts[3] = 1
+        last = norm
+    work.counts[3] = 1
+    return DIVERGED, -1, excess
+
+
+@njit
+def accept(model, work, memory, h, alpha_m, alpha_f):
+    """(3): write the iterate and the new algorithmic acceleration into the memory."""
+    for k in range(memory.a.shape[0]):
+        mean = (1 - alpha_f) * work.u_dot[k] + alpha_f * memory.u_dot[k]
+        memory.a[k] = (mean - alpha_m * memory.a[k]) / (1 - alpha_m)
+    memory.r[:, :] = work.r
+    memory.q[:] = work.q
+    memory.u[:] = work.u
+    memory.u_dot[:] = work.u_dot
+    memory.w[:] = work.w
+    p = work.scratch[:4]
+    for i in range(model.kind.shape[0]):
+        rotate_euler_parameters(memory.p[i], work.theta[i], p)
+        for k in range(4):
+            memory.p[i, k] = p[k]
+    loads, dissipated = power(model, work)
+    memory.work[0] += 0.5 * h * (memory.power[0] + loads)
+    memory.work[1] += 0.5 * h * (memory.power[1] + dissipated)
+    memory.power[0] = loads
+    memory.power[1] = dissipated
+
+
+@njit
+def write_row(model, work, memory, t, rows, k):
+    """Evaluate at the state in the memory and write row k of the results."""
+    load_state(model, work, memory)
+    evaluate(model, work, 1.0)
+    rows.t[k] = t
+    rows.r[k] = memory.r
+    rows.p[k] = memory.p
+    rows.q[k] = memory.q
+    rows.u[k] = memory.u
+    rows.u_dot[k] = memory.u_dot
+    rows.w[k] = memory.w
+    diagnose(model, work, rows.diagnostics[k], rows.drift[k])
+    rows.diagnostics[k, 10] = memory.work[0]
+    rows.diagnostics[k, 11] = memory.work[1]
+
+
+@njit
+def advance(model, work, memory, t0, h, first, n_steps, every, coefficients, tolerance, max_iterations, length, rows):
+    """Advance by n_steps, the first of them number `first` from t0; write a row after every `every`-th.
+
+    Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
+    """
+    put_weights(model, work, coefficients[2] * h * h)
+    n_rows = 0
+    excess = 0.0
+    for k in range(n_steps):
+        status, index, excess = one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length)
+        if status != DONE:
+            return status, k, n_rows, index, excess
+        if (first + k + 1) % every == 0:
+            write_row(model, work, memory, t0 + (first + k + 1) * h, rows, n_rows)
+            n_rows += 1
+    return DONE, n_steps, n_rows, -1, excess

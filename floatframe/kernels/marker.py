@@ -1,0 +1,294 @@
+"""Motion of a marker from that of its body, and the way of a wrench on the marker back to the body.
+
+With rho = c + Psi_t q, th = Psi_r q, E = exp(th), T' = left Jacobian at th, nu = T' th_dot, all in body axes:
+
+    position     r + R rho                        velocity          v + R (omega × rho + rho_dot)
+    axes         R E triad                        angular velocity  R (omega + nu)
+    variation    dr_P = R (dx + dphi × rho + Psi_t dq),  dphi_P = R (dphi + T' Psi_r dq)
+    wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_tᵀ f + (T' Psi_r)ᵀ m
+"""
+
+from numba import njit
+
+from floatframe.kernels.rotation import cross, exp_matrix, left_jacobian, left_jacobian_derivative
+
+__all__ = ["marker_acceleration_bias", "marker_columns", "marker_motion", "marker_stiffness", "wrench_to_body"]
+
+
+@njit
+def rotate(R, x0, x1, x2):
+    """Return R x as three numbers."""
+    return (
+        R[0, 0] * x0 + R[0, 1] * x1 + R[0, 2] * x2,
+        R[1, 0] * x0 + R[1, 1] * x1 + R[1, 2] * x2,
+        R[2, 0] * x0 + R[2, 1] * x1 + R[2, 2] * x2,
+    )
+
+
+@njit
+def rotate_back(R, x0, x1, x2):
+    """Return Rᵀ x as three numbers."""
+    return (
+        R[0, 0] * x0 + R[1, 0] * x1 + R[2, 0] * x2,
+        R[0, 1] * x0 + R[1, 1] * x1 + R[2, 1] * x2,
+        R[0, 2] * x0 + R[1, 2] * x1 + R[2, 2] * x2,
+    )
+
+
+@njit
+def marker_motion(model, work, m):
+    """Write place and motion of marker m."""
+    i = model.m_body[m]
+    A, triad = work.m_A[m], model.m_triad[m]
+    if i < 0:
+        for a in range(3):
+            work.m_r[m, a] = model.m_position[m, a]
+            work.m_v[m, a] = 0.0
+            work.m_omega[m, a] = 0.0
+            for b in range(3):
+                A[a, b] = triad[a, b]
+        return
+    R, u0 = work.R[i], model.u0[i]
+    u = work.u
+    rho, rho_dot, spin = work.rho[m], work.rho_dot[m], work.spin[m]
+    for a in range(3):
+        rho[a] = model.m_position[m, a]
+    if model.m_psi0[m] >= 0:
+        elastic_motion(model, work, m, i)
+        exp_matrix(work.angle[m], A)
+        for b in range(3):
+            x0, x1, x2 = rotate(A, triad[0, b], triad[1, b], triad[2, b])
+            work.scratch[3 * b], work.scratch[3 * b + 1], work.scratch[3 * b + 2] = rotate(R, x0, x1, x2)
+        for b in range(3):
+            for a in range(3):
+                A[a, b] = work.scratch[3 * b + a]
+    else:
+        for b in range(3):
+            A[0, b], A[1, b], A[2, b] = rotate(R, triad[0, b], triad[1, b], triad[2, b])
+    x0, x1, x2 = rotate(R, rho[0], rho[1], rho[2])
+    work.m_r[m, 0] = work.r[i, 0] + x0
+    work.m_r[m, 1] = work.r[i, 1] + x1
+    work.m_r[m, 2] = work.r[i, 2] + x2
+    o0, o1, o2 = u[u0 + 3], u[u0 + 4], u[u0 + 5]
+    x0, x1, x2 = cross(o0, o1, o2, rho[0], rho[1], rho[2])
+    x0, x1, x2 = rotate(R, x0 + rho_dot[0], x1 + rho_dot[1], x2 + rho_dot[2])
+    work.m_v[m, 0] = u[u0] + x0
+    work.m_v[m, 1] = u[u0 + 1] + x1
+    work.m_v[m, 2] = u[u0 + 2] + x2
+    work.m_omega[m, 0], work.m_omega[m, 1], work.m_omega[m, 2] = rotate(R, o0 + spin[0], o1 + spin[1], o2 + spin[2])
+
+
+@njit
+def elastic_motion(model, work, m, i):
+    """Add the elastic displacement to rho and write elastic rotation, rates and the left Jacobian."""
+    n, q0, u0, o = model.n_q[i], model.q0[i], model.u0[i], model.m_psi0[m]
+    for a in range(3):
+        d, d_dot, th, th_dot = 0.0, 0.0, 0.0, 0.0
+        t = model.psi[o + a * n : o + (a + 1) * n]
+        r = model.psi[o + (a + 3) * n : o + (a + 4) * n]
+        for k in range(n):
+            d += t[k] * work.q[q0 + k]
+            th += r[k] * work.q[q0 + k]
+            d_dot += t[k] * work.u[u0 + 6 + k]
+            th_dot += r[k] * work.u[u0 + 6 + k]
+        work.rho[m, a] += d
+        work.rho_dot[m, a] = d_dot
+        work.angle[m, a] = th
+        work.angle_dot[m, a] = th_dot
+    left_jacobian(work.angle[m], work.T_left[m])
+    d = work.angle_dot[m]
+    s = work.spin[m]
+    s[0], s[1], s[2] = rotate(work.T_left[m], d[0], d[1], d[2])
+
+
+@njit
+def marker_acceleration_bias(model, work, m, out):
+    """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot, ground axes, into out.
+
+    R (omega × (omega × rho + 2 rho_dot)) and R (omega × nu + (dT'/dth [th_dot]) th_dot).
+    """
+    out[:] = 0.0
+    i = model.m_body[m]
+    if i < 0:
+        return
+    R, u0 = work.R[i], model.u0[i]
+    o0, o1, o2 = work.u[u0 + 3], work.u[u0 + 4], work.u[u0 + 5]
+    rho, rho_dot = work.rho[m], work.rho_dot[m]
+    x0, x1, x2 = cross(o0, o1, o2, rho[0], rho[1], rho[2])
+    x0, x1, x2 = cross(o0, o1, o2, x0 + 2 * rho_dot[0], x1 + 2 * rho_dot[1], x2 + 2 * rho_dot[2])
+    out[0], out[1], out[2] = rotate(R, x0, x1, x2)
+    if model.m_psi0[m] >= 0:
+        d, nu = work.angle_dot[m], work.spin[m]
+        slope = work.scratch[:9].reshape((3, 3))
+        left_jacobian_derivative(work.angle[m], d[0], d[1], d[2], 1.0, slope)
+        x0, x1, x2 = cross(o0, o1, o2, nu[0], nu[1], nu[2])
+        y0, y1, y2 = rotate(slope, d[0], d[1], d[2])
+        out[3], out[4], out[5] = rotate(R, x0 + y0, x1 + y1, x2 + y2)
+
+
+@njit
+def wrench_to_body(model, work, m):
+    """Subtract the generalised forces of the wrench on marker m from the residual of its body."""
+    i = model.m_body[m]
+    if i < 0:
+        return
+    n, u0 = model.n_q[i], model.u0[i]
+    R, F, rho = work.R[i], work.m_wrench[m], work.rho[m]
+    f0, f1, f2 = rotate_back(R, F[0], F[1], F[2])
+    t0, t1, t2 = rotate_back(R, F[3], F[4], F[5])
+    res = work.residual
+    x0, x1, x2 = cross(rho[0], rho[1], rho[2], f0, f1, f2)
+    res[u0] -= f0
+    res[u0 + 1] -= f1
+    res[u0 + 2] -= f2
+    res[u0 + 3] -= x0 + t0
+    res[u0 + 4] -= x1 + t1
+    res[u0 + 5] -= x2 + t2
+    o = model.m_psi0[m]
+    if o >= 0:
+        psi = model.psi[o : o + 6 * n]
+        t0, t1, t2 = rotate_back(work.T_left[m], t0, t1, t2)
+        for k in range(n):
+            res[u0 + 6 + k] -= (
+                psi[k] * f0
+                + psi[n + k] * f1
+                + psi[2 * n + k] * f2
+                + psi[3 * n + k] * t0
+                + psi[4 * n + k] * t1
+                + psi[5 * n + k] * t2
+            )
+
+
+@njit
+def marker_columns(model, work, m, rate, turning, column, row):
+    """Write the derivatives of the motion of marker m by the body unknowns (dx, dtheta, dq), in body axes.
+
+    column, (6, 6 + n): of position and rotation by velocities, whose transpose carries a wrench to the body.
+    row, (12, 6 + n): of position, rotation, velocity, angular velocity by the unknowns of a step, in which
+    domega = rate dtheta, dq_dot = rate dq, and the body turns by `turning` dtheta, (3, 3).
+    """
+    i = model.m_body[m]
+    n, u0 = model.n_q[i], model.u0[i]
+    rho, rho_dot, nu = work.rho[m], work.rho_dot[m], work.spin[m]
+    o0, o1, o2 = work.u[u0 + 3], work.u[u0 + 4], work.u[u0 + 5]
+    column[:, :] = 0.0
+    row[:, :] = 0.0
+    for a in range(3):
+        column[a, a] = 1.0
+        column[3 + a, 3 + a] = 1.0
+        row[a, a] = 1.0
+        row[6 + a, a] = rate
+        for b in range(3):
+            row[3 + a, 3 + b] = turning[a, b]
+        row[9 + a, 3 + a] = rate
+    s0, s1, s2 = cross(o0, o1, o2, rho[0], rho[1], rho[2])
+    s0, s1, s2 = s0 + rho_dot[0], s1 + rho_dot[1], s2 + rho_dot[2]
+    e0, e1, e2 = o0 + nu[0], o1 + nu[1], o2 + nu[2]
+    for b in range(3):
+        unit = (1.0 if b == 0 else 0.0, 1.0 if b == 1 else 0.0, 1.0 if b == 2 else 0.0)
+        x0, x1, x2 = cross(unit[0], unit[1], unit[2], rho[0], rho[1], rho[2])
+        column[0, 3 + b], column[1, 3 + b], column[2, 3 + b] = x0, x1, x2
+        row[6, 3 + b] += rate * x0
+        row[7, 3 + b] += rate * x1
+        row[8, 3 + b] += rate * x2
+        t0, t1, t2 = turning[0, b], turning[1, b], turning[2, b]
+        row[0, 3 + b], row[1, 3 + b], row[2, 3 + b] = cross(t0, t1, t2, rho[0], rho[1], rho[2])
+        x0, x1, x2 = cross(t0, t1, t2, s0, s1, s2)
+        row[6, 3 + b] += x0
+        row[7, 3 + b] += x1
+        row[8, 3 + b] += x2
+        x0, x1, x2 = cross(t0, t1, t2, e0, e1, e2)
+        row[9, 3 + b] += x0
+        row[10, 3 + b] += x1
+        row[11, 3 + b] += x2
+    o = model.m_psi0[m]
+    if o < 0:
+        return
+    slope = work.scratch[:9].reshape((3, 3))
+    d = work.angle_dot[m]
+    left_jacobian_derivative(work.angle[m], d[0], d[1], d[2], 1.0, slope)
+    psi = model.psi[o : o + 6 * n]
+    for k in range(n):
+        p0, p1, p2 = psi[k], psi[n + k], psi[2 * n + k]
+        y0, y1, y2 = psi[3 * n + k], psi[4 * n + k], psi[5 * n + k]
+        t0, t1, t2 = rotate(work.T_left[m], y0, y1, y2)
+        column[0, 6 + k], column[1, 6 + k], column[2, 6 + k] = p0, p1, p2
+        column[3, 6 + k], column[4, 6 + k], column[5, 6 + k] = t0, t1, t2
+        row[0, 6 + k], row[1, 6 + k], row[2, 6 + k] = p0, p1, p2
+        row[3, 6 + k], row[4, 6 + k], row[5, 6 + k] = t0, t1, t2
+        x0, x1, x2 = cross(o0, o1, o2, p0, p1, p2)
+        row[6, 6 + k], row[7, 6 + k], row[8, 6 + k] = x0 + rate * p0, x1 + rate * p1, x2 + rate * p2
+        x0, x1, x2 = rotate(slope, y0, y1, y2)
+        row[9, 6 + k], row[10, 6 + k], row[11, 6 + k] = x0 + rate * t0, x1 + rate * t1, x2 + rate * t2
+
+
+@njit
+def marker_stiffness(model, work, m, c_k, is_follower, H, turn):
+    """Add the derivative of minus the generalised forces of a held wrench on marker m to H and turn.
+
+    A wrench fixed in space turns against the body (turn); one fixed in the marker turns with its elastic rotation.
+    """
+    i = model.m_body[m]
+    n = model.n_q[i]
+    R, F, rho = work.R[i], work.m_wrench[m], work.rho[m]
+    f0, f1, f2 = rotate_back(R, F[0], F[1], F[2])
+    t0, t1, t2 = rotate_back(R, F[3], F[4], F[5])
+    if not is_follower:
+        for b in range(3):
+            unit = (1.0 if b == 0 else 0.0, 1.0 if b == 1 else 0.0, 1.0 if b == 2 else 0.0)
+            x0, x1, x2 = cross(f0, f1, f2, unit[0], unit[1], unit[2])
+            y0, y1, y2 = cross(rho[0], rho[1], rho[2], x0, x1, x2)
+            z0, z1, z2 = cross(t0, t1, t2, unit[0], unit[1], unit[2])
+            turn[0, b] -= x0
+            turn[1, b] -= x1
+            turn[2, b] -= x2
+            turn[3, b] -= y0 + z0
+            turn[4, b] -= y1 + z1
+            turn[5, b] -= y2 + z2
+    o = model.m_psi0[m]
+    if o < 0:
+        return
+    psi = model.psi[o : o + 6 * n]
+    T = work.T_left[m]
+    slope = work.scratch[:9].reshape((3, 3))
+    left_jacobian_derivative(work.angle[m], t0, t1, t2, -1.0, slope)
+    for j in range(n):
+        p0, p1, p2 = psi[j], psi[n + j], psi[2 * n + j]
+        y0, y1, y2 = psi[3 * n + j], psi[4 * n + j], psi[5 * n + j]
+        # tau: drho × f
+        x0, x1, x2 = cross(p0, p1, p2, f0, f1, f2)
+        H[3, 6 + j] -= c_k * x0
+        H[4, 6 + j] -= c_k * x1
+        H[5, 6 + j] -= c_k * x2
+        # h: Psi_rᵀ d(T m)
+        s0, s1, s2 = rotate(slope, y0, y1, y2)
+        l0, l1, l2 = rotate(T, y0, y1, y2)  # rotation of the marker in the body
+        df0, df1, df2 = 0.0, 0.0, 0.0
+        if is_follower:
+            df0, df1, df2 = cross(l0, l1, l2, f0, f1, f2)
+            dt0, dt1, dt2 = cross(l0, l1, l2, t0, t1, t2)
+            x0, x1, x2 = cross(rho[0], rho[1], rho[2], df0, df1, df2)
+            H[0, 6 + j] -= c_k * df0
+            H[1, 6 + j] -= c_k * df1
+            H[2, 6 + j] -= c_k * df2
+            H[3, 6 + j] -= c_k * (x0 + dt0)
+            H[4, 6 + j] -= c_k * (x1 + dt1)
+            H[5, 6 + j] -= c_k * (x2 + dt2)
+            z0, z1, z2 = rotate_back(T, dt0, dt1, dt2)
+            s0, s1, s2 = s0 + z0, s1 + z1, s2 + z2
+        else:
+            # turn, row of mode j: Psi_t,j · (f × dphi) + (T' Psi_r,j) · (m × dphi) = dphi · (Psi × f + ...)
+            x0, x1, x2 = cross(p0, p1, p2, f0, f1, f2)
+            z0, z1, z2 = cross(l0, l1, l2, t0, t1, t2)
+            turn[6 + j, 0] -= x0 + z0
+            turn[6 + j, 1] -= x1 + z1
+            turn[6 + j, 2] -= x2 + z2
+        for k in range(n):
+            H[6 + k, 6 + j] -= c_k * (
+                psi[k] * df0
+                + psi[n + k] * df1
+                + psi[2 * n + k] * df2
+                + psi[3 * n + k] * s0
+                + psi[4 * n + k] * s1
+                + psi[5 * n + k] * s2
+            )

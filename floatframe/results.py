@@ -1,0 +1,289 @@
+"""Results on disk: closed segments while a motion is computed, one file when it is done (docs/results_file.md).
+
+A run that writes to swing.h5 first fills the folder swing.h5.segments with head.h5 and 000000.h5, 000001.h5, ...:
+each is written under a temporary name and moved into place, so that a killed run leaves every closed segment readable.
+At the end the segments are copied into one file, which is moved to swing.h5, and the folder is removed.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import h5py
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.errors import ResultsError
+from floatframe.kernels.model import N_DRIFTS, Rows
+
+__all__ = ["ArraySource", "BodyEntry", "FileSource", "Head", "MemorySource", "ResultsWriter", "open_results"]
+
+FORMAT = "floatframe-results"
+VERSION = 1  #: of the format; a reader refuses greater ones
+SEGMENTS = ".segments"  #: added to the name of the results file
+UNFINISHED = ".unfinished"  #: added to the name of a file being written
+
+DATASETS = {  # name in the file -> field of Rows, what it is
+    "t": ("t", "time"),
+    "position": ("r", "of the frame origins, ground axes, (n_t, n_bodies, 3)"),
+    "euler_parameters": ("p", "w, x, y, z of R_GB, (n_t, n_bodies, 4)"),
+    "q": ("q", "modal coordinates of all bodies, (n_t, n_q)"),
+    "u": ("u", "per body: velocity of the origin in ground axes, angular velocity in body axes, q_dot, (n_t, n_u)"),
+    "u_dot": ("u_dot", "rates of u, (n_t, n_u)"),
+    "w": ("w", "force (and moment) of each connection on its marker A, ground axes, (n_t, n_w)"),
+    "diagnostics": (
+        "diagnostics",
+        "kinetic, strain, gravity and spring energy, linear momentum (3), angular momentum "
+        "about the ground origin (3), work of point forces, energy taken by damping",
+    ),
+    "drift": ("drift", "of each joint: distance, angle, their rates, (n_t, n_joints, 4)"),
+}
+
+
+@dataclass(frozen=True)
+class BodyEntry:
+    """Where the columns of a body are."""
+
+    name: str
+    n_q: int
+    q0: int  #: first column in q
+    u0: int  #: first column in u
+    source: str = ""  #: path of the modal file; "" for rigid bodies and bodies made in memory
+    digest: str = ""  #: of that file
+
+
+@dataclass(frozen=True)
+class Head:
+    """What a results file says besides numbers."""
+
+    system: str
+    units: str  #: name of the unit system
+    bodies: tuple[BodyEntry, ...]
+    joints: tuple[str, ...]
+    springs: tuple[str, ...]
+    w0: tuple[int, ...]  #: first column in w of each connection (joints, then springs), and the end
+    run: Mapping[str, Any]  #: integrator and its parameters, h, t_end, version
+
+
+class ArraySource(Protocol):
+    """Where the arrays of a trajectory are: in memory or in files."""
+
+    def read(self, name: str) -> Array:
+        """Return a whole dataset by its name in `DATASETS`."""
+
+
+@dataclass(frozen=True, eq=False)
+class MemorySource:
+    """Arrays in memory."""
+
+    arrays: Mapping[str, Array]
+
+    def read(self, name: str) -> Array:
+        """Return a whole dataset."""
+        return self.arrays[name]
+
+
+@dataclass(frozen=True, eq=False)
+class FileSource:
+    """Arrays in one file, or in consecutive segments."""
+
+    paths: tuple[Path, ...]
+    shapes: Mapping[str, tuple[int, ...]]  #: of one row, for the case that there is no segment
+
+    def read(self, name: str) -> Array:
+        """Return a whole dataset."""
+        parts = [np.zeros((0, *self.shapes[name]))]
+        for path in self.paths:
+            with h5py.File(path, "r") as file:
+                parts.append(file[name][...])
+        return np.concatenate(parts)
+
+
+class ResultsWriter:
+    """Writes the rows of a run in closed segments, and joins them at the end.
+
+    Raises
+    ------
+    ResultsError
+        If the folder or a file cannot be written.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], head: Head) -> None:
+        self.path = Path(path)
+        self.head = head
+        self.folder = self.path.with_name(self.path.name + SEGMENTS)
+        self.n_segments = 0
+        self.open_rows: list[Rows] = []
+        if self.path.is_dir():
+            raise ResultsError(f"results file {str(self.path)!r}: expected a file name, got a folder")
+        if not self.path.parent.is_dir():
+            raise ResultsError(f"results file {str(self.path)!r}: no such folder {str(self.path.parent)!r}; make it")
+        self.guarded(self.begin)
+
+    def begin(self) -> None:
+        """Make an empty folder of segments with the head."""
+        if self.folder.exists():
+            shutil.rmtree(self.folder)
+        self.folder.mkdir()
+        self.write_file(self.folder / "head.h5", lambda file: write_head(file, self.head, is_complete=False))
+
+    def guarded(self, action: Callable[[], None]) -> None:
+        """Run an action; say in words why it cannot write."""
+        try:
+            action()
+        except OSError as error:
+            raise ResultsError(
+                f"results file {str(self.path)!r}: cannot be written: {error}; closed segments stay in "
+                f"{str(self.folder)!r}"
+            ) from error
+
+    @staticmethod
+    def write_file(path: Path, fill: Callable[[h5py.File], None]) -> None:
+        """Write a file under a temporary name and move it into place."""
+        unfinished = path.with_name(path.name + UNFINISHED)
+        try:
+            with h5py.File(unfinished, "w") as file:
+                fill(file)
+            os.replace(unfinished, path)
+        finally:
+            unfinished.unlink(missing_ok=True)
+
+    def append(self, rows: Rows) -> None:
+        """Take rows into the open segment."""
+        if len(rows.t):
+            self.open_rows.append(rows)
+
+    def close_segment(self) -> None:
+        """Write the open segment, if it holds anything."""
+        if not self.open_rows:
+            return
+        arrays = arrays_of(self.open_rows)
+        arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+
+        def fill(file: h5py.File) -> None:
+            file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
+            for name, array in arrays.items():
+                file.create_dataset(name, data=array)
+
+        self.guarded(lambda: self.write_file(self.folder / f"{self.n_segments:06d}.h5", fill))
+        self.n_segments += 1
+        self.open_rows = []
+
+    def finish(self) -> None:
+        """Join the segments into the results file and remove them."""
+        self.close_segment()
+        _, source = open_segments(self.folder)
+
+        def fill(file: h5py.File) -> None:
+            write_head(file, self.head, is_complete=True)
+            copy_segments(file, source)
+
+        self.guarded(lambda: self.write_file(self.path, fill))
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def arrays_of(parts: list[Rows]) -> dict[str, Array]:
+    """Return the datasets of consecutive rows."""
+    return {name: np.concatenate([getattr(rows, field) for rows in parts]) for name, (field, _) in DATASETS.items()}
+
+
+def copy_segments(file: h5py.File, source: FileSource) -> None:
+    """Copy all segments into one file, a segment at a time."""
+    counts = []
+    for path in source.paths:
+        with h5py.File(path, "r") as segment:
+            counts.append(len(segment["t"]))
+    n_t = sum(counts)
+    for name, (_, words) in DATASETS.items():
+        dataset = file.create_dataset(name, shape=(n_t, *source.shapes[name]), dtype=np.float64)
+        dataset.attrs["is"] = words
+    first = 0
+    for path, count in zip(source.paths, counts, strict=True):
+        with h5py.File(path, "r") as segment:
+            for name in DATASETS:
+                if count and file[name].size:
+                    file[name][first : first + count] = segment[name][...]
+        first += count
+
+
+def write_head(file: h5py.File, head: Head, *, is_complete: bool) -> None:
+    """Write the attributes and tables of a results file."""
+    file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
+    file.attrs["is_complete"] = is_complete
+    file.attrs["head"] = json.dumps(asdict(head))
+
+
+def read_head(path: Path, file: h5py.File) -> tuple[Head, bool]:
+    """Return the head of a results file and whether the run was complete."""
+    if file.attrs.get("format") != FORMAT or "head" not in file.attrs:
+        raise ResultsError(f"{path}: expected a results file of floatframe, got format {file.attrs.get('format')!r}")
+    version = int(file.attrs["version"])
+    if version > VERSION:
+        raise ResultsError(f"{path}: results format {version}, but this program reads up to {VERSION}; update it")
+    data = json.loads(file.attrs["head"])
+    data["bodies"] = tuple(BodyEntry(**body) for body in data["bodies"])
+    for name in ("joints", "springs", "w0"):
+        data[name] = tuple(data[name])
+    return Head(**data), bool(file.attrs["is_complete"])
+
+
+def row_shapes(head: Head) -> dict[str, tuple[int, ...]]:
+    """Return the shape of one row of each dataset."""
+    n_b = len(head.bodies)
+    n_q = sum(body.n_q for body in head.bodies)
+    return {
+        "t": (),
+        "position": (n_b, 3),
+        "euler_parameters": (n_b, 4),
+        "q": (n_q,),
+        "u": (6 * n_b + n_q,),
+        "u_dot": (6 * n_b + n_q,),
+        "w": (head.w0[-1],),
+        "diagnostics": (12,),
+        "drift": (len(head.joints), N_DRIFTS),
+    }
+
+
+def open_segments(folder: Path) -> tuple[Head, FileSource]:
+    """Return the head and the closed segments of an unfinished run."""
+    try:
+        with h5py.File(folder / "head.h5", "r") as file:
+            head, _ = read_head(folder, file)
+    except (OSError, KeyError, ValueError, TypeError) as error:
+        raise ResultsError(f"{folder}: not the segments of a run: {error}") from error
+    paths = sorted(path for path in folder.glob("[0-9]*.h5"))
+    return head, FileSource(tuple(paths), row_shapes(head))
+
+
+def open_results(path: str | os.PathLike[str]) -> tuple[Head, FileSource, bool]:
+    """Return head, arrays and completeness of a results file, or of the segments that a killed run left in its place.
+
+    Raises
+    ------
+    ResultsError
+        If there is neither, or the file is of another kind, a newer version or damaged.
+    """
+    path = Path(path)
+    folder = path if path.name.endswith(SEGMENTS) else path.with_name(path.name + SEGMENTS)
+    if path.is_dir() or (not path.exists() and folder.is_dir()):
+        head, source = open_segments(folder)
+        return head, source, False
+    if not path.exists():
+        raise ResultsError(f"results file {str(path)!r}: no such file")
+    try:
+        with h5py.File(path, "r") as file:
+            head, is_complete = read_head(path, file)
+            shapes = row_shapes(head)
+            for name, shape in shapes.items():
+                if name not in file or file[name].shape != (len(file["t"]), *shape):
+                    raise ResultsError(f"{path}: dataset {name!r} is missing or misshapen; the file is damaged")
+    except ResultsError:
+        raise
+    except (OSError, KeyError, ValueError, TypeError) as error:
+        words = f"{path}: expected a results file of floatframe; it is damaged or of another kind: {error}"
+        raise ResultsError(words) from error
+    return head, FileSource((path,), shapes), is_complete

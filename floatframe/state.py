@@ -1,0 +1,24 @@
+"""The state of a system: where its bodies are and how they move."""
+
+from dataclasses import dataclass
+
+from cms.arrays import Array, frozen
+
+__all__ = ["State"]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Positions and velocities of all bodies, in the order of the system.
+
+    Velocities of body i in u: v_GO in ground axes (3), omega_B in body axes (3), q_dot (n_q of the body).
+    """
+
+    r: Array  #: position of the frame origins, ground axes, (n_b, 3) [m]
+    p: Array  #: Euler parameters (w, x, y, z) of R_GB, (n_b, 4)
+    q: Array  #: modal coordinates of all bodies, (n_q,)
+    u: Array  #: velocities, (6 n_b + n_q,)
+
+    def __post_init__(self) -> None:
+        for name in ("r", "p", "q", "u"):
+            object.__setattr__(self, name, frozen(getattr(self, name).copy()))

@@ -1,0 +1,83 @@
+"""A system: bodies, joints and forces in one coherent set of units."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from cms.units import Units, unit_system
+from cms.words import nearest
+from floatframe.errors import ModelError
+from floatframe.flexible_body import FlexibleBody
+from floatframe.forces import Force, Gravity
+from floatframe.ground import GROUND
+from floatframe.joints import Joint
+from floatframe.rigid_body import RigidBody
+
+if TYPE_CHECKING:
+    from floatframe.compiled import CompiledSystem
+
+__all__ = ["Body", "System"]
+
+Body = RigidBody | FlexibleBody
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Bodies, the joints between them and the forces on them.
+
+    Raises
+    ------
+    ModelError
+        If there is no body, a name is missing or used twice, a flexible body was made in other units, or (when the
+        system is first compiled) a joint or force names a body, interface or place that does not exist.
+    """
+
+    bodies: Sequence[Body]
+    joints: Sequence[Joint] = ()
+    forces: Sequence[Force] = ()
+    units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
+    name: str = "system"
+
+    def __post_init__(self) -> None:
+        for part in ("bodies", "joints", "forces"):
+            object.__setattr__(self, part, tuple(getattr(self, part)))
+        where = f"system {self.name!r}"
+        if not self.bodies:
+            raise ModelError(f"{where}: expected at least one body, got none")
+        require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
+        named = [force.name for force in self.forces if not isinstance(force, Gravity)]
+        require_names(f"{where}: joints and forces", [joint.name for joint in self.joints] + named)
+        for body in self.bodies:
+            if isinstance(body, FlexibleBody) and body.reduced.units != self.units:
+                raise ModelError(
+                    f"{where}: flexible body {body.name!r} is in units {body.reduced.units.name!r}, but "
+                    f"the system in {self.units.name!r}; give the system the units of the body, or "
+                    "reduce the body again in those of the system"
+                )
+
+    @cached_property
+    def compiled(self) -> "CompiledSystem":
+        """The system as flat arrays; made once."""
+        from floatframe.compiled import compile_system
+
+        return compile_system(self)
+
+    def body(self, name: str) -> Body:
+        """Return the body of that name; `ModelError` with the choices if there is none."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        choices = [body.name for body in self.bodies]
+        raise ModelError(f"system {self.name!r}: no body {name!r}{nearest(name, choices)}")
+
+
+def require_names(where: str, names: Iterable[str], *, taken: Iterable[str] = ()) -> None:
+    """Raise `ModelError` unless every name is a word, used once, and can name a group in a results file."""
+    seen = set(taken)
+    for name in names:
+        if not isinstance(name, str) or not name.strip() or "/" in name or name in (".", ".."):
+            raise ModelError(f"{where}: expected a name without '/', got {name!r}")
+        if name in seen:
+            raise ModelError(f"{where}: the name {name!r} is used twice, or reserved; give each its own")
+        seen.add(name)

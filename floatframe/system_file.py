@@ -1,0 +1,327 @@
+"""The system file: what `floatframe run` reads (docs/system_file.md).
+
+    system, run = read_system("swing.toml")
+    trajectory = integrate(system, run.integrator, run.t_end, run.h, output="swing.h5", output_every=run.output_every,
+                           progress=callback)          # callback(Progress(t, t_end, n_steps, n_total, n_iterations))
+    trajectory = read_results("swing.h5")
+
+All of them raise `FloatframeError`, whose text is one message for the user.
+"""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+
+from cms.errors import CmsError
+from cms.modal_file import read
+from cms.paths import near_file
+from cms.reduced_body import ReducedBody
+from cms.toml_file import Matrix3, Table, Vector3, choice, numbers, read_toml, validated
+from cms.units import UNIT_SYSTEMS, unit_system
+from cms.words import nearest
+from floatframe.errors import FloatframeError, ModelError, SystemFileError
+from floatframe.flexible_body import FlexibleBody
+from floatframe.forces import FORCES, Force, Gravity, PointForce, SpringDamper
+from floatframe.ground import GROUND
+from floatframe.integrators import GeneralizedAlpha
+from floatframe.joints import JOINTS, FixedJoint, Joint, RevoluteJoint, SphericalJoint
+from floatframe.markers import Marker, Place
+from floatframe.rigid_body import RigidBody
+from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.system import Body, System
+
+__all__ = ["RunOptions", "read_system"]
+
+Name = Annotated[str, StringConstraints(min_length=1)]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+KEYS_OF_JOINTS = {"fixed": ("rotation",), "revolute": ("axis", "axis_b"), "spherical": ()}
+KEYS_OF_FORCES = {
+    "point-force": ("body", "marker", "triad", "force", "torque", "is_follower"),
+    "spring-damper": ("body_a", "marker_a", "body_b", "marker_b", "stiffness", "damping", "free_length", "preload"),
+}
+
+
+def place_on_body(value: Any) -> Any:
+    """Return the name of an interface, or a position as three numbers."""
+    if isinstance(value, str) and value:
+        return value
+    try:
+        return numbers(value)
+    except ValueError:
+        raise ValueError('expected the name of an interface ("big_end") or a position [x, y, z] in the body') from None
+
+
+def four_numbers(value: Any) -> tuple[float, ...]:
+    """Return Euler parameters."""
+    try:
+        return (*numbers(value[:3]), *numbers([value[3], 0.0, 0.0])[:1]) if len(value) == 4 else numbers(None)
+    except (ValueError, TypeError):
+        raise ValueError("expected four numbers, [w, x, y, z]") from None
+
+
+PlaceOnBody = Annotated[str | tuple[float, float, float], BeforeValidator(place_on_body)]
+Parameters4 = Annotated[tuple[float, float, float, float], BeforeValidator(four_numbers)]
+
+
+class SystemSection(Table):
+    """[system]: name, units, gravity."""
+
+    name: Name | None = Field(None, description="the name of the system, text; default: the name of the file")
+    units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
+        description=f"the unit system of all numbers, one of {', '.join(UNIT_SYSTEMS)}"
+    )
+    gravity: Vector3 = Field((0.0, 0.0, 0.0), description="the acceleration of free fall, [x, y, z]")
+
+
+class BodySection(Table):
+    """[bodies.NAME]: a flexible body from a modal file, or a rigid one from its mass properties."""
+
+    file: Path | None = Field(None, description="the path of a modal file, relative to the system file")
+    mass: Positive | None = Field(None, description="a number above 0, the mass of a rigid body")
+    inertia: Matrix3 | None = Field(None, description="the inertia tensor about the centre of mass, three rows")
+    center_of_mass: Vector3 | None = Field(None, description="the centre of mass in the body frame, [x, y, z]")
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="the position of the body (mesh) origin, [x, y, z]")
+    rotation_vector: Vector3 | None = Field(None, description="axis times angle in rad from ground to body, [x, y, z]")
+    euler_parameters: Parameters4 | None = Field(None, description="Euler parameters of length 1, [w, x, y, z]")
+    velocity: Vector3 = Field((0.0, 0.0, 0.0), description="the velocity of the body (mesh) origin, [x, y, z]")
+    omega_B: Vector3 = Field((0.0, 0.0, 0.0), description="the angular velocity in body (mesh) axes, [x, y, z]")  # noqa: N815
+
+    @field_validator("file", mode="before")
+    @classmethod
+    def _beside_the_system(cls, value: Any, info: ValidationInfo) -> Path:
+        if not isinstance(value, str) or not value:
+            raise ValueError("expected the path of a modal file, text")
+        path = Path(info.context or ".") / value
+        if not path.is_file():
+            raise ValueError(f"no such file: {path}{near_file(path)}")
+        return path
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> "BodySection":
+        if (self.file is None) == (self.mass is None):
+            raise ValueError(
+                f"expected either file (flexible) or mass and inertia (rigid), got {'both' if self.file else 'neither'}"
+            )
+        if self.mass is not None and self.inertia is None:
+            raise ValueError("inertia: missing; a rigid body needs mass and inertia")
+        if self.file is not None and (self.inertia is not None or self.center_of_mass is not None):
+            raise ValueError("a flexible body has its inertia in its file; remove inertia and center_of_mass")
+        if self.rotation_vector is not None and self.euler_parameters is not None:
+            raise ValueError("expected either rotation_vector or euler_parameters, got both")
+        return self
+
+
+class JointSection(Table):
+    """[joints.NAME]: a joint between two bodies."""
+
+    type: choice("type of joint", lambda: tuple(JOINTS)) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(JOINTS)}"
+    )
+    body_a: Name = Field(description='the name of a body, or "ground"')
+    body_b: Name = Field(description='the name of a body, or "ground"')
+    marker_a: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_a")
+    marker_b: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_b")
+    triad_a: Matrix3 | None = Field(None, description="the axes of marker_a, [x axis, y axis, z axis]")
+    triad_b: Matrix3 | None = Field(None, description="the axes of marker_b, [x axis, y axis, z axis]")
+    axis: Vector3 | None = Field(None, description="the axis in the axes of marker_a, [x, y, z]")
+    axis_b: Vector3 | None = Field(None, description="the axis in the axes of marker_b, [x, y, z]; default: as placed")
+    rotation: Matrix3 | None = Field(None, description="the held rotation, three rows; default: as placed")
+
+    @model_validator(mode="after")
+    def _fits_the_type(self) -> "JointSection":
+        for key in ("axis", "axis_b", "rotation"):
+            if getattr(self, key) is not None and key not in KEYS_OF_JOINTS[self.type]:
+                raise ValueError(f"a {self.type} joint has no key {key}{nearest(key, KEYS_OF_JOINTS[self.type])}")
+        if self.type == "revolute" and self.axis is None:
+            raise ValueError("axis: missing; a revolute joint needs its axis in the axes of marker_a, [x, y, z]")
+        if self.marker_a is None and self.marker_b is None:
+            raise ValueError("expected marker_a or marker_b or both: the interface or position where the joint is")
+        return self
+
+
+class ForceSection(Table):
+    """[forces.NAME]: a force element."""
+
+    type: choice("type of force", lambda: tuple(FORCES)) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(FORCES)}"
+    )
+    body: Name | None = Field(None, description='the name of a body, or "ground"')
+    marker: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in the body")
+    triad: Matrix3 | None = Field(None, description="the axes of the marker, [x axis, y axis, z axis]")
+    force: Vector3 | None = Field(None, description="the force, [x, y, z]")
+    torque: Vector3 | None = Field(None, description="the torque, [x, y, z]")
+    is_follower: bool | None = Field(None, description="true: fixed in the body; false: fixed in space")
+    body_a: Name | None = Field(None, description='the name of a body, or "ground"')
+    body_b: Name | None = Field(None, description='the name of a body, or "ground"')
+    marker_a: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_a")
+    marker_b: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_b")
+    stiffness: NotNegative | None = Field(None, description="a number, 0 or more, the stiffness of the spring")
+    damping: NotNegative | None = Field(None, description="a number, 0 or more, the constant of the damper")
+    free_length: NotNegative | None = Field(None, description="a number, 0 or more, the free length")
+    preload: float | None = Field(None, description="a number, the constant part of the tension")
+
+    @model_validator(mode="after")
+    def _fits_the_type(self) -> "ForceSection":
+        allowed = KEYS_OF_FORCES[self.type]
+        for key in type(self).model_fields:
+            if key != "type" and getattr(self, key) is not None and key not in allowed:
+                raise ValueError(f"a {self.type} has no key {key}{nearest(key, allowed)}")
+        for key in ("body", "body_a", "body_b"):
+            if key in allowed and getattr(self, key) is None:
+                raise ValueError(f'{key}: missing; expected the name of a body, or "ground"')
+        if self.type == "point-force" and self.force is None and self.torque is None:
+            raise ValueError("expected force or torque or both, got neither")
+        return self
+
+
+class RunSection(Table):
+    """[run]: how the motion is computed."""
+
+    t_end: Positive = Field(description="a number above 0, the end time")
+    h: Positive = Field(description="a number above 0, the step size")
+    rho_inf: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.8, description="a number between 0 and 1, the spectral radius at infinite frequency"
+    )
+    output_every: Annotated[int, Field(ge=1)] = Field(
+        1, description="a whole number above 0: results are written after every so many steps"
+    )
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
+        GeneralizedAlpha.tolerance, description="a number between 0 and 1, the tolerance of Newton's method"
+    )
+
+
+class SystemFile(Table):
+    """A system and its run."""
+
+    system: SystemSection = Field(description="a table [system] with units and gravity")
+    bodies: dict[str, BodySection] = Field(description="tables [bodies.NAME]")
+    joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")
+    forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
+    run: RunSection = Field(description="a table [run] with t_end and h")
+
+    @model_validator(mode="after")
+    def _names_bodies(self) -> "SystemFile":
+        choices = [GROUND.name, *self.bodies]
+        for kind, sections in (("joints", self.joints), ("forces", self.forces)):
+            for name, section in sections.items():
+                for key in ("body", "body_a", "body_b"):
+                    body = getattr(section, key, None)
+                    if body is not None and body not in choices:
+                        hint = nearest(body, choices)
+                        raise ValueError(f'{kind}.{name}.{key} = "{body}": there is no such body{hint}')
+        return self
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What the table [run] asks for."""
+
+    t_end: float
+    h: float
+    rho_inf: float
+    output_every: int
+    tolerance: float
+
+    @property
+    def integrator(self) -> GeneralizedAlpha:
+        """The integrator with these parameters."""
+        return GeneralizedAlpha(rho_inf=self.rho_inf, tolerance=self.tolerance)
+
+
+def read_system(path: str | os.PathLike[str]) -> tuple[System, RunOptions]:
+    """Read and check a system file and the modal files it names.
+
+    Raises
+    ------
+    SystemFileError
+        With every problem: key path, value, what was expected, choices and the nearest name.
+    """
+    path = Path(path)
+    data = validated(SystemFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)
+    files: dict[Path, ReducedBody] = {}
+    try:
+        bodies = [body_of(name, section, files) for name, section in data.bodies.items()]
+        joints = [joint_of(name, section) for name, section in data.joints.items()]
+        forces: list[Force] = [force_of(name, section) for name, section in data.forces.items()]
+        if any(data.system.gravity):
+            forces.insert(0, Gravity(np.array(data.system.gravity)))
+        system = System(bodies, joints, forces, unit_system(data.system.units), data.system.name or path.stem)
+        _ = system.compiled  # markers and interfaces are looked up here
+    except (FloatframeError, CmsError) as error:
+        raise SystemFileError(f"{path}: {error}") from error
+    return system, RunOptions(**data.run.model_dump())
+
+
+def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody]) -> Body:
+    """Return the body of a table; a modal file is read once for all its instances."""
+    if section.euler_parameters is not None:
+        orientation = np.array(section.euler_parameters)
+    else:
+        orientation = euler_parameters_of_rotation_vector(np.array(section.rotation_vector or (0.0, 0.0, 0.0)))
+    motion: dict[str, Any] = {
+        "position": section.position,
+        "orientation": orientation,
+        "velocity": section.velocity,
+        "omega_B": section.omega_B,
+    }
+    if section.file is None:
+        assert section.mass is not None  # checked by the table
+        center = section.center_of_mass or (0.0, 0.0, 0.0)
+        return RigidBody(name, section.mass, np.array(section.inertia), center_of_mass=np.array(center), **motion)
+    if section.file not in files:
+        try:
+            files[section.file] = read(section.file)
+        except CmsError as error:
+            raise ModelError(f"bodies.{name}.file: {error}") from error
+    return FlexibleBody(name, files[section.file], source=str(section.file.resolve()), **motion)
+
+
+def marker_of(body: str, place: str | tuple[float, float, float] | None, triad: Any = None) -> Marker:
+    """Return a marker by interface or position; rows of the triad in the file are its axes."""
+    axes = None if triad is None else np.array(triad).T
+    if isinstance(place, str):
+        return Marker(body, place, triad=axes)
+    return Marker(body, position=None if place is None else np.array(place), triad=axes)
+
+
+def joint_of(name: str, section: JointSection) -> Joint:
+    """Return the joint of a table; an end without marker lies where the other end is placed."""
+    ends: list[Place] = []
+    for body, place, triad in (
+        (section.body_a, section.marker_a, section.triad_a),
+        (section.body_b, section.marker_b, section.triad_b),
+    ):
+        ends.append(body if place is None else marker_of(body, place, triad))
+    if section.type == "revolute":
+        axis_b = None if section.axis_b is None else np.array(section.axis_b)
+        return RevoluteJoint(name, ends[0], ends[1], axis=np.array(section.axis), axis_b=axis_b)
+    if section.type == "fixed":
+        return FixedJoint(name, ends[0], ends[1], None if section.rotation is None else np.array(section.rotation))
+    return SphericalJoint(name, ends[0], ends[1])
+
+
+def force_of(name: str, section: ForceSection) -> Force:
+    """Return the force of a table."""
+    if section.type == "point-force":
+        assert section.body is not None  # checked by the table
+        marker = marker_of(section.body, section.marker, section.triad)
+        zero = (0.0, 0.0, 0.0)
+        return PointForce(
+            name, marker, np.array(section.force or zero), np.array(section.torque or zero), bool(section.is_follower)
+        )
+    assert section.body_a is not None  # checked by the table
+    assert section.body_b is not None
+    return SpringDamper(
+        name,
+        marker_of(section.body_a, section.marker_a),
+        marker_of(section.body_b, section.marker_b),
+        section.stiffness or 0.0,
+        section.damping or 0.0,
+        section.free_length,
+        section.preload or 0.0,
+    )
