@@ -1,11 +1,11 @@
 """The commands of `cms`; each imports what it needs when it runs, so that `cms --help` answers at once."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.console import commands, guarded, out, output_path, print_table, stages
+from cms.cli.console import commands, guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
     from cms.cli.console import Stages
@@ -17,7 +17,7 @@ __all__ = ["app"]
 app = commands("cms", "Component mode synthesis: a meshed part becomes a small, exact, portable flexible body.")
 
 ModalFile = Annotated[Path, typer.Argument(help="A modal file, as cms reduce writes it.")]
-Output = Annotated[Optional[Path], typer.Option("--output", "-o", help="File to write.")]  # noqa: UP045 - typer < 0.15
+Output = Annotated[Path | None, typer.Option("--output", "-o", help="Modal file to write.")]
 
 
 @app.command("reduce")
@@ -85,6 +85,45 @@ def info_command(
     say(f"digest {digest(file)}")
 
 
+@app.command("view")
+@guarded
+def view_command(
+    file: ModalFile,
+    mode: Annotated[int, typer.Option("--mode", "-m", help="Number of the mode, as cms info lists them.")] = 1,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to write (.png).")] = None,
+    animate: Annotated[Path | None, typer.Option("--animate", "-a", help="Film to write (.gif or .mp4).")] = None,
+    scale: Annotated[
+        float | None, typer.Option(help="Largest displacement drawn, as a share of the body's diagonal; default 0.09.")
+    ] = None,
+) -> None:
+    """Draw a mode on the real surface of the body, as a picture or a film; needs no display.
+
+    Without -o and --animate the picture stands beside the modal file: rod.h5 gives rod_mode3.png.
+
+    Example: cms view rod.h5 --mode 3 -o m3.png
+
+    Example: cms view rod.h5 --mode 3 --animate m3.gif
+    """
+    from cms.modal_file import read
+    from cms.rendering import SceneError
+    from cms.view import animate_mode, view_mode
+
+    picture = output
+    if output is None and animate is None:
+        picture = file.with_name(f"{file.stem}_mode{mode}.png")
+    targets = [output_path(path, "", SceneError, overwrite_of=(file,)) for path in (picture, animate) if path]
+    body = read(file)
+    with stages() as clock:
+        if picture is not None:
+            with clock("draw"):
+                view_mode(body, mode, picture, scale=scale)
+        if animate is not None:
+            with clock("film") as advance:
+                animate_mode(body, mode, animate, scale=scale, on_frame=lambda done, all_: advance(done / all_))
+    for path in targets:
+        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
 def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     """Print mass properties, modes and interfaces of a body; provenance too if everything is wanted."""
     from cms.cli.record import body_record, body_size
@@ -135,11 +174,6 @@ def print_times(clock: "Stages") -> None:
     """Print the time of each stage."""
     rows = [(name, f"{seconds:.2f}") for name, seconds in clock.seconds.items()]
     print_table("Time", ("stage", "s>"), [*rows, ("all", f"{sum(clock.seconds.values()):.2f}")])
-
-
-def say(text: str) -> None:
-    """Print a line on standard output, as it is."""
-    out().print(text, markup=False, soft_wrap=True)
 
 
 def vector(values: Any, scale: float | None = None) -> str:

@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 a fault of the program, 2 something the user can put right
 """
 
 import functools
+import logging
 import os
 import sys
 import time
@@ -16,6 +17,7 @@ from typing import Any, ParamSpec, TypeVar
 import typer
 
 __all__ = [
+    "INTERRUPTED",
     "Stages",
     "bug",
     "commands",
@@ -24,6 +26,7 @@ __all__ = [
     "print_error",
     "print_table",
     "run",
+    "say",
     "stages",
     "version_option",
 ]
@@ -41,6 +44,7 @@ PIPE_WIDTH = 160  #: columns of tables that are not written to a terminal
 
 def run(app: typer.Typer, name: str) -> None:
     """Run an application; text that the terminal's encoding cannot show is replaced, never a reason to fail."""
+    logging.getLogger().addHandler(Notes(logging.WARNING))
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
@@ -50,6 +54,14 @@ def run(app: typer.Typer, name: str) -> None:
     except KeyboardInterrupt:
         print_error("interrupted")
         sys.exit(INTERRUPTED)
+
+
+class Notes(logging.Handler):
+    """Tells the warnings of the packages, one line each, on standard error."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one warning."""
+        typer.echo(f"note: {record.getMessage()}", err=True)
 
 
 def commands(name: str, help: str) -> typer.Typer:
@@ -183,6 +195,11 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
     out().print(table)
+
+
+def say(text: str) -> None:
+    """Print a line on standard output, as it is."""
+    out().print(text, markup=False, soft_wrap=True)
 
 
 def escape(cell: Any) -> str:

@@ -1,0 +1,11 @@
+"""The command line `floatframe`: compute a motion, look at it, plot and animate it."""
+
+__all__ = ["main"]
+
+
+def main() -> None:
+    """Run the command line (entry point of the package)."""
+    from cms.cli.console import run
+    from floatframe.cli.app import app
+
+    run(app, "floatframe")

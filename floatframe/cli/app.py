@@ -1,0 +1,129 @@
+"""The commands of `floatframe`; each imports what it needs when it runs, so that --help answers at once."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
+
+if TYPE_CHECKING:
+    from floatframe.trajectory import Trajectory
+
+__all__ = ["app"]
+
+app = commands("floatframe", "Flexible multibody dynamics: bodies from modal files, joints and forces become motion.")
+
+ResultsFile = Annotated[Path, typer.Argument(help="A results file, as floatframe run writes it.")]
+
+
+@app.command("run")
+@guarded
+def run_command(
+    system: Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file to write.")] = None,
+) -> None:
+    """Compute the motion of a system.
+
+    Without -o the results stand beside the system file: swing.toml gives swing.h5.
+
+    Example: floatframe run swing.toml -o swing.h5
+    """
+    from floatframe.errors import ResultsError
+    from floatframe.flexible_body import FlexibleBody
+    from floatframe.integration import Progress, integrate
+    from floatframe.results import SEGMENTS
+    from floatframe.system_file import read_system
+
+    model, options = read_system(system)
+    sources = [Path(body.source) for body in model.bodies if isinstance(body, FlexibleBody) and body.source]
+    path = output_path(output, system.with_suffix(".h5"), ResultsError, overwrite_of=(system, *sources))
+    last: list[Progress] = []
+    began = time.perf_counter()
+    try:
+        with stages(remaining=True) as clock, clock(f"{model.name}: motion") as advance:
+
+            def on_progress(progress: Progress) -> None:
+                last[:] = [progress]
+                advance(progress.n_steps / progress.n_total)
+
+            trajectory = integrate(
+                model, options.integrator, options.t_end, options.h, output=path, output_every=options.output_every,
+                progress=on_progress,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        print_error(f"interrupted; the motion so far is in {path}{SEGMENTS}, which plot, animate and info can read")
+        raise typer.Exit(INTERRUPTED) from None
+    print_run(trajectory, last[0] if last else None, time.perf_counter() - began)
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def print_run(trajectory: "Trajectory", progress: Any, seconds: float | None) -> None:
+    """Print what a motion is and how good; numbers of the computation where it was done just now."""
+    from floatframe.cli.record import run_record
+
+    record = run_record(trajectory)
+    units = trajectory.units
+    second, length = units.time_symbol, units.length_symbol
+    energy = f"{units.force_symbol} {length}"
+    run = record["run"]
+    rows = [
+        ("system", record["system"]),
+        ("units", units.name),
+        ("bodies", ", ".join(f"{b['name']} ({b['n_modes']} modes)" for b in record["bodies"])),
+        ("integrator", integrator_words(run)),
+        ("step", f"{run['h']:.6g} {second}"),
+        ("time", f"{record['t_first']:.6g} to {record['t_last']:.6g} {second}, {record['n_outputs']} outputs"),
+        ("steps", str(record["n_steps"])),
+    ]
+    if not record["is_complete"]:
+        rows.append(("note", f"this run did not reach its end, {run.get('t_end', 0):.6g} {second}"))
+    if progress is not None:
+        each = progress.n_iterations / max(progress.n_steps, 1)
+        rows.append(("Newton iterations", f"{progress.n_iterations} ({each:.2f} a step)"))
+    if seconds is not None:
+        rows.append(("wall time", f"{seconds:.2f} s"))
+    rows.append(("energy defect", f"{record['energy_defect']:.2e} of {record['energy_scale']:.6g} {energy}"))
+    print_table("Run", ("", ""), rows)
+    print_table(
+        f"Energy [{energy}]",
+        ("", "start>", "end>"),
+        [(name, *(f"{v:.6g}" for v in pair)) for name, pair in record["energy"].items() if pair and any(pair)],
+    )
+    if record["drift"]:
+        print_table(
+            "Joints: largest drift",
+            ("joint", f"{length}>", "rad>", f"{length}/{second}>", f"rad/{second}>"),
+            [(name, *(f"{value:.1e}" for value in drift.values())) for name, drift in record["drift"].items()],
+        )
+
+
+def integrator_words(run: dict[str, Any]) -> str:
+    """Return the integrator and its parameters."""
+    known = {"integrator", "t_start", "t_end", "h", "output_every", "floatframe"}
+    options = ", ".join(f"{key} = {value}" for key, value in run.items() if key not in known)
+    return f"{run.get('integrator', '')} ({options})"
+
+
+@app.command("info")
+@guarded
+def info_command(
+    file: ResultsFile,
+    json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
+) -> None:
+    """Show what is in a results file: system, run, energy balance, drift of the joints.
+
+    Example: floatframe info swing.h5 --json
+    """
+    from floatframe.trajectory import read_results
+
+    trajectory = read_results(file)
+    if json:
+        import json as json_module
+
+        from floatframe.cli.record import run_record
+
+        typer.echo(json_module.dumps(run_record(trajectory), indent=2, ensure_ascii=True))
+        return
+    print_run(trajectory, None, None)

@@ -1,0 +1,75 @@
+"""How good a computed motion is, as one record: `floatframe run` and `floatframe info` print it."""
+
+from typing import Any
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.trajectory import Trajectory
+
+__all__ = ["balance_defect", "energy_scale", "run_record"]
+
+
+def energy_scale(trajectory: Trajectory) -> float:
+    """Return the largest energy that moves about in the motion [J]: what an energy error is measured by.
+
+    Kinetic, strain and spring energy, the range of the potential of gravity (its zero is arbitrary), and the work of
+    forces and dampers.
+    """
+    e = trajectory.energies
+    parts = (e.kinetic, e.strain, e.springs, e.gravity - e.gravity.min(initial=np.inf), e.work, e.dissipated)
+    return max(float(np.abs(part).max(initial=0.0)) for part in parts)
+
+
+def balance_defect(trajectory: Trajectory) -> Array:
+    """Return total energy - work + dissipated, less its value at the start, (n_t,) [J]; exactly computed: zero."""
+    balance = trajectory.energies.balance
+    return np.asarray(balance - balance[:1])
+
+
+def run_record(trajectory: Trajectory) -> dict[str, Any]:
+    """Return times, bodies, energies, energy balance and joint drift of a motion, in plain types and its units.
+
+    `energy_defect` is the largest |balance defect| over `energy_scale`; a drift is the largest over time.
+    """
+    energies, scale = trajectory.energies, energy_scale(trajectory)
+    defect = float(np.abs(balance_defect(trajectory)).max(initial=0.0))
+    drifts = {name: trajectory.drift(name) for name in trajectory.head.joints}
+    run = trajectory.head.run
+    n_t = len(trajectory.t)
+    return {
+        "system": trajectory.head.system,
+        "units": trajectory.head.units,
+        "is_complete": trajectory.is_complete,
+        "run": dict(run),
+        "n_outputs": n_t,
+        "t_first": float(trajectory.t[0]) if n_t else None,
+        "t_last": float(trajectory.t[-1]) if n_t else None,
+        "n_steps": round((float(trajectory.t[-1]) - run["t_start"]) / run["h"]) if n_t else 0,
+        "bodies": [
+            {"name": body.name, "n_modes": body.n_q, "source": body.source, "digest": body.digest}
+            for body in trajectory.head.bodies
+        ],
+        "energy": {
+            name: [float(values[0]), float(values[-1])] if n_t else None
+            for name, values in {
+                "kinetic": energies.kinetic,
+                "strain": energies.strain,
+                "gravity": energies.gravity,
+                "springs": energies.springs,
+                "work": energies.work,
+                "dissipated": energies.dissipated,
+            }.items()
+        },
+        "energy_scale": scale,
+        "energy_defect": defect / scale if scale else 0.0,
+        "drift": {
+            name: {
+                "distance": float(np.abs(drift.distance).max(initial=0.0)),
+                "angle": float(np.abs(drift.angle).max(initial=0.0)),
+                "distance_rate": float(np.abs(drift.distance_rate).max(initial=0.0)),
+                "angle_rate": float(np.abs(drift.angle_rate).max(initial=0.0)),
+            }
+            for name, drift in drifts.items()
+        },
+    }

@@ -1,0 +1,239 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+from cms.modal_file import write
+from floatframe.cli.app import app
+from floatframe.cli.record import balance_defect, energy_scale, run_record
+from floatframe.trajectory import read_results
+from tests.synthetic import synthetic_reduced_body
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = [sys.executable, "-c", "from floatframe.cli import main; main()"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+
+RIGID = """
+[system]
+units = "m-kg-s"
+gravity = [0, 0, -9.81]
+
+[bodies.stick]
+mass = 2.0
+inertia = [[0.01, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]
+position = [0.5, 0, 0]
+
+[joints.pin]
+type = "revolute"
+body_a = "ground"
+body_b = "stick"
+marker_b = [-0.5, 0, 0]
+axis = [0, 1, 0]
+
+[run]
+t_end = 0.5
+h = 1e-3
+"""
+
+FLEXIBLE = """
+[system]
+units = "mm-t-s"
+
+[bodies.part]
+file = "part.h5"
+omega_B = [0, 0, 3]
+
+[run]
+t_end = 0.01
+h = 1e-4
+"""
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    (tmp_path / "swing.toml").write_text(RIGID)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory) -> Path:
+    """The results of the rigid pendulum, computed by the command."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "swing.toml").write_text(RIGID)
+    result = run("run", folder / "swing.toml")
+    assert result.exit_code == 0, result.output
+    return folder / "swing.h5"
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() if p.is_file() else b"" for p in sorted(folder.iterdir())}
+
+
+def assert_refused(result, *words):
+    """Exit code 2, one message on standard error with these words, no traceback."""
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith("error: ")
+    assert result.stderr.count("error: ") == 1
+    assert "Traceback" not in result.output
+    for word in words:
+        assert word in result.stderr
+
+
+def test_run_computes_the_motion_that_the_file_describes(results):
+    """The stick falls about the pin: energy gives its speed at the last position."""
+    trajectory = read_results(results)
+    assert trajectory.is_complete
+    motion = trajectory.body("stick")
+    height = motion.r[-1, 2]
+    inertia_about_pin = 0.2 + 2.0 * 0.5**2
+    omega = np.linalg.norm(motion.omega_B[-1])
+    assert_allclose(0.5 * inertia_about_pin * omega**2, -2.0 * 9.81 * height, rtol=1e-4)
+    assert sorted(p.name for p in results.parent.iterdir()) == ["swing.h5", "swing.toml"]
+
+
+def test_run_prints_steps_balance_and_drift(folder):
+    result = run("run", folder / "swing.toml", "-o", folder / "out.h5")
+    assert result.exit_code == 0, result.output
+    for word in ("500", "Newton iterations", "wall time", "energy defect", "kinetic", "pin", "wrote"):
+        assert word in result.stdout
+    assert sorted(contents(folder)) == ["out.h5", "swing.toml"]
+
+
+def test_a_flexible_body_runs_from_its_modal_file(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE)
+    result = run("run", folder / "spin.toml")
+    assert result.exit_code == 0, result.output
+    record = run_record(read_results(folder / "spin.h5"))
+    assert record["bodies"][0]["n_modes"] == 5
+    assert len(record["bodies"][0]["digest"]) == 64
+
+
+def test_info_shows_the_run(results):
+    result = run("info", results)
+    assert result.exit_code == 0, result.output
+    for word in ("swing", "m-kg-s", "stick", "GeneralizedAlpha", "rho_inf = 0.8", "energy defect", "pin"):
+        assert word in result.stdout
+    record = json.loads(run("info", results, "--json").stdout)
+    assert record["n_steps"] == 500
+    assert record["t_last"] == 0.5
+    assert record["energy_defect"] < 1e-4
+    assert record["drift"]["pin"]["distance"] < 1e-9
+
+
+def test_the_energy_defect_is_the_balance_over_the_energy_that_moves(results):
+    trajectory = read_results(results)
+    energies = trajectory.energies
+    total = energies.kinetic + energies.gravity
+    assert_allclose(balance_defect(trajectory), total - total[0], rtol=0, atol=1e-13 * energy_scale(trajectory))
+    assert_allclose(energy_scale(trajectory), max(energies.kinetic.max(), np.ptp(energies.gravity)), rtol=1e-14)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('units = "m-kg-s"', 'units = "m-kg"', ["system.units", "did you mean 'm-kg-s'?"]),
+    ("mass = 2.0", "mass = -2.0", ["bodies.stick.mass = -2.0: expected a number above 0"]),
+    ("mass = 2.0", "mass = nan", ["bodies.stick.mass = nan"]),
+    ("mass = 2.0", "maas = 2.0", ["bodies.stick.maas: unknown key; did you mean 'mass'?"]),
+    ('type = "revolute"', 'type = "revolut"', ["joints.pin.type", "did you mean 'revolute'?"]),
+    ('body_b = "stick"', 'body_b = "stik"', ["joints.pin.body_b", "did you mean 'stick'?"]),
+    ("h = 1e-3", "h = 0", ["run.h = 0: expected a number above 0"]),
+    ("h = 1e-3", "", ["run.h: missing"]),
+    ("[run]", "[rum]", ["rum: unknown key; did you mean 'run'?"]),
+    ("mass = 2.0\n", 'file = "part.h5"\n', ["bodies.stick.file", "no such file"]),
+    ("[run]", "[run", ["not valid TOML"]),
+])  # fmt: skip
+def test_a_bad_system_file_ends_in_one_message_and_leaves_nothing(folder, old, new, words):
+    assert RIGID.count(old) == 1
+    (folder / "swing.toml").write_text(RIGID.replace(old, new))
+    before = contents(folder)
+    assert_refused(run("run", folder / "swing.toml"), *words)
+    assert contents(folder) == before
+
+
+def test_a_damaged_modal_file_is_refused(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    damaged = (folder / "part.h5").read_bytes()
+    (folder / "part.h5").write_bytes(damaged[:-100])
+    (folder / "spin.toml").write_text(FLEXIBLE)
+    before = contents(folder)
+    assert_refused(run("run", folder / "spin.toml"), "part.h5", "truncated")
+    (folder / "part.h5").write_bytes(damaged[:4000] + bytes([damaged[4000] ^ 8]) + damaged[4001:])
+    assert_refused(run("run", folder / "spin.toml"), "part.h5", "altered")
+    assert sorted(contents(folder)) == sorted(before)
+
+
+def test_bodies_in_other_units_are_refused(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE.replace("mm-t-s", "m-kg-s"))
+    assert_refused(run("run", folder / "spin.toml"), "mm-t-s", "m-kg-s")
+
+
+def test_the_output_is_checked_before_the_work(folder):
+    for output, words in [("nowhere/out.h5", "does not exist"), ("swing.toml", "this is the input"), (".", "folder")]:
+        assert_refused(run("run", folder / "swing.toml", "-o", folder / output), words)
+    assert sorted(contents(folder)) == ["swing.toml"]
+
+
+@pytest.mark.parametrize("command", ["info"])
+def test_a_file_that_holds_no_results_is_refused(folder, command, results):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "text.h5").write_text("no results")
+    (folder / "short.h5").write_bytes(results.read_bytes()[:3000])
+    for name in ("part.h5", "text.h5", "short.h5", "missing.h5"):
+        before = contents(folder)
+        assert_refused(run(command, folder / name), name)
+        assert contents(folder) == before
+
+
+def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder):
+    (folder / "swing.h5").write_bytes(b"the old results")
+    (folder / "swing.toml").write_text(RIGID.replace("t_end = 0.5", "t_end = 1e5"))
+    with subprocess.Popen([*PROGRAM, "run", "swing.toml"], cwd=folder, env=ENVIRONMENT, text=True,
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        segments = folder / "swing.h5.segments"
+        try:
+            process.wait(timeout=0.2)
+        except subprocess.TimeoutExpired:
+            for _ in range(300):
+                if (segments / "000000.h5").is_file():
+                    break
+                try:
+                    process.wait(timeout=0.2)
+                except subprocess.TimeoutExpired:
+                    continue
+                break
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=60)
+    assert process.returncode == 130, error
+    assert error.startswith("error: interrupted")
+    assert "Traceback" not in error
+    assert (folder / "swing.h5").read_bytes() == b"the old results"
+    result = run("info", segments)
+    assert result.exit_code == 0, result.output
+    assert "did not reach its end" in result.stdout
+
+
+def test_help_names_the_commands_and_loads_nothing_heavy():
+    script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
+    result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    for command in ("run", "info"):
+        assert command in result.stdout
+    loaded = result.stdout[result.stdout.rindex("[") :]
+    for heavy in ("numpy", "scipy", "h5py", "pydantic", "pyvista", "numba", "matplotlib"):
+        assert f"'{heavy}'" not in loaded
+
+
+def test_version():
+    assert run("--version").stdout.startswith("floatframe ")
