@@ -73,6 +73,5 @@ def fitting_distance(relative: Array, half: Array) -> float:
 def seen_points(scene: Scene) -> Array:
     """Return the points that must be in the picture, (n, 3): corners of boxes would waste room, so all nodes."""
     found = [surface.nodes[..., np.unique(surface.triangles), :].reshape(-1, 3) for surface in scene.surfaces]
-    lines = [part for part in scene.lines if not part.is_backdrop] or (() if found else scene.lines)
-    found += [part.points[..., np.unique(part.segments), :].reshape(-1, 3) for part in lines]
+    found += [lines.points[..., np.unique(lines.segments), :].reshape(-1, 3) for lines in scene.lines]
     return np.concatenate([part for part in found if len(part)])

@@ -98,7 +98,7 @@ class DrawnSurface:
             np.concatenate([seen[triangles[shown], :2], seen[ends[:, [0, 1, 1]], :2]]),
             np.concatenate([rgba, np.zeros((len(ends), 4))]),
             np.concatenate([rgba, edge_color]),
-            np.concatenate([np.full(len(rgba), 0.35), np.full(len(ends), 1.0)]),
+            np.concatenate([np.full(len(rgba), 0.35), np.full(len(ends), 0.75)]),
         )
 
     def shaded(self, normals: Array, faces_eye: Array, camera: Camera, frame: int) -> Array:

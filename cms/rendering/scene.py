@@ -58,7 +58,7 @@ class Lines:
     color: str = "#5b6770"
     width: float = 1.5  #: [px]
     opacity: float = 1.0
-    is_backdrop: bool = False  #: whether it may reach out of the picture, as a ground does
+    is_backdrop: bool = False  #: whether it lies behind all else, as a ground does
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", frozen_int(self.segments))
