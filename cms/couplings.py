@@ -225,7 +225,7 @@ def _multiplier_rows(
         if (new_index[members] < 0).any():
             raise BodyError(f"{where}: shares nodes with a rigid interface")
         points = body.nodes[interface.nodes]
-        A = mean_motion(points, interface.weights, interface.reference)
+        A = mean_motion(points, np.asarray(interface.weights), interface.reference)
         radius = float(
             np.sqrt(np.average(((points - points.mean(axis=0)) ** 2).sum(axis=1), weights=interface.weights))
         )
@@ -259,7 +259,7 @@ def _require_spread(body: FEBody, interface: Interface) -> None:
     has_rotation = np.isin(interface.nodes, body.dofs[body.dofs[:, 1] >= 3, 0]).any()
     if interface.kind == "rigid" and has_rotation:
         return  # a node with rotations follows all six motions
-    weights = interface.weights if interface.kind == "distributing" else np.ones(len(interface.nodes))
+    weights = np.asarray(interface.weights) if interface.kind == "distributing" else np.ones(len(interface.nodes))
     used = interface.nodes[weights > 0]
     points = body.nodes[used]
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

@@ -45,4 +45,8 @@ def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:
 
 def boundary_groups(body: FEBody, family: str) -> tuple[str, ...]:
     """Return one group per boundary dof, such as 'constraint big_end'."""
-    return tuple(f"{family} {interface.name}" for interface in body.interfaces for _ in interface.dofs)
+    return tuple(
+        f"{family} {interface.name}"
+        for interface in body.interfaces
+        for _ in (interface.dofs if interface.dofs is not None else ())
+    )

@@ -18,7 +18,7 @@ def main() -> int:
         "lint": ["ruff", "check", "."],
         "types": ["mypy"],
         "tests": ["pytest", "-q", *markers, "tests"],
-        "notebooks": ["pytest", "-q", "--nbmake", "--nbmake-timeout=300", "--override-ini=filterwarnings=", "notebooks"],
+        "notebooks": ["pytest", "-q", "--nbmake", "--nbmake-timeout=300", "-o", "filterwarnings=", "notebooks"],
     }
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
     for name, command in checks.items():

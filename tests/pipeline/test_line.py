@@ -109,5 +109,3 @@ def test_job_of_the_readme_gives_the_body_of_its_python_example(tmp_path, reduce
     from_job = cms.read(tmp_path / "rod.h5")
     assert_allclose(from_job.frequencies, reduced.frequencies, rtol=1e-10)
     assert_allclose(from_job.moments.J0, reduced.moments.J0, rtol=0, atol=1e-12 * reduced.moments.J0.max())
-
-
