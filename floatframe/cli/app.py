@@ -127,3 +127,37 @@ def info_command(
         typer.echo(json_module.dumps(run_record(trajectory), indent=2, ensure_ascii=True))
         return
     print_run(trajectory, None, None)
+
+
+@app.command("animate")
+@guarded
+def animate_command(
+    file: ResultsFile,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Film to write (.gif or .mp4).")] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="Seconds of motion in a second of film; default: so that it is well seen.")
+    ] = None,
+    magnification: Annotated[
+        float | None, typer.Option(help="How many times larger elastic displacement is drawn; default: to be seen.")
+    ] = None,
+    fps: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
+) -> None:
+    """Draw the motion into a film: deformed bodies, coloured by elastic displacement; needs no display.
+
+    Without -o the film stands beside the results: swing.h5 gives swing.gif.
+
+    Example: floatframe animate swing.h5 -o swing.mp4
+    """
+    from floatframe.animation import animate, bodies_of
+    from floatframe.errors import ResultsError
+    from floatframe.trajectory import read_results
+
+    trajectory = read_results(file)
+    path = output_path(output, file.with_suffix(".gif"), ResultsError, overwrite_of=(file,))
+    bodies = bodies_of(trajectory)
+    with stages(remaining=True) as clock, clock("film") as advance:
+        animate(
+            trajectory, bodies, path, fps=fps, speed=speed, magnification=magnification,
+            on_frame=lambda done, all_: advance(done / all_),
+        )  # fmt: skip
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")

@@ -157,6 +157,32 @@ def test_info_json_is_the_record(modal_file):
     assert len(record["digest"]) == 64
 
 
+def test_view_draws_a_picture_beside_the_modal_file(modal_file, tmp_path):
+    path = tmp_path / "bar.h5"
+    path.write_bytes(modal_file.read_bytes())
+    result = run("view", path, "--mode", "2")
+    assert result.exit_code == 0, result.output
+    assert sorted(contents(tmp_path)) == ["bar.h5", "bar_mode2.png"]
+    assert (tmp_path / "bar_mode2.png").read_bytes().startswith(b"\x89PNG")
+    assert "wrote" in result.stdout
+
+
+def test_view_draws_films_and_pictures_where_it_is_told(modal_file, tmp_path, monkeypatch):
+    """Which functions are called with what; the drawing has its own tests."""
+    calls = []
+
+    def recorded(kind):
+        return lambda body, mode, path, **options: (calls.append((kind, mode, options["scale"])), path.touch())
+
+    monkeypatch.setattr("cms.view.view_mode", recorded("picture"))
+    monkeypatch.setattr("cms.view.animate_mode", recorded("film"))
+    assert run("view", modal_file, "-m", "3", "-a", tmp_path / "m.gif", "--scale", "0.2").exit_code == 0
+    assert calls == [("film", 3, 0.2)]
+    assert run("view", modal_file, "-a", tmp_path / "m.gif", "-o", tmp_path / "m.png").exit_code == 0
+    assert calls[1:] == [("picture", 1, None), ("film", 1, None)]
+    assert sorted(contents(tmp_path)) == ["m.gif", "m.png"]
+
+
 def test_central_inertia_is_that_of_the_point_masses():
     rng = np.random.default_rng(0)
     mass, c = rng.uniform(1, 2, 7), rng.normal(size=(7, 3))
@@ -273,7 +299,7 @@ def test_a_mechanism_is_named(folder):
     (lambda b: b"", "not a modal-file"),
     (lambda b: b"some text", "not a modal-file"),
 ])
-@pytest.mark.parametrize("command", [["info"], ["info", "--json"]])
+@pytest.mark.parametrize("command", [["info"], ["info", "--json"], ["view"]])
 def test_a_damaged_modal_file_is_refused(modal_file, tmp_path, damage, words, command):
     path = tmp_path / "bad.h5"
     path.write_bytes(damage(modal_file.read_bytes()))
@@ -289,6 +315,22 @@ def test_other_and_newer_and_missing_files_are_refused(tmp_path, modal_file):
     write_sealed(Content("modal-file", 2, {}), tmp_path / "new.h5")
     assert_refused(run("info", tmp_path / "new.h5"), "format version 2", "update")
     assert_refused(run("info", modal_file.with_name("baz.h5")), "did you mean 'bar.h5'?")
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    (["--mode", "6"], "expected a mode between 1 and 5"),
+    (["--mode", "0"], "expected a mode between 1 and 5"),
+    (["--mode", "1", "-o", "m.jpg"], "ends in .png"),
+    (["--mode", "1", "--animate", "m.png"], ".gif or .mp4"),
+    (["--mode", "1", "--scale", "-1"], "scale"),
+    (["--mode", "1", "-o", "bar.h5"], "this is the input"),
+    (["--mode", "1", "-o", "nowhere/m.png"], "does not exist"),
+])  # fmt: skip
+def test_view_refuses_what_it_cannot_draw(modal_file, tmp_path, monkeypatch, options, words):
+    (tmp_path / "bar.h5").write_bytes(modal_file.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert_refused(run("view", "bar.h5", *options), words)
+    assert sorted(contents(tmp_path)) == ["bar.h5"]
 
 
 def test_the_output_is_checked_before_the_work(folder):
@@ -361,7 +403,7 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
     script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
     result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
-    for command in ("reduce", "info"):
+    for command in ("reduce", "info", "view"):
         assert command in result.stdout
     loaded = result.stdout[result.stdout.rindex("[") :]
     for heavy in ("numpy", "scipy", "h5py", "pydantic", "meshio", "skfem", "pyvista", "numba", "matplotlib"):

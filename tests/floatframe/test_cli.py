@@ -132,6 +132,38 @@ def test_info_shows_the_run(results):
     assert record["drift"]["pin"]["distance"] < 1e-9
 
 
+def test_animate_draws_a_film(results, tmp_path):
+    result = run("animate", results, "-o", tmp_path / "swing.gif", "--speed", "100")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "swing.gif").read_bytes().startswith(b"GIF8")
+    assert sorted(contents(tmp_path)) == ["swing.gif"]
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    (["-o", "swing.avi"], ".gif or .mp4"),
+    (["-o", "nowhere/swing.gif"], "does not exist"),
+    (["--speed", "-1"], "speed"),
+    (["--fps", "0"], "fps"),
+])  # fmt: skip
+def test_animate_refuses_what_it_cannot_draw(results, tmp_path, monkeypatch, options, words):
+    (tmp_path / "swing.h5").write_bytes(results.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert_refused(run("animate", "swing.h5", *options), words)
+    assert sorted(contents(tmp_path)) == ["swing.h5"]
+
+
+def test_animate_refuses_a_modal_file_that_has_changed(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE)
+    assert run("run", folder / "spin.toml").exit_code == 0
+    write(synthetic_reduced_body(seed=1), folder / "part.h5")
+    before = contents(folder)
+    assert_refused(run("animate", folder / "spin.h5"), "part.h5", "has changed")
+    (folder / "part.h5").unlink()
+    assert_refused(run("animate", folder / "spin.h5"), "part.h5", "no such file")
+    assert sorted(contents(folder)) == sorted(set(before) - {"part.h5"})
+
+
 def test_the_energy_defect_is_the_balance_over_the_energy_that_moves(results):
     trajectory = read_results(results)
     energies = trajectory.energies
@@ -185,7 +217,7 @@ def test_the_output_is_checked_before_the_work(folder):
     assert sorted(contents(folder)) == ["swing.toml"]
 
 
-@pytest.mark.parametrize("command", ["info"])
+@pytest.mark.parametrize("command", ["info", "animate"])
 def test_a_file_that_holds_no_results_is_refused(folder, command, results):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "text.h5").write_text("no results")
@@ -228,7 +260,7 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
     script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
     result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
-    for command in ("run", "info"):
+    for command in ("run", "info", "animate"):
         assert command in result.stdout
     loaded = result.stdout[result.stdout.rindex("[") :]
     for heavy in ("numpy", "scipy", "h5py", "pydantic", "pyvista", "numba", "matplotlib"):
