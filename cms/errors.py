@@ -3,6 +3,7 @@
 __all__ = [
     "BodyError",
     "CmsError",
+    "EigenError",
     "FactorizationError",
     "JobError",
     "ModalFileError",
@@ -29,6 +30,10 @@ class ModeSetError(CmsError, ValueError):
 
 class FactorizationError(CmsError, RuntimeError):
     """A sparse matrix could not be factorised: singular, indefinite or too large."""
+
+
+class EigenError(CmsError, RuntimeError):
+    """Vibration modes could not be found to the tolerance, or their number does not agree with the inertia."""
 
 
 class ModalFileError(CmsError, ValueError):

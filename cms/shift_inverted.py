@@ -1,0 +1,93 @@
+"""The shift-inverted operator S = (K - sigma M)⁻¹ M, and modes refined by one more application of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.arrays import Array
+from cms.errors import EigenError
+from cms.factorization import Factorization
+from cms.sparse_product import SymmetricProduct
+
+__all__ = ["Modes", "ShiftInverted", "Wanted", "refined_modes"]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """How many modes are asked for: the first `count`, or all up to `omega2`."""
+
+    count: int | None
+    omega2: float | None
+
+    def __post_init__(self) -> None:
+        if (self.count is None) == (self.omega2 is None):
+            raise EigenError("eigenmodes: expected either n_modes or cutoff, got both or none of them")
+        if self.count is not None and self.count < 1:
+            raise EigenError(f"eigenmodes: n_modes = {self.count}; expected at least 1")
+        if self.omega2 is not None and not 0 < self.omega2 < np.inf:
+            raise EigenError("eigenmodes: cutoff: expected a finite frequency above 0")
+
+
+class ShiftInverted:
+    """The operator S with its tolerance; counts the columns it solves for."""
+
+    def __init__(
+        self,
+        M: sp.csc_array,
+        shift: float,
+        factorization: Factorization,
+        tolerance: float,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        self.M, self.M_product, self.shift, self.tolerance = M, SymmetricProduct(M), shift, tolerance
+        self.n = M.shape[0]
+        self.n_solves = 0
+        self._factorization, self._progress = factorization, progress
+
+    def solve(self, b: Array) -> Array:
+        """Return (K - sigma M)⁻¹ b, (n, k)."""
+        self.n_solves += b.shape[1]
+        return self._factorization.solve(b)
+
+    def report(self, found: int, wanted: int) -> None:
+        """Tell the caller how far the search is."""
+        if self._progress is not None:
+            self._progress(found, wanted)
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes as coefficients of an expanded block: the wanted ones, and a few guards after them."""
+
+    omega2: Array  #: ascending, (n_wanted + n_guards,)
+    n_wanted: int
+    residuals: Array  #: of the block before its last inverse iteration, (n_wanted,)
+    Y: Array  #: (n, n_wanted + n_guards)
+    Z: Array  #: coefficients, M-orthonormal Phi = Y Z
+
+    def expand(self) -> Array:
+        """Return the M-orthonormal modes Phi, (n, n_wanted + n_guards)."""
+        return self.Y @ self.Z
+
+
+def refined_modes(operator: ShiftInverted, X: Array, theta: Array, n_wanted: int) -> Modes:
+    """Modes from M-orthonormal Ritz vectors X, (n, p), by one inverse iteration and Rayleigh-Ritz.
+
+    (1) Y = S X / theta; residuals |Y - X|_M
+    (2) Yᵀ (K - sigma M) Y = Yᵀ M X / theta = H,  Yᵀ M Y = G;  H z = (omega² - sigma) G z
+    """
+    M_X = operator.M_product @ X
+    Y = operator.solve(M_X)
+    Y /= theta
+    M_X /= theta
+    H = Y.T @ M_X
+    del M_X
+    X -= Y
+    residuals = np.sqrt(np.maximum(np.einsum("nk,nk->k", X, operator.M_product @ X), 0.0))[:n_wanted]
+    del X
+    G = Y.T @ (operator.M_product @ Y)
+    mu, Z = la.eigh((H + H.T) / 2, (G + G.T) / 2)
+    return Modes(mu + operator.shift, n_wanted, residuals, Y, Z)
