@@ -117,6 +117,7 @@ def compile_system(system: System) -> CompiledSystem:
         psi=psi,
         m_connection=connection_of_marker,
         m_sign=np.array(sign, dtype=float),
+        m_follower=integers([0] * (len(markers) - len(loads)) + [int(load.is_follower) for load in loads]),
         m_x0=m_x0,
         end0=offsets(np.array([len(group) for group in ends_of])),
         ends=integers(ends),
@@ -133,7 +134,6 @@ def compile_system(system: System) -> CompiledSystem:
         l_marker=integers(load_marker),
         l_force=stacked([load.force for load in loads], (3,)),
         l_torque=stacked([load.torque for load in loads], (3,)),
-        l_follower=integers([int(load.is_follower) for load in loads]),
         **plan_elimination(sizes, ends_of, connection_of_marker)._asdict(),
     )
     return CompiledSystem(

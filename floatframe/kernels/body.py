@@ -14,22 +14,21 @@ W_ab = S_ab q and s = S + 1C q:
 One pass over S_ab (9 n² numbers) and one over 4C (3 n²) carry the cost.
 """
 
-from numba import njit
-
+from floatframe.kernels.compilation import inner, merged
 from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, MASS, S_AB, STIFFNESS
 from floatframe.kernels.rotation import cross
 
 __all__ = ["body_forces", "body_mass_product", "body_tangent", "first_moment", "modal_term"]
 
 
-@njit
+@inner
 def block(model, i, which, size):
     """Return a constant block of body i as a view of the flat store."""
     start = model.block0[model.kind[i], which]
     return model.blocks[start : start + size]
 
 
-@njit
+@inner
 def modal_term(model, i, which, x, out):
     """Add M x, K x or D x of body i to out, (n_q,)."""
     n = model.n_q[i]
@@ -46,7 +45,7 @@ def modal_term(model, i, which, x, out):
             out[k] += total
 
 
-@njit
+@inner
 def first_moment(model, i, q):
     """Return s = S + 1C q as three numbers."""
     t, n = model.kind[i], model.n_q[i]
@@ -60,7 +59,7 @@ def first_moment(model, i, q):
     return s0, s1, s2
 
 
-@njit
+@inner
 def shape_moment(model, i, x):
     """Return 1C x as three numbers."""
     n = model.n_q[i]
@@ -74,7 +73,7 @@ def shape_moment(model, i, x):
     return s0, s1, s2
 
 
-@njit
+@inner
 def body_forces(model, work, i):
     """Write the left sides of (1) to (3) of body i into `work.residual`, and W, Y, J, D_q_dot into their places."""
     t, n, u0, q0 = model.kind[i], model.n_q[i], model.u0[i], model.q0[i]
@@ -184,7 +183,7 @@ def body_forces(model, work, i):
     res[5] = x2 + y2 + t2 + J[2, 0] * e0 + J[2, 1] * e1 + J[2, 2] * e2
 
 
-@njit
+@inner
 def products(model, i, q, qd, W, Y):
     """Write W_ab = S_ab q and Y = 4C q_dot; the inner loops run over contiguous numbers."""
     n = model.n_q[i]
@@ -204,7 +203,7 @@ def products(model, i, q, qd, W, Y):
             Y[j] += row[j] * y
 
 
-@njit
+@inner
 def body_mass_product(model, work, i, v, out):
     """Write generalised momenta M u of body i into out, (6 + n_q,), for v, (6 + n_q,), with v_GO in body axes.
 
@@ -240,7 +239,7 @@ def body_mass_product(model, work, i, v, out):
         modal_term(model, i, MASS, v[6:], out[6:])
 
 
-@njit
+@inner
 def put_tilde(H, row, column, factor, x, y, z):
     """Add factor * tilde((x, y, z)) to H at (row, column)."""
     H[row, column + 1] -= factor * z
@@ -251,7 +250,7 @@ def put_tilde(H, row, column, factor, x, y, z):
     H[row + 2, column + 1] += factor * x
 
 
-@njit
+@inner
 def put_tilde_product(H, row, column, factor, a0, a1, a2, b0, b1, b2):
     """Add factor * tilde(a) tilde(b) = factor * (b aᵀ - (a·b) 1) to H at (row, column)."""
     a, b = (a0, a1, a2), (b0, b1, b2)
@@ -262,7 +261,7 @@ def put_tilde_product(H, row, column, factor, a0, a1, a2, b0, b1, b2):
         H[row + i, column + i] -= factor * dot
 
 
-@njit
+@inner
 def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """Write the derivative of (1) to (3) into H, (6 + n, 6 + n), with weights of mass, damping, stiffness parts.
 
@@ -309,7 +308,7 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     modal_tangent(model, work, i, c_m, c_d, c_k, H, turn, qd, qdd, (a0, a1, a2), (o0, o1, o2), (e0, e1, e2))
 
 
-@njit
+@merged
 def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn, qd, qdd, a, o, e):
     """Write the rows and columns of the modes; see `body_tangent`."""
     n, q0 = model.n_q[i], model.q0[i]
@@ -394,7 +393,7 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn, qd, qdd, a, o, e):
     modal_block(model, i, STIFFNESS, c_k, H)
 
 
-@njit
+@inner
 def modal_block(model, i, which, factor, H):
     """Add factor * M, K or D to the modal block of H."""
     n = model.n_q[i]

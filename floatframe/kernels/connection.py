@@ -9,16 +9,15 @@ rows that say what the wrench is (GAUGE, SPRING) are multiplied by c_k, so that 
 
 import math
 
-from numba import njit
-
 from floatframe.joints.rows import DOT, POINT
+from floatframe.kernels.compilation import inner
 from floatframe.kernels.marker import marker_acceleration_bias, rotate
 from floatframe.kernels.rotation import cross
 
 __all__ = ["connection_derivatives", "connection_rows", "constraint_rates", "row_rate", "spring_tension"]
 
 
-@njit
+@inner
 def spring_line(model, work, c):
     """Return r_B - r_A, v_B - v_A (six numbers) and the length of spring c."""
     a, b = model.c_a[c], model.c_b[c]
@@ -27,7 +26,7 @@ def spring_line(model, work, c):
     return x0, x1, x2, y0, y1, y2, math.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
 
 
-@njit
+@inner
 def spring_tension(model, work, c):
     """Return tension over length, its parts without damping, length and rate of length of spring c.
 
@@ -41,7 +40,7 @@ def spring_tension(model, work, c):
     return (k * (length - free) + damping * rate + preload) / length, length, rate
 
 
-@njit
+@inner
 def connection_rows(model, work, c, c_k):
     """Write the residual of connection c, and its wrench on both markers."""
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
@@ -71,7 +70,7 @@ def connection_rows(model, work, c, c_k):
             work.g[k] = c_k * (e0 * work.w[w0 + 3] + e1 * work.w[w0 + 4] + e2 * work.w[w0 + 5])
 
 
-@njit
+@inner
 def connection_derivatives(model, work, c, c_k):
     """Write P at both markers and V of connection c."""
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
@@ -103,7 +102,7 @@ def connection_derivatives(model, work, c, c_k):
             V[r, 3], V[r, 4], V[r, 5] = e0, e1, e2
 
 
-@njit
+@inner
 def spring_derivatives(model, work, c, c_k):
     """Write P and V of spring c.
 
@@ -129,7 +128,7 @@ def spring_derivatives(model, work, c, c_k):
             P_b[r, 6 + j] = -c_k * by_v
 
 
-@njit
+@inner
 def row_rate(model, work, k, a, b):
     """Return the rate of the held quantity of row k between markers a and b; zero for rows that hold none."""
     x = model.row_x[k]
@@ -149,7 +148,7 @@ def row_rate(model, work, k, a, b):
     return 0.0
 
 
-@njit
+@inner
 def row_acceleration(model, work, k, a, b, bias_a, bias_b):
     """Return the second rate of the held quantity of row k for given accelerations (6) of both markers.
 
@@ -181,7 +180,7 @@ def row_acceleration(model, work, k, a, b, bias_a, bias_b):
     return 0.0
 
 
-@njit
+@inner
 def constraint_rates(model, work, rate, bias):
     """Write for every row the rate of the held quantity and its second rate at zero u_dot, both (n_w,).
 

@@ -1,11 +1,11 @@
 """Small dense matrices: LU factorisation with partial pivoting, and solves. Row-major, in place."""
 
-from numba import njit
+from floatframe.kernels.compilation import inner
 
 __all__ = ["lu_factor", "lu_solve", "lu_solve_columns"]
 
 
-@njit
+@inner
 def lu_factor(A, pivot):
     """Overwrite A, (n, n), with its factors; rows are compared after scaling by their largest number.
 
@@ -38,7 +38,7 @@ def lu_factor(A, pivot):
     return True
 
 
-@njit
+@inner
 def lu_solve(A, pivot, b):
     """Overwrite b, (n,), with A⁻¹ b."""
     n = A.shape[0]
@@ -58,7 +58,7 @@ def lu_solve(A, pivot, b):
         b[i] = total / A[i, i]
 
 
-@njit
+@inner
 def lu_solve_columns(A, pivot, B):
     """Overwrite B, (n, m), with A⁻¹ B."""
     n, m = B.shape

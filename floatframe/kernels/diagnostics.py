@@ -2,10 +2,9 @@
 
 import math
 
-from numba import njit
-
 from floatframe.joints.rows import DOT, POINT
 from floatframe.kernels.body import body_mass_product, first_moment, modal_term
+from floatframe.kernels.compilation import inner
 from floatframe.kernels.connection import row_rate, spring_tension
 from floatframe.kernels.marker import rotate, rotate_back
 from floatframe.kernels.model import DAMPING, N_DRIFTS, STIFFNESS
@@ -14,7 +13,7 @@ from floatframe.kernels.rotation import cross
 __all__ = ["diagnose", "power"]
 
 
-@njit
+@inner
 def quadratic(model, work, i, which, x):
     """Return xᵀ M x, xᵀ K x or xᵀ D x of body i."""
     n = model.n_q[i]
@@ -28,7 +27,7 @@ def quadratic(model, work, i, which, x):
     return total
 
 
-@njit
+@inner
 def diagnose(model, work, out, drift):
     """Write energies and momenta into out[:10], and the drift of each joint into drift, (n_c, N_DRIFTS).
 
@@ -84,7 +83,7 @@ def diagnose(model, work, out, drift):
             drift[c, k] = math.sqrt(drift[c, k])
 
 
-@njit
+@inner
 def power(model, work):
     """Return the power of the point forces, and that taken by dampers and modal damping (positive)."""
     loads, dissipated = 0.0, 0.0

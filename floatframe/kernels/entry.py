@@ -66,7 +66,8 @@ def make_entry(digest):
                 rows,
             )
         if what == OBSERVE:
-            write_row(model, work, memory, numbers[0], rows, 0)
+            work.counts[4] = 0
+            write_row(model, work, memory, numbers[0], rows)
             memory.power[0], memory.power[1] = power(model, work)
         else:
             c_m, c_d, c_k = numbers[0], numbers[1], numbers[2]
@@ -79,7 +80,7 @@ def make_entry(digest):
                 body = factorize_bodies(model, work, c_m, c_d, c_k)
                 if body >= 0:
                     return SINGULAR_BODY, 0, 0, body, 0.0
-                connection = correction(model, work, c_k, True)
+                connection = correction(model, work, c_k, what == CORRECT)
                 if connection >= 0:
                     return SINGULAR_CONNECTION, 0, 0, connection, 0.0
         return DONE, 0, 0, -1, 0.0

@@ -1,8 +1,7 @@
 """Evaluation of the whole system at one iterate: residuals, and their derivatives body by body."""
 
-from numba import njit
-
 from floatframe.kernels.body import body_forces, body_tangent
+from floatframe.kernels.compilation import inner, merged
 from floatframe.kernels.connection import connection_derivatives, connection_rows
 from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, rotate, wrench_to_body
 from floatframe.kernels.rotation import right_jacobian
@@ -10,7 +9,7 @@ from floatframe.kernels.rotation import right_jacobian
 __all__ = ["evaluate", "linearize", "tangent_of_body"]
 
 
-@njit
+@inner
 def evaluate(model, work, c_k):
     """Write the residuals of bodies and rows for the iterate in `work`; rows of wrenches weighted by c_k."""
     for m in range(model.m_body.shape[0]):
@@ -28,12 +27,12 @@ def evaluate(model, work, c_k):
     work.counts[0] += 1
 
 
-@njit
+@inner
 def load_wrench(model, work, k):
     """Write the wrench of load k on its marker, ground axes."""
     m = model.l_marker[k]
     F, f, t = work.m_wrench[m], model.l_force[k], model.l_torque[k]
-    if model.l_follower[k]:
+    if model.m_follower[m]:
         A = work.m_A[m]
         F[0], F[1], F[2] = rotate(A, f[0], f[1], f[2])
         F[3], F[4], F[5] = rotate(A, t[0], t[1], t[2])
@@ -43,7 +42,7 @@ def load_wrench(model, work, k):
             F[3 + a] = t[a]
 
 
-@njit
+@merged
 def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
     """Write the tangent of body i into H, (6 + n, 6 + n), with all wrenches on it held fixed in space or in markers.
 
@@ -53,17 +52,17 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
     turn = work.scratch[9 : 9 + 3 * (6 + n)].reshape((6 + n, 3))
     body_tangent(model, work, i, c_m, c_d, c_k, H, turn)
     for e in range(model.end0[i], model.end0[i + 1]):
-        marker_stiffness(model, work, model.ends[e], c_k, False, H, turn)
+        marker_stiffness(model, work, model.ends[e], c_k, H, turn)
     for k in range(model.l_marker.shape[0]):
         m = model.l_marker[k]
         if model.m_body[m] == i:
-            marker_stiffness(model, work, m, c_k, model.l_follower[k] != 0, H, turn)
+            marker_stiffness(model, work, m, c_k, H, turn)
     for r in range(6 + n):
         for b in range(3):
             H[r, 3 + b] += c_k * (turn[r, 0] * turning[0, b] + turn[r, 1] * turning[1, b] + turn[r, 2] * turning[2, b])
 
 
-@njit
+@inner
 def linearize(model, work, c_m, c_d, c_k):
     """Write H of every body, J_row and J_column of every end, and P, V of every connection (nothing factorised)."""
     rate = c_d / c_k if c_k > 0.0 else 0.0

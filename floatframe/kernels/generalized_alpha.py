@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from floatframe.kernels.compilation import inner, merged
 from floatframe.kernels.diagnostics import diagnose, power
 from floatframe.kernels.evaluation import evaluate
 from floatframe.kernels.model import MASS, STIFFNESS
@@ -18,7 +17,7 @@ MANY = 4  # iterations of a step after which the next one starts with new factor
 ROUNDOFF = 2e-15  # of a position
 
 
-@njit
+@inner
 def put_weights(model, work, c_k):
     """Write the weights of the norm: mass, inertia, M + c_k K."""
     for i in range(model.kind.shape[0]):
@@ -36,7 +35,7 @@ def put_weights(model, work, c_k):
                 work.weight[u0 + 6 + k] += factor * model.blocks[start + k * step]
 
 
-@njit
+@inner
 def load_state(model, work, memory):
     """Copy the memory of the integrator into the iterate; rotation since the beginning of the step is zero."""
     work.r[:, :] = memory.r
@@ -49,7 +48,7 @@ def load_state(model, work, memory):
         matrix_of_euler_parameters(memory.p[i], work.R[i])
 
 
-@njit
+@inner
 def turn_body(work, memory, i, step):
     """Write R of body i: that of the beginning of the step, turned by theta. step, (3, 3), is overwritten."""
     exp_matrix(work.theta[i], step)
@@ -61,7 +60,7 @@ def turn_body(work, memory, i, step):
             R[a, b] = start[a, 0] * step[0, b] + start[a, 1] * step[1, b] + start[a, 2] * step[2, b]
 
 
-@njit
+@inner
 def predict(model, work, memory, h, alpha_f):
     """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
     size, size_x = 0.0, 0.0
@@ -86,7 +85,7 @@ def predict(model, work, memory, h, alpha_f):
     return size, size_x
 
 
-@njit
+@inner
 def update(model, work, memory, by_rate, by_acceleration, c_k):
     """Add the correction (y, mu) to the iterate; return its squared norm."""
     total = 0.0
@@ -114,7 +113,7 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
     return total
 
 
-@njit
+@inner
 def roundoff_floor(model, work, length):
     """Return the squared norm of rounding errors of the positions."""
     total = 0.0
@@ -126,7 +125,7 @@ def roundoff_floor(model, work, length):
     return total * ROUNDOFF * ROUNDOFF
 
 
-@njit
+@merged
 def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length):
     """Advance the memory by one step.
 
@@ -180,7 +179,7 @@ def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, le
     return DIVERGED, -1, excess
 
 
-@njit
+@inner
 def accept(model, work, memory, h, alpha_m, alpha_f):
     """(3): write the iterate and the new algorithmic acceleration into the memory."""
     for k in range(memory.a.shape[0]):
@@ -203,9 +202,11 @@ def accept(model, work, memory, h, alpha_m, alpha_f):
     memory.power[1] = dissipated
 
 
-@njit
-def write_row(model, work, memory, t, rows, k):
-    """Evaluate at the state in the memory and write row k of the results."""
+@inner
+def write_row(model, work, memory, t, rows):
+    """Evaluate at the state in the memory and write the next row of the results."""
+    k = work.counts[4]
+    work.counts[4] += 1
     load_state(model, work, memory)
     evaluate(model, work, 1.0)
     rows.t[k] = t
@@ -220,20 +221,19 @@ def write_row(model, work, memory, t, rows, k):
     rows.diagnostics[k, 11] = memory.work[1]
 
 
-@njit
+@merged
 def advance(model, work, memory, t0, h, first, n_steps, every, coefficients, tolerance, max_iterations, length, rows):
     """Advance by n_steps, the first of them number `first` from t0; write a row after every `every`-th.
 
     Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
     """
     put_weights(model, work, coefficients[2] * h * h)
-    n_rows = 0
+    work.counts[4] = 0
     excess = 0.0
     for k in range(n_steps):
         status, index, excess = one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length)
         if status != DONE:
-            return status, k, n_rows, index, excess
+            return status, k, work.counts[4], index, excess
         if (first + k + 1) % every == 0:
-            write_row(model, work, memory, t0 + (first + k + 1) * h, rows, n_rows)
-            n_rows += 1
-    return DONE, n_steps, n_rows, -1, excess
+            write_row(model, work, memory, t0 + (first + k + 1) * h, rows)
+    return DONE, n_steps, work.counts[4], -1, excess

@@ -8,14 +8,13 @@ With rho = c + Psi_t q, th = Psi_r q, E = exp(th), T' = left Jacobian at th, nu 
     wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_tᵀ f + (T' Psi_r)ᵀ m
 """
 
-from numba import njit
-
+from floatframe.kernels.compilation import inner
 from floatframe.kernels.rotation import cross, exp_matrix, left_jacobian, left_jacobian_derivative
 
 __all__ = ["marker_acceleration_bias", "marker_columns", "marker_motion", "marker_stiffness", "wrench_to_body"]
 
 
-@njit
+@inner
 def rotate(R, x0, x1, x2):
     """Return R x as three numbers."""
     return (
@@ -25,7 +24,7 @@ def rotate(R, x0, x1, x2):
     )
 
 
-@njit
+@inner
 def rotate_back(R, x0, x1, x2):
     """Return Rᵀ x as three numbers."""
     return (
@@ -35,7 +34,7 @@ def rotate_back(R, x0, x1, x2):
     )
 
 
-@njit
+@inner
 def marker_motion(model, work, m):
     """Write place and motion of marker m."""
     i = model.m_body[m]
@@ -78,7 +77,7 @@ def marker_motion(model, work, m):
     work.m_omega[m, 0], work.m_omega[m, 1], work.m_omega[m, 2] = rotate(R, o0 + spin[0], o1 + spin[1], o2 + spin[2])
 
 
-@njit
+@inner
 def elastic_motion(model, work, m, i):
     """Add the elastic displacement to rho and write elastic rotation, rates and the left Jacobian."""
     n, q0, u0, o = model.n_q[i], model.q0[i], model.u0[i], model.m_psi0[m]
@@ -101,7 +100,7 @@ def elastic_motion(model, work, m, i):
     s[0], s[1], s[2] = rotate(work.T_left[m], d[0], d[1], d[2])
 
 
-@njit
+@inner
 def marker_acceleration_bias(model, work, m, out):
     """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot, ground axes, into out.
 
@@ -126,7 +125,7 @@ def marker_acceleration_bias(model, work, m, out):
         out[3], out[4], out[5] = rotate(R, x0 + y0, x1 + y1, x2 + y2)
 
 
-@njit
+@inner
 def wrench_to_body(model, work, m):
     """Subtract the generalised forces of the wrench on marker m from the residual of its body."""
     i = model.m_body[m]
@@ -159,7 +158,7 @@ def wrench_to_body(model, work, m):
             )
 
 
-@njit
+@inner
 def marker_columns(model, work, m, rate, turning, column, row):
     """Write the derivatives of the motion of marker m by the body unknowns (dx, dtheta, dq), in body axes.
 
@@ -222,8 +221,8 @@ def marker_columns(model, work, m, rate, turning, column, row):
         row[9, 6 + k], row[10, 6 + k], row[11, 6 + k] = x0 + rate * t0, x1 + rate * t1, x2 + rate * t2
 
 
-@njit
-def marker_stiffness(model, work, m, c_k, is_follower, H, turn):
+@inner
+def marker_stiffness(model, work, m, c_k, H, turn):
     """Add the derivative of minus the generalised forces of a held wrench on marker m to H and turn.
 
     A wrench fixed in space turns against the body (turn); one fixed in the marker turns with its elastic rotation.
@@ -233,6 +232,7 @@ def marker_stiffness(model, work, m, c_k, is_follower, H, turn):
     R, F, rho = work.R[i], work.m_wrench[m], work.rho[m]
     f0, f1, f2 = rotate_back(R, F[0], F[1], F[2])
     t0, t1, t2 = rotate_back(R, F[3], F[4], F[5])
+    is_follower = model.m_follower[m] != 0
     if not is_follower:
         for b in range(3):
             unit = (1.0 if b == 0 else 0.0, 1.0 if b == 1 else 0.0, 1.0 if b == 2 else 0.0)

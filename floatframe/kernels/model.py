@@ -63,6 +63,7 @@ class Model(NamedTuple):
     psi: Array
     m_connection: IntArray  #: connection of which it is an end, -1 for none, (n_m,)
     m_sign: Array  #: +1 at end A, -1 at end B: sign of the wrench, (n_m,)
+    m_follower: IntArray  #: whether its wrench turns with it, (n_m,)
     m_x0: IntArray  #: Σ (6 + n_q) over the ends before it, (n_m,)
     end0: IntArray  #: ends of body i are ends[end0[i]:end0[i + 1]], (n_b + 1,)
     ends: IntArray
@@ -81,7 +82,6 @@ class Model(NamedTuple):
     l_marker: IntArray  #: (n_l,)
     l_force: Array  #: (n_l, 3)
     l_torque: Array  #: (n_l, 3)
-    l_follower: IntArray  #: (n_l,)
     # block elimination of the connections, see kernels/schur.py
     order: IntArray  #: connections in the order of elimination, (n_c,)
     s_diagonal: IntArray  #: where the diagonal block begins in the store of blocks, (n_c,)
@@ -146,7 +146,7 @@ class Work(NamedTuple):
     weight: Array  #: of the norm of corrections, (n_u,)
     scratch: Array  #: (12 * (6 + largest n_q),)
     factors: Array  #: c_m, c_d, c_k for which H was factorised, zero for never, (3,)
-    counts: IntArray  #: evaluations, factorisations, iterations, flag "factorise at the next step", (4,)
+    counts: IntArray  #: evaluations, factorisations, iterations, flag "factorise next", rows, (5,)
 
 
 def new_work(model: Model) -> Work:
@@ -204,7 +204,7 @@ def new_work(model: Model) -> Work:
         weight=zeros(n_u),
         scratch=zeros(12 * (6 + n_largest)),
         factors=zeros(3),
-        counts=np.array([0, 0, 0, 1], np.int64),
+        counts=np.array([0, 0, 0, 1, 0], np.int64),
     )
 
 

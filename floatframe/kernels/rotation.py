@@ -6,7 +6,7 @@ s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³; below t = 1/2 their ser
 
 import math
 
-from numba import njit
+from floatframe.kernels.compilation import inner
 
 __all__ = [
     "cross",
@@ -21,7 +21,7 @@ __all__ = [
 SERIES_BELOW = 0.25  # t² at the switch
 
 
-@njit
+@inner
 def quotient_s(x):
     """Return sin t / t of x = t²."""
     if x < SERIES_BELOW:
@@ -30,7 +30,7 @@ def quotient_s(x):
     return math.sin(t) / t
 
 
-@njit
+@inner
 def quotient_a(x):
     """Return (1 - cos t)/t² of x = t²."""
     if x < SERIES_BELOW:
@@ -38,7 +38,7 @@ def quotient_a(x):
     return (1 - math.cos(math.sqrt(x))) / x
 
 
-@njit
+@inner
 def quotient_b(x):
     """Return (t - sin t)/t³ of x = t²."""
     if x < SERIES_BELOW:
@@ -47,7 +47,7 @@ def quotient_b(x):
     return (t - math.sin(t)) / (x * t)
 
 
-@njit
+@inner
 def quotient_da(x):
     """Return (da/dt)/t of x = t²."""
     if x < SERIES_BELOW:
@@ -56,7 +56,7 @@ def quotient_da(x):
     return (t * math.sin(t) - 2 * (1 - math.cos(t))) / (x * x)
 
 
-@njit
+@inner
 def quotient_db(x):
     """Return (db/dt)/t of x = t²."""
     if x < SERIES_BELOW:
@@ -65,13 +65,13 @@ def quotient_db(x):
     return ((1 - math.cos(t)) - 3 * (t - math.sin(t)) / t) / (x * x)
 
 
-@njit
+@inner
 def cross(a0, a1, a2, b0, b1, b2):
     """Return a × b as three numbers."""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
-@njit
+@inner
 def polynomial(th, first, second, out):
     """Write 1 + first tilde(th) + second tilde(th)² into out, (3, 3)."""
     x, y, z = th[0], th[1], th[2]
@@ -86,28 +86,28 @@ def polynomial(th, first, second, out):
     out[2, 1] = second * y * z + first * x
 
 
-@njit
+@inner
 def exp_matrix(th, out):
     """Write the rotation matrix of a rotation vector."""
     x = th[0] * th[0] + th[1] * th[1] + th[2] * th[2]
     polynomial(th, quotient_s(x), quotient_a(x), out)
 
 
-@njit
+@inner
 def right_jacobian(th, out):
     """Write T(th)."""
     x = th[0] * th[0] + th[1] * th[1] + th[2] * th[2]
     polynomial(th, -quotient_a(x), quotient_b(x), out)
 
 
-@njit
+@inner
 def left_jacobian(th, out):
     """Write T(th)ᵀ."""
     x = th[0] * th[0] + th[1] * th[1] + th[2] * th[2]
     polynomial(th, quotient_a(x), quotient_b(x), out)
 
 
-@njit
+@inner
 def left_jacobian_derivative(th, v0, v1, v2, sign, out):
     """Write d(Tᵀ v)/dth for sign = +1, d(T v)/dth for sign = -1, (3, 3), v held.
 
@@ -132,7 +132,7 @@ def left_jacobian_derivative(th, v0, v1, v2, sign, out):
     out[2, 1] -= a * v0
 
 
-@njit
+@inner
 def matrix_of_euler_parameters(p, out):
     """Write R_GB of p = (w, x, y, z)."""
     w, x, y, z = p[0], p[1], p[2], p[3]
@@ -147,7 +147,7 @@ def matrix_of_euler_parameters(p, out):
     out[2, 1] = 2 * (y * z + w * x)
 
 
-@njit
+@inner
 def rotate_euler_parameters(p, th, out):
     """Write p * exp(th/2), made of length one again, into out, (4,)."""
     x = 0.25 * (th[0] * th[0] + th[1] * th[1] + th[2] * th[2])

@@ -7,8 +7,7 @@ With z = H⁻¹(-c_k residual), X = H⁻¹ J_columnᵀ and Z = J_row X the conne
 and Z do not turn with the body, so that they can serve for many steps; P, R and V are those of the iterate.
 """
 
-from numba import njit
-
+from floatframe.kernels.compilation import inner
 from floatframe.kernels.connection import connection_derivatives
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.evaluation import linearize
@@ -16,7 +15,7 @@ from floatframe.kernels.evaluation import linearize
 __all__ = ["correction", "factorize_bodies"]
 
 
-@njit
+@inner
 def factorize_bodies(model, work, c_m, c_d, c_k):
     """Linearise at the iterate, factorise H and write X, Z. Return the body whose H is singular, or -1."""
     linearize(model, work, c_m, c_d, c_k)
@@ -51,7 +50,7 @@ def factorize_bodies(model, work, c_m, c_d, c_k):
     return -1
 
 
-@njit
+@inner
 def assemble(model, work, c_k):
     """Write the block matrix of the connections at the iterate."""
     s = work.s
@@ -84,7 +83,7 @@ def assemble(model, work, c_k):
                     s[o + r * columns + part + k] += sign * (x0 * R[k, 0] + x1 * R[k, 1] + x2 * R[k, 2])
 
 
-@njit
+@inner
 def factorize_connections(model, work):
     """Block LU of the connections in the planned order. Return the connection with a singular block, or -1."""
     s = work.s
@@ -112,13 +111,13 @@ def factorize_connections(model, work):
                 for r in range(rows):
                     for k in range(columns):
                         total = 0.0
-                        for inner in range(n):
-                            total += L[r, inner] * U[inner, k]
+                        for j_ in range(n):
+                            total += L[r, j_] * U[j_, k]
                         s[o + r * columns + k] -= total
     return -1
 
 
-@njit
+@inner
 def solve_connections(model, work):
     """Overwrite mu by the solution for the right side in mu."""
     s, mu = work.s, work.mu
@@ -143,7 +142,7 @@ def solve_connections(model, work):
                     mu[model.c_w0[j] + r] -= s[o + r * columns + k] * mu[model.c_w0[i] + k]
 
 
-@njit
+@inner
 def correction(model, work, c_k, is_new):
     """Write the correction (y, mu) for the residuals in `work`; reassemble the connections if is_new.
 

@@ -5,9 +5,10 @@ on as tuples they would cost each inner function some nine hundred machine argum
 """
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import typeof, types
 from numba.experimental import structref
 
+from floatframe.kernels.compilation import merged
 from floatframe.kernels.model import Memory, Model, Rows, Work
 
 __all__ = ["pack_memory", "pack_model", "pack_rows", "pack_work"]
@@ -40,7 +41,7 @@ def packer(kind, n_dimensions):
     text = "\n".join(["def pack(data):", "    packed = new(structure)", *lines, "    return packed"])
     scope = {"new": structref.new, "structure": Structure(fields)}
     exec(text, scope)
-    return njit(scope["pack"])
+    return merged(scope["pack"])
 
 
 pack_model = packer(Model, N_DIMENSIONS)
