@@ -18,7 +18,8 @@ __all__ = ["EigenResult", "eigenmodes"]
 
 SMALL = 300  #: dofs up to which dense matrices are faster
 LARGEST_DENSE = 3000  #: dofs up to which dense matrices are affordable, where many of the modes are wanted
-SHIFT = 1e-8  #: of a free body, as a part of the median of K_kk / M_kk
+SHIFT = 1e-6  #: of a free body, as a part of the median of K_kk / M_kk: near its first elastic omega²
+SHIFT_SMALL = 1e-4  #: the same for the few dofs of a dense pencil
 ZERO = 1e-13  #: the same part, below which omega² is rounding of K: a rigid-body mode
 MISMATCH = 1e-3  #: defect of K x = omega² M x that only a factorisation of another matrix explains
 GAP = 1e-4  #: relative gap between two omega² in which modes can be counted
@@ -100,17 +101,17 @@ def eigenmodes(
     wanted = Wanted(n_modes, None if cutoff is None else (2 * np.pi * cutoff) ** 2)
     if wanted.count is not None and wanted.count > n:
         raise EigenError(f"eigenmodes: n_modes = {n_modes}, but there are {n} dofs; choose n_modes <= {n}")
+    is_large_part = wanted.count is not None and 3 * wanted.count > n
+    is_dense = n <= SMALL or (is_large_part and n <= LARGEST_DENSE)
     scale = frequency_scale(K, M)
     if shift is None:
-        shift = 0.0 if factorization is not None else -SHIFT * scale
+        shift = 0.0 if factorization is not None else -(SHIFT_SMALL if is_dense else SHIFT) * scale
     with ExitStack() as stack:
         if factorization is None:
             factorization = stack.enter_context(_factorize_shifted(K, M, shift))
         if factorization.n != n:
             raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
         operator = ShiftInverted(M, shift, factorization, tolerance, progress)
-        is_large_part = wanted.count is not None and 3 * wanted.count > n
-        is_dense = n <= SMALL or (is_large_part and n <= LARGEST_DENSE)
         search = (DenseSearch if is_dense else KrylovSearch)(operator, wanted)
         modes = search.modes(wanted)
         is_proven = False
