@@ -13,6 +13,7 @@ from cms.frames import FrameCondition
 from cms.independent import Columns, gram, independent_columns
 from cms.mode_set import ModeSet
 from cms.orientation import orientation
+from cms.sparse_product import SymmetricProduct
 
 __all__ = ["FinishedBasis", "finish"]
 
@@ -52,7 +53,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     """
     where = f"mode set {modes.name!r} of body {body.name!r}"
     V = modes.columns
-    columns = Columns(V, body.K @ V, body.M @ V, np.eye(V.shape[1]))
+    columns = Columns(V, SymmetricProduct(body.K) @ V, SymmetricProduct(body.M) @ V, np.eye(V.shape[1]))
     K_V = gram(V, columns.KX)
     omega2_1 = first_elastic(where, columns, condition)
     Q, redundant = independent_columns(columns, body, omega2_1)  # (1)

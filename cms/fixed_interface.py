@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.arrays import Array, IntArray
-from cms.errors import BodyError, FactorizationError, ModeSetError
+from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
 from cms.factorization import Factorization, factorize
 from cms.fe_body import MULTIPLIER, FEBody
 from cms.submatrix import principal_block
@@ -73,7 +73,7 @@ def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.c
     start = f"body {body.name!r}: with all interfaces held its stiffness is singular"
     try:
         modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1))
-    except Exception:  # the message about the mechanism matters more than why its picture failed
+    except (EigenError, FactorizationError):  # the message about the mechanism matters more than why its picture failed
         return f"{start}; it has a mechanism, or a part that no interface holds"
     energy = np.abs(K_ii @ modes.Phi).max(axis=0) / (np.abs(K_ii.data).max() * np.abs(modes.Phi).max(axis=0))
     is_free = energy < ZERO_ENERGY
