@@ -87,12 +87,9 @@ def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.c
 
 
 def moving_nodes(body: FEBody, rows: IntArray, Phi: Array) -> str:
-    """Name the nodes that move most in these motions over the given dofs, with their positions."""
-    size = np.abs(Phi).max(axis=1)
-    nodes = []
-    for k in np.argsort(size)[::-1]:
-        if body.dofs[rows[k], 0] not in nodes:
-            nodes.append(int(body.dofs[rows[k], 0]))
-        if len(nodes) == 3:
-            break
-    return node_list(nodes, body.nodes)
+    """Name the three nodes that move most in these motions over the given dofs, with their positions."""
+    is_translation = (body.dofs[rows, 1] >= 0) & (body.dofs[rows, 1] < 3)
+    chosen = is_translation if is_translation.any() else np.ones(len(rows), bool)
+    size = np.bincount(body.dofs[rows[chosen], 0], (Phi[chosen] ** 2).sum(axis=1), minlength=len(body.nodes))
+    order = np.argsort(-np.round(size / size.max(), 6), kind="stable")  # nodes that move alike: in their order
+    return node_list(order[: min(3, np.count_nonzero(size))].tolist(), body.nodes)
