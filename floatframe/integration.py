@@ -187,6 +187,7 @@ def head_of(system: System, integrator: GeneralizedAlpha, t_start: float, t_end:
         "t_end": t_end,
         "h": h,
         "output_every": every,
+        "gravity": [float(x) for x in compiled.model.gravity],
         "floatframe": release,
     }
     return Head(

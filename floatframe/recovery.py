@@ -1,0 +1,57 @@
+"""From a motion back to the body: positions of nodes and interfaces in ground axes."""
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.reduced_body import ReducedBody
+from floatframe.errors import ResultsError
+from floatframe.rotations import rotation_matrix
+from floatframe.trajectory import Trajectory
+
+__all__ = ["interface_positions", "nodal_positions", "point_positions"]
+
+
+def require_same_modes(trajectory: Trajectory, body_name: str, reduced: ReducedBody) -> None:
+    """Raise `ResultsError` unless the reduced body has as many modes as the body of the trajectory."""
+    _, entry = trajectory.entry(body_name)
+    if entry.n_q != reduced.n_q:
+        raise ResultsError(
+            f"body {body_name!r} has {entry.n_q} modes in the trajectory, but the reduced body {reduced.name!r} has "
+            f"{reduced.n_q}; give the modal file of the run ({entry.source or 'made in memory'})"
+        )
+
+
+def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int) -> Array:
+    """Return positions of the kept nodes of a flexible body at an output time, ground axes, (n_kept, 3) [m].
+
+    r + R (c + Phi q), with all modes of the body, static ones included.
+
+    Raises
+    ------
+    ResultsError
+        If there is no such body, or the reduced body is another one.
+    """
+    require_same_modes(trajectory, body_name, reduced)
+    motion = trajectory.body(body_name)
+    local = reduced.nodes + reduced.Phi @ motion.q[i_time]
+    return motion.r[i_time] + local @ rotation_matrix(motion.p[i_time]).T
+
+
+def interface_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
+    """Return positions of the reference point of an interface over time, ground axes, (n_t, 3) [m]."""
+    require_same_modes(trajectory, body_name, reduced)
+    place = reduced.interface(interface)
+    motion = trajectory.body(body_name)
+    return at_points(motion.r, motion.p, place.position + motion.q @ place.Psi[:3].T)
+
+
+def point_positions(trajectory: Trajectory, body_name: str, point: Array) -> Array:
+    """Return positions of a point that is fixed in the frame of a body, ground axes, (n_t, 3) [m]."""
+    motion = trajectory.body(body_name)
+    return at_points(motion.r, motion.p, np.broadcast_to(np.asarray(point, dtype=float), motion.r.shape))
+
+
+def at_points(r: Array, p: Array, local: Array) -> Array:
+    """Return r + R local for each time, (n_t, 3)."""
+    w, v = p[:, :1], p[:, 1:]
+    return r + local + 2 * np.cross(v, np.cross(v, local) + w * local)
