@@ -88,8 +88,15 @@ def measure(route, million_dofs):
     K, M = ROUTES[route](mesh)
     seconds = time.perf_counter() - begin
     held = sum(array.nbytes for matrix in (K, M) for array in (matrix.data, matrix.indices, matrix.indptr)) / 1e9
-    return {"n_dof": K.shape[0], "nnz": K.nnz, "seconds": seconds, "peak": memory("VmHWM") - before, "held": held,
-            "start_up": start_up, "mass": float(M.sum() / 3)}
+    return {
+        "n_dof": K.shape[0],
+        "nnz": K.nnz,
+        "seconds": seconds,
+        "peak": memory("VmHWM") - before,
+        "held": held,
+        "start_up": start_up,
+        "mass": float(M.sum() / 3),
+    }
 
 
 def child(route, million_dofs, cache=None):

@@ -78,8 +78,10 @@ def assemble(
     if not kinds:
         raise MeshError("assembly: the mesh has no solid cells; expected tetrahedra, hexahedra or wedges")
     if not np.isfinite(mesh.nodes).all():
-        raise MeshError(f"assembly: {(~np.isfinite(mesh.nodes)).any(axis=1).sum()} nodes have coordinates that are not "
-                        f"finite numbers")
+        raise MeshError(
+            f"assembly: {(~np.isfinite(mesh.nodes)).any(axis=1).sum()} nodes have coordinates that are not "
+            f"finite numbers"
+        )
     for kind in kinds:
         require_known_nodes(kind, mesh.cells[kind], len(mesh.nodes))
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
@@ -112,16 +114,20 @@ def node_graph(lists: list[np.ndarray], n_nodes: int, pool: ThreadPoolExecutor) 
     if members.size > LARGEST_INT32:
         raise MeshError(f"assembly: {members.size} element nodes, expected at most {LARGEST_INT32}")
     offsets = np.cumsum([0, *[cells.size for cells in lists]])
-    first = np.concatenate([
-        offset + np.repeat(np.arange(0, cells.size, cells.shape[1], dtype=np.int32), cells.shape[1])
-        for offset, cells in zip(offsets[:-1].astype(np.int32), lists, strict=True)
-    ])
+    first = np.concatenate(
+        [
+            offset + np.repeat(np.arange(0, cells.size, cells.shape[1], dtype=np.int32), cells.shape[1])
+            for offset, cells in zip(offsets[:-1].astype(np.int32), lists, strict=True)
+        ]
+    )
     n_members = np.concatenate([np.full(cells.size, cells.shape[1], np.int8) for cells in lists])
     start, places = node_incidence(members, n_nodes)
     unused = np.flatnonzero(np.diff(start) == 0)
     if unused.size:
-        raise MeshError(f"assembly: {unused.size} of {n_nodes} nodes belong to no solid cell (first: {unused[0]}); "
-                        f"drop them first: fe_models.unused_nodes.drop_unused_nodes(mesh)")
+        raise MeshError(
+            f"assembly: {unused.size} of {n_nodes} nodes belong to no solid cell (first: {unused[0]}); "
+            f"drop them first: fe_models.unused_nodes.drop_unused_nodes(mesh)"
+        )
     counts = np.zeros(n_nodes, np.int64)
     in_parts(pool, row_counts, (members, first, n_members, start, places), (counts,))
     row_start = np.concatenate([[0], np.cumsum(counts)])
@@ -159,16 +165,46 @@ def assembled_data(
             batch = cells[begin : begin + n_batch]
             cuts = [len(batch) * part // n_parts for part in range(n_parts + 1)]
             shares = [(slice(a, b), slice(begin + a, begin + b)) for a, b in pairwise(cuts)]
-            run(pool, [
-                (element_matrices, nodes, cells[rows], properties, materials[rows], *tables, K_e[at], M_e[at],
-                 is_inverted[rows])
-                for at, rows in shares
-            ])
-            run(pool, [
-                (scatter_elements, batch, first_place, graph.start, graph.places, cursor, graph.row_start,
-                 graph.columns, K_e, M_e, part, n_parts, where[part], K_data, M_data)
-                for part in range(n_parts)
-            ])
+            run(
+                pool,
+                [
+                    (
+                        element_matrices,
+                        nodes,
+                        cells[rows],
+                        properties,
+                        materials[rows],
+                        *tables,
+                        K_e[at],
+                        M_e[at],
+                        is_inverted[rows],
+                    )
+                    for at, rows in shares
+                ],
+            )
+            run(
+                pool,
+                [
+                    (
+                        scatter_elements,
+                        batch,
+                        first_place,
+                        graph.start,
+                        graph.places,
+                        cursor,
+                        graph.row_start,
+                        graph.columns,
+                        K_e,
+                        M_e,
+                        part,
+                        n_parts,
+                        where[part],
+                        K_data,
+                        M_data,
+                    )
+                    for part in range(n_parts)
+                ],
+            )
             first_place += batch.size
             if progress is not None:
                 progress(first_place / len(graph.places))
@@ -232,6 +268,8 @@ def require_upright(kind: str, is_inverted: np.ndarray) -> None:
     rows = np.flatnonzero(is_inverted)
     if rows.size:
         some = ", ".join(str(row) for row in rows[:5]) + (", ..." if rows.size > 5 else "")
-        raise MeshError(f"assembly: {rows.size} of {len(is_inverted)} {kind} cells are inverted or collapsed (Jacobian "
-                        f"not positive): cells {some}; expected the node order of VTK; repair the mesh, or straighten "
-                        f"curved elements there")
+        raise MeshError(
+            f"assembly: {rows.size} of {len(is_inverted)} {kind} cells are inverted or collapsed (Jacobian "
+            f"not positive): cells {some}; expected the node order of VTK; repair the mesh, or straighten "
+            f"curved elements there"
+        )

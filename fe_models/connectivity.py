@@ -44,8 +44,14 @@ def connectivity(mesh: Mesh) -> Connectivity:
     n_cells = mesh.n_cells
     neighbours = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(n_cells, n_cells))
     n_facet_parts, _ = connected_components(neighbours, directed=False)
-    return Connectivity(tuple(int(c) for c in count[order]), tuple(part_node), int(n_facet_parts), n_overlapping,
-                        n_mismatched, _transitions(mesh))
+    return Connectivity(
+        tuple(int(c) for c in count[order]),
+        tuple(part_node),
+        int(n_facet_parts),
+        n_overlapping,
+        n_mismatched,
+        _transitions(mesh),
+    )
 
 
 def _facet_pairs(mesh: Mesh) -> tuple[IntArray, int, int]:

@@ -78,9 +78,11 @@ def distributing_interface(
     facets = _facets(name, mesh, selection)
     if not facets:
         count = len(_members(name, mesh, selection))
-        raise InterfaceError(f"interface {name!r}: the {count} selected nodes make up no complete facet of the surface "
-                             f"and so have no area; select a surface, or widen the tolerance so that middle nodes "
-                             f"are selected too")
+        raise InterfaceError(
+            f"interface {name!r}: the {count} selected nodes make up no complete facet of the surface "
+            f"and so have no area; select a surface, or widen the tolerance so that middle nodes "
+            f"are selected too"
+        )
     weights = facet_weights(mesh.nodes, facets)
     nodes = np.unique(np.concatenate([rows.ravel() for rows in facets.values()]))
     area = weights[nodes].sum()
@@ -124,8 +126,10 @@ def check_overlap(interfaces: Sequence[Interface]) -> None:
         if common.size:
             shared.append(f"{first.name!r} and {second.name!r} share {common.size} nodes (first node {common[0]})")
     if shared:
-        raise InterfaceError(f"interfaces: {'; '.join(shared)}; a node can follow only one interface: make the "
-                             f"selections smaller, or join the two interfaces to one")
+        raise InterfaceError(
+            f"interfaces: {'; '.join(shared)}; a node can follow only one interface: make the "
+            f"selections smaller, or join the two interfaces to one"
+        )
 
 
 def _members(name: str, mesh: Mesh, selection: Selection) -> IntArray:
@@ -147,15 +151,19 @@ def _require_spread(name: str, kind: str, positions: Array, weights: Array) -> N
     where = f"interface {name!r}: {kind}"
     weighted = positions[weights > 0]
     if len(weighted) < 3:
-        raise InterfaceError(f"{where}: expected at least 3 nodes that are not on one line, got {len(weighted)}; a "
-                             f"single node carries no rotation: use kind 'nodes', or select more")
+        raise InterfaceError(
+            f"{where}: expected at least 3 nodes that are not on one line, got {len(weighted)}; a "
+            f"single node carries no rotation: use kind 'nodes', or select more"
+        )
     w = weights[weights > 0] / weights.sum()
     radii = np.linalg.svd(np.sqrt(w)[:, None] * (weighted - w @ weighted), compute_uv=False)
     if radii[0] == 0:
         raise InterfaceError(f"{where}: its {len(weighted)} nodes are all at one place; merge coincident nodes")
     if radii[1] <= RANK_TOLERANCE * radii[0]:
-        raise InterfaceError(f"{where}: its {len(weighted)} nodes lie on one line (widths {radii[1]:.2g} and "
-                             f"{radii[0]:.2g}), so the rotation about it is free; select nodes beside the line")
+        raise InterfaceError(
+            f"{where}: its {len(weighted)} nodes lie on one line (widths {radii[1]:.2g} and "
+            f"{radii[0]:.2g}), so the rotation about it is free; select nodes beside the line"
+        )
 
 
 def _interface(
@@ -178,6 +186,8 @@ def _interface(
     axes = np.eye(3) if triad is None else np.asarray(triad, dtype=float)
     is_triad = axes.shape == (3, 3) and np.abs(axes.T @ axes - np.eye(3)).max() < 1e-8 and np.linalg.det(axes) > 0
     if not is_triad:
-        raise InterfaceError(f"interface {name!r}: triad: expected orthonormal right-handed axes as columns (3, 3), "
-                             f"got {np.array2string(axes, precision=4)}")
+        raise InterfaceError(
+            f"interface {name!r}: triad: expected orthonormal right-handed axes as columns (3, 3), "
+            f"got {np.array2string(axes, precision=4)}"
+        )
     return Interface(name, kind, nodes, point, triad=axes, weights=weights)

@@ -43,8 +43,10 @@ class Material:
         if self.rho <= 0:
             raise MaterialError(f"{where}: rho: expected a density above zero, got {self.rho:g}")
         if not -1 < self.nu < 0.5:
-            raise MaterialError(f"{where}: nu: expected -1 < nu < 0.5, got {self.nu:g}; an incompressible material "
-                                f"(0.5) needs a mixed element, which solids here do not have")
+            raise MaterialError(
+                f"{where}: nu: expected -1 < nu < 0.5, got {self.nu:g}; an incompressible material "
+                f"(0.5) needs a mixed element, which solids here do not have"
+            )
 
     @property
     def lam(self) -> float:
@@ -93,8 +95,10 @@ def assign_materials(
             taken = rows[(number[kind][rows] >= 0) & (number[kind][rows] != index)]
             if taken.size:
                 other = used[number[kind][taken[0]]].name
-                raise MaterialError(f"materials: {taken.size} {kind} cells of group {group!r} have two materials, "
-                                    f"{other!r} and {material.name!r}; first cell: {taken[0]}")
+                raise MaterialError(
+                    f"materials: {taken.size} {kind} cells of group {group!r} have two materials, "
+                    f"{other!r} and {material.name!r}; first cell: {taken[0]}"
+                )
             number[kind][rows] = index
     missing = {kind: np.flatnonzero(index < 0) for kind, index in number.items() if (index < 0).any()}
     if missing:

@@ -42,8 +42,10 @@ class ScalarMassModel:
 
     def nodal_stress(self, u: Array) -> Array:
         """Refuse: matrices do not know the elements."""
-        raise BodyError(f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "
-                        f"(fe_models.solid.solid_body) for stresses")
+        raise BodyError(
+            f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "
+            f"(fe_models.solid.solid_body) for stresses"
+        )
 
 
 def body_from_matrices(
@@ -90,8 +92,15 @@ def body_from_matrices(
         require_both_triangles(f"{where}: {key}", matrix)
     record = dict(provenance or {}) | {"mesh": (provenance or {}).get("mesh", "matrices")}
     body = FEBody(
-        name=name, M=sparse["M"], K=sparse["K"], D=sparse.get("D"), nodes=nodes, dofs=dofs.astype(np.int64),
-        interfaces=tuple(interfaces), units=units, surface=np.zeros((0, 3), np.int64) if surface is None else surface,
+        name=name,
+        M=sparse["M"],
+        K=sparse["K"],
+        D=sparse.get("D"),
+        nodes=nodes,
+        dofs=dofs.astype(np.int64),
+        interfaces=tuple(interfaces),
+        units=units,
+        surface=np.zeros((0, 3), np.int64) if surface is None else surface,
     )
     unique, count = np.unique(body.dofs, axis=0, return_counts=True)
     if len(unique) < len(body.dofs):
@@ -135,8 +144,10 @@ def require_both_triangles(where: str, matrix: sp.csc_array) -> None:
     below = np.count_nonzero(matrix.data[matrix.indices > column])
     above = np.count_nonzero(matrix.data[matrix.indices < column])
     if max(below, above) > 0 and min(below, above) == 0:
-        raise BodyError(f"{where}: expected both triangles, got the {'lower' if below else 'upper'} one only; "
-                        f"pass A + A.T - diag(A)")
+        raise BodyError(
+            f"{where}: expected both triangles, got the {'lower' if below else 'upper'} one only; "
+            f"pass A + A.T - diag(A)"
+        )
 
 
 def body_from_npz(path: str | Path, *, name: str | None = None, units: Units | None = None) -> FEBody:
@@ -203,8 +214,10 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
             archive = np.load(stream, allow_pickle=False)
             arrays = {} if isinstance(archive, np.ndarray) else {key: archive[key] for key in archive.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
-        raise MeshError(f"{path}: not a readable .npz archive of plain arrays ({error}); write it with "
-                        f"numpy.savez(path, M=..., K=..., nodes=..., dofs=..., units=...)") from error
+        raise MeshError(
+            f"{path}: not a readable .npz archive of plain arrays ({error}); write it with "
+            f"numpy.savez(path, M=..., K=..., nodes=..., dofs=..., units=...)"
+        ) from error
     if isinstance(archive, np.ndarray):
         raise MeshError(f"{path}: expected an .npz archive with M, K, nodes and dofs, got a single array")
     return arrays
@@ -222,9 +235,11 @@ def sparse_of(path: Path, arrays: Mapping[str, np.ndarray], key: str, n_dof: int
     forms = {"triplets": {"data", "row", "col"}, "compressed": {"data", "indptr", "indices"}}
     form = next((form for form, needed in forms.items() if set(parts) == needed), "dense" if not parts else "")
     if (parts and key in arrays) or (key not in arrays and form not in forms):
-        raise MeshError(f"{path}: {key}: expected {key} alone, or {key}_row, {key}_col, {key}_data, or {key}_indptr, "
-                        f"{key}_indices, {key}_data; got "
-                        f"{', '.join(name for name in arrays if name.split('_')[0] == key) or 'none of these'}")
+        raise MeshError(
+            f"{path}: {key}: expected {key} alone, or {key}_row, {key}_col, {key}_data, or {key}_indptr, "
+            f"{key}_indices, {key}_data; got "
+            f"{', '.join(name for name in arrays if name.split('_')[0] == key) or 'none of these'}"
+        )
     try:
         if form == "dense":
             return sp.csc_array(arrays[key], dtype=float)
@@ -265,17 +280,23 @@ def interfaces_of(path: Path, arrays: Mapping[str, np.ndarray]) -> list[Interfac
         require_key(path, arrays, f"interface/{name}/nodes")
         members = parts["nodes"]
         if members.dtype.kind not in "iu" or members.ndim != 1 or not members.size:
-            raise MeshError(f"{path}: interface/{name}/nodes: expected node numbers, (n_members,), got {members.dtype} "
-                            f"{members.shape}")
+            raise MeshError(
+                f"{path}: interface/{name}/nodes: expected node numbers, (n_members,), got {members.dtype} "
+                f"{members.shape}"
+            )
         if members.min() < 0 or members.max() >= len(arrays["nodes"]):
-            raise MeshError(f"{path}: interface/{name}/nodes: expected 0..{len(arrays['nodes']) - 1}, got "
-                            f"{members.min()}..{members.max()}")
-        interfaces.append(Interface(
-            name=name,
-            kind=str(parts["kind"].item()) if "kind" in parts and parts["kind"].size == 1 else "rigid",
-            nodes=members,
-            reference=parts.get("reference", arrays["nodes"][members].mean(axis=0)),
-            triad=parts.get("triad", np.eye(3)),
-            weights=parts.get("weights"),
-        ))
+            raise MeshError(
+                f"{path}: interface/{name}/nodes: expected 0..{len(arrays['nodes']) - 1}, got "
+                f"{members.min()}..{members.max()}"
+            )
+        interfaces.append(
+            Interface(
+                name=name,
+                kind=str(parts["kind"].item()) if "kind" in parts and parts["kind"].size == 1 else "rigid",
+                nodes=members,
+                reference=parts.get("reference", arrays["nodes"][members].mean(axis=0)),
+                triad=parts.get("triad", np.eye(3)),
+                weights=parts.get("weights"),
+            )
+        )
     return interfaces

@@ -243,16 +243,33 @@ def _cell_findings(
     findings = []
     if inverted:
         everything = sum(len(rows) for rows in inverted.values()) == mesh.n_cells
-        hint = ("all cells are inside out: the mesh is mirrored, reverse their node order" if everything
-                else "mesh again there, or move their middle nodes")
-        findings.append(Finding("inverted", True, f"{_listed(mesh, inverted)} inverted (Jacobian <= 0 at an "
-                                                  f"integration point); {hint}"))
+        hint = (
+            "all cells are inside out: the mesh is mirrored, reverse their node order"
+            if everything
+            else "mesh again there, or move their middle nodes"
+        )
+        findings.append(
+            Finding(
+                "inverted", True, f"{_listed(mesh, inverted)} inverted (Jacobian <= 0 at an integration point); {hint}"
+            )
+        )
     if degenerate:
-        findings.append(Finding("degenerate", True, f"{_listed(mesh, degenerate)} degenerate (without volume); remove "
-                                                    f"them or mesh again there"))
+        findings.append(
+            Finding(
+                "degenerate",
+                True,
+                f"{_listed(mesh, degenerate)} degenerate (without volume); remove them or mesh again there",
+            )
+        )
     if distorted:
-        findings.append(Finding("distorted", False, f"{_listed(mesh, distorted)} distorted: the Jacobian is <= 0 at a "
-                                                    f"node, though not where it is integrated"))
+        findings.append(
+            Finding(
+                "distorted",
+                False,
+                f"{_listed(mesh, distorted)} distorted: the Jacobian is <= 0 at a "
+                f"node, though not where it is integrated",
+            )
+        )
     return findings
 
 
@@ -263,8 +280,10 @@ def _listed(mesh: Mesh, chosen: Mapping[str, IntArray]) -> str:
         numbers = mesh.cell_numbers[kind][rows[:5]] if kind in mesh.cell_numbers else rows[:5]
         first = ", ".join(str(number) for number in numbers)
         at = _vector(mesh.nodes[mesh.cells[kind][rows[0]]].mean(axis=0))
-        parts.append(f"{rows.size} {kind} cells ({'numbers' if kind in mesh.cell_numbers else 'rows'} {first}"
-                     f"{', ...' if rows.size > 5 else ''}; the first at {at})")
+        parts.append(
+            f"{rows.size} {kind} cells ({'numbers' if kind in mesh.cell_numbers else 'rows'} {first}"
+            f"{', ...' if rows.size > 5 else ''}; the first at {at})"
+        )
     return " and ".join(parts) + " are"
 
 
@@ -276,25 +295,60 @@ def _link_findings(links: Connectivity, coincident: IntArray, mesh: Mesh) -> lis
             f"{count} cells about {_vector(mesh.nodes[node])}"
             for count, node in zip(links.part_cells[:5], links.part_node, strict=False)
         )
-        findings.append(Finding("parts", True, f"the mesh falls into {len(links.part_cells)} parts that are not "
-                                               f"connected ({shown}); expected one body{merge}"))
+        findings.append(
+            Finding(
+                "parts",
+                True,
+                f"the mesh falls into {len(links.part_cells)} parts that are not "
+                f"connected ({shown}); expected one body{merge}",
+            )
+        )
     elif coincident.size:
-        findings.append(Finding("coincident", False, f"{coincident.size} nodes coincide with another (first: node "
-                                                     f"{coincident[0]} at {_vector(mesh.nodes[coincident[0]])}): the "
-                                                     f"mesh is cut open there unless that is meant; merge them"))
+        findings.append(
+            Finding(
+                "coincident",
+                False,
+                f"{coincident.size} nodes coincide with another (first: node "
+                f"{coincident[0]} at {_vector(mesh.nodes[coincident[0]])}): the "
+                f"mesh is cut open there unless that is meant; merge them",
+            )
+        )
     if links.n_facet_parts > len(links.part_cells):
-        findings.append(Finding("hinge", False, f"{links.n_facet_parts} pieces share no facet with the rest and hang "
-                                                f"together in single nodes or edges, which may act as hinges"))
+        findings.append(
+            Finding(
+                "hinge",
+                False,
+                f"{links.n_facet_parts} pieces share no facet with the rest and hang "
+                f"together in single nodes or edges, which may act as hinges",
+            )
+        )
     if links.n_overlapping:
-        findings.append(Finding("overlap", True, f"{links.n_overlapping} facets belong to more than two cells: cells "
-                                                 f"overlap; remove the doubled ones"))
+        findings.append(
+            Finding(
+                "overlap",
+                True,
+                f"{links.n_overlapping} facets belong to more than two cells: cells overlap; remove the doubled ones",
+            )
+        )
     if links.n_mismatched:
-        findings.append(Finding("transition", True, f"{links.n_mismatched} facets join cells with different middle "
-                                                    f"nodes (linear beside quadratic): their middle nodes hang free; "
-                                                    f"use one order"))
+        findings.append(
+            Finding(
+                "transition",
+                True,
+                f"{links.n_mismatched} facets join cells with different middle "
+                f"nodes (linear beside quadratic): their middle nodes hang free; "
+                f"use one order",
+            )
+        )
     if links.n_transitions:
-        findings.append(Finding("tetra-on-quad", False, f"{links.n_transitions} quadrilateral facets carry triangles "
-                                                        f"of other cells: displacements gape there; use one type"))
+        findings.append(
+            Finding(
+                "tetra-on-quad",
+                False,
+                f"{links.n_transitions} quadrilateral facets carry triangles "
+                f"of other cells: displacements gape there; use one type",
+            )
+        )
     return findings
 
 

@@ -43,8 +43,10 @@ class FaceGroup:
     def facets(self, mesh: Mesh) -> dict[str, IntArray]:
         """Return face type -> faces of the group, as complete facets of the solid where they are such."""
         if self.name not in mesh.face_sets:
-            raise InterfaceError(f"no face group {self.name!r}{_other_kind(mesh, self.name, 'face group')}"
-                                 f"{nearest(self.name, mesh.face_sets)}")
+            raise InterfaceError(
+                f"no face group {self.name!r}{_other_kind(mesh, self.name, 'face group')}"
+                f"{nearest(self.name, mesh.face_sets)}"
+            )
         faces = {kind: mesh.faces[kind][rows] for kind, rows in mesh.face_sets[self.name].items() if rows.size}
         if not faces:
             raise InterfaceError(f"face group {self.name!r} is empty; {_WHY_EMPTY}")
@@ -61,8 +63,10 @@ class NodeSet:
     def members(self, mesh: Mesh) -> IntArray:
         """Return the nodes of the set, ascending."""
         if self.name not in mesh.node_sets:
-            raise InterfaceError(f"no node set {self.name!r}{_other_kind(mesh, self.name, 'node set')}"
-                                 f"{nearest(self.name, mesh.node_sets)}")
+            raise InterfaceError(
+                f"no node set {self.name!r}{_other_kind(mesh, self.name, 'node set')}"
+                f"{nearest(self.name, mesh.node_sets)}"
+            )
         nodes = np.unique(mesh.node_sets[self.name])
         if nodes.size == 0:
             raise InterfaceError(f"node set {self.name!r} is empty; {_WHY_EMPTY}")
@@ -86,10 +90,12 @@ class Plane:
         signed = (mesh.nodes[surface] - _point("plane", self.point)) @ normal
         found = surface[np.abs(signed) <= tolerance]
         if found.size == 0:
-            raise InterfaceError(f"plane through {_text(self.point)} with normal {_text(self.normal)} has no surface "
-                                 f"node within {tolerance:.3g}; the body lies between {signed.min():.6g} and "
-                                 f"{signed.max():.6g} along the normal, the nearest node is "
-                                 f"{np.abs(signed).min():.3g} away")
+            raise InterfaceError(
+                f"plane through {_text(self.point)} with normal {_text(self.normal)} has no surface "
+                f"node within {tolerance:.3g}; the body lies between {signed.min():.6g} and "
+                f"{signed.max():.6g} along the normal, the nearest node is "
+                f"{np.abs(signed).min():.3g} away"
+            )
         return found
 
 
@@ -122,10 +128,14 @@ class Cylinder:
         if found.size == 0:
             where = f"cylinder about {_text(self.point)} along {_text(self.axis)} with radius {self.radius:g}"
             if not inside.any():
-                raise InterfaceError(f"{where}: no surface node between {low:g} and {high:g} along the axis; the body "
-                                     f"lies between {along.min():.6g} and {along.max():.6g}")
-            raise InterfaceError(f"{where} has no surface node within {tolerance:.3g} of it; the nearest differs by "
-                                 f"{off[inside].min():.3g}")
+                raise InterfaceError(
+                    f"{where}: no surface node between {low:g} and {high:g} along the axis; the body "
+                    f"lies between {along.min():.6g} and {along.max():.6g}"
+                )
+            raise InterfaceError(
+                f"{where} has no surface node within {tolerance:.3g} of it; the nearest differs by "
+                f"{off[inside].min():.3g}"
+            )
         return found
 
 
@@ -147,9 +157,11 @@ class Box:
         found = surface[((lo - slack <= X) & (hi + slack >= X)).all(axis=1)]
         if found.size == 0:
             away = np.linalg.norm(np.maximum(np.maximum(lo - X, X - hi), 0), axis=1)
-            raise InterfaceError(f"box from {_text(self.lo)} to {_text(self.hi)} contains no surface node; the body "
-                                 f"lies from {_text(X.min(axis=0))} to {_text(X.max(axis=0))}, the nearest node is "
-                                 f"{away.min():.3g} away")
+            raise InterfaceError(
+                f"box from {_text(self.lo)} to {_text(self.hi)} contains no surface node; the body "
+                f"lies from {_text(X.min(axis=0))} to {_text(X.max(axis=0))}, the nearest node is "
+                f"{away.min():.3g} away"
+            )
         return found
 
 
@@ -202,8 +214,10 @@ def _require_on_solid(mesh: Mesh, what: str, nodes: IntArray) -> None:
         used[cells] = True
     loose = np.unique(nodes[~used[nodes]])
     if loose.size:
-        raise InterfaceError(f"{what}: {loose.size} of its nodes belong to no solid cell, first node {loose[0]}; "
-                             f"select nodes of the solid, or merge the coincident nodes of skin and solid")
+        raise InterfaceError(
+            f"{what}: {loose.size} of its nodes belong to no solid cell, first node {loose[0]}; "
+            f"select nodes of the solid, or merge the coincident nodes of skin and solid"
+        )
 
 
 def _other_kind(mesh: Mesh, name: str, wanted: str) -> str:

@@ -53,8 +53,19 @@ def nodal_stress(
             volume_at_nodes(mesh.nodes, cells, of_cell[kind], of_node, table.gradients, table.weights, volume)
             futures = [
                 pool.submit(
-                    add_element_stress, mesh.nodes, cells, of_cell[kind], of_node, lame, table.gradients,
-                    table.weights, element.extrapolation, fields, first, last, stress,
+                    add_element_stress,
+                    mesh.nodes,
+                    cells,
+                    of_cell[kind],
+                    of_node,
+                    lame,
+                    table.gradients,
+                    table.weights,
+                    element.extrapolation,
+                    fields,
+                    first,
+                    last,
+                    stress,
                 )
                 for first, last in pairwise(cuts.tolist())
             ]

@@ -42,28 +42,48 @@ def implausible_units(units: Units, size: float, materials: Iterable[_Elastic]) 
     advice = f"{advice}; change the units or the numbers"
     metres = size * units.length
     if not SIZE[0] <= metres <= SIZE[1]:
-        texts.append((True, f"units {units.name}: the body is {size:.4g} {units.length_symbol} = {metres:.4g} m large; "
-                            f"expected {SIZE[0]:g} to {SIZE[1]:g} m. {advice}"))
+        texts.append(
+            (
+                True,
+                f"units {units.name}: the body is {size:.4g} {units.length_symbol} = {metres:.4g} m large; "
+                f"expected {SIZE[0]:g} to {SIZE[1]:g} m. {advice}",
+            )
+        )
     for material in materials:
         rho = material.rho * units.to_si(mass=1, length=-3)
         E = material.E * units.to_si(mass=1, length=-1, time=-2)
         if not DENSITY[0] <= rho <= DENSITY[1]:
             steel = STEEL / units.to_si(mass=1, length=-3)
-            texts.append((True, f"units {units.name}: density of {material.name!r} {material.rho:.4g} "
-                                f"{units.mass_symbol}/{units.length_symbol}³ = {rho:.4g} kg/m³; expected "
-                                f"{DENSITY[0]:g} to {DENSITY[1]:g} kg/m³ (steel in {units.name} is {steel:.4g}). "
-                                f"{advice}"))
+            texts.append(
+                (
+                    True,
+                    f"units {units.name}: density of {material.name!r} {material.rho:.4g} "
+                    f"{units.mass_symbol}/{units.length_symbol}³ = {rho:.4g} kg/m³; expected "
+                    f"{DENSITY[0]:g} to {DENSITY[1]:g} kg/m³ (steel in {units.name} is {steel:.4g}). "
+                    f"{advice}",
+                )
+            )
         if not MODULUS[0] <= E <= MODULUS[1]:
             steel = 2.1e11 / units.to_si(mass=1, length=-1, time=-2)
-            texts.append((True, f"units {units.name}: modulus of {material.name!r} {material.E:.4g} "
-                                f"{units.stress_symbol} = {E:.4g} Pa; expected {MODULUS[0]:g} to {MODULUS[1]:g} Pa "
-                                f"(steel in {units.name} is {steel:.4g}). {advice}"))
+            texts.append(
+                (
+                    True,
+                    f"units {units.name}: modulus of {material.name!r} {material.E:.4g} "
+                    f"{units.stress_symbol} = {E:.4g} Pa; expected {MODULUS[0]:g} to {MODULUS[1]:g} Pa "
+                    f"(steel in {units.name} is {steel:.4g}). {advice}",
+                )
+            )
         elif DENSITY[0] <= rho <= DENSITY[1]:
             speed = (E / rho) ** 0.5
             if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
-                texts.append((False, f"units {units.name}: waves in {material.name!r} run at sqrt(E/rho) = {speed:.4g} "
-                                     f"m/s; expected {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s (steel: 5170): do "
-                                     f"modulus and density have the same units? {advice}"))
+                texts.append(
+                    (
+                        False,
+                        f"units {units.name}: waves in {material.name!r} run at sqrt(E/rho) = {speed:.4g} "
+                        f"m/s; expected {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s (steel: 5170): do "
+                        f"modulus and density have the same units? {advice}",
+                    )
+                )
     return texts
 
 

@@ -98,14 +98,16 @@ def motion_scene(
     """Return the scene of a motion: surfaces, interfaces and their trails, ground; else as `animate`."""
     unknown = set(bodies) - set(trajectory.body_names)
     if unknown:
-        raise ResultsError(f"film: the trajectory has no body {sorted(unknown)[0]!r}; it has "
-                           f"{', '.join(trajectory.body_names)}")
+        raise ResultsError(
+            f"film: the trajectory has no body {sorted(unknown)[0]!r}; it has {', '.join(trajectory.body_names)}"
+        )
     flexible = {name: body for name, body in bodies.items() if isinstance(body, ReducedBody)}
     motions = {name: trajectory.body(name) for name in trajectory.body_names}
     for name, reduced in flexible.items():
         if motions[name].q.shape[1] != reduced.n_q:
-            raise ResultsError(f"film: body {name!r} has {reduced.n_q} modes, but its motion "
-                               f"{motions[name].q.shape[1]}")
+            raise ResultsError(
+                f"film: body {name!r} has {reduced.n_q} modes, but its motion {motions[name].q.shape[1]}"
+            )
     rows = times.rows
     displacements = {name: motions[name].q[rows] @ modes_as_rows(body) for name, body in flexible.items()}
     if magnification is None:

@@ -77,8 +77,9 @@ def chain(n=6, stiffness=1000.0, mass=2.0) -> FEBody:
     nodes = np.stack([np.arange(n, dtype=float), np.zeros(n), np.zeros(n)], axis=1)
     dofs = np.stack([np.arange(n), np.zeros(n, int)], axis=1)
     ends = [Interface(name, "nodes", np.array([node]), nodes[node]) for name, node in (("left", 0), ("right", n - 1))]
-    return FEBody("chain", sp.csc_array(mass * sp.eye_array(n)), sp.csc_array(stiffness * springs), nodes, dofs,
-                  tuple(ends))
+    return FEBody(
+        "chain", sp.csc_array(mass * sp.eye_array(n)), sp.csc_array(stiffness * springs), nodes, dofs, tuple(ends)
+    )
 
 
 def two_node_beam_matrices(E=2.1e11, G=8.1e10, A=1e-4, Iy=1e-9, Iz=2e-9, J=3e-9, rho=7850.0, L=0.1):
@@ -91,10 +92,29 @@ def two_node_beam_matrices(E=2.1e11, G=8.1e10, A=1e-4, Iy=1e-9, Iz=2e-9, J=3e-9,
     for dofs, stiff, heavy in (([0, 6], E * A, rho * A), ([3, 9], G * J, rho * (Iy + Iz))):
         K[np.ix_(dofs, dofs)] += stiff * rod_K
         M[np.ix_(dofs, dofs)] += heavy * rod_M
-    bend_K = np.array([[12, 6 * L, -12, 6 * L], [6 * L, 4 * L**2, -6 * L, 2 * L**2],
-                       [-12, -6 * L, 12, -6 * L], [6 * L, 2 * L**2, -6 * L, 4 * L**2]]) / L**3
-    bend_M = np.array([[156, 22 * L, 54, -13 * L], [22 * L, 4 * L**2, 13 * L, -3 * L**2],
-                       [54, 13 * L, 156, -22 * L], [-13 * L, -3 * L**2, -22 * L, 4 * L**2]]) * L / 420
+    bend_K = (
+        np.array(
+            [
+                [12, 6 * L, -12, 6 * L],
+                [6 * L, 4 * L**2, -6 * L, 2 * L**2],
+                [-12, -6 * L, 12, -6 * L],
+                [6 * L, 2 * L**2, -6 * L, 4 * L**2],
+            ]
+        )
+        / L**3
+    )
+    bend_M = (
+        np.array(
+            [
+                [156, 22 * L, 54, -13 * L],
+                [22 * L, 4 * L**2, 13 * L, -3 * L**2],
+                [54, 13 * L, 156, -22 * L],
+                [-13 * L, -3 * L**2, -22 * L, 4 * L**2],
+            ]
+        )
+        * L
+        / 420
+    )
     for dofs, I_b, sign in (([1, 5, 7, 11], Iz, 1), ([2, 4, 8, 10], Iy, -1)):  # in the x-z plane uz' = -ry
         signs = np.array([1, sign, 1, sign])
         K[np.ix_(dofs, dofs)] += E * I_b * bend_K * np.outer(signs, signs)
@@ -130,4 +150,3 @@ def distorted(mesh: Mesh, amount=0.1, seed=0) -> Mesh:
     )
     shift = np.random.default_rng(seed).uniform(-1, 1, mesh.nodes.shape) * amount * shortest / np.sqrt(3)
     return Mesh(mesh.nodes + shift, mesh.cells, mesh.cell_sets, mesh.faces, mesh.face_sets, mesh.node_sets, mesh.source)
-

@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 
 from cms.rendering.errors import RenderError, SceneError
 
-__all__ = ["FILM_SUFFIXES", "PICTURE_SUFFIXES", "Image", "average_of_blocks", "require_suffix", "write_film",
-           "write_picture"]
+__all__ = [
+    "FILM_SUFFIXES",
+    "PICTURE_SUFFIXES",
+    "Image",
+    "average_of_blocks",
+    "require_suffix",
+    "write_film",
+    "write_picture",
+]
 
 Image = NDArray[np.uint8]  #: (height, width, 3)
 

@@ -108,8 +108,12 @@ def draw_triads(draw: Any, scene: Scene, layout: Layout, camera: Camera, frame: 
             at, words = (origin[0] + 0.7 * u, origin[1] + 0.55 * u), font(round(0.9 * u))
             box = draw.textbbox(at, triad.label, font=words)
             pad = 0.25 * u
-            draw.rounded_rectangle((box[0] - pad, box[1] - pad, box[2] + pad, box[3] + pad), radius=0.3 * u,
-                                   fill="#ffffff", outline="#c5cdd4")
+            draw.rounded_rectangle(
+                (box[0] - pad, box[1] - pad, box[2] + pad, box[3] + pad),
+                radius=0.3 * u,
+                fill="#ffffff",
+                outline="#c5cdd4",
+            )
             draw.text(at, triad.label, INK, font=words)
 
 

@@ -74,8 +74,9 @@ def add_surface(plotter: Any, surface: Surface, scene: Scene, colors: Any) -> Ca
         if surface.n_frames > 1:
             nodes = frame_of(surface.nodes, frame, 2)
             mesh.points = nodes[origin]
-            turned = mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False,
-                                          auto_orient_normals=False)
+            turned = mesh.compute_normals(
+                cell_normals=False, split_vertices=False, consistent_normals=False, auto_orient_normals=False
+            )
             mesh.point_data["Normals"] = np.asarray(turned.point_data["Normals"])
             if outline is not None:
                 outline.points = nodes

@@ -103,8 +103,9 @@ def drawn(
                 fallback(out)
             os.replace(out, target)
     except OSError as error:
-        raise RenderError(f"{target}: cannot be written ({error.strerror or error}); check the folder and its space"
-                          ) from error
+        raise RenderError(
+            f"{target}: cannot be written ({error.strerror or error}); check the folder and its space"
+        ) from error
     note = f"drawn with matplotlib, since pyvista could not ({reason})" if reason else ""
     return Drawing(target, "matplotlib" if reason else "pyvista", note)
 

@@ -33,15 +33,18 @@ class Surface:
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
             raise SceneError(f"{where}: triangles: expected (n_triangles, 3), got {self.triangles.shape}")
         if self.triangles.size and (self.triangles.min() < 0 or self.triangles.max() >= n_nodes):
-            raise SceneError(f"{where}: triangles: expected nodes 0..{n_nodes - 1}, got "
-                             f"{self.triangles.min()}..{self.triangles.max()}")
+            raise SceneError(
+                f"{where}: triangles: expected nodes 0..{n_nodes - 1}, got "
+                f"{self.triangles.min()}..{self.triangles.max()}"
+            )
         if not 0 < self.opacity <= 1:
             raise SceneError(f"{where}: opacity: expected 0 < opacity <= 1, got {self.opacity}")
         if self.scalars is not None:
             put(self, "scalars", finite(f"{where}: scalars", self.scalars))
             if self.scalars.shape not in ((n_nodes,), (self.n_frames, n_nodes)):
-                raise SceneError(f"{where}: scalars: expected ({n_nodes},) or ({self.n_frames}, {n_nodes}), got "
-                                 f"{self.scalars.shape}")
+                raise SceneError(
+                    f"{where}: scalars: expected ({n_nodes},) or ({self.n_frames}, {n_nodes}), got {self.scalars.shape}"
+                )
 
     @property
     def n_frames(self) -> int:
@@ -90,8 +93,10 @@ class Triad:
         object.__setattr__(self, "axes", finite(where, self.axes))
         frames = self.position.shape[:-1]
         if self.position.shape[-1:] != (3,) or len(frames) > 1 or self.axes.shape != (*frames, 3, 3):
-            raise SceneError(f"{where}: expected position (3,) and axes (3, 3), or both with n_frames in front, got "
-                             f"{self.position.shape} and {self.axes.shape}")
+            raise SceneError(
+                f"{where}: expected position (3,) and axes (3, 3), or both with n_frames in front, got "
+                f"{self.position.shape} and {self.axes.shape}"
+            )
 
     @property
     def n_frames(self) -> int:

@@ -51,9 +51,7 @@ def smooth_neighbours(nodes: Array, triangles: IntArray) -> sp.csr_array:
     (n_triangles, n_triangles), with entries 0 and 1; the triangle itself is included.
     """
     n = len(triangles)
-    corner = sp.csr_array(
-        (np.ones(3 * n), (np.repeat(np.arange(n), 3), triangles.ravel())), shape=(n, len(nodes))
-    )
+    corner = sp.csr_array((np.ones(3 * n), (np.repeat(np.arange(n), 3), triangles.ravel())), shape=(n, len(nodes)))
     touch = sp.coo_array(corner @ corner.T)
     normals = triangle_normals(nodes, triangles)
     rows, columns = touch.row, touch.col

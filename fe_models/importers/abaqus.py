@@ -23,8 +23,14 @@ __all__ = ["read_abaqus"]
 
 _SOLIDS = {4: "tetra", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
 _SOLID = re.compile(r"C3D(\d+)[A-Z]*$")
-_FACES = {"3": ("triangle", 3), "4": ("quad", 4), "6": ("triangle6", 6), "65": ("triangle6", 6), "8": ("quad8", 8),
-          "9": ("quad9", 9)}
+_FACES = {
+    "3": ("triangle", 3),
+    "4": ("quad", 4),
+    "6": ("triangle6", 6),
+    "65": ("triangle6", 6),
+    "8": ("quad8", 8),
+    "9": ("quad9", 9),
+}
 _FACE = re.compile(r"(?:STRI|S|DS|CPS|CPE|CPEG|M3D|SFM3D|R3D)(\d+)(?:R|RS|RSW|5|R5|H|I|T|RT)?$")
 _LINES = {"B31": 2, "B32": 3, "B33": 2, "T3D2": 2, "T3D3": 3, "T2D2": 2, "B21": 2, "B22": 3, "R2D2": 2}
 _IGNORED = ("MASS", "ROTARYI", "SPRING", "DASHPOT", "CONN3D", "DCOUP3D", "GAPUNI", "JOINTC")
@@ -210,8 +216,10 @@ def _elements(here: str, block: DeckBlock, kind: str, n_nodes: int) -> IntArray:
     except ValueError as error:
         raise MeshError(f"{here}: expected element and node numbers below; {error}") from error
     if values.size % (n_nodes + 1):
-        raise MeshError(f"{here}: {kind} elements have {n_nodes} nodes: expected a multiple of {n_nodes + 1} numbers "
-                        f"below, got {values.size}")
+        raise MeshError(
+            f"{here}: {kind} elements have {n_nodes} nodes: expected a multiple of {n_nodes + 1} numbers "
+            f"below, got {values.size}"
+        )
     return values.reshape(-1, n_nodes + 1)
 
 
@@ -238,8 +246,10 @@ def _set_entries(here: str, block: DeckBlock) -> Iterator[_Entry]:
 def _require_unique(where: str, what: str, numbers: IntArray) -> None:
     values, count = np.unique(numbers, return_counts=True)
     if (count > 1).any():
-        raise MeshError(f"{where}: {(count > 1).sum()} {what} numbers are defined twice, first "
-                        f"{values[count > 1][0]}; keep one of each")
+        raise MeshError(
+            f"{where}: {(count > 1).sum()} {what} numbers are defined twice, first "
+            f"{values[count > 1][0]}; keep one of each"
+        )
 
 
 def _require_known(where: str, name: str, what: str, missing: IntArray) -> None:

@@ -20,6 +20,7 @@ _REFUSED = {
     "MANIFEST": "write one input file without references to others",
 }  # keyword -> what to do; each makes or moves nodes or elements
 
+
 @dataclass(frozen=True)
 class DeckBlock:
     """A keyword line with its parameters and the data lines below it."""
@@ -86,14 +87,19 @@ def _block(where: str, head: str, line_number: int, lines: list[str]) -> DeckBlo
 def _refuse(where: str, blocks: list[DeckBlock]) -> None:
     for block in blocks:
         if block.keyword in _REFUSED:
-            raise MeshError(f"{where}, line {block.line_number}: *{block.keyword} is not read: "
-                            f"{_REFUSED[block.keyword]}")
+            raise MeshError(
+                f"{where}, line {block.line_number}: *{block.keyword} is not read: {_REFUSED[block.keyword]}"
+            )
         if block.keyword in ("NODE", "ELEMENT", "NSET", "ELSET") and "INPUT" in block.parameters:
-            raise MeshError(f"{where}, line {block.line_number}: *{block.keyword}, INPUT=... is not read: put the "
-                            f"included text into this file")
+            raise MeshError(
+                f"{where}, line {block.line_number}: *{block.keyword}, INPUT=... is not read: put the "
+                f"included text into this file"
+            )
         if block.keyword == "NODE" and block.parameters.get("SYSTEM", "R").upper() != "R":
-            raise MeshError(f"{where}, line {block.line_number}: *NODE in a cylindrical or spherical system is not "
-                            f"read: write the nodes in global coordinates")
+            raise MeshError(
+                f"{where}, line {block.line_number}: *NODE in a cylindrical or spherical system is not "
+                f"read: write the nodes in global coordinates"
+            )
 
 
 def _one_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
@@ -103,12 +109,16 @@ def _one_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], lis
     if not parts and not instances:
         return blocks, []
     if len(parts) > 1 or len(instances) > 1:
-        raise MeshError(f"{where}: the deck has {len(parts)} parts and {len(instances)} instances; expected one part "
-                        f"with one instance. Export one part, or the assembly as a flat deck")
+        raise MeshError(
+            f"{where}: the deck has {len(parts)} parts and {len(instances)} instances; expected one part "
+            f"with one instance. Export one part, or the assembly as a flat deck"
+        )
     for instance in instances:
         if instance.lines:
-            raise MeshError(f"{where}, line {instance.line_number}: the instance is moved (translation or rotation "
-                            f"lines below *INSTANCE), which is not read; export a flat deck")
+            raise MeshError(
+                f"{where}, line {instance.line_number}: the instance is moved (translation or rotation "
+                f"lines below *INSTANCE), which is not read; export a flat deck"
+            )
     name = instances[0].parameters.get("NAME", "") if instances else ""
     kept, notes, scope, assembly_nodes = [], [], "", 0
     for block in blocks:
@@ -127,8 +137,10 @@ def _one_part(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], lis
         else:
             assembly_nodes += 1
     if assembly_nodes:
-        notes.append(f"{assembly_nodes} blocks of nodes, elements or sets of the assembly itself (such as reference "
-                     f"points) were left out")
+        notes.append(
+            f"{assembly_nodes} blocks of nodes, elements or sets of the assembly itself (such as reference "
+            f"points) were left out"
+        )
     return kept, notes
 
 

@@ -159,13 +159,16 @@ def _header(where: str, data: bytes) -> tuple[str, bool]:
     at = data.find(b"$MeshFormat")
     fields = data[at:].split(b"\n", 2)[1].split() if at >= 0 else []
     if len(fields) < 3:
-        raise MeshError(f"{where}: expected a Gmsh file (a line $MeshFormat, then version, kind and size), got "
-                        f"{data[:20]!r}")
+        raise MeshError(
+            f"{where}: expected a Gmsh file (a line $MeshFormat, then version, kind and size), got {data[:20]!r}"
+        )
     version = fields[0].decode("ascii", "replace")
     version = {"2": "2.2", "4": "4.1"}.get(version, version)
     if version not in ("2.2", "4.1"):
-        raise MeshError(f"{where}: Gmsh format {version} is not supported; expected 2.2 or 4.1. Convert it: "
-                        f"gmsh -save -format msh41 -o new.msh {Path(where[5:]).name}")
+        raise MeshError(
+            f"{where}: Gmsh format {version} is not supported; expected 2.2 or 4.1. Convert it: "
+            f"gmsh -save -format msh41 -o new.msh {Path(where[5:]).name}"
+        )
     if fields[1] == b"1":
         start = data.index(b"\n", data.index(b"\n", at) + 1) + 1
         if data[start : start + 4] != b"\x01\x00\x00\x00" or fields[2] != b"8":
@@ -213,8 +216,10 @@ def _places(where: str, node_numbers: IntArray) -> IntArray:
     if len(node_numbers) == 0:
         return np.full(1, -1)
     if node_numbers.min() < 0 or node_numbers.max() > 100 * len(node_numbers) + 10_000_000:
-        raise MeshError(f"{where}: section $Nodes: node numbers from {node_numbers.min()} to {node_numbers.max()} "
-                        f"for {len(node_numbers)} nodes; the file is damaged")
+        raise MeshError(
+            f"{where}: section $Nodes: node numbers from {node_numbers.min()} to {node_numbers.max()} "
+            f"for {len(node_numbers)} nodes; the file is damaged"
+        )
     places = np.full(int(node_numbers.max()) + 2, -1)
     places[node_numbers] = np.arange(len(node_numbers))
     if (places >= 0).sum() != len(node_numbers):
@@ -230,8 +235,10 @@ def _connectivity(place_of: IntArray, kind: str, rows: IntArray) -> IntArray:
 
 def _type(where: str, code: int) -> tuple[str, int, int]:
     if code not in _TYPES:
-        raise MeshError(f"{where}: section $Elements: unsupported cells of Gmsh type {code}; supported: linear and "
-                        f"quadratic tetrahedra and hexahedra, and linear wedges")
+        raise MeshError(
+            f"{where}: section $Elements: unsupported cells of Gmsh type {code}; supported: linear and "
+            f"quadratic tetrahedra and hexahedra, and linear wedges"
+        )
     return _TYPES[code]
 
 

@@ -109,8 +109,11 @@ def _family_names(families: Any) -> dict[int, list[str]]:
     names = {}
     for family in families.values():
         if "GRO" in family:
-            rows = np.atleast_2d(family["GRO"]["NOM"][()].view(np.uint8) if family["GRO"]["NOM"].dtype.kind == "i"
-                                 else family["GRO"]["NOM"][()])
+            rows = np.atleast_2d(
+                family["GRO"]["NOM"][()].view(np.uint8)
+                if family["GRO"]["NOM"].dtype.kind == "i"
+                else family["GRO"]["NOM"][()]
+            )
             texts = [bytes(bytearray(np.asarray(row, np.uint8))).decode("utf-8", "replace") for row in rows]
             names[int(family.attrs["NUM"])] = [text.split("\0")[0].strip() for text in texts]
     return names

@@ -70,8 +70,10 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
             number = _integer(here, fields, 1)
             cp = fields[2] if len(fields) > 2 else ""
             if cp not in ("", "0"):
-                raise MeshError(f"{here} {number}: position in coordinate system {cp} (CP), which is not read; "
-                                f"expected basic coordinates. Export the deck with all grid points in the basic system")
+                raise MeshError(
+                    f"{here} {number}: position in coordinate system {cp} (CP), which is not read; "
+                    f"expected basic coordinates. Export the deck with all grid points in the basic system"
+                )
             if not cp:
                 without_cp.append(number)
             grid_numbers.append(number)
@@ -91,8 +93,10 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
         elif card.startswith(_NOTED):
             noted[card] = noted.get(card, 0) + 1
     if default_cp not in ("", "0") and without_cp:
-        raise MeshError(f"{where}: GRDSET puts {len(without_cp)} grid points into coordinate system {default_cp}, "
-                        f"which is not read; expected basic coordinates")
+        raise MeshError(
+            f"{where}: GRDSET puts {len(without_cp)} grid points into coordinate system {default_cp}, "
+            f"which is not read; expected basic coordinates"
+        )
     if not grid_numbers:
         raise MeshError(f"{where}: expected grid points (GRID), got none; is this a Nastran bulk data file?")
     numbers_of_nodes = np.array(grid_numbers, dtype=np.int64)
@@ -147,8 +151,10 @@ def _cards(where: str, text: str) -> Iterator[tuple[int, str, list[str]]]:
             if not fields:
                 raise MeshError(f"{where}, line {k}: a continuation without a card before it: {line[:40]!r}")
             if own_mark.strip("+*") and mark.strip("+*") and own_mark.strip("+*") != mark.strip("+*"):
-                raise MeshError(f"{where}, line {k}: continuation {own_mark!r} does not follow its card, which asks "
-                                f"for {mark!r}; write the continuations in sequence")
+                raise MeshError(
+                    f"{where}, line {k}: continuation {own_mark!r} does not follow its card, which asks "
+                    f"for {mark!r}; write the continuations in sequence"
+                )
             fields += new[1:]
         else:
             if fields:
@@ -184,8 +190,10 @@ def _nodes_of(here: str, card: str, given: list[str]) -> tuple[int, list[str]]:
     for count in reversed(counts):
         if all(filled[:count]) and (card not in _SOLID_CARDS or not any(filled[count:])):
             return count, given[:count]
-    raise MeshError(f"{here}: expected {' or '.join(str(c) for c in counts)} nodes, got {sum(filled)}; elements with "
-                    f"some middle nodes left out are not supported")
+    raise MeshError(
+        f"{here}: expected {' or '.join(str(c) for c in counts)} nodes, got {sum(filled)}; elements with "
+        f"some middle nodes left out are not supported"
+    )
 
 
 def _integer(here: str, fields: list[str], place: int) -> int:
@@ -205,8 +213,9 @@ def _real(here: str, fields: list[str], place: int) -> float:
         return float(word)
     except ValueError:
         try:
-            return float(word[0] + word[1:].upper().replace("D", "").replace("E", "").replace("+", "E+")
-                         .replace("-", "E-"))
+            return float(
+                word[0] + word[1:].upper().replace("D", "").replace("E", "").replace("+", "E+").replace("-", "E-")
+            )
         except ValueError as error:
             raise MeshError(f"{here}: field {place + 1}: expected a coordinate, got {word!r}") from error
 

@@ -48,10 +48,12 @@ def require_node_order(where: str, kind: str, nodes: Array, cells: IntArray) -> 
     if wrong.max() > len(cells) / 2:
         place = int(wrong.argmax())
         other = middles[int(found[place].argmax())]
-        raise MeshError(f"{where}: the middle nodes of {kind} cells are in another order than this file format has: "
-                        f"node {n_corners + place + 1} of the cells should lie between their nodes "
-                        f"{_numbers(middles[place])}, in {wrong[place]} of {len(cells)} cells it lies between nodes "
-                        f"{_numbers(other)}; export the mesh again with the node order of the format")
+        raise MeshError(
+            f"{where}: the middle nodes of {kind} cells are in another order than this file format has: "
+            f"node {n_corners + place + 1} of the cells should lie between their nodes "
+            f"{_numbers(middles[place])}, in {wrong[place]} of {len(cells)} cells it lies between nodes "
+            f"{_numbers(other)}; export the mesh again with the node order of the format"
+        )
 
 
 def _numbers(local: tuple[int, ...]) -> str:

@@ -64,22 +64,28 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
     node_numbers = np.arange(len(nodes)) if raw.node_numbers is None else raw.node_numbers
     if not np.isfinite(nodes).all():
         bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
-        raise MeshError(f"{where}: expected finite coordinates, got NaN or infinity at {bad.size} of {len(nodes)} "
-                        f"nodes, first node {node_numbers[bad[0]]}; write the mesh again")
+        raise MeshError(
+            f"{where}: expected finite coordinates, got NaN or infinity at {bad.size} of {len(nodes)} "
+            f"nodes, first node {node_numbers[bad[0]]}; write the mesh again"
+        )
     blocks = [block for block in raw.blocks if len(block.nodes)]
     _require_supported(where, blocks)
     for block in blocks:
         if block.nodes.min() < 0 or block.nodes.max() >= len(nodes):
             row = int(np.argmax(((block.nodes < 0) | (block.nodes >= len(nodes))).any(axis=1)))
-            raise MeshError(f"{where}: {block.kind} cell {_number(block, row)} names a node that is not in the file; "
-                            f"the file is incomplete or damaged")
+            raise MeshError(
+                f"{where}: {block.kind} cell {_number(block, row)} names a node that is not in the file; "
+                f"the file is incomplete or damaged"
+            )
     notes = list(raw.notes)
     cells, cell_sets, numbers = _collect(where, blocks, SOLID_TYPES, raw.repeats_are_memberships, notes)
     faces, face_sets, _ = _collect(where, blocks, FACE_TYPES, True, notes)
     if not cells:
         found = ", ".join(f"{len(b.nodes)} {b.kind}" for b in blocks) or "no cells"
-        raise MeshError(f"{where}: expected solid cells ({', '.join(SOLID_TYPES)}), got {found}; export the volume "
-                        f"mesh, not only its surface")
+        raise MeshError(
+            f"{where}: expected solid cells ({', '.join(SOLID_TYPES)}), got {found}; export the volume "
+            f"mesh, not only its surface"
+        )
     for kind, rows in cells.items():
         require_node_order(where, kind, nodes, rows)
     node_sets = {name: np.unique(members) for name, members in raw.node_sets.items()}
@@ -90,9 +96,19 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
                 below.setdefault(group, []).append(block.nodes[rows].ravel())
     for group, parts in below.items():
         node_sets.setdefault(group, np.unique(np.concatenate(parts)))
-    return Mesh(nodes, cells, cell_sets, faces, face_sets, node_sets, source=str(path), digest=digest,
-                node_numbers=np.zeros(0, np.int64) if raw.node_numbers is None else raw.node_numbers,
-                cell_numbers=numbers, notes=tuple(notes))
+    return Mesh(
+        nodes,
+        cells,
+        cell_sets,
+        faces,
+        face_sets,
+        node_sets,
+        source=str(path),
+        digest=digest,
+        node_numbers=np.zeros(0, np.int64) if raw.node_numbers is None else raw.node_numbers,
+        cell_numbers=numbers,
+        notes=tuple(notes),
+    )
 
 
 def _require_supported(where: str, blocks: list[RawBlock]) -> None:
@@ -102,8 +118,10 @@ def _require_supported(where: str, blocks: list[RawBlock]) -> None:
             counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
     if counts:
         listed = ", ".join(f"{count} of type {kind}" for kind, count in counts.items())
-        raise MeshError(f"{where}: unsupported cells: {listed}; supported solids: {', '.join(SOLID_TYPES)}; faces: "
-                        f"{', '.join(FACE_TYPES)}. Mesh the part again with these, or split the cells into tetrahedra")
+        raise MeshError(
+            f"{where}: unsupported cells: {listed}; supported solids: {', '.join(SOLID_TYPES)}; faces: "
+            f"{', '.join(FACE_TYPES)}. Mesh the part again with these, or split the cells into tetrahedra"
+        )
 
 
 def _number(block: RawBlock, row: int) -> str:
@@ -126,8 +144,10 @@ def _collect(
         names = np.concatenate([np.arange(len(b.nodes)) if b.numbers is None else b.numbers for b in mine])
         kept, place = _without_repeats(where, kind, rows, names, repeats_allowed)
         if len(kept) < len(rows) and kind in SOLID_TYPES:
-            notes.append(f"{len(rows) - len(kept)} {kind} cells were listed more than once, because they are in "
-                         f"several groups; each is kept once, in all its groups")
+            notes.append(
+                f"{len(rows) - len(kept)} {kind} cells were listed more than once, because they are in "
+                f"several groups; each is kept once, in all its groups"
+            )
         cells[kind] = rows[kept]
         if all(block.numbers is not None for block in mine):
             numbers[kind] = names[kept]
@@ -156,8 +176,10 @@ def _without_repeats(
     same_order = (rows[again] == rows[first[classes[again]]]).all(axis=1)
     if not allowed or (kind in SOLID_TYPES and not same_order.all()):
         row = again[0] if not allowed else again[~same_order][0]
-        raise MeshError(f"{where}: {again.size} {kind} cells are listed twice, first {names[first[classes[row]]]} and "
-                        f"{names[row]} on the same nodes: their mass and stiffness would count double; remove one")
+        raise MeshError(
+            f"{where}: {again.size} {kind} cells are listed twice, first {names[first[classes[row]]]} and "
+            f"{names[row]} on the same nodes: their mass and stiffness would count double; remove one"
+        )
     kept = np.unique(first)
     place = np.searchsorted(kept, first[classes])
     return kept, place

@@ -74,8 +74,10 @@ def read_mesh(path: str | Path) -> Mesh:
         raise
     except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
         text = str(error).strip().splitlines()
-        raise MeshError(f"{where}: could not be read as a {name} file: it is damaged or of another kind "
-                        f"({type(error).__name__}{': ' + text[0][:200] if text else ''})") from error
+        raise MeshError(
+            f"{where}: could not be read as a {name} file: it is damaged or of another kind "
+            f"({type(error).__name__}{': ' + text[0][:200] if text else ''})"
+        ) from error
 
 
 def _neighbours(path: Path) -> str:

@@ -43,8 +43,10 @@ def read_vtk(path: Path, data: bytes) -> RawMesh:
     if path.suffix.lower() == ".vtu":
         pieces = len(re.findall(rb"<Piece[\s>]", data))
         if pieces > 1:
-            raise MeshError(f"{where}: the file has {pieces} pieces; expected one. Merge them (in ParaView: Merge "
-                            f"Blocks, then save again)")
+            raise MeshError(
+                f"{where}: the file has {pieces} pieces; expected one. Merge them (in ParaView: Merge "
+                f"Blocks, then save again)"
+            )
     said = io.StringIO()
     mesh, failure = None, None
     try:
@@ -60,8 +62,10 @@ def read_vtk(path: Path, data: bytes) -> RawMesh:
         raise MeshError(f"{where}: unsupported cells of type {failure.args[0]}; {_SUPPORTED}") from failure
     if mesh is None:
         reason = words if isinstance(failure, SystemExit) else f"{words} {failure}".strip()
-        raise MeshError(f"{where}: could not be read as a VTK file: it is damaged or of another kind "
-                        f"({' '.join(reason.split())[:200] or type(failure).__name__})") from failure
+        raise MeshError(
+            f"{where}: could not be read as a VTK file: it is damaged or of another kind "
+            f"({' '.join(reason.split())[:200] or type(failure).__name__})"
+        ) from failure
     nodes = np.asarray(mesh.points, dtype=float)
     blocks = []
     for k, block in enumerate(mesh.cells):

@@ -37,32 +37,62 @@ class Bracket:
     def __post_init__(self) -> None:
         require_lengths(self)
         t, r = self.thickness, self.bore / 2
-        require(self, self.bolt < t + self.bolt_edge and self.bolt / 2 < self.bolt_edge,
-                f"bolt holes inside the foot, got a diameter of {self.bolt} at {self.bolt_edge} from the edge",
-                "choose a smaller bolt or a larger bolt_edge")
+        require(
+            self,
+            self.bolt < t + self.bolt_edge and self.bolt / 2 < self.bolt_edge,
+            f"bolt holes inside the foot, got a diameter of {self.bolt} at {self.bolt_edge} from the edge",
+            "choose a smaller bolt or a larger bolt_edge",
+        )
         rows = self.bolt_x[1] - self.bolt_x[0]
-        require(self, rows > self.bolt, f"two rows of bolts in the foot, got axes {rows:g} apart",
-                "lengthen the foot or choose a smaller bolt or bolt_edge")
-        require(self, self.bolt_x[0] - self.bolt / 2 > t + self.fillet,
-                f"bolt holes clear of the fillet, got one {self.bolt_x[0] - self.bolt / 2 - t:g} from the upright",
-                f"choose fillet < {self.bolt_x[0] - self.bolt / 2 - t:g} or a larger bolt_edge")
+        require(
+            self,
+            rows > self.bolt,
+            f"two rows of bolts in the foot, got axes {rows:g} apart",
+            "lengthen the foot or choose a smaller bolt or bolt_edge",
+        )
+        require(
+            self,
+            self.bolt_x[0] - self.bolt / 2 > t + self.fillet,
+            f"bolt holes clear of the fillet, got one {self.bolt_x[0] - self.bolt / 2 - t:g} from the upright",
+            f"choose fillet < {self.bolt_x[0] - self.bolt / 2 - t:g} or a larger bolt_edge",
+        )
         gap = self.width / 2 - self.bolt_edge - self.bolt / 2 - self.rib_thickness / 2
-        require(self, gap > 0, f"bolt holes clear of the rib, got an overlap of {-gap:g}",
-                "widen the bracket or choose a thinner rib or a smaller bolt_edge")
-        require(self, self.bore < self.width, f"bore < width, got {self.bore} and {self.width}",
-                "choose a smaller bore")
-        require(self, self.bore_height + r < self.height,
-                f"the bore below the upright's top, got its edge at {self.bore_height + r:g} of {self.height}",
-                "lower the bore")
-        require(self, self.bore_height - r > t + max(self.rib_height, self.fillet),
-                f"the bore above the rib and the fillet, got its edge at {self.bore_height - r:g} and their top at "
-                f"{t + max(self.rib_height, self.fillet):g}", "raise the bore or choose a lower rib")
-        require(self, self.rib_length < self.foot_length - t and self.rib_height < self.height - t,
-                "a rib that ends on the foot and on the upright", "choose a smaller rib")
+        require(
+            self,
+            gap > 0,
+            f"bolt holes clear of the rib, got an overlap of {-gap:g}",
+            "widen the bracket or choose a thinner rib or a smaller bolt_edge",
+        )
+        require(
+            self, self.bore < self.width, f"bore < width, got {self.bore} and {self.width}", "choose a smaller bore"
+        )
+        require(
+            self,
+            self.bore_height + r < self.height,
+            f"the bore below the upright's top, got its edge at {self.bore_height + r:g} of {self.height}",
+            "lower the bore",
+        )
+        require(
+            self,
+            self.bore_height - r > t + max(self.rib_height, self.fillet),
+            f"the bore above the rib and the fillet, got its edge at {self.bore_height - r:g} and their top at "
+            f"{t + max(self.rib_height, self.fillet):g}",
+            "raise the bore or choose a lower rib",
+        )
+        require(
+            self,
+            self.rib_length < self.foot_length - t and self.rib_height < self.height - t,
+            "a rib that ends on the foot and on the upright",
+            "choose a smaller rib",
+        )
         slope = np.hypot(self.rib_length, self.rib_height)
         reach = self.rib_length * self.rib_height / (self.rib_length + self.rib_height + slope)
-        require(self, self.fillet < 2 * reach, f"fillet < {2 * reach:g} (covered by the rib), got {self.fillet}",
-                "choose a smaller fillet or a larger rib")
+        require(
+            self,
+            self.fillet < 2 * reach,
+            f"fillet < {2 * reach:g} (covered by the rib), got {self.fillet}",
+            "choose a smaller fillet or a larger rib",
+        )
 
     @property
     def bolt_x(self) -> tuple[float, float]:
@@ -76,9 +106,7 @@ class Bracket:
         return tuple((x, side * y) for x in self.bolt_x for side in (-1, 1))
 
 
-def mesh_bracket(
-    bracket: Bracket | None = None, *, size: float = 8.0, order: int = 2, path: str | Path
-) -> PartMesh:
+def mesh_bracket(bracket: Bracket | None = None, *, size: float = 8.0, order: int = 2, path: str | Path) -> PartMesh:
     """Mesh a bracket into a Gmsh 4.1 binary file.
 
     Groups: volume "bracket"; faces "bolts" (all four holes), "bolt_1" to "bolt_4" (`Bracket.bolt_axes`), "bore".
@@ -134,8 +162,13 @@ def draw(gmsh: ModuleType, bracket: Bracket) -> None:
     ell = extrude_y(occ, lines, w)  # (1)
     y = -bracket.rib_thickness / 2
     inside = t / 2  # the rib starts inside both plates, so that no faces merely touch
-    corners = ((inside, inside), (t + bracket.rib_length, inside), (t + bracket.rib_length, t),
-               (t, t + bracket.rib_height), (inside, t + bracket.rib_height))
+    corners = (
+        (inside, inside),
+        (t + bracket.rib_length, inside),
+        (t + bracket.rib_length, t),
+        (t, t + bracket.rib_height),
+        (inside, t + bracket.rib_height),
+    )
     p = [point(x, z, y) for x, z in corners]
     lines = [occ.addLine(p[k], p[(k + 1) % 5]) for k in range(5)]
     whole, _ = occ.fuse([ell], [extrude_y(occ, lines, bracket.rib_thickness)])  # (2)

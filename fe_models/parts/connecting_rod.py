@@ -49,29 +49,60 @@ class ConnectingRod:
             bore, outer = getattr(self, f"{end}_bore"), getattr(self, f"{end}_outer")
             require(self, bore < outer, f"{end}_bore < {end}_outer, got {bore} and {outer}", "thicken the ring")
             height, width = getattr(self, f"shank_height_{end}"), getattr(self, f"{end}_width")
-            require(self, height < outer, f"shank_height_{end} < {end}_outer, got {height} and {outer}",
-                    "the shank must run into the ring")
-            require(self, self.shank_width <= width,
-                    f"shank_width <= {end}_width, got {self.shank_width} and {width}", "make the shank thinner")
+            require(
+                self,
+                height < outer,
+                f"shank_height_{end} < {end}_outer, got {height} and {outer}",
+                "the shank must run into the ring",
+            )
+            require(
+                self,
+                self.shank_width <= width,
+                f"shank_width <= {end}_width, got {self.shank_width} and {width}",
+                "make the shank thinner",
+            )
         rings = (self.big_outer + self.small_outer) / 2
-        require(self, self.centre_distance > rings,
-                f"centre_distance > {rings:g} (both outer radii), got {self.centre_distance}", "lengthen the rod")
-        require(self, self.web <= self.shank_width, f"web <= shank_width, got {self.web} and {self.shank_width}",
-                "make the web thinner")
+        require(
+            self,
+            self.centre_distance > rings,
+            f"centre_distance > {rings:g} (both outer radii), got {self.centre_distance}",
+            "lengthen the rod",
+        )
+        require(
+            self,
+            self.web <= self.shank_width,
+            f"web <= shank_width, got {self.web} and {self.shank_width}",
+            "make the web thinner",
+        )
         outline = shank_outline(self)
-        require(self, outline[1][0] < outline[2][0],
-                f"fillets that leave some straight shank, got a radius of {self.fillet}",
-                "choose a smaller fillet or a longer rod")
+        require(
+            self,
+            outline[1][0] < outline[2][0],
+            f"fillets that leave some straight shank, got a radius of {self.fillet}",
+            "choose a smaller fillet or a longer rod",
+        )
         if self.web < self.shank_width:
             pocket = pocket_circles(self)
-            require(self, pocket is not None, f"room for the pockets inside flanges of {self.flange}",
-                    "choose thinner flanges, a higher or longer shank, or web = shank_width")
+            require(
+                self,
+                pocket is not None,
+                f"room for the pockets inside flanges of {self.flange}",
+                "choose thinner flanges, a higher or longer shank, or web = shank_width",
+            )
         if self.bolt:
             require(self, self.bolt < self.boss, f"bolt < boss, got {self.bolt} and {self.boss}", "widen the boss")
-            require(self, self.boss <= self.big_width,
-                    f"boss <= big_width, got {self.boss} and {self.big_width}", "choose a smaller boss")
-            require(self, self.boss_length < self.big_outer,
-                    f"boss_length < big_outer, got {self.boss_length} and {self.big_outer}", "shorten the boss")
+            require(
+                self,
+                self.boss <= self.big_width,
+                f"boss <= big_width, got {self.boss} and {self.big_width}",
+                "choose a smaller boss",
+            )
+            require(
+                self,
+                self.boss_length < self.big_outer,
+                f"boss_length < big_outer, got {self.boss_length} and {self.big_outer}",
+                "shorten the boss",
+            )
 
     @property
     def bolt_offset(self) -> float:
@@ -203,13 +234,15 @@ def outline_wire(occ: ModuleType, rod: ConnectingRod, z: float) -> int:
     for side in (1, -1):
         p = [point(q, side) for q in (ring_big, line_big, line_small, ring_small)]
         centre_big, centre_small = point(c_big, side), point(c_small, side)
-        halves.append([
-            occ.addLine(back, p[0]),
-            occ.addCircleArc(p[0], centre_big, p[1]),
-            occ.addLine(p[1], p[2]),
-            occ.addCircleArc(p[2], centre_small, p[3]),
-            occ.addLine(p[3], front),
-        ])
+        halves.append(
+            [
+                occ.addLine(back, p[0]),
+                occ.addCircleArc(p[0], centre_big, p[1]),
+                occ.addLine(p[1], p[2]),
+                occ.addCircleArc(p[2], centre_small, p[3]),
+                occ.addLine(p[3], front),
+            ]
+        )
     return int(occ.addCurveLoop([*halves[0], *reversed(halves[1])]))
 
 
@@ -222,10 +255,18 @@ def slot_wire(occ: ModuleType, circles: tuple[tuple[float, float], tuple[float, 
     low_1, low_2 = occ.addPoint(x_1 + r_1 * n[0], -r_1 * n[1], z), occ.addPoint(x_2 + r_2 * n[0], -r_2 * n[1], z)
     back, front = occ.addPoint(x_1 - r_1, 0, z), occ.addPoint(x_2 + r_2, 0, z)
     c_1, c_2 = occ.addPoint(x_1, 0, z), occ.addPoint(x_2, 0, z)
-    return int(occ.addCurveLoop([
-        occ.addCircleArc(back, c_1, up_1), occ.addLine(up_1, up_2), occ.addCircleArc(up_2, c_2, front),
-        occ.addCircleArc(front, c_2, low_2), occ.addLine(low_2, low_1), occ.addCircleArc(low_1, c_1, back),
-    ]))
+    return int(
+        occ.addCurveLoop(
+            [
+                occ.addCircleArc(back, c_1, up_1),
+                occ.addLine(up_1, up_2),
+                occ.addCircleArc(up_2, c_2, front),
+                occ.addCircleArc(front, c_2, low_2),
+                occ.addLine(low_2, low_1),
+                occ.addCircleArc(low_1, c_1, back),
+            ]
+        )
+    )
 
 
 def boss(occ: ModuleType, rod: ConnectingRod, side: int) -> tuple[int, int]:
@@ -233,13 +274,15 @@ def boss(occ: ModuleType, rod: ConnectingRod, side: int) -> tuple[int, int]:
     x, y, r = -rod.boss_length / 2, side * rod.bolt_offset, rod.boss / 2
     corners = [occ.addPoint(x, yy, zz) for yy, zz in ((0, -r), (y, -r), (y + side * r, 0), (y, r), (0, r))]
     centre = occ.addPoint(x, y, 0)
-    wire = occ.addCurveLoop([
-        occ.addLine(corners[0], corners[1]),
-        occ.addCircleArc(corners[1], centre, corners[2]),
-        occ.addCircleArc(corners[2], centre, corners[3]),
-        occ.addLine(corners[3], corners[4]),
-        occ.addLine(corners[4], corners[0]),
-    ])
+    wire = occ.addCurveLoop(
+        [
+            occ.addLine(corners[0], corners[1]),
+            occ.addCircleArc(corners[1], centre, corners[2]),
+            occ.addCircleArc(corners[2], centre, corners[3]),
+            occ.addLine(corners[3], corners[4]),
+            occ.addLine(corners[4], corners[0]),
+        ]
+    )
     bodies = occ.extrude([(2, occ.addPlaneSurface([wire]))], rod.boss_length, 0, 0)
     return next((dim, tag) for dim, tag in bodies if dim == 3)
 

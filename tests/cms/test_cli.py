@@ -131,8 +131,18 @@ def test_matrices_reduce_without_a_mesh(folder):
 
     body = bar_body(nx=4)
     M, K = body.M.tocoo(), body.K.tocoo()
-    np.savez(folder / "bar.npz", M_row=M.row, M_col=M.col, M_data=M.data, K_row=K.row, K_col=K.col, K_data=K.data,
-             nodes=body.nodes, dofs=body.dofs, **{f"interface/{i.name}/nodes": i.nodes for i in body.interfaces})
+    np.savez(
+        folder / "bar.npz",
+        M_row=M.row,
+        M_col=M.col,
+        M_data=M.data,
+        K_row=K.row,
+        K_col=K.col,
+        K_data=K.data,
+        nodes=body.nodes,
+        dofs=body.dofs,
+        **{f"interface/{i.name}/nodes": i.nodes for i in body.interfaces},
+    )
     (folder / "bar.toml").write_text('[body]\nmatrices = "bar.npz"\nunits = "m-kg-s"\n[reduction]\nn_modes = 2\n')
     result = run("reduce", folder / "bar.toml")
     assert result.exit_code == 0, result.output
@@ -187,8 +197,9 @@ def test_central_inertia_is_that_of_the_point_masses():
     rng = np.random.default_rng(0)
     mass, c = rng.uniform(1, 2, 7), rng.normal(size=(7, 3))
     body = synthetic_reduced_body(n_q=1)
-    moments = type(body.moments)(mass.sum(), mass @ c, (c.T * mass) @ c, body.moments.C1, body.moments.P,
-                                 body.moments.S_kl)
+    moments = type(body.moments)(
+        mass.sum(), mass @ c, (c.T * mass) @ c, body.moments.C1, body.moments.P, body.moments.S_kl
+    )
     d = c - mass @ c / mass.sum()
     expected = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(mass, d, strict=True))
     assert_allclose(central_inertia(moments), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
@@ -292,13 +303,16 @@ def test_a_mechanism_is_named(folder):
     assert contents(folder) == before
 
 
-@pytest.mark.parametrize(("damage", "words"), [
-    (lambda b: b[: len(b) // 2], "truncated"),
-    (lambda b: b[:100], "truncated"),
-    (lambda b: b[:5000] + bytes([b[5000] ^ 1]) + b[5001:], "altered"),
-    (lambda b: b"", "not a modal-file"),
-    (lambda b: b"some text", "not a modal-file"),
-])
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda b: b[: len(b) // 2], "truncated"),
+        (lambda b: b[:100], "truncated"),
+        (lambda b: b[:5000] + bytes([b[5000] ^ 1]) + b[5001:], "altered"),
+        (lambda b: b"", "not a modal-file"),
+        (lambda b: b"some text", "not a modal-file"),
+    ],
+)
 @pytest.mark.parametrize("command", [["info"], ["info", "--json"], ["view"]])
 def test_a_damaged_modal_file_is_refused(modal_file, tmp_path, damage, words, command):
     path = tmp_path / "bad.h5"
@@ -335,8 +349,12 @@ def test_view_refuses_what_it_cannot_draw(modal_file, tmp_path, monkeypatch, opt
 
 def test_the_output_is_checked_before_the_work(folder):
     before = contents(folder)
-    for output, words in [("nowhere/out.h5", "does not exist"), ("bar.toml", "this is the input"),
-                          ("bar.inp", "this is the input"), (".", "this is a folder")]:
+    for output, words in [
+        ("nowhere/out.h5", "does not exist"),
+        ("bar.toml", "this is the input"),
+        ("bar.inp", "this is the input"),
+        (".", "this is a folder"),
+    ]:
         assert_refused(run("reduce", folder / "bar.toml", "-o", folder / output), words)
     assert contents(folder) == before
 
@@ -372,8 +390,9 @@ def test_a_full_disk_leaves_the_old_file_and_one_message(folder):
     before = contents(folder)
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
     program = [sys.executable, "-c", limit + PROGRAM[2]]
-    result = subprocess.run([*program, "reduce", "bar.toml", "-o", "out.h5"], cwd=folder, env=ENVIRONMENT,
-                            capture_output=True, text=True)
+    result = subprocess.run(
+        [*program, "reduce", "bar.toml", "-o", "out.h5"], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True
+    )
     assert result.returncode == 2, result.stderr
     assert result.stderr.startswith("error: ")
     assert "cannot be written" in result.stderr
@@ -387,8 +406,14 @@ def test_a_killed_run_leaves_the_old_file(folder):
     before = contents(folder)
     slow = "import cms.modal_file as m, time; m.write = lambda *_: (print('ready', flush=True), time.sleep(60)); "
     program = [sys.executable, "-c", slow + PROGRAM[2]]
-    with subprocess.Popen([*program, "reduce", "bar.toml", "-o", "out.h5"], cwd=folder, env=ENVIRONMENT, text=True,
-                          stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    with subprocess.Popen(
+        [*program, "reduce", "bar.toml", "-o", "out.h5"],
+        cwd=folder,
+        env=ENVIRONMENT,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
         assert process.stdout.readline() == "ready\n"
         time.sleep(0.1)
         process.send_signal(signal.SIGINT)

@@ -131,8 +131,15 @@ def monomial_integral(cell, p):
 @pytest.mark.parametrize(
     ("cell", "label", "limits"),
     [
-        ("tet", 1, 1), ("tet", 2, 2), ("tet", 5, 4), ("tet", 8, 7), ("hex", 3, (3, 3, 3)), ("hex", 5, (5, 5, 5)),
-        ("hex", 9, (9, 9, 9)), ("wedge", (2, 3), (2, 3)), ("wedge", (3, 5), (3, 5)),
+        ("tet", 1, 1),
+        ("tet", 2, 2),
+        ("tet", 5, 4),
+        ("tet", 8, 7),
+        ("hex", 3, (3, 3, 3)),
+        ("hex", 5, (5, 5, 5)),
+        ("hex", 9, (9, 9, 9)),
+        ("wedge", (2, 3), (2, 3)),
+        ("wedge", (3, 5), (3, 5)),
     ],
 )
 def test_quadrature_is_exact_to_the_degree_that_the_elements_need(cell, label, limits):
@@ -180,8 +187,13 @@ def test_elements_of_different_kinds_share_their_nodes():
     wedges = box_mesh(1, 2, 2, 0.5, kind="wedge")
     nodes = np.vstack([hexahedra.nodes, wedges.nodes + np.array([0.5, 0, 0])])
     unique, number = np.unique(nodes.round(12), axis=0, return_inverse=True)
-    mesh = Mesh(unique, {"hexahedron": number[hexahedra.cells["hexahedron"]],
-                         "wedge": number[wedges.cells["wedge"] + len(hexahedra.nodes)]})
+    mesh = Mesh(
+        unique,
+        {
+            "hexahedron": number[hexahedra.cells["hexahedron"]],
+            "wedge": number[wedges.cells["wedge"] + len(hexahedra.nodes)],
+        },
+    )
     assert len(unique) == len(hexahedra.nodes) + len(wedges.nodes) - 9
     K, M_s = assembled(distorted(mesh, 0.1))
     parts = [assembled_part(distorted(mesh, 0.1), kind) for kind in mesh.cells]

@@ -54,8 +54,9 @@ def test_quadrature_of_a_curved_cell_equals_a_rule_of_much_higher_degree(kind):
     weight = np.einsum("i,j,k->ijk", w, w, w).ravel()
     if kind.startswith("tetra"):  # collapse the cube: x, y (1 - x), z (1 - x)(1 - y)
         weight = weight * (1 - cube[:, 0]) ** 2 * (1 - cube[:, 1])
-        cube = np.column_stack([cube[:, 0], cube[:, 1] * (1 - cube[:, 0]),
-                                cube[:, 2] * (1 - cube[:, 0]) * (1 - cube[:, 1])])
+        cube = np.column_stack(
+            [cube[:, 0], cube[:, 1] * (1 - cube[:, 0]), cube[:, 2] * (1 - cube[:, 0]) * (1 - cube[:, 1])]
+        )
     elif kind == "wedge":
         weight = weight * (1 - cube[:, 0])
         cube = np.column_stack([cube[:, 0], cube[:, 1] * (1 - cube[:, 0]), cube[:, 2]])
@@ -87,8 +88,10 @@ def test_boundary_of_a_mixed_mesh_hides_the_facets_between_cell_types():
     hexes, wedges = faced_box("hexahedron", (1, 1, 1), (1, 1, 1)), faced_box("wedge", (1, 1, 1), (1, 1, 1))
     nodes = np.concatenate([hexes.nodes, wedges.nodes + np.array([1, 0, 0])])
     unique, number = np.unique(np.rint(nodes), axis=0, return_inverse=True)
-    mesh = Mesh(unique, {"hexahedron": number[hexes.cells["hexahedron"]],
-                         "wedge": number[wedges.cells["wedge"] + len(hexes.nodes)]})
+    mesh = Mesh(
+        unique,
+        {"hexahedron": number[hexes.cells["hexahedron"]], "wedge": number[wedges.cells["wedge"] + len(hexes.nodes)]},
+    )
     assert_allclose(facet_weights(mesh.nodes, boundary_facets(mesh)).sum(), 10.0, rtol=ROUNDOFF, atol=0)
     assert_allclose(enclosed_volume(mesh.nodes, boundary_triangles(mesh)), 2.0, rtol=100 * ROUNDOFF, atol=0)
 

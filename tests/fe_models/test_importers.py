@@ -30,17 +30,20 @@ def write(path, mesh, **options):
 
 
 @pytest.mark.parametrize("kind", SOLID_TYPES)
-@pytest.mark.parametrize(("suffix", "options"), [
-    (".vtk", {}),
-    (".vtk", {"file_format": "vtk42"}),
-    (".vtk", {"binary": False}),
-    (".vtu", {}),
-    (".vtu", {"binary": False}),
-    (".msh", {"file_format": "gmsh"}),
-    (".msh", {"file_format": "gmsh", "binary": False}),
-    (".msh", {"file_format": "gmsh22"}),
-    (".msh", {"file_format": "gmsh22", "binary": False}),
-])
+@pytest.mark.parametrize(
+    ("suffix", "options"),
+    [
+        (".vtk", {}),
+        (".vtk", {"file_format": "vtk42"}),
+        (".vtk", {"binary": False}),
+        (".vtu", {}),
+        (".vtu", {"binary": False}),
+        (".msh", {"file_format": "gmsh"}),
+        (".msh", {"file_format": "gmsh", "binary": False}),
+        (".msh", {"file_format": "gmsh22"}),
+        (".msh", {"file_format": "gmsh22", "binary": False}),
+    ],
+)
 def test_reading_returns_what_meshio_wrote(kind, suffix, options, tmp_path):
     mesh = faced_box(kind)
     path = write(tmp_path / f"box{suffix}", meshio_mesh(mesh), **options)
@@ -119,8 +122,11 @@ def test_med_in_its_own_orientation_and_in_that_of_meshio(kind, tmp_path):
 
 
 def test_med_families_become_groups(tmp_path):
-    mesh = meshio_mesh(faced_box("hexahedron"), cell_data={"cell_tags": [np.array([-1, -2])]},
-                       point_data={"point_tags": np.array([3, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0])})
+    mesh = meshio_mesh(
+        faced_box("hexahedron"),
+        cell_data={"cell_tags": [np.array([-1, -2])]},
+        point_data={"point_tags": np.array([3, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0])},
+    )
     mesh.cell_tags = {-1: ["steel", "all"], -2: ["all"]}
     mesh.point_tags = {3: ["pin"], 4: ["pin", "hole"]}
     read = read_mesh(write(tmp_path / "box.med", mesh))

@@ -152,8 +152,9 @@ def test_truncated_file_is_refused(suffix, part, tmp_path, capsys):
 @pytest.mark.parametrize("binary", [True, False])
 def test_gmsh_file_truncated_anywhere_is_refused(version, binary, tmp_path, capsys):
     mesh = faced_box("tetra")
-    content = written(tmp_path / "good.msh", meshio.Mesh(mesh.nodes, list(mesh.cells.items())), file_format=version,
-                      binary=binary)
+    content = written(
+        tmp_path / "good.msh", meshio.Mesh(mesh.nodes, list(mesh.cells.items())), file_format=version, binary=binary
+    )
     for end in np.linspace(1, content.rindex(b"$EndElements"), 40).astype(int):
         refusal(tmp_path, "rod.msh", content[:end], capsys)
 
@@ -208,15 +209,21 @@ def test_plane_mesh_is_refused(tmp_path):
 @pytest.mark.parametrize(("kind", "n_nodes"), [("pyramid", 5), ("wedge15", 15), ("pyramid13", 13)])
 @pytest.mark.parametrize("suffix", [".msh", ".inp", ".bdf", ".med", ".vtk"])
 def test_unsupported_cells_are_named_and_counted(kind, n_nodes, suffix, tmp_path, capsys):
-    codes = {"pyramid": (7, "C3D5", "CPYRAM", "PY5", 14), "wedge15": (18, "C3D15", "CPENTA", "P15", 26),
-             "pyramid13": (19, "C3D13", "CPYRAM", "P13", 27)}[kind]
+    codes = {
+        "pyramid": (7, "C3D5", "CPYRAM", "PY5", 14),
+        "wedge15": (18, "C3D15", "CPENTA", "P15", 26),
+        "pyramid13": (19, "C3D13", "CPYRAM", "P13", 27),
+    }[kind]
     numbers = np.arange(1, n_nodes + 1)
     points = np.random.default_rng(0).random((n_nodes, 3))
     lines = [f"{k} {' '.join(map(str, p))}" for k, p in zip(numbers, points, strict=True)]
     row = " ".join(map(str, numbers))
     if suffix == ".msh":
-        content = (f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{n_nodes}\n" + "\n".join(lines) +
-                   f"\n$EndNodes\n$Elements\n1\n1 {codes[0]} 2 1 1 {row}\n$EndElements\n")
+        content = (
+            f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{n_nodes}\n"
+            + "\n".join(lines)
+            + f"\n$EndNodes\n$Elements\n1\n1 {codes[0]} 2 1 1 {row}\n$EndElements\n"
+        )
     elif suffix == ".inp":
         content = "*NODE\n" + "\n".join(line.replace(" ", ", ") for line in lines)
         content += f"\n*ELEMENT, TYPE={codes[1]}\n1, {row.replace(' ', ', ')}\n"
@@ -235,9 +242,13 @@ def test_unsupported_cells_are_named_and_counted(kind, n_nodes, suffix, tmp_path
             mesh[f"MAI/{codes[3]}/NOD"].attrs["NBR"] = 1
         content = (tmp_path / "good.med").read_bytes()
     else:
-        content = (f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {n_nodes} double\n" +
-                   "\n".join(" ".join(map(str, p)) for p in points) + f"\nCELLS 1 {n_nodes + 1}\n{n_nodes} " +
-                   " ".join(map(str, numbers - 1)) + f"\nCELL_TYPES 1\n{codes[4]}\n")
+        content = (
+            f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {n_nodes} double\n"
+            + "\n".join(" ".join(map(str, p)) for p in points)
+            + f"\nCELLS 1 {n_nodes + 1}\n{n_nodes} "
+            + " ".join(map(str, numbers - 1))
+            + f"\nCELL_TYPES 1\n{codes[4]}\n"
+        )
     text = refusal(tmp_path, f"rod{suffix}", content, capsys)
     name = {".inp": codes[1]}.get(suffix, kind) if kind != "wedge15" else kind
     assert "unsupported cells" in text
@@ -309,8 +320,9 @@ def test_two_cells_on_the_same_nodes_in_another_order_are_refused_in_gmsh_22(tmp
 def test_groups_of_one_name_and_two_dimensions_and_cells_without_a_group(tmp_path):
     text = MSH22.replace("$Nodes", '$PhysicalNames\n2\n2 1 "end"\n3 1 "end"\n$EndPhysicalNames\n$Nodes', 1)
     text = text.replace("4\n1 0 0 0", "5\n9 0 0 -1\n1 0 0 0")
-    text = text.replace("1\n1 4 2 1 1 1 2 3 4", "4\n1 4 2 1 1 1 2 3 4\n2 4 2 0 1 1 3 2 9\n"
-                        "3 2 2 1 1 1 2 3\n4 15 2 6 1 9")
+    text = text.replace(
+        "1\n1 4 2 1 1 1 2 3 4", "4\n1 4 2 1 1 1 2 3 4\n2 4 2 0 1 1 3 2 9\n3 2 2 1 1 1 2 3\n4 15 2 6 1 9"
+    )
     mesh = read_text(tmp_path, "rod.msh", text)
     assert_array_equal(mesh.cell_sets["end"]["tetra"], [0])
     assert mesh.n_cells == 2
@@ -319,17 +331,20 @@ def test_groups_of_one_name_and_two_dimensions_and_cells_without_a_group(tmp_pat
     assert_array_equal(mesh.node_numbers, [9, 1, 2, 3, 4])
 
 
-@pytest.mark.parametrize(("old", "new", "words"), [
-    ("2.2 0 8", "1.0 0 8", "Gmsh format 1.0 is not supported"),
-    ("2.2 0 8", "4.0 0 8", "gmsh -save -format msh41"),
-    ("$EndElements\n", "$EndElements\n$PartitionedEntities\n$EndPartitionedEntities\n", "partitioned"),
-    ("1 4 2 1 1 1 2 3 4", "1 44 2 1 1 1 2 3 4", "Gmsh type 44"),
-    ("$Elements\n1\n", "$Elements\n7\n", "7 cells announced, 1 lines found"),
-    ("3 0 1 0", "3 0 one 0", "expected numbers only"),
-    ("$Nodes\n4", "$Nodes\nfour", "could not be read as a Gmsh file: it is damaged or of another kind (ValueError"),
-    ("$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n", "", "expected a section $Elements"),
-    ("$EndNodes", "$EndNodes\n$Nodes\n0\n$EndNodes", "section $Nodes is there twice"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("2.2 0 8", "1.0 0 8", "Gmsh format 1.0 is not supported"),
+        ("2.2 0 8", "4.0 0 8", "gmsh -save -format msh41"),
+        ("$EndElements\n", "$EndElements\n$PartitionedEntities\n$EndPartitionedEntities\n", "partitioned"),
+        ("1 4 2 1 1 1 2 3 4", "1 44 2 1 1 1 2 3 4", "Gmsh type 44"),
+        ("$Elements\n1\n", "$Elements\n7\n", "7 cells announced, 1 lines found"),
+        ("3 0 1 0", "3 0 one 0", "expected numbers only"),
+        ("$Nodes\n4", "$Nodes\nfour", "could not be read as a Gmsh file: it is damaged or of another kind (ValueError"),
+        ("$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n", "", "expected a section $Elements"),
+        ("$EndNodes", "$EndNodes\n$Nodes\n0\n$EndNodes", "section $Nodes is there twice"),
+    ],
+)
 def test_gmsh_files_that_cannot_be_read_truthfully(old, new, words, tmp_path, capsys):
     assert old in MSH22
     assert words in refusal(tmp_path, "rod.msh", MSH22.replace(old, new, 1), capsys)
@@ -339,7 +354,10 @@ def test_gmsh_files_that_cannot_be_read_truthfully(old, new, words, tmp_path, ca
 
 
 def test_abaqus_sets_are_joined_generated_nested_and_compared_without_case(tmp_path):
-    mesh = read_text(tmp_path, "rod.inp", """*HEADING
+    mesh = read_text(
+        tmp_path,
+        "rod.inp",
+        """*HEADING
 ** a comment
 *NODE, NSET=Everything
 1, 0, 0, 0
@@ -369,12 +387,18 @@ upper, LOWER
 *NSET, NSET=of lower, ELSET=lower
 *SURFACE, NAME=s
 upper, S1
-""")
+""",
+    )
     assert mesh.n_cells == 2
     assert_array_equal(mesh.nodes[2], [0, 1, 0])
     sets = {name: list(nodes) for name, nodes in mesh.node_sets.items()}
-    assert sets == {"Everything": [0, 1, 2, 3], "Tip": [3, 4], "odd": [0, 2, 4], "both": [0, 2, 3, 4],
-                    "of lower": [0, 1, 2, 4]}
+    assert sets == {
+        "Everything": [0, 1, 2, 3],
+        "Tip": [3, 4],
+        "odd": [0, 2, 4],
+        "both": [0, 2, 3, 4],
+        "of lower": [0, 1, 2, 4],
+    }
     groups = {name: list(rows["tetra"]) for name, rows in mesh.cell_sets.items()}
     assert groups == {"upper": [0], "lower": [1], "all": [0, 1]}
     assert mesh.notes == ("1 blocks *SURFACE were left out",)
@@ -395,37 +419,46 @@ def part_deck(instances):
 
 
 def test_abaqus_part_with_one_instance_reads_like_a_flat_deck(tmp_path):
-    mesh = read_text(tmp_path, "rod.inp", part_deck(
-        "*INSTANCE, NAME=p-1, PART=p\n*END INSTANCE\n*NODE\n1, 9, 9, 9\n*NSET, NSET=ref\n1,\n"
-        "*NSET, NSET=tip, INSTANCE=P-1\n4,\n"
-    ))
+    mesh = read_text(
+        tmp_path,
+        "rod.inp",
+        part_deck(
+            "*INSTANCE, NAME=p-1, PART=p\n*END INSTANCE\n*NODE\n1, 9, 9, 9\n*NSET, NSET=ref\n1,\n"
+            "*NSET, NSET=tip, INSTANCE=P-1\n4,\n"
+        ),
+    )
     assert len(mesh.nodes) == 4
     assert {name: list(nodes) for name, nodes in mesh.node_sets.items()} == {"inside": [0], "tip": [3]}
     assert "2 blocks of nodes, elements or sets of the assembly itself" in mesh.notes[0]
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    (part_deck("*INSTANCE, NAME=p-1, PART=p\n5., 0., 0.\n*END INSTANCE\n"), "the instance is moved"),
-    (part_deck("*INSTANCE, NAME=a, PART=p\n*END INSTANCE\n*INSTANCE, NAME=b, PART=p\n*END INSTANCE\n"),
-     "1 parts and 2 instances"),
-    (TETRA + "*INCLUDE, INPUT=more.inp\n", "*INCLUDE is not read"),
-    (TETRA + "*ELEMENT, TYPE=C3D4, INPUT=more.inp\n", "*ELEMENT, INPUT=... is not read"),
-    ("*SYSTEM\n1,0,0\n" + TETRA, "*SYSTEM is not read"),
-    (TETRA.replace("*NODE", "*NODE, SYSTEM=C"), "cylindrical or spherical"),
-    (TETRA + "*NGEN\n1, 4, 1\n", "*NGEN is not read"),
-    (TETRA + "*NCOPY\n1\n", "*NCOPY is not read"),
-    (TETRA + "*ELGEN\n1\n", "*ELGEN is not read"),
-    (TETRA.replace("TYPE=C3D4", "TYPE=C3D10"), "expected a multiple of 11 numbers below, got 5"),
-    (TETRA.replace(", TYPE=C3D4", ""), "expected TYPE="),
-    (TETRA.replace("2, 1, 0, 0", "2, one, 0, 0"), "expected number, x, y, z"),
-    (TETRA + "*NSET, NSET=a\n99\n", "NSET 'a' names 1 nodes that are not in the deck, first 99"),
-    (TETRA + "*ELSET, ELSET=a\n99\n", "ELSET 'a' names 1 elements that are not in the deck, first 99"),
-    (TETRA + "*NSET, NSET=a\nb\n", "names an unknown set 'B'"),
-    (TETRA + "*NSET, NSET=a\nb\n*NSET, NSET=b\na\n", "contains itself"),
-    (TETRA + "*NSET, NSET=a, GENERATE\n1, 4, 0\n", "expected first, last, increment"),
-    ("1, 0, 0, 0\n" + TETRA, "expected a keyword line"),
-    ("*HEADING\nrod\n", "expected nodes (*NODE), got none"),
-])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (part_deck("*INSTANCE, NAME=p-1, PART=p\n5., 0., 0.\n*END INSTANCE\n"), "the instance is moved"),
+        (
+            part_deck("*INSTANCE, NAME=a, PART=p\n*END INSTANCE\n*INSTANCE, NAME=b, PART=p\n*END INSTANCE\n"),
+            "1 parts and 2 instances",
+        ),
+        (TETRA + "*INCLUDE, INPUT=more.inp\n", "*INCLUDE is not read"),
+        (TETRA + "*ELEMENT, TYPE=C3D4, INPUT=more.inp\n", "*ELEMENT, INPUT=... is not read"),
+        ("*SYSTEM\n1,0,0\n" + TETRA, "*SYSTEM is not read"),
+        (TETRA.replace("*NODE", "*NODE, SYSTEM=C"), "cylindrical or spherical"),
+        (TETRA + "*NGEN\n1, 4, 1\n", "*NGEN is not read"),
+        (TETRA + "*NCOPY\n1\n", "*NCOPY is not read"),
+        (TETRA + "*ELGEN\n1\n", "*ELGEN is not read"),
+        (TETRA.replace("TYPE=C3D4", "TYPE=C3D10"), "expected a multiple of 11 numbers below, got 5"),
+        (TETRA.replace(", TYPE=C3D4", ""), "expected TYPE="),
+        (TETRA.replace("2, 1, 0, 0", "2, one, 0, 0"), "expected number, x, y, z"),
+        (TETRA + "*NSET, NSET=a\n99\n", "NSET 'a' names 1 nodes that are not in the deck, first 99"),
+        (TETRA + "*ELSET, ELSET=a\n99\n", "ELSET 'a' names 1 elements that are not in the deck, first 99"),
+        (TETRA + "*NSET, NSET=a\nb\n", "names an unknown set 'B'"),
+        (TETRA + "*NSET, NSET=a\nb\n*NSET, NSET=b\na\n", "contains itself"),
+        (TETRA + "*NSET, NSET=a, GENERATE\n1, 4, 0\n", "expected first, last, increment"),
+        ("1, 0, 0, 0\n" + TETRA, "expected a keyword line"),
+        ("*HEADING\nrod\n", "expected nodes (*NODE), got none"),
+    ],
+)
 def test_abaqus_decks_that_cannot_be_read_truthfully(text, words, tmp_path, capsys):
     assert words in refusal(tmp_path, "rod.inp", text, capsys)
 
@@ -434,7 +467,10 @@ def test_abaqus_decks_that_cannot_be_read_truthfully(text, words, tmp_path, caps
 
 
 def test_nastran_forms_of_numbers_cards_and_comments(tmp_path):
-    mesh = read_text(tmp_path, "rod.nas", """$ no executive control: bulk data only
+    mesh = read_text(
+        tmp_path,
+        "rod.nas",
+        """$ no executive control: bulk data only
 grid,1,0,0.,0.,0.   $ comment
 GRID    2               1.+0    0.      0.
 GRID*                  3                              0.             1.0
@@ -442,29 +478,33 @@ GRID*                  3                              0.             1.0
 GRID,4,,,,1.-1
 ctetra  10      2       1       2       3       4
 CONM2,77,4,,3.5
-""")
+""",
+    )
     assert_array_equal(mesh.nodes, [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.1]])
     assert_array_equal(mesh.cell_sets["pid_2"]["tetra"], [0])
     assert_array_equal(mesh.cell_numbers["tetra"], [10])
     assert mesh.notes == ("1 CONM2 cards were left out",)
 
 
-@pytest.mark.parametrize(("old", "new", "words"), [
-    ("GRID,2,,", "GRID,2,5,", "GRID 2: position in coordinate system 5 (CP)"),
-    ("GRID,1", "GRDSET,,5\nGRID,1", "GRDSET puts 4 grid points into coordinate system 5"),
-    ("GRID,1,", "INCLUDE 'more.bdf'\nGRID,1,", "INCLUDE is not read"),
-    ("ENDDATA\n", "", "expected ENDDATA at the end"),
-    ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3,4,5", "expected 4 or 10 nodes, got 5"),
-    ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3", "expected 4 or 10 nodes, got 3"),
-    ("CTETRA,1", "CTETRX,1", "unknown solid element"),
-    ("GRID,2,,1.,0.,0.", "GRID,2,,1.,x,0.", "field 5: expected a coordinate, got 'x'"),
-    ("GRID,2", "GRID,two", "field 2: expected a number, got 'two'"),
-    ("GRID,1", "=,*1\nGRID,1", "replicated cards"),
-    ("BEGIN BULK\n", "BEGIN BULK\n+,1,2\n", "continuation without a card"),
-    ("ENDDATA", "BEGIN SUPER=2\nENDDATA", "a second BEGIN (superelement)"),
-    ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3,4,,,+A\n+B,", "continuation '+B' does not follow its card"),
-    ("GRID", "XRID", "expected grid points (GRID), got none"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("GRID,2,,", "GRID,2,5,", "GRID 2: position in coordinate system 5 (CP)"),
+        ("GRID,1", "GRDSET,,5\nGRID,1", "GRDSET puts 4 grid points into coordinate system 5"),
+        ("GRID,1,", "INCLUDE 'more.bdf'\nGRID,1,", "INCLUDE is not read"),
+        ("ENDDATA\n", "", "expected ENDDATA at the end"),
+        ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3,4,5", "expected 4 or 10 nodes, got 5"),
+        ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3", "expected 4 or 10 nodes, got 3"),
+        ("CTETRA,1", "CTETRX,1", "unknown solid element"),
+        ("GRID,2,,1.,0.,0.", "GRID,2,,1.,x,0.", "field 5: expected a coordinate, got 'x'"),
+        ("GRID,2", "GRID,two", "field 2: expected a number, got 'two'"),
+        ("GRID,1", "=,*1\nGRID,1", "replicated cards"),
+        ("BEGIN BULK\n", "BEGIN BULK\n+,1,2\n", "continuation without a card"),
+        ("ENDDATA", "BEGIN SUPER=2\nENDDATA", "a second BEGIN (superelement)"),
+        ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3,4,,,+A\n+B,", "continuation '+B' does not follow its card"),
+        ("GRID", "XRID", "expected grid points (GRID), got none"),
+    ],
+)
 def test_nastran_decks_that_cannot_be_read_truthfully(old, new, words, tmp_path, capsys):
     assert old in BULK
     text = BULK.replace(old, new) if old == "GRID" else BULK.replace(old, new, 1)

@@ -97,8 +97,15 @@ def test_distributing_weights_of_a_quadratic_tetrahedron_mesh_lie_on_the_middle_
 
 def test_linear_faces_over_quadratic_cells_select_the_middle_nodes():
     mesh = faced_box("tetra10")
-    linear = Mesh(mesh.nodes, mesh.cells, {}, {"triangle": mesh.faces["triangle6"][:, :3]},
-                  {"end": {"triangle": mesh.face_sets["right face"]["triangle6"]}}, {}, source="box")
+    linear = Mesh(
+        mesh.nodes,
+        mesh.cells,
+        {},
+        {"triangle": mesh.faces["triangle6"][:, :3]},
+        {"end": {"triangle": mesh.face_sets["right face"]["triangle6"]}},
+        {},
+        source="box",
+    )
     assert_array_equal(FaceGroup("end").members(linear), FaceGroup("right face").members(mesh))
     assert list(selected_facets(linear, FaceGroup("end"))) == ["triangle6"]
 
@@ -159,23 +166,29 @@ def test_empty_box_says_where_the_body_is():
     assert "from (0, 0, 0) to (2, 1, 1.5), the nearest node is 1 away" in text
 
 
-@pytest.mark.parametrize("selection", [
-    Plane((0, 0, np.nan), (1, 0, 0)),
-    Plane((0, 0, 0), (0, 0, 0)),
-    Plane((0, 0, 0), (1, 0, 0), tolerance=-1),
-    Cylinder((0, 0, 0), (0, 0, 1), 0.0),
-    Box((1, 0, 0), (0, 1, 1)),
-    NearestNode((0, np.inf, 0)),
-])
+@pytest.mark.parametrize(
+    "selection",
+    [
+        Plane((0, 0, np.nan), (1, 0, 0)),
+        Plane((0, 0, 0), (0, 0, 0)),
+        Plane((0, 0, 0), (1, 0, 0), tolerance=-1),
+        Cylinder((0, 0, 0), (0, 0, 1), 0.0),
+        Box((1, 0, 0), (0, 1, 1)),
+        NearestNode((0, np.inf, 0)),
+    ],
+)
 def test_impossible_geometry_is_refused(selection):
     assert "expected" in message(rigid_interface, faced_box("tetra"), "end", selection)
 
 
-@pytest.mark.parametrize(("selection", "words"), [
-    (NearestNode((0, 0, 0)), "got 1"),
-    (Box((0, 0, 0), (1, 0, 0)), "got 2"),
-    (Box((0, 0, 0), (2, 0, 0)), "3 nodes lie on one line"),
-])
+@pytest.mark.parametrize(
+    ("selection", "words"),
+    [
+        (NearestNode((0, 0, 0)), "got 1"),
+        (Box((0, 0, 0), (1, 0, 0)), "got 2"),
+        (Box((0, 0, 0), (2, 0, 0)), "3 nodes lie on one line"),
+    ],
+)
 def test_rigid_interface_with_too_few_or_collinear_nodes_is_refused(selection, words):
     assert words in message(rigid_interface, faced_box("hexahedron"), "end", selection)
 

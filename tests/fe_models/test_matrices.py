@@ -59,8 +59,9 @@ def test_mass_that_differs_between_directions_is_not_scalar(spoil):
         M[3:6, 3:6] += 1e-6 * M.max() * (1 - np.eye(3))  # the same in all directions: only the pattern tells
     else:
         keep = keep[1:]
-    foreign = body_from_matrices(M[np.ix_(keep, keep)], body.K[keep][:, keep], body.nodes, body.dofs[keep],
-                                 name="spoilt", units=SI)
+    foreign = body_from_matrices(
+        M[np.ix_(keep, keep)], body.K[keep][:, keep], body.nodes, body.dofs[keep], name="spoilt", units=SI
+    )
     assert scalar_mass_of(foreign) is None
     assert foreign.element_model is None
 

@@ -40,8 +40,14 @@ def read(path):
     mesh = meshio.read(path)
     tetra = np.concatenate([block.data for block in mesh.cells if block.type == "tetra10"])
     groups = {
-        name: np.concatenate([block.data[rows] for block, rows in zip(mesh.cells, sets, strict=True)
-                              if block.type == "triangle6" and len(rows)] or [np.zeros((0, 6), int)])
+        name: np.concatenate(
+            [
+                block.data[rows]
+                for block, rows in zip(mesh.cells, sets, strict=True)
+                if block.type == "triangle6" and len(rows)
+            ]
+            or [np.zeros((0, 6), int)]
+        )
         for name, sets in mesh.cell_sets.items()
         if not name.startswith("gmsh:")
     }
@@ -84,8 +90,9 @@ def test_shipped_rod_bores_are_round_with_curved_mid_side_nodes(end, x):
     face = points[np.unique(groups[f"{end}_end"])]
     radius = getattr(rod, f"{end}_bore") / 2
     assert_allclose(np.hypot(face[:, 0] - x, face[:, 1]), radius, rtol=1e-9, atol=0)
-    assert_allclose([face[:, 2].min(), face[:, 2].max()], np.array([-0.5, 0.5]) * getattr(rod, f"{end}_width"),
-                    rtol=1e-9, atol=0)
+    assert_allclose(
+        [face[:, 2].min(), face[:, 2].max()], np.array([-0.5, 0.5]) * getattr(rod, f"{end}_width"), rtol=1e-9, atol=0
+    )
 
 
 def test_shipped_rod_is_the_default_rod(gmsh, tmp_path):
@@ -168,17 +175,20 @@ def test_bracket_has_the_volume_and_the_groups_of_its_dimensions(gmsh, tmp_path)
     assert_array_equal(np.unique(groups["bolts"]), together)
 
 
-@pytest.mark.parametrize(("wrong", "words"), [
-    ({"big_bore": 0.0}, "big_bore: expected a positive length, got 0"),
-    ({"web": np.nan}, "web: expected a positive length, got nan"),
-    ({"small_bore": 40.0}, "small_bore < small_outer"),
-    ({"centre_distance": 45.0}, "centre_distance > 51"),
-    ({"web": 20.0}, "web <= shank_width"),
-    ({"fillet": 300.0}, "smaller fillet"),
-    ({"flange": 13.5}, "room for the pockets"),
-    ({"boss": 7.0}, "bolt < boss"),
-    ({"shank_height_big": 80.0}, "shank_height_big < big_outer"),
-])
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"big_bore": 0.0}, "big_bore: expected a positive length, got 0"),
+        ({"web": np.nan}, "web: expected a positive length, got nan"),
+        ({"small_bore": 40.0}, "small_bore < small_outer"),
+        ({"centre_distance": 45.0}, "centre_distance > 51"),
+        ({"web": 20.0}, "web <= shank_width"),
+        ({"fillet": 300.0}, "smaller fillet"),
+        ({"flange": 13.5}, "room for the pockets"),
+        ({"boss": 7.0}, "bolt < boss"),
+        ({"shank_height_big": 80.0}, "shank_height_big < big_outer"),
+    ],
+)
 def test_a_rod_that_cannot_be_is_refused_with_words(wrong, words):
     with pytest.raises(PartError, match=words) as caught:
         ConnectingRod(**wrong)
@@ -186,16 +196,19 @@ def test_a_rod_that_cannot_be_is_refused_with_words(wrong, words):
     assert isinstance(caught.value, FeModelsError)
 
 
-@pytest.mark.parametrize(("wrong", "words"), [
-    ({"thickness": -1.0}, "thickness: expected a positive length"),
-    ({"bore": 80.0}, "bore < width"),
-    ({"bore_height": 100.0}, "below the upright's top"),
-    ({"bore_height": 60.0}, "above the rib"),
-    ({"rib_thickness": 40.0}, "clear of the rib"),
-    ({"foot_length": 40.0}, "two rows of bolts"),
-    ({"fillet": 12.0}, "clear of the fillet"),
-    ({"rib_length": 95.0}, "smaller rib"),
-])
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"thickness": -1.0}, "thickness: expected a positive length"),
+        ({"bore": 80.0}, "bore < width"),
+        ({"bore_height": 100.0}, "below the upright's top"),
+        ({"bore_height": 60.0}, "above the rib"),
+        ({"rib_thickness": 40.0}, "clear of the rib"),
+        ({"foot_length": 40.0}, "two rows of bolts"),
+        ({"fillet": 12.0}, "clear of the fillet"),
+        ({"rib_length": 95.0}, "smaller rib"),
+    ],
+)
 def test_a_bracket_that_cannot_be_is_refused_with_words(wrong, words):
     with pytest.raises(PartError, match=words):
         Bracket(**wrong)
@@ -212,10 +225,13 @@ def test_another_file_format_is_refused(gmsh, tmp_path):
         mesh_connecting_rod(size=COARSE, path=tmp_path / "rod.stl")
 
 
-@pytest.mark.parametrize(("error", "words"), [
-    (ModuleNotFoundError("No module named 'gmsh'"), r'pip install "floatframe\[mesh\]"'),
-    (OSError("libGLU.so.1: cannot open shared object file"), "libGLU.so.1.*apt-get install libglu1-mesa"),
-])
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (ModuleNotFoundError("No module named 'gmsh'"), r'pip install "floatframe\[mesh\]"'),
+        (OSError("libGLU.so.1: cannot open shared object file"), "libGLU.so.1.*apt-get install libglu1-mesa"),
+    ],
+)
 def test_a_missing_mesher_is_told_with_the_way_to_get_it(error, words, monkeypatch, tmp_path):
     original = builtins.__import__
 

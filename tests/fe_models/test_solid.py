@@ -64,8 +64,9 @@ def test_triangular_prism_has_the_moments_of_a_prism():
     body = solid(Mesh(nodes, {"wedge": [[0, 1, 2, 3, 4, 5]]}))
     moments = moments_from_gram(body.element_model.mass_gram(np.zeros((18, 0))))
     m = STEEL.rho * a * b * c / 2
-    R = m * np.array([[a**2 / 6, a * b / 12, a * c / 6], [a * b / 12, b**2 / 6, b * c / 6],
-                      [a * c / 6, b * c / 6, c**2 / 3]])
+    R = m * np.array(
+        [[a**2 / 6, a * b / 12, a * c / 6], [a * b / 12, b**2 / 6, b * c / 6], [a * c / 6, b * c / 6, c**2 / 3]]
+    )
     assert_allclose(moments.S, m * np.array([a / 3, b / 3, c / 2]), rtol=ROUNDOFF)
     assert_allclose(moments.R, R, rtol=ROUNDOFF)
 
@@ -162,8 +163,14 @@ def timoshenko(n_modes, *, length, width, height, clamped):
     k = 10 * (1 + STEEL.nu) / (12 + 11 * STEEL.nu)
 
     def determinant(omega):
-        rows = np.array([[0, 1, 0, 1 / (k * G * A)], [0, 0, 1 / (STEEL.E * inertia), 0],
-                         [0, -STEEL.rho * inertia * omega**2, 0, -1], [-STEEL.rho * A * omega**2, 0, 0, 0]])
+        rows = np.array(
+            [
+                [0, 1, 0, 1 / (k * G * A)],
+                [0, 0, 1 / (STEEL.E * inertia), 0],
+                [0, -STEEL.rho * inertia * omega**2, 0, -1],
+                [-STEEL.rho * A * omega**2, 0, 0, 0],
+            ]
+        )
         scale = np.diag([length, 1, STEEL.E * inertia / length, STEEL.E * inertia / length**2])
         T = expm(np.linalg.inv(scale) @ rows @ scale * length)
         return np.linalg.det(T[2:, 2:] if clamped else T[2:, :2])
@@ -210,8 +217,13 @@ def test_rod_of_two_materials_has_the_frequency_of_the_transcendental_equation()
     c = [np.sqrt(m.E / m.rho) for m in (one, two)]
     Z = [np.sqrt(m.E * m.rho) for m in (one, two)]
     # clamped at x = 0, free at x = 1, halves of length 1/2: Z1 cos cos = Z2 sin sin
-    omega = brentq(lambda w: Z[0] * np.cos(w / c[0] / 2) * np.cos(w / c[1] / 2)
-                   - Z[1] * np.sin(w / c[0] / 2) * np.sin(w / c[1] / 2), 100.0, 2.5 * min(c))
+    omega = brentq(
+        lambda w: (
+            Z[0] * np.cos(w / c[0] / 2) * np.cos(w / c[1] / 2) - Z[1] * np.sin(w / c[0] / 2) * np.sin(w / c[1] / 2)
+        ),
+        100.0,
+        2.5 * min(c),
+    )
     for n in sizes:
         body = solid(box_mesh(n, 1, 1, 1.0, 0.1, 0.1, "hexahedron20"), {"left half": one, "right half": two})
         lateral = np.flatnonzero(body.dofs[:, 1] > 0)
@@ -237,8 +249,9 @@ def test_constant_stress_is_recovered_at_every_node_of_a_distorted_mesh(kind):
     stress = body.element_model.nodal_stress(np.hstack([u, -2 * u]))
     expected = voigt(STEEL.lam * np.trace(strain) * np.eye(3) + 2 * STEEL.mu * strain)
     assert stress.shape == (len(body.nodes), 6, 2)
-    assert_allclose(stress[:, :, 0], np.tile(expected, (len(body.nodes), 1)), rtol=0,
-                    atol=100 * ROUNDOFF * np.abs(expected).max())
+    assert_allclose(
+        stress[:, :, 0], np.tile(expected, (len(body.nodes), 1)), rtol=0, atol=100 * ROUNDOFF * np.abs(expected).max()
+    )
     assert_allclose(stress[:, :, 1], -2 * stress[:, :, 0], rtol=ROUNDOFF)
 
 
