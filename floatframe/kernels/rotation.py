@@ -25,7 +25,9 @@ SERIES_BELOW = 0.25  # t² at the switch
 def quotient_s(x):
     """Return sin t / t of x = t²."""
     if x < SERIES_BELOW:
-        return 1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 - x / 39916800))))
+        return 1 + x * (
+            -1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 + x * (-1 / 39916800 + x / 6227020800))))
+        )
     t = math.sqrt(x)
     return math.sin(t) / t
 
@@ -34,7 +36,9 @@ def quotient_s(x):
 def quotient_a(x):
     """Return (1 - cos t)/t² of x = t²."""
     if x < SERIES_BELOW:
-        return 1 / 2 + x * (-1 / 24 + x * (1 / 720 + x * (-1 / 40320 + x * (1 / 3628800 - x / 479001600))))
+        return 1 / 2 + x * (
+            -1 / 24 + x * (1 / 720 + x * (-1 / 40320 + x * (1 / 3628800 + x * (-1 / 479001600 + x / 87178291200))))
+        )
     return (1 - math.cos(math.sqrt(x))) / x
 
 

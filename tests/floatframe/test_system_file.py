@@ -1,0 +1,138 @@
+"""System files: what they mean, and how mistakes in them are answered."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+from floatframe import FixedJoint, Gravity, PointForce, RevoluteJoint, SystemFileError, integrate
+from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.system_file import read_system
+from tests.floatframe.bodies import random_point_masses, reduced_body, stiffness
+
+SWING = """
+[system]
+units = "m-kg-s"
+gravity = [0, 0, -9.81]
+
+[bodies.rod]
+file = "rod.h5"
+position = [0, 0, 1]
+rotation_vector = [0, 0.3, 0]
+
+[bodies.bob]
+mass = 2.0
+inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]
+position = [1, 0, 1]
+omega_B = [0, 0, 0]
+
+[joints.pin]
+type = "revolute"
+body_a = "ground"
+body_b = "rod"
+marker_b = "end_b"
+axis = [0, 1, 0]
+
+[joints.weld]
+type = "fixed"
+body_a = "rod"
+marker_a = "end_a"
+body_b = "bob"
+
+[forces.spring]
+type = "spring-damper"
+body_a = "bob"
+body_b = "ground"
+marker_b = [2, 0, 0]
+stiffness = 10
+damping = 0.5
+
+[forces.push]
+type = "point-force"
+body = "bob"
+force = [1, 0, 0]
+is_follower = true
+
+[run]
+t_end = 0.05
+h = 1e-3
+rho_inf = 0.7
+output_every = 5
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    cms.write(reduced_body(random_point_masses(3, 3), stiffness(3), name="rod"), tmp_path / "rod.h5")
+
+    def written(*changes):
+        text = SWING
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new, 1)
+        path = tmp_path / "swing.toml"
+        path.write_text(text)
+        return path
+
+    return written
+
+
+def test_file_becomes_the_system_it_describes(write):
+    system, run = read_system(write())
+    assert system.name == "swing"
+    assert [body.name for body in system.bodies] == ["rod", "bob"]
+    assert_allclose(system.bodies[0].orientation, euler_parameters_of_rotation_vector([0, 0.3, 0]))
+    assert isinstance(system.joints[0], RevoluteJoint)
+    assert isinstance(system.joints[1], FixedJoint)
+    assert [type(force).__name__ for force in system.forces] == ["Gravity", "SpringDamper", "PointForce"]
+    assert isinstance(system.forces[0], Gravity)
+    assert isinstance(system.forces[2], PointForce)
+    assert system.forces[2].is_follower
+    assert (run.t_end, run.h, run.output_every, run.integrator.rho_inf) == (0.05, 1e-3, 5, 0.7)
+    motion = integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every)
+    assert len(motion.t) == 11
+    assert len(motion.head.bodies[0].digest) == 64
+    assert np.isfinite(motion.body("rod").q).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('units = "m-kg-s"', 'units = "m-kg-z"', r'units = "m-kg-z": unknown unit system; did you mean .m-kg-s.'),
+        ('file = "rod.h5"', 'file = "rad.h5"', r"no such file: .*rad.h5; did you mean 'rod.h5'"),
+        ("mass = 2.0", "mass = -2.0", r"bodies.bob.mass = -2.0: expected a number above 0"),
+        ("mass = 2.0", "mas = 2.0", r"bodies.bob.mas: unknown key; did you mean 'mass'"),
+        ("inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]", "", "inertia: missing; a rigid body needs"),
+        ("inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]", "inertia = [[1, 0, 0], [0, 1, 0], [0, 0, 9]]",
+         "no mass distribution has the principal moments"),
+        ('type = "revolute"', 'type = "revolut"', "unknown type of joint; did you mean 'revolute'"),
+        ('type = "revolute"', 'type = "spherical"', "a spherical joint has no key axis"),
+        ('body_b = "rod"', 'body_b = "rodd"', r'pin.body_b = "rodd": there is no such body; did you mean .rod.'),
+        ('marker_b = "end_b"', 'marker_b = "end_bb"', "has no interface 'end_bb'; did you mean 'end_b'"),
+        ("axis = [0, 1, 0]", "", "axis: missing; a revolute joint needs its axis"),
+        ("axis = [0, 1, 0]", "axis = [0, nan, 0]", r"joints.pin.axis .*expected three numbers"),
+        ("stiffness = 10", "stiffness = -1", "forces.spring.stiffness = -1: expected a number, 0 or more"),
+        ("force = [1, 0, 0]", "stiffness = 3", "a point-force has no key stiffness"),
+        ("t_end = 0.05", "", "run.t_end: missing; expected a number above 0, the end time"),
+        ("h = 1e-3", "h = 0", "run.h = 0: expected a number above 0"),
+        ("rho_inf = 0.7", "rho_inf = 1.7", "run.rho_inf = 1.7"),
+        ("[system]", "[system", "not valid TOML"),
+        ("units = \"m-kg-s\"", "units = \"mm-t-s\"", "flexible body 'rod' is in units 'm-kg-s'"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_answered_with_key_value_and_choices(write, old, new, words):
+    with pytest.raises(SystemFileError, match=words):
+        read_system(write((old, new)))
+
+
+def test_a_damaged_modal_file_is_named_with_its_key(write, tmp_path):
+    path = write()
+    (tmp_path / "rod.h5").write_bytes(b"nothing")
+    with pytest.raises(SystemFileError, match=r"bodies\.rod\.file: .*rod\.h5"):
+        read_system(path)
+
+
+def test_two_instances_read_their_file_once(write):
+    path = write(("[bodies.bob]", '[bodies.rod2]\nfile = "rod.h5"\nposition = [5, 0, 0]\n\n[bodies.bob]'))
+    system, _ = read_system(path)
+    assert system.bodies[0].reduced is system.bodies[1].reduced
