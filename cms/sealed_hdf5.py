@@ -9,7 +9,6 @@ does not depend on how HDF5 lays them out, so it survives repacking and tells wh
 import hashlib
 import os
 import re
-import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from cms.errors import ModalFileError
-from cms.paths import near_file
+from cms.paths import near_file, replace_file
 
 __all__ = ["SEAL_SIZE", "Content", "Dataset", "read_sealed", "write_sealed"]
 
@@ -55,7 +54,12 @@ def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
         If the file cannot be written (no folder, no permission, disk full); an old file of that name is unchanged.
     """
     image = hdf5_image(content)
-    replace_file(Path(path), seal(content.format, content.version, image), image)
+    path = Path(path)
+    try:
+        replace_file(path, seal(content.format, content.version, image), image)
+    except OSError as error:
+        old = "; the file that was there is unchanged" if path.is_file() else "; nothing was written"
+        raise ModalFileError(f"{path}: cannot be written: {reason(error)}{old}") from error
 
 
 def read_sealed(path: str | os.PathLike[str], *, format: str, version: int) -> Content:
@@ -288,38 +292,3 @@ def reason(error: BaseException) -> str:
     """Return the first line of an error's own words."""
     text = str(getattr(error, "strerror", None) or error or type(error).__name__)
     return text.splitlines()[0]
-
-
-# Moving into place ---------------------------------------------------------------------------------------------------
-
-
-def replace_file(path: Path, *parts: bytes) -> None:
-    """Write the parts beside `path`, make them durable, and give them its name in one step."""
-    path = path.resolve()  # through a link, so that the link stays one
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
-        try:
-            with open(descriptor, "wb") as file:
-                for data in parts:
-                    file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, path)
-        except BaseException:  # also an interrupt: the half-written file goes, the old one stays
-            part.unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        old = "; the file that was there is unchanged" if path.is_file() else "; nothing was written"
-        raise ModalFileError(f"{path}: cannot be written: {reason(error)}{old}") from error
-    sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Make the new name durable where the system can (not on Windows)."""
-    if os.name == "posix":
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)

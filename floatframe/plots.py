@@ -9,6 +9,7 @@ from cms.arrays import Array
 from cms.reduced_body import ReducedBody
 from floatframe.energy_balance import balance_defect, energy_scale
 from floatframe.errors import ResultsError
+from floatframe.interface_motion import elastic_displacement, interface_path
 from floatframe.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -49,18 +50,28 @@ def plot_energy_defect(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axe
     return finished(ax, "error of the energy balance / largest energy", "")
 
 
-def plot_positions(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Position of each body's frame origin in ground axes; coordinates that stay put are left out."""
+def plot_positions(
+    trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None, ax: "Axes | None" = None
+) -> "Axes":
+    """Positions in ground axes: interfaces of the given bodies, frame origins of the others; what stays is left out."""
     ax = axes_for(trajectory, ax)
-    curves = {}
+    points = {}
     for name in trajectory.body_names:
-        r = trajectory.body(name).r
-        reach = np.ptp(r, axis=0).max(initial=0.0)
-        for a, axis in enumerate("xyz"):
-            if np.ptp(r[:, a]) > 1e-9 * reach:
-                curves[f"{name} {axis}"] = r[:, a]
+        motion = trajectory.body(name)
+        body = (bodies or {}).get(name)
+        if body is None or not body.interfaces:
+            points[name] = motion.r
+        else:
+            points |= {f"{name} {interface.name}": interface_path(motion, interface) for interface in body.interfaces}
+    reach = max(float(np.ptp(path, axis=0).max(initial=0.0)) for path in points.values())
+    curves = {
+        f"{name} {axis}": path[:, a]
+        for name, path in points.items()
+        for a, axis in enumerate("xyz")
+        if np.ptp(path[:, a]) > 1e-6 * reach
+    }
     draw_largest(ax, trajectory, curves)
-    return finished(ax, "position of the frame origins", trajectory.units.length_symbol)
+    return finished(ax, "position", trajectory.units.length_symbol)
 
 
 def plot_modal_coordinates(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
@@ -82,7 +93,7 @@ def plot_elastic_displacement(
     """Elastic displacement of the interfaces in the body frame, its magnitude; `bodies` by name."""
     ax = axes_for(trajectory, ax)
     curves = {
-        f"{name} {interface.name}": np.linalg.norm(trajectory.body(name).q @ interface.Psi[:3].T, axis=1)
+        f"{name} {interface.name}": np.linalg.norm(elastic_displacement(trajectory.body(name), interface), axis=1)
         for name, body in bodies.items()
         for interface in body.interfaces
     }
@@ -124,7 +135,7 @@ def plot_overview(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | No
 
     if len(trajectory.t) == 0:
         raise ResultsError("plot: the trajectory has no rows")
-    panels: list[Callable[[Trajectory, Axes], Axes]] = [plot_positions, plot_energies]
+    panels: list[Callable[[Trajectory, Axes], Axes]] = [lambda t, ax: plot_positions(t, bodies, ax), plot_energies]
     if any(body.n_q for body in trajectory.head.bodies):
         if bodies:
             panels.append(lambda t, ax: plot_elastic_displacement(t, bodies, ax))

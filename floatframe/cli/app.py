@@ -129,6 +129,43 @@ def info_command(
     print_run(trajectory, None, None)
 
 
+@app.command("plot")
+@guarded
+def plot_command(
+    file: ResultsFile,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to write (.png, .svg, .pdf).")] = None,
+) -> None:
+    """Plot the motion: positions, energies, elastic displacement, reactions, energy error, joint drift.
+
+    Without -o the picture stands beside the results: swing.h5 gives swing.png.
+
+    Example: floatframe plot swing.h5 -o swing.png
+    """
+    import io
+
+    from cms.errors import CmsError
+    from cms.paths import replace_file
+    from floatframe.animation import bodies_of
+    from floatframe.errors import ResultsError
+    from floatframe.plots import plot_overview
+    from floatframe.trajectory import read_results
+
+    trajectory = read_results(file)
+    path = output_path(output, file.with_suffix(".png"), ResultsError, overwrite_of=(file,))
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf"):
+        raise ResultsError(f"--output {path}: expected a file name that ends in .png, .svg or .pdf")
+    try:
+        bodies = bodies_of(trajectory)
+    except CmsError as error:  # the motion can be plotted without its bodies
+        typer.echo(f"note: elastic displacement is left out: {error}", err=True)
+        bodies = {}
+    picture = io.BytesIO()
+    plot_overview(trajectory, bodies).savefig(picture, format=kind, dpi=130)
+    replace_file(path, picture.getvalue())
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
 @app.command("animate")
 @guarded
 def animate_command(

@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from cms.modal_file import write
 from floatframe.cli.app import app
-from floatframe.cli.record import balance_defect, energy_scale, run_record
+from floatframe.cli.record import run_record
+from floatframe.energy_balance import balance_defect, energy_scale
 from floatframe.trajectory import read_results
 from tests.synthetic import synthetic_reduced_body
 
@@ -132,6 +133,31 @@ def test_info_shows_the_run(results):
     assert record["drift"]["pin"]["distance"] < 1e-9
 
 
+@pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_plot_draws_a_picture(results, tmp_path, suffix, magic):
+    result = run("plot", results, "-o", tmp_path / f"swing.{suffix}")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / f"swing.{suffix}").read_bytes().startswith(magic)
+    assert sorted(contents(tmp_path)) == [f"swing.{suffix}"]
+
+
+def test_plot_goes_without_the_modal_files_and_says_so(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE)
+    assert run("run", folder / "spin.toml").exit_code == 0
+    assert "note" not in run("plot", folder / "spin.h5").stderr
+    (folder / "part.h5").unlink()
+    result = run("plot", folder / "spin.h5")
+    assert result.exit_code == 0
+    assert result.stderr.startswith("note: elastic displacement is left out")
+
+
+def test_plot_refuses_other_kinds_of_files(results, tmp_path):
+    assert_refused(run("plot", results, "-o", tmp_path / "swing.jpg"), ".png, .svg or .pdf")
+    assert_refused(run("plot", results, "-o", results), "this is the input")
+    assert contents(tmp_path) == {}
+
+
 def test_animate_draws_a_film(results, tmp_path):
     result = run("animate", results, "-o", tmp_path / "swing.gif", "--speed", "100")
     assert result.exit_code == 0, result.output
@@ -217,7 +243,7 @@ def test_the_output_is_checked_before_the_work(folder):
     assert sorted(contents(folder)) == ["swing.toml"]
 
 
-@pytest.mark.parametrize("command", ["info", "animate"])
+@pytest.mark.parametrize("command", ["info", "plot", "animate"])
 def test_a_file_that_holds_no_results_is_refused(folder, command, results):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "text.h5").write_text("no results")
@@ -231,8 +257,14 @@ def test_a_file_that_holds_no_results_is_refused(folder, command, results):
 def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder):
     (folder / "swing.h5").write_bytes(b"the old results")
     (folder / "swing.toml").write_text(RIGID.replace("t_end = 0.5", "t_end = 1e5"))
-    with subprocess.Popen([*PROGRAM, "run", "swing.toml"], cwd=folder, env=ENVIRONMENT, text=True,
-                          stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    with subprocess.Popen(
+        [*PROGRAM, "run", "swing.toml"],
+        cwd=folder,
+        env=ENVIRONMENT,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
         segments = folder / "swing.h5.segments"
         try:
             process.wait(timeout=0.2)
@@ -260,7 +292,7 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
     script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
     result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
-    for command in ("run", "info", "animate"):
+    for command in ("run", "info", "plot", "animate"):
         assert command in result.stdout
     loaded = result.stdout[result.stdout.rindex("[") :]
     for heavy in ("numpy", "scipy", "h5py", "pydantic", "pyvista", "numba", "matplotlib"):
