@@ -16,11 +16,21 @@ __all__ = ["main"]
 
 def main(scene_path: str, out: str, fps: str = "") -> None:
     """Draw the scene of a file into another: a film if fps is given, else a picture."""
+    leave_no_core_file()
     scene = read_scene(Path(scene_path))
     if fps:
         draw_animation(scene, Path(out), pyvista_view, fps=float(fps), on_frame=report)
     else:
         draw_picture(scene, Path(out), pyvista_view)
+
+
+def leave_no_core_file() -> None:
+    """Forbid core files, where there is such a thing: VTK may well crash, and its memory is of no use to the user."""
+    try:
+        import resource
+    except ImportError:
+        return
+    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
 
 
 def report(done: int, all_: int) -> None:
