@@ -1,38 +1,31 @@
 """Plots of a computed motion: each function draws into the axes it is given, or into a figure of its own."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.reduced_body import ReducedBody
 from floatframe.energy_balance import balance_defect, energy_scale
-from floatframe.errors import ResultsError
-from floatframe.interface_motion import elastic_displacement, interface_path
 from floatframe.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 __all__ = [
     "plot_drift",
-    "plot_elastic_displacement",
     "plot_energies",
-    "plot_energy_defect",
+    "plot_energy_balance",
     "plot_modal_coordinates",
-    "plot_overview",
+    "plot_momentum",
     "plot_positions",
-    "plot_reactions",
+    "plot_reaction",
 ]
 
-MOST_CURVES = 8  #: in one plot; of more, those with the largest values are drawn
 FLOOR = 1e-300  #: below which a logarithmic axis shows nothing
 
 
 def plot_energies(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Kinetic, strain, gravity and spring energy, their sum, and what forces and dampers exchanged."""
+    """Kinetic, strain, gravity and spring energy, work of forces and dissipation, unless zero; and the total energy."""
     ax, e = axes_for(trajectory, ax), trajectory.energies
     parts = {"kinetic": e.kinetic, "strain": e.strain, "gravity": e.gravity, "springs": e.springs,
              "work of forces": e.work, "dissipated": e.dissipated}  # fmt: skip
@@ -40,74 +33,56 @@ def plot_energies(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
         if np.any(values):
             ax.plot(trajectory.t, values, label=name)
     ax.plot(trajectory.t, e.total, "k--", linewidth=1, label="total")
-    return finished(ax, "energy", energy_unit(trajectory))
+    units = trajectory.units
+    return labelled(ax, f"energy [{units.force_symbol} {units.length_symbol}]")
 
 
-def plot_energy_defect(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
+def plot_energy_balance(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
     """Error of the energy balance over the largest energy that moves about."""
     ax = axes_for(trajectory, ax)
-    ax.plot(trajectory.t, balance_defect(trajectory) / (energy_scale(trajectory) or 1.0), "k")
-    return finished(ax, "error of the energy balance / largest energy", "")
+    defect = balance_defect(trajectory) / (energy_scale(trajectory) or 1.0)
+    ax.plot(trajectory.t, defect, "k", label="total - work + dissipated")
+    return labelled(ax, "error of the energy balance / largest energy")
 
 
-def plot_positions(
-    trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None, ax: "Axes | None" = None
-) -> "Axes":
-    """Positions in ground axes: interfaces of the given bodies, frame origins of the others; what stays is left out."""
+def plot_momentum(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
+    """Linear momentum, and angular momentum about the ground origin (right axis), by component."""
     ax = axes_for(trajectory, ax)
-    points = {}
-    for name in trajectory.body_names:
-        motion = trajectory.body(name)
-        body = (bodies or {}).get(name)
-        if body is None or not body.interfaces:
-            points[name] = motion.r
-        else:
-            points |= {f"{name} {interface.name}": interface_path(motion, interface) for interface in body.interfaces}
-    reach = max(float(np.ptp(path, axis=0).max(initial=0.0)) for path in points.values())
-    curves = {
-        f"{name} {axis}": path[:, a]
-        for name, path in points.items()
-        for a, axis in enumerate("xyz")
-        if np.ptp(path[:, a]) > 1e-6 * reach
-    }
-    draw_largest(ax, trajectory, curves)
-    return finished(ax, "position", trajectory.units.length_symbol)
-
-
-def plot_modal_coordinates(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Modal coordinates of all bodies."""
-    ax = axes_for(trajectory, ax)
-    curves = {
-        f"{name} q{k + 1}": values
-        for name in trajectory.body_names
-        for k, values in enumerate(trajectory.body(name).q.T)
-    }
-    draw_largest(ax, trajectory, curves)
     units = trajectory.units
-    return finished(ax, "modal coordinates", f"{units.mass_symbol}$^{{1/2}}$ {units.length_symbol}" if curves else "")
+    linear = f"{units.mass_symbol} {units.length_symbol}/{units.time_symbol}"
+    other = ax.twinx()
+    for a, axis in enumerate("xyz"):
+        ax.plot(trajectory.t, trajectory.linear_momentum[:, a], color=f"C{a}", label=f"linear {axis}")
+        other.plot(trajectory.t, trajectory.angular_momentum[:, a], "--", color=f"C{a}", label=f"angular {axis}")
+    labelled(other, f"angular momentum [{linear} {units.length_symbol}]")
+    return labelled(ax, f"linear momentum [{linear}]")
 
 
-def plot_elastic_displacement(
-    trajectory: Trajectory, bodies: Mapping[str, ReducedBody], ax: "Axes | None" = None
+def plot_positions(trajectory: Trajectory, body: str, ax: "Axes | None" = None) -> "Axes":
+    """Position of a body's frame origin in ground axes, by component."""
+    ax = axes_for(trajectory, ax)
+    for axis, values in zip("xyz", trajectory.body(body).r.T, strict=True):
+        ax.plot(trajectory.t, values, label=f"{body} {axis}")
+    return labelled(ax, f"position [{trajectory.units.length_symbol}]")
+
+
+def plot_modal_coordinates(
+    trajectory: Trajectory, body: str, ax: "Axes | None" = None, *, modes: Sequence[int] | None = None
 ) -> "Axes":
-    """Elastic displacement of the interfaces in the body frame, its magnitude; `bodies` by name."""
-    ax = axes_for(trajectory, ax)
-    curves = {
-        f"{name} {interface.name}": np.linalg.norm(elastic_displacement(trajectory.body(name), interface), axis=1)
-        for name, body in bodies.items()
-        for interface in body.interfaces
-    }
-    draw_largest(ax, trajectory, {name: values for name, values in curves.items() if np.any(values)})
-    return finished(ax, "elastic displacement of interfaces", trajectory.units.length_symbol)
+    """Modal coordinates of a body; `modes`: which, from 0 (all by default)."""
+    ax, units = axes_for(trajectory, ax), trajectory.units
+    q = trajectory.body(body).q
+    for k in range(q.shape[1]) if modes is None else modes:
+        ax.plot(trajectory.t, q[:, k], label=f"{body} q{k + 1}")
+    return labelled(ax, f"modal coordinate [{units.mass_symbol}$^{{1/2}}$ {units.length_symbol}]")
 
 
-def plot_reactions(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
-    """Magnitude of the force that each joint and spring-damper carries."""
+def plot_reaction(trajectory: Trajectory, name: str, ax: "Axes | None" = None) -> "Axes":
+    """Force that a joint or spring-damper exerts on its marker A, by component in ground axes."""
     ax = axes_for(trajectory, ax)
-    names = trajectory.connection_names
-    curves = {name: np.linalg.norm(trajectory.reaction(name).force, axis=1) for name in names}
-    draw_largest(ax, trajectory, curves)
-    return finished(ax, "force in joints and springs", trajectory.units.force_symbol)
+    for axis, values in zip("xyz", trajectory.reaction(name).force.T, strict=True):
+        ax.plot(trajectory.t, values, label=f"{name} {axis}")
+    return labelled(ax, f"force [{trajectory.units.force_symbol}]")
 
 
 def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
@@ -116,45 +91,10 @@ def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
     for name in trajectory.head.joints:
         drift = trajectory.drift(name)
         for kind, values in ((f"distance [{length}]", drift.distance), ("angle [rad]", drift.angle)):
-            if np.any(np.abs(values) > FLOOR):
-                ax.semilogy(
-                    trajectory.t, np.where(np.abs(values) > FLOOR, np.abs(values), np.nan), label=f"{name} {kind}"
-                )
-    return finished(ax, "drift of joints", "")
-
-
-def plot_overview(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None) -> "Figure":
-    """Return a figure with all of these; elastic displacement where the bodies are given, else modal coordinates.
-
-    Raises
-    ------
-    ResultsError
-        If the trajectory has no rows.
-    """
-    from matplotlib.figure import Figure
-
-    if len(trajectory.t) == 0:
-        raise ResultsError("plot: the trajectory has no rows")
-    panels: list[Callable[[Trajectory, Axes], Axes]] = [lambda t, ax: plot_positions(t, bodies, ax), plot_energies]
-    if any(body.n_q for body in trajectory.head.bodies):
-        if bodies:
-            panels.append(lambda t, ax: plot_elastic_displacement(t, bodies, ax))
-        else:
-            panels.append(plot_modal_coordinates)
-    panels.append(plot_energy_defect)
-    if trajectory.connection_names:
-        panels.append(plot_reactions)
-    if trajectory.head.joints:
-        panels.append(plot_drift)
-    n_rows = (len(panels) + 1) // 2
-    figure = Figure(figsize=(13, 3.4 * n_rows + 0.6), layout="constrained")
-    figure.suptitle(trajectory.head.system)
-    axes = figure.subplots(n_rows, 2, squeeze=False).ravel()
-    for panel, ax in zip(panels, axes, strict=False):
-        panel(trajectory, ax)
-    for ax in axes[len(panels) :]:
-        ax.remove()
-    return figure
+            size = np.abs(values)
+            if np.any(size > FLOOR):
+                ax.semilogy(trajectory.t, np.where(size > FLOOR, size, np.nan), label=f"{name} {kind}")
+    return labelled(ax, f"drift of joints [{length}, rad]")
 
 
 def axes_for(trajectory: Trajectory, ax: "Axes | None") -> "Axes":
@@ -168,25 +108,9 @@ def axes_for(trajectory: Trajectory, ax: "Axes | None") -> "Axes":
     return ax
 
 
-def draw_largest(ax: "Axes", trajectory: Trajectory, curves: Mapping[str, Array]) -> None:
-    """Draw the curves with the largest values, in their order."""
-    size = {name: float(np.abs(values).max(initial=0.0)) for name, values in curves.items()}
-    kept = set(sorted(size, key=lambda name: -size[name])[:MOST_CURVES])
-    for name, values in curves.items():
-        if name in kept:
-            ax.plot(trajectory.t, values, label=name)
-    if len(kept) < len(curves):
-        ax.text(0.99, 0.02, f"the largest {len(kept)} of {len(curves)}", ha="right", transform=ax.transAxes, alpha=0.6)
-
-
-def finished(ax: "Axes", title: str, unit: str) -> "Axes":
-    """Set title, unit and legend."""
-    ax.set_title(f"{title} [{unit}]" if unit else title, loc="left", fontsize="medium")
+def labelled(ax: "Axes", label: str) -> "Axes":
+    """Set the label of y, and a legend of the curves."""
+    ax.set_ylabel(label)
     if ax.get_legend_handles_labels()[0]:
         ax.legend(fontsize="small")
     return ax
-
-
-def energy_unit(trajectory: Trajectory) -> str:
-    """Return the unit of energy: force times length."""
-    return f"{trajectory.units.force_symbol} {trajectory.units.length_symbol}"

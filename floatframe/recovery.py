@@ -8,7 +8,7 @@ from floatframe.errors import ResultsError
 from floatframe.rotations import rotation_matrix
 from floatframe.trajectory import Trajectory
 
-__all__ = ["interface_positions", "nodal_positions", "point_positions"]
+__all__ = ["elastic_displacements", "interface_positions", "nodal_positions", "point_positions"]
 
 
 def require_same_modes(trajectory: Trajectory, body_name: str, reduced: ReducedBody) -> None:
@@ -43,6 +43,12 @@ def interface_positions(trajectory: Trajectory, body_name: str, reduced: Reduced
     place = reduced.interface(interface)
     motion = trajectory.body(body_name)
     return at_points(motion.r, motion.p, place.position + motion.q @ place.Psi[:3].T)
+
+
+def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
+    """Return the displacement of an interface in the body frame over time, Psi q, (n_t, 3) [m]."""
+    require_same_modes(trajectory, body_name, reduced)
+    return np.asarray(trajectory.body(body_name).q @ reduced.interface(interface).Psi[:3].T)
 
 
 def point_positions(trajectory: Trajectory, body_name: str, point: Array) -> Array:

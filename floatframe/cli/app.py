@@ -147,7 +147,7 @@ def plot_command(
     from cms.paths import replace_file
     from floatframe.animation import bodies_of
     from floatframe.errors import ResultsError
-    from floatframe.plots import plot_overview
+    from floatframe.overview import plot_overview
     from floatframe.trajectory import read_results
 
     trajectory = read_results(file)
