@@ -1,0 +1,54 @@
+from .boundary import boundary_facets as boundary_facets
+from .boundary import boundary_triangles as boundary_triangles
+from .errors import (
+    FeModelsError as FeModelsError,
+)
+from .errors import (
+    InterfaceError as InterfaceError,
+)
+from .errors import (
+    MaterialError as MaterialError,
+)
+from .errors import (
+    MeshError as MeshError,
+)
+from .importers.read_mesh import read_mesh as read_mesh
+from .interfaces import (
+    check_overlap as check_overlap,
+)
+from .interfaces import (
+    distributing_interface as distributing_interface,
+)
+from .interfaces import (
+    nodes_interface as nodes_interface,
+)
+from .interfaces import (
+    rigid_interface as rigid_interface,
+)
+from .material import Material as Material
+from .matrices import body_from_matrices as body_from_matrices
+from .matrices import body_from_npz as body_from_npz
+from .mesh import Mesh as Mesh
+from .mesh_report import Finding as Finding
+from .mesh_report import MeshReport as MeshReport
+from .mesh_report import report_mesh as report_mesh
+from .selections import (
+    Box as Box,
+)
+from .selections import (
+    Cylinder as Cylinder,
+)
+from .selections import (
+    FaceGroup as FaceGroup,
+)
+from .selections import (
+    NearestNode as NearestNode,
+)
+from .selections import (
+    NodeSet as NodeSet,
+)
+from .selections import (
+    Plane as Plane,
+)
+from .solid import solid_body as solid_body
+from .unused_nodes import drop_unused_nodes as drop_unused_nodes

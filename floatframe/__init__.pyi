@@ -1,0 +1,35 @@
+from .errors import (
+    ConvergenceError as ConvergenceError,
+)
+from .errors import (
+    FloatframeError as FloatframeError,
+)
+from .errors import (
+    ModelError as ModelError,
+)
+from .errors import (
+    ResultsError as ResultsError,
+)
+from .errors import (
+    SystemFileError as SystemFileError,
+)
+from .flexible_body import FlexibleBody as FlexibleBody
+from .forces import Gravity as Gravity
+from .forces import PointForce as PointForce
+from .forces import SpringDamper as SpringDamper
+from .ground import GROUND as GROUND
+from .ground import Ground as Ground
+from .initial import ConsistentState as ConsistentState
+from .initial import consistent_state as consistent_state
+from .integration import Progress as Progress
+from .integration import integrate as integrate
+from .integrators import GeneralizedAlpha as GeneralizedAlpha
+from .joints import FixedJoint as FixedJoint
+from .joints import RevoluteJoint as RevoluteJoint
+from .joints import SphericalJoint as SphericalJoint
+from .markers import Marker as Marker
+from .rigid_body import RigidBody as RigidBody
+from .state import State as State
+from .system import System as System
+from .trajectory import Trajectory as Trajectory
+from .trajectory import read_results as read_results
