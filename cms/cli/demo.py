@@ -1,0 +1,76 @@
+"""`cms demo`: the whole line on the shipped connecting rod, step by step as a user would type it."""
+
+import time
+from importlib.resources import files
+from pathlib import Path
+
+import typer
+
+from cms.cli.console import print_table, say
+from cms.errors import JobError
+
+__all__ = ["run_demo"]
+
+JOBS = ("rod.toml", "swing.toml")  #: shipped beside this file
+MODE = 3
+
+
+def run_demo(folder: Path) -> None:
+    """Copy the shipped part and its jobs into a folder and run every command on them.
+
+    Raises
+    ------
+    JobError
+        If the folder cannot be made.
+    """
+    # the border of the product: the command lines alone may import outward
+    from cms.cli.app import info_record, reduce_command, view_command
+    from cms.paths import replace_file
+    from fe_models.parts.shipped import shipped_mesh
+    from floatframe.cli.app import animate_command, plot_command, run_command
+
+    began = time.perf_counter()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise JobError(f"{folder}: cannot be made: {error.strerror}; choose another folder: cms demo FOLDER") from error
+    for name in JOBS:
+        replace_file(folder / name, (files("cms.cli") / "data" / name).read_bytes())
+    replace_file(folder / "rod.msh", shipped_mesh("connecting_rod").read_bytes())
+
+    modal, results = folder / "rod.h5", folder / "swing.h5"
+    step(folder, "cms reduce rod.toml -o rod.h5")
+    reduce_command(folder / "rod.toml", modal)
+    step(folder, "cms info rod.h5 --json > rod.json")
+    replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
+    step(folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
+    view_command(modal, MODE, folder / f"m{MODE}.png", folder / f"m{MODE}.gif")
+    step(folder, "floatframe run swing.toml -o swing.h5")
+    run_command(folder / "swing.toml", results)
+    step(folder, "floatframe plot swing.h5 -o swing.png")
+    plot_command(results, folder / "swing.png")
+    step(folder, "floatframe animate swing.h5 -o swing.mp4")
+    animate_command(results, folder / "swing.mp4")
+
+    made = {
+        "rod.msh": "the shipped mesh, tet10",
+        "rod.toml": "what to reduce and how",
+        "rod.h5": "the modal file",
+        "rod.json": "what is in it",
+        f"m{MODE}.png": f"mode {MODE}, picture",
+        f"m{MODE}.gif": f"mode {MODE}, film",
+        "swing.toml": "the system: the rod on a pin, let go",
+        "swing.h5": "its motion",
+        "swing.png": "its plots",
+        "swing.mp4": "its film",
+    }
+    typer.echo()
+    rows = [(str(folder / name), f"{(folder / name).stat().st_size / 1e6:.2f}", words) for name, words in made.items()]
+    print_table("Files of the demo", ("file", "MB>", "what it is"), rows)
+    say(f"{time.perf_counter() - began:.0f} s; change rod.toml or swing.toml and run the commands above in {folder}")
+
+
+def step(folder: Path, command: str) -> None:
+    """Announce a step by the command that does the same."""
+    typer.echo()
+    typer.secho(f"{folder}$ {command}", bold=True)
