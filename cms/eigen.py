@@ -175,7 +175,13 @@ def _factorize_shifted(K: sp.csc_array, M: sp.csc_array, sigma: float) -> Factor
 def _count_below(K: sp.csc_array, M: sp.csc_array, sigma: float, at_shift: Factorization) -> int:
     """Modes between the shift and sigma, by Sylvester's law: K - sigma M has one more negative eigenvalue for each."""
     with _factorize_shifted(K, M, sigma) as factorization:
-        return factorization.inertia.n_negative - at_shift.inertia.n_negative
+        inertia = factorization.inertia
+    if inertia.n_zero or at_shift.inertia.n_zero:
+        raise EigenError(
+            f"eigenmodes: {inertia.n_zero} pivots at {_hertz(sigma):.6g} Hz are zero within rounding, so that modes "
+            "cannot be counted there; ask for another number of modes, or do without the proof"
+        )
+    return inertia.n_negative - at_shift.inertia.n_negative
 
 
 def _zero_rigid(omega2: Array, *, zero: float) -> Array:

@@ -19,10 +19,10 @@ Backend = type[PardisoFactor] | type[SuperLuFactor]
 
 @dataclass(frozen=True)
 class Inertia:
-    """Numbers of negative, zero (within rounding) and positive eigenvalues."""
+    """Numbers of negative and positive eigenvalues; certain only if no pivot was within rounding of zero."""
 
     n_negative: int
-    n_zero: int
+    n_zero: int  #: pivots within rounding of zero, counted with a guessed sign in the others
     n_positive: int
 
 
@@ -163,18 +163,16 @@ def _require_regular(A: sp.csc_array, factorization: Factorization) -> None:
     An exactly singular matrix often passes the pivots, because rounding leaves them near 1e-16 instead of zero. Its
     solutions then are 1e16 times too long along the null space and no longer satisfy A x = b.
     """
-    if factorization._factor.n_perturbed:
-        problem = f"{factorization._factor.n_perturbed} pivots are zero within rounding"
-    else:
-        b = np.random.default_rng(0).standard_normal(A.shape[0])
-        b = _unit(factorization.solve(b))
-        x = factorization.solve(b)
-        residual = np.linalg.norm(A @ x - b) if np.isfinite(x).all() else np.inf
-        if residual < SINGULAR:
-            return
-        problem = f"a solution leaves {100 * min(residual, 9.99):.0f} % of its right-hand side"
-    factorization.close()
-    raise FactorizationError(f"factorize: the matrix is singular ({problem}); n = {A.shape[0]}")
+    b = np.random.default_rng(0).standard_normal(A.shape[0])
+    b = _unit(factorization.solve(b))
+    x = factorization.solve(b)
+    residual = np.linalg.norm(A @ x - b) if np.isfinite(x).all() else np.inf
+    if not residual < SINGULAR:
+        factorization.close()
+        raise FactorizationError(
+            f"factorize: the matrix is singular: a solution leaves {100 * min(residual, 9.99):.0f} % of its right-hand "
+            f"side; n = {A.shape[0]}"
+        )
 
 
 def _unit(x: Array) -> Array:

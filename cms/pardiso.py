@@ -23,7 +23,7 @@ __all__ = ["PardisoFactor", "mkl_runtime"]
 POSITIVE_DEFINITE, INDEFINITE = 2, -2  # mtype: real symmetric
 ANALYSE_AND_FACTORIZE, SOLVE, RELEASE = 12, 33, -1  # phase
 CHUNK = 64  #: right-hand sides per call; wider ones gain nothing measurable, and PARDISO's workspace grows with them
-PIVOT_PERTURBATION = 13  #: pivots below 1e-13 of the matrix norm are raised to it, counted, and refused afterwards
+PIVOT_PERTURBATION = 13  #: pivots below 1e-13 of the matrix norm are raised to it and counted; PARDISO then refines
 
 NOT_FACTORIZED = {
     -2: "not enough memory for the factor",
