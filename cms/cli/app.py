@@ -71,18 +71,23 @@ def info_command(
 
     Example: cms info rod.h5 --json
     """
+    if json:
+        typer.echo(info_record(file))
+        return
     from cms.modal_file import digest, read
 
-    reduced = read(file)
-    if json:
-        import json as json_module
-
-        from cms.cli.record import body_record
-
-        typer.echo(json_module.dumps({**body_record(reduced), "digest": digest(file)}, indent=2, ensure_ascii=True))
-        return
-    print_body(reduced, everything=True)
+    print_body(read(file), everything=True)
     say(f"digest {digest(file)}")
+
+
+def info_record(file: Path) -> str:
+    """Return what is in a modal file as JSON text."""
+    import json
+
+    from cms.cli.record import body_record
+    from cms.modal_file import digest, read
+
+    return json.dumps({**body_record(read(file)), "digest": digest(file)}, indent=2)
 
 
 @app.command("view")
@@ -122,6 +127,20 @@ def view_command(
                 animate_mode(body, mode, animate, scale=scale, on_frame=lambda done, all_: advance(done / all_))
     for path in targets:
         say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+@app.command("demo")
+@guarded
+def demo_command(
+    folder: Annotated[Path, typer.Argument(help="Folder for the files of the demo.")] = Path("demo"),
+) -> None:
+    """Run the whole line on a shipped connecting rod: reduce, info, view, run, plot, animate; about a minute.
+
+    Example: cms demo
+    """
+    from cms.cli.demo import run_demo
+
+    run_demo(folder)
 
 
 def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
