@@ -1,0 +1,117 @@
+"""Craig-Bampton modes of a steel bar against exudyn's FEMinterface, on the same hex8 matrices.
+
+    python -m benchmarks.craig_bampton_vs_exudyn           # 160x9x9 elements, 48 thousand dofs
+    python -m benchmarks.craig_bampton_vs_exudyn --large   # adds 220x14x14, 149 thousand dofs: exudyn takes minutes, 10 GB
+
+Bar of 1 x 0.05 x 0.05 m, rigid interfaces (RBE2) at both ends, 14 fixed-interface modes. Each side is a process of its
+own that loads K, M and the nodes. Time: from the matrices in memory to the modes, with modules imported; here it
+includes couplings, checks, the finishing step and the inertia invariants, there only the Hurty-Craig-Bampton modes.
+Memory: peak of the process above what it held before. Both must find the same fixed-interface frequencies.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+N_MODES = 14
+BARS = {"48k": (160, 9, 9), "149k": (220, 14, 14)}
+
+
+def make(elements, folder):
+    from cms.units import unit_system
+    from fe_models.solid import solid_body
+    from tests.bodies import STEEL, box_mesh
+
+    mesh = box_mesh(*elements, 1.0, 0.05, 0.05, "hexahedron")
+    body = solid_body(mesh, STEEL, name="bar", units=unit_system("m-kg-s"))
+    sp.save_npz(folder / "K.npz", sp.csr_matrix(body.K), compressed=False)
+    sp.save_npz(folder / "M.npz", sp.csr_matrix(body.M), compressed=False)
+    np.savez(folder / "nodes.npz", nodes=mesh.nodes, left=mesh.node_sets["left"], right=mesh.node_sets["right"])
+    return body.n_dof
+
+
+def own(folder):
+    from cms import NodalFrame, couple, craig_bampton, reduce
+    from cms.fe_body import FEBody, Interface
+
+    K, M, nodes, left, right = load(folder)
+    couple, craig_bampton, reduce  # imported before the clock starts
+    dofs = np.stack([np.repeat(np.arange(len(nodes)), 3), np.tile(np.arange(3), len(nodes))], axis=1)
+
+    def run():
+        ends = [Interface(name, "rigid", n, nodes[n].mean(axis=0)) for name, n in (("left", left), ("right", right))]
+        body = couple(FEBody("bar", M, K, nodes, dofs, ends))
+        modes = craig_bampton(body, n_modes=N_MODES)
+        reduce(body, modes, frame=NodalFrame("left"))
+        return modes.frequencies[12:]
+
+    return run
+
+
+def exudyn(folder):
+    from exudyn.FEM import FEMinterface, HCBstaticModeSelection
+
+    K, M, nodes, left, right = load(folder)
+    fem = FEMinterface()
+    fem.nodes = {"Position": nodes}
+    fem.massMatrix, fem.stiffnessMatrix = M, K
+
+    def run():
+        fem.ComputeHurtyCraigBamptonModes(
+            [left.tolist(), right.tolist()], N_MODES, computationMode=HCBstaticModeSelection.RBE2
+        )
+        return np.sqrt(np.asarray(fem.eigenValues)) / (2 * np.pi)
+
+    return run
+
+
+def load(folder):
+    table = np.load(folder / "nodes.npz")
+    K, M = sp.load_npz(folder / "K.npz"), sp.load_npz(folder / "M.npz")
+    return K, M, table["nodes"], table["left"], table["right"]
+
+
+def measure(side, folder):
+    """Run one side in this process and print its record."""
+    run = {"own": own, "exudyn": exudyn}[side](folder)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.perf_counter()
+    frequencies = run()
+    seconds = time.perf_counter() - start
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    record = {"s": seconds, "GB": (after - before) / 1e6, "GB in all": after / 1e6, "Hz": list(map(float, frequencies))}
+    print("RECORD " + json.dumps(record))
+
+
+def main():
+    names = list(BARS) if "--large" in sys.argv else ["48k"]
+    print("| dofs | floatframe | exudyn 1.13.6 | time | memory |\n|---|---|---|---|---|")
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            n_dof = make(BARS[name], Path(folder))
+            record = {}
+            for side in ("own", "exudyn"):
+                command = [sys.executable, "-m", "benchmarks.craig_bampton_vs_exudyn", side, folder]
+                out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+                record[side] = json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0])
+        ours, theirs = record["own"], record["exudyn"]
+        np.testing.assert_allclose(ours["Hz"], sorted(theirs["Hz"])[:N_MODES], rtol=1e-6)
+        print(
+            f"| {n_dof} | {ours['s']:.2f} s, {ours['GB']:.2f} GB | {theirs['s']:.1f} s, {theirs['GB']:.2f} GB "
+            f"| {theirs['s'] / ours['s']:.1f}x | {theirs['GB'] / ours['GB']:.1f}x |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 2:
+        measure(sys.argv[1], Path(sys.argv[2]))
+    else:
+        main()
