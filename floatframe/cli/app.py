@@ -53,7 +53,9 @@ def run_command(
                 progress=on_progress,
             )  # fmt: skip
     except KeyboardInterrupt:
-        print_error(f"interrupted; the motion so far is in {path}{SEGMENTS}, which plot, animate and info can read")
+        segments = Path(f"{path}{SEGMENTS}")
+        kept = f"the motion so far is in {segments}, which plot, animate and info can read"
+        print_error(f"interrupted; {kept if segments.is_dir() else 'nothing was written'}")
         raise typer.Exit(INTERRUPTED) from None
     print_run(trajectory, last[0] if last else None, time.perf_counter() - began)
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")

@@ -211,6 +211,33 @@ def test_the_record_gives_the_centre_of_mass_in_mesh_coordinates(folder):
     assert_allclose(body_record(body)["center_of_mass"]["B"], [50, 0, 0], rtol=0, atol=1e-9)
 
 
+def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch):
+    """With pictures and films left blank: drawing has its own tests and takes most of the minute."""
+
+    def blank(*arguments, **_):
+        next(a for a in arguments if isinstance(a, Path)).touch()
+
+    for name in ("cms.view.view_mode", "cms.view.animate_mode", "floatframe.animation.animate"):
+        monkeypatch.setattr(name, blank)
+    monkeypatch.chdir(tmp_path)
+    result = run("demo")
+    assert result.exit_code == 0, result.output
+    files = contents(tmp_path / "demo")
+    for name in ("rod.h5", "m3.png", "m3.gif", "swing.h5", "swing.png", "swing.mp4"):
+        assert name in files
+        assert name in result.stdout
+    for command in ("cms reduce", "cms info", "cms view", "floatframe run", "floatframe plot", "floatframe animate"):
+        assert f"demo$ {command}" in result.stdout
+    assert json.loads(files["rod.json"])["name"] == "rod"
+
+
+def test_the_demo_needs_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "demo").write_text("a file")
+    assert_refused(run("demo"), "demo: cannot be made")
+    assert contents(tmp_path) == {"demo": b"a file"}
+
+
 # Bad input -----------------------------------------------------------------------------------------------------------
 
 
@@ -270,6 +297,19 @@ def test_a_bad_mesh_ends_in_one_message_and_leaves_nothing(folder, kind):
     result = run("reduce", folder / "bar.toml")
     assert_refused(result)
     assert all(word in result.stderr.lower() for word in words), result.stderr
+    assert contents(folder) == before
+
+
+def test_matrices_with_nan_are_refused(folder):
+    from tests.bodies import bar as bar_body
+
+    body = bar_body(nx=2)
+    K = body.K.toarray()
+    K[3, 3] = np.nan
+    np.savez(folder / "bar.npz", M=body.M.toarray(), K=K, nodes=body.nodes, dofs=body.dofs)
+    (folder / "bar.toml").write_text('[body]\nmatrices = "bar.npz"\nunits = "m-kg-s"\n[reduction]\nn_modes = 2\n')
+    before = contents(folder)
+    assert_refused(run("reduce", folder / "bar.toml"), "K: expected finite numbers")
     assert contents(folder) == before
 
 
@@ -428,7 +468,7 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
     script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
     result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
-    for command in ("reduce", "info", "view"):
+    for command in ("reduce", "info", "view", "demo"):
         assert command in result.stdout
     loaded = result.stdout[result.stdout.rindex("[") :]
     for heavy in ("numpy", "scipy", "h5py", "pydantic", "meshio", "skfem", "pyvista", "numba", "matplotlib"):
