@@ -12,7 +12,7 @@ from cms.errors import JobError
 __all__ = ["run_demo"]
 
 JOBS = ("rod.toml", "swing.toml")  #: shipped beside this file
-MODE = 3
+MODE = 5  #: the mode that is drawn: bending of the shank in the plane of the rod
 
 
 def run_demo(folder: Path) -> None:
@@ -21,26 +21,20 @@ def run_demo(folder: Path) -> None:
     Raises
     ------
     JobError
-        If the folder cannot be made.
+        If the folder cannot be made, or holds a job that was changed: it is not overwritten.
     """
     # the border of the product: the command lines alone may import outward
-    from cms.cli.app import info_record, reduce_command, view_command
+    from cms.cli.app import info_command, info_record, reduce_command, view_command
     from cms.paths import replace_file
-    from fe_models.parts.shipped import shipped_mesh
     from floatframe.cli.app import animate_command, plot_command, run_command
 
     began = time.perf_counter()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise JobError(f"{folder}: cannot be made: {error.strerror}; choose another folder: cms demo FOLDER") from error
-    for name in JOBS:
-        replace_file(folder / name, (files("cms.cli") / "data" / name).read_bytes())
-    replace_file(folder / "rod.msh", shipped_mesh("connecting_rod").read_bytes())
-
+    put_inputs(folder)
     modal, results = folder / "rod.h5", folder / "swing.h5"
     step(folder, "cms reduce rod.toml -o rod.h5")
     reduce_command(folder / "rod.toml", modal)
+    step(folder, "cms info rod.h5")
+    info_command(modal)
     step(folder, "cms info rod.h5 --json > rod.json")
     replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
     step(folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
@@ -68,6 +62,27 @@ def run_demo(folder: Path) -> None:
     rows = [(str(folder / name), f"{(folder / name).stat().st_size / 1e6:.2f}", words) for name, words in made.items()]
     print_table("Files of the demo", ("file", "MB>", "what it is"), rows)
     say(f"{time.perf_counter() - began:.0f} s; change rod.toml or swing.toml and run the commands above in {folder}")
+
+
+def put_inputs(folder: Path) -> None:
+    """Put the mesh and the job files into the folder; a job that was changed there is left alone and told."""
+    from cms.paths import replace_file
+    from fe_models.parts import shipped_mesh
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise JobError(f"{folder}: cannot be made: {error.strerror}; choose another folder: cms demo FOLDER") from error
+    jobs = {name: (files("cms.cli") / "data" / name).read_bytes() for name in JOBS}
+    for name, content in jobs.items():
+        if (folder / name).exists() and (folder / name).read_bytes() != content:
+            raise JobError(
+                f"{folder / name}: is there already, with other contents, and would be lost; move it away, or choose "
+                "another folder: cms demo FOLDER"
+            )
+    for name, content in jobs.items():
+        replace_file(folder / name, content)
+    replace_file(folder / "rod.msh", shipped_mesh("connecting_rod").read_bytes())
 
 
 def step(folder: Path, command: str) -> None:
