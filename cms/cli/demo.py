@@ -12,7 +12,7 @@ from cms.errors import JobError
 __all__ = ["run_demo"]
 
 JOBS = ("rod.toml", "swing.toml")  #: shipped beside this file
-MODE = 5  #: the mode that is drawn: bending of the shank in the plane of the rod
+MODE = 3
 
 
 def run_demo(folder: Path) -> None:
