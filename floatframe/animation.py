@@ -186,7 +186,7 @@ def scene_size(flexible: Mapping[str, ReducedBody], frames: Mapping[str, tuple[A
 
 
 def chosen_magnification(flexible: Mapping[str, ReducedBody], displacements: Mapping[str, Array]) -> float:
-    """Return 1 where the displacement is seen as it is, else the round number that draws it at 3 to 6 % of a body."""
+    """Return 1 where the displacement is seen as it is, else the round number that draws it at 2.4 to 6 % of a body."""
     share = max(
         (float(np.abs(displacements[name]).max()) / diagonal(body) for name, body in flexible.items()), default=1.0
     )

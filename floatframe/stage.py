@@ -37,8 +37,9 @@ def view_axes(points: Array, up: Array) -> tuple[Array, Array]:
     flat = flat - np.outer(flat @ up, up)
     _, vectors = np.linalg.eigh(flat.T @ flat + 1e3 * float((flat**2).sum() + 1e-300) * np.outer(up, up))
     across = vectors[:, 0]
-    across = across * np.sign(across[np.argmax(np.abs(across))])  # towards the eye: the positive axis
-    side = np.cross(up, across)
+    side = np.cross(up, across)  # to the right, as the eye sees it
+    if side[np.argmax(np.abs(side))] < 0:
+        across, side = -across, -side
     return -(across + 0.33 * up + 0.3 * side), up
 
 
