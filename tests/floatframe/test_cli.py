@@ -254,7 +254,8 @@ def test_a_file_that_holds_no_results_is_refused(folder, command, results):
         assert contents(folder) == before
 
 
-def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder):
+def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder, results):
+    """`results` comes first, so that the kernels are compiled and the run gets to its steps at once."""
     (folder / "swing.h5").write_bytes(b"the old results")
     (folder / "swing.toml").write_text(RIGID.replace("t_end = 0.5", "t_end = 1e5"))
     with subprocess.Popen(
@@ -269,7 +270,7 @@ def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder):
         try:
             process.wait(timeout=0.2)
         except subprocess.TimeoutExpired:
-            for _ in range(300):
+            for _ in range(600):
                 if (segments / "000000.h5").is_file():
                     break
                 try:
