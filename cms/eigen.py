@@ -13,10 +13,12 @@ from cms.factorization import Factorization, factorize
 from cms.mode_search import DenseSearch, KrylovSearch
 from cms.orientation import orientation
 from cms.shift_inverted import ShiftInverted, Wanted
+from cms.threads import one_blas_thread
 
 __all__ = ["EigenResult", "eigenmodes"]
 
 SMALL = 300  #: dofs up to which dense matrices are faster
+LARGEST_FOR_ONE_THREAD = 200_000  #: dofs up to which NumPy's second BLAS thread costs the solver more than it brings
 LARGEST_DENSE = 3000  #: dofs up to which dense matrices are affordable, where many of the modes are wanted
 SHIFT = 1e-6  #: of a free body, as a part of the median of K_kk / M_kk: near its first elastic omega²
 SHIFT_SMALL = 1e-4  #: the same for the few dofs of a dense pencil
@@ -107,6 +109,8 @@ def eigenmodes(
     if shift is None:
         shift = 0.0 if factorization is not None else -(SHIFT_SMALL if is_dense else SHIFT) * scale
     with ExitStack() as stack:
+        if n <= LARGEST_FOR_ONE_THREAD:
+            stack.enter_context(one_blas_thread())
         if factorization is None:
             factorization = stack.enter_context(_factorize_shifted(K, M, shift))
         if factorization.n != n:

@@ -11,6 +11,8 @@ References
 import ctypes
 import os
 from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,12 +40,27 @@ NOT_FACTORIZED = {
 @cache
 def mkl_runtime() -> ctypes.CDLL | None:
     """Return the loaded library, or None where there is none (other processors, macOS, not installed)."""
+    # its threads give the processor back at once: between two solves it belongs to NumPy and to our own threads
+    os.environ.setdefault("KMP_BLOCKTIME", "0")
+    path = installed_mkl()
+    if path is not None:  # found by its package: pypardiso would search all of sys.prefix, a second and more
+        os.environ.setdefault("PYPARDISO_MKL_RT", path)
     try:
         from pypardiso import PyPardisoSolver
 
         return PyPardisoSolver().libmkl
     except (ImportError, OSError, AttributeError):
         return None
+
+
+def installed_mkl() -> str | None:
+    """Return the path of the runtime library in the installed package `mkl`, if there is one."""
+    try:
+        files = distribution("mkl").files or []
+    except PackageNotFoundError:
+        return None
+    paths = [Path(str(file.locate())) for file in files if "mkl_rt" in file.name and not file.name.endswith(".lib")]
+    return next((str(path) for path in paths if path.is_file()), None)
 
 
 class PardisoFactor:

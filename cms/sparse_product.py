@@ -1,12 +1,12 @@
 """Products of a large symmetric sparse matrix with blocks of columns, in threads (SciPy's own use one)."""
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import scipy.sparse as sp
 
 from cms.arrays import Array
+from cms.threads import n_threads
 
 __all__ = ["SymmetricProduct"]
 
@@ -40,11 +40,6 @@ class SymmetricProduct:
             else:
                 list(self._pool.map(multiply, range(len(self._parts))))
         return result
-
-
-def n_threads() -> int:
-    """Processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
 def _rows(A: sp.csc_array, first: int, last: int) -> sp.csr_array:

@@ -18,10 +18,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.arrays import Array, IntArray
+from cms.threads import n_threads
 from fe_models.elements import ReferenceElement, reference_element
 from fe_models.errors import MeshError
 from fe_models.mesh import Mesh
-from fe_models.threads import n_threads
 
 __all__ = ["Progress", "assemble", "expand_scalar_mass"]
 

@@ -12,13 +12,13 @@ import scipy.sparse as sp
 from cms.arrays import Array, IntArray, frozen_int
 from cms.errors import BodyError
 from cms.fe_body import FEBody, Interface
+from cms.threads import n_threads
 from cms.units import Units
 from fe_models.assembly import Progress, assemble, expand_scalar_mass
 from fe_models.boundary import boundary_triangles
 from fe_models.material import Material, assign_materials
 from fe_models.mesh import Mesh
 from fe_models.stress import nodal_stress, stiffest_at_nodes
-from fe_models.threads import n_threads
 
 __all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
 

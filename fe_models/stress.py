@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from cms.arrays import Array, IntArray
+from cms.threads import n_threads
 from fe_models.elements import reference_element
 from fe_models.material import Material
 from fe_models.mesh import Mesh
-from fe_models.threads import n_threads
 
 __all__ = ["nodal_stress", "stiffest_at_nodes"]
 

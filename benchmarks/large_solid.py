@@ -1,0 +1,116 @@
+"""A large connecting rod from the mesh file to the closed modal file, against the bare solver.
+
+    python -m benchmarks.large_solid              # about 0.5 million dofs
+    python -m benchmarks.large_solid 0.5 1.0      # and 1 million
+
+tet10, two rigid interfaces (RBE2), 50 fixed-interface modes. "line": everything from reading the mesh file to the closed
+modal file. "bare": one PARDISO factorisation of K_II and one solve of 60 columns without iterative refinement, nothing
+else counted. Each is a process of its own, so the peaks of memory are their own; the ratio is line / bare.
+Meshes are made by gmsh once and kept in benchmarks/out.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+OUT = Path(__file__).parent / "out"
+SIZES = {"0.5": 1.62, "1.0": 1.24}  # million dofs -> element size [mm]
+N_MODES = 50
+
+
+def mesh_file(million):
+    from fe_models.parts import mesh_connecting_rod
+
+    path = OUT / f"rod_{million}.msh"
+    if not path.is_file():
+        OUT.mkdir(exist_ok=True)
+        mesh_connecting_rod(size=SIZES[million], path=path)
+    return path
+
+
+def solid(path):
+    import cms
+    import fe_models
+
+    mesh = fe_models.read_mesh(path)
+    steel = fe_models.Material("steel", E=210e3, nu=0.3, rho=7.85e-9)
+    yield "read", mesh
+    fe_models.report_mesh(mesh, steel, units="mm-t-s").raise_for_errors()
+    yield "report", None
+    ends = [fe_models.rigid_interface(mesh, name, fe_models.FaceGroup(name)) for name in ("big_end", "small_end")]
+    body = fe_models.solid_body(mesh, steel, name="rod", units=cms.unit_system("mm-t-s"), interfaces=ends)
+    yield "assemble", None
+    body = cms.couple(body)
+    yield "couple", body
+
+
+def line(path):
+    """The whole line, with the time of each stage."""
+    import cms
+
+    times, clock, body = {}, time.perf_counter(), None
+    start = clock
+
+    def stamp(stage):
+        nonlocal clock
+        times[stage] = time.perf_counter() - clock
+        clock = time.perf_counter()
+
+    for stage, result in solid(path):
+        stamp(stage)
+        body = result
+    modes = cms.craig_bampton(body, n_modes=N_MODES)
+    stamp("mode set")
+    reduced = cms.reduce(body, modes, frame=cms.NodalFrame("big_end"))
+    stamp("reduce")
+    cms.write(reduced, OUT / "line.h5")
+    stamp("write")
+    return {"s": time.perf_counter() - start, "stages": times, "n_dof": body.n_dof}
+
+
+def bare(path):
+    """One factorisation of K_II, one solve of 60 columns."""
+    from cms.factorization import lower_triangle
+    from cms.pardiso import PardisoFactor
+    from cms.submatrix import principal_block
+
+    *_, (_, body) = solid(path)
+    lower = lower_triangle(principal_block(body.K, body.i))
+    columns = np.asfortranarray(np.random.default_rng(0).standard_normal((lower.shape[0], 60)))
+    start = time.perf_counter()
+    factor = PardisoFactor(lower, definite=True)
+    factored = time.perf_counter()
+    factor.solve(columns)
+    solved = time.perf_counter()
+    return {"s": solved - start, "stages": {"factor": factored - start, "solve": solved - factored}}
+
+
+def main():
+    for million in [a for a in sys.argv[1:] if a in SIZES] or ["0.5"]:
+        path = mesh_file(million)
+        record = {}
+        for what in ("bare", "line", "bare"):  # bare before and after: the machine drifts
+            command = [sys.executable, "-m", "benchmarks.large_solid", what, str(path)]
+            out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+            record.setdefault(what, []).append(json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0]))
+        (whole,), bares = record["line"], record["bare"]
+        seconds = [b["s"] for b in bares]
+        print(f"{whole['n_dof']} dofs: line {whole['s']:.1f} s, peak {whole['GB']:.1f} GB; bare "
+              f"{' and '.join(f'{s:.1f}' for s in seconds)} s, peak {bares[0]['GB']:.1f} GB; "
+              f"ratio {whole['s'] / np.mean(seconds):.2f}")
+        print("  line:", ", ".join(f"{stage} {s:.1f}" for stage, s in whole["stages"].items()))
+        print("  bare:", ", ".join(f"{stage} {s:.1f}" for stage, s in bares[-1]["stages"].items()), flush=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] and sys.argv[1] in ("line", "bare"):
+        record = {"line": line, "bare": bare}[sys.argv[1]](Path(sys.argv[2]))
+        record["GB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+        print("RECORD " + json.dumps(record))
+    else:
+        main()
