@@ -3,8 +3,8 @@
     python -m benchmarks.large_solid              # about 0.5 million dofs
     python -m benchmarks.large_solid 0.5 1.0      # and 1 million
 
-tet10, two rigid interfaces (RBE2), 50 fixed-interface modes. "line": everything from reading the mesh file to the closed
-modal file. "bare": one PARDISO factorisation of K_II and one solve of 60 columns without iterative refinement, nothing
+tet10, two rigid interfaces (RBE2), 50 fixed-interface modes. "line": everything from reading the mesh file to the
+closed modal file. "bare": one PARDISO factorisation of K_II and one solve of 60 columns without iterative refinement, nothing
 else counted. Each is a process of its own, so the peaks of memory are their own; the ratio is line / bare.
 Meshes are made by gmsh once and kept in benchmarks/out.
 """
@@ -100,9 +100,11 @@ def main():
             record.setdefault(what, []).append(json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0]))
         (whole,), bares = record["line"], record["bare"]
         seconds = [b["s"] for b in bares]
-        print(f"{whole['n_dof']} dofs: line {whole['s']:.1f} s, peak {whole['GB']:.1f} GB; bare "
-              f"{' and '.join(f'{s:.1f}' for s in seconds)} s, peak {bares[0]['GB']:.1f} GB; "
-              f"ratio {whole['s'] / np.mean(seconds):.2f}")
+        print(
+            f"{whole['n_dof']} dofs: line {whole['s']:.1f} s, peak {whole['GB']:.1f} GB; bare "
+            f"{' and '.join(f'{s:.1f}' for s in seconds)} s, peak {bares[0]['GB']:.1f} GB; "
+            f"ratio {whole['s'] / np.mean(seconds):.2f}"
+        )
         print("  line:", ", ".join(f"{stage} {s:.1f}" for stage, s in whole["stages"].items()))
         print("  bare:", ", ".join(f"{stage} {s:.1f}" for stage, s in bares[-1]["stages"].items()), flush=True)
 
