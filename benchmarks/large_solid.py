@@ -4,8 +4,8 @@
     python -m benchmarks.large_solid 0.5 1.0      # and 1 million
 
 tet10, two rigid interfaces (RBE2), 50 fixed-interface modes. "line": everything from reading the mesh file to the
-closed modal file. "bare": one PARDISO factorisation of K_II and one solve of 60 columns without iterative refinement, nothing
-else counted. Each is a process of its own, so the peaks of memory are their own; the ratio is line / bare.
+closed modal file. "bare": one PARDISO factorisation of K_II and one solve of 60 columns without iterative refinement,
+nothing else counted. Each is a process of its own, so the peaks of memory are their own; the ratio is line / bare.
 Meshes are made by gmsh once and kept in benchmarks/out.
 """
 
