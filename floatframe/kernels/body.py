@@ -14,7 +14,7 @@ W_ab = S_ab q and s = S + 1C q:
 One pass over S_ab (9 n² numbers) and one over 4C (3 n²) carry the cost.
 """
 
-from floatframe.kernels.compilation import inner, merged
+from floatframe.kernels.compilation import inner
 from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, MASS, S_AB, STIFFNESS
 from floatframe.kernels.rotation import cross
 
@@ -274,10 +274,8 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     u, ud, J, Dd = work.u, work.u_dot, work.J[i], work.D_q_dot[i]
     a0, a1, a2 = work.a_B[i, 0], work.a_B[i, 1], work.a_B[i, 2]
     o0, o1, o2 = u[u0 + 3], u[u0 + 4], u[u0 + 5]
-    e0, e1, e2 = ud[u0 + 3], ud[u0 + 4], ud[u0 + 5]
     q = work.q[q0 : q0 + n]
     qd = u[u0 + 6 : u0 + 6 + n]
-    qdd = ud[u0 + 6 : u0 + 6 + n]
     H[:, :] = 0.0
     turn[:, :] = 0.0
     s0, s1, s2 = first_moment(model, i, q)
@@ -305,92 +303,141 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
         H[5, 3 + b] += c_m * J[2, b] + c_d * (2 * Dd[2, b] + y2)
     if n == 0:
         return
-    modal_tangent(model, work, i, c_m, c_d, c_k, H, turn, qd, qdd, (a0, a1, a2), (o0, o1, o2), (e0, e1, e2))
+    modal_tangent(model, work, i, c_m, c_d, c_k, H, turn)
 
 
-@merged
-def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn, qd, qdd, a, o, e):
+@inner
+def rate_tensor(c3, W, n, k, a, b):
+    """Return 3C_k - W_k of component (a, b): D_k without its trace."""
+    o = (3 * a + b) * n + k
+    return c3[o] - W[o]
+
+
+@inner
+def tensor_products(c3, W, n, k, x0, x1, x2):
+    """Return D_k x and D_kᵀ x, six numbers."""
+    trace = W[k] + W[4 * n + k] + W[8 * n + k]
+    d00 = rate_tensor(c3, W, n, k, 0, 0) + trace
+    d01 = rate_tensor(c3, W, n, k, 0, 1)
+    d02 = rate_tensor(c3, W, n, k, 0, 2)
+    d10 = rate_tensor(c3, W, n, k, 1, 0)
+    d11 = rate_tensor(c3, W, n, k, 1, 1) + trace
+    d12 = rate_tensor(c3, W, n, k, 1, 2)
+    d20 = rate_tensor(c3, W, n, k, 2, 0)
+    d21 = rate_tensor(c3, W, n, k, 2, 1)
+    d22 = rate_tensor(c3, W, n, k, 2, 2) + trace
+    return (
+        d00 * x0 + d01 * x1 + d02 * x2,
+        d10 * x0 + d11 * x1 + d12 * x2,
+        d20 * x0 + d21 * x1 + d22 * x2,
+        d00 * x0 + d10 * x1 + d20 * x2,
+        d01 * x0 + d11 * x1 + d21 * x2,
+        d02 * x0 + d12 * x1 + d22 * x2,
+    )
+
+
+@inner
+def put_column(H, row, column, x0, x1, x2):
+    """Write three numbers down a column of H."""
+    H[row, column] = x0
+    H[row + 1, column] = x1
+    H[row + 2, column] = x2
+
+
+@inner
+def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """Write the rows and columns of the modes; see `body_tangent`."""
-    n, q0 = model.n_q[i], model.q0[i]
+    n, q0, u0 = model.n_q[i], model.q0[i], model.u0[i]
     W = work.W[9 * q0 : 9 * (q0 + n)]
     Y = work.Y[3 * q0 : 3 * (q0 + n)]
     c1 = block(model, i, C1, 3 * n)
     c2 = block(model, i, C2, 3 * n)
     c3 = block(model, i, C3, 9 * n)
-    S = block(model, i, S_AB, 9 * n * n)
-    A = block(model, i, C4, 3 * n * n)
-    square = o[0] * o[0] + o[1] * o[1] + o[2] * o[2]
+    a0, a1, a2 = work.a_B[i, 0], work.a_B[i, 1], work.a_B[i, 2]
+    o0, o1, o2 = work.u[u0 + 3], work.u[u0 + 4], work.u[u0 + 5]
+    e0, e1, e2 = work.u_dot[u0 + 3], work.u_dot[u0 + 4], work.u_dot[u0 + 5]
     for k in range(n):
         x0, x1, x2 = c1[k], c1[n + k], c1[2 * n + k]
-        Mq = W[k] + W[4 * n + k] + W[8 * n + k]
-        B = (
-            c2[k] + W[7 * n + k] - W[5 * n + k],
-            c2[n + k] + W[2 * n + k] - W[6 * n + k],
-            c2[2 * n + k] + W[3 * n + k] - W[n + k],
-        )
-        # D_k omega and D_kᵀ omega
-        D_o, Dt_o, dJ_e, dJ_o = [0.0] * 3, [0.0] * 3, [0.0] * 3, [0.0] * 3
-        for r in range(3):
-            D_o[r] = Mq * o[r]
-            Dt_o[r] = Mq * o[r]
-            dJ_e[r] = 2 * Mq * e[r]
-            for b in range(3):
-                D_rb = c3[(3 * r + b) * n + k] - W[(3 * r + b) * n + k]
-                D_br = c3[(3 * b + r) * n + k] - W[(3 * b + r) * n + k]
-                D_o[r] += D_rb * o[b]
-                Dt_o[r] += D_br * o[b]
-                dJ_e[r] += (D_rb + D_br) * e[b]
-        for r in range(3):
-            dJ_o[r] = D_o[r] + Dt_o[r]
-        x = (x0, x1, x2)
-        z0, z1, z2 = cross(o[0], o[1], o[2], x0, x1, x2)
-        zz0, zz1, zz2 = cross(o[0], o[1], o[2], z0, z1, z2)
-        ex0, ex1, ex2 = cross(e[0], e[1], e[2], x0, x1, x2)
+        b0 = c2[k] + W[7 * n + k] - W[5 * n + k]
+        b1 = c2[n + k] + W[2 * n + k] - W[6 * n + k]
+        b2 = c2[2 * n + k] + W[3 * n + k] - W[n + k]
+        d0, d1, d2, t0, t1, t2 = tensor_products(c3, W, n, k, o0, o1, o2)
+        j0, j1, j2 = d0 + t0, d1 + t1, d2 + t2  # dJ/dq_k omega
+        p0, p1, p2, s0, s1, s2 = tensor_products(c3, W, n, k, e0, e1, e2)
+        z0, z1, z2 = cross(o0, o1, o2, x0, x1, x2)
+        w0, w1, w2 = cross(o0, o1, o2, z0, z1, z2)
+        v0, v1, v2 = cross(e0, e1, e2, x0, x1, x2)
         # (1) by q
-        H[0, 6 + k] = c_m * x0 + 2 * c_d * z0 + c_k * (ex0 + zz0)
-        H[1, 6 + k] = c_m * x1 + 2 * c_d * z1 + c_k * (ex1 + zz1)
-        H[2, 6 + k] = c_m * x2 + 2 * c_d * z2 + c_k * (ex2 + zz2)
+        put_column(
+            H, 0, 6 + k,
+            c_m * x0 + 2 * c_d * z0 + c_k * (v0 + w0),
+            c_m * x1 + 2 * c_d * z1 + c_k * (v1 + w1),
+            c_m * x2 + 2 * c_d * z2 + c_k * (v2 + w2),
+        )  # fmt: skip
         # (2) by q, but for the sums over modes below
-        xa0, xa1, xa2 = cross(x0, x1, x2, a[0], a[1], a[2])
-        w0, w1, w2 = cross(o[0], o[1], o[2], dJ_o[0], dJ_o[1], dJ_o[2])
-        H[3, 6 + k] = c_m * B[0] + 2 * c_d * D_o[0] + c_k * (xa0 + dJ_e[0] + w0)
-        H[4, 6 + k] = c_m * B[1] + 2 * c_d * D_o[1] + c_k * (xa1 + dJ_e[1] + w1)
-        H[5, 6 + k] = c_m * B[2] + 2 * c_d * D_o[2] + c_k * (xa2 + dJ_e[2] + w2)
+        v0, v1, v2 = cross(x0, x1, x2, a0, a1, a2)
+        w0, w1, w2 = cross(o0, o1, o2, j0, j1, j2)
+        put_column(
+            H, 3, 6 + k,
+            c_m * b0 + 2 * c_d * d0 + c_k * (v0 + p0 + s0 + w0),
+            c_m * b1 + 2 * c_d * d1 + c_k * (v1 + p1 + s1 + w1),
+            c_m * b2 + 2 * c_d * d2 + c_k * (v2 + p2 + s2 + w2),
+        )  # fmt: skip
         # (3) by a, alpha, omega
-        for r in range(3):
-            H[6 + k, r] = c_m * x[r]
-            H[6 + k, 3 + r] = c_m * B[r] + c_d * (2 * Y[r * n + k] - dJ_o[r])
-        t0, t1, t2 = cross(x0, x1, x2, a[0], a[1], a[2])
-        turn[6 + k, 0], turn[6 + k, 1], turn[6 + k, 2] = t0, t1, t2
-    for j in range(n):  # column of mode j
-        row4 = A[3 * n * j : 3 * n * (j + 1)]  # 4C_kj over [a, k]
-        rows = S[9 * n * j : 9 * n * (j + 1)]  # ∫ phi_a,k phi_b,j over [ab, k]
-        g0, g1, g2 = 0.0, 0.0, 0.0  # Σ_k 4C_kj q_ddot_k
-        d = [0.0] * 3  # Σ_k q_dot_k 5C_jk omega
-        for k in range(n):
-            g0 += row4[k] * qdd[k]
-            g1 += row4[n + k] * qdd[k]
-            g2 += row4[2 * n + k] * qdd[k]
-            gyro = row4[k] * o[0] + row4[n + k] * o[1] + row4[2 * n + k] * o[2]
-            euler = row4[k] * e[0] + row4[n + k] * e[1] + row4[2 * n + k] * e[2]
-            centrifugal = square * (rows[k] + rows[4 * n + k] + rows[8 * n + k])
-            for r in range(3):
-                for b in range(3):
-                    centrifugal -= o[r] * o[b] * rows[(3 * r + b) * n + k]
-            H[6 + k, 6 + j] = 2 * c_d * gyro + c_k * (euler - centrifugal)
-        for r in range(3):
-            for b in range(3):  # 5C_jk = delta_rb trace - ∫ phi_r,k phi_b,j
-                total, trace = 0.0, 0.0
-                for k in range(n):
-                    total += rows[(3 * r + b) * n + k] * qd[k]
-                    trace += rows[4 * b * n + k] * qd[k]
-                d[r] += trace * o[r] - total * o[b]
-        H[3, 6 + j] += c_k * (g0 + 2 * d[0])
-        H[4, 6 + j] += c_k * (g1 + 2 * d[1])
-        H[5, 6 + j] += c_k * (g2 + 2 * d[2])
+        row = H[6 + k]
+        row[0], row[1], row[2] = c_m * x0, c_m * x1, c_m * x2
+        row[3] = c_m * b0 + c_d * (2 * Y[k] - j0)
+        row[4] = c_m * b1 + c_d * (2 * Y[n + k] - j1)
+        row[5] = c_m * b2 + c_d * (2 * Y[2 * n + k] - j2)
+        turn[6 + k, 0], turn[6 + k, 1], turn[6 + k, 2] = v0, v1, v2
+    modal_columns(model, work, i, c_d, c_k, H)
     modal_block(model, i, MASS, c_m, H)
     modal_block(model, i, DAMPING, c_d, H)
     modal_block(model, i, STIFFNESS, c_k, H)
+
+
+@inner
+def modal_columns(model, work, i, c_d, c_k, H):
+    """Add what needs products over 4C and S_ab: the modal block, and the rest of (2) by q.
+
+    2 4C_kj·omega, 4C_kj·alpha - omegaᵀ 5C_jk omega; Σ_k 4C_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega.
+    """
+    n, u0 = model.n_q[i], model.u0[i]
+    S = block(model, i, S_AB, 9 * n * n)
+    A = block(model, i, C4, 3 * n * n)
+    qd = work.u[u0 + 6 : u0 + 6 + n]
+    qdd = work.u_dot[u0 + 6 : u0 + 6 + n]
+    o, weight = work.u[u0 + 3 : u0 + 6], work.scratch[:9]
+    e = work.u_dot[u0 + 3 : u0 + 6]
+    f0, f1, f2 = 2 * c_d * o[0] + c_k * e[0], 2 * c_d * o[1] + c_k * e[1], 2 * c_d * o[2] + c_k * e[2]
+    square = o[0] * o[0] + o[1] * o[1] + o[2] * o[2]
+    for a in range(3):  # omegaᵀ 5C omega = Σ weight_ab S_ab
+        for b in range(3):
+            weight[3 * a + b] = -c_k * ((square if a == b else 0.0) - o[a] * o[b])
+    for j in range(n):
+        row4 = A[3 * n * j : 3 * n * (j + 1)]  # 4C_kj over [a, k]
+        rows = S[9 * n * j : 9 * n * (j + 1)]  # ∫ phi_a,k phi_b,j over [ab, k]
+        out = H[6 + j, 6:]  # row j from column j: 4C is antisymmetric in k, j, the rest symmetric
+        for k in range(n):
+            out[k] = -(f0 * row4[k] + f1 * row4[n + k] + f2 * row4[2 * n + k])
+        for ab in range(9):
+            factor = weight[ab]
+            for k in range(n):
+                out[k] += factor * rows[ab * n + k]
+        trace = 0.0
+        for r in range(3):
+            for k in range(n):
+                trace += rows[4 * r * n + k] * qd[k]
+        for r in range(3):
+            total = 2 * trace * o[r]
+            for k in range(n):
+                total += row4[r * n + k] * qdd[k]
+            for b in range(3):
+                product = 0.0
+                for k in range(n):
+                    product += rows[(3 * r + b) * n + k] * qd[k]
+                total -= 2 * product * o[b]
+            H[3 + r, 6 + j] += c_k * total
 
 
 @inner

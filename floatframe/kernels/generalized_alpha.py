@@ -36,14 +36,23 @@ def put_weights(model, work, c_k):
 
 
 @inner
+def copy(source, target):
+    """Copy numbers."""
+    for k in range(source.shape[0]):
+        target[k] = source[k]
+
+
+@inner
 def load_state(model, work, memory):
     """Copy the memory of the integrator into the iterate; rotation since the beginning of the step is zero."""
-    work.r[:, :] = memory.r
-    work.q[:] = memory.q
-    work.u[:] = memory.u
-    work.u_dot[:] = memory.u_dot
-    work.w[:] = memory.w
-    work.theta[:, :] = 0.0
+    copy(memory.r.reshape(memory.r.size), work.r.reshape(memory.r.size))
+    copy(memory.q, work.q)
+    copy(memory.u, work.u)
+    copy(memory.u_dot, work.u_dot)
+    copy(memory.w, work.w)
+    for i in range(model.kind.shape[0]):
+        for k in range(3):
+            work.theta[i, k] = 0.0
     for i in range(model.kind.shape[0]):
         matrix_of_euler_parameters(memory.p[i], work.R[i])
 
@@ -185,11 +194,11 @@ def accept(model, work, memory, h, alpha_m, alpha_f):
     for k in range(memory.a.shape[0]):
         mean = (1 - alpha_f) * work.u_dot[k] + alpha_f * memory.u_dot[k]
         memory.a[k] = (mean - alpha_m * memory.a[k]) / (1 - alpha_m)
-    memory.r[:, :] = work.r
-    memory.q[:] = work.q
-    memory.u[:] = work.u
-    memory.u_dot[:] = work.u_dot
-    memory.w[:] = work.w
+    copy(work.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
+    copy(work.q, memory.q)
+    copy(work.u, memory.u)
+    copy(work.u_dot, memory.u_dot)
+    copy(work.w, memory.w)
     p = work.scratch[:4]
     for i in range(model.kind.shape[0]):
         rotate_euler_parameters(memory.p[i], work.theta[i], p)
@@ -210,12 +219,12 @@ def write_row(model, work, memory, t, rows):
     load_state(model, work, memory)
     evaluate(model, work, 1.0)
     rows.t[k] = t
-    rows.r[k] = memory.r
-    rows.p[k] = memory.p
-    rows.q[k] = memory.q
-    rows.u[k] = memory.u
-    rows.u_dot[k] = memory.u_dot
-    rows.w[k] = memory.w
+    copy(memory.r.reshape(memory.r.size), rows.r[k].reshape(memory.r.size))
+    copy(memory.p.reshape(memory.p.size), rows.p[k].reshape(memory.p.size))
+    copy(memory.q, rows.q[k])
+    copy(memory.u, rows.u[k])
+    copy(memory.u_dot, rows.u_dot[k])
+    copy(memory.w, rows.w[k])
     diagnose(model, work, rows.diagnostics[k], rows.drift[k])
     rows.diagnostics[k, 10] = memory.work[0]
     rows.diagnostics[k, 11] = memory.work[1]
