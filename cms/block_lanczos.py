@@ -12,6 +12,7 @@ import scipy.linalg as la
 
 from cms.arrays import Array
 from cms.sparse_product import SymmetricProduct
+from cms.tall import combine, inner, subtract
 
 __all__ = ["BlockLanczos", "RitzPairs"]
 
@@ -131,27 +132,30 @@ class BlockLanczos:
         C_sum = np.zeros((self.m, W.shape[1])) if wants_coupling else np.zeros((self.m, 0))
         R_sum = np.eye(W.shape[1])
         M_W = self.M @ W
-        largest = np.sqrt(max(np.einsum("nk,nk->k", W, M_W).max(initial=0.0), 0.0))
+        largest = np.nan
         for k_pass in range(MAX_PASSES):
-            C = V.T @ M_W
-            gram = W.T @ M_W - C.T @ C  # of W - V C, as long as little cancels
-            before = np.einsum("nk,nk->k", W, M_W)
-            W = W - V @ C
+            C = inner(V, M_W)
+            gram = inner(W, M_W)
+            before = np.diag(gram)
+            gram = gram - C.T @ C  # of W - V C, as long as little cancels
+            subtract(W, V, C)
             if wants_coupling:
                 C_sum += C @ R_sum
             if k_pass == 0 and not _is_safe(gram, before):
                 M_W = self.M @ W
-                gram = W.T @ M_W
+                gram = inner(W, M_W)
             length2, U = la.eigh((gram + gram.T) / 2)
+            if k_pass == 0:
+                largest = np.sqrt(max(before.max(initial=0.0), 0.0))
             floor = DEPENDENT * largest if k_pass == 0 else 0.1
             kept = length2 > floor**2
             scaled = U[:, kept] / np.sqrt(length2[kept])
-            W = W @ scaled
+            W = combine(W, scaled)
             R_sum = (U[:, kept] * np.sqrt(length2[kept])).T @ R_sum
             if not kept.any():
                 break
             if k_pass and length2.min() > 0.9:  # the pass changed nothing but rounding
-                M_W = M_W @ scaled
+                M_W = combine(M_W, scaled)
                 break
             M_W = self.M @ W
         return W, C_sum, R_sum, M_W[:, : W.shape[1]]

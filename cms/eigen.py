@@ -13,16 +13,17 @@ from cms.factorization import Factorization, factorize
 from cms.mode_search import DenseSearch, KrylovSearch
 from cms.orientation import orientation
 from cms.shift_inverted import ShiftInverted, Wanted
+from cms.tall import combine
 from cms.threads import one_blas_thread
 
 __all__ = ["EigenResult", "eigenmodes"]
 
 SMALL = 300  #: dofs up to which dense matrices are faster
-LARGEST_FOR_ONE_THREAD = 200_000  #: dofs up to which NumPy's second BLAS thread costs the solver more than it brings
 LARGEST_DENSE = 3000  #: dofs up to which dense matrices are affordable, where many of the modes are wanted
 SHIFT = 1e-6  #: of a free body, as a part of the median of K_kk / M_kk: near its first elastic omega²
 SHIFT_SMALL = 1e-4  #: the same for the few dofs of a dense pencil
 ZERO = 1e-13  #: the same part, below which omega² is rounding of K: a rigid-body mode
+TIGHTEST, LOOSEST = 1e-13, 0.1  #: tolerances that rounding allows, and that say anything
 MISMATCH = 1e-3  #: defect of K x = omega² M x that only a factorisation of another matrix explains
 GAP = 1e-4  #: relative gap between two omega² in which modes can be counted
 
@@ -103,14 +104,15 @@ def eigenmodes(
     wanted = Wanted(n_modes, None if cutoff is None else (2 * np.pi * cutoff) ** 2)
     if wanted.count is not None and wanted.count > n:
         raise EigenError(f"eigenmodes: n_modes = {n_modes}, but there are {n} dofs; choose n_modes <= {n}")
+    if not TIGHTEST <= tolerance <= LOOSEST:
+        raise EigenError(f"eigenmodes: tolerance = {tolerance:g}; expected {TIGHTEST:g} to {LOOSEST:g}")
     is_large_part = wanted.count is not None and 3 * wanted.count > n
     is_dense = n <= SMALL or (is_large_part and n <= LARGEST_DENSE)
     scale = frequency_scale(K, M)
     if shift is None:
         shift = 0.0 if factorization is not None else -(SHIFT_SMALL if is_dense else SHIFT) * scale
     with ExitStack() as stack:
-        if n <= LARGEST_FOR_ONE_THREAD:
-            stack.enter_context(one_blas_thread())
+        stack.enter_context(one_blas_thread())
         if factorization is None:
             factorization = stack.enter_context(_factorize_shifted(K, M, shift))
         if factorization.n != n:
@@ -141,7 +143,7 @@ def eigenmodes(
         del search  # frees the basis before the modes are expanded
     omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)))
     Phi = modes.expand()
-    Phi = Phi @ orientation(Phi, omega2)[:, :k]
+    Phi = combine(Phi, orientation(Phi, omega2)[:, :k])
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
     method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"

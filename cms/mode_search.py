@@ -7,14 +7,16 @@ from cms.arrays import Array
 from cms.block_lanczos import BlockLanczos, RitzPairs
 from cms.errors import EigenError
 from cms.shift_inverted import Modes, ShiftInverted, Wanted, refined_modes
+from cms.tall import combine
 
 __all__ = ["DenseSearch", "KrylovSearch"]
 
 BLOCK = 8  #: columns of a Lanczos block; measured in docs/eigensolver.md
 GUARDS = 8  #: Ritz vectors beyond the wanted ones that take part in the last step
 FIRST_GUESS = 30  #: modes to make room for, as long as only a frequency is given
-MOST_BLOCKS = 3000
+MOST_COLUMNS = 40  #: to solve for, per wanted mode and guard
 MOST_REFINEMENTS = 4
+FLOOR = 1e-13  #: residual by the recurrence below which only rounding is left
 NEGLIGIBLE = 1e-12  #: theta against the largest one, below which a mode has no mass
 NEGATIVE = 1e-8  #: the same for a negative theta that is more than rounding
 MASSLESS = 1e-13  #: eigenvalue of M against its largest, below which a direction has no mass
@@ -37,10 +39,10 @@ class KrylovSearch:
         for _ in range(MOST_REFINEMENTS):
             ritz, k = self._converge(wanted, at_least, tolerance)
             n_kept = leading_count(ritz.theta, k, k + GUARDS)
-            modes = refined_modes(operator, self._lanczos.V @ ritz.S[:, :n_kept], ritz.theta[:n_kept], k)
+            modes = refined_modes(operator, combine(self._lanczos.V, ritz.S[:, :n_kept]), ritz.theta[:n_kept], k)
             if modes.residuals.max(initial=0.0) <= operator.tolerance:
                 return modes
-            tolerance *= 0.1  # the recurrence was more hopeful than the truth
+            tolerance = max(0.1 * tolerance, FLOOR)  # the recurrence was more hopeful than the truth
         raise EigenError(
             f"eigenmodes: residuals stay at {modes.residuals.max():.1e}, expected {operator.tolerance:.1e}; "
             "K is too ill-conditioned for this tolerance: allow a larger one, or mend units and stiffness contrasts"
@@ -50,7 +52,8 @@ class KrylovSearch:
         """Advance until the wanted pairs have converged by the recurrence; return all pairs and the wanted number."""
         lanczos = self._lanczos
         next_look = 0
-        for _ in range(MOST_BLOCKS):
+        k, most = 1, np.inf
+        while lanczos.n_solves <= most:
             if lanczos.m >= next_look or lanczos.is_exhausted:
                 ritz = lanczos.ritz()
                 refuse_negative(ritz.theta)
@@ -59,6 +62,7 @@ class KrylovSearch:
                     return ritz, k
                 next_look = lanczos.m + max(BLOCK, lanczos.m // 16)
                 lanczos.grow(basis_size(k))
+                most = MOST_COLUMNS * (k + 10 * BLOCK)
             if lanczos.m + BLOCK > lanczos.capacity:
                 ritz = lanczos.ritz()
                 lanczos.restart(ritz, min(lanczos.m - BLOCK, k + (lanczos.capacity - k) // 3))

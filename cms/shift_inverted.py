@@ -11,6 +11,7 @@ from cms.arrays import Array
 from cms.errors import EigenError
 from cms.factorization import Factorization
 from cms.sparse_product import SymmetricProduct
+from cms.tall import combine, inner
 
 __all__ = ["Modes", "ShiftInverted", "Wanted", "refined_modes"]
 
@@ -70,7 +71,7 @@ class Modes:
 
     def expand(self) -> Array:
         """Return the M-orthonormal modes Phi, (n, n_wanted + n_guards)."""
-        return self.Y @ self.Z
+        return combine(self.Y, self.Z)
 
 
 def refined_modes(operator: ShiftInverted, X: Array, theta: Array, n_wanted: int) -> Modes:
@@ -83,11 +84,11 @@ def refined_modes(operator: ShiftInverted, X: Array, theta: Array, n_wanted: int
     Y = operator.solve(M_X)
     Y /= theta
     M_X /= theta
-    H = Y.T @ M_X
+    H = inner(Y, M_X)
     del M_X
     X -= Y
     residuals = np.sqrt(np.maximum(np.einsum("nk,nk->k", X, operator.M_product @ X), 0.0))[:n_wanted]
     del X
-    G = Y.T @ (operator.M_product @ Y)
+    G = inner(Y, operator.M_product @ Y)
     mu, Z = la.eigh((H + H.T) / 2, (G + G.T) / 2)
     return Modes(mu + operator.shift, n_wanted, residuals, Y, Z)
