@@ -12,7 +12,7 @@ from cms.errors import EigenError
 from cms.factorization import Factorization, factorize
 from cms.mode_search import DenseSearch, KrylovSearch
 from cms.orientation import orientation
-from cms.shift_inverted import ShiftInverted, Wanted
+from cms.shift_inverted import Modes, ShiftInverted, Wanted
 from cms.tall import combine
 from cms.threads import one_blas_thread
 
@@ -25,6 +25,7 @@ SHIFT_SMALL = 1e-4  #: the same for the few dofs of a dense pencil
 ZERO = 1e-13  #: the same part, below which omega² is rounding of K: a rigid-body mode
 TIGHTEST, LOOSEST = 1e-13, 0.1  #: tolerances that rounding allows, and that say anything
 MISMATCH = 1e-3  #: defect of K x = omega² M x that only a factorisation of another matrix explains
+MOST_PROOFS = 3
 GAP = 1e-4  #: relative gap between two omega² in which modes can be counted
 
 
@@ -120,25 +121,10 @@ def eigenmodes(
         operator = ShiftInverted(M, shift, factorization, tolerance, progress)
         search = (DenseSearch if is_dense else KrylovSearch)(operator, wanted)
         modes = search.modes(wanted)
-        is_proven = False
-        for _ in range(3 if verify else 0):
-            last, sigma = counting_shift(modes.omega2, modes.n_wanted, wanted, shift)
-            n_below = _count_below(K, M, sigma, factorization)
-            if n_below == last:
-                is_proven = True
-                break
-            if n_below < last:
-                raise EigenError(
-                    f"eigenmodes: found {last} modes below {_hertz(sigma):.6g} Hz, but the inertia counts {n_below}; "
-                    "the factorisation or the symmetry of K and M is broken"
-                )
-            modes = search.modes(wanted, at_least=n_below)
-        if verify and not is_proven:
-            raise EigenError(
-                f"eigenmodes: the inertia counts {n_below} modes below {_hertz(sigma):.6g} Hz, found {last}; "
-                "ask for more modes"
-            )
-        k, residuals, method = modes.n_wanted, modes.residuals, search.description
+        if verify:
+            modes = _proven_modes(K, M, search, modes, wanted)
+        k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
+        residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
         del search  # frees the basis before the modes are expanded
     omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)))
@@ -147,7 +133,7 @@ def eigenmodes(
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
     method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"
-    return EigenResult(omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven)
+    return EigenResult(omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=verify)
 
 
 def frequency_scale(K: sp.csc_array, M: sp.csc_array) -> float:
@@ -157,6 +143,27 @@ def frequency_scale(K: sp.csc_array, M: sp.csc_array) -> float:
     if not has_both.any():
         raise EigenError("eigenmodes: no dof has both stiffness and mass; expected a body that can vibrate")
     return float(np.median(stiffness[has_both] / mass[has_both]))
+
+
+def _proven_modes(
+    K: sp.csc_array, M: sp.csc_array, search: KrylovSearch | DenseSearch, modes: Modes, wanted: Wanted
+) -> Modes:
+    """Return the modes once their number agrees with the inertia; look for more as long as it is larger."""
+    operator = search.operator
+    for _ in range(MOST_PROOFS):
+        last, sigma = counting_shift(modes.omega2, modes.n_wanted, wanted, operator.shift)
+        n_below = _count_below(K, M, sigma, operator.factorization)
+        if n_below == last:
+            return modes
+        if n_below < last:
+            raise EigenError(
+                f"eigenmodes: found {last} modes below {_hertz(sigma):.6g} Hz, but the inertia counts {n_below}; "
+                "expected symmetric K and M, and a factorisation of them"
+            )
+        modes = search.modes(wanted, at_least=n_below)
+    raise EigenError(
+        f"eigenmodes: the inertia counts {n_below} modes below {_hertz(sigma):.6g} Hz, found {last}; ask for more modes"
+    )
 
 
 def counting_shift(omega2: Array, k: int, wanted: Wanted, shift: float) -> tuple[int, float]:

@@ -60,6 +60,8 @@ class KrylovSearch:
                 k, is_done = self._judge(ritz, wanted, at_least, tolerance)
                 if is_done:
                     return ritz, k
+                if lanczos.is_exhausted:
+                    raise EigenError(f"eigenmodes: expected {k} modes, found all there are: {len(ritz.theta)}")
                 next_look = lanczos.m + max(BLOCK, lanczos.m // 16)
                 lanczos.grow(basis_size(k))
                 most = MOST_COLUMNS * (k + 10 * BLOCK)

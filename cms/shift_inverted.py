@@ -46,12 +46,12 @@ class ShiftInverted:
         self.M, self.M_product, self.shift, self.tolerance = M, SymmetricProduct(M), shift, tolerance
         self.n = M.shape[0]
         self.n_solves = 0
-        self._factorization, self._progress = factorization, progress
+        self.factorization, self._progress = factorization, progress
 
     def solve(self, b: Array) -> Array:
         """Return (K - sigma M)⁻¹ b, (n, k)."""
         self.n_solves += b.shape[1]
-        return self._factorization.solve(b)
+        return self.factorization.solve(b)
 
     def report(self, found: int, wanted: int) -> None:
         """Tell the caller how far the search is."""

@@ -8,12 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from cms.block_lanczos import BlockLanczos
 from cms.couplings import couple
 from cms.eigen import eigenmodes
 from cms.errors import EigenError, FactorizationError
 from cms.factorization import factorize
 from cms.pardiso import mkl_runtime
 from cms.shift_inverted import ShiftInverted, refined_modes
+from cms.sparse_product import SymmetricProduct
 from cms.superlu import SuperLuFactor
 from tests.bodies import STEEL, bar, beam
 
@@ -71,6 +73,14 @@ def test_multiple_modes_are_found_completely(n_modes):
     result = eigenmodes(K, M, n_modes=n_modes, verify=True)
     assert_modes(K, M, result, omega2[:n_modes])
     assert result.is_proven
+
+
+def test_a_mode_of_higher_multiplicity_than_the_block_is_found_completely():
+    """450 equal oscillators of three frequencies: the Krylov space of one block ends after three steps."""
+    omega2 = np.repeat([1.0, 2.0, 5.0], 150)
+    K, M = sp.diags_array(omega2, format="csc"), sp.eye_array(450, format="csc")
+    assert_modes(K, M, eigenmodes(K, M, n_modes=20, verify=True), omega2[:20])
+    assert_modes(K, M, eigenmodes(K, M, cutoff=hertz(1.5), verify=True), omega2[:150])
 
 
 def test_a_free_lattice_has_a_rigid_mode_of_frequency_zero():
@@ -187,6 +197,21 @@ def test_restarts_keep_the_modes(monkeypatch):
     result = eigenmodes(K, M, n_modes=20, verify=True)
     assert result.n_solves > unrestarted.n_solves
     assert_modes(K, M, result, omega2[:20])
+
+
+def test_a_restart_changes_no_leading_ritz_pair():
+    K, M, _ = lattice(40, 40)
+    lanczos = BlockLanczos(factorize(K).solve, SymmetricProduct(M), K.shape[0], block=4, capacity=60)
+    for _ in range(12):
+        before = lanczos.advance()
+    lanczos.restart(before, 20)
+    after = lanczos.ritz()
+    assert_allclose(after.theta, before.theta[:20], rtol=ROUNDOFF, atol=0)
+    assert_allclose(after.residuals, before.residuals[:20], rtol=1e-8, atol=ROUNDOFF)
+    assert_allclose(lanczos.V.T @ (M @ lanczos.V), np.eye(20), rtol=0, atol=ROUNDOFF)
+    S_V = factorize(K).solve(M @ lanczos.V)
+    true = np.linalg.norm(S_V - lanczos.V * after.theta, axis=0) / after.theta
+    assert_allclose(after.residuals, true, rtol=1e-6, atol=1e-11)
 
 
 def test_multipliers_constrain_the_modes():
