@@ -71,7 +71,8 @@ def main():
         for n_q in (8, 20, 50):
             seconds, counts = measure(chain(n_bodies, n_q), n_steps)
             per_step = seconds * 1e6
-            row = f"{n_bodies:6d} {n_q:6d} {per_step:8.1f} {per_step / n_bodies:13.1f} {counts[2]:11.2f} {counts[1]:15.3f}"
+            counted = f"{counts[2]:11.2f} {counts[1]:15.3f}"
+            row = f"{n_bodies:6d} {n_q:6d} {per_step:8.1f} {per_step / n_bodies:13.1f} {counted}"
             print(row)
 
 

@@ -271,7 +271,7 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """
     t, n, u0, q0 = model.kind[i], model.n_q[i], model.u0[i], model.q0[i]
     m = model.mass[t]
-    u, ud, J, Dd = work.u, work.u_dot, work.J[i], work.D_q_dot[i]
+    u, J, Dd = work.u, work.J[i], work.D_q_dot[i]
     a0, a1, a2 = work.a_B[i, 0], work.a_B[i, 1], work.a_B[i, 2]
     o0, o1, o2 = u[u0 + 3], u[u0 + 4], u[u0 + 5]
     q = work.q[q0 : q0 + n]
