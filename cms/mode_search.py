@@ -11,7 +11,7 @@ from cms.tall import combine
 
 __all__ = ["DenseSearch", "KrylovSearch"]
 
-BLOCK = 8  #: columns of a Lanczos block; measured in docs/eigensolver.md
+BLOCK = 8  #: columns of a Lanczos block
 GUARDS = 8  #: Ritz vectors beyond the wanted ones that take part in the last step
 FIRST_GUESS = 30  #: modes to make room for, as long as only a frequency is given
 MOST_COLUMNS = 40  #: to solve for, per wanted mode and guard
