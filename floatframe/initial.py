@@ -16,6 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from cms.arrays import Array
+from floatframe.arrays import array_of_shape
 from floatframe.compiled import CompiledSystem
 from floatframe.errors import ModelError
 from floatframe.joints.rows import DOT, GAUGE, POINT, SPRING
@@ -31,6 +32,7 @@ from floatframe.linearization import (
     with_mass_for_all,
     with_modal_weight,
 )
+from floatframe.rigid_body import euler_parameters_from_user
 from floatframe.state import State
 from floatframe.system import System
 
@@ -65,12 +67,23 @@ def consistent_state(system: System, state: State | None = None) -> ConsistentSt
         If the joints cannot be closed from these positions, or some constraints repeat others.
     """
     compiled = system.compiled
-    state = compiled.placed if state is None else state
+    state = compiled.placed if state is None else checked(compiled, state)
     work = new_work(compiled.model)
     state = assembled(compiled, work, state)
     require_independent_constraints(compiled, work, state)
     state = with_compatible_velocities(compiled, work, state)
     return ConsistentState(state, *solve_accelerations(compiled, work, state))
+
+
+def checked(compiled: CompiledSystem, state: State) -> State:
+    """Return a state given by the user; `ModelError` if it is not one of this system."""
+    p = np.empty_like(compiled.placed.p)
+    for name in ("r", "p", "q", "u"):
+        value = array_of_shape(f"state: {name}", getattr(state, name), getattr(compiled.placed, name).shape)
+        if name == "p":
+            for i, parameters in enumerate(value):
+                p[i] = euler_parameters_from_user(f"state: p of body {compiled.body_names[i]!r}", parameters)
+    return State(state.r, p, state.q, state.u)
 
 
 def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:

@@ -58,7 +58,9 @@ class GeneralizedAlpha:
     .. [2] Bruels & Cardona (2010), Journal of Computational and Nonlinear Dynamics 5, 031002.
     """
 
-    rho_inf: float = 0.8  #: spectral radius at infinite frequency, 0 <= rho_inf <= 1; 1: no numerical damping
+    #: spectral radius at infinite frequency, 0 <= rho_inf <= 1; 1: no numerical damping, reactions of joints then
+    #: oscillate by O(h) for good
+    rho_inf: float = 0.8
     tolerance: float = 1e-8  #: largest last correction over the one that the accelerations of the step amount to
     max_iterations: int = 25
 

@@ -43,7 +43,6 @@ class Outcome(NamedTuple):
 def make_entry(digest):
     """Return the cached entry; the digest of the sources enters its key, see the package docstring."""
 
-    @njit(cache=True)
     def run(what, model_data, work_data, memory_data, rows_data, numbers, integers, out):
         if digest == 0:
             return DONE, 0, 0, -1, 0.0
@@ -85,7 +84,10 @@ def make_entry(digest):
                     return SINGULAR_CONNECTION, 0, 0, connection, 0.0
         return DONE, 0, 0, -1, 0.0
 
-    return run
+    try:
+        return njit(run, cache=True, error_model="numpy")
+    except RuntimeError:  # nowhere to keep the cache: compiled anew in each process
+        return njit(run, error_model="numpy")
 
 
 run = make_entry(source_digest())

@@ -154,6 +154,17 @@ def test_a_loop_without_redundant_constraints_runs():
     assert motion.drift("j4").distance.max() < 1e-13
 
 
+def test_a_state_that_is_none_of_this_system_is_refused():
+    system = open_chain()
+    placed = system.compiled.placed
+    with pytest.raises(ModelError, match="state: u: expected finite numbers"):
+        consistent_state(system, State(placed.r, placed.p, placed.q, placed.u * np.nan))
+    with pytest.raises(ModelError, match=r"state: q: expected shape \(3,\), got \(2,\)"):
+        consistent_state(system, State(placed.r, placed.p, placed.q[:2], placed.u))
+    with pytest.raises(ModelError, match=r"p of body 'second'.*of length 1"):
+        consistent_state(system, State(placed.r, placed.p * [[1], [2], [1]], placed.q, placed.u))
+
+
 def test_an_impossible_assembly_names_the_open_joint():
     bodies = [RigidBody("link", 1.0, LINK)]
     joints = [
