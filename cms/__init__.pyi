@@ -5,6 +5,7 @@ from .fe_body import Interface as Interface
 from .frames import NodalFrame as NodalFrame
 from .frames import TisserandFrame as TisserandFrame
 from .invariants import Moments as Moments
+from .load_cases import LoadCase as LoadCase
 from .modal_file import read as read
 from .modal_file import write as write
 from .mode_set import ModeSet as ModeSet

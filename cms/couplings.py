@@ -98,6 +98,7 @@ def couple(body: FEBody) -> FEBody:
         interfaces=interfaces,
         nodes=np.concatenate([body.nodes, *[interface.reference[None] for interface in references]]),
         recovery=Recovery(recovery, body.dofs),
+        load_cases=tuple(replace(case, f=recovery.T @ case.f) for case in body.load_cases),
     )
 
 

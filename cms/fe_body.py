@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from cms.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape, symmetric_csc
 from cms.errors import BodyError
+from cms.load_cases import LoadCase, check_load_cases
 from cms.units import Units, unit_system
 from cms.words import nearest
 
@@ -127,6 +128,7 @@ class FEBody:
     surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of nodes, (n_tri, 3)
     element_model: ElementModel | None = None  #: None: bare matrices, then exact only what matrices can give
     recovery: Recovery | None = None  #: None: the dofs are those of the mesh
+    load_cases: tuple[LoadCase, ...] = ()  #: named loads over the dofs of this body
     provenance: Mapping[str, str] = field(default_factory=dict)  #: where it came from: file, digest, options
 
     def __post_init__(self) -> None:
@@ -158,6 +160,7 @@ class FEBody:
         put(self, "K", symmetric_csc(f"{where}: K", self.K, n_dof))
         if self.D is not None:
             put(self, "D", symmetric_csc(f"{where}: D", self.D, n_dof))
+        put(self, "load_cases", check_load_cases(where, self.load_cases, n_dof))
         names = [interface.name for interface in self.interfaces]
         if len(set(names)) != len(names):
             raise BodyError(f"{where}: two interfaces have the same name; got {', '.join(names)}")
@@ -228,6 +231,10 @@ class FEBody:
     def with_interfaces(self, *interfaces: Interface) -> "FEBody":
         """Return the body with these interfaces added (still to be coupled)."""
         return replace(self, interfaces=(*self.interfaces, *interfaces))
+
+    def with_load_cases(self, *load_cases: LoadCase) -> "FEBody":
+        """Return the body with these load cases added."""
+        return replace(self, load_cases=(*self.load_cases, *load_cases))
 
 
 def put_translations(field_: Array, dofs: IntArray, u: Array) -> None:

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, 
 
 from cms.errors import JobError
 from cms.fe_body import INTERFACE_KINDS
+from cms.load_cases import LOAD_CASE_KINDS
 from cms.mode_sets import MODE_SETS
 from cms.paths import near_file
 from cms.toml_file import Matrix3, Range, Table, Vector3, choice, read_toml, validated
@@ -20,6 +21,11 @@ __all__ = ["SELECTIONS", "Job", "mode_set_options", "read_job"]
 SELECTIONS = ("faces", "nodes", "plane", "cylinder", "box", "nearest")  #: keys that select the nodes of an interface
 ACCEPTABLE = ("overlap", "parts", "transition", "units")  #: errors of the mesh report that may be meant
 FRAMES = ("nodal", "tisserand")
+KEYS_OF_LOADS = {
+    "pressure": ("pressure",),
+    "gravity": ("acceleration",),
+    "force": ("force", "torque", "at", "reference"),
+}  #: keys of a load case by its kind, beside the selections of pressure and force
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
@@ -142,6 +148,49 @@ class InterfaceSection(Table):
         return self
 
 
+class LoadCaseSection(Table):
+    """[load_cases.NAME]: a named load, whose modal forces and stresses go into the modal file."""
+
+    kind: choice("kind", lambda: LOAD_CASE_KINDS) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(LOAD_CASE_KINDS)}"
+    )
+    pressure: float | None = Field(None, description="a number, positive pushes on the surface [stress unit]")
+    acceleration: Vector3 | None = Field(None, description="the acceleration of free fall, [x, y, z]")
+    force: Vector3 | None = Field(None, description="the total force, [x, y, z]")
+    torque: Vector3 | None = Field(None, description="the total torque about the reference point, [x, y, z]")
+    at: Name | None = Field(None, description="the name of an interface, at whose reference point it acts")
+    reference: Vector3 | None = Field(None, description="the point the force acts at, [x, y, z]")
+    faces: Name | None = Field(None, description="the name of a group of faces")
+    nodes: Name | None = Field(None, description="the name of a group of nodes")
+    plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
+    cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
+    box: BoxSection | None = Field(None, description="a table {lo, hi}")
+    nearest: NearestSection | None = Field(None, description="a table {point}")
+
+    @property
+    def selection(self) -> str | None:
+        """The key of the selection that is given, if one is."""
+        return next((key for key in SELECTIONS if getattr(self, key) is not None), None)
+
+    @model_validator(mode="after")
+    def _keys_of_the_kind(self) -> "LoadCaseSection":
+        allowed = KEYS_OF_LOADS[self.kind] + (() if self.kind == "gravity" else SELECTIONS)
+        given = [key for key in type(self).model_fields if key != "kind" and getattr(self, key) is not None]
+        for key in given:
+            if key not in allowed:
+                raise ValueError(f"a load case of kind {self.kind!r} has no key {key}{nearest(key, allowed)}")
+        places = [key for key in given if key in (*SELECTIONS, "at")]
+        if self.kind != "gravity" and len(places) != 1:
+            choices = ", ".join(("at", *SELECTIONS) if self.kind == "force" else SELECTIONS)
+            raise ValueError(f"expected exactly one of {choices}; got {', '.join(places) or 'none'}")
+        amounts = ("force", "torque") if self.kind == "force" else KEYS_OF_LOADS[self.kind]
+        if not any(key in given for key in amounts):
+            raise ValueError(f"{' or '.join(amounts)}: missing; how large is the load?")
+        if self.at is not None and self.reference is not None:
+            raise ValueError("reference: an interface has its own; remove the key, or select the nodes instead of at")
+        return self
+
+
 class ReductionSection(Table):
     """[reduction]: the mode set, its options, and the body frame."""
 
@@ -199,6 +248,7 @@ class Job(Table):
     body: BodySection = Field(description="a table [body] with mesh and units")
     materials: dict[str, MaterialSection] = Field({}, description="tables [materials.NAME]")
     interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")
+    load_cases: dict[str, LoadCaseSection] = Field({}, description="tables [load_cases.NAME]")
     reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
     damping: DampingSection | None = Field(None, description="a table [damping] with ratio, or alpha and beta")
 
@@ -222,6 +272,15 @@ class Job(Table):
         at = self.reduction.at
         if self.body.mesh and at is not None and at not in self.interfaces:
             raise ValueError(f'reduction.at = "{at}": there is no such interface{nearest(at, self.interfaces)}')
+        for name, case in self.load_cases.items():
+            if self.body.mesh and case.at is not None and case.at not in self.interfaces:
+                raise ValueError(
+                    f'load_cases.{name}.at = "{case.at}": there is no such interface{nearest(case.at, self.interfaces)}'
+                )
+            if self.body.matrices and case.selection is not None:
+                raise ValueError(
+                    f"load_cases.{name}.{case.selection}: matrices have no mesh to select on; give at = an interface"
+                )
         return self
 
 

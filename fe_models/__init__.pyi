@@ -7,6 +7,9 @@ from .errors import (
     InterfaceError as InterfaceError,
 )
 from .errors import (
+    LoadError as LoadError,
+)
+from .errors import (
     MaterialError as MaterialError,
 )
 from .errors import (
@@ -25,6 +28,11 @@ from .interfaces import (
 from .interfaces import (
     rigid_interface as rigid_interface,
 )
+from .loads import gravity_load as gravity_load
+from .loads import interface_load as interface_load
+from .loads import nodal_load as nodal_load
+from .loads import pressure_load as pressure_load
+from .loads import selection_load as selection_load
 from .material import Material as Material
 from .matrices import body_from_matrices as body_from_matrices
 from .matrices import body_from_npz as body_from_npz

@@ -1,6 +1,6 @@
 """Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
 
-__all__ = ["FeModelsError", "InterfaceError", "MaterialError", "MeshError"]
+__all__ = ["FeModelsError", "InterfaceError", "LoadError", "MaterialError", "MeshError"]
 
 
 class FeModelsError(Exception):
@@ -17,3 +17,7 @@ class MaterialError(FeModelsError, ValueError):
 
 class InterfaceError(FeModelsError, ValueError):
     """An interface selects nothing, too little, or what another interface has."""
+
+
+class LoadError(FeModelsError, ValueError):
+    """A load case is impossible on this body: no such node, no dof to carry it, no face to press on."""

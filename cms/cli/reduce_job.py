@@ -9,7 +9,8 @@ import numpy as np
 from cms.cli.console import Stages
 from cms.errors import JobError
 from cms.fe_body import FEBody, Interface
-from cms.job import InterfaceSection, Job, mode_set_options
+from cms.job import InterfaceSection, Job, LoadCaseSection, mode_set_options
+from cms.load_cases import LoadCase
 from cms.reduced_body import ReducedBody
 from cms.units import unit_system
 
@@ -85,7 +86,8 @@ def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
         interfaces = interfaces_of(job, mesh)
     name = str(job.body.name)
     with stages("assemble") as advance:
-        return solid_body(mesh, materials, name=name, units=units, interfaces=interfaces, progress=advance)
+        body = solid_body(mesh, materials, name=name, units=units, interfaces=interfaces, progress=advance)
+        return body.with_load_cases(*load_cases_of(job, body, mesh))
 
 
 def body_of_matrices(job: Job, path: Path, stages: Stages) -> FEBody:
@@ -93,7 +95,8 @@ def body_of_matrices(job: Job, path: Path, stages: Stages) -> FEBody:
     from fe_models.matrices import body_from_npz
 
     with stages("read matrices"):
-        return body_from_npz(path, name=job.body.name, units=unit_system(job.body.units))
+        body = body_from_npz(path, name=job.body.name, units=unit_system(job.body.units))
+        return body.with_load_cases(*load_cases_of(job, body))
 
 
 def materials_of(job: Job) -> "Material | dict[str, Material]":
@@ -120,13 +123,22 @@ def interfaces_of(job: Job, mesh: "Mesh") -> tuple[Interface, ...]:
 
 def interface_of(name: str, section: InterfaceSection, mesh: "Mesh") -> Interface:
     """Return one interface: its selection, kind, reference point and axes."""
-    from fe_models import interfaces, selections
+    from fe_models import interfaces
 
     makers = {
         "rigid": interfaces.rigid_interface,
         "distributing": interfaces.distributing_interface,
         "nodes": interfaces.nodes_interface,
     }
+    chosen = selection_of(section.selection, getattr(section, section.selection))
+    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+    return makers[section.kind](mesh, name, chosen, reference=section.reference, triad=triad)
+
+
+def selection_of(key: str, given: Any) -> Any:
+    """Return the selection that a key of the job names, with the options given."""
+    from fe_models import selections
+
     types = {
         "faces": selections.FaceGroup,
         "nodes": selections.NodeSet,
@@ -135,11 +147,30 @@ def interface_of(name: str, section: InterfaceSection, mesh: "Mesh") -> Interfac
         "box": selections.Box,
         "nearest": selections.NearestNode,
     }
-    given = getattr(section, section.selection)
-    selection: Any = types[section.selection]
-    chosen = selection(given) if isinstance(given, str) else selection(**given.model_dump())
-    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
-    return makers[section.kind](mesh, name, chosen, reference=section.reference, triad=triad)
+    selection: Any = types[key]
+    return selection(given) if isinstance(given, str) else selection(**given.model_dump())
+
+
+def load_cases_of(job: Job, body: FEBody, mesh: "Mesh | None" = None) -> tuple[LoadCase, ...]:
+    """Return the load cases of the job on this body, not yet coupled."""
+    return tuple(load_case_of(name, section, body, mesh) for name, section in job.load_cases.items())
+
+
+def load_case_of(name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | None") -> LoadCase:
+    """Return one load case; the job has checked that its keys fit its kind."""
+    from fe_models import loads
+
+    if section.acceleration is not None:
+        return loads.gravity_load(body, name, section.acceleration)
+    force, torque = section.force or (0.0, 0.0, 0.0), section.torque or (0.0, 0.0, 0.0)
+    if section.at is not None:
+        return loads.interface_load(body, name, section.at, force=force, torque=torque)
+    if mesh is None or section.selection is None:
+        raise JobError(f"load_cases.{name}: there is no mesh to select on; give at = an interface")
+    chosen = selection_of(section.selection, getattr(section, section.selection))
+    if section.pressure is not None:
+        return loads.pressure_load(body, mesh, name, chosen, section.pressure)
+    return loads.selection_load(body, mesh, name, chosen, force=force, torque=torque, reference=section.reference)
 
 
 def frame_of(job: Job) -> Any:

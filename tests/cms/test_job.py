@@ -3,7 +3,16 @@ from pathlib import Path
 import pytest
 
 from cms.errors import JobError
-from cms.job import BodySection, DampingSection, InterfaceSection, Job, MaterialSection, ReductionSection, read_job
+from cms.job import (
+    BodySection,
+    DampingSection,
+    InterfaceSection,
+    Job,
+    LoadCaseSection,
+    MaterialSection,
+    ReductionSection,
+    read_job,
+)
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "job_file.md"
 
@@ -22,6 +31,17 @@ plane = {point = [0, 0, 0], normal = [0, 0, 1]}
 kind = "nodes"
 nodes = "left"
 triad = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+[load_cases.weight]
+kind = "gravity"
+acceleration = [0, 0, -9810]
+[load_cases.firing]
+kind = "pressure"
+pressure = 12
+plane = {point = [0, 0, 0], normal = [0, 0, 1]}
+[load_cases.pull]
+kind = "force"
+torque = [0, 0, 3]
+at = "small_end"
 [reduction]
 n_modes = 12
 frame = "nodal"
@@ -89,6 +109,18 @@ def test_a_good_job_is_read(job_file):
     ("[reduction]", "[reductio]", "reductio: unknown key; did you mean 'reduction'?"),
     ("[damping]", "[interfaces.x]\nkind='rigid'\nbox=3\n[damping]", "interfaces.x.box = 3: expected a table {lo, hi}"),
     ("[damping]", "[materials.b]\nyoung=1\npoisson=0\ndensity=1\n[damping]", "there are 2 materials; name the group"),
+    ('kind = "gravity"', 'kind = "gravitas"', "load_cases.weight.kind = \"gravitas\": unknown kind; did you mean 'grav"),
+    ("acceleration = ", "pressure = 1\nforce =", "weight: a load case of kind 'gravity' has no key pressure"),
+    ("acceleration = [0, 0, -9810]", "", "load_cases.weight: acceleration: missing; how large is the load?"),
+    ("acceleration = [0, 0, -9810]", "box = {lo=[0,0,0], hi=[1,1,1]}", "kind 'gravity' has no key box"),
+    ("pressure = 12", "", "load_cases.firing: pressure: missing; how large is the load?"),
+    ("pressure = 12", "pressure = 12\nbox={lo=[0,0,0],hi=[1,1,1]}", "one of faces, nodes, plane, cylinder, box, nearest; got plane, "
+                                                                    "box"),
+    ("pressure = 12", "pressure = nan", "load_cases.firing.pressure = nan: expected a number"),
+    ("torque = [0, 0, 3]", "", "load_cases.pull: force or torque: missing"),
+    ('at = "small_end"\n', "", "expected exactly one of at, faces, nodes"),
+    ('at = "small_end"', 'at = "smal_end"', "load_cases.pull.at = \"smal_end\": there is no such interface; did you mean"),
+    ('at = "small_end"', 'at = "small_end"\nreference = [0,0,0]', "an interface has its own"),
     ('[body]', '[body]\naccept = ["part"]', "'part' is not a finding that can be accepted; did you mean 'parts'?"),
     ('[body]', '[body]\nname = 3', "body.name = 3: expected the name of the body"),
     ('[body]', "body = 3\n[bodi]", "body = 3: expected a table [body]"),
@@ -137,7 +169,7 @@ def test_matrices_bring_their_interfaces_and_no_material(job_file, tmp_path):
 
 def test_every_key_is_documented():
     text = DOCUMENT.read_text(encoding="utf-8")
-    for table in (BodySection, MaterialSection, InterfaceSection, ReductionSection, DampingSection):
+    for table in (BodySection, MaterialSection, InterfaceSection, LoadCaseSection, ReductionSection, DampingSection):
         for key in table.model_fields:
             assert f"| `{key}` |" in text, f"{table.__name__}: {key}"
     for key in Job.model_fields:
