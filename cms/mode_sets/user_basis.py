@@ -1,0 +1,109 @@
+"""User basis: columns that came from elsewhere, taken as a mode set."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+from zipfile import BadZipFile
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.coupled_field import coupled_field
+from cms.errors import ModeSetError
+from cms.fe_body import FEBody
+from cms.mode_set import ModeSet
+
+if TYPE_CHECKING:
+    from cms.families import Families
+
+__all__ = ["user_basis"]
+
+
+def user_basis(
+    body: FEBody,
+    *,
+    columns: Array | str | os.PathLike[str],
+    labels: Sequence[str] | None = None,
+    frequencies: Array | None = None,
+    families: "Families | None" = None,
+) -> ModeSet:
+    """Take given columns as a mode set.
+
+    Parameters
+    ----------
+    body
+        A coupled body.
+    columns
+        Displacement columns over the dofs of the coupled body (n_dof, k), or over those of its mesh (n_mesh_dof, k),
+        which are then brought to the coupled body (`cms.coupled_field`: rigid interfaces take the nearest rigid motion,
+        and how near that is stands in the options of the set). Or a file: .npy with the array, .npz with `columns` and,
+        if need be, `labels` and `frequencies`.
+    labels
+        One per column; "user 1", "user 2", … by default, or those of the file.
+    frequencies
+        Of vibration columns, NaN for static ones, (k,) [Hz]; all NaN by default, or those of the file.
+    families
+        Not used; here so that all mode sets are called alike.
+
+    Raises
+    ------
+    ModeSetError
+        If the file cannot be read, or shape, labels or numbers do not fit the body.
+    """
+    body.require_coupled()
+    options = {"columns": "given as an array"}
+    if isinstance(columns, str | os.PathLike):
+        path = Path(columns)
+        columns, labels, frequencies = _read(path, labels, frequencies)
+        options["columns"] = f"file {path.name}"
+    V = np.asarray(columns)
+    where = f"user_basis: body {body.name!r}"
+    if V.dtype.kind not in "fiu":
+        raise ModeSetError(f"{where}: columns: expected real numbers, got {V.dtype}")
+    V = V.astype(np.float64)
+    n_mesh = body.n_dof if body.recovery is None else body.recovery.matrix.shape[0]
+    if V.ndim != 2 or len(V) not in (body.n_dof, n_mesh) or V.shape[1] == 0:
+        mesh = "" if n_mesh == body.n_dof else f" or ({n_mesh}, k) over the dofs of the mesh"
+        raise ModeSetError(f"{where}: columns: expected ({body.n_dof}, k) over the coupled dofs{mesh}, got {V.shape}")
+    if not np.isfinite(V).all():
+        raise ModeSetError(f"{where}: columns: expected finite numbers, got NaN or infinite ones")
+    if len(V) != body.n_dof:
+        field = coupled_field(body, V)
+        V = field.columns
+        options |= {
+            f"motion of interface {name} that is not rigid": f"{part:.3g}" for name, part in field.departure.items()
+        }
+    k = V.shape[1]
+    labels = tuple(f"user {j + 1}" for j in range(k)) if labels is None else tuple(str(label) for label in labels)
+    frequencies = np.full(k, np.nan) if frequencies is None else np.asarray(frequencies, dtype=float)
+    if len(labels) != k or frequencies.shape != (k,):
+        raise ModeSetError(
+            f"{where}: {k} columns need as many labels and frequencies, got {len(labels)} and {frequencies.shape}"
+        )
+    return ModeSet("user-basis", V, labels, frequencies, options, ("user",) * k)
+
+
+def _read(
+    path: Path, labels: Sequence[str] | None, frequencies: Array | None
+) -> tuple[Array, Sequence[str] | None, Array | None]:
+    """Read an array from .npy, or columns, labels and frequencies from .npz; never a pickle."""
+    where = f"user_basis: {path}"
+    try:
+        with open(path, "rb") as file:
+            content = np.load(file, allow_pickle=False)
+            if isinstance(content, np.ndarray):
+                return content, labels, frequencies
+            if "columns" not in content:
+                raise ModeSetError(
+                    f"{where}: expected an array named 'columns', got {', '.join(content.files) or 'nothing'}"
+                )
+            labels = content["labels"].tolist() if labels is None and "labels" in content else labels
+            frequencies = content["frequencies"] if frequencies is None and "frequencies" in content else frequencies
+            return content["columns"], labels, frequencies
+    except FileNotFoundError:
+        raise ModeSetError(f"{where}: no such file") from None
+    except (OSError, ValueError, EOFError, BadZipFile) as error:
+        if isinstance(error, ModeSetError):
+            raise
+        raise ModeSetError(f"{where}: not a readable .npy or .npz file of numbers: {error}") from error
