@@ -1,5 +1,6 @@
 from .couplings import couple as couple
 from .errors import CmsError as CmsError
+from .families import Families as Families
 from .fe_body import FEBody as FEBody
 from .fe_body import Interface as Interface
 from .frames import NodalFrame as NodalFrame

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from cms.arrays import Array, frozen
 from cms.errors import EigenError
 from cms.factorization import Factorization, factorize
+from cms.inverse import Inverse
 from cms.mode_search import DenseSearch, KrylovSearch
 from cms.orientation import orientation
 from cms.shift_inverted import Modes, ShiftInverted, Wanted
@@ -52,7 +53,7 @@ def eigenmodes(
     *,
     n_modes: int | None = None,
     cutoff: float | None = None,
-    factorization: Factorization | None = None,
+    factorization: Inverse | None = None,
     shift: float | None = None,
     tolerance: float = 1e-6,
     verify: bool = False,
@@ -185,7 +186,7 @@ def _factorize_shifted(K: sp.csc_array, M: sp.csc_array, sigma: float) -> Factor
     return factorize(A, definite=sigma <= 0 and bool((A.diagonal() > 0).all()))
 
 
-def _count_below(K: sp.csc_array, M: sp.csc_array, sigma: float, at_shift: Factorization) -> int:
+def _count_below(K: sp.csc_array, M: sp.csc_array, sigma: float, at_shift: Inverse) -> int:
     """Modes between the shift and sigma, by Sylvester's law: K - sigma M has one more negative eigenvalue for each."""
     with _factorize_shifted(K, M, sigma) as factorization:
         inertia = factorization.inertia

@@ -22,8 +22,8 @@ class FixedInterfaceBody:
     """Interior partition of a coupled body and the factorisation of K_II; use as a context manager to free it."""
 
     body: FEBody
-    i: IntArray  #: interior dofs, (n_i,)
-    b: IntArray  #: boundary dofs, (n_b,)
+    i: IntArray  #: interior dofs: all others, ascending, (n_i,)
+    b: IntArray  #: held dofs: the boundary dofs in the order of `body.b`, then extra ones, (n_b,)
     K_ii: sp.csc_array  #: (n_i, n_i) [N/m]
     M_ii: sp.csc_array  #: (n_i, n_i) [kg]
     factorization: Factorization  #: of K_ii
@@ -40,18 +40,24 @@ class FixedInterfaceBody:
         return int((self.body.dofs[:, 1] == MULTIPLIER).sum())
 
 
-def fix_interfaces(body: FEBody) -> FixedInterfaceBody:
+def fix_interfaces(body: FEBody, extra: IntArray | None = None) -> FixedInterfaceBody:
     """Hold all boundary dofs of a coupled body and factorise its interior stiffness.
+
+    Parameters
+    ----------
+    extra
+        More dofs to hold, where the interfaces alone leave a rigid-body motion free (`determinate_partition`).
 
     Raises
     ------
     ModeSetError
-        If the body has no interface, or no interior dof is left.
+        If no dof is held (the body has no interface), or no interior dof is left.
     BodyError
         If it moves without energy while its interfaces are held: a mechanism; the text says where.
     """
     body.require_coupled()
-    b, i = body.b, body.i
+    b = body.b if extra is None else np.concatenate([body.b, np.setdiff1d(extra, body.b)])
+    i = np.setdiff1d(np.arange(body.n_dof), b)
     if len(b) == 0:
         raise ModeSetError(f"body {body.name!r} has no interface; give it at least one, or take free modes")
     if len(i) == 0:

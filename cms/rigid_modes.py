@@ -10,12 +10,15 @@ from cms.fe_body import FEBody
 
 __all__ = [
     "determinate_dofs",
+    "determinate_partition",
     "geometric_rigid_modes",
+    "independent_rigid_modes",
     "null_space_rigid_modes",
     "rigid_motion_of_points",
     "static_rigid_modes",
 ]
 
+HOLDS = 1e-4  #: pivot above which a dof holds a motion well enough to rest a factorisation on it
 RANK_TOLERANCE = 1e-8  #: of rigid-body modes restricted to some dofs, rotations scaled by the body length
 
 
@@ -78,6 +81,67 @@ def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
             "take an interface with six dofs, or more nodes that are not on one line"
         )
     return np.sort(candidates[pivots[:6]])
+
+
+def independent_rigid_modes(body: FEBody) -> Array:
+    """Rigid-body modes about the mean of the nodes, without those the body's dofs do not know, (n_dof, n_r).
+
+    n_r is 6 in space, 3 for a body of plane dofs, 1 for a row of masses. Columns d [-] first, then theta [m].
+
+    Raises
+    ------
+    BodyError
+        If the body has no displacement dofs.
+    """
+    Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    scaled = _in_lengths(body, Psi_R)
+    scaled[:, 3:] /= body.length or 1.0
+    _, R, pivots = la.qr(scaled, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(R))
+    rank = int((sizes > RANK_TOLERANCE * sizes.max(initial=0.0)).sum()) if sizes.any() else 0
+    if rank == 0:
+        raise BodyError(f"body {body.name!r}: has no displacement dofs; expected components 0..5")
+    return Psi_R[:, np.sort(pivots[:rank])]
+
+
+def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArray]:
+    """Choose the statically determinate dofs R among the boundary dofs, and interior ones where those do not suffice.
+
+    (1) pivoted QR of the rigid-body modes restricted to B, rotations scaled by the body length
+    (2) where their rank there is below n_r: the same over the interior dofs for the motions B leaves free
+
+    Parameters
+    ----------
+    Psi_R
+        Independent rigid-body modes, (n_dof, n_r).
+
+    Returns
+    -------
+    r
+        Determinate dofs, (n_r,), ascending.
+    extra
+        Those of them that are interior dofs; empty for a body whose interfaces hold it.
+    """
+    scaled = _in_lengths(body, Psi_R)
+    scaled /= np.abs(scaled).max(axis=0)
+    n_r = scaled.shape[1]
+    b = body.b
+    Q, R, pivots = la.qr(scaled[b].T, pivoting=True) if len(b) else (np.eye(n_r), np.zeros((n_r, 0)), b)
+    rank = int((np.abs(np.diag(R)) > HOLDS).sum())
+    held = b[pivots[:rank]]
+    extra = np.zeros(0, np.int64)
+    if rank < n_r:
+        i = body.i
+        *_, pivots = la.qr((scaled[i] @ Q[:, rank:]).T, mode="economic", pivoting=True)
+        extra = np.sort(i[pivots[: n_r - rank]])
+    return np.sort(np.concatenate([held, extra])), extra
+
+
+def _in_lengths(body: FEBody, Psi_R: Array) -> Array:
+    """Return rigid-body modes with rotation dofs counted as the translation at one body length."""
+    scaled = Psi_R.copy()
+    scaled[body.dofs[:, 1] >= 3] *= body.length or 1.0
+    return scaled
 
 
 def static_rigid_modes(body: FEBody, r: IntArray) -> Array:

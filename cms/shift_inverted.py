@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from cms.arrays import Array
 from cms.errors import EigenError
-from cms.factorization import Factorization
+from cms.inverse import Inverse
 from cms.sparse_product import SymmetricProduct
 from cms.tall import combine, inner
 
@@ -39,7 +39,7 @@ class ShiftInverted:
         self,
         M: sp.csc_array,
         shift: float,
-        factorization: Factorization,
+        factorization: Inverse,
         tolerance: float,
         progress: Callable[[int, int], None] | None = None,
     ) -> None:

@@ -3,10 +3,22 @@
 import numpy as np
 
 from cms.arrays import Array
+from cms.eigen import EigenResult
 from cms.fe_body import FEBody
 from cms.fixed_interface import FixedInterfaceBody
+from cms.flexibility import Flexibility
+from cms.tall import combine
 
-__all__ = ["boundary_groups", "boundary_labels", "constraint_modes"]
+__all__ = [
+    "attachment_modes",
+    "boundary_groups",
+    "boundary_labels",
+    "constraint_modes",
+    "inertia_relief_modes",
+    "redundant_constraint_modes",
+    "residual_attachment_modes",
+    "unrestrained_attachment_modes",
+]
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 BLOCK = 60  #: right-hand sides solved at once; wider blocks gain nothing measurable and cost memory
@@ -15,7 +27,7 @@ BLOCK = 60  #: right-hand sides solved at once; wider blocks gain nothing measur
 def constraint_modes(fixed: FixedInterfaceBody) -> Array:
     """Constraint modes Psi_C: unit displacement of one boundary dof, the other boundary dofs held.
 
-    Interior part -K_II⁻¹ K_IB; columns in the order of `body.b`.
+    Interior part -K_II⁻¹ K_IB; columns in the order of the held dofs `fixed.b`.
 
     Returns
     -------
@@ -30,6 +42,92 @@ def constraint_modes(fixed: FixedInterfaceBody) -> Array:
         columns = slice(first, min(first + BLOCK, len(b)))
         Psi_C[i, columns] = fixed.factorization.solve(-K_b[:, columns].toarray()[i])
     return Psi_C
+
+
+def redundant_constraint_modes(free: Flexibility) -> Array:
+    """Redundant constraint modes Psi_RC: unit displacement of one E dof, the other E dofs and R held.
+
+    Parameters
+    ----------
+    free
+        The flexibility of the free body, whose pivots are R.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_e), the constraint modes of the E dofs.
+    """
+    return free.condensed.Psi_C[:, free.e]
+
+
+def attachment_modes(free: Flexibility) -> Array:
+    """Attachment modes Psi_A: unit force on one E dof, R held; Psi_A = Psi_C,E S_EE⁻¹.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_e), translations per force [m/N] or per moment [1/N].
+    """
+    return combine(free.condensed.Psi_C[:, free.e], free.solve_boundary(np.eye(len(free.e))))
+
+
+def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
+    """Inertia-relief modes Psi_H: static response to the loads M Psi_R of rigid-body accelerations, all of B held.
+
+    Interior part K_II⁻¹ (M Psi_R)_I.
+
+    Parameters
+    ----------
+    Psi_R
+        Rigid-body modes, (n_dof, n_r).
+
+    Returns
+    -------
+    Array
+        (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²].
+    """
+    Psi_H = np.zeros(Psi_R.shape)
+    Psi_H[fixed.i] = fixed.factorization.solve((fixed.body.M @ Psi_R)[fixed.i])
+    return Psi_H
+
+
+def unrestrained_attachment_modes(free: Flexibility) -> Array:
+    """Unrestrained attachment modes Psi_U = Pᵀ G_R P F_B: unit force on each boundary dof of the free body.
+
+    The force is in balance with the rigid-body acceleration it causes, so the choice of R does not matter.
+    G_R P F_B = Psi_C,E S_EE⁻¹ F_E - (G_R M N) N_Bᵀ with M-orthonormal rigid-body modes N: six solves, whatever n_b.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N].
+    """
+    n_b, h = len(free.condensed.body.b), free.condensed.fixed.b
+    on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
+    on_boundary[free.e] = free.solve_boundary(np.eye(len(h), n_b)[free.e])
+    u = combine(free.condensed.Psi_C, on_boundary)
+    u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
+    return u - combine(free.N, free.M_N.T @ u)
+
+
+def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResult) -> Array:
+    """Residual attachment modes: Psi_U - Phi Lambda⁻¹ Phi_Bᵀ, the unrestrained ones without the part of the kept modes.
+
+    Parameters
+    ----------
+    Psi_U
+        Unrestrained attachment modes, (n_dof, n_b).
+    free_modes
+        Elastic modes of the free body that are kept.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_b).
+    """
+    if not len(free_modes.omega2):
+        return Psi_U
+    return Psi_U - combine(free_modes.Phi, (free_modes.Phi[body.b] / free_modes.omega2).T)
 
 
 def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:

@@ -79,7 +79,7 @@ def craig_bampton(
         n_b, n_phi = len(fixed.b), len(modes.frequencies)
         columns = np.zeros((body.n_dof, n_b + n_phi))
         columns[:, :n_b] = Psi_C
-        columns[fixed.i, n_b:] = modes.Phi
+        columns[:, n_b:] = modes.Phi
         options |= {"n_modes": str(n_phi), "verified": str(verify), "eigensolver": modes.method}
         if cutoff is not None:
             options["cutoff"] = repr(float(cutoff))
