@@ -3,6 +3,7 @@
 __all__ = [
     "BodyError",
     "CmsError",
+    "CompareError",
     "EigenError",
     "FactorizationError",
     "JobError",
@@ -30,6 +31,10 @@ class ModeSetError(CmsError, ValueError):
 
 class FactorizationError(CmsError, RuntimeError):
     """A sparse matrix could not be factorised: singular, indefinite or too large."""
+
+
+class CompareError(CmsError, ValueError):
+    """A comparison of mode sets cannot be made as it was asked for."""
 
 
 class EigenError(CmsError, RuntimeError):

@@ -1,0 +1,46 @@
+"""Numbers of vibration modes in words: "0:30", "0:30:5", "0,2,5,10"."""
+
+import re
+
+from cms.errors import CompareError
+
+__all__ = ["mode_counts"]
+
+MOST_COUNTS = 500  #: numbers of modes in one comparison; more is a slip of the hand
+
+
+def mode_counts(text: str) -> tuple[int, ...]:
+    """Return the numbers of modes that a range or a list names, ascending.
+
+    >>> mode_counts("0:4"), mode_counts("0:10:5"), mode_counts("3,1,8:10")
+    ((0, 1, 2, 3, 4), (0, 5, 10), (1, 3, 8, 9, 10))
+
+    Parameters
+    ----------
+    text
+        Parts with commas between; each a number, a:b (both ends included) or a:b:step.
+
+    Raises
+    ------
+    CompareError
+        If a part is not of this form, runs downwards, or names too many numbers.
+    """
+    counts: set[int] = set()
+    for part in text.split(","):
+        words = part.strip()
+        if not re.fullmatch(r"\d+(:\d+){0,2}", words):
+            raise CompareError(
+                f"modes: {text!r}: {words!r} is not a number of modes; expected whole numbers, 0 or more, as 0:30 "
+                "(from:to), 0:30:5 (from:to:step) or 0,2,5 (a list)"
+            )
+        numbers = [int(word) for word in words.split(":")]
+        first, last = numbers[0], numbers[1] if len(numbers) > 1 else numbers[0]
+        step = numbers[2] if len(numbers) > 2 else 1
+        if last < first:
+            raise CompareError(f"modes: {text!r}: {words!r} runs from {first} down to {last}; expected {last}:{first}")
+        if step < 1:
+            raise CompareError(f"modes: {text!r}: {words!r} has step {step}; expected 1 or more")
+        if (last - first) // step >= MOST_COUNTS:
+            raise CompareError(f"modes: {text!r}: {words!r} names more than {MOST_COUNTS} numbers; take a larger step")
+        counts.update(range(first, last + 1, step))
+    return tuple(sorted(counts))
