@@ -97,6 +97,9 @@ def couple(body: FEBody) -> FEBody:
         dofs=new_dofs,
         interfaces=interfaces,
         nodes=np.concatenate([body.nodes, *[interface.reference[None] for interface in references]]),
+        node_volumes=None
+        if body.node_volumes is None
+        else np.concatenate([body.node_volumes, np.zeros(len(references))]),
         recovery=Recovery(recovery, body.dofs),
         load_cases=tuple(replace(case, f=recovery.T @ case.f) for case in body.load_cases),
     )

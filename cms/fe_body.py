@@ -14,7 +14,7 @@ from cms.load_cases import LoadCase, check_load_cases
 from cms.units import Units, unit_system
 from cms.words import nearest
 
-__all__ = ["INTERFACE_KINDS", "MULTIPLIER", "ElementModel", "FEBody", "Interface", "Recovery"]
+__all__ = ["INTERFACE_KINDS", "MULTIPLIER", "ElementModel", "FEBody", "Interface", "Recovery", "StressPointModel"]
 
 MULTIPLIER = -1  #: component code of a Lagrange multiplier of a distributing (RBE3) interface
 INTERFACE_KINDS = ("rigid", "distributing", "nodes")
@@ -22,6 +22,10 @@ INTERFACE_KINDS = ("rigid", "distributing", "nodes")
 
 class ElementModel(Protocol):
     """What only the elements know: exact integrals over mass, and stress, of a displacement field."""
+
+    @property
+    def has_nodal_stress(self) -> bool:
+        """Whether `nodal_stress` can be asked for; bare matrices and pure frames of beams do not know it."""
 
     def mass_gram(self, u: Array) -> Array:
         """Integrals over mass ∫ a aᵀ of a = [1, c, u_x, u_y, u_z] (THEORY §5).
@@ -48,7 +52,28 @@ class ElementModel(Protocol):
         Returns
         -------
         Array
-            (n_mesh_nodes, 6, k) [Pa], components xx, yy, zz, yz, xz, xy.
+            (n_mesh_nodes, 6, k) [Pa], components xx, yy, zz, yz, xz, xy; zero at nodes without solid elements.
+        """
+
+
+class StressPointModel(Protocol):
+    """Stress of a displacement field at named points, such as the outer points of beam sections."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One per point, such as "shaft 3 a top": (n_points,)."""
+
+    @property
+    def positions(self) -> Array:
+        """Undeformed, mesh axes, (n_points, 3) [m]."""
+
+    def stress(self, u: Array) -> Array:
+        """Return the stress, (n_points, 6, k) [Pa], components as in `ElementModel.nodal_stress`, mesh axes.
+
+        Parameters
+        ----------
+        u
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
         """
 
 
@@ -129,6 +154,9 @@ class FEBody:
     element_model: ElementModel | None = None  #: None: bare matrices, then exact only what matrices can give
     recovery: Recovery | None = None  #: None: the dofs are those of the mesh
     load_cases: tuple[LoadCase, ...] = ()  #: named loads over the dofs of this body
+    stress_points: StressPointModel | None = None  #: stress at points beside the nodes; None: there are none
+    #: volume each node stands for, none negative, (n_nodes,) [m³]; None: unknown, nodes with translations count equally
+    node_volumes: Array | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)  #: where it came from: file, digest, options
 
     def __post_init__(self) -> None:
@@ -160,6 +188,12 @@ class FEBody:
         put(self, "K", symmetric_csc(f"{where}: K", self.K, n_dof))
         if self.D is not None:
             put(self, "D", symmetric_csc(f"{where}: D", self.D, n_dof))
+        if self.node_volumes is not None:
+            put(self, "node_volumes", frozen(self.node_volumes))
+            require_shape(f"{where}: node_volumes", self.node_volumes, (len(self.nodes),))
+            require_finite(f"{where}: node_volumes", self.node_volumes)
+            if (self.node_volumes < 0).any() or not self.node_volumes.any():
+                raise BodyError(f"{where}: node_volumes: expected no negative volume and a positive sum")
         put(self, "load_cases", check_load_cases(where, self.load_cases, n_dof))
         names = [interface.name for interface in self.interfaces]
         if len(set(names)) != len(names):

@@ -34,6 +34,11 @@ class ScalarMassModel:
     nodes: Array  #: (n_nodes, 3) [m]
     dofs: IntArray  #: (node, component) of every dof, (n_dof, 2)
 
+    @property
+    def has_nodal_stress(self) -> bool:
+        """False: matrices do not know the elements."""
+        return False
+
     def mass_gram(self, u: Array) -> Array:
         """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k); u is (n_dof, k)."""
         translations = np.zeros((len(self.nodes), 3, u.shape[1]))

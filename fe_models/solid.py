@@ -16,12 +16,15 @@ from cms.threads import n_threads
 from cms.units import Units
 from fe_models.assembly import Progress, assemble, expand_scalar_mass
 from fe_models.boundary import boundary_triangles
+from fe_models.cell_shapes import cell_jacobians
+from fe_models.elements import reference_element
 from fe_models.material import Material, assign_materials
 from fe_models.mesh import Mesh
 from fe_models.stress import nodal_stress, stiffest_at_nodes
 
 __all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
 
+CELLS_AT_ONCE = 8_000  #: whose Jacobians are held at once
 GRAM_BYTES = 64e6  #: of one block of rows of [1, X, u] and of M_s times it
 
 
@@ -38,6 +41,11 @@ class SolidModel:
     def of_node(self) -> IntArray:
         """The material whose stress each node shows: the stiffest of its elements, (n_nodes,)."""
         return frozen_int(stiffest_at_nodes(self.mesh, self.materials, self.of_cell))
+
+    @property
+    def has_nodal_stress(self) -> bool:
+        """True: the elements know it."""
+        return True
 
     def mass_gram(self, u: Array) -> Array:
         """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
@@ -100,6 +108,7 @@ def solid_body(
         interfaces=tuple(interfaces),
         units=units,
         surface=boundary_triangles(mesh),
+        node_volumes=node_volumes(mesh),
         element_model=SolidModel(mesh, used, of_cell, M_s),
         provenance=provenance(mesh, used, of_cell),
     )
@@ -129,6 +138,23 @@ def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
             for rows, product in zip(group, pool.map(lambda rows: M_s[rows] @ A, group), strict=True):
                 gram += A[rows].T @ product
     return np.asarray((gram + gram.T) / 2)  # symmetric by definition; the blocks round the halves apart
+
+
+def node_volumes(mesh: Mesh) -> Array:
+    """Return the volume each node stands for, (n_nodes,) [m³]: that of its elements, shared out by ∫N_n².
+
+    ∫N_n itself, which would be consistent, is negative at the corners of quadratic elements. The shares are those of
+    the reference cell; volumes by the few points of the stress, exact for cells with straight edges.
+    """
+    volumes = np.zeros(len(mesh.nodes))
+    for kind, cells in mesh.cells.items():
+        element = reference_element(kind)
+        share = element.mass.weights @ element.mass.values**2
+        for begin in range(0, len(cells), CELLS_AT_ONCE):
+            rows = cells[begin : begin + CELLS_AT_ONCE]
+            V = cell_jacobians(kind, mesh.nodes[rows], element.stress.points) @ element.stress.weights
+            volumes += np.bincount(rows.ravel(), np.outer(V, share / share.sum()).ravel(), minlength=len(volumes))
+    return volumes
 
 
 def provenance(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
