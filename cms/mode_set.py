@@ -24,6 +24,7 @@ class ModeSet:
     groups: tuple[
         str, ...
     ] = ()  #: one per column, such as "constraint big_end"; by default the label but its last word
+    data: Mapping[str, Array] = field(default_factory=dict)  #: numbers about the set, such as Hankel singular values
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", frozen(self.columns))
@@ -32,6 +33,7 @@ class ModeSet:
         object.__setattr__(self, "groups", groups)
         object.__setattr__(self, "frequencies", frozen(self.frequencies))
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
+        object.__setattr__(self, "data", MappingProxyType({name: frozen(x) for name, x in self.data.items()}))
         n_columns = self.columns.shape[1]
         if not len(self.labels) == len(self.groups) == n_columns or self.frequencies.shape != (n_columns,):
             raise ModeSetError(
