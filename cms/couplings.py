@@ -33,7 +33,7 @@ def couple(body: FEBody) -> FEBody:
     BodyError
         If two interfaces share a node, or the members of an interface cannot carry a rotation (collinear, too few).
     """
-    if body.recovery is not None:
+    if body.recovery is not None and body.interfaces and body.is_coupled:
         raise BodyError(f"body {body.name!r}: is coupled already")
     _refuse_overlap(body)
     todo = [interface for interface in body.interfaces if interface.dofs is None]
@@ -41,6 +41,7 @@ def couple(body: FEBody) -> FEBody:
     distributing = [interface for interface in todo if interface.kind == "distributing"]
     for interface in (*rigid, *distributing):
         _require_spread(body, interface)
+    _require_dofs(body, todo)
     dofs_of_node = _DofTable(body)
 
     # new dofs: kept mesh dofs | reference nodes | multipliers
@@ -100,7 +101,9 @@ def couple(body: FEBody) -> FEBody:
         node_volumes=None
         if body.node_volumes is None
         else np.concatenate([body.node_volumes, np.zeros(len(references))]),
-        recovery=Recovery(recovery, body.dofs),
+        recovery=Recovery(recovery, body.dofs)
+        if body.recovery is None
+        else Recovery(sp.csr_array(body.recovery.matrix @ recovery), body.recovery.dofs),
         load_cases=tuple(replace(case, f=recovery.T @ case.f) for case in body.load_cases),
     )
 
@@ -255,6 +258,19 @@ def _refuse_overlap(body: FEBody) -> None:
                 f"{shared.count(shared[0])} nodes; a node can belong to one interface only"
             )
         owner.update(dict.fromkeys(interface.nodes.tolist(), interface.name))
+
+
+def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
+    """Refuse members without dofs: nodes that already follow others."""
+    has_dofs = np.zeros(len(body.nodes), dtype=bool)
+    has_dofs[body.dofs[:, 0]] = True
+    for interface in interfaces:
+        without = interface.nodes[~has_dofs[interface.nodes]]
+        if len(without):
+            raise BodyError(
+                f"body {body.name!r}: interface {interface.name!r}: {len(without)} member nodes have no dofs, first node "
+                f"{without[0]}: they follow a rigid link; take the node that leads them"
+            )
 
 
 def _require_spread(body: FEBody, interface: Interface) -> None:

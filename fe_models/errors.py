@@ -1,6 +1,6 @@
 """Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
 
-__all__ = ["FeModelsError", "InterfaceError", "LoadError", "MaterialError", "MeshError"]
+__all__ = ["BeamError", "FeModelsError", "InterfaceError", "LoadError", "MaterialError", "MeshError", "SectionError"]
 
 
 class FeModelsError(Exception):
@@ -13,6 +13,14 @@ class MeshError(FeModelsError, ValueError):
 
 class MaterialError(FeModelsError, ValueError):
     """A material is impossible, or cells have none or two."""
+
+
+class SectionError(FeModelsError, ValueError):
+    """A cross-section of a beam is impossible, or lines have none or two."""
+
+
+class BeamError(FeModelsError, ValueError):
+    """A beam model is impossible: a line without length or direction, a follower of two nodes, an unknown node."""
 
 
 class InterfaceError(FeModelsError, ValueError):
