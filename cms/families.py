@@ -25,6 +25,7 @@ from cms.static_modes import (
     residual_attachment_modes,
     unrestrained_attachment_modes,
 )
+from cms.tall import combine
 from cms.vibration_modes import elastic_modes, fixed_interface_modes, no_modes
 
 __all__ = ["Families"]
@@ -71,9 +72,13 @@ class Families:
 
     # -- partition -------------------------------------------------------------------------------------------------
 
-    @cached_property
+    @property
     def Psi_R(self) -> Array:
         """Rigid-body modes about the mean of the nodes, independent ones only, (n_dof, n_r)."""
+        return self._rigid[0]
+
+    @cached_property
+    def _rigid(self) -> tuple[Array, IntArray]:
         return independent_rigid_modes(self.body)
 
     @cached_property
@@ -212,7 +217,15 @@ class Families:
             self._flexibilities[conditions.key] = Flexibility(self.condensed, conditions)
         return self._flexibilities[conditions.key]
 
+    def without_boundary(self, Phi: Array) -> Array:
+        """Return Phi - Psi_C Phi_h: beside Psi_C the same span, and zero on the held dofs, (n_dof, k)."""
+        return Phi - combine(self.Psi_C, Phi[self.h])
+
     # -- words -----------------------------------------------------------------------------------------------------
+
+    def rigid_labels(self, family: str) -> tuple[str, ...]:
+        """Return one label per rigid-body mode, such as 'rigid-body rx'."""
+        return tuple(f"{family} {COMPONENTS[k]}" for k in self._rigid[1])
 
     def held_labels(self, family: str) -> tuple[str, ...]:
         """Return one label per held dof."""

@@ -83,10 +83,15 @@ def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
     return np.sort(candidates[pivots[:6]])
 
 
-def independent_rigid_modes(body: FEBody) -> Array:
-    """Rigid-body modes about the mean of the nodes, without those the body's dofs do not know, (n_dof, n_r).
+def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
+    """Rigid-body modes about the mean of the nodes, without those the body's dofs do not know.
 
-    n_r is 6 in space, 3 for a body of plane dofs, 1 for a row of masses. Columns d [-] first, then theta [m].
+    Returns
+    -------
+    Psi_R
+        (n_dof, n_r): n_r is 6 in space, 3 for a body of plane dofs, 1 for a row of masses; columns d [-], theta [m].
+    components
+        Which of d_x d_y d_z theta_x theta_y theta_z they are, (n_r,).
 
     Raises
     ------
@@ -101,7 +106,8 @@ def independent_rigid_modes(body: FEBody) -> Array:
     rank = int((sizes > RANK_TOLERANCE * sizes.max(initial=0.0)).sum()) if sizes.any() else 0
     if rank == 0:
         raise BodyError(f"body {body.name!r}: has no displacement dofs; expected components 0..5")
-    return Psi_R[:, np.sort(pivots[:rank])]
+    components = np.sort(pivots[:rank]).astype(np.int64)
+    return Psi_R[:, components], components
 
 
 def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArray]:

@@ -3,8 +3,38 @@
 from collections.abc import Callable
 
 from cms.mode_set import ModeSet
-from cms.mode_sets.craig_bampton import craig_bampton, guyan
+from cms.mode_sets.attachment import attachment, unrestrained_attachment
+from cms.mode_sets.craig_bampton import craig_bampton, craig_bampton_ir, guyan
+from cms.mode_sets.free_interface import craig_chang, dual_craig_bampton, herting, macneal, normal_modes, rubin
+from cms.mode_sets.loaded_interface import benfield_hruda
 
-__all__ = ["MODE_SETS", "craig_bampton", "guyan"]
+__all__ = [
+    "MODE_SETS",
+    "attachment",
+    "benfield_hruda",
+    "craig_bampton",
+    "craig_bampton_ir",
+    "craig_chang",
+    "dual_craig_bampton",
+    "guyan",
+    "herting",
+    "macneal",
+    "normal_modes",
+    "rubin",
+    "unrestrained_attachment",
+]
 
-MODE_SETS: dict[str, Callable[..., ModeSet]] = {"craig-bampton": craig_bampton, "guyan": guyan}
+MODE_SETS: dict[str, Callable[..., ModeSet]] = {
+    "guyan": guyan,
+    "craig-bampton": craig_bampton,
+    "craig-bampton-ir": craig_bampton_ir,
+    "herting": herting,
+    "benfield-hruda": benfield_hruda,
+    "rubin": rubin,
+    "macneal": macneal,
+    "craig-chang": craig_chang,
+    "dual-craig-bampton": dual_craig_bampton,
+    "attachment": attachment,
+    "unrestrained-attachment": unrestrained_attachment,
+    "normal": normal_modes,
+}

@@ -1,18 +1,19 @@
-"""Craig-Bampton and Guyan-Irons: constraint modes, with and without fixed-interface vibration modes."""
+"""Craig-Bampton and its kin: constraint modes with fixed- or mixed-interface modes, with and without inertia relief."""
 
-from contextlib import ExitStack
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cms.errors import ModeSetError
+from cms.eigen import EigenResult
+from cms.families import Families
 from cms.fe_body import FEBody
-from cms.fixed_interface import FixedInterfaceBody, fix_interfaces
+from cms.flexibility import BoundaryConditions
+from cms.mixed_boundary import free_directions
 from cms.mode_set import ModeSet
-from cms.static_modes import boundary_groups, boundary_labels, constraint_modes
-from cms.vibration_modes import fixed_interface_modes
+from cms.mode_sets.blocks import Block, constraint_block, mode_set, static_block, vibration_block
+from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
 
-__all__ = ["craig_bampton", "guyan"]
+__all__ = ["craig_bampton", "craig_bampton_ir", "guyan"]
 
 
 def craig_bampton(
@@ -21,12 +22,14 @@ def craig_bampton(
     n_modes: int | None = None,
     cutoff: float | None = None,
     verify: bool = False,
-    fixed: FixedInterfaceBody | None = None,
+    free: Mapping[str, Sequence[str]] | None = None,
+    families: Families | None = None,
 ) -> ModeSet:
     """Craig-Bampton mode set: [Psi_C, fixed-interface modes] [1]_.
 
     (1) Psi_C: interior part -K_II⁻¹ K_IB
     (2) K_II phi = omega² M_II phi, all boundary dofs held
+    (3) with free boundary dofs: phi of the body held at the others, in the columns phi - Psi_C phi_B
 
     Parameters
     ----------
@@ -38,13 +41,17 @@ def craig_bampton(
         Instead of a number: all fixed-interface modes up to this frequency [Hz, or 1/time unit of the body].
     verify
         Prove by the inertia of a factorisation that no mode was missed.
-    fixed
-        The interior factorisation, to share it with other mode sets; made and freed here by default.
+    free
+        Mixed boundary conditions: interface -> components along its axes that step (2) leaves free, such as
+        {"pin": ["rz"]} for a bearing; they keep their constraint modes.
+    families
+        The families of this body, to share them with other mode sets; made and freed here by default.
 
     Raises
     ------
     ModeSetError
-        If not exactly one of `n_modes` and `cutoff` is given, or there are fewer interior dofs than modes.
+        If not exactly one of `n_modes` and `cutoff` is given, there are fewer interior dofs than modes, or no mode lies
+        below the cutoff.
     BodyError
         If the body is a mechanism when its interfaces are held.
 
@@ -52,48 +59,78 @@ def craig_bampton(
     ----------
     .. [1] THEORY §2-3.
     """
-    if (n_modes is None) == (cutoff is None):
-        raise ModeSetError(
-            f"craig_bampton: expected either n_modes or cutoff, got n_modes = {n_modes}, cutoff = {cutoff}"
-        )
-    if n_modes is not None and n_modes < 0:
-        raise ModeSetError(f"craig_bampton: n_modes = {n_modes}; expected 0 or more")
-    if cutoff is not None and not cutoff > 0:
-        raise ModeSetError(f"craig_bampton: cutoff = {cutoff}; expected a frequency above 0")
-    body.require_coupled()
-    n_i = body.n_dof - len(body.b)
-    if n_modes is not None and n_modes >= n_i:
-        raise ModeSetError(
-            f"craig_bampton: n_modes = {n_modes}, but body {body.name!r} has {n_i} interior dofs; "
-            f"choose 0 <= n_modes < {n_i}"
-        )
-    with ExitStack() as stack:
-        if fixed is None:
-            fixed = stack.enter_context(fix_interfaces(body))
-        Psi_C = constraint_modes(fixed)
-        labels, groups = boundary_labels(body, "constraint"), boundary_groups(body, "constraint")
-        options = {"n_modes": "0", "solver": fixed.factorization.description}
-        if n_modes == 0:
-            return ModeSet("craig-bampton", Psi_C, labels, np.full(len(labels), np.nan), options, groups)
-        modes = fixed_interface_modes(fixed, n_modes=n_modes, cutoff=cutoff, verify=verify)
-        n_b, n_phi = len(fixed.b), len(modes.frequencies)
-        columns = np.zeros((body.n_dof, n_b + n_phi))
-        columns[:, :n_b] = Psi_C
-        columns[:, n_b:] = modes.Phi
-        options |= {"n_modes": str(n_phi), "verified": str(verify), "eigensolver": modes.method}
-        if cutoff is not None:
-            options["cutoff"] = repr(float(cutoff))
-        return ModeSet(
-            "craig-bampton",
-            columns,
-            (*labels, *(f"fixed-interface {k + 1}" for k in range(n_phi))),
-            np.concatenate([np.full(n_b, np.nan), modes.frequencies]),
-            options,
-            (*groups, *["fixed-interface"] * n_phi),
-        )
+    with families_of(body, families) as families:
+        require_interfaces("craig_bampton", body)
+        block, modes = _held_modes("craig_bampton", families, n_modes, cutoff, verify, free or {})
+        blocks = [constraint_block(families), block]
+        return mode_set("craig-bampton", families, blocks, modes=modes, cutoff=cutoff, options=_free_words(free))
 
 
-def guyan(body: FEBody, *, fixed: FixedInterfaceBody | None = None) -> ModeSet:
+def craig_bampton_ir(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    free: Mapping[str, Sequence[str]] | None = None,
+    families: Families | None = None,
+) -> ModeSet:
+    """Craig-Bampton with inertia relief: [Psi_C, Psi_H, fixed-interface modes].
+
+    Psi_H, the static responses to rigid-body accelerations with B held, make the set statically complete: exact for
+    gravity and for every static interface load of the accelerated body, whatever the number of modes. Parameters and
+    errors are those of `craig_bampton`.
+    """
+    with families_of(body, families) as families:
+        require_interfaces("craig_bampton_ir", body)
+        block, modes = _held_modes("craig_bampton_ir", families, n_modes, cutoff, verify, free or {})
+        labels = families.rigid_labels("inertia-relief")
+        relief = static_block(families.Psi_H, labels, ["inertia-relief"] * len(labels))
+        blocks = [constraint_block(families), relief, block]
+        return mode_set("craig-bampton-ir", families, blocks, modes=modes, cutoff=cutoff, options=_free_words(free))
+
+
+def guyan(body: FEBody, *, families: Families | None = None) -> ModeSet:
     """Guyan-Irons static condensation: constraint modes only (Craig-Bampton with n_modes = 0)."""
-    modes = craig_bampton(body, n_modes=0, fixed=fixed)
-    return replace(modes, name="guyan")
+    with families_of(body, families) as families:
+        require_interfaces("guyan", body)
+        return mode_set("guyan", families, [constraint_block(families)])
+
+
+def _held_modes(
+    name: str,
+    families: Families,
+    n_modes: int | None,
+    cutoff: float | None,
+    verify: bool,
+    free: Mapping[str, Sequence[str]],
+) -> tuple[Block, EigenResult]:
+    """Return the modes with B held, or with all of B held but its free dofs (zero on B again by Psi_C)."""
+    body = families.body
+    directions = free_directions(body, free)
+    if not directions.shape[1]:
+        modes = checked_modes(
+            name, "fixed-interface", families.fixed_modes, body, n_modes=n_modes, cutoff=cutoff, verify=verify
+        )
+        if len(families.h) == len(body.b):
+            return vibration_block("fixed-interface", modes), modes
+        return vibration_block("fixed-interface", modes, families.without_boundary(modes.Phi)), modes
+    n_b, n_h = len(body.b), len(families.h)
+    Z = np.zeros((n_h, directions.shape[1] + n_h - n_b))
+    Z[:n_b, : directions.shape[1]] = directions
+    Z[n_b:, directions.shape[1] :] = np.eye(n_h - n_b)
+    modes = checked_modes(
+        name,
+        "mixed-interface",
+        lambda **asked: families.elastic_modes(BoundaryConditions(Z), **asked),
+        body,
+        n_modes=n_modes,
+        cutoff=cutoff,
+        verify=verify,
+    )
+    return vibration_block("mixed-interface", modes, families.without_boundary(modes.Phi)), modes
+
+
+def _free_words(free: Mapping[str, Sequence[str]] | None) -> dict[str, str]:
+    words = "; ".join(f"{name} {' '.join(components)}" for name, components in (free or {}).items() if components)
+    return {"free": words} if words else {}

@@ -1,0 +1,108 @@
+"""Attachment sets: responses to unit interface forces with the rigid-body modes, and vibration modes beside them."""
+
+import numpy as np
+
+from cms.families import Families
+from cms.fe_body import FEBody
+from cms.flexibility import BoundaryConditions
+from cms.mode_set import ModeSet
+from cms.mode_sets.blocks import mode_set, rigid_block, static_block, vibration_block
+from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+from cms.static_modes import boundary_groups, boundary_labels
+
+__all__ = ["attachment", "unrestrained_attachment"]
+
+
+def attachment(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    families: Families | None = None,
+) -> ModeSet:
+    """Attachment mode set: [Psi_R, Psi_A, modes with R held].
+
+    (1) Psi_A: unit force on each excess boundary dof E, the determinate dofs R held
+    (2) K phi = omega² M phi with R held and E free, as Psi_A has them
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface.
+    n_modes
+        Number of modes with R held; 0 spans the constraint modes.
+    cutoff
+        Instead of a number: all of them up to this frequency [Hz, or 1/time unit of the body].
+    verify
+        Prove by the inertia of a factorisation that no mode was missed.
+    families
+        The families of this body, to share them; made and freed here by default.
+
+    Raises
+    ------
+    ModeSetError
+        If not exactly one of `n_modes` and `cutoff` is given, or no mode lies below the cutoff.
+    BodyError
+        If the body is held to the ground, or has no inertia in some rigid-body motion.
+    """
+    with families_of(body, families) as families:
+        require_interfaces("attachment", body)
+        conditions = BoundaryConditions(np.eye(len(families.h))[:, families.free.e])
+        modes = checked_modes(
+            "attachment",
+            "determinate-interface",
+            lambda **asked: families.elastic_modes(conditions, **asked),
+            body,
+            n_modes=n_modes,
+            cutoff=cutoff,
+            verify=verify,
+        )
+        labels = np.array(boundary_labels(body, "attachment"), dtype=object)[families.free.e]
+        groups = np.array(boundary_groups(body, "attachment"), dtype=object)[families.free.e]
+        blocks = [
+            rigid_block(families),
+            static_block(families.Psi_A, labels.tolist(), groups.tolist()),
+            vibration_block("determinate-interface", modes),
+        ]
+        held = ", ".join(label.removeprefix("held ") for label in held_words(families))
+        return mode_set("attachment", families, blocks, modes=modes, cutoff=cutoff, options={"held": held})
+
+
+def unrestrained_attachment(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    families: Families | None = None,
+) -> ModeSet:
+    """Unrestrained attachment mode set: [Psi_R, Psi_U, free modes]; spans Rubin's set.
+
+    Psi_U: unit force on each boundary dof of the free body, in balance with its rigid-body acceleration. Parameters and
+    errors are those of `attachment`, with the elastic modes of the free body.
+    """
+    with families_of(body, families) as families:
+        require_interfaces("unrestrained_attachment", body)
+        modes = checked_modes(
+            "unrestrained_attachment",
+            "elastic free",
+            families.free_modes,
+            body,
+            n_modes=n_modes,
+            cutoff=cutoff,
+            verify=verify,
+        )
+        family = "unrestrained attachment"
+        blocks = [
+            rigid_block(families),
+            static_block(families.Psi_U, boundary_labels(body, family), boundary_groups(body, family)),
+            vibration_block("free", modes),
+        ]
+        return mode_set("unrestrained-attachment", families, blocks, modes=modes, cutoff=cutoff)
+
+
+def held_words(families: Families) -> list[str]:
+    """Return the determinate dofs in words."""
+    labels = families.held_labels("held")
+    return [label for dof, label in zip(families.h.tolist(), labels, strict=True) if dof in families.r]

@@ -1,0 +1,77 @@
+"""Blocks of columns of one family, and the mode set they make side by side."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.eigen import EigenResult
+from cms.families import Families
+from cms.mode_set import ModeSet
+
+__all__ = ["Block", "constraint_block", "mode_set", "rigid_block", "static_block", "vibration_block"]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Columns of one family with their names."""
+
+    columns: Array  #: (n_dof, k)
+    labels: tuple[str, ...]  #: (k,)
+    groups: tuple[str, ...]  #: (k,)
+    frequencies: Array  #: (k,), NaN for static columns
+
+
+def static_block(columns: Array, labels: Sequence[str], groups: Sequence[str]) -> Block:
+    """Return static columns."""
+    return Block(columns, tuple(labels), tuple(groups), np.full(columns.shape[1], np.nan))
+
+
+def constraint_block(families: Families) -> Block:
+    """Return the constraint modes."""
+    return static_block(families.Psi_C, families.held_labels("constraint"), families.held_groups("constraint"))
+
+
+def rigid_block(families: Families) -> Block:
+    """Return the rigid-body modes."""
+    labels = families.rigid_labels("rigid-body")
+    return static_block(families.Psi_R, labels, ["rigid-body"] * len(labels))
+
+
+def vibration_block(kind: str, modes: EigenResult, columns: Array | None = None) -> Block:
+    """Return vibration modes, or the columns that were made from them, one each."""
+    n = len(modes.frequencies)
+    return Block(
+        modes.Phi if columns is None else columns,
+        tuple(f"{kind} {k + 1}" for k in range(n)),
+        (kind,) * n,
+        np.asarray(modes.frequencies),
+    )
+
+
+def mode_set(
+    name: str,
+    families: Families,
+    blocks: Sequence[Block],
+    *,
+    modes: EigenResult | None = None,
+    cutoff: float | None = None,
+    options: Mapping[str, str] | None = None,
+) -> ModeSet:
+    """Put blocks side by side, and record what was asked for and which solver ran."""
+    recorded = {"solver": families.fixed.factorization.description}
+    if modes is not None:
+        recorded |= {"n_modes": str(len(modes.frequencies))}
+        if len(modes.frequencies):
+            recorded |= {"verified": str(modes.is_proven), "eigensolver": modes.method}
+    if cutoff is not None:
+        recorded["cutoff"] = repr(float(cutoff))
+    return ModeSet(
+        name,
+        np.hstack([block.columns for block in blocks]) if len(blocks) > 1 else blocks[0].columns,
+        tuple(label for block in blocks for label in block.labels),
+        np.concatenate([block.frequencies for block in blocks]),
+        {**recorded, **(options or {})},
+        tuple(group for block in blocks for group in block.groups),
+    )

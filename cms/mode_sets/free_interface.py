@@ -1,0 +1,197 @@
+"""Free-interface sets: vibration modes of the free body, and what makes them statically complete."""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.arrays import Array
+from cms.eigen import EigenResult
+from cms.families import Families
+from cms.fe_body import FEBody
+from cms.mode_set import ModeSet
+from cms.mode_sets.blocks import Block, constraint_block, mode_set, rigid_block, static_block, vibration_block
+from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+from cms.static_modes import boundary_groups, boundary_labels
+from cms.tall import combine
+
+__all__ = ["craig_chang", "dual_craig_bampton", "herting", "macneal", "normal_modes", "rubin"]
+
+DEPENDENT = 1e-12  #: eigenvalue of the scaled residual flexibility against its largest, below which it is rounding
+
+
+def normal_modes(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    families: Families | None = None,
+) -> ModeSet:
+    """Normal modes alone: [Psi_R, free modes]; exact frequencies of the free body, poor under interface loads.
+
+    Parameters
+    ----------
+    body
+        A coupled body; it may have no interface.
+    n_modes
+        Number of elastic free modes.
+    cutoff
+        Instead of a number: all of them up to this frequency [Hz, or 1/time unit of the body].
+    verify
+        Prove by the inertia of a factorisation that no mode was missed.
+    families
+        The families of this body, to share them; made and freed here by default.
+
+    Raises
+    ------
+    ModeSetError
+        If not exactly one of `n_modes` and `cutoff` is given, or no mode lies below the cutoff.
+    BodyError
+        If the body is held to the ground, or has no inertia in some rigid-body motion.
+    """
+    with families_of(body, families) as families:
+        modes = _free_modes("normal_modes", families, n_modes, cutoff, verify)
+        blocks = [rigid_block(families), vibration_block("free", modes)]
+        return mode_set("normal", families, blocks, modes=modes, cutoff=cutoff)
+
+
+def rubin(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    families: Families | None = None,
+) -> ModeSet:
+    """Rubin mode set: [Psi_R, free modes, residual attachment modes].
+
+    (1) K phi = omega² M phi of the free body
+    (2) residual attachment: Psi_U - Phi Lambda⁻¹ Phi_Bᵀ, the static remainder of the modes that are left out
+
+    Statically complete, and exact to omega² about zero frequency at the interfaces. Parameters and errors are those of
+    `normal_modes`, but the body needs an interface; n_modes = 0 gives [Psi_R, Psi_U].
+    """
+    with families_of(body, families) as families:
+        require_interfaces("rubin", body)
+        modes = _free_modes("rubin", families, n_modes, cutoff, verify)
+        blocks = [rigid_block(families), vibration_block("free", modes), _residual_block(families, modes)]
+        return mode_set("rubin", families, blocks, modes=modes, cutoff=cutoff)
+
+
+def macneal(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    families: Families | None = None,
+) -> ModeSet:
+    """Span of MacNeal's set, that of `rubin`: his reduction differs in the pencil alone, which lacks residual inertia.
+
+    A floating frame needs the inertia of every shape, so here it is kept; `cms.reduced_pencil.macneal_pencil` has the
+    pencil itself, to compare. Parameters and errors are those of `rubin`.
+    """
+    modes = rubin(body, n_modes=n_modes, cutoff=cutoff, verify=verify, families=families)
+    return replace(modes, name="macneal", options={**modes.options, "span": "of rubin, with residual inertia"})
+
+
+def dual_craig_bampton(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    families: Families | None = None,
+) -> ModeSet:
+    """Span of the dual Craig-Bampton set, that of `rubin`: it differs in its unknowns, which are interface forces.
+
+    A floating frame needs displacements; `cms.reduced_pencil.dual_craig_bampton_pencil` has the pencil itself, to
+    compare. Parameters and errors are those of `rubin`.
+    """
+    modes = rubin(body, n_modes=n_modes, cutoff=cutoff, verify=verify, families=families)
+    return replace(modes, name="dual-craig-bampton", options={**modes.options, "span": "of rubin, in displacements"})
+
+
+def craig_chang(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    families: Families | None = None,
+) -> ModeSet:
+    """Craig-Chang mode set: Rubin's span in physical interface coordinates.
+
+    u = Phi q + Psi_d f with the rigid-body and free modes Phi and the residual attachment modes Psi_d; on the boundary
+    u_B = Phi_B q + G_d f, so f = G_d⁻¹ (u_B - Phi_B q), and
+
+    (1) interface columns Psi_d G_d⁻¹: unit displacement of one boundary dof
+    (2) free columns Phi - Psi_d G_d⁻¹ Phi_B, which vanish on the boundary
+
+    Where modes are kept in so great a number that G_d is singular, its pseudo-inverse loses nothing: a force without
+    residual displacement at the interfaces has none anywhere. Parameters and errors are those of `rubin`.
+    """
+    with families_of(body, families) as families:
+        require_interfaces("craig_chang", body)
+        modes = _free_modes("craig_chang", families, n_modes, cutoff, verify)
+        residual, b = families.residual_attachment(modes), body.b
+        interface = combine(residual, _pseudo_inverse(residual[b]))
+        rigid, free = rigid_block(families), vibration_block("free", modes)
+        blocks = [
+            static_block(
+                interface, boundary_labels(body, "residual interface"), boundary_groups(body, "residual interface")
+            ),
+            replace(rigid, columns=rigid.columns - combine(interface, rigid.columns[b])),
+            replace(free, columns=free.columns - combine(interface, free.columns[b])),
+        ]
+        return mode_set("craig-chang", families, blocks, modes=modes, cutoff=cutoff)
+
+
+def herting(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    families: Families | None = None,
+) -> ModeSet:
+    """Herting mode set: [Psi_C, Psi_H, phi - Psi_C phi_B] with phi the free modes.
+
+    Statically complete as Craig-Bampton with inertia relief, with the exact modes of the free body besides. Parameters
+    and errors are those of `rubin`.
+    """
+    with families_of(body, families) as families:
+        require_interfaces("herting", body)
+        modes = _free_modes("herting", families, n_modes, cutoff, verify)
+        labels = families.rigid_labels("inertia-relief")
+        blocks = [
+            constraint_block(families),
+            static_block(families.Psi_H, labels, ["inertia-relief"] * len(labels)),
+            vibration_block("free", modes, families.without_boundary(modes.Phi)),
+        ]
+        return mode_set("herting", families, blocks, modes=modes, cutoff=cutoff)
+
+
+def _free_modes(name: str, families: Families, n_modes: int | None, cutoff: float | None, verify: bool) -> EigenResult:
+    return checked_modes(
+        name, "elastic free", families.free_modes, families.body, n_modes=n_modes, cutoff=cutoff, verify=verify
+    )
+
+
+def _residual_block(families: Families, modes: EigenResult) -> Block:
+    body, family = families.body, "residual attachment"
+    return static_block(
+        families.residual_attachment(modes), boundary_labels(body, family), boundary_groups(body, family)
+    )
+
+
+def _pseudo_inverse(G: Array) -> Array:
+    """Return the pseudo-inverse of a symmetric positive semidefinite matrix, scaled by its diagonal."""
+    diagonal = np.diag(G)
+    size = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    scaled = G * np.outer(size, size)
+    values, vectors = la.eigh((scaled + scaled.T) / 2)
+    kept = values > DEPENDENT * values[-1]
+    half = size[:, None] * vectors[:, kept] / np.sqrt(values[kept])
+    return half @ half.T

@@ -1,0 +1,91 @@
+"""Benfield-Hruda: constraint modes and the modes of the body with the mass and stiffness of its neighbours."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.errors import ModeSetError
+from cms.families import Families
+from cms.fe_body import FEBody
+from cms.flexibility import BoundaryConditions
+from cms.interface_loads import InterfaceLoad, boundary_load
+from cms.mode_set import ModeSet
+from cms.mode_sets.blocks import constraint_block, mode_set, vibration_block
+from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+
+__all__ = ["benfield_hruda"]
+
+
+def benfield_hruda(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    verify: bool = False,
+    loads: Sequence[InterfaceLoad] = (),
+    families: Families | None = None,
+) -> ModeSet:
+    """Benfield-Hruda mode set: [Psi_C, phi - Psi_C phi_B], phi the loaded-interface modes.
+
+    (1) (K + K_load) phi = omega² (M + M_load) phi, with the mass and stiffness of the neighbours on the boundary
+    (2) phi - Psi_C phi_B spans the same beside Psi_C, and stays well-conditioned with it
+
+    The modes of (1) are near those of the assembled system, so few of them do. Rigid-body motions that the loads leave
+    free are in the span of Psi_C and not counted.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface.
+    n_modes
+        Number of elastic loaded-interface modes.
+    cutoff
+        Instead of a number: all of them up to this frequency [Hz, or 1/time unit of the body].
+    verify
+        Prove by the inertia of a factorisation that no mode was missed.
+    loads
+        Mass and stiffness per interface (`point_load`, `InterfaceLoad`), or of neighbours across interfaces
+        (`condensed_load`).
+    families
+        The families of this body, to share them; made and freed here by default.
+
+    Raises
+    ------
+    ModeSetError
+        If there is no load, not exactly one of `n_modes` and `cutoff`, or no mode below the cutoff.
+    BodyError
+        If a load names an unknown interface or is not a mass or stiffness.
+    """
+    with families_of(body, families) as families:
+        require_interfaces("benfield_hruda", body)
+        if not loads:
+            names = ", ".join(interface.name for interface in body.interfaces)
+            raise ModeSetError(
+                "benfield_hruda: expected loads, the mass or stiffness of the neighbours on at least one interface "
+                f"({names}), got none; take craig_bampton or rubin where they are not known"
+            )
+        K_b, M_b = boundary_load(body, loads)
+        rest = np.zeros((len(families.h) - len(body.b),) * 2)
+        conditions = BoundaryConditions(
+            np.eye(len(families.h)),
+            la.block_diag(K_b, rest) if K_b.any() else None,
+            la.block_diag(M_b, rest) if M_b.any() else None,
+        )
+        modes = checked_modes(
+            "benfield_hruda",
+            "loaded-interface",
+            lambda **asked: families.elastic_modes(conditions, **asked),
+            body,
+            n_modes=n_modes,
+            cutoff=cutoff,
+            verify=verify,
+        )
+        blocks = [
+            constraint_block(families),
+            vibration_block("loaded-interface", modes, families.without_boundary(modes.Phi)),
+        ]
+        loaded = ", ".join(dict.fromkeys(name for load in loads for name in load.interfaces))
+        return mode_set(
+            "benfield-hruda", families, blocks, modes=modes, cutoff=cutoff, options={"loaded interfaces": loaded}
+        )
