@@ -1,3 +1,15 @@
+from .analyses import Channel as Channel
+from .analyses import Equilibrium as Equilibrium
+from .analyses import LinearSystem as LinearSystem
+from .analyses import Locus as Locus
+from .analyses import SystemModes as SystemModes
+from .analyses import campbell as campbell
+from .analyses import linearize as linearize
+from .analyses import root_locus as root_locus
+from .analyses import static_equilibrium as static_equilibrium
+from .analyses import steady_rotation as steady_rotation
+from .analyses import sweep as sweep
+from .analyses import system_modes as system_modes
 from .errors import (
     ConvergenceError as ConvergenceError,
 )

@@ -1,0 +1,230 @@
+"""Equilibrium: at rest, or in a steady rotation about an axis fixed in space.
+
+A flow that ends in the equilibrium, made implicit with growing steps (pseudo-transient continuation):
+
+    (1) at a state x:  residual f(x) of the bodies, gaps g(x) of the joints, at the velocities of the steady motion
+    (2) (W/tau + K) dx - Jᵀ dw = -f,   G dx = -g          W: mass with modal stiffness, K: whole tangent
+    (3) tau grows as f falls: small tau follows the flow downhill, large tau is Newton's method
+
+Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.arrays import Array
+from floatframe.analyses.tangents import held_rows, turning_matrices
+from floatframe.arrays import array_of_shape
+from floatframe.compiled import CompiledSystem
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.initial import assembled, checked, require_independent_constraints
+from floatframe.kernels.model import Work, new_work
+from floatframe.linearization import (
+    Linearized,
+    displaced,
+    in_ground_axes,
+    linearized,
+    set_iterate,
+    solve,
+    with_modal_weight,
+)
+from floatframe.rotations import rotation_matrix
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
+
+LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
+FASTEST_GROWTH = 30.0  #: of tau in one step
+CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A state in which all forces balance."""
+
+    state: State  #: with the velocities of the steady rotation, zero at rest
+    u_dot: Array  #: accelerations of the steady rotation, zero at rest, (n_u,)
+    w: Array  #: wrenches of joints and spring-dampers on their markers A, ground axes, (n_w,)
+    omega: Array  #: angular velocity of the steady rotation, ground axes, (3,) [rad/s]; zero at rest
+    residual: float  #: largest force out of balance, relative to the forces at work
+    n_iterations: int
+
+
+def static_equilibrium(
+    system: System, state: State | None = None, *, tolerance: float = 1e-9, max_iterations: int = 200
+) -> Equilibrium:
+    """Return the equilibrium at rest near a state (default: the bodies as placed), under all forces of the system.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is no equilibrium near by: something is free to fall, or the way there is too far.
+    ModelError
+        If the joints cannot be closed, or some constraints repeat others.
+    """
+    return steady_rotation(system, (0.0, 0.0, 0.0), state=state, tolerance=tolerance, max_iterations=max_iterations)
+
+
+def steady_rotation(
+    system: System,
+    omega: Array | tuple[float, float, float],
+    *,
+    center: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
+    state: State | None = None,
+    tolerance: float = 1e-9,
+    max_iterations: int = 200,
+) -> Equilibrium:
+    """Return the state in which the whole system turns like a rigid body about an axis fixed in space.
+
+    Parameters
+    ----------
+    system
+        Its joints to the ground must allow the rotation, and its forces must turn with it.
+    omega
+        Angular velocity, ground axes, (3,) [rad/s].
+    center
+        A point of the axis, ground axes, (3,) [m].
+    state
+        Where to begin; its velocities do not matter. Default: the bodies as placed.
+    tolerance
+        Largest force out of balance, relative to the forces at work.
+    max_iterations
+        Steps towards the equilibrium.
+
+    Raises
+    ------
+    ConvergenceError
+        If no such motion is found.
+    ModelError
+        If the joints cannot be closed or do not allow the rotation, or some constraints repeat others.
+    """
+    omega = array_of_shape("steady_rotation: omega", omega, (3,))
+    center = array_of_shape("steady_rotation: center", center, (3,))
+    compiled = system.compiled
+    model = compiled.model
+    work = new_work(model)
+    state = assembled(compiled, work, compiled.placed if state is None else checked(compiled, state))
+    require_independent_constraints(compiled, work, state)
+    holds = held_rows(model)
+    w, tau, last = np.zeros(len(work.w)), 0.0, np.inf
+    for iteration in range(max_iterations + 1):
+        state, u_dot = turning(compiled, state, omega, center)
+        set_iterate(work, state, u_dot, w)
+        parts, K = _tangent(compiled, work)
+        W = with_modal_weight(model, linearized(model, work, 1.0, 0.0, 0.0).H)
+        forces, gaps = work.residual.copy(), work.g.copy()
+        size = _size(W, forces)
+        scale_of_forces = _forces_at_work(compiled, work, parts, W)
+        error = size / scale_of_forces if scale_of_forces > 0 else 0.0
+        is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
+        is_told = np.abs(gaps[~holds]).max(initial=0.0) <= tolerance * np.abs(w).max(initial=0.0)
+        if error <= tolerance and is_closed and is_told:
+            _require_rotation(compiled, work, omega)
+            return Equilibrium(state, u_dot, w, omega, error, iteration)
+        if iteration == max_iterations:
+            break
+        if tau == 0.0:
+            tau = 0.1 * compiled.length / max(size / np.sqrt(_total_mass(W)), np.finfo(float).tiny)
+        else:
+            tau *= min(max(last / max(size, np.finfo(float).tiny), 0.1), FASTEST_GROWTH)
+        last = size
+        y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
+        if not np.isfinite(y).all():
+            break
+        part = min(1.0, LARGEST_TURN / max(_largest_motion(compiled, y), 1e-300))
+        state = displaced(model, state, part * in_ground_axes(model, state, y))
+        w = w + part * dw
+    raise ConvergenceError(
+        f"no equilibrium found in {max_iterations} steps: forces are out of balance by {error:.2g} of those at work, "
+        f"most at body {_worst_body(compiled, W, forces)!r}; hold what can fall or drift, start nearer, or add damping "
+        "and integrate until it rests",
+        t=0.0,
+        h=0.0,
+        residual=error,
+    )
+
+
+def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array) -> tuple[State, Array]:
+    """Return the state with the velocities of a rotation of all bodies about an axis, and the accelerations, (n_u,)."""
+    u, u_dot = np.zeros_like(state.u), np.zeros_like(state.u)
+    for i, u0 in enumerate(compiled.model.u0[:-1]):
+        v = np.cross(omega, state.r[i] - center)
+        u[u0 : u0 + 3] = v
+        u[u0 + 3 : u0 + 6] = rotation_matrix(state.p[i]).T @ omega
+        u_dot[u0 : u0 + 3] = np.cross(omega, v)
+    return State(state.r, state.p, state.q, u), u_dot
+
+
+def _tangent(compiled: CompiledSystem, work: Work) -> tuple[Linearized, tuple[Array, ...]]:
+    """Return rows and wrenches, and of each body the derivative of the residual along the steady rotations."""
+    model = compiled.model
+    parts = linearized(model, work, 0.0, 0.0, 1.0)
+    if not work.u.any():
+        return parts, parts.H
+    Omega, Omega_t = turning_matrices(model, work)
+    by_both = linearized(model, work, 0.0, 1.0, 1.0)
+    mass = linearized(model, work, 1.0, 0.0, 0.0).H
+    K = []
+    for i, k in enumerate(parts.H):
+        u = slice(int(model.u0[i]), int(model.u0[i + 1]))
+        K.append(k + (by_both.H[i] - k) @ Omega[u, u] + mass[i] @ Omega_t[u, u] @ Omega[u, u])
+    G = parts.G + (by_both.G - parts.G) @ sp.csr_array(Omega)
+    return Linearized(parts.H, parts.J, sp.csr_array(G), parts.V), tuple(K)
+
+
+def _size(W: tuple[Array, ...], forces: Array) -> float:
+    """Return the length of forces in the norm of W⁻¹: for one mass, force by the root of its mass."""
+    total, first = 0.0, 0
+    for block in W:
+        f = forces[first : first + len(block)]
+        total += float(f @ np.linalg.solve(block, f))
+        first += len(block)
+    return float(np.sqrt(total))
+
+
+def _forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: tuple[Array, ...]) -> float:
+    """Return the length of the forces of joints, springs and weight, in the norm of the residual."""
+    reactions = _size(W, parts.J.T @ work.w) if len(work.w) else 0.0
+    return max(reactions, _size(W, work.residual + (parts.J.T @ work.w if len(work.w) else 0.0)))
+
+
+def _total_mass(W: tuple[Array, ...]) -> float:
+    return float(sum(block[0, 0] for block in W))
+
+
+def _largest_motion(compiled: CompiledSystem, y: Array) -> float:
+    """Return the largest translation, relative to the size of the system, or rotation of a body."""
+    largest = 0.0
+    for u0 in compiled.model.u0[:-1]:
+        largest = max(
+            largest,
+            float(np.linalg.norm(y[u0 : u0 + 3])) / compiled.length,
+            float(np.linalg.norm(y[u0 + 3 : u0 + 6])),
+        )
+    return largest
+
+
+def _worst_body(compiled: CompiledSystem, W: tuple[Array, ...], forces: Array) -> str:
+    u0 = compiled.model.u0
+    sizes = [_size((block,), forces[u0[i] : u0[i + 1]]) for i, block in enumerate(W)]
+    return compiled.body_names[int(np.argmax(sizes))]
+
+
+def _require_rotation(compiled: CompiledSystem, work: Work, omega: Array) -> None:
+    """Raise `ModelError` naming the joint that the rotation would open."""
+    from floatframe.kernels.entry import rates_of_constraints
+
+    if not omega.any() or not len(work.w):
+        return
+    rate, _ = rates_of_constraints(compiled.model, work)
+    speed = float(np.linalg.norm(omega)) * max(compiled.length, 1.0)
+    worst = int(np.argmax(np.abs(rate)))
+    if abs(rate[worst]) > 1e-6 * speed:
+        joint = int(np.searchsorted(compiled.model.c_w0, worst, side="right")) - 1
+        raise ModelError(
+            f"steady_rotation: joint {compiled.joint_names[joint]!r} does not allow a rotation with omega = "
+            f"{omega.tolist()}; give the axis of the joint, and its place as center"
+        )

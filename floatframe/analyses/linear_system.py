@@ -1,0 +1,164 @@
+"""Linearisation of a system about an equilibrium or a steady rotation, in coordinates that fulfil the joints.
+
+With N a basis of the motions the joints allow (G N = 0) and the matrices of `tangents`:
+
+    xi = N z,  nu = N z_dot + Omega N z
+    M_z = Nᵀ M N,  C_z = Nᵀ (C N + M (Omega + Omega') N),  K_z = Nᵀ (K + C Omega + M Omega' Omega) N
+
+N does not change in time, because in body axes nothing does.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.arrays import Array, frozen
+from floatframe.analyses.channels import Channel, channel_rows
+from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
+from floatframe.analyses.tangents import tangents, turning_matrices
+from floatframe.errors import ModelError
+from floatframe.kernels.model import new_work
+from floatframe.linearization import linearized, set_iterate
+from floatframe.system import System
+
+if TYPE_CHECKING:
+    from scipy.signal import StateSpace
+
+__all__ = ["LinearSystem", "linearize"]
+
+RANK = 1e-10  #: singular value of the scaled rows below which one repeats others
+MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion has no mass
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSystem:
+    """M z_ddot + C z_dot + K z = B s,  y = L z: small motions z about a steady one, inputs s, outputs y."""
+
+    equilibrium: Equilibrium
+    M: Array  #: (n_z, n_z)
+    C: Array  #: with gyroscopic terms, (n_z, n_z)
+    K: Array  #: with geometric, centrifugal and circulatory terms, (n_z, n_z)
+    B: Array  #: (n_z, n_inputs)
+    L: Array  #: (n_outputs, n_z)
+    N: Array  #: motions of the bodies (translation and rotation in body axes, modes), (n_u, n_z)
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    body_names: tuple[str, ...]
+    body_masses: tuple[Array, ...]  #: mass matrix of each body, (6 + n_q, 6 + n_q)
+
+    def __post_init__(self) -> None:
+        for name in ("M", "C", "K", "B", "L", "N"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def n_z(self) -> int:
+        """Number of independent motions (the mobility, with the modes of flexible bodies)."""
+        return int(self.M.shape[0])
+
+    def bodies(self) -> Iterator[tuple[slice, Array]]:
+        """Yield for each body its rows of N and its mass matrix."""
+        first = 0
+        for mass in self.body_masses:
+            yield slice(first, first + len(mass)), mass
+            first += len(mass)
+
+    def with_mass(self) -> tuple["LinearSystem", Array]:
+        """Return the system without its massless motions, which follow the others statically, and z by its motions."""
+        scale = 1 / np.sqrt(np.maximum(np.diag(self.M), np.finfo(float).tiny))
+        values, vectors = la.eigh(scale[:, None] * self.M * scale)
+        is_massive = values > MASSLESS
+        if is_massive.all():
+            return self, np.eye(self.n_z)
+        dynamic, static = scale[:, None] * vectors[:, is_massive], scale[:, None] * vectors[:, ~is_massive]
+        # scaled so that a massless motion of tiny diagonal mass does not spoil the others
+        static /= np.linalg.norm(static, axis=0)
+        T = dynamic - static @ la.solve(static.T @ self.K @ static, static.T @ self.K @ dynamic)
+        parts = {name: T.T @ getattr(self, name) @ T for name in ("M", "C", "K")}
+        return replace(self, **parts, B=T.T @ self.B, L=self.L @ T, N=self.N @ T), T
+
+    def state_space(self) -> "StateSpace":
+        """Return A, B, C, D over the state (z, z_dot) of the motions with mass, as `scipy.signal.StateSpace`."""
+        from scipy.signal import StateSpace
+
+        system, _ = self.with_mass()
+        n = system.n_z
+        factor = la.cho_factor(system.M)
+        A = np.zeros((2 * n, 2 * n))
+        A[:n, n:] = np.eye(n)
+        A[n:, :n] = -la.cho_solve(factor, system.K)
+        A[n:, n:] = -la.cho_solve(factor, system.C)
+        B = np.vstack([np.zeros((n, system.B.shape[1])), la.cho_solve(factor, system.B)])
+        C = np.hstack([system.L, np.zeros_like(system.L)])
+        return StateSpace(A, B, C, np.zeros((len(C), B.shape[1])))
+
+    def response(self, frequencies: Array) -> Array:
+        """Return the frequency response y/s at frequencies [Hz], (n_frequencies, n_outputs, n_inputs), complex."""
+        H = np.empty((len(frequencies), len(self.outputs), len(self.inputs)), complex)
+        for k, omega in enumerate(2 * np.pi * np.asarray(frequencies, dtype=float)):
+            H[k] = self.L @ np.linalg.solve(self.K + 1j * omega * self.C - omega**2 * self.M, self.B)
+        return H
+
+
+def linearize(
+    system: System,
+    about: Equilibrium | None = None,
+    *,
+    inputs: tuple[Channel, ...] = (),
+    outputs: tuple[Channel, ...] = (),
+) -> LinearSystem:
+    """Linearise a system about an equilibrium or a steady rotation.
+
+    Parameters
+    ----------
+    system
+        The system.
+    about
+        As `static_equilibrium` or `steady_rotation` returns it; the equilibrium at rest by default.
+    inputs, outputs
+        Channels; a channel can be both. Their directions turn with a steady rotation.
+
+    Raises
+    ------
+    ModelError
+        If nothing can move.
+    """
+    about = static_equilibrium(system) if about is None else about
+    compiled = system.compiled
+    model, work = compiled.model, new_work(compiled.model)
+    set_iterate(work, about.state, about.u_dot, about.w)
+    parts = tangents(model, work)
+    Omega, Omega_t = turning_matrices(model, work)
+    N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.u0[:-1]])
+    if N.shape[1] == 0:
+        raise ModelError(f"system {system.name!r}: its joints allow no motion; nothing can be linearised")
+    return LinearSystem(
+        about,
+        M=N.T @ parts.M @ N,
+        C=N.T @ (parts.C + parts.M @ (Omega + Omega_t)) @ N,
+        K=N.T @ (parts.K + parts.C @ Omega + parts.M @ Omega_t @ Omega) @ N,
+        B=(channel_rows(system, compiled, work, tuple(inputs)) @ N).T,
+        L=channel_rows(system, compiled, work, tuple(outputs)) @ N,
+        N=N,
+        inputs=tuple(channel.name for channel in inputs),
+        outputs=tuple(channel.name for channel in outputs),
+        body_names=compiled.body_names,
+        body_masses=linearized(model, work, 1.0, 0.0, 0.0).H,
+    )
+
+
+def allowed_motions(G: Array, length: float, bodies: list[int]) -> Array:
+    """Return an orthonormal basis of the null space of G, (n_u, n_z), with rotations scaled by the length."""
+    n_u = G.shape[1]
+    if not len(G):
+        return np.eye(n_u)
+    scale = np.ones(n_u)
+    for u0 in bodies:
+        scale[u0 + 3 : u0 + 6] = 1 / length
+    scaled = G * scale
+    size = np.linalg.norm(scaled, axis=1)
+    _, values, right = la.svd(scaled[size > 0] / size[size > 0, None])
+    rank = int((values > RANK * values[0]).sum()) if len(values) else 0
+    return scale[:, None] * right[rank:].T

@@ -1,0 +1,113 @@
+"""System modes over a parameter: root locus and Campbell diagram, modes followed by their shapes."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from cms.arrays import Array
+from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
+from floatframe.analyses.linear_system import LinearSystem, linearize
+from floatframe.analyses.system_modes import system_modes
+from floatframe.arrays import array_of_shape, unit_vector
+from floatframe.errors import ModelError
+from floatframe.system import System
+
+__all__ = ["Locus", "campbell", "root_locus"]
+
+
+@dataclass(frozen=True, eq=False)
+class Locus:
+    """Eigenvalues over a parameter; a column follows one mode."""
+
+    parameter: str  #: its name, with its unit
+    values: Array  #: (n_values,)
+    eigenvalues: Array  #: (n_values, n_modes) complex [1/s]; NaN where a mode has no counterpart
+
+    @property
+    def frequencies(self) -> Array:
+        """Im(lambda)/2 pi, (n_values, n_modes) [Hz]."""
+        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> Array:
+        """-Re(lambda)/|lambda|, (n_values, n_modes)."""
+        size = np.abs(self.eigenvalues)
+        return np.divide(-self.eigenvalues.real, size, out=np.zeros(size.shape), where=size > 0)
+
+
+def root_locus(
+    build: Callable[[float], LinearSystem],
+    values: Sequence[float] | Array,
+    *,
+    parameter: str = "parameter",
+    n_modes: int | None = None,
+) -> Locus:
+    """Follow the modes of a system while a parameter changes.
+
+    Parameters
+    ----------
+    build
+        From a value of the parameter to the linearised system (same bodies and modes for every value).
+    values
+        In steps small enough that shapes change little from one to the next, (n_values,).
+    parameter
+        What it is, for tables and plots.
+    n_modes
+        How many to follow, by ascending |lambda| at the first value; all by default.
+    """
+    values = np.asarray(values, dtype=float)
+    if values.ndim != 1 or len(values) == 0:
+        raise ModelError(f"root_locus: values: expected a list of numbers, got shape {values.shape}")
+    modes = system_modes(build(float(values[0])))
+    n = len(modes.eigenvalues) if n_modes is None else min(n_modes, len(modes.eigenvalues))
+    table = np.full((len(values), n), np.nan + 0j)
+    table[0] = modes.eigenvalues[:n]
+    shapes = modes.shapes[:, :n]
+    for row, value in zip(table[1:], values[1:], strict=True):
+        modes = system_modes(build(float(value)))
+        rows, columns = linear_sum_assignment(distance(shapes, modes.shapes))
+        row[rows] = modes.eigenvalues[columns]
+        shapes = shapes.copy()
+        shapes[:, rows] = modes.shapes[:, columns]
+    return Locus(parameter, values, table)
+
+
+def distance(shapes: Array, others: Array) -> Array:
+    """Return 1 - MAC of shapes and other ones, (n, n_others)."""
+    a, b = shapes / np.linalg.norm(shapes, axis=0), others / np.linalg.norm(others, axis=0)
+    return 1 - np.abs(a.conj().T @ b) ** 2
+
+
+def campbell(
+    system: System,
+    speeds: Sequence[float] | Array,
+    *,
+    axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
+    center: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
+    n_modes: int | None = None,
+) -> Locus:
+    """Frequencies and damping of a system that turns steadily, over its speed, as seen from the turning system.
+
+    Parameters
+    ----------
+    system
+        Its joints to the ground must allow the rotation.
+    speeds
+        Angular speeds, ascending, (n_speeds,) [rad/s].
+    axis, center
+        Direction and a point of the axis of rotation, ground axes, (3,).
+    n_modes
+        How many modes to follow.
+    """
+    axis = unit_vector("campbell: axis", axis)
+    center = array_of_shape("campbell: center", center, (3,))
+    last: list[Equilibrium] = []
+
+    def at(speed: float) -> LinearSystem:
+        state = last[0].state if last else None
+        last[:] = [steady_rotation(system, speed * axis, center=center, state=state)]
+        return linearize(system, last[0])
+
+    return root_locus(at, speeds, parameter="speed [rad/s]", n_modes=n_modes)

@@ -1,0 +1,86 @@
+"""Vibration modes of a whole system: complex eigenvalues with frequency and damping, and what moves in each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.arrays import Array
+from floatframe.analyses.linear_system import LinearSystem
+
+__all__ = ["SystemModes", "system_modes"]
+
+ZERO = 1e-7  #: |lambda| by the highest one below which a mode is a motion that costs nothing
+UNSTABLE = 1e-6  #: growth rate by the highest |lambda| that rounding explains: a double eigenvalue moves by its root
+
+
+@dataclass(frozen=True, eq=False)
+class SystemModes:
+    """Modes exp(lambda t): one of each conjugate pair, by ascending |lambda|."""
+
+    eigenvalues: Array  #: lambda, imaginary part >= 0, (n_modes,) complex [1/s]
+    shapes: Array  #: motions of the bodies (body axes), the largest entry 1, (n_u, n_modes) complex
+    energy_shares: Array  #: share of each body in the kinetic energy of the mode, (n_modes, n_bodies)
+    bodies: tuple[str, ...]  #: their names
+
+    @property
+    def frequencies(self) -> Array:
+        """Damped frequencies Im(lambda)/2 pi, (n_modes,) [Hz]; 0 for a motion that does not oscillate."""
+        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
+
+    @property
+    def natural_frequencies(self) -> Array:
+        """Undamped frequencies |lambda|/2 pi, (n_modes,) [Hz]."""
+        return np.abs(self.eigenvalues) / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> Array:
+        """-Re(lambda)/|lambda|, (n_modes,); 1 for a motion that decays without oscillation, 0 for one at rest."""
+        size = np.abs(self.eigenvalues)
+        return np.divide(-self.eigenvalues.real, size, out=np.zeros(len(size)), where=size > 0)
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether no mode grows."""
+        return bool((self.eigenvalues.real <= UNSTABLE * np.abs(self.eigenvalues).max(initial=0.0)).all())
+
+
+def system_modes(linear: LinearSystem) -> SystemModes:
+    """Return all modes of a linearised system.
+
+    Without damping, gyroscopic and circulatory terms the symmetric pencil (K, M) is solved, so that frequencies are
+    real; otherwise the first-order pencil of (z, z_dot).
+    """
+    system, _ = linear.with_mass()
+    M, C, K = (np.asarray(a) for a in (system.M, system.C, system.K))
+    omega2, Z = la.eigh((K + K.T) / 2, (M + M.T) / 2)
+    highest = np.sqrt(np.abs(omega2).max())
+    modal_C = Z.T @ C @ Z
+    is_conservative = (
+        np.abs(modal_C).max() <= 1e-12 * highest and np.abs(Z.T @ (K - K.T) @ Z).max() <= 1e-10 * highest**2
+    )
+    if is_conservative:
+        root = np.sqrt(omega2.astype(complex))
+        eigenvalues = np.where(omega2 >= 0, 1j * root.real, root.imag)
+        shapes = Z.astype(complex)
+        for k in np.flatnonzero(omega2 < -((ZERO * highest) ** 2)):  # an unstable one has a decaying twin
+            eigenvalues = np.append(eigenvalues, -eigenvalues[k])
+            shapes = np.column_stack([shapes, shapes[:, k]])
+    else:
+        # in the coordinates of the undamped modes, scaled by their frequencies: a well-scaled state matrix
+        n = len(omega2)
+        modal_K = Z.T @ K @ Z
+        A = np.zeros((2 * n, 2 * n))
+        A[:n, n:] = highest * np.eye(n)
+        A[n:, :n] = -modal_K / highest
+        A[n:, n:] = -modal_C
+        eigenvalues, vectors = la.eig(A)
+        keep = eigenvalues.imag >= 0
+        eigenvalues, shapes = eigenvalues[keep], Z @ vectors[:n, keep]
+    eigenvalues = np.where(np.abs(eigenvalues) <= ZERO * highest, 0.0, eigenvalues)
+    order = np.lexsort((eigenvalues.imag, np.abs(eigenvalues)))
+    shapes = (system.N @ shapes)[:, order]
+    largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
+    energies = np.array([np.einsum("uk,uv,vk->k", shapes[u].conj(), m, shapes[u]).real for u, m in linear.bodies()])
+    shares = (energies / energies.sum(axis=0)).T
+    return SystemModes(eigenvalues[order], shapes / largest, shares, linear.body_names)
