@@ -129,6 +129,26 @@ def view_command(
         say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
+@app.command("check")
+@guarded
+def check_command(
+    file: ModalFile,
+    job: Annotated[Path | None, typer.Option("--job", "-j", help="Job file of the full model to compare with.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the records as JSON, for other programs.")] = False,
+) -> None:
+    """Judge a modal file: one verdict per check, the reason, and what to do; exit code 1 if one fails.
+
+    Without a job the file is asked whether it says one thing; with its job it is compared with the full model.
+
+    Example: cms check rod.h5
+
+    Example: cms check rod.h5 --job rod.toml --json
+    """
+    from cms.cli.check import check_file
+
+    raise typer.Exit(check_file(file, job, as_json=json))
+
+
 @app.command("demo")
 @guarded
 def demo_command(

@@ -1,0 +1,8 @@
+"""Quality: numbers with a tolerance, a verdict, the reason and the next action, for any reduced body.
+
+`check_body` asks a modal file alone, `check_reduction` compares with the full model.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,9 @@
+from .body_check import check_body as check_body
+from .effective_mass import EffectiveMass as EffectiveMass
+from .effective_mass import effective_mass as effective_mass
+from .errors import QualityError as QualityError
+from .limits import LIMITS as LIMITS
+from .limits import Limit as Limit
+from .record import QualityRecord as QualityRecord
+from .record import has_failed as has_failed
+from .record import worst as worst

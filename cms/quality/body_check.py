@@ -1,0 +1,45 @@
+"""Everything a reduced body can be asked without its full model."""
+
+from cms.quality.effective_mass import check_effective_mass
+from cms.quality.identities import (
+    check_energy_shares,
+    check_frame_condition,
+    check_free_frequencies,
+    check_inertia_tensor,
+    check_modal_mass,
+)
+from cms.quality.interface_motions import check_interface_motions, check_rigid_interfaces
+from cms.quality.record import QualityRecord
+from cms.quality.step_size import check_damping, check_dropped_columns, check_step_size
+from cms.quality.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
+from cms.reduced_body import ReducedBody
+
+__all__ = ["BODY_CHECKS", "check_body"]
+
+BODY_CHECKS = (
+    check_symmetry,
+    check_definiteness,
+    check_kinetic_energy,
+    check_modal_mass,
+    check_frame_condition,
+    check_free_frequencies,
+    check_inertia_tensor,
+    check_rigid_interfaces,
+    check_interface_motions,
+    check_energy_shares,
+    check_effective_mass,
+    check_step_size,
+    check_damping,
+    check_dropped_columns,
+)
+
+
+def check_body(reduced: ReducedBody) -> tuple[QualityRecord, ...]:
+    """Check a reduced body by itself: whether it says one thing, and what it asks of its user.
+
+    Returns
+    -------
+    tuple of QualityRecord
+        One for each of `BODY_CHECKS`, in their order.
+    """
+    return tuple(check(reduced) for check in BODY_CHECKS)

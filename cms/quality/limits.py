@@ -1,0 +1,128 @@
+"""Every threshold of the quality checks, written once."""
+
+from dataclasses import dataclass
+
+__all__ = ["LIMITS", "Limit"]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a value without unit may be."""
+
+    title: str  #: of the record, in words
+    tolerance: float | None  #: largest value that passes; None: information only
+    failing: float | None  #: above it fails, between both is a warning; None: never fails
+    action: str  #: what to do when it does not pass
+
+
+REDUCE_AGAIN = "reduce the body again; the file does not say one thing"
+LIMITS: dict[str, Limit] = {
+    # A reduced body alone: does it say one thing? ----------------------------------------------------------------
+    "symmetry": Limit("symmetry of M, K, D and moments", 1e-9, 1e-6, REDUCE_AGAIN),
+    "definiteness": Limit(
+        "no negative mass, stiffness or damping", 1e-9, 1e-6,
+        "look for a wrong sign or a mechanism in the model, then reduce again",
+    ),
+    "kinetic-energy": Limit(
+        "kinetic energy of rigid and elastic motion is positive", 1e-9, 1e-6,
+        "the mass moments do not belong to one body: a sign, a unit or an origin is wrong; reduce again",
+    ),
+    "modal-mass": Limit(
+        "modal mass from the mass moments (M*)", 1e-8, 1e-4,
+        "the mass moments and the modes are of different bodies or units; reduce again",
+    ),
+    "frame-condition": Limit(
+        "modes satisfy the body frame", 1e-8, 1e-4,
+        "the frame named in the file is not that of its modes; reduce again in the wanted frame",
+    ),
+    "free-frequencies": Limit(
+        "free-free frequencies recomputed from moments and stiffness", 1e-6, 1e-4,
+        "a mass moment has a wrong sign, order or unit; reduce again",
+    ),
+    "inertia-tensor": Limit(
+        "inertia tensor that masses can have", 1e-9, 1e-6,
+        "check density, units and the origin of the inertia; no distribution of mass has this tensor",
+    ),
+    "rigid-interfaces": Limit(
+        "members of rigid interfaces move rigidly", 1e-8, 1e-4,
+        "the interface motions do not fit the modes at its nodes; reduce again",
+    ),
+    "interface-motions": Limit(
+        "independent motions of the interfaces that are missing", 0.0, None,
+        "add constraint or attachment modes: joints at these interfaces meet a body that cannot follow",
+    ),
+    "energy-shares": Limit("energy shares of the sources sum to one", 1e-9, 1e-3, REDUCE_AGAIN),
+    "effective-mass": Limit(
+        "effective mass that the modes leave out", 0.1, None,
+        "add fixed-interface modes or inertia-relief modes, or accept it if the missing direction is not driven",
+    ),
+    "dropped-columns": Limit(
+        "redundant columns that were dropped", None, None,
+        "",
+    ),
+    "step-size": Limit(
+        "highest over lowest frequency", 1e4, None,
+        "drop the stiffest modes, or take an implicit integrator with numerical damping (rho_inf below 1)",
+    ),
+    "damping": Limit(
+        "share of modes without damping", None, None,
+        "",
+    ),
+    # A mode set against its full model -----------------------------------------------------------------------------
+    "same-body": Limit(
+        "the reduced body is that of this model and mode set", 1e-6, 1e-6,
+        "check with the job the file was made from, or reduce again",
+    ),
+    "grounding": Limit(
+        "stiffness is blind to rigid-body motion (K Psi_R = 0)", 1e-9, 1e-6,
+        "release the body from the ground, or give the nodes with all their digits",
+    ),
+    "mass-properties": Limit(
+        "mass, centre and inertia: full matrix against moments", 1e-9, 1e-4,
+        "check the density, the mass matrix (lumped, rotated, scaled?) and the units",
+    ),
+    "invariants": Limit(
+        "linear invariants by a second route", 1e-8, 1e-4,
+        "the moments are not those of the mass matrix; reduce again from a body with its element model",
+    ),
+    "frequency-error": Limit(
+        "error of the free-free frequencies in the band", 0.01, 0.05,
+        "keep more modes, or take a set with inertia relief or residual attachment modes",
+    ),
+    "mac": Limit(
+        "modes in the band that the set does not recover (1 - MAC, mass-weighted)", 0.02, 0.2,
+        "keep more modes, or hold the frequency band lower",
+    ),
+    "mac-nodal": Limit(
+        "modes in the band that the set does not recover (1 - MAC, nodal)", 0.02, None,
+        "keep more modes, or hold the frequency band lower",
+    ),
+    "static-interface": Limit(
+        "static response to loads on the interfaces, error in energy norm", 1e-6, 0.1,
+        "add constraint or attachment modes for the loads listed",
+    ),
+    "static-inertia": Limit(
+        "static response to rigid-body accelerations, error in energy norm", 0.05, None,
+        "add inertia-relief modes (six columns), or keep more vibration modes",
+    ),
+    "frequency-response": Limit(
+        "frequency response at the interfaces, relative error over the band", 0.05, 0.3,
+        "keep more modes, or hold the band lower",
+    ),
+    "residual-bound": Limit(
+        "guaranteed distance of the frequencies in the band to true ones", 0.1, None,
+        "keep more modes; the true error is at most this and mostly near its square",
+    ),
+    "conditioning": Limit(
+        "condition of the mode set's columns", 1e8, 1e13,
+        "leave out columns that are nearly combinations of others; digits are lost in the reduced matrices",
+    ),
+    "interface-stiffening": Limit(
+        "change of frequencies between rigid and distributing interfaces", 0.05, None,
+        "the truth lies between RBE2 and RBE3: choose by the stiffness of the real joint, or spread the interface",
+    ),
+    "deformation-error": Limit(
+        "deformation of the reference motion outside the mode set", 0.05, None,
+        "add modes that carry the load: inertia relief, attachment or load-case residual vectors",
+    ),
+}  # fmt: skip
