@@ -1,5 +1,22 @@
+from .beams.attachments import PointMass as PointMass
+from .beams.attachments import RigidLink as RigidLink
+from .beams.attachments import Spring as Spring
+from .beams.body import BeamProperty as BeamProperty
+from .beams.body import beam_body as beam_body
+from .beams.body import link_rigidly as link_rigidly
+from .beams.interfaces import NodeIndices as NodeIndices
+from .beams.interfaces import line_interface as line_interface
+from .beams.line_mesh import LineMesh as LineMesh
+from .beams.line_mesh import straight_line as straight_line
+from .beams.sections import BoxSection as BoxSection
+from .beams.sections import Circle as Circle
+from .beams.sections import GeneralSection as GeneralSection
+from .beams.sections import ISection as ISection
+from .beams.sections import Rectangle as Rectangle
+from .beams.sections import Tube as Tube
 from .boundary import boundary_facets as boundary_facets
 from .boundary import boundary_triangles as boundary_triangles
+from .errors import BeamError as BeamError
 from .errors import (
     FeModelsError as FeModelsError,
 )
@@ -15,6 +32,7 @@ from .errors import (
 from .errors import (
     MeshError as MeshError,
 )
+from .errors import SectionError as SectionError
 from .importers.read_mesh import read_mesh as read_mesh
 from .interfaces import (
     check_overlap as check_overlap,

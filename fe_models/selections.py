@@ -8,6 +8,7 @@ import numpy as np
 
 from cms.arrays import Array, IntArray
 from cms.words import nearest
+from fe_models.beams.line_mesh import LineMesh
 from fe_models.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
 from fe_models.errors import InterfaceError
 from fe_models.mesh import Mesh
@@ -22,7 +23,7 @@ Vector = tuple[float, float, float]
 class Selection(Protocol):
     """Something that chooses nodes of a mesh."""
 
-    def members(self, mesh: Mesh) -> IntArray:
+    def members(self, mesh: Mesh | LineMesh) -> IntArray:
         """Return the chosen nodes, ascending; `InterfaceError` if there are none."""
 
 
@@ -36,12 +37,14 @@ class FaceGroup:
 
     name: str
 
-    def members(self, mesh: Mesh) -> IntArray:
+    def members(self, mesh: Mesh | LineMesh) -> IntArray:
         """Return the nodes of the group, ascending."""
         return np.unique(np.concatenate([rows.ravel() for rows in self.facets(mesh).values()]))
 
-    def facets(self, mesh: Mesh) -> dict[str, IntArray]:
+    def facets(self, mesh: Mesh | LineMesh) -> dict[str, IntArray]:
         """Return face type -> faces of the group, as complete facets of the solid where they are such."""
+        if isinstance(mesh, LineMesh):
+            raise InterfaceError(f"face group {self.name!r}: a mesh of lines has no faces; select nodes")
         if self.name not in mesh.face_sets:
             raise InterfaceError(
                 f"no face group {self.name!r}{_other_kind(mesh, self.name, 'face group')}"
@@ -60,7 +63,7 @@ class NodeSet:
 
     name: str
 
-    def members(self, mesh: Mesh) -> IntArray:
+    def members(self, mesh: Mesh | LineMesh) -> IntArray:
         """Return the nodes of the set, ascending."""
         if self.name not in mesh.node_sets:
             raise InterfaceError(
@@ -82,9 +85,9 @@ class Plane:
     normal: Vector  #: any length
     tolerance: float | None = None  #: distance [m]; None: 1e-6 of the diagonal of the bounding box
 
-    def members(self, mesh: Mesh) -> IntArray:
+    def members(self, mesh: Mesh | LineMesh) -> IntArray:
         """Return the surface nodes within the tolerance, ascending."""
-        surface = boundary_nodes(mesh)
+        surface = candidates(mesh)
         normal = _unit("plane", "normal", self.normal)
         tolerance = _tolerance("plane", self.tolerance, 1e-6 * _diagonal(mesh))
         signed = (mesh.nodes[surface] - _point("plane", self.point)) @ normal
@@ -109,14 +112,14 @@ class Cylinder:
     span: tuple[float, float] | None = None  #: range along the axis from `point` [m]; None: no limit
     tolerance: float | None = None  #: difference to the radius [m]; None: 1e-3 of the radius
 
-    def members(self, mesh: Mesh) -> IntArray:
+    def members(self, mesh: Mesh | LineMesh) -> IntArray:
         """Return the surface nodes within the tolerance, ascending.
 
         Middle nodes on straight edges lie inside a coarse hole by its sagitta: give a larger tolerance for those.
         """
         if not self.radius > 0:
             raise InterfaceError(f"cylinder: radius: expected a length above zero, got {self.radius}")
-        surface = boundary_nodes(mesh)
+        surface = candidates(mesh)
         axis = _unit("cylinder", "axis", self.axis)
         tolerance = _tolerance("cylinder", self.tolerance, 1e-3 * self.radius)
         arm = mesh.nodes[surface] - _point("cylinder", self.point)
@@ -146,12 +149,12 @@ class Box:
     lo: Vector  #: [m]
     hi: Vector  #: [m]
 
-    def members(self, mesh: Mesh) -> IntArray:
+    def members(self, mesh: Mesh | LineMesh) -> IntArray:
         """Return the surface nodes inside, ascending; the walls, widened by 1e-9 of the body, belong to the box."""
         lo, hi = _point("box", self.lo), _point("box", self.hi)
         if (lo > hi).any():
             raise InterfaceError(f"box: expected lo <= hi, got {_text(self.lo)} and {_text(self.hi)}")
-        surface = boundary_nodes(mesh)
+        surface = candidates(mesh)
         X = mesh.nodes[surface]
         slack = 1e-9 * _diagonal(mesh)
         found = surface[((lo - slack <= X) & (hi + slack >= X)).all(axis=1)]
@@ -171,11 +174,16 @@ class NearestNode:
 
     point: Vector  #: [m]
 
-    def members(self, mesh: Mesh) -> IntArray:
+    def members(self, mesh: Mesh | LineMesh) -> IntArray:
         """Return that node, (1,)."""
-        surface = boundary_nodes(mesh)
+        surface = candidates(mesh)
         point = _point("nearest node", self.point)
         return surface[[int(np.linalg.norm(mesh.nodes[surface] - point, axis=1).argmin())]]
+
+
+def candidates(mesh: Mesh | LineMesh) -> IntArray:
+    """Return the nodes that geometry can select: those of the surface of a solid, all nodes of a frame; ascending."""
+    return np.arange(len(mesh.nodes)) if isinstance(mesh, LineMesh) else boundary_nodes(mesh)
 
 
 def selected_facets(mesh: Mesh, selection: Selection) -> dict[str, IntArray]:
@@ -208,7 +216,9 @@ def _complete(mesh: Mesh, faces: Mapping[str, IntArray]) -> dict[str, IntArray]:
     return {kind: rows for kind, rows in joined.items() if len(rows)}
 
 
-def _require_on_solid(mesh: Mesh, what: str, nodes: IntArray) -> None:
+def _require_on_solid(mesh: Mesh | LineMesh, what: str, nodes: IntArray) -> None:
+    if isinstance(mesh, LineMesh):
+        return
     used = np.zeros(len(mesh.nodes), dtype=bool)
     for cells in mesh.cells.values():
         used[cells] = True
@@ -220,8 +230,10 @@ def _require_on_solid(mesh: Mesh, what: str, nodes: IntArray) -> None:
         )
 
 
-def _other_kind(mesh: Mesh, name: str, wanted: str) -> str:
+def _other_kind(mesh: Mesh | LineMesh, name: str, wanted: str) -> str:
     """Say that the name is that of another kind of group."""
+    if isinstance(mesh, LineMesh):
+        return f" ({name!r} is a group of lines)" if name in mesh.line_sets else ""
     kinds = {"face group": mesh.face_sets, "node set": mesh.node_sets, "cell group": mesh.cell_sets}
     others = [kind for kind, sets in kinds.items() if kind != wanted and name in sets]
     return f" ({name!r} is a {others[0]})" if others else ""
@@ -250,7 +262,7 @@ def _tolerance(where: str, tolerance: float | None, default: float) -> float:
     return tolerance
 
 
-def _diagonal(mesh: Mesh) -> float:
+def _diagonal(mesh: Mesh | LineMesh) -> float:
     return float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
 
 

@@ -1,0 +1,103 @@
+"""Local axes of straight lines, and the way from nodal dofs to those of the ends of the beam axis."""
+
+import numpy as np
+
+from cms.arrays import Array
+from fe_models.beams.line_mesh import LineMesh
+from fe_models.errors import BeamError
+
+__all__ = ["LineGeometry", "line_geometry"]
+
+PARALLEL = 1e-6  #: sine of the angle between a line and its orientation vector, below which there is no y axis
+
+
+class LineGeometry:
+    """Ends, lengths and local axes of the beam axes of a mesh.
+
+    Attributes
+    ----------
+    ends : (n_lines, 2, 3) ends of the axis: node + offset [m]
+    length : (n_lines,) [m]
+    R : (n_lines, 3, 3) local axes x, y, z as columns, in mesh axes
+    T : (n_lines, 12, 12) local dofs of the axis ends from the dofs of the nodes
+    """
+
+    def __init__(self, ends: Array, levers: Array, R: Array) -> None:
+        self.ends = ends
+        self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        self.R = R
+        T = np.zeros((len(R), 12, 12))
+        for end in range(2):
+            rows = 6 * end
+            T[:, rows : rows + 3, rows : rows + 3] = R.transpose(0, 2, 1)
+            T[:, rows + 3 : rows + 6, rows + 3 : rows + 6] = R.transpose(0, 2, 1)
+            # u_end = u_node + theta × lever
+            T[:, rows : rows + 3, rows + 3 : rows + 6] = -R.transpose(0, 2, 1) @ skew(levers[:, end])
+        self.T = T
+
+
+def line_geometry(mesh: LineMesh, orientations: Array, section_offsets: Array) -> LineGeometry:
+    """Return the geometry of the lines.
+
+    (1) x from the first to the second end of the line, its offsets included
+    (2) y: the part of the orientation vector v across x; by default v = e_z × x (z points up), e_y for a vertical line
+    (3) z = x × y
+    (4) section offsets move both ends along the local y and z
+
+    Parameters
+    ----------
+    mesh
+        Nodes, lines and their offsets.
+    orientations
+        Vector v of each line, (n_lines, 3); NaN rows: default.
+    section_offsets
+        Of the centroid from the line, local (y, z), (n_lines, 2) [m].
+
+    Raises
+    ------
+    BeamError
+        If a line has no length, or its orientation vector is along it.
+    """
+    n = len(mesh.lines)
+    levers = np.zeros((n, 2, 3)) if mesh.offsets is None else np.array(mesh.offsets)
+    ends = mesh.nodes[mesh.lines] + levers
+    d = ends[:, 1] - ends[:, 0]
+    L = np.linalg.norm(d, axis=1)
+    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0))) or 1.0
+    short = np.flatnonzero(L <= 1e-12 * size)
+    if short.size:
+        raise BeamError(
+            f"{short.size} lines have no length, first line {short[0]} at node {_node(mesh, short[0])}; merge its "
+            "nodes and remove the line, or join them by a spring"
+        )
+    x = d / L[:, None]  # (1)
+    v = np.array(orientations, dtype=float)  # (2)
+    is_default = np.isnan(v).any(axis=1)
+    up = np.cross([0.0, 0.0, 1.0], x)
+    is_vertical = np.linalg.norm(up, axis=1) < PARALLEL
+    v[is_default] = np.where(is_vertical[:, None], [0.0, 1.0, 0.0], up)[is_default]
+    length_v = np.linalg.norm(v, axis=1)
+    y = v - np.einsum("na,na->n", v, x)[:, None] * x
+    across = np.linalg.norm(y, axis=1)
+    bad = np.flatnonzero(across <= PARALLEL * length_v)
+    if bad.size:
+        raise BeamError(
+            f"{bad.size} lines have an orientation vector of zero length or along the line, first line {bad[0]} at "
+            f"node {_node(mesh, bad[0])}: the vector shall point across it, towards the local y axis"
+        )
+    y /= across[:, None]
+    R = np.stack([x, y, np.cross(x, y)], axis=2)  # (3)
+    shift = np.einsum("nab,nb->na", R[:, :, 1:], section_offsets)  # (4)
+    return LineGeometry(ends + shift[:, None], levers + shift[:, None], R)
+
+
+def skew(v: Array) -> Array:
+    """Return v~ with v~ w = v × w, (n, 3, 3), of vectors (n, 3)."""
+    S = np.zeros((len(v), 3, 3))
+    S[:, 0, 1], S[:, 0, 2], S[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    return S - S.transpose(0, 2, 1)
+
+
+def _node(mesh: LineMesh, line: int) -> int:
+    node = int(mesh.lines[line, 0])
+    return int(mesh.node_numbers[node]) if mesh.node_numbers.size else node

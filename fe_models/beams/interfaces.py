@@ -1,0 +1,84 @@
+"""Interfaces of a frame: nodes made rigid, distributing, or kept node by node."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cms.arrays import Array, IntArray
+from cms.errors import BodyError
+from cms.fe_body import Interface
+from fe_models.beams.line_mesh import LineMesh
+from fe_models.errors import InterfaceError
+from fe_models.mesh import Mesh
+from fe_models.selections import Selection
+
+__all__ = ["NodeIndices", "line_interface"]
+
+
+@dataclass(frozen=True)
+class NodeIndices:
+    """Nodes by their index in the mesh."""
+
+    nodes: tuple[int, ...]
+
+    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+        """Return these nodes, ascending."""
+        nodes = np.unique(np.asarray(self.nodes, dtype=np.int64))
+        if nodes.size == 0 or nodes.min() < 0 or nodes.max() >= len(mesh.nodes):
+            raise InterfaceError(f"nodes {list(self.nodes)[:5]}: expected some of 0..{len(mesh.nodes) - 1}")
+        return nodes
+
+
+def line_interface(
+    mesh: LineMesh,
+    name: str,
+    selection: Selection,
+    *,
+    kind: str = "rigid",
+    reference: ArrayLike | None = None,
+    triad: ArrayLike | None = None,
+) -> Interface:
+    """Make an interface at nodes of a frame.
+
+    Parameters
+    ----------
+    mesh
+        Mesh of the frame.
+    name
+        Name of the interface.
+    selection
+        Which nodes, such as `NodeSet("end")`, `NodeIndices((0,))` or `NearestNode(point)`.
+    kind
+        "rigid": the nodes move rigidly with the reference node, one node is enough; "distributing": the reference node
+        follows their mean motion, weighted by the length of the lines, which needs three nodes beside one line;
+        "nodes": every dof of every node.
+    reference
+        Reference point, (3,) [m]; None: the mean of the nodes.
+    triad
+        Axes of the interface as columns in mesh axes, (3, 3); None: the mesh axes.
+
+    Raises
+    ------
+    InterfaceError
+        If nothing is selected, or reference or triad do not do.
+    """
+    try:
+        nodes = selection.members(mesh)
+    except InterfaceError as error:
+        raise InterfaceError(f"interface {name!r}: {error}") from None
+    point = mesh.nodes[nodes].mean(axis=0) if reference is None else np.asarray(reference, dtype=float)
+    axes = np.eye(3) if triad is None else np.asarray(triad, dtype=float)
+    weights = line_weights(mesh)[nodes] if kind == "distributing" else None
+    try:
+        return Interface(name, kind, nodes, point, triad=axes, weights=weights)
+    except BodyError as error:
+        raise InterfaceError(str(error)) from None
+
+
+def line_weights(mesh: LineMesh) -> Array:
+    """Half of the length of every line at each of its nodes, (n_nodes,) [m]."""
+    ends = mesh.nodes[mesh.lines]
+    weights = np.zeros(len(mesh.nodes))
+    np.add.at(weights, mesh.lines.ravel(), np.repeat(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2, 2))
+    return weights

@@ -1,0 +1,66 @@
+"""What a beam element needs to know of a cross-section, and how section forces become stress at its points."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.errors import SectionError
+
+__all__ = ["SectionProperties", "normal_stress"]
+
+FORCES = ("N", "Vy", "Vz", "Mx", "My", "Mz")  #: section forces on the face whose normal is +x, at the centroid
+
+
+@dataclass(frozen=True, eq=False)
+class SectionProperties:
+    """A homogeneous cross-section in its principal axes y, z through the centroid; x along the beam.
+
+    Raises
+    ------
+    SectionError
+        Unless A, Iy, Iz, J and the shear areas are positive (shear areas may be infinite).
+    """
+
+    A: float  #: area [m²]
+    Iy: float  #: ∫ z², bending in the x-z plane [m⁴]
+    Iz: float  #: ∫ y², bending in the x-y plane [m⁴]
+    J: float  #: Saint-Venant torsion constant [m⁴]
+    A_sy: float  #: shear area along y, kappa_y A [m²]; infinite: no shear deformation
+    A_sz: float  #: shear area along z, kappa_z A [m²]
+    points: Array  #: stress recovery points (y, z), which are the vertices of the outline too, (n_points, 2) [m]
+    stress: Array  #: (sigma_xx, tau_xy, tau_xz) at the points for unit `FORCES`, (n_points, 3, 6) [1/m², 1/m³]
+    loops: tuple[IntArray, ...] = ()  #: outline: points of the outer loop anticlockwise in (y, z), then of holes
+    cap: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of the face with normal +x
+    shear_center: tuple[float, float] = (0.0, 0.0)  #: (y, z) of the shear centre [m]
+
+    def __post_init__(self) -> None:
+        for name in ("A", "Iy", "Iz", "J", "A_sy", "A_sz"):
+            value = float(getattr(self, name))
+            object.__setattr__(self, name, value)
+            if not (value > 0 and (np.isfinite(value) or name in ("A_sy", "A_sz"))):
+                raise SectionError(f"section: {name}: expected a number above zero, got {value:g}")
+        object.__setattr__(self, "points", frozen(self.points))
+        object.__setattr__(self, "stress", frozen(self.stress))
+        object.__setattr__(self, "loops", tuple(frozen_int(loop) for loop in self.loops))
+        object.__setattr__(self, "cap", frozen_int(self.cap))
+        n = len(self.points)
+        if self.points.shape != (n, 2) or self.stress.shape != (n, 3, 6):
+            raise SectionError(
+                f"section: expected points (n, 2) and stress (n, 3, 6), got {self.points.shape} and {self.stress.shape}"
+            )
+
+    @property
+    def J_polar(self) -> float:
+        """Polar second moment Iy + Iz, of the rotary inertia about x [m⁴]."""
+        return self.Iy + self.Iz
+
+
+def normal_stress(points: Array, A: float, Iy: float, Iz: float) -> Array:
+    """Return the stress coefficients of sigma_xx = N/A + My z/Iy - Mz y/Iz; the shear rows are zero, (n, 3, 6)."""
+    y, z = np.asarray(points).T
+    stress = np.zeros((len(y), 3, 6))
+    stress[:, 0, 0] = 1 / A
+    stress[:, 0, 4] = z / Iy
+    stress[:, 0, 5] = -y / Iz
+    return stress

@@ -1,0 +1,86 @@
+"""The skin of a frame: outlines swept along the lines; its nodes are drawn, and show the stress of section points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.beams.axes import LineGeometry
+from fe_models.beams.section_properties import SectionProperties
+
+__all__ = ["Skin", "make_skin"]
+
+SAME = 1e-9  #: of the sizes: ends and axes of two lines that continue each other
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Rings of section points at the ends of the lines; lines that continue each other share the ring between them."""
+
+    points: Array  #: (n_skin, 3) [m]
+    mover: IntArray  #: node of the mesh that moves each point rigidly, (n_skin,)
+    triangles: IntArray  #: of points, outward, (n_tri, 3)
+    ring_start: IntArray  #: first point of the ring at both ends of each line, (n_lines, 2)
+
+
+def make_skin(
+    nodes: Array, lines: IntArray, geometry: LineGeometry, of_line: IntArray, sections: tuple[SectionProperties, ...]
+) -> Skin:
+    """Sweep the outlines along the lines.
+
+    Parameters
+    ----------
+    nodes, lines
+        Of the mesh, (n_nodes, 3) and (n_lines, 2).
+    geometry
+        Ends and axes of the lines.
+    of_line
+        Section of each line, (n_lines,).
+    sections
+        Their outlines.
+    """
+    size = float(np.linalg.norm(np.ptp(nodes, axis=0))) or 1.0
+    rings: dict[tuple[int, int], list[tuple[Array, Array, int, int]]] = {}  # (node, section) -> ends that lie there
+    points, mover, triangles = [], [], []
+    start = np.zeros((len(lines), 2), np.int64)
+    uses: dict[int, list[tuple[int, int]]] = {}
+    n_points = 0
+    for line, (pair, section) in enumerate(zip(lines, of_line, strict=True)):
+        outline = sections[section].points
+        for end, node in enumerate(pair):
+            X, R = geometry.ends[line, end], geometry.R[line]
+            here = rings.setdefault((int(node), int(section)), [])
+            continued = [
+                first_other
+                for X_other, R_other, other_end, first_other in here
+                if other_end != end and np.abs(X - X_other).max() <= SAME * size and np.abs(R - R_other).max() <= SAME
+            ]
+            first = continued[0] if continued else n_points
+            if not continued:
+                points.append(X + outline @ R[:, 1:].T)
+                mover.append(np.full(len(outline), node))
+                n_points += len(outline)
+                here.append((X, R, end, first))
+            start[line, end] = first
+            uses.setdefault(first, []).append((line, end))
+        for loop, turn in zip(sections[section].loops, (1, *[-1] * len(sections[section].loops)), strict=False):
+            triangles.append(_side(start[line], loop, turn))
+    for first, ends in uses.items():
+        if len(ends) == 1:  # nothing continues here: close it
+            line, end = ends[0]
+            cap = sections[of_line[line]].cap + first
+            triangles.append(cap if end == 1 else cap[:, ::-1])
+    return Skin(
+        frozen(np.concatenate(points) if points else np.zeros((0, 3))),
+        frozen_int(np.concatenate(mover) if mover else np.zeros(0)),
+        frozen_int(np.concatenate(triangles) if triangles else np.zeros((0, 3))),
+        frozen_int(start),
+    )
+
+
+def _side(start: IntArray, loop: IntArray, turn: int) -> IntArray:
+    """Triangles between the two rings of a loop; turn -1: the loop is a hole, its outside lies within."""
+    a, b = start[0] + loop, start[1] + loop
+    a_next, b_next = np.roll(a, -1), np.roll(b, -1)
+    side = np.concatenate([np.stack([a, a_next, b_next], axis=1), np.stack([a, b_next, b], axis=1)])
+    return side if turn == 1 else side[:, ::-1]
