@@ -185,7 +185,7 @@ def frame_of(job: Job) -> Any:
 
 def damping_of(job: Job) -> Any:
     """Return the damping of the job, or None."""
-    from cms.reduction import ModalDamping, RayleighDamping
+    from cms.damping import ModalDamping, RayleighDamping
 
     if job.damping is None:
         return None
