@@ -1,8 +1,13 @@
 from .couplings import couple as couple
+from .damping import ModalDamping as ModalDamping
+from .damping import PerModeDamping as PerModeDamping
+from .damping import RampDamping as RampDamping
+from .damping import RayleighDamping as RayleighDamping
 from .errors import CmsError as CmsError
 from .families import Families as Families
 from .fe_body import FEBody as FEBody
 from .fe_body import Interface as Interface
+from .frames import BuckensFrame as BuckensFrame
 from .frames import NodalFrame as NodalFrame
 from .frames import TisserandFrame as TisserandFrame
 from .interface_loads import InterfaceLoad as InterfaceLoad
@@ -29,8 +34,6 @@ from .mode_sets import unrestrained_attachment as unrestrained_attachment
 from .reduced_body import BodyFrame as BodyFrame
 from .reduced_body import ReducedBody as ReducedBody
 from .reduced_body import ReducedInterface as ReducedInterface
-from .reduction import ModalDamping as ModalDamping
-from .reduction import RayleighDamping as RayleighDamping
 from .reduction import reduce as reduce
 from .units import UNIT_SYSTEMS as UNIT_SYSTEMS
 from .units import Units as Units

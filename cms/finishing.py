@@ -13,6 +13,7 @@ from cms.frames import FrameCondition
 from cms.independent import Columns, gram, independent_columns
 from cms.mode_set import ModeSet
 from cms.orientation import orientation
+from cms.source_columns import SourceColumns, source_columns
 from cms.sparse_product import SymmetricProduct
 
 __all__ = ["FinishedBasis", "finish"]
@@ -30,7 +31,7 @@ class FinishedBasis:
     Phi: Array  #: (n_dof, n_q)
     M: Array  #: Phi.T M Phi, (n_q, n_q): identity, zero rows for massless static shapes
     K: Array  #: Phi.T K Phi, (n_q, n_q), diagonal
-    energy_shares: Array  #: of the columns of the mode set in each shape, rows sum to 1, (n_q, n_columns)
+    columns: SourceColumns  #: the columns of the mode set and their parts in the energy of each shape
     dropped: tuple[str, ...]  #: labels of redundant columns
     n_rigid: int  #: independent rigid-body motions the columns contained
     free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
@@ -89,7 +90,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         Phi=Phi,
         M=np.diag(is_massive.astype(float)),
         K=np.diag(omega2),
-        energy_shares=_shares(A, K_V),
+        columns=source_columns(modes.labels, modes.groups, A, K_V @ A),
         dropped=tuple(modes.labels[k] for k in redundant),
         n_rigid=n_rigid,
         free_omega2=free_omega2,
@@ -152,12 +153,3 @@ def free_elastic(Q: Columns, G_K: Array, condition: FrameCondition, omega2_1: fl
     G_M = gram(Q.X, Q.MX) - Y.T @ np.linalg.solve(rigid_mass, Y)
     Z, is_massive, _ = elastic_eigenvectors(G_K, (G_M + G_M.T) / 2, omega2_1)
     return np.sort(np.einsum("kq,kl,lq->q", Z, G_K, Z)[is_massive])
-
-
-def _shares(A: Array, K_V: Array) -> Array:
-    """Share of column k in the energy aᵀ K a of each shape: |a_k (K a)_k| over their sum, (n_q, n_columns).
-
-    The terms a_k (K a)_k alone sum to the energy, but some are negative where columns work against each other.
-    """
-    work = np.abs(A * (K_V @ A))
-    return (work / work.sum(axis=0)).T

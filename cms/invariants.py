@@ -81,6 +81,18 @@ class Moments:
         """M*_kl = ∫ phi_k · phi_l, (n_q, n_q) [kg]."""
         return frozen(np.einsum("aakl->kl", self.S_kl))
 
+    @property
+    def gram(self) -> Array:
+        """The Gram matrix ∫ a aᵀ, a = [1, c, phi_x, phi_y, phi_z], (4 + 3 n_q, 4 + 3 n_q), of these moments."""
+        n = self.n_q
+        gram = np.zeros((4 + 3 * n, 4 + 3 * n))
+        gram[0, 0], gram[0, 1:4], gram[1:4, 1:4] = self.m, self.S, self.R
+        gram[0, 4:] = self.C1.reshape(-1)
+        gram[1:4, 4:] = self.P.reshape(3, -1)
+        gram[4:, 4:] = self.S_kl.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
+        gram[1:4, 0], gram[4:, :4] = gram[0, 1:4], gram[:4, 4:].T
+        return gram
+
     def inertia(self, q: Array) -> Array:
         """Return J(q) = J0 + Σ q_k (3C_k + 3C_kᵀ) + Σ q_k q_l 5C_kl, (3, 3) [kg m²], symmetric."""
         linear = np.einsum("k,kab->ab", q, self.C3)

@@ -8,7 +8,7 @@ import numpy as np
 from cms.arrays import Array, frozen, require_finite, require_shape
 from cms.errors import BodyError
 
-__all__ = ["LOAD_CASE_KINDS", "LoadCase", "check_load_cases", "load_columns"]
+__all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
 
 LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: in words of the job file; a body takes any text
 
@@ -31,6 +31,27 @@ class LoadCase:
         if self.f.ndim != 1:
             raise BodyError(f"load case {self.name!r}: f: expected one number per dof, got shape {self.f.shape}")
         require_finite(f"load case {self.name!r}: f", self.f)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedLoadCase:
+    """A named load on a reduced body: its resultant and its modal forces, for an amplitude of one."""
+
+    name: str
+    kind: str
+    force: Array  #: resultant in B, (3,) [N]
+    torque: Array  #: resultant about the undeformed origin of B, (3,) [N m]
+    h: Array  #: modal forces Phiᵀ f, (n_q,) [N per unit of Phi]
+
+    def __post_init__(self) -> None:
+        where = f"load case {self.name!r}"
+        for name in ("force", "torque", "h"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+            require_finite(f"{where}: {name}", getattr(self, name))
+        require_shape(f"{where}: force", self.force, (3,))
+        require_shape(f"{where}: torque", self.torque, (3,))
+        if self.h.ndim != 1:
+            raise BodyError(f"{where}: h: expected one number per mode, got shape {self.h.shape}")
 
 
 def check_load_cases(where: str, load_cases: Iterable[LoadCase], n_dof: int) -> tuple[LoadCase, ...]:

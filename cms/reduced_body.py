@@ -9,6 +9,10 @@ import numpy as np
 from cms.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from cms.errors import BodyError
 from cms.invariants import Moments
+from cms.load_cases import ReducedLoadCase
+from cms.nodal_sums import NodalSums
+from cms.source_columns import SourceColumns
+from cms.stress_modes import PointStress
 from cms.units import Units
 from cms.words import nearest
 
@@ -22,14 +26,18 @@ class BodyFrame:
     c_mesh = origin + axes @ c_B.
     """
 
-    kind: str  #: "nodal" or "tisserand"
+    kind: str  #: "nodal", "tisserand" or "buckens"
     origin: Array  #: in mesh coordinates, (3,) [m]
     axes: Array = field(default_factory=lambda: np.eye(3))  #: columns: axes of B in mesh axes, (3, 3)
-    at: str = ""  #: interface that carries a nodal frame; "": dofs chosen automatically
+    at: str = ""  #: interface that carries a nodal frame; "": other dofs
+    #: dofs that a nodal frame holds, (node of the mesh, component), (6, 2); empty: another kind, or not on record
+    dofs: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "origin", frozen(self.origin))
         object.__setattr__(self, "axes", frozen(self.axes))
+        object.__setattr__(self, "dofs", frozen_int(self.dofs))
+        require_shape("body frame: dofs", self.dofs, (len(self.dofs), 2))
         require_shape("body frame: origin", self.origin, (3,))
         require_shape("body frame: axes", self.axes, (3, 3))
         require_finite("body frame: origin", self.origin)
@@ -46,6 +54,8 @@ class ReducedInterface:
     triad: Array  #: undeformed axes as columns in B, (3, 3)
     Psi: Array  #: translation and rotation of the point in B for each mode, (6, n_q) [-, 1/m]
     members: IntArray  #: member nodes, indices into `ReducedBody.nodes`, (n_members,)
+    #: False: Psi has no rotation (rows 3-5 are zero) and is the mean translation of the members, which lie on one line
+    has_rotation: bool = True
 
     def __post_init__(self) -> None:
         where = f"interface {self.name!r}"
@@ -81,6 +91,13 @@ class ReducedBody:
     surface: IntArray  #: triangles of kept nodes, (n_tri, 3)
     interfaces: tuple[ReducedInterface, ...]
     provenance: Mapping[str, str] = field(default_factory=dict)  #: versions, digests, options, solver
+    columns: SourceColumns | None = None  #: columns of the mode set; None: not on record
+    nodal_sums: NodalSums | None = None  #: what a Buckens frame needs; None: not on record
+    load_cases: tuple[ReducedLoadCase, ...] = ()
+    #: stress of the modes at the kept nodes, xx yy zz yz xz xy in axes of B, (n_kept, 6, n_q) [Pa per unit of q]; None:
+    #: left out, or unknown. Zero at reference nodes, which belong to no element
+    stress: Array | None = None
+    point_stress: PointStress | None = None  #: stress of the modes at named points; None: left out, or there are none
 
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"
@@ -90,7 +107,11 @@ class ReducedBody:
             require_finite(f"{where}: {name}", getattr(self, name))
         for name in ("node_ids", "surface"):
             put(self, name, frozen_int(getattr(self, name)))
-        for name in ("labels", "sources", "interfaces"):
+        if self.stress is not None:
+            put(self, "stress", frozen(self.stress))
+            require_shape(f"{where}: stress", self.stress, (len(self.nodes), 6, self.n_q))
+            require_finite(f"{where}: stress", self.stress)
+        for name in ("labels", "sources", "interfaces", "load_cases"):
             put(self, name, tuple(getattr(self, name)))
         put(self, "provenance", MappingProxyType(dict(self.provenance)))
         n, n_kept = self.n_q, len(self.nodes)
@@ -108,6 +129,16 @@ class ReducedBody:
             raise BodyError(f"{where}: {n} modes need as many labels, got {len(self.labels)}")
         if self.moments.n_q != n:
             raise BodyError(f"{where}: {n} modes, but moments of {self.moments.n_q}")
+        widths = {f"load case {case.name!r}: h": case.h.shape for case in self.load_cases}
+        if self.columns is not None:
+            widths["columns"] = (np.asarray(self.columns.A).shape[1],)
+        if self.nodal_sums is not None:
+            widths["nodal sums"] = (np.asarray(self.nodal_sums.U1).shape[1],)
+        if self.point_stress is not None:
+            widths["stress points"] = (np.asarray(self.point_stress.modes).shape[2],)
+        for name, width in widths.items():
+            if width != (n,):
+                raise BodyError(f"{where}: {n} modes, but {name} of {width[0]}")
         if self.surface.size and (self.surface.min() < 0 or self.surface.max() >= n_kept):
             raise BodyError(f"{where}: surface: nodes outside 0..{n_kept - 1}")
         for interface in self.interfaces:
@@ -134,3 +165,11 @@ class ReducedBody:
                 return interface
         choices = [interface.name for interface in self.interfaces]
         raise BodyError(f"reduced body {self.name!r}: no interface {name!r}{nearest(name, choices)}")
+
+    def load_case(self, name: str) -> ReducedLoadCase:
+        """Return the load case of that name; `BodyError` with the choices if there is none."""
+        for case in self.load_cases:
+            if case.name == name:
+                return case
+        choices = [case.name for case in self.load_cases]
+        raise BodyError(f"reduced body {self.name!r}: no load case {name!r}{nearest(name, choices)}")

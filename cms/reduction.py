@@ -2,52 +2,37 @@
 
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib import metadata
 
 import numpy as np
 
 from cms.arrays import Array, IntArray
 from cms.couplings import mean_motion
+from cms.damping import Damping, modal_damping
 from cms.errors import BodyError, ModeSetError
 from cms.fe_body import FEBody, Interface
 from cms.finishing import FinishedBasis, finish
 from cms.frames import Frame, TisserandFrame, frame_condition
 from cms.invariants import Moments, moments_from_gram
+from cms.load_cases import LoadCase, ReducedLoadCase
 from cms.matrix_moments import gram_from_matrices
 from cms.mode_set import ModeSet
+from cms.nodal_sums import NodalSums, node_weights, weighted_rigid_modes
 from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.rigid_modes import geometric_rigid_modes
+from cms.stress_modes import nodal_stress_modes, point_stress_modes
 
-__all__ = ["Damping", "ModalDamping", "RayleighDamping", "reduce"]
-
-
-@dataclass(frozen=True)
-class ModalDamping:
-    """The same damping ratio for every mode: D = diag(2 ratio omega)."""
-
-    ratio: float  #: of critical damping, 0 <= ratio
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.ratio < np.inf:
-            raise ModeSetError(f"damping: ratio = {self.ratio}; expected 0 or more (0.01 is 1 % of critical)")
+__all__ = ["reduce"]
 
 
-@dataclass(frozen=True)
-class RayleighDamping:
-    """D = alpha M + beta K."""
-
-    alpha: float = 0.0  #: [1/s]
-    beta: float = 0.0  #: [s]
-
-    def __post_init__(self) -> None:
-        if not (0 <= self.alpha < np.inf and 0 <= self.beta < np.inf):
-            raise ModeSetError(f"damping: alpha = {self.alpha}, beta = {self.beta}; expected 0 or more")
-
-
-Damping = ModalDamping | RayleighDamping
-
-
-def reduce(body: FEBody, modes: ModeSet, *, frame: Frame | None = None, damping: Damping | None = None) -> ReducedBody:
+def reduce(
+    body: FEBody,
+    modes: ModeSet,
+    *,
+    frame: Frame | None = None,
+    damping: Damping | None = None,
+    stress: bool = True,
+) -> ReducedBody:
     """Reduce a body to the span of a mode set.
 
     Parameters
@@ -60,6 +45,8 @@ def reduce(body: FEBody, modes: ModeSet, *, frame: Frame | None = None, damping:
         Body reference frame; Tisserand (mean axis) by default.
     damping
         Added to the body's own D, which is projected; none by default.
+    stress
+        Whether to keep the stress of the modes at the kept nodes and the stress points, where the body knows it.
 
     Raises
     ------
@@ -78,8 +65,6 @@ def reduce(body: FEBody, modes: ModeSet, *, frame: Frame | None = None, damping:
     finished = finish(body, modes, condition)
     kept = kept_nodes(body)
     axes, origin = condition.frame.axes, condition.frame.origin
-    sources = tuple(dict.fromkeys(modes.groups))
-    in_source = np.array([[group == source for source in sources] for group in modes.groups], dtype=float)
     # components in B; exact zeros of aligned axes stay exact
     Phi_kept = np.einsum("ba,nbk->nak", axes, body.translations(finished.Phi)[kept])
     index_of = np.full(len(body.nodes), -1, np.int64)
@@ -91,9 +76,9 @@ def reduce(body: FEBody, modes: ModeSet, *, frame: Frame | None = None, damping:
         M=finished.M,
         K=finished.K,
         D=reduced_damping(body, finished, damping),
-        labels=mode_labels(modes, finished),
-        energy_shares=finished.energy_shares @ in_source,
-        sources=sources,
+        labels=finished.columns.mode_labels(),
+        energy_shares=finished.columns.group_shares(),
+        sources=finished.columns.sources,
         moments=reduced_moments(body, finished.Phi, condition.frame),
         free_frequencies=np.sqrt(np.maximum(finished.free_omega2, 0.0)) / (2 * np.pi),
         nodes=(body.nodes[kept] - origin) @ axes,
@@ -104,6 +89,11 @@ def reduce(body: FEBody, modes: ModeSet, *, frame: Frame | None = None, damping:
             reduced_interface(body, interface, finished.Phi, condition.frame, index_of) for interface in body.interfaces
         ),
         provenance=reduction_provenance(body, modes, finished, damping),
+        columns=finished.columns,
+        nodal_sums=reduced_nodal_sums(body, finished.Phi, condition.frame),
+        load_cases=tuple(reduced_load_case(body, case, finished.Phi, condition.frame) for case in body.load_cases),
+        stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
+        point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
     )
 
 
@@ -130,20 +120,51 @@ def reduced_moments(body: FEBody, Phi: Array, frame: BodyFrame) -> Moments:
     return moments_from_gram(L @ gram @ L.T, is_exact=body.element_model is not None)
 
 
+def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums | None:
+    """Weighted sums over the nodes in the frame B; None where the nodes do not span a body."""
+    weights = node_weights(body)
+    if not weights.any():
+        return None
+    c = (body.nodes - frame.origin) @ frame.axes
+    try:
+        U = weighted_rigid_modes(body, frame.origin).T @ Phi
+    except BodyError:  # nodes on one line, or without translations: no Buckens frame can be had
+        return None
+    return NodalSums(
+        w=weights.sum(),
+        S=weights @ c,
+        R=c.T @ (weights[:, None] * c),
+        U1=frame.axes.T @ U[:3],
+        U2=frame.axes.T @ U[3:],
+        is_volume=body.node_volumes is not None,
+    )
+
+
+def reduced_load_case(body: FEBody, case: LoadCase, Phi: Array, frame: BodyFrame) -> ReducedLoadCase:
+    """Modal forces of a load case, and its resultant about the origin of B."""
+    wrench = geometric_rigid_modes(body, origin=frame.origin).T @ case.f
+    R = frame.axes.T
+    return ReducedLoadCase(case.name, case.kind, force=R @ wrench[:3], torque=R @ wrench[3:], h=Phi.T @ case.f)
+
+
 def reduced_interface(
     body: FEBody, interface: Interface, Phi: Array, frame: BodyFrame, index_of: IntArray
 ) -> ReducedInterface:
     """Motion of an interface with the modes: of its reference node, or the mean motion of its nodes."""
     if interface.dofs is None:
         raise BodyError(f"body {body.name!r}: interface {interface.name!r} is not coupled; call cms.couple(body)")
-    has_reference_node = len(interface.dofs) == 6 and len(np.unique(body.dofs[interface.dofs, 0])) == 1
-    if has_reference_node:
+    has_rotation = True
+    if len(interface.dofs) == 6 and len(np.unique(body.dofs[interface.dofs, 0])) == 1:  # a reference node
         Psi = Phi[interface.dofs]
         reference = body.nodes[body.dofs[interface.dofs[0], 0]]
     else:
         members = body.translations(Phi)[interface.nodes]
         reference = interface.reference
-        Psi = _mean_motion_or_translation(body, interface) @ members.reshape(-1, Phi.shape[1])
+        has_rotation = are_spread(body.nodes[interface.nodes])
+        to_mean = mean_motion if has_rotation else mean_translation
+        Psi = to_mean(body.nodes[interface.nodes], np.asarray(interface.weights), interface.reference) @ (
+            members.reshape(-1, Phi.shape[1])
+        )
     R = frame.axes.T
     return ReducedInterface(
         interface.name,
@@ -152,41 +173,31 @@ def reduced_interface(
         triad=R @ interface.triad,
         Psi=np.concatenate([R @ Psi[:3], R @ Psi[3:]]),
         members=index_of[interface.nodes],
+        has_rotation=has_rotation,
     )
 
 
-def _mean_motion_or_translation(body: FEBody, interface: Interface) -> Array:
-    """Mean motion of a nodes interface; its translation only where the nodes are on one line."""
-    points, weights = body.nodes[interface.nodes], np.asarray(interface.weights)
+def are_spread(points: Array) -> bool:
+    """Return whether points span at least a piece of a plane, so that their mean motion has a rotation."""
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(points) >= 3 and spread[1] > 1e-6 * spread[0]:
-        return mean_motion(points, weights, interface.reference)
+    return bool(len(points) >= 3 and spread[1] > 1e-6 * spread[0])
+
+
+def mean_translation(points: Array, weights: Array, reference: Array) -> Array:
+    """Weighted mean translation of points, no rotation, (6, 3 n_points), columns node-major."""
     translation = np.kron(weights, np.eye(3))
     return np.vstack([translation, np.zeros_like(translation)])
 
 
 def reduced_damping(body: FEBody, finished: FinishedBasis, damping: Damping | None) -> Array:
     """Return D* = Phiᵀ D Phi plus the modal or Rayleigh part, (n_q, n_q) [1/s]."""
-    omega2, mass = np.diag(finished.K), np.diag(finished.M)
-    D = np.zeros((len(omega2), len(omega2)))
+    D = np.zeros_like(finished.K)
     if body.D is not None:
         D += finished.Phi.T @ (body.D @ finished.Phi)
         D = (D + D.T) / 2
-    if isinstance(damping, ModalDamping):
-        D += np.diag(2 * damping.ratio * np.sqrt(omega2) * mass)
-    elif isinstance(damping, RayleighDamping):
-        D += np.diag(damping.alpha * mass + damping.beta * omega2)
+    if damping is not None:
+        D += modal_damping(damping, finished.M, finished.K, second=body.units.time)
     return D
-
-
-def mode_labels(modes: ModeSet, finished: FinishedBasis) -> tuple[str, ...]:
-    """Say in words which columns carry a mode's energy: the largest one or two with their shares."""
-    labels = []
-    for shares in finished.energy_shares:
-        order = np.argsort(shares)[::-1]
-        parts = [order[0]] if shares[order[0]] > 0.9 or len(order) < 2 or shares[order[1]] < 0.05 else order[:2]
-        labels.append(", ".join(f"{modes.labels[k]} ({100 * shares[k]:.0f} %)" for k in parts))
-    return tuple(labels)
 
 
 def reduction_provenance(

@@ -1,7 +1,10 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
+from cms.cli.job_mode_set import load_of
 from cms.errors import JobError
 from cms.job import (
     BodySection,
@@ -49,6 +52,10 @@ at = "big_end"
 [damping]
 ratio = 0.01
 """
+
+
+LOADED = 'set = "benfield-hruda"\nloads = {'
+SIX_ROWS = np.eye(6).tolist()
 
 
 @pytest.fixture
@@ -109,17 +116,16 @@ def test_a_good_job_is_read(job_file):
     ("[reduction]", "[reductio]", "reductio: unknown key; did you mean 'reduction'?"),
     ("[damping]", "[interfaces.x]\nkind='rigid'\nbox=3\n[damping]", "interfaces.x.box = 3: expected a table {lo, hi}"),
     ("[damping]", "[materials.b]\nyoung=1\npoisson=0\ndensity=1\n[damping]", "there are 2 materials; name the group"),
-    ('kind = "gravity"', 'kind = "gravitas"', "load_cases.weight.kind = \"gravitas\": unknown kind; did you mean 'grav"),
+    ('kind = "gravity"', 'kind = "gravitas"', "weight.kind = \"gravitas\": unknown kind; did you mean 'grav"),
     ("acceleration = ", "pressure = 1\nforce =", "weight: a load case of kind 'gravity' has no key pressure"),
     ("acceleration = [0, 0, -9810]", "", "load_cases.weight: acceleration: missing; how large is the load?"),
     ("acceleration = [0, 0, -9810]", "box = {lo=[0,0,0], hi=[1,1,1]}", "kind 'gravity' has no key box"),
     ("pressure = 12", "", "load_cases.firing: pressure: missing; how large is the load?"),
-    ("pressure = 12", "pressure = 12\nbox={lo=[0,0,0],hi=[1,1,1]}", "one of faces, nodes, plane, cylinder, box, nearest; got plane, "
-                                                                    "box"),
+    ("pressure = 12", "pressure = 12\nbox={lo=[0,0,0],hi=[1,1,1]}", "expected exactly one of faces, nodes, plane"),
     ("pressure = 12", "pressure = nan", "load_cases.firing.pressure = nan: expected a number"),
     ("torque = [0, 0, 3]", "", "load_cases.pull: force or torque: missing"),
     ('at = "small_end"\n', "", "expected exactly one of at, faces, nodes"),
-    ('at = "small_end"', 'at = "smal_end"', "load_cases.pull.at = \"smal_end\": there is no such interface; did you mean"),
+    ('at = "small_end"', 'at = "smal_end"', "pull.at = \"smal_end\": there is no such interface; did you mean"),
     ('at = "small_end"', 'at = "small_end"\nreference = [0,0,0]', "an interface has its own"),
     ('[body]', '[body]\naccept = ["part"]', "'part' is not a finding that can be accepted; did you mean 'parts'?"),
     ('[body]', '[body]\nname = 3', "body.name = 3: expected the name of the body"),
@@ -142,6 +148,48 @@ def test_all_problems_are_told_at_once(job_file):
     lines = str(caught.value).splitlines()
     assert lines[0].endswith("rod.toml: 4 problems:")
     assert len(lines) == 5
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    ('set = "benfield-hruda"', "reduction: mode set 'benfield-hruda' needs the mass or stiffness of the neighbours"),
+    ('set = "rubin"\nloads = {big_end = {mass = 1}}', "mode set 'rubin' has no option loads; choices: cutoff, n_modes"),
+    ('set = "rubin"\nfree = {big_end = ["rz"]}', "mode set 'rubin' has no option free"),
+    ('set = "guyan"', "mode set 'guyan' has no option n_modes"),
+    ('set = "craig-bampton-ir"\nn_modes = 3\ncutoff = 4.0', "expected either n_modes (how many) or cutoff"),
+    ('set = "normal"\nn_modes = 0', "holds only rigid-body motion; choose n_modes >= 1"),
+    ('free = {big_ent = ["rz"]}', "reduction.free.big_ent: there is no such interface; did you mean 'big_end'?"),
+    ('free = {big_end = ["zr"]}', "reduction.free.big_end = ['zr']: unknown component 'zr'; did you mean 'rz'?"),
+    ('free = {big_end = ["rz", "rz"]}', "expected a list of components, each once, of ux, uy, uz, rx, ry, rz"),
+    ('free = {big_end = []}', "expected a list of components, each once"),
+    (LOADED + "big_ent = {mass = 1}}", "reduction.loads.big_ent: there is no such interface; did you mean 'big_end'?"),
+    (LOADED + "big_end = {mas = 1}}", "reduction.loads.big_end.mas: unknown key; did you mean 'mass'?"),
+    (LOADED + "big_end = {}}", "reduction.loads.big_end: expected a mass, inertia, stiffness or rotational_stiffness"),
+    (LOADED + "big_end = {mass = 0, stiffness = [0, 0, 0]}}", "expected a mass, inertia, stiffness or rotational_st"),
+    (LOADED + "big_end = {mass = -1}}", "reduction.loads.big_end.mass = -1: expected one number, 0 or more"),
+    (LOADED + "big_end = {mass = [1, 2, 3]}}", "mass: expected one number, or six rows of six numbers"),
+    (LOADED + "big_end = {mass = [[1, 2], [3, 4]]}}", "expected one number, three, or six rows of six numbers"),
+    (LOADED + "big_end = {inertia = [1, 2]}}", "expected one number, 0 or more, or three, [x, y, z]"),
+    (LOADED + f"big_end = {{mass = {SIX_ROWS}, inertia = 2}}}}", "mass as six rows holds the inertia too"),
+    ('set = "benfield-hruda"\nneighbours = [{job = "crank.toml", interfaces = {big_end = "pin"}}]', "no such file"),
+    ('set = "benfield-hruda"\nneighbours = [{job = "rod.toml", interfaces = {}}]', "expected at least one pair"),
+    ('set = "benfield-hruda"\nneighbours = [{job = "rod.toml", interfaces = {x = "pin"}}]',
+     "reduction.neighbours.interfaces.x: there is no such interface"),
+])  # fmt: skip
+def test_options_that_do_not_fit_the_mode_set_are_refused(job_file, options, words):
+    text = GOOD.replace("n_modes = 12", options if "n_modes" in options else f"{options}\nn_modes = 12")
+    with pytest.raises(JobError) as caught:
+        read_job(job_file(text))
+    assert words in str(caught.value)
+
+
+def test_loads_are_numbers_or_matrices(job_file):
+    text = GOOD.replace(
+        "n_modes = 12", LOADED + f"big_end = {{mass = 2, inertia = [1, 2, 3], stiffness = {SIX_ROWS}}}}}"
+    )
+    loads = read_job(job_file(text.replace("set =", "n_modes = 12\nset ="))).reduction.loads
+    load = load_of("big_end", loads["big_end"])
+    assert_array_equal(load.M, np.diag([2, 2, 2, 1, 2, 3]))
+    assert_array_equal(load.K, np.eye(6))
 
 
 def test_a_file_that_is_no_toml_is_refused_with_its_place(job_file, tmp_path):

@@ -7,12 +7,13 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from cms.couplings import couple
+from cms.damping import ModalDamping, RayleighDamping
 from cms.errors import BodyError, ModeSetError
 from cms.fe_body import FEBody, Interface
 from cms.frames import NodalFrame, TisserandFrame
 from cms.mode_set import ModeSet
 from cms.mode_sets import craig_bampton, guyan
-from cms.reduction import ModalDamping, RayleighDamping, reduce
+from cms.reduction import reduce
 from cms.rigid_modes import geometric_rigid_modes
 from tests.bodies import STEEL, bar, box_mesh, with_interfaces
 
