@@ -178,11 +178,9 @@ class _Span:
         Z = np.zeros((len(G), rank))
         Z[pivots[:rank] - 1] = la.solve_triangular(np.triu(factor[:rank, :rank]), np.eye(rank))
         block = _products(body, block.X @ Z)
-        for _ in range(2):  # the smaller the remainder was, the more of the span its rounding carries
-            block = self._without_span(block)
-            G = gram(block.X, block.KX) + self.omega2 * gram(block.X, block.MX)
-            block = _products(body, block.X @ la.solve_triangular(la.cholesky(G), np.eye(rank)))
-        return block
+        block = self._without_span(block)  # the smaller the remainder was, the more of the span its rounding carries
+        G = gram(block.X, block.KX) + self.omega2 * gram(block.X, block.MX)
+        return _products(body, block.X @ la.solve_triangular(la.cholesky(G), np.eye(rank)))
 
     def _without_span(self, block: Columns) -> Columns:
         return _products(self.body, block.X - self.columns.X @ self.columns.inner(block, self.omega2))

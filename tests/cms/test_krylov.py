@@ -12,7 +12,7 @@ from cms.load_cases import LoadCase
 from cms.mode_sets.krylov import krylov
 from cms.receptance import boundary_scale, largest_error, receptance_of_modes
 from cms.reduction import reduce
-from tests.bodies import bar, beam, chain
+from tests.bodies import bar, chain
 
 ROUNDOFF = 1e-12
 
@@ -115,13 +115,11 @@ def test_n_modes_counts_columns_beyond_the_static_ones(body):
     assert_allclose(more.columns[:, :21], few.columns, rtol=0, atol=1e-9 * np.abs(few.columns).max())
 
 
-def test_columns_stay_orthonormal_through_many_blocks():
-    body = couple(beam(20))
-    modes = krylov(body, n_blocks=8)
+def test_columns_stay_orthonormal_until_the_whole_space_is_spanned(body):
+    modes = krylov(body, n_blocks=12)
     V = modes.columns[:, 6:]
-    K, M = V.T @ (body.K @ V), V.T @ (body.M @ V)
-    for omega2 in (modes.data["omega2"],):
-        assert_allclose(K + omega2 * M, np.eye(len(K)), rtol=0, atol=1e3 * ROUNDOFF)
+    W = V.T @ (body.K @ V) + modes.data["omega2"] * (V.T @ (body.M @ V))
+    assert_allclose(W, np.eye(body.n_dof - 6), rtol=0, atol=1e2 * ROUNDOFF)
 
 
 def test_load_cases_are_among_the_loads(body):
