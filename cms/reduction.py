@@ -18,6 +18,7 @@ from cms.load_cases import LoadCase, ReducedLoadCase
 from cms.matrix_moments import gram_from_matrices
 from cms.mode_set import ModeSet
 from cms.nodal_sums import NodalSums, node_weights, weighted_rigid_modes
+from cms.node_motion import interface_node_motion
 from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.rigid_modes import geometric_rigid_modes
 from cms.stress_modes import nodal_stress_modes, point_stress_modes
@@ -157,6 +158,8 @@ def reduced_interface(
     if len(interface.dofs) == 6 and len(np.unique(body.dofs[interface.dofs, 0])) == 1:  # a reference node
         Psi = Phi[interface.dofs]
         reference = body.nodes[body.dofs[interface.dofs[0], 0]]
+    elif (motion := interface_node_motion(body, interface, Phi)) is not None:
+        Psi, reference = motion, interface.reference
     else:
         members = body.translations(Phi)[interface.nodes]
         reference = interface.reference

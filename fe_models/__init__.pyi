@@ -58,6 +58,7 @@ from .mesh import Mesh as Mesh
 from .mesh_report import Finding as Finding
 from .mesh_report import MeshReport as MeshReport
 from .mesh_report import report_mesh as report_mesh
+from .planar import planar as planar
 from .selections import (
     Box as Box,
 )
@@ -78,3 +79,4 @@ from .selections import (
 )
 from .solid import solid_body as solid_body
 from .unused_nodes import drop_unused_nodes as drop_unused_nodes
+from .weld import weld as weld

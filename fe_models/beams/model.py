@@ -29,6 +29,11 @@ class BeamModel:
     skin: Skin
 
     @property
+    def has_nodal_stress(self) -> bool:
+        """Whether there is a skin that shows stress."""
+        return len(self.skin.points) > 0
+
+    @property
     def n_mesh_dof(self) -> int:
         """Dofs of the mesh: of the nodes, then of the skin."""
         return 6 * self.n_nodes + 3 * len(self.skin.points)

@@ -1,0 +1,76 @@
+"""A planar body: elastic in one plane, rigid out of it, and still a body in space with six rigid-body motions."""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.elimination import eliminate_dofs
+from cms.errors import BodyError
+from cms.fe_body import FEBody, Interface
+from cms.rigid_modes import rigid_motion_of_points
+
+__all__ = ["planar"]
+
+
+def planar(body: FEBody, *, normal: int = 2) -> FEBody:
+    """Return the body with all deformation across a plane taken away.
+
+    In-plane dofs stay (two translations and the rotation about the normal: three per node). Out of the plane every
+    node follows one reference node rigidly: its translation along the normal and the rotations about the two in-plane
+    axes are the only three such dofs of the body. So mass, inertia and invariants stay those of the body in space, K
+    costs nothing for all six rigid-body motions, and frames, mode sets and multibody systems work as they do in space;
+    a body that moves in its plane moves as a planar model does.
+
+    The reference node is that of the first interface: its boundary dofs are six, those of the others lose the three
+    out of plane.
+
+    Parameters
+    ----------
+    body
+        A coupled body, without distributing interfaces.
+    normal
+        Mesh axis across the plane: 0, 1 or 2 for x, y or z.
+
+    Raises
+    ------
+    BodyError
+        If the body is not coupled, has multipliers, or no node has six dofs.
+    """
+    where = f"planar: body {body.name!r}"
+    if normal not in (0, 1, 2):
+        raise BodyError(f"{where}: normal: expected axis 0, 1 or 2 of the mesh, got {normal!r}")
+    body.require_coupled()
+    if (body.dofs[:, 1] < 0).any():
+        raise BodyError(f"{where}: has distributing interfaces; make them rigid, or choose single nodes")
+    node, component = body.dofs.T
+    is_out = np.isin(component, [normal, *(3 + axis for axis in range(3) if axis != normal)])
+    reference = _reference_node(body, where)
+    out_of_reference = np.flatnonzero(is_out & (node == reference))
+    slaves = np.flatnonzero(is_out & (node != reference))
+    rows = np.zeros((len(slaves), 6))
+    is_translation = component[slaves] < 3
+    motion = rigid_motion_of_points(body.nodes[node[slaves]], body.nodes[reference])[:, normal]
+    rows[is_translation] = motion[is_translation]
+    rows[~is_translation, component[slaves][~is_translation]] = 1.0
+    columns = sp.csr_array(rows[:, component[out_of_reference]])
+    placement = sp.csr_array((np.ones(3), (np.arange(3), out_of_reference)), shape=(3, body.n_dof))
+    kept = np.setdiff1d(np.arange(body.n_dof), slaves)
+    body = replace(body, interfaces=tuple(_without(interface, kept) for interface in body.interfaces))
+    return eliminate_dofs(body, slaves, columns @ placement)
+
+
+def _reference_node(body: FEBody, where: str) -> int:
+    """Return the node of the first boundary dofs, else the first with six dofs."""
+    candidates = [np.asarray(i.dofs) for i in body.interfaces if i.dofs is not None]
+    nodes = np.concatenate([*[body.dofs[dofs, 0] for dofs in candidates], body.dofs[:, 0]])
+    count = np.bincount(body.dofs[:, 0], minlength=len(body.nodes))
+    with_six = nodes[count[nodes] == 6]
+    if not len(with_six):
+        raise BodyError(f"{where}: no node has six dofs; expected beams, or a rigid interface")
+    return int(with_six[0])
+
+
+def _without(interface: Interface, kept: np.ndarray) -> Interface:
+    dofs = np.asarray(interface.dofs)
+    return replace(interface, dofs=dofs[np.isin(dofs, kept)])

@@ -1,0 +1,241 @@
+"""Weld: several bodies become one, joined where their interfaces meet; solids and frames alike."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.arrays import Array, IntArray
+from cms.elimination import eliminate_dofs
+from cms.errors import BodyError
+from cms.fe_body import ElementModel, FEBody, Interface, Recovery
+from cms.load_cases import LoadCase
+from cms.rigid_modes import rigid_motion_of_points
+
+__all__ = ["WeldedModel", "weld"]
+
+Place = tuple[str, str]  #: name of a body, name of its interface
+
+
+@dataclass(frozen=True, eq=False)
+class WeldedModel:
+    """The element models of the parts side by side (`cms.fe_body.ElementModel`)."""
+
+    parts: tuple[ElementModel, ...]
+    n_mesh_dof: tuple[int, ...]  #: of each part
+    n_nodes: tuple[int, ...]  #: of each part, reference nodes included
+
+    @property
+    def has_nodal_stress(self) -> bool:
+        """Whether any part knows its stress; the others show zero."""
+        return any(part.has_nodal_stress for part in self.parts)
+
+    def mass_gram(self, u: Array) -> Array:
+        """Return the sum of the Gram matrices of the parts, (4 + 3 k, 4 + 3 k)."""
+        k = np.shape(u)[1]
+        gram = np.zeros((4 + 3 * k, 4 + 3 * k))
+        for part, rows in zip(self.parts, self._rows(), strict=True):
+            gram += part.mass_gram(u[rows])
+        return gram
+
+    def nodal_stress(self, u: Array) -> Array:
+        """Return the stress at the nodes of all parts, (n_nodes, 6, k); zero at reference nodes."""
+        stresses = []
+        for part, rows, n_nodes in zip(self.parts, self._rows(), self.n_nodes, strict=True):
+            stress = np.zeros((n_nodes, 6, np.shape(u)[1]))
+            if part.has_nodal_stress:
+                own = part.nodal_stress(u[rows])
+                stress[: len(own)] = own
+            stresses.append(stress)
+        return np.concatenate(stresses)
+
+    def _rows(self) -> list[slice]:
+        ends = np.cumsum([0, *self.n_mesh_dof])
+        return [slice(begin, end) for begin, end in pairwise(ends.tolist())]
+
+
+def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, name: str) -> FEBody:
+    """Join coupled bodies into one.
+
+    (1) matrices, nodes, dofs, surfaces and load cases side by side
+    (2) at each joint the six dofs of the second interface follow those of the first rigidly: u_2 = u_1 + theta_1 × r
+    (3) interfaces that are joined are boundary no more; the others stay as they are
+
+    A beam meets a solid by an interface on the solid's faces, rigid (RBE2) or distributing (RBE3), and one at the
+    beam's end node. Joined interfaces need not lie at one point: the distance is a rigid arm.
+
+    Parameters
+    ----------
+    bodies
+        Coupled bodies in the same units and mesh axes, with different names.
+    joints
+        Pairs of (body name, interface name).
+    name
+        Of the whole. Interfaces keep their names where these are unique, else they become "body.interface".
+
+    Returns
+    -------
+    FEBody
+        Coupled; its element model is `WeldedModel` where every part has one.
+
+    Raises
+    ------
+    BodyError
+        If names are unknown or repeated, units differ, a body is not coupled, an interface has not six dofs at one
+        node, or a joint closes a ring of followers.
+    """
+    where = f"weld {name!r}"
+    bodies, joints = tuple(bodies), tuple(joints)
+    _require_fit(where, bodies)
+    index = {body.name: k for k, body in enumerate(bodies)}
+    first_dof = np.cumsum([0, *(body.n_dof for body in bodies)])
+    first_node = np.cumsum([0, *(len(body.nodes) for body in bodies)])
+    joined, pairs = _joined_dofs(where, bodies, index, first_dof, joints)
+    side_by_side = _side_by_side(name, bodies, joined, first_dof, first_node)
+    slaves, T_s = _followers(where, side_by_side, pairs)
+    return eliminate_dofs(side_by_side, slaves, T_s) if len(slaves) else side_by_side
+
+
+def _require_fit(where: str, bodies: tuple[FEBody, ...]) -> None:
+    names = [body.name for body in bodies]
+    if not bodies or len(set(names)) != len(names):
+        raise BodyError(f"{where}: expected bodies with different names, got {', '.join(names) or 'none'}")
+    for body in bodies:
+        body.require_coupled()
+        if body.units != bodies[0].units:
+            raise BodyError(
+                f"{where}: body {body.name!r} is in {body.units.name}, {bodies[0].name!r} in {bodies[0].units.name}; "
+                "make all in one unit system"
+            )
+
+
+def _joined_dofs(
+    where: str,
+    bodies: tuple[FEBody, ...],
+    index: dict[str, int],
+    first_dof: IntArray,
+    joints: tuple[tuple[Place, Place], ...],
+) -> tuple[set[Place], list[tuple[IntArray, IntArray]]]:
+    """Return the interfaces that are joined, and the dofs of both sides of each joint."""
+    joined: set[Place] = set()
+    pairs = []
+    for joint in joints:
+        dofs = []
+        for body_name, interface_name in joint:
+            if body_name not in index:
+                raise BodyError(f"{where}: no body {body_name!r}; expected one of {', '.join(index)}")
+            body = bodies[index[body_name]]
+            mine = np.asarray(body.interface(interface_name).dofs)
+            if len(mine) != 6 or len(np.unique(body.dofs[mine, 0])) != 1:
+                raise BodyError(
+                    f"{where}: interface {interface_name!r} of body {body_name!r} has {len(mine)} dofs; a joint needs "
+                    "the six of one node: take kind 'rigid' or 'distributing'"
+                )
+            dofs.append(first_dof[index[body_name]] + mine)
+            joined.add((body_name, interface_name))
+        pairs.append((dofs[0], dofs[1]))
+    return joined, pairs
+
+
+def _side_by_side(
+    name: str, bodies: tuple[FEBody, ...], joined: set[Place], first_dof: IntArray, first_node: IntArray
+) -> FEBody:
+    n_dof = int(first_dof[-1])
+    left = [(body, i) for body in bodies for i in body.interfaces if (body.name, i.name) not in joined]
+    names = [interface.name for _, interface in left]
+    cases = [(body, case) for body in bodies for case in body.load_cases]
+    case_names = [case.name for _, case in cases]
+    start = {body.name: (int(d), int(n)) for body, d, n in zip(bodies, first_dof, first_node, strict=False)}
+    interfaces = [
+        _moved(body, interface, names.count(interface.name) > 1, *start[body.name]) for body, interface in left
+    ]
+    load_cases = []
+    for body, case in cases:
+        f = np.zeros(n_dof)
+        f[start[body.name][0] :][: body.n_dof] = case.f
+        own_name = f"{body.name}.{case.name}" if case_names.count(case.name) > 1 else case.name
+        load_cases.append(LoadCase(own_name, case.kind, f))
+    recoveries = [
+        Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
+        for body in bodies
+    ]
+    volumes = [body.node_volumes for body in bodies]
+    models = [body.element_model for body in bodies]
+    return FEBody(
+        name=name,
+        M=sp.block_diag([body.M for body in bodies], format="csc"),
+        K=sp.block_diag([body.K for body in bodies], format="csc"),
+        D=_block_damping(bodies),
+        nodes=np.concatenate([body.nodes for body in bodies]),
+        dofs=_numbered([body.dofs for body in bodies], first_node),
+        interfaces=tuple(interfaces),
+        units=bodies[0].units,
+        surface=np.concatenate([body.surface + n for body, n in zip(bodies, first_node, strict=False)]),
+        element_model=None
+        if any(model is None for model in models)
+        else WeldedModel(
+            tuple(model for model in models if model is not None),
+            tuple(recovery.matrix.shape[0] for recovery in recoveries),
+            tuple(len(body.nodes) for body in bodies),
+        ),
+        recovery=Recovery(
+            sp.csr_array(sp.block_diag([recovery.matrix for recovery in recoveries], format="csr")),
+            _numbered([recovery.dofs for recovery in recoveries], first_node),
+        ),
+        load_cases=tuple(load_cases),
+        node_volumes=None if any(v is None for v in volumes) else np.concatenate([v for v in volumes if v is not None]),
+        provenance={f"{body.name}: {key}": value for body in bodies for key, value in body.provenance.items()},
+    )
+
+
+def _moved(body: FEBody, interface: Interface, is_ambiguous: bool, first_dof: int, first_node: int) -> Interface:
+    return replace(
+        interface,
+        name=f"{body.name}.{interface.name}" if is_ambiguous else interface.name,
+        nodes=interface.nodes + first_node,
+        dofs=np.asarray(interface.dofs) + first_dof,
+    )
+
+
+def _numbered(dofs: list[IntArray], first_node: IntArray) -> IntArray:
+    return np.concatenate([d + np.array([n, 0]) for d, n in zip(dofs, first_node, strict=False)])
+
+
+def _block_damping(bodies: tuple[FEBody, ...]) -> Any:
+    if all(body.D is None for body in bodies):
+        return None
+    return sp.block_diag([sp.csc_array(body.K.shape) if body.D is None else body.D for body in bodies], format="csc")
+
+
+def _followers(where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]]) -> tuple[IntArray, sp.csr_array]:
+    """Return the dofs that follow and their rows over all dofs; chains are resolved to the leader of all."""
+    leader: dict[int, int] = {}  # node -> node
+    dofs_of: dict[int, IntArray] = {}
+    for pair in pairs:
+        nodes = [int(body.dofs[dofs[0], 0]) for dofs in pair]
+        dofs_of |= dict(zip(nodes, pair, strict=True))
+        roots = [_root(leader, node) for node in nodes]
+        if roots[0] == roots[1]:
+            raise BodyError(f"{where}: a joint joins what is joined already; remove one of the joints")
+        leader[roots[1]] = roots[0]
+    slaves, rows, columns, values = [], [], [], []
+    for node in leader:
+        root = _root(leader, node)
+        motion = np.eye(6)
+        motion[:3] = rigid_motion_of_points(body.nodes[node][None], body.nodes[root])[0]
+        at = np.nonzero(motion)
+        rows += (len(slaves) + at[0]).tolist()
+        columns += dofs_of[root][at[1]].tolist()
+        values += motion[at].tolist()
+        slaves += dofs_of[node].tolist()
+    T_s = sp.csr_array((values, (rows, columns)), shape=(len(slaves), body.n_dof))
+    return np.array(slaves, dtype=np.int64), T_s
+
+
+def _root(leader: dict[int, int], node: int) -> int:
+    while node in leader:
+        node = leader[node]
+    return node
