@@ -1,6 +1,5 @@
 """The reduction job: what `cms reduce` reads (docs/job_file.md)."""
 
-import inspect
 import os
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,18 +8,17 @@ from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, 
 
 from cms.errors import JobError
 from cms.fe_body import INTERFACE_KINDS
+from cms.job_reduction import ReductionSection, mode_set_options, named_interfaces
 from cms.load_cases import LOAD_CASE_KINDS
-from cms.mode_sets import MODE_SETS
 from cms.paths import near_file
 from cms.toml_file import Matrix3, Range, Table, Vector3, choice, read_toml, validated
 from cms.units import UNIT_SYSTEMS
 from cms.words import nearest
 
-__all__ = ["SELECTIONS", "Job", "mode_set_options", "read_job"]
+__all__ = ["SELECTIONS", "Job", "ReductionSection", "mode_set_options", "read_job"]
 
 SELECTIONS = ("faces", "nodes", "plane", "cylinder", "box", "nearest")  #: keys that select the nodes of an interface
 ACCEPTABLE = ("overlap", "parts", "transition", "units")  #: errors of the mesh report that may be meant
-FRAMES = ("nodal", "tisserand")
 KEYS_OF_LOADS = {
     "pressure": ("pressure",),
     "gravity": ("acceleration",),
@@ -191,37 +189,6 @@ class LoadCaseSection(Table):
         return self
 
 
-class ReductionSection(Table):
-    """[reduction]: the mode set, its options, and the body frame."""
-
-    set: choice("mode set", lambda: tuple(MODE_SETS)) = Field(  # type: ignore[valid-type]
-        "craig-bampton", description="the name of a mode set"
-    )
-    n_modes: Annotated[int, Field(ge=0)] | None = Field(
-        None, description="a whole number, 0 or more, of vibration modes"
-    )
-    cutoff: Positive | None = Field(None, description="a number above 0, the highest frequency of the modes [Hz]")
-    verify: bool | None = Field(None, description="true or false: prove that no mode was missed")
-    frame: choice("frame", lambda: FRAMES) = Field(  # type: ignore[valid-type]
-        "tisserand", description=f"one of {', '.join(FRAMES)}"
-    )
-    at: Name | None = Field(None, description="the name of an interface, which carries a nodal frame")
-    origin: Vector3 | None = Field(None, description="the origin of the body frame in mesh coordinates, [x, y, z]")
-
-    @model_validator(mode="after")
-    def _options_of_the_set(self) -> "ReductionSection":
-        allowed = mode_set_options(self.set)
-        for key in ("n_modes", "cutoff", "verify"):
-            if getattr(self, key) is not None and key not in allowed:
-                raise ValueError(f"mode set {self.set!r} has no option {key}{nearest(key, allowed)}")
-        if {"n_modes", "cutoff"} <= set(allowed) and (self.n_modes is None) == (self.cutoff is None):
-            given = "neither" if self.n_modes is None else "both"
-            raise ValueError(f"expected either n_modes (how many) or cutoff (up to which frequency in Hz), got {given}")
-        if self.at is not None and self.frame != "nodal":
-            raise ValueError(f'at = "{self.at}" belongs to frame = "nodal"; got frame = "{self.frame}"')
-        return self
-
-
 class DampingSection(Table):
     """[damping]: modal ratio or Rayleigh."""
 
@@ -269,9 +236,9 @@ class Job(Table):
                     f'materials.{everywhere[0]}: cells = "all", but there are {len(self.materials)} materials; '
                     "name the group of cells of each"
                 )
-        at = self.reduction.at
-        if self.body.mesh and at is not None and at not in self.interfaces:
-            raise ValueError(f'reduction.at = "{at}": there is no such interface{nearest(at, self.interfaces)}')
+        for where, name in named_interfaces(self.reduction).items():
+            if self.body.mesh and name not in self.interfaces:
+                raise ValueError(f"reduction.{where}: there is no such interface{nearest(name, self.interfaces)}")
         for name, case in self.load_cases.items():
             if self.body.mesh and case.at is not None and case.at not in self.interfaces:
                 raise ValueError(
@@ -282,12 +249,6 @@ class Job(Table):
                     f"load_cases.{name}.{case.selection}: matrices have no mesh to select on; give at = an interface"
                 )
         return self
-
-
-def mode_set_options(name: str) -> tuple[str, ...]:
-    """Return the options of a mode set that a job can give."""
-    takes = inspect.signature(MODE_SETS[name]).parameters
-    return tuple(key for key in ("n_modes", "cutoff", "verify") if key in takes)
 
 
 def read_job(path: str | os.PathLike[str]) -> Job:

@@ -90,10 +90,10 @@ def table_at(model: type[BaseModel], location: Sequence[str | int]) -> type[Base
             field = here.model_fields.get(str(part))
             here = field.annotation if field is not None else None
         else:
-            here = (get_args(here) or (None,))[-1]  # dict[str, Table]
-        options = [option for option in get_args(here) if isinstance(option, type) and issubclass(option, BaseModel)]
-        if len(options) == 1 and "dict" not in str(here):
-            here = options[0]  # Table | None
+            here = (get_args(here) or (None,))[-1]  # dict[str, Table], list[Table]
+        given = [option for option in get_args(here) if option is not type(None)]
+        if type(None) in get_args(here) and len(given) == 1:
+            here = given[0]  # Table | None
     return here if isinstance(here, type) and issubclass(here, BaseModel) else None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from cms.cli.console import Stages
 from cms.errors import JobError
 from cms.fe_body import FEBody, Interface
-from cms.job import InterfaceSection, Job, LoadCaseSection, mode_set_options
+from cms.job import InterfaceSection, Job, LoadCaseSection
 from cms.load_cases import LoadCase
 from cms.reduced_body import ReducedBody
 from cms.units import unit_system
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fe_models.material import Material
     from fe_models.mesh import Mesh
 
-__all__ = ["reduce_job"]
+__all__ = ["job_body", "reduce_job"]
 
 
 def reduce_job(
@@ -40,9 +40,20 @@ def reduce_job(
     CmsError, FeModelsError
         If the mesh, a material, an interface or the mode set does not do.
     """
-    from cms.couplings import couple
-    from cms.mode_sets import MODE_SETS
+    from cms.cli.job_mode_set import job_mode_set
     from cms.reduction import reduce
+
+    stages = stages or Stages()
+    coupled = job_body(job, stages, on_report=on_report)
+    with stages(f"mode set {job.reduction.set}"):
+        modes = job_mode_set(coupled, job.reduction)
+    with stages("reduce"):
+        return reduce(coupled, modes, frame=frame_of(job), damping=damping_of(job))
+
+
+def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
+    """Run a job up to the coupled body: read, check, assemble, couple the interfaces."""
+    from cms.couplings import couple
 
     stages = stages or Stages()
     if job.body.mesh is not None:
@@ -52,18 +63,7 @@ def reduce_job(
     else:
         raise JobError("job: expected either mesh or matrices, got neither")
     with stages("couple interfaces"):
-        coupled = couple(body)
-    reduction = job.reduction
-    asked = {
-        "n_modes": reduction.n_modes,
-        "cutoff": None if reduction.cutoff is None else reduction.cutoff * body.units.time,  # cycles per time unit
-        "verify": reduction.verify,
-    }
-    options = {key: asked[key] for key in mode_set_options(reduction.set) if asked[key] is not None}
-    with stages(f"mode set {reduction.set}"):
-        modes = MODE_SETS[reduction.set](coupled, **options)
-    with stages("reduce"):
-        return reduce(coupled, modes, frame=frame_of(job), damping=damping_of(job))
+        return couple(body)
 
 
 def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:

@@ -1,0 +1,75 @@
+"""The mode set a job asks for, with its options as the functions take them."""
+
+from typing import Any
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.families import Families
+from cms.fe_body import FEBody
+from cms.interface_loads import InterfaceLoad, condensed_load
+from cms.job_reduction import LoadSection, NeighbourSection, ReductionSection, mode_set_options
+from cms.mode_set import ModeSet
+from cms.mode_sets import MODE_SETS
+
+__all__ = ["job_mode_set"]
+
+
+def job_mode_set(body: FEBody, reduction: ReductionSection, *, families: Families | None = None) -> ModeSet:
+    """Make the mode set of the table [reduction] for a coupled body.
+
+    Parameters
+    ----------
+    families
+        The families of the body, to share them with other sets.
+
+    Raises
+    ------
+    CmsError, FeModelsError
+        If the set cannot be made with these options, or a neighbour cannot be read.
+    """
+    options: dict[str, Any] = {}
+    for key in mode_set_options(reduction.set):
+        value = getattr(reduction, key)
+        if value is None:
+            continue
+        if key == "cutoff":
+            options[key] = value * body.units.time  # cycles per time unit of the body
+        elif key == "loads":
+            made = [load_of(name, section) for name, section in value.items()]
+            options["loads"] = [*options.get("loads", []), *made]
+        elif key == "neighbours":
+            options["loads"] = [*options.get("loads", []), *(neighbour_load(body, section) for section in value)]
+        else:
+            options[key] = value
+    return MODE_SETS[reduction.set](body, **options, families=families)
+
+
+def load_of(name: str, section: LoadSection) -> InterfaceLoad:
+    """Return the load of one interface."""
+    return InterfaceLoad(
+        (name,), _matrix(section.mass, section.inertia), _matrix(section.stiffness, section.rotational_stiffness)
+    )
+
+
+def neighbour_load(body: FEBody, section: NeighbourSection) -> InterfaceLoad:
+    """Read the neighbour's job, build its body, and condense it to the shared interfaces."""
+    from cms.cli.reduce_job import job_body
+    from cms.errors import JobError
+    from cms.job import read_job
+
+    job = read_job(section.job)
+    neighbour = job_body(job)
+    if neighbour.units != body.units:
+        raise JobError(
+            f"{section.job}: the neighbour is in units {neighbour.units.name}, body {body.name!r} in "
+            f"{body.units.name}; give both the same units"
+        )
+    return condensed_load(neighbour, section.interfaces)
+
+
+def _matrix(translation: tuple[tuple[float, ...], ...] | None, rotation: tuple[float, ...] | None) -> Array:
+    if translation is not None and len(translation) == 6:
+        return np.array(translation)
+    first = (0.0, 0.0, 0.0) if translation is None else translation[0]
+    return np.diag([*first, *(rotation or (0.0, 0.0, 0.0))])

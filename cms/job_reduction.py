@@ -1,0 +1,172 @@
+"""The table [reduction] of a job: the mode set, its options, and the body frame (docs/job_file.md)."""
+
+import inspect
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+
+from cms.mode_sets import MODE_SETS
+from cms.paths import near_file
+from cms.static_modes import COMPONENTS
+from cms.toml_file import Table, Vector3, choice, is_no_number
+from cms.words import nearest
+
+__all__ = [
+    "FRAMES",
+    "SET_OPTIONS",
+    "LoadSection",
+    "NeighbourSection",
+    "ReductionSection",
+    "mode_set_options",
+    "named_interfaces",
+]
+
+FRAMES = ("nodal", "tisserand")
+SET_OPTIONS = ("n_modes", "cutoff", "verify", "free", "loads", "neighbours")  #: keys that belong to some mode sets
+
+Name = Annotated[str, StringConstraints(min_length=1)]
+Positive = Annotated[float, Field(gt=0)]
+Rows = tuple[tuple[float, ...], ...]
+
+
+def components(value: Any) -> tuple[str, ...]:
+    """Return one component or a list of components of an interface."""
+    words = [value] if isinstance(value, str) else value
+    if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
+        raise ValueError(f"expected a list of components, each once, of {', '.join(COMPONENTS)}")
+    for word in words:
+        if word not in COMPONENTS:
+            raise ValueError(f"unknown component {word!r}{nearest(str(word), COMPONENTS)}")
+    return tuple(words)
+
+
+def amount(value: Any) -> tuple[float, float, float]:
+    """Return one number for all axes, or three, none negative."""
+    values = [value] * 3 if not isinstance(value, list | tuple) else value
+    if len(values) != 3 or any(is_no_number(x) or x < 0 for x in values):
+        raise ValueError("expected one number, 0 or more, or three, [x, y, z]")
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def amount_or_matrix(value: Any) -> Rows:
+    """Return one number or three as one row, or six rows of six numbers."""
+    if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
+        if [len(row) for row in value if isinstance(row, list | tuple)] != [6] * 6 or len(value) != 6:
+            raise ValueError("expected one number, three, or six rows of six numbers")
+        if any(is_no_number(x) for row in value for x in row):
+            raise ValueError("expected numbers in every row")
+        return tuple(tuple(float(x) for x in row) for row in value)
+    return (amount(value),)
+
+
+Components = Annotated[tuple[str, ...], BeforeValidator(components)]
+Amount = Annotated[tuple[float, float, float], BeforeValidator(amount)]
+AmountOrMatrix = Annotated[Rows, BeforeValidator(amount_or_matrix)]
+
+
+class LoadSection(Table):
+    """[reduction.loads.NAME]: mass and stiffness of the neighbours at one interface."""
+
+    mass: AmountOrMatrix | None = Field(None, description="a number, 0 or more, or six rows of six")
+    inertia: Amount | None = Field(None, description="a number, 0 or more, or three, [x, y, z]")
+    stiffness: AmountOrMatrix | None = Field(None, description="a number, 0 or more, or three, or six rows of six")
+    rotational_stiffness: Amount | None = Field(None, description="a number, 0 or more, or three, [x, y, z]")
+
+    @model_validator(mode="after")
+    def _once(self) -> "LoadSection":
+        for matrix, rest in (("mass", "inertia"), ("stiffness", "rotational_stiffness")):
+            given = getattr(self, matrix)
+            if given is not None and len(given) == 6 and getattr(self, rest) is not None:
+                raise ValueError(f"{matrix} as six rows holds the {rest} too; remove {rest}")
+        if self.mass is not None and len(self.mass) == 1 and len(set(self.mass[0])) > 1:
+            raise ValueError("mass: expected one number, or six rows of six numbers")
+        parts = [row for part in (self.mass, self.stiffness) if part for row in part]
+        parts += [part for part in (self.inertia, self.rotational_stiffness) if part]
+        if not any(x for row in parts for x in row):
+            raise ValueError("expected a mass, inertia, stiffness or rotational_stiffness above 0")
+        return self
+
+
+class NeighbourSection(Table):
+    """[[reduction.neighbours]]: a neighbouring body, whose mass and stiffness are condensed to shared interfaces."""
+
+    job: Path = Field(description="the path of the neighbour's job file, relative to this one")
+    interfaces: dict[str, str] = Field(description='a table {"our interface" = "its interface"}')
+
+    @field_validator("job", mode="before")
+    @classmethod
+    def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
+        if not isinstance(value, str) or not value:
+            raise ValueError("expected the path of a job file, text")
+        path = Path(info.context or ".") / value
+        if not path.is_file():
+            raise ValueError(f"no such file: {path}{near_file(path)}")
+        return path
+
+    @field_validator("interfaces")
+    @classmethod
+    def _some(cls, value: dict[str, str]) -> dict[str, str]:
+        if not value:
+            raise ValueError('expected at least one pair, {"our interface" = "its interface"}')
+        return value
+
+
+class ReductionSection(Table):
+    """[reduction]: the mode set, its options, and the body frame."""
+
+    set: choice("mode set", lambda: tuple(MODE_SETS)) = Field(  # type: ignore[valid-type]
+        "craig-bampton", description="the name of a mode set"
+    )
+    n_modes: Annotated[int, Field(ge=0)] | None = Field(
+        None, description="a whole number, 0 or more, of vibration modes"
+    )
+    cutoff: Positive | None = Field(None, description="a number above 0, the highest frequency of the modes [Hz]")
+    verify: bool | None = Field(None, description="true or false: prove that no mode was missed")
+    free: dict[str, Components] | None = Field(
+        None, description='a table of interfaces and their free components, {pin = ["rz"]}'
+    )
+    loads: dict[str, LoadSection] | None = Field(None, description="tables [reduction.loads.INTERFACE]")
+    neighbours: list[NeighbourSection] | None = Field(None, description="tables [[reduction.neighbours]]")
+    frame: choice("frame", lambda: FRAMES) = Field(  # type: ignore[valid-type]
+        "tisserand", description=f"one of {', '.join(FRAMES)}"
+    )
+    at: Name | None = Field(None, description="the name of an interface, which carries a nodal frame")
+    origin: Vector3 | None = Field(None, description="the origin of the body frame in mesh coordinates, [x, y, z]")
+
+    @model_validator(mode="after")
+    def _options_of_the_set(self) -> "ReductionSection":
+        allowed = mode_set_options(self.set)
+        for key in SET_OPTIONS:
+            if getattr(self, key) is not None and key not in allowed:
+                raise ValueError(f"mode set {self.set!r} has no option {key}{nearest(key, allowed)}")
+        if {"n_modes", "cutoff"} <= set(allowed) and (self.n_modes is None) == (self.cutoff is None):
+            given = "neither" if self.n_modes is None else "both"
+            raise ValueError(f"expected either n_modes (how many) or cutoff (up to which frequency in Hz), got {given}")
+        if "loads" in allowed and not self.loads and not self.neighbours:
+            raise ValueError(
+                f"mode set {self.set!r} needs the mass or stiffness of the neighbours at the interfaces: give tables "
+                "[reduction.loads.INTERFACE] or [[reduction.neighbours]]"
+            )
+        if self.set == "normal" and self.n_modes == 0:
+            raise ValueError("mode set 'normal' with n_modes = 0 holds only rigid-body motion; choose n_modes >= 1")
+        if self.at is not None and self.frame != "nodal":
+            raise ValueError(f'at = "{self.at}" belongs to frame = "nodal"; got frame = "{self.frame}"')
+        return self
+
+
+def mode_set_options(name: str) -> tuple[str, ...]:
+    """Return the options of a mode set that a job can give."""
+    takes = inspect.signature(MODE_SETS[name]).parameters
+    return tuple(key for key in SET_OPTIONS if key in takes or (key == "neighbours" and "loads" in takes))
+
+
+def named_interfaces(reduction: ReductionSection) -> Mapping[str, str]:
+    """Return where the table names interfaces of the body: key path -> name."""
+    named = {} if reduction.at is None else {f'at = "{reduction.at}"': reduction.at}
+    named |= {f"free.{name}": name for name in reduction.free or {}}
+    named |= {f"loads.{name}": name for name in reduction.loads or {}}
+    for neighbour in reduction.neighbours or []:
+        named |= {f"neighbours.interfaces.{name}": name for name in neighbour.interfaces}
+    return named
