@@ -1,0 +1,5 @@
+from .compare import compare as compare
+from .comparison import Comparison as Comparison
+from .comparison import Point as Point
+from .comparison import SetResult as SetResult
+from .mode_counts import mode_counts as mode_counts

@@ -1,0 +1,286 @@
+"""Compare mode sets of one body with its full model, each with several numbers of vibration modes."""
+
+import inspect
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.compare.comparison import Comparison, FullResults, Point, SetResult
+from cms.compare.coordinates import Coordinates, ReferenceBasis
+from cms.compare.drawing import draw_modes
+from cms.compare.evaluation import Reference, judge_subset
+from cms.compare.free_shapes import free_shapes
+from cms.compare.full_model import FullModel, read_full_model, reference_digest, solve_full_model, write_full_model
+from cms.compare.pulse import Pulse, default_pulse, pulse_response
+from cms.compare.response import full_response
+from cms.compare.subsets import SUBSETS
+from cms.compare.verdicts import answer, is_good, ranking, set_sentence, shown_point
+from cms.errors import CmsError, CompareError
+from cms.families import Families
+from cms.fe_body import FEBody
+from cms.mode_set import ModeSet
+from cms.mode_sets import MODE_SETS
+from cms.words import nearest
+
+__all__ = ["compare"]
+
+DAMPING = 0.02  #: ratio of every mode in response and motion, full and reduced alike
+Stage = Callable[[str], AbstractContextManager[Any]]
+
+
+def compare(
+    body: FEBody,
+    sets: Sequence[str] | Mapping[str, Mapping[str, Any]],
+    counts: Sequence[int],
+    *,
+    band: float | None = None,
+    n_reference: int = 10,
+    damping: float = DAMPING,
+    pulse_at: str | None = None,
+    cache: Path | None = None,
+    stage: Stage | None = None,
+) -> Comparison:
+    """Judge mode sets with several numbers of vibration modes against the full model.
+
+    (1) the full model once: free modes, static responses, response of the interfaces, a short motion
+    (2) every set once, with the most modes, from the same families and their one factorisation
+    (3) all of it in small coordinates, where the sets with fewer modes are subspaces
+    (4) records of every subspace; verdicts from the records
+
+    Parameters
+    ----------
+    body
+        A coupled body with an interface.
+    sets
+        Names in `MODE_SETS`, or name -> options other than n_modes.
+    counts
+        Numbers of vibration modes.
+    band
+        Highest frequency [Hz]; None: that of elastic free mode n_reference.
+    n_reference
+        Number of elastic free modes in the band, where no band is given.
+    damping
+        Ratio of every mode in response and motion.
+    pulse_at
+        Interface the force pulse of the motion acts on; the first by default.
+    cache
+        File that keeps the solution of the full model for the next comparison; None: nothing is kept.
+    stage
+        Called with the name of each stage, gives a context manager around it.
+
+    Raises
+    ------
+    CompareError
+        If a set is unknown, no count is given, or the band holds no mode. A set that cannot be made does not raise: its
+        result says why.
+    BodyError
+        If the body is a mechanism or not free.
+    """
+    options = {name: dict(sets[name]) if isinstance(sets, Mapping) else {} for name in sets}
+    check_request(options, counts, band, n_reference, damping)
+    clock = _Clock(stage)
+    pulse = default_pulse(body, pulse_at)
+    with Families(body) as families:
+        with clock("full model"):
+            full, was_cached, digest = full_model(families, pulse, band, n_reference, cache)
+            motion = pulse_response(full.omega2, full.Phi[body.b], pulse, band=full.band, damping=damping)
+            reference = Reference(full, motion, full_response(body, full, damping=damping), 1 / body.units.time)
+            basis = ReferenceBasis(body, full.columns, full.rigid.shape[1], float(full.omega2[0]))
+        results = []
+        for name, extra in options.items():
+            with clock(name):
+                results.append(set_result(name, extra, counts, families, basis, reference))
+    order = ranking(results)
+    hertz = 1 / body.units.time
+    n_band = full.n_band
+    with clock("surface"):
+        drawing = draw_modes(body, full.Phi[:, :n_band])
+    return Comparison(
+        name=body.name,
+        units=body.units,
+        n_dof=body.n_dof,
+        n_nodes=len(body.nodes),
+        interfaces=tuple((i.name, i.kind, len(i.nodes)) for i in body.interfaces),
+        full=FullResults(
+            frequencies_hz=full.frequencies * hertz,
+            n_band=n_band,
+            band_hz=full.band * hertz,
+            response_hz=reference.response.omega / (2 * np.pi) * hertz,
+            response=reference.response.drawn(reference.response.H),
+            response_words=reference.response.words,
+            damping=damping,
+            t=motion.t * body.units.time,
+            force=motion.force,
+            motion_words=f"{pulse.where}, {motion.duration * body.units.time:.3g} s long",
+            mass=full.mass,
+            held_mass=full.held_mass,
+            was_cached=was_cached,
+            digest=digest,
+        ),
+        sets=tuple(results),
+        ranking=order,
+        sentence=answer(results, order, full.band * hertz),
+        drawing=drawing,
+        seconds=clock.seconds,
+        provenance=provenance(body, families),
+    )
+
+
+def check_request(
+    options: Mapping[str, Any], counts: Sequence[int], band: float | None, n_reference: int, damping: float
+) -> None:
+    """Refuse what cannot be compared, before any work."""
+    if not options:
+        raise CompareError(f"sets: expected at least one mode set; choices: {', '.join(sorted(MODE_SETS))}")
+    for name in options:
+        if name not in MODE_SETS:
+            raise CompareError(f"sets: unknown mode set {name!r}{nearest(name, MODE_SETS)}")
+    if not counts or min(counts) < 0:
+        raise CompareError(f"modes: expected numbers of modes, 0 or more, got {list(counts)}")
+    if band is not None and not (np.isfinite(band) and band > 0):
+        raise CompareError(f"band: expected a frequency above 0 Hz, got {band:g}")
+    if n_reference < 1:
+        raise CompareError(f"reference modes: expected 1 or more, got {n_reference}")
+    if not 0 < damping < 1:
+        raise CompareError(f"damping: expected a ratio between 0 and 1 (0.02 is 2 %), got {damping:g}")
+
+
+def full_model(
+    families: Families, pulse: Pulse, band: float | None, n_reference: int, cache: Path | None
+) -> tuple[FullModel, bool, str]:
+    """Return the solution of the full model, whether it was found in the cache, and its digest."""
+    body = families.body
+    digest = reference_digest(body, band, n_reference, pulse.direction.tolist())
+    found = None if cache is None else read_full_model(cache, digest)
+    if found is not None:
+        return found, True, digest
+    scaled = None if band is None else band * body.units.time  # cycles per time unit
+    full = solve_full_model(families, pulse, n_modes=n_reference, band=scaled)
+    if cache is not None:
+        write_full_model(cache, full, digest)
+    return full, False, digest
+
+
+def set_result(
+    name: str,
+    options: Mapping[str, Any],
+    counts: Sequence[int],
+    families: Families,
+    basis: ReferenceBasis,
+    reference: Reference,
+) -> SetResult:
+    """Return the result of one set; where it cannot be made, its sentence says why."""
+    began = time.perf_counter()
+    words = first_sentence(MODE_SETS[name].__doc__)
+    try:
+        points, columns = judged_points(name, options, counts, families, basis, reference)
+    except (CmsError, np.linalg.LinAlgError) as error:
+        return SetResult(name, words, (), None, "error", f"could not be made: {error}")
+    shown = shown_point(points)
+    kept = tuple(point if k == shown else without_curves(point) for k, point in enumerate(points))
+    verdict: Literal["pass", "fail"] = "pass" if any(point.is_good for point in points) else "fail"
+    chosen = columns[shown] if shown is not None else {}
+    return SetResult(
+        name, words, kept, shown, verdict, set_sentence(points), chosen, seconds=time.perf_counter() - began
+    )  # fmt: skip
+
+
+def judged_points(
+    name: str,
+    options: Mapping[str, Any],
+    counts: Sequence[int],
+    families: Families,
+    basis: ReferenceBasis,
+    reference: Reference,
+) -> tuple[list[Point], list[dict[str, int]]]:
+    """Return the points of one set and the number of columns of each family in each."""
+    make = MODE_SETS[name]
+    takes = inspect.signature(make).parameters
+    body = families.body
+    asked = sorted(set(counts)) if "n_modes" in takes else [0]
+    points, families_of_columns = [], []
+
+    def judge(n_modes: int, c: Coordinates, T: Array, labels: tuple[str, ...], groups: Sequence[str]) -> None:
+        rigid = c.reference[:, reference.full.parts["rigid"]]
+        shapes = free_shapes(c, T, rigid, basis.omega2)
+        dropped = tuple(labels[k] for k in shapes.redundant)
+        records = judge_subset(reference, c, shapes, dropped)
+        points.append(Point(n_modes, len(labels), shapes.n_q, dropped, records, is_good(records)))
+        families_of_columns.append({group: list(groups).count(group) for group in dict.fromkeys(groups)})
+
+    def made(n_modes: int) -> ModeSet:
+        counted = {"n_modes": n_modes} if "n_modes" in takes else {}
+        return make(body, **counted, **options, families=families)
+
+    if name in SUBSETS:
+        modes = made(asked[-1])
+        c = basis.coordinates(modes.columns)
+        at_b = np.asarray(modes.columns[body.b])
+        group_of = dict(zip(modes.labels, modes.groups, strict=True))
+        for n_modes in asked:
+            C, labels = SUBSETS[name](modes, at_b, n_modes)
+            judge(n_modes, c, c.columns @ C, labels, [group_of[label] for label in labels])
+    else:
+        for n_modes in asked:
+            modes = made(n_modes)
+            c = basis.coordinates(modes.columns)
+            judge(n_modes, c, c.columns, modes.labels, modes.groups)
+    return points, families_of_columns
+
+
+def without_curves(point: Point) -> Point:
+    """Return the point with the values and sentences of its records; of the arrays the frequencies stay."""
+    return replace(
+        point,
+        records=tuple(
+            record if record.name == "frequency-error" else replace(record, data={}) for record in point.records
+        ),
+    )
+
+
+def first_sentence(text: str | None) -> str:
+    """Return the first line of a docstring without its marks."""
+    line = (text or "").strip().split("\n")[0]
+    return line.split(" [1]_")[0].rstrip(".")
+
+
+def provenance(body: FEBody, families: Families) -> dict[str, str]:
+    """Record where the body came from, the solver, and versions."""
+    versions = {f"version {name}": metadata.version(name) for name in ("numpy", "scipy")}
+    try:
+        versions["version floatframe"] = metadata.version("floatframe")
+    except metadata.PackageNotFoundError:  # run from a checkout that is not installed
+        versions["version floatframe"] = "unknown"
+    return {**dict(body.provenance), "version python": platform.python_version(), **versions}
+
+
+class _Clock:
+    """Seconds of the stages, beside what the caller shows of them."""
+
+    def __init__(self, stage: Stage | None) -> None:
+        self.seconds: dict[str, float] = {}
+        self._stage = stage or (lambda name: nullcontext())
+
+    def __call__(self, name: str) -> "_Timed":
+        return _Timed(self, name, self._stage(name))
+
+
+class _Timed:
+    def __init__(self, clock: _Clock, name: str, inner: AbstractContextManager[Any]) -> None:
+        self._clock, self._name, self._inner = clock, name, inner
+
+    def __enter__(self) -> None:
+        self._began = time.perf_counter()
+        self._inner.__enter__()
+
+    def __exit__(self, *failure: Any) -> None:
+        self._inner.__exit__(*failure)
+        self._clock.seconds[self._name] = time.perf_counter() - self._began

@@ -1,0 +1,131 @@
+"""Which mode set is good enough, with how few modes, and why: sentences from records."""
+
+from collections.abc import Sequence
+
+from cms.compare.comparison import Point, SetResult
+from cms.quality.limits import LIMITS
+from cms.quality.record import QualityRecord
+
+__all__ = ["DECIDING", "DOUBTS", "answer", "is_good", "number_words", "ranking", "set_sentence", "shown_point"]
+
+#: records that decide whether a set is good enough, and what they are called in a sentence
+DECIDING = {
+    "frequency-error": "free frequencies",
+    "mac": "mode shapes (1 - MAC)",
+    "static-interface": "static interface loads",
+    "static-inertia": "static inertia loads",
+    "frequency-response": "frequency response",
+    "deformation-error": "deformation in the motion",
+}
+#: records that are told beside them, and decide nothing
+DOUBTS = {
+    "residual-bound": "residual bound",
+    "effective-mass": "missing effective mass",
+    "conditioning": "condition",
+    "dropped-columns": "dropped columns",
+}
+
+
+def is_good(records: Sequence[QualityRecord]) -> bool:
+    """Whether every deciding record passes; what does not apply ("info") does not decide."""
+    return all(record.verdict in ("pass", "info") for record in records if record.name in DECIDING)
+
+
+def shown_point(points: Sequence[Point]) -> int | None:
+    """Return the index of the smallest point that is good enough, else of the largest; None if there is none."""
+    if not points:
+        return None
+    return next((k for k, point in enumerate(points) if point.is_good), len(points) - 1)
+
+
+def set_sentence(points: Sequence[Point]) -> str:
+    """Say with how many modes a set is good enough and what fewer would miss, or what is missing with the most."""
+    shown = shown_point(points)
+    if shown is None:
+        return "it has no columns to judge"
+    point = points[shown]
+    if not point.is_good:
+        most = f"even with {modes_words(point.n_modes)}" if len(points) > 1 else f"with {modes_words(point.n_modes)}"
+        return f"not good enough {most}: {'; '.join(miss(record) for record in missed(point))}"
+    text = f"good enough with {modes_words(point.n_modes)}, {point.n_q} coordinates"
+    if shown == 0:
+        return f"{text}, the fewest that were tried"
+    before = points[shown - 1]
+    return f"{text}; with {before.n_modes}: {'; '.join(miss(record) for record in missed(before))}"
+
+
+def missed(point: Point) -> list[QualityRecord]:
+    """Return the deciding records that do not pass."""
+    return [record for record in point.records if record.name in DECIDING and record.verdict not in ("pass", "info")]
+
+
+def miss(record: QualityRecord) -> str:
+    """Say by how much a record misses its limit."""
+    return f"{DECIDING[record.name]} {number_words(record.value)}, limit {number_words(LIMITS[record.name].tolerance)}"
+
+
+def ranking(sets: Sequence[SetResult]) -> tuple[str, ...]:
+    """Return the sets that are good enough: fewest coordinates first, then fewest modes, then as they were given."""
+    good = [result for result in sets if result.verdict == "pass" and result.detail is not None]
+    good.sort(key=lambda result: (result.detail.n_q, result.detail.n_modes))  # type: ignore[union-attr]
+    return tuple(result.name for result in good)
+
+
+def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> str:
+    """Say which set to take."""
+    band = f"up to {band_hz:.4g} Hz"
+    if not order:
+        tried = [result for result in sets if result.detail is not None]
+        if not tried:
+            return "No mode set could be made; the reasons stand below."
+        nearest_ = min(tried, key=lambda result: len(missed(result.detail)))  # type: ignore[arg-type]
+        assert nearest_.detail is not None
+        what = ", ".join(DECIDING[record.name] for record in missed(nearest_.detail))
+        return (
+            f"No mode set that was tried is good enough {band}. Nearest comes {nearest_.name} with "
+            f"{modes_words(nearest_.detail.n_modes)}, which misses: {what}. Try more modes, or a lower band."
+        )
+    best = next(result for result in sets if result.name == order[0])
+    point = best.detail
+    assert point is not None
+    records = {record.name: record for record in point.records}
+    told = [
+        f"{DECIDING[name]} to {number_words(records[name].value)}"
+        for name in ("frequency-error", "frequency-response", "deformation-error")
+        if name in records and records[name].verdict == "pass"
+    ]
+    text = (
+        f"Take {best.name} with {modes_words(point.n_modes)}: {point.n_q} coordinates are good enough {band} "
+        f"({', '.join(told)})."
+    )
+    details = {result.name: result.detail for result in sets}
+    equal = [name for name in order[1:] if details[name].n_q == point.n_q]  # type: ignore[union-attr]
+    if equal:
+        text += f" {listed(equal)} {'needs' if len(equal) == 1 else 'need'} as many."
+    others = [name for name in order[1:] if name not in equal]
+    if others:
+        text += f" {listed([f'{name} needs {details[name].n_q}' for name in others])}."  # type: ignore[union-attr]
+    return text
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return 'a', 'a and b', 'a, b and c'."""
+    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+
+
+def modes_words(n_modes: int) -> str:
+    """Return '1 vibration mode', '4 vibration modes', 'no vibration modes'."""
+    return f"{n_modes or 'no'} vibration mode{'' if n_modes == 1 else 's'}"
+
+
+def number_words(value: float | None) -> str:
+    """Return a number without unit: percents where they read well, powers of ten below, 'none found' for infinity."""
+    if value is None:
+        return "none"
+    if value != value or value in (float("inf"), float("-inf")):
+        return "incomplete"
+    if value == 0:
+        return "0"
+    if value < 1e-4:
+        return f"{value:.0e}".replace("e-0", "e-")
+    return f"{100 * value:.2g} %" if value < 0.995 else f"{100 * value:.3g} %"
