@@ -1,0 +1,151 @@
+"""Balanced truncation of the second-order system: directions ranked by what the interfaces excite and see."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.balancing import balance
+from cms.errors import ModeSetError
+from cms.families import Families
+from cms.fe_body import FEBody
+from cms.finishing import elastic_eigenvectors
+from cms.independent import Columns, gram, independent_columns
+from cms.mode_set import ModeSet
+from cms.mode_sets.blocks import mode_set, rigid_block, static_block
+from cms.mode_sets.selection import families_of, require_interfaces
+from cms.receptance import boundary_scale
+from cms.tall import combine
+
+__all__ = ["balanced_truncation"]
+
+FEWEST_RICH = 60  #: free modes of the rich basis, at least
+RICH_FACTOR = 3  #: free modes of the rich basis for each mode asked for
+NOTHING_LEFT = 1e-7  #: length of a residual attachment mode, of the whole one, below which it is rounding
+REPORTED = 12  #: singular values in the options of the set; all of them are in its data
+
+
+def balanced_truncation(
+    body: FEBody,
+    *,
+    n_modes: int | None = None,
+    tolerance: float | None = None,
+    damping_ratio: float = 0.01,
+    n_rich: int | None = None,
+    families: Families | None = None,
+) -> ModeSet:
+    """Balanced truncation of the elastic part of the free body: [Psi_R, balanced directions].
+
+    (1) rich basis: free modes and residual attachment modes, M-orthonormal and K-diagonal, in which the Lyapunov
+        equation is small
+    (2) damping: that of the body projected, and a modal ratio, since without damping there is no Gramian
+    (3) loads and responses: unit forces on all boundary dofs, moments at a lever of the body length
+    (4) position-velocity balancing (`cms.balancing`): one symmetric projection, ranked by its singular values
+
+    The number of directions is that of `n_modes`, or as many as leave a part of at most `tolerance` of the sum of the
+    position-velocity singular values. All singular values are in `data` of the set ("hankel", "hankel signs",
+    "position-velocity"). Twice the sum of the Hankel singular values left out bounds the error of first-order balanced
+    truncation; one symmetric projection has no such bound, its error falls alike. The set is not statically complete:
+    add residual vectors where static answers must be exact.
+
+    Parameters
+    ----------
+    body
+        A coupled body with at least one interface.
+    n_modes
+        Number of balanced directions.
+    tolerance
+        Instead of a number: part of the sum that may be left out, 0 to 1.
+    damping_ratio
+        Modal damping that is added for the balancing alone, of critical; 1 % by default.
+    n_rich
+        Free modes of the rich basis; by default 3 n_modes, but 60 at least.
+    families
+        Mode families to share; made and freed here by default.
+
+    Raises
+    ------
+    ModeSetError
+        If not exactly one of n_modes and tolerance is given, numbers are out of range, or a mode is undamped.
+    """
+    if (n_modes is None) == (tolerance is None):
+        raise ModeSetError(
+            f"balanced_truncation: expected either n_modes or tolerance, got n_modes = {n_modes}, tolerance = "
+            f"{tolerance}"
+        )
+    if n_modes is not None and n_modes < 0:
+        raise ModeSetError(f"balanced_truncation: n_modes = {n_modes}; expected 0 or more")
+    if tolerance is not None and not 0 < tolerance < 1:
+        raise ModeSetError(f"balanced_truncation: tolerance = {tolerance}; expected a number between 0 and 1")
+    if not 0 <= damping_ratio < np.inf:
+        raise ModeSetError(f"balanced_truncation: damping_ratio = {damping_ratio}; expected 0 or more (0.01 is 1 %)")
+    if n_rich is not None and n_rich < 1:
+        raise ModeSetError(f"balanced_truncation: n_rich = {n_rich}; expected 1 or more")
+    body.require_coupled()
+    require_interfaces("balanced_truncation", body)
+    with families_of(body, families) as families:
+        rich = rich_basis(families, n_rich or max(FEWEST_RICH, RICH_FACTOR * (n_modes or 0)))
+        n = len(rich.omega2)
+        if n_modes is not None and n_modes > n:
+            raise ModeSetError(
+                f"balanced_truncation: n_modes = {n_modes}, but the rich basis of body {body.name!r} has {n} elastic "
+                "columns with mass; choose fewer, or a larger n_rich"
+            )
+        D = np.diag(2 * damping_ratio * np.sqrt(rich.omega2))
+        if body.D is not None:
+            D = D + gram(rich.Phi, body.D @ rich.Phi)
+        system = balance(rich.omega2, D, (boundary_scale(body)[:, None] * rich.Phi[body.b]).T)
+        sigma = system.position_velocity
+        if n_modes is None:
+            left = 1 - np.cumsum(sigma) / sigma.sum()
+            n_modes = int(np.argmax(left <= (tolerance or 0.0))) + 1
+        columns = static_block(
+            combine(rich.Phi, system.T[:, :n_modes]),
+            [f"balanced {k + 1}" for k in range(n_modes)],
+            ["balanced"] * n_modes,
+        )
+        options = {
+            "n_modes": str(n_modes),
+            "rich basis": f"{n} elastic columns",
+            "damping": f"ratio {damping_ratio!r}" + (" and that of the body" if body.D is not None else ""),
+            "Hankel singular values": _listed(system.hankel),
+            "position-velocity singular values": _listed(sigma),
+            "part left out": f"{sigma[n_modes:].sum() / sigma.sum():.3g}",
+        }
+        modes = mode_set("balanced-truncation", families, [rigid_block(families), columns], options=options)
+        data = {"hankel": system.hankel, "hankel signs": system.signs, "position-velocity": sigma}
+        return replace(modes, data=data)
+
+
+@dataclass(frozen=True, eq=False)
+class RichBasis:
+    """M-orthonormal, K-diagonal elastic columns of the free body."""
+
+    Phi: Array  #: (n_dof, n)
+    omega2: Array  #: (n,) [1/s²]
+
+
+def rich_basis(families: Families, n_free: int) -> RichBasis:
+    """Return free modes with residual attachment modes (the span of Rubin's set), without massless directions."""
+    body = families.body
+    n_most = int((body.M.diagonal() > 0).sum()) - families.Psi_R.shape[1]
+    modes = families.free_modes(n_modes=max(1, min(n_free, n_most)))
+    residual = families.residual_attachment(modes)
+    is_left = _stiffness(body, residual) > NOTHING_LEFT**2 * _stiffness(body, families.Psi_U)
+    V = np.hstack([modes.Phi, residual[:, is_left]])
+    omega2_1 = float(modes.omega2[0])
+    Q, _ = independent_columns(Columns(V, body.K @ V, body.M @ V, np.eye(V.shape[1])), body, omega2_1)
+    G_K = gram(Q.X, Q.KX)
+    Z, is_massive, _ = elastic_eigenvectors(G_K, gram(Q.X, Q.MX), omega2_1)
+    Z = Z[:, is_massive]
+    return RichBasis(combine(Q.X, Z), np.einsum("kq,kl,lq->q", Z, G_K, Z))
+
+
+def _stiffness(body: FEBody, u: Array) -> Array:
+    """Strain energy of every column, doubled, (k,)."""
+    return np.einsum("nk,nk->k", u, body.K @ u)
+
+
+def _listed(values: Array) -> str:
+    shown = ", ".join(f"{value:.4g}" for value in values[:REPORTED])
+    return shown + (f", … ({len(values)} in all)" if len(values) > REPORTED else "")
