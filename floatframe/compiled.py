@@ -142,7 +142,7 @@ def compile_system(system: System) -> CompiledSystem:
         joint_names=tuple(joint.name for joint in system.joints),
         spring_names=tuple(spring.name for spring in dampers),
         placed=placed,
-        length=system_length(markers, placed, n_q),
+        length=system_length(markers, placed, n_q, model),
     )
 
 
@@ -179,8 +179,9 @@ def spring_length(
     return free_length
 
 
-def system_length(markers: list[MarkerData], placed: State, n_q: IntArray) -> float:
-    """Return the largest arm of a marker in its body, or the size of the system; 1 if there is none of either."""
+def system_length(markers: list[MarkerData], placed: State, n_q: IntArray, model: Model) -> float:
+    """Return the largest arm of a marker or radius of gyration in a body, or the size of the system; 1 if all are 0."""
     arms = [float(np.linalg.norm(marker.position)) for marker in markers if marker.body >= 0]
+    radii = np.sqrt(np.maximum(np.trace(model.J0, axis1=1, axis2=2), 0.0) / (2 * model.mass))
     points = [marker_pose(marker, placed, n_q)[0] for marker in markers] + list(placed.r)
-    return max([*arms, float(np.linalg.norm(np.ptp(np.array(points), axis=0)))]) or 1.0
+    return max([*arms, float(radii.max()), float(np.linalg.norm(np.ptp(np.array(points), axis=0)))]) or 1.0

@@ -37,7 +37,8 @@ from floatframe.system import System
 __all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
 
 LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
-FASTEST_GROWTH = 30.0  #: of tau in one step
+FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: of tau in one step, while the residual falls or stands
+STANDING = 0.9  #: last residual by this one, below which it rises: tau shrinks with it
 CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
 
 
@@ -129,7 +130,8 @@ def steady_rotation(
         if tau == 0.0:
             tau = 0.1 * compiled.length / max(size / np.sqrt(_total_mass(W)), np.finfo(float).tiny)
         else:
-            tau *= min(max(last / max(size, np.finfo(float).tiny), 0.1), FASTEST_GROWTH)
+            fall = last / max(size, np.finfo(float).tiny)
+            tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
         last = size
         y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
         if not np.isfinite(y).all():

@@ -43,6 +43,7 @@ def root_locus(
     *,
     parameter: str = "parameter",
     n_modes: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Locus:
     """Follow the modes of a system while a parameter changes.
 
@@ -56,6 +57,8 @@ def root_locus(
         What it is, for tables and plots.
     n_modes
         How many to follow, by ascending |lambda| at the first value; all by default.
+    progress
+        Called with the numbers of values done and of all values.
     """
     values = np.asarray(values, dtype=float)
     if values.ndim != 1 or len(values) == 0:
@@ -65,7 +68,9 @@ def root_locus(
     table = np.full((len(values), n), np.nan + 0j)
     table[0] = modes.eigenvalues[:n]
     shapes = modes.shapes[:, :n]
-    for row, value in zip(table[1:], values[1:], strict=True):
+    for done, (row, value) in enumerate(zip(table[1:], values[1:], strict=True), start=1):
+        if progress is not None:
+            progress(done, len(values))
         modes = system_modes(build(float(value)))
         rows, columns = linear_sum_assignment(distance(shapes, modes.shapes))
         row[rows] = modes.eigenvalues[columns]
@@ -87,6 +92,7 @@ def campbell(
     axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
     center: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
     n_modes: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Locus:
     """Frequencies and damping of a system that turns steadily, over its speed, as seen from the turning system.
 
@@ -100,6 +106,8 @@ def campbell(
         Direction and a point of the axis of rotation, ground axes, (3,).
     n_modes
         How many modes to follow.
+    progress
+        Called with the numbers of speeds done and of all speeds.
     """
     axis = unit_vector("campbell: axis", axis)
     center = array_of_shape("campbell: center", center, (3,))
@@ -110,4 +118,4 @@ def campbell(
         last[:] = [steady_rotation(system, speed * axis, center=center, state=state)]
         return linearize(system, last[0])
 
-    return root_locus(at, speeds, parameter="speed [rad/s]", n_modes=n_modes)
+    return root_locus(at, speeds, parameter="speed [rad/s]", n_modes=n_modes, progress=progress)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
+from floatframe.cli import analyses
 
 if TYPE_CHECKING:
     from floatframe.trajectory import Trajectory
@@ -200,3 +201,6 @@ def animate_command(
             on_frame=lambda done, all_: advance(done / all_),
         )  # fmt: skip
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+analyses.register(app)

@@ -1,0 +1,351 @@
+"""The commands that analyse a system without its motion: static, eig, linearize, campbell."""
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import guarded, output_path, print_table, say, stages
+
+if TYPE_CHECKING:
+    from floatframe.analyses import Channel, Equilibrium, LinearSystem
+    from floatframe.system import System
+
+__all__ = ["register"]
+
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+
+SystemArgument = Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")]
+Json = Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")]
+Speed = Annotated[float, typer.Option(help="Speed of a steady rotation of the whole system [rad/time unit].")]
+Axis = Annotated[str, typer.Option(help='Axis of the rotation in ground axes: x, y, z or "0.6,0,0.8".')]
+Center = Annotated[str, typer.Option(help='A point of the axis: "x,y,z".')]
+Modes = Annotated[int, typer.Option("--modes", "-n", help="How many modes, by ascending frequency.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an application."""
+    app.command("static")(static_command)
+    app.command("eig")(eig_command)
+    app.command("linearize")(linearize_command)
+    app.command("campbell")(campbell_command)
+
+
+@guarded
+def static_command(system: SystemArgument, json: Json = False) -> None:
+    """Find the equilibrium of a system at rest: where its bodies are, reactions, and whether it is stable.
+
+    Example: floatframe static crane.toml
+    """
+    from floatframe.analyses import linearize, static_equilibrium, system_modes
+    from floatframe.errors import ModelError
+
+    model = read(system)
+    rest = static_equilibrium(model)
+    try:
+        is_stable = system_modes(linearize(model, rest)).is_stable
+    except ModelError:  # nothing can move
+        is_stable = True
+    record = equilibrium_record(model, rest) | {"is_stable": is_stable}
+    if json:
+        typer.echo(json_module.dumps(record, indent=2))
+        return
+    units = model.units
+    print_table(
+        "Equilibrium",
+        ("body", f"origin [{units.length_symbol}]", "rotation vector [rad]", "largest modal coordinate>"),
+        [
+            (b["name"], numbers(b["position"]), numbers(b["rotation_vector"]), f"{b['largest_q']:.4g}")
+            for b in record["bodies"]
+        ],
+    )
+    if record["reactions"]:
+        print_table(
+            "Reactions on markers A, ground axes",
+            (
+                "joint or spring",
+                f"force [{units.force_symbol}]",
+                f"moment [{units.force_symbol} {units.length_symbol}]",
+            ),
+            [(r["name"], numbers(r["force"]), numbers(r["moment"])) for r in record["reactions"]],
+        )
+    say(f"{'stable' if is_stable else 'unstable: the least push makes it leave'}; forces out of balance by "
+        f"{record['residual']:.1e} of those at work, {record['n_iterations']} iterations")  # fmt: skip
+
+
+@guarded
+def eig_command(
+    system: SystemArgument,
+    speed: Speed = 0.0,
+    axis: Axis = "z",
+    center: Center = "0,0,0",
+    n_modes: Modes = 20,
+    json: Json = False,
+) -> None:
+    """Vibration modes of a system about its equilibrium, or about a steady rotation: frequency, damping, what moves.
+
+    Example: floatframe eig crane.toml
+
+    Example: floatframe eig rotor.toml --speed 100 --axis z
+    """
+    from floatframe.analyses import system_modes
+
+    model = read(system)
+    linear = linearized(model, speed, axis, center)
+    modes = system_modes(linear)
+    per_second = 1 / model.units.time
+    record: dict[str, Any] = {
+        "system": model.name,
+        "speed": speed,
+        "is_stable": modes.is_stable,
+        "modes": [
+            {
+                "number": k + 1,
+                "frequency_hz": float(modes.frequencies[k] * per_second),
+                "damping_ratio": float(modes.damping_ratios[k]),
+                "eigenvalue": [float(value.real * per_second), float(value.imag * per_second)],
+                "energy_shares": dict(zip(modes.bodies, map(float, modes.energy_shares[k]), strict=True)),
+            }
+            for k, value in enumerate(modes.eigenvalues[:n_modes])
+        ],
+    }
+    if json:
+        typer.echo(json_module.dumps(record, indent=2))
+        return
+    print_table(
+        f"Modes of {model.name}" + (f" at {speed:g} rad/{model.units.time_symbol}" if speed else ""),
+        ("mode>", "Hz>", "damping>", "moves (share of the kinetic energy)"),
+        [(m["number"], f"{m['frequency_hz']:.6g}", damping_words(m), moving_words(m)) for m in record["modes"]],
+    )
+    left = len(modes.eigenvalues) - len(record["modes"])
+    say(f"{'stable' if modes.is_stable else 'unstable'}; {linear.n_z} independent motions"
+        + (f", {left} more modes (--modes)" if left > 0 else ""))  # fmt: skip
+
+
+@guarded
+def linearize_command(
+    system: SystemArgument,
+    inputs: Annotated[
+        list[str], typer.Option("--input", "-i", help="A force: body/interface:x (also y, z, rx, ry, rz); repeatable.")
+    ] = [],  # noqa: B006
+    outputs: Annotated[
+        list[str], typer.Option("--out", "-m", help="A measured motion, in the words of --input; repeatable.")
+    ] = [],  # noqa: B006
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write (.npz).")] = None,
+    speed: Speed = 0.0,
+    axis: Axis = "z",
+    center: Center = "0,0,0",
+) -> None:
+    """Linearise a system: M, C, K of its independent motions, and the state space A, B, C, D, into an .npz file.
+
+    Example: floatframe linearize crane.toml --input jib/tip:z --out jib/tip:z -o crane.npz
+    """
+    import io
+
+    import numpy as np
+
+    from cms.paths import replace_file
+    from floatframe.errors import ModelError
+
+    model = read(system)
+    path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system,))
+    if path.suffix.lower() != ".npz":
+        raise ModelError(f"--output {path}: expected a file name that ends in .npz")
+    linear = linearized(
+        model,
+        speed,
+        axis,
+        center,
+        inputs=tuple(channel(text) for text in inputs),
+        outputs=tuple(channel(text) for text in outputs),
+    )
+    space = linear.state_space()
+    data = io.BytesIO()
+    np.savez(
+        data, A=space.A, B=space.B, C=space.C, D=space.D, M_z=linear.M, C_z=linear.C, K_z=linear.K, B_z=linear.B,
+        L=linear.L, N=linear.N, inputs=linear.inputs, outputs=linear.outputs,
+    )  # fmt: skip
+    replace_file(path, data.getvalue())
+    say(f"{linear.n_z} independent motions, {len(space.A)} states, {len(inputs)} inputs, {len(outputs)} outputs")
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+@guarded
+def campbell_command(
+    system: SystemArgument,
+    speeds: Annotated[str, typer.Option(help='Speeds "from:to:number" [rad/time unit].')],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture (.png, .svg, .pdf) or .csv.")] = None,
+    axis: Axis = "z",
+    center: Center = "0,0,0",
+    n_modes: Modes = 12,
+) -> None:
+    """Campbell diagram: frequencies of a steadily turning system over its speed.
+
+    Example: floatframe campbell rotor.toml --speeds 0:200:21 --axis z -o rotor.png
+    """
+    import io
+
+    import numpy as np
+
+    from cms.paths import replace_file
+    from floatframe.analyses import campbell
+    from floatframe.analyses.plots import plot_campbell
+    from floatframe.errors import ModelError
+
+    model = read(system)
+    path = output_path(output, system.with_suffix(".png"), ModelError, overwrite_of=(system,))
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf", "csv"):
+        raise ModelError(f"--output {path}: expected a file name that ends in .png, .svg, .pdf or .csv")
+    values = speed_range(speeds)
+    with stages() as clock, clock("modes over the speed") as advance:
+        locus = campbell(
+            model, values, axis=vector(axis, "--axis"), center=vector(center, "--center"), n_modes=n_modes,
+            progress=lambda done, all_: advance(done / all_),
+        )  # fmt: skip
+    if kind == "csv":
+        table = np.column_stack([locus.values, locus.frequencies / model.units.time, locus.damping_ratios])
+        n = locus.eigenvalues.shape[1]
+        head = ",".join(["speed", *(f"Hz {k + 1}" for k in range(n)), *(f"damping {k + 1}" for k in range(n))])
+        lines = [head, *(",".join(f"{value:.10g}" for value in row) for row in table)]
+        replace_file(path, ("\n".join(lines) + "\n").encode())
+    else:
+        picture = io.BytesIO()
+        plot_campbell(locus, time_unit=model.units.time).get_figure(root=True).savefig(picture, format=kind, dpi=130)
+        replace_file(path, picture.getvalue())
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def read(path: Path) -> "System":
+    """Return the system of a file."""
+    from floatframe.system_file import read_system
+
+    return read_system(path)[0]
+
+
+def linearized(
+    system: "System",
+    speed: float,
+    axis: str,
+    center: str,
+    *,
+    inputs: "tuple[Channel, ...]" = (),
+    outputs: "tuple[Channel, ...]" = (),
+) -> "LinearSystem":
+    """Return the system linearised about rest, or about a steady rotation."""
+    import numpy as np
+
+    from floatframe.analyses import linearize, steady_rotation
+    from floatframe.arrays import unit_vector
+
+    omega = speed * np.asarray(unit_vector("--axis", vector(axis, "--axis")))
+    about = steady_rotation(system, omega, center=vector(center, "--center"))
+    return linearize(system, about, inputs=inputs, outputs=outputs)
+
+
+def vector(text: str, where: str) -> tuple[float, float, float]:
+    """Return three numbers from "x", "y", "z" or "a,b,c"."""
+    from floatframe.errors import ModelError
+
+    named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    if text in named:
+        return named[text]
+    try:
+        a, b, c = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ModelError(f'{where} {text}: expected x, y, z or three numbers "a,b,c"') from None
+    return a, b, c
+
+
+def speed_range(text: str) -> Any:
+    """Return speeds from "from:to:number"."""
+    import numpy as np
+
+    from floatframe.errors import ModelError
+
+    try:
+        first, last, number = text.split(":")
+        values = np.linspace(float(first), float(last), int(number))
+    except ValueError:
+        values = np.zeros(0)
+    if not len(values) or not np.isfinite(values).all():
+        raise ModelError(f'--speeds {text}: expected "from:to:number", such as 0:200:21')
+    return values
+
+
+def channel(text: str) -> "Channel":
+    """Return a channel from "body/interface:component"."""
+    import numpy as np
+
+    from floatframe.analyses import Channel
+    from floatframe.errors import ModelError
+    from floatframe.markers import Marker
+
+    place, _, component = text.rpartition(":")
+    body, _, interface = place.partition("/")
+    if not body or component not in COMPONENTS:
+        raise ModelError(
+            f"channel {text!r}: expected body/interface:component (an interface only for flexible bodies), with a "
+            f"component of {', '.join(COMPONENTS)}"
+        )
+    index = COMPONENTS.index(component)
+    kind = "translation" if index < 3 else "rotation"
+    return Channel(text, Marker(body, interface or None), np.eye(3)[index % 3], kind)
+
+
+def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
+    """Return an equilibrium in plain types: places of the bodies, reactions in ground axes."""
+    import numpy as np
+
+    from floatframe.rotations import rotation_log, rotation_matrix
+
+    model, names = system.compiled.model, system.compiled.connection_names
+    bodies = []
+    for i, name in enumerate(system.compiled.body_names):
+        q = rest.state.q[model.q0[i] : model.q0[i + 1]]
+        bodies.append(
+            {
+                "name": name,
+                "position": rest.state.r[i].tolist(),
+                "rotation_vector": rotation_log(rotation_matrix(rest.state.p[i])).tolist(),
+                "largest_q": float(np.abs(q).max(initial=0.0)),
+                "q": q.tolist(),
+            }
+        )
+    reactions = []
+    for c, name in enumerate(names):
+        w = rest.w[model.c_w0[c] : model.c_w0[c + 1]]
+        reactions.append(
+            {"name": name, "force": w[:3].tolist(), "moment": (w[3:6] if len(w) >= 6 else np.zeros(3)).tolist()}
+        )
+    return {
+        "system": system.name,
+        "units": system.units.name,
+        "bodies": bodies,
+        "reactions": reactions,
+        "residual": rest.residual,
+        "n_iterations": rest.n_iterations,
+    }
+
+
+def numbers(values: Any) -> str:
+    """Return a vector in one line; what is rounding beside the largest number reads 0."""
+    scale = max((abs(value) for value in values), default=0.0)
+    return "(" + ", ".join(f"{value if abs(value) > 1e-9 * scale else 0:.6g}" for value in values) + ")"
+
+
+def damping_words(mode: dict[str, Any]) -> str:
+    """Return the damping ratio of a mode in percent, or what else it does."""
+    ratio = mode["damping_ratio"]
+    if ratio < -1e-9:
+        return "grows"
+    if mode["frequency_hz"] == 0:
+        return "decays" if ratio > 0 else ""
+    return f"{100 * ratio:.3g} %" if ratio > 1e-9 else ""
+
+
+def moving_words(mode: dict[str, Any]) -> str:
+    """Say which bodies carry the kinetic energy of a mode."""
+    shares = sorted(mode["energy_shares"].items(), key=lambda item: -item[1])
+    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares[:3] if share >= 0.005)

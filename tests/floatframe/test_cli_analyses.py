@@ -1,0 +1,96 @@
+"""The commands static, eig, linearize and campbell: what they say is what the functions return; refusals in words."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+from floatframe.cli.app import app
+
+PENDULUM = """
+[system]
+units = "m-kg-s"
+gravity = [0, -9.81, 0]
+
+[bodies.rod]
+mass = 2.0
+inertia = [[1e-4, 0, 0], [0, 0.166666666666666667, 0], [0, 0, 0.166666666666666667]]
+center_of_mass = [0.5, 0, 0]
+
+[joints.hinge]
+type = "revolute"
+body_a = "ground"
+body_b = "rod"
+marker_a = [0, 0, 0]
+axis = [0, 0, 1]
+
+[run]
+t_end = 1.0
+h = 1e-3
+"""
+runner = CliRunner()
+
+
+@pytest.fixture
+def pendulum(tmp_path):
+    path = tmp_path / "pendulum.toml"
+    path.write_text(PENDULUM)
+    return path
+
+
+def invoke(*words, code=0):
+    result = runner.invoke(app, [str(word) for word in words])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def test_static_tells_where_the_rod_hangs_and_what_holds_it(pendulum):
+    record = json.loads(invoke("static", pendulum, "--json"))
+    assert_allclose(np.abs(record["bodies"][0]["rotation_vector"]), [0, 0, np.pi / 2], rtol=0, atol=1e-8)
+    assert_allclose(record["reactions"][0]["force"], [0, -2 * 9.81, 0], rtol=0, atol=1e-7)
+    assert record["is_stable"]
+    assert "stable" in invoke("static", pendulum)
+
+
+def test_eig_tells_the_frequency_of_the_textbook(pendulum):
+    record = json.loads(invoke("eig", pendulum, "--json"))
+    assert_allclose(record["modes"][0]["frequency_hz"], np.sqrt(1.5 * 9.81) / (2 * np.pi), rtol=1e-8)
+    assert "rod 100 %" in invoke("eig", pendulum)
+
+
+def test_linearize_writes_the_state_space_of_the_pendulum(pendulum, tmp_path):
+    path = tmp_path / "lin.npz"
+    invoke("linearize", pendulum, "--input", "rod:rz", "--out", "rod:rz", "-o", path)
+    J = 2.0 / 3
+    s = 2j
+    with np.load(path) as data:
+        transfer = data["C"] @ np.linalg.solve(s * np.eye(2) - data["A"], data["B"]) + data["D"]
+    assert_allclose(transfer[0, 0], 1 / (J * s**2 + 9.81), rtol=1e-8)
+
+
+def test_campbell_draws_a_picture_and_writes_a_table(pendulum, tmp_path):
+    still = pendulum.with_name("free.toml")
+    still.write_text(PENDULUM.replace("[0, -9.81, 0]", "[0, 0, 0]"))
+    assert "free.png" in invoke("campbell", still, "--speeds", "0:5:3")
+    assert (tmp_path / "free.png").read_bytes().startswith(b"\x89PNG")
+    invoke("campbell", still, "--speeds", "0:5:3", "-o", tmp_path / "table.csv")
+    lines = (tmp_path / "table.csv").read_text().splitlines()
+    assert lines[0] == "speed,Hz 1,damping 1"
+    assert len(lines) == 4
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["linearize", "--input", "rod/tip"], "expected body/interface:component"),
+        (["linearize", "--input", "rode:x"], "no body 'rode'; did you mean 'rod'"),
+        (["eig", "--axis", "up"], "expected x, y, z or three numbers"),
+        (["campbell", "--speeds", "0:5"], 'expected "from:to:number"'),
+        (["eig", "--speed", "3", "--axis", "x"], "does not allow a rotation"),
+    ],
+)
+def test_what_cannot_be_understood_is_refused_with_words(pendulum, words, message):
+    output = invoke(words[0], pendulum, *words[1:], code=2)
+    assert message in " ".join(output.split())
