@@ -34,7 +34,8 @@ def _polynomials(
     functions = [kind.basis(degree) for degree in range(first, first + n)]
     derivatives = [[f.deriv(d)(xi) / half**d if d else f(xi) for f in functions] for d in range(3)]
     tables = [np.array(rows).reshape(n, len(s)).T for rows in derivatives]
-    return AxisFunctions(*tables, tuple(f"{letter}{degree}" for degree in range(first, first + n)))
+    values, slopes, curvatures = tables
+    return AxisFunctions(values, slopes, curvatures, tuple(f"{letter}{degree}" for degree in range(first, first + n)))
 
 
 def monomials(s: Array, span: Array, n: int, first: int) -> AxisFunctions:
@@ -59,12 +60,13 @@ def cubic_splines(s: Array, span: Array, n: int, first: int) -> AxisFunctions:
             f"assumed_modes: {n} splines: cubic splines come in sets of at least {CUBIC + 1 - first} here; "
             f"choose {CUBIC + 1 - first} or more, or Legendre polynomials"
         )
-    inner = np.linspace(*span, n_all - CUBIC + 1)
+    inner = np.linspace(span[0], span[1], n_all - CUBIC + 1)
     knots = np.concatenate([np.full(CUBIC, span[0]), inner, np.full(CUBIC, span[1])])
     kept = np.arange(1, n + 1)
     splines = BSpline(knots, np.eye(n_all)[:, kept], CUBIC)
-    tables = [splines.derivative(d)(s) if d else splines(s) for d in range(3)]
-    return AxisFunctions(*tables, tuple(f"B{j + 1}" for j in kept))
+    return AxisFunctions(
+        splines(s), splines.derivative(1)(s), splines.derivative(2)(s), tuple(f"B{j + 1}" for j in kept)
+    )
 
 
 AXIS_FUNCTIONS = {"legendre": legendre, "monomials": monomials, "splines": cubic_splines}
