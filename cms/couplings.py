@@ -39,9 +39,9 @@ def couple(body: FEBody) -> FEBody:
     todo = [interface for interface in body.interfaces if interface.dofs is None]
     rigid = [interface for interface in todo if interface.kind == "rigid"]
     distributing = [interface for interface in todo if interface.kind == "distributing"]
+    _require_dofs(body, todo)
     for interface in (*rigid, *distributing):
         _require_spread(body, interface)
-    _require_dofs(body, todo)
     dofs_of_node = _DofTable(body)
 
     # new dofs: kept mesh dofs | reference nodes | multipliers
