@@ -7,6 +7,7 @@ from .errors import CmsError as CmsError
 from .families import Families as Families
 from .fe_body import FEBody as FEBody
 from .fe_body import Interface as Interface
+from .frame_conversion import convert_frame as convert_frame
 from .frames import BuckensFrame as BuckensFrame
 from .frames import NodalFrame as NodalFrame
 from .frames import TisserandFrame as TisserandFrame
