@@ -10,6 +10,7 @@ References
 
 import ctypes
 import os
+import sys
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -123,7 +124,7 @@ class PardisoFactor:
             self._call(RELEASE)
 
     def __del__(self) -> None:
-        if getattr(self, "is_open", False):
+        if getattr(self, "is_open", False) and not sys.is_finalizing():  # the end of the process frees it as well
             self.close()
 
     def _call(self, phase: int, b: Array | None = None, x: Array | None = None) -> int:
