@@ -33,7 +33,9 @@ from .errors import (
     MeshError as MeshError,
 )
 from .errors import SectionError as SectionError
+from .importers.read_mesh import read_line_mesh as read_line_mesh
 from .importers.read_mesh import read_mesh as read_mesh
+from .importers.tables import read_tables as read_tables
 from .interfaces import (
     check_overlap as check_overlap,
 )

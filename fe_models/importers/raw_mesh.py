@@ -12,7 +12,7 @@ from fe_models.errors import MeshError
 from fe_models.importers.node_order import require_node_order
 from fe_models.mesh import FACE_TYPES, SOLID_TYPES, Mesh
 
-__all__ = ["RawBlock", "RawMesh", "mesh_from_raw"]
+__all__ = ["RawBlock", "RawMesh", "collect_cells", "mesh_from_raw", "require_nodes"]
 
 LINES = ("vertex", "line", "line3", "line4")  #: cells below two dimensions: they select nodes
 
@@ -56,30 +56,11 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
         nodes that do not exist, cells are listed twice, or middle nodes are not where their type has them.
     """
     where = f"mesh {path}"
-    nodes = np.asarray(raw.nodes, dtype=float)
-    if nodes.ndim != 2 or len(nodes) == 0:
-        raise MeshError(f"{where}: expected nodes, got none; is the file complete?")
-    if nodes.shape[1] != 3:
-        raise MeshError(f"{where}: expected nodes in space (x, y, z), got {nodes.shape[1]} coordinates per node")
-    node_numbers = np.arange(len(nodes)) if raw.node_numbers is None else raw.node_numbers
-    if not np.isfinite(nodes).all():
-        bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
-        raise MeshError(
-            f"{where}: expected finite coordinates, got NaN or infinity at {bad.size} of {len(nodes)} "
-            f"nodes, first node {node_numbers[bad[0]]}; write the mesh again"
-        )
-    blocks = [block for block in raw.blocks if len(block.nodes)]
+    nodes, blocks = require_nodes(where, raw)
     _require_supported(where, blocks)
-    for block in blocks:
-        if block.nodes.min() < 0 or block.nodes.max() >= len(nodes):
-            row = int(np.argmax(((block.nodes < 0) | (block.nodes >= len(nodes))).any(axis=1)))
-            raise MeshError(
-                f"{where}: {block.kind} cell {_number(block, row)} names a node that is not in the file; "
-                f"the file is incomplete or damaged"
-            )
     notes = list(raw.notes)
-    cells, cell_sets, numbers = _collect(where, blocks, SOLID_TYPES, raw.repeats_are_memberships, notes)
-    faces, face_sets, _ = _collect(where, blocks, FACE_TYPES, True, notes)
+    cells, cell_sets, numbers = collect_cells(where, blocks, SOLID_TYPES, raw.repeats_are_memberships, notes)
+    faces, face_sets, _ = collect_cells(where, blocks, FACE_TYPES, True, notes)
     if not cells:
         found = ", ".join(f"{len(b.nodes)} {b.kind}" for b in blocks) or "no cells"
         raise MeshError(
@@ -111,6 +92,31 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
     )
 
 
+def require_nodes(where: str, raw: RawMesh) -> tuple[Array, list[RawBlock]]:
+    """Return nodes and blocks that hold cells, after checking that coordinates are numbers and nodes are there."""
+    nodes = np.asarray(raw.nodes, dtype=float)
+    if nodes.ndim != 2 or len(nodes) == 0:
+        raise MeshError(f"{where}: expected nodes, got none; is the file complete?")
+    if nodes.shape[1] != 3:
+        raise MeshError(f"{where}: expected nodes in space (x, y, z), got {nodes.shape[1]} coordinates per node")
+    node_numbers = np.arange(len(nodes)) if raw.node_numbers is None else raw.node_numbers
+    if not np.isfinite(nodes).all():
+        bad = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
+        raise MeshError(
+            f"{where}: expected finite coordinates, got NaN or infinity at {bad.size} of {len(nodes)} "
+            f"nodes, first node {node_numbers[bad[0]]}; write the mesh again"
+        )
+    blocks = [block for block in raw.blocks if len(block.nodes)]
+    for block in blocks:
+        if block.nodes.min() < 0 or block.nodes.max() >= len(nodes):
+            row = int(np.argmax(((block.nodes < 0) | (block.nodes >= len(nodes))).any(axis=1)))
+            raise MeshError(
+                f"{where}: {block.kind} cell {_number(block, row)} names a node that is not in the file; "
+                f"the file is incomplete or damaged"
+            )
+    return nodes, blocks
+
+
 def _require_supported(where: str, blocks: list[RawBlock]) -> None:
     counts: dict[str, int] = {}
     for block in blocks:
@@ -128,7 +134,7 @@ def _number(block: RawBlock, row: int) -> str:
     return str(row if block.numbers is None else block.numbers[row])
 
 
-def _collect(
+def collect_cells(
     where: str, blocks: list[RawBlock], kinds: tuple[str, ...], repeats_allowed: bool, notes: list[str]
 ) -> tuple[dict[str, IntArray], dict[str, dict[str, IntArray]], dict[str, IntArray]]:
     """Join the blocks of each kind, drop repeats, and renumber the groups."""

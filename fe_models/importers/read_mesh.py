@@ -1,20 +1,25 @@
 """One door for mesh files: the format by its suffix, one error for everything that can be wrong with a file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from hashlib import sha256
 from pathlib import Path
+from typing import TypeVar
 
 from cms.words import nearest
-from fe_models.errors import MeshError
+from fe_models.beams.line_mesh import LineMesh
+from fe_models.errors import FeModelsError, MeshError
 from fe_models.importers.abaqus import read_abaqus
 from fe_models.importers.gmsh import read_gmsh
+from fe_models.importers.line_cells import line_mesh_from_raw
 from fe_models.importers.med import read_med
 from fe_models.importers.nastran import read_nastran
 from fe_models.importers.raw_mesh import RawMesh, mesh_from_raw
 from fe_models.importers.vtk import read_vtk
 from fe_models.mesh import Mesh
 
-__all__ = ["MESH_FORMATS", "read_mesh"]
+__all__ = ["MESH_FORMATS", "read_line_mesh", "read_mesh"]
+
+M = TypeVar("M")
 
 MESH_FORMATS: dict[str, tuple[str, Callable[[Path, bytes], RawMesh]]] = {
     ".msh": ("Gmsh", read_gmsh),
@@ -52,6 +57,34 @@ def read_mesh(path: str | Path) -> Mesh:
         If the file is missing, unreadable, damaged, of an unknown or unsupported kind, or could only be read with
         another meaning than its own program gives it.
     """
+    return _read(path, mesh_from_raw)
+
+
+def read_line_mesh(path: str | Path, *, groups: Iterable[str] | None = None) -> LineMesh:
+    """Read the lines of a frame from a mesh file, by the same readers as `read_mesh`.
+
+    Cells with two nodes, and those with three as two lines, are beams: Gmsh curves, VTK lines, Abaqus B31 and B32,
+    Nastran CBAR and CBEAM, MED SE2. Their groups name sections (Gmsh physical curves, Abaqus element sets, Nastran
+    pid_7), groups of points name interfaces. Solids, faces and nodes on no line are left out; `notes` says so.
+
+    Parameters
+    ----------
+    path
+        The file.
+    groups
+        Only the lines of these groups; None: all lines.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`, and if there are no lines or a group is unknown.
+    """
+    wanted = None if groups is None else tuple(groups)
+    return _read(path, lambda raw, path, digest: line_mesh_from_raw(raw, path, digest, wanted))
+
+
+def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
+    """Find the reader of a file and convert what it says; whatever is wrong becomes one message."""
     path = Path(path)
     where = f"mesh {path}"
     suffix = path.suffix.lower()
@@ -69,8 +102,8 @@ def read_mesh(path: str | Path) -> Mesh:
         raise MeshError(f"{where}: the file is empty")
     name, reader = MESH_FORMATS[suffix]
     try:
-        return mesh_from_raw(reader(path, data), path, sha256(data).hexdigest())
-    except MeshError:
+        return convert(reader(path, data), path, sha256(data).hexdigest())
+    except FeModelsError:
         raise
     except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
         text = str(error).strip().splitlines()
