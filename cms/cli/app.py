@@ -134,6 +134,9 @@ def view_command(
 def check_command(
     file: ModalFile,
     job: Annotated[Path | None, typer.Option("--job", "-j", help="Job file of the full model to compare with.")] = None,
+    band: Annotated[
+        float | None, typer.Option(help="Highest frequency of interest [Hz]; default: highest kept mode over 1.5.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the records as JSON, for other programs.")] = False,
 ) -> None:
     """Judge a modal file: one verdict per check, the reason, and what to do; exit code 1 if one fails.
@@ -146,7 +149,40 @@ def check_command(
     """
     from cms.cli.check import check_file
 
-    raise typer.Exit(check_file(file, job, as_json=json))
+    raise typer.Exit(check_file(file, job, band=band, as_json=json))
+
+
+@app.command("frf")
+@guarded
+def frf_command(
+    file: ModalFile,
+    excited: Annotated[str, typer.Option("--from", help="Interface the force acts on.")],
+    answering: Annotated[str, typer.Option("--to", help="Interface whose motion is shown.")],
+    band: Annotated[str, typer.Option(help="Frequencies [Hz], lowest:highest or lowest:highest:number.")],
+    component: Annotated[
+        list[str] | None,
+        typer.Option("--component", "-c", help="Motion, or motion/force, as uz or uz/ry; repeat for more [ux uy uz]."),
+    ] = None,
+    damping: Annotated[
+        float | None, typer.Option(help="Ratio of every free-free mode; default: the file's own, 0.01 with --job.")
+    ] = None,
+    inertance: Annotated[bool, typer.Option("--inertance", help="Acceleration instead of displacement.")] = False,
+    job: Annotated[Path | None, typer.Option("--job", "-j", help="Job file of the full model to draw over it.")] = None,
+    output: Annotated[
+        list[Path] | None, typer.Option("--output", "-o", help="Picture (.png .svg .pdf) or table (.csv); repeatable.")
+    ] = None,
+) -> None:
+    """Frequency response of the free body from a force at one interface to the motion of another, in mesh axes.
+
+    Example: cms frf rod.h5 --from big_end --to small_end --band 10:5000 -c uz -o frf.png
+
+    Example: cms frf rod.h5 --from big_end --to small_end --band 10:5000 --job rod.toml -o frf.png -o frf.csv
+    """
+    from cms.cli.frf import FrfRequest, run_frf
+
+    run_frf(
+        FrfRequest(file, excited, answering, band, tuple(component or ()), damping, inertance, job, tuple(output or ()))
+    )
 
 
 @app.command("demo")

@@ -16,13 +16,16 @@ __all__ = ["check_file", "print_records", "quality_report"]
 WORDS = {"pass": "passes", "warn": "passes with warnings", "fail": "fails", "info": "has nothing to judge"}
 
 
-def check_file(file: Path, job: Path | None, *, as_json: bool) -> int:
+def check_file(file: Path, job: Path | None, *, band: float | None, as_json: bool) -> int:
     """Check a modal file and print the verdicts; the exit code is 1 if one fails, else 0."""
     from cms.modal_file import read
     from cms.quality.body_check import check_body
+    from cms.quality.errors import QualityError
 
+    if band is not None and job is None:
+        raise QualityError("--band: says how far the full model is compared; give its job with --job")
     reduced = read(file)
-    records = check_body(reduced) if job is None else check_against(reduced, job)
+    records = check_body(reduced) if job is None else check_against(reduced, job, band)
     if as_json:
         typer.echo(json.dumps(quality_report(reduced, records), indent=2))
     else:
@@ -30,17 +33,29 @@ def check_file(file: Path, job: Path | None, *, as_json: bool) -> int:
     return int(has_failed(records))
 
 
-def check_against(reduced: ReducedBody, job: Path) -> tuple[QualityRecord, ...]:
-    """Check a reduced body against the full model of a job."""
+def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple[QualityRecord, ...]:
+    """Check a reduced body against the full model and the mode set of a job, with one factorisation."""
     from cms.cli.console import stages
-    from cms.cli.full_model import full_model
+    from cms.cli.job_mode_set import job_mode_set
+    from cms.cli.reduce_job import uncoupled_body
+    from cms.couplings import couple
+    from cms.families import Families
     from cms.job import read_job
-    from cms.quality.reduction_check import check_reduction
+    from cms.quality.full_reference import FullReference, usable_band
+    from cms.quality.reduction_check import check_reduction, require_same_units
 
+    job = read_job(path)
     with stages() as clock:
-        model = full_model(read_job(job), clock)
-        with clock("compare"):
-            return check_reduction(model.body, model.modes, reduced, uncoupled=model.uncoupled)
+        uncoupled = uncoupled_body(job, clock)
+        require_same_units(uncoupled, reduced)
+        with clock("couple interfaces"):
+            body = couple(uncoupled)
+        with Families(body) as families:
+            with clock(f"mode set {job.reduction.set}"):
+                modes = job_mode_set(body, job.reduction, families=families)
+            top = usable_band(modes, reduced) if band is None else band
+            with clock("compare"), FullReference(body, band=top, families=families) as reference:
+                return check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled)
 
 
 def quality_report(reduced: ReducedBody, records: Sequence[QualityRecord]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fe_models.material import Material
     from fe_models.mesh import Mesh
 
-__all__ = ["job_body", "reduce_job"]
+__all__ = ["job_body", "reduce_job", "uncoupled_body"]
 
 
 def reduce_job(
@@ -56,14 +56,18 @@ def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any
     from cms.couplings import couple
 
     stages = stages or Stages()
-    if job.body.mesh is not None:
-        body = body_of_mesh(job, job.body.mesh, stages, on_report)
-    elif job.body.matrices is not None:
-        body = body_of_matrices(job, job.body.matrices, stages)
-    else:
-        raise JobError("job: expected either mesh or matrices, got neither")
+    body = uncoupled_body(job, stages, on_report=on_report)
     with stages("couple interfaces"):
         return couple(body)
+
+
+def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
+    """Run a job up to the body whose interfaces are still to be coupled."""
+    if job.body.mesh is not None:
+        return body_of_mesh(job, job.body.mesh, stages, on_report)
+    if job.body.matrices is not None:
+        return body_of_matrices(job, job.body.matrices, stages)
+    raise JobError("job: expected either mesh or matrices, got neither")
 
 
 def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:

@@ -44,10 +44,19 @@ def free_pencil(reduced: ReducedBody) -> FreePencil:
     return FreePencil(M, K, D)
 
 
-def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array]:
-    """Elastic modes of the free reduced body: omega² ascending (n,) [1/s²] and shapes over x (6 + n_q, n).
+def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
+    """Elastic modes of the free reduced body, ascending, then its massless shapes.
 
-    Rigid motion is condensed by M_rr x_r + M_rq q = 0; massless shapes have no frequency and are left out.
+    Rigid motion is condensed by M_rr x_r + M_rq q = 0.
+
+    Returns
+    -------
+    omega2
+        Squared frequencies, stiffness of massless shapes, (n,) [1/s²].
+    X
+        Shapes over x, (6 + n_q, n).
+    is_massive
+        (n,) bool.
 
     Raises
     ------
@@ -59,10 +68,9 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array]:
     T = np.vstack([-np.linalg.solve(M_rr, M_rq), np.eye(reduced.n_q)])
     G_M = T.T @ pencil.M @ T
     Z, is_massive, _ = elastic_eigenvectors(reduced.K, (G_M + G_M.T) / 2, stiffness_scale(reduced))
-    Z = Z[:, is_massive]
     omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
-    order = np.argsort(omega2)
-    return omega2[order], T @ Z[:, order]
+    order = np.lexsort((omega2, np.logical_not(is_massive)))
+    return omega2[order], T @ Z[:, order], is_massive[order]
 
 
 def stiffness_scale(reduced: ReducedBody) -> float:

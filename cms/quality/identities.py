@@ -67,10 +67,10 @@ def check_free_frequencies(reduced: ReducedBody) -> QualityRecord:
     """
     stored = np.asarray(reduced.free_frequencies)
     try:
-        omega2, _ = free_elastic_modes(reduced)
+        omega2, _, is_massive = free_elastic_modes(reduced)
     except np.linalg.LinAlgError:
         return information("free-frequencies", "the body has no inertia about some axis, so no free-free frequencies")
-    own = np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi)
+    own = np.sqrt(np.maximum(omega2[is_massive], 0.0)) / (2 * np.pi)
     if not len(stored):
         return information("free-frequencies", "the file holds no free-free frequencies to compare with")
     if len(own) != len(stored):

@@ -74,7 +74,7 @@ LIMITS: dict[str, Limit] = {
         "check with the job the file was made from, or reduce again",
     ),
     "grounding": Limit(
-        "stiffness is blind to rigid-body motion (K Psi_R = 0)", 1e-9, 1e-6,
+        "stiffness is blind to rigid-body motion (K Psi_R = 0)", 1e-11, 1e-6,
         "release the body from the ground, or give the nodes with all their digits",
     ),
     "mass-properties": Limit(

@@ -1,0 +1,227 @@
+"""The command `cms frf`: frequency response between two interfaces of a modal file, with the full model over it."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.cli.console import output_path, print_table, say
+from cms.quality.errors import QualityError
+from cms.quality.frf import POINTS, compare_responses, frequency_grid
+from cms.quality.port_model import FrequencyResponse, file_response
+from cms.quality.ports import COMPONENTS
+from cms.reduced_body import ReducedBody
+from cms.words import nearest
+
+__all__ = ["FrfRequest", "parse_band", "parse_component", "run_frf"]
+
+PICTURES, TABLES = (".png", ".svg", ".pdf"), (".csv",)
+OVERLAY_DAMPING = 0.01  #: ratio in both responses where none is given: a full model brings no damping that compares
+
+
+@dataclass(frozen=True)
+class FrfRequest:
+    """What the command was asked for."""
+
+    file: Path
+    excited: str
+    answering: str
+    band: str
+    components: tuple[str, ...]
+    damping: float | None
+    is_inertance: bool
+    job: Path | None
+    outputs: tuple[Path, ...]
+
+
+def run_frf(request: FrfRequest) -> None:
+    """Compute the response, print its peaks, and write what was asked for."""
+    from cms.modal_file import read
+
+    frequencies = parse_band(request.band)
+    pairs = tuple(parse_component(text) for text in request.components or COMPONENTS[:3])
+    paths = [checked_output(path, request) for path in request.outputs]
+    reduced = read(request.file)
+    for name in (request.excited, request.answering):
+        reduced.interface(name)  # refuse an unknown one before any work
+    damping = OVERLAY_DAMPING if request.damping is None and request.job is not None else request.damping
+    own = file_response(reduced, frequencies, damping=damping).between(request.excited, request.answering)
+    full = None if request.job is None else full_response(request, reduced, frequencies, damping or 0.0)
+    print_peaks(request, reduced, own, full, pairs)
+    for path in paths:
+        if path.suffix in TABLES:
+            write_table(path, own, full, pairs, is_inertance=request.is_inertance)
+        else:
+            draw(path, request, reduced, own, full, pairs)
+        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def parse_band(text: str) -> Array:
+    """Return the frequencies of lowest:highest or lowest:highest:number, evenly spaced by their logarithm [Hz].
+
+    >>> parse_band("10:1000:3").round(6).tolist()
+    [10.0, 100.0, 1000.0]
+
+    Raises
+    ------
+    QualityError
+        If the text is no band.
+    """
+    parts = text.split(":")
+    try:
+        lowest, highest = float(parts[0]), float(parts[1])
+        points = int(parts[2]) if len(parts) == 3 else POINTS
+        if len(parts) > 3:
+            raise ValueError
+    except (ValueError, IndexError):
+        raise QualityError(
+            f"--band {text!r}: expected lowest:highest or lowest:highest:number in Hz, as 10:5000 or 10:5000:800"
+        ) from None
+    return frequency_grid(lowest, highest, points)
+
+
+def parse_component(text: str) -> tuple[int, int]:
+    """Return the motion and the force of "uz" (force along the same) or "uz/ry", indices into `COMPONENTS`."""
+    motion, _, force = text.partition("/")
+    force = force or motion
+    for word in (motion, force):
+        if word not in COMPONENTS:
+            raise QualityError(f"--component {text!r}: {word!r} is no component{nearest(word, COMPONENTS)}")
+    return COMPONENTS.index(motion), COMPONENTS.index(force)
+
+
+def checked_output(path: Path, request: FrfRequest) -> Path:
+    """Return where to write after checking that this is possible and of a known kind."""
+    if path.suffix.lower() not in (*PICTURES, *TABLES):
+        raise QualityError(f"--output {path}: expected a name that ends in {', '.join((*PICTURES, *TABLES))}")
+    inputs = [request.file] + ([request.job] if request.job else [])
+    return Path(output_path(path, "", QualityError, overwrite_of=inputs))
+
+
+def full_response(request: FrfRequest, reduced: ReducedBody, frequencies: Array, damping: float) -> FrequencyResponse:
+    """Compute the response of the full model of a job between the two interfaces."""
+    from cms.cli.console import stages
+    from cms.cli.reduce_job import uncoupled_body
+    from cms.couplings import couple
+    from cms.families import Families
+    from cms.job import read_job
+    from cms.quality.port_model import modal_response
+    from cms.quality.ports import Ports
+    from cms.quality.reduction_check import require_same_units
+    from cms.quality.reference_response import reference_response
+
+    assert request.job is not None
+    job = read_job(request.job)
+    with stages() as clock:
+        uncoupled = uncoupled_body(job, clock)
+        require_same_units(uncoupled, reduced)
+        with clock("couple interfaces"):
+            body = couple(uncoupled)
+        names = tuple(dict.fromkeys((request.excited, request.answering)))
+        ports = Ports.of_body(body, names)
+        with clock("full model"), Families(body) as families:
+            known = reference_response(families, ports, float(frequencies[-1]) * body.units.time)
+    time = body.units.time
+    full = modal_response(known.model, frequencies, damping=damping, time=time)
+    return full.between(request.excited, request.answering)
+
+
+def print_peaks(
+    request: FrfRequest,
+    reduced: ReducedBody,
+    own: FrequencyResponse,
+    full: FrequencyResponse | None,
+    pairs: tuple[tuple[int, int], ...],
+) -> None:
+    """Print the largest peaks of each component, and the error against the full model."""
+    from cms.quality.frf import peaks
+
+    unit = response_unit
+    rows = []
+    for motion, force in pairs:
+        magnitude = np.abs(shown(own, request.is_inertance)[:, motion, force])
+        found = peaks(own.frequencies, magnitude)[:6]
+        where = ", ".join(f"{f:.5g}" for f in sorted(f for f, _ in found)) or "none in the band"
+        rows.append((pair_words(motion, force), where, f"{magnitude.max():.4g}", unit(reduced, motion, force, request)))
+    print_table(
+        f"{reduced.name}: {request.excited} to {request.answering}, {own.damping}",
+        ("motion/force", "peaks [Hz]", "largest>", "unit"),
+        rows,
+    )
+    if full is not None:
+        error = compare_responses(full, own, float(np.linalg.norm(np.ptp(reduced.nodes, axis=0))) or 1.0)
+        k = int(np.argmax(error))
+        good = np.flatnonzero(error > 0.05)
+        up_to = own.frequencies[-1] if not len(good) else own.frequencies[max(good[0] - 1, 0)]
+        say(
+            f"Against the full model: below 5 % up to {up_to:.5g} Hz, largest {100 * error[k]:.3g} % at "
+            f"{own.frequencies[k]:.5g} Hz"
+        )
+
+
+def shown(response: FrequencyResponse, is_inertance: bool) -> np.ndarray:
+    """Return inertance or receptance, (n_f, 6, 6)."""
+    return response.inertance if is_inertance else response.H
+
+
+def pair_words(motion: int, force: int) -> str:
+    """Return 'uz/fz', 'rz/mz', 'ux/my'."""
+    names = ("fx", "fy", "fz", "mx", "my", "mz")
+    return f"{COMPONENTS[motion]}/{names[force]}"
+
+
+def response_unit(reduced: ReducedBody, motion: int, force: int, request: FrfRequest) -> str:
+    """Return the unit of one component."""
+    units = reduced.units
+    top = units.length_symbol if motion < 3 else "rad"
+    top += f"/{units.time_symbol}²" if request.is_inertance else ""
+    bottom = units.force_symbol if force < 3 else f"({units.force_symbol} {units.length_symbol})"
+    return f"{top}/{bottom}"
+
+
+def write_table(
+    path: Path,
+    own: FrequencyResponse,
+    full: FrequencyResponse | None,
+    pairs: tuple[tuple[int, int], ...],
+    *,
+    is_inertance: bool,
+) -> None:
+    """Write frequency, and real and imaginary part of each component, as CSV."""
+    columns = [("frequency_hz", own.frequencies)]
+    for source, response in (("reduced", own), ("full", full)):
+        if response is None:
+            continue
+        for motion, force in pairs:
+            values = shown(response, is_inertance)[:, motion, force]
+            words = f"{source} {pair_words(motion, force)}"
+            columns += [(f"{words} real", values.real), (f"{words} imag", values.imag)]
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow([name for name, _ in columns])
+        writer.writerows(zip(*(map(repr, map(float, values)) for _, values in columns), strict=True))
+
+
+def draw(
+    path: Path,
+    request: FrfRequest,
+    reduced: ReducedBody,
+    own: FrequencyResponse,
+    full: FrequencyResponse | None,
+    pairs: tuple[tuple[int, int], ...],
+) -> None:
+    """Draw magnitude and phase of each component."""
+    from cms.quality.plots import frf_figure
+
+    curves = {"reduced": own} if full is None else {"full model": full, "reduced": own}
+    units = [response_unit(reduced, motion, force, request) for motion, force in pairs]
+    figure = frf_figure(
+        curves,
+        [(motion, force) for motion, force in pairs],
+        [f"{pair_words(*pair)} [{unit}]" for pair, unit in zip(pairs, units, strict=True)],
+        is_inertance=request.is_inertance,
+        title=f"{reduced.name}: {request.excited} to {request.answering}, {own.damping}",
+    )
+    figure.savefig(path, dpi=150)

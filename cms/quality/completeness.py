@@ -1,0 +1,84 @@
+"""Static completeness: whether a mode set answers loads on the interfaces and rigid-body accelerations exactly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.arrays import Array, frozen
+from cms.fe_body import FEBody
+from cms.quality.free_basis import FreeBasis
+from cms.quality.full_reference import FullReference
+from cms.quality.record import QualityRecord, information, judge
+
+__all__ = ["StaticCompleteness", "completeness_records", "energy_error", "static_completeness"]
+
+NO_ENERGY = 1e-24  #: strain energy of a response over the largest of its kind, below which there is none
+ACCELERATIONS = ("ax", "ay", "az", "alpha x", "alpha y", "alpha z")
+
+
+@dataclass(frozen=True, eq=False)
+class StaticCompleteness:
+    """Relative errors in energy norm, sqrt(eᵀ K e / uᵀ K u), of static responses in the span of a mode set."""
+
+    interface_loads: tuple[str, ...]  #: one per excess boundary dof E: 'load big_end ux'
+    interface: Array  #: body held at the determinate dofs R under that unit load, (n_e,); NaN: no deformation
+    inertia_loads: tuple[str, ...]
+    inertia: Array  #: interfaces held, under that rigid-body acceleration, (n_r,); NaN: no deformation
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "interface", frozen(self.interface))
+        object.__setattr__(self, "inertia", frozen(self.inertia))
+
+
+def energy_error(body: FEBody, basis: FreeBasis, U: Array) -> Array:
+    """Relative energy error of the best approximation of columns U by rigid motion and modes, (k,); NaN: no energy.
+
+    c = Phiᵀ K u / omega², e = u - Phi c; the error is formed, not the difference of two energies. Rigid motion is taken
+    off first: it has no energy, but its rounding has.
+    """
+    U = U - basis.N @ (basis.N.T @ (body.M @ U))
+    K_U = body.K @ U
+    energy = np.einsum("nk,nk->k", U, K_U)
+    c = (basis.Phi.T @ K_U) / basis.omega2[:, None]
+    E = U - basis.Phi @ c
+    error = np.einsum("nk,nk->k", E, body.K @ E)
+    has_energy = energy > NO_ENERGY * energy.max(initial=0.0)
+    return np.sqrt(np.maximum(error, 0.0) / np.where(has_energy, energy, np.nan))
+
+
+def static_completeness(reference: FullReference, basis: FreeBasis) -> StaticCompleteness:
+    """Find the error of every unit interface load and every unit rigid-body acceleration.
+
+    Interface loads are in balance with the reactions at R (attachment modes Psi_A: with R any balanced combination of
+    interface forces); accelerations act with all interfaces held (inertia-relief modes Psi_H).
+    """
+    body, families = reference.body, reference.families
+    Psi_H, labels = families.Psi_H, families.held_labels("load")
+    return StaticCompleteness(
+        tuple(labels[k] for k in families.free.e),
+        energy_error(body, basis, families.Psi_A),
+        acceleration_labels(Psi_H.shape[1]),
+        energy_error(body, basis, Psi_H),
+    )
+
+
+def acceleration_labels(n_r: int) -> tuple[str, ...]:
+    """Return names of the rigid-body accelerations; numbers where the body knows fewer than six."""
+    return ACCELERATIONS if n_r == 6 else tuple(f"acceleration {k + 1}" for k in range(n_r))
+
+
+def completeness_records(statics: StaticCompleteness) -> tuple[QualityRecord, ...]:
+    """Records "static-interface" and "static-inertia"."""
+    records = []
+    for name, labels, errors in (
+        ("static-interface", statics.interface_loads, statics.interface),
+        ("static-inertia", statics.inertia_loads, statics.inertia),
+    ):
+        data = {"labels": labels, "errors": errors}
+        if not np.isfinite(errors).any():
+            records.append(information(name, "no such load deforms the body", data))
+            continue
+        k = int(np.nanargmax(errors))
+        reason = f"largest of {len(errors)} loads is {errors[k]:.2e}, of {labels[k]!r}"
+        records.append(judge(name, errors[k], reason, data))
+    return tuple(records)

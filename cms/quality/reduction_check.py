@@ -1,0 +1,98 @@
+"""Everything a mode set and its reduced body can be asked against the full model."""
+
+from cms.fe_body import FEBody
+from cms.mode_set import ModeSet
+from cms.quality.body_check import check_body
+from cms.quality.completeness import completeness_records, static_completeness
+from cms.quality.conditioning import column_condition, conditioning_record, dropped_record
+from cms.quality.deformation import deformation_error, deformation_record
+from cms.quality.errors import QualityError
+from cms.quality.free_basis import free_basis
+from cms.quality.frequencies import compare_frequencies, frequency_records
+from cms.quality.frf import response_comparison, response_record
+from cms.quality.full_reference import FullReference, usable_band
+from cms.quality.full_shapes import full_shapes, same_body_record
+from cms.quality.interface_stiffening import interface_stiffening, stiffening_record
+from cms.quality.mass_properties import check_grounding, check_invariants, check_mass_properties
+from cms.quality.port_model import port_model
+from cms.quality.record import QualityRecord
+from cms.quality.residuals import residual_bounds, residual_record
+from cms.quality.transient import Snapshots
+from cms.reduced_body import ReducedBody
+
+__all__ = ["check_reduction", "require_same_units"]
+
+
+def check_reduction(
+    body: FEBody,
+    modes: ModeSet,
+    reduced: ReducedBody,
+    *,
+    reference: FullReference | None = None,
+    uncoupled: FEBody | None = None,
+    snapshots: Snapshots | None = None,
+) -> tuple[QualityRecord, ...]:
+    """Check a reduced body by itself and against its full model.
+
+    Parameters
+    ----------
+    body
+        The coupled body that `modes` and `reduced` were made from.
+    reference
+        The full model up to a band, to share it between mode sets; by default it is made here, for the band that
+        custom allows the mode set (`usable_band`).
+    uncoupled
+        The body before `couple`: adds the comparison of rigid with distributing interfaces (two more factorisations).
+    snapshots
+        A reference motion: adds the deformation error.
+
+    Returns
+    -------
+    tuple of QualityRecord
+        Those of `check_body`, then those against the full model.
+
+    Raises
+    ------
+    QualityError
+        If mode set or reference are of another body.
+    """
+    if modes.columns.shape[0] != body.n_dof:
+        raise QualityError(
+            f"check: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body {body.name!r} has "
+            f"{body.n_dof}; check with the body it was made from"
+        )
+    require_same_units(body, reduced)
+    if reference is None:
+        with FullReference(body, band=usable_band(modes, reduced)) as own:
+            return check_reduction(body, modes, reduced, reference=own, uncoupled=uncoupled, snapshots=snapshots)
+    if reference.body is not body:
+        raise QualityError(f"check: the reference is of another body than {body.name!r}")
+    records = [record for record in check_body(reduced) if record.name != "dropped-columns"]
+    grounding = check_grounding(body)
+    records += [grounding, check_mass_properties(body, reduced)]
+    if grounding.verdict == "fail":
+        return tuple(records)  # no free body: its rigid-body motions cost energy
+    basis = free_basis(body, modes, reference.families)
+    shapes = full_shapes(body, basis, reduced)
+    records += [same_body_record(body, basis, reduced, shapes), check_invariants(body, reduced, shapes)]
+    records += frequency_records(compare_frequencies(reference, basis), reference.band)
+    records += completeness_records(static_completeness(reference, basis))
+    if body.interfaces:
+        records.append(response_record(response_comparison(reference, port_model(reduced))))
+    records.append(residual_record(residual_bounds(reference, basis)))
+    condition, _ = column_condition(body, modes, float(basis.omega2[0]))
+    records += [conditioning_record(condition, modes.columns.shape[1]), dropped_record(basis, modes.columns.shape[1])]
+    if uncoupled is not None and any(interface.kind != "nodes" for interface in uncoupled.interfaces):
+        records.append(stiffening_record(interface_stiffening(uncoupled)))
+    if snapshots is not None:
+        records.append(deformation_record(deformation_error(body, basis, snapshots)))
+    return tuple(records)
+
+
+def require_same_units(body: FEBody, reduced: ReducedBody) -> None:
+    """Raise `QualityError` unless full model and reduced body are in the same units."""
+    if body.units != reduced.units:
+        raise QualityError(
+            f"check: body {body.name!r} is in units {body.units.name}, the reduced body {reduced.name!r} in "
+            f"{reduced.units.name}; check with the job the file was made from"
+        )
