@@ -29,7 +29,8 @@ def coupled_field(body: FEBody, u_mesh: Array) -> CoupledField:
     (2) rigid interface: the rigid motion of its reference node nearest to that of the members (least squares,
         rotations of members scaled by the body length)
     (3) distributing interface: the weighted mean motion of the members, exact by definition
-    (4) multipliers: zero; a field that satisfies the constraint has the same energy with any multiplier
+    (4) reference nodes inside the body, where parts are welded: the nearest motion, as in (2)
+    (5) multipliers: zero; a field that satisfies the constraint has the same energy with any multiplier
 
     Parameters
     ----------
@@ -38,7 +39,13 @@ def coupled_field(body: FEBody, u_mesh: Array) -> CoupledField:
     """
     if body.recovery is None:
         return CoupledField(u_mesh, {})
-    columns = body.recovery.matrix.T @ u_mesh  # (1), (4): rows of the identity; the other rows are made below
+    columns = np.zeros((body.n_dof, np.shape(u_mesh)[1]))  # (5)
+    row_of = np.full((len(body.nodes), 6), -1, np.int64)
+    in_mesh = np.flatnonzero(body.recovery.dofs[:, 1] >= 0)
+    row_of[tuple(body.recovery.dofs[in_mesh].T)] = in_mesh
+    row = np.where(body.dofs[:, 1] >= 0, row_of[tuple(body.dofs.T)], -1)
+    columns[row >= 0] = u_mesh[row[row >= 0]]  # (1)
+    is_known = (row >= 0) | (body.dofs[:, 1] < 0)
     departure: dict[str, float] = {}
     for interface in body.interfaces:
         if interface.dofs is None or interface.kind == "nodes":
@@ -49,6 +56,14 @@ def coupled_field(body: FEBody, u_mesh: Array) -> CoupledField:
             points = body.nodes[interface.nodes]
             A = mean_motion(points, np.asarray(interface.weights), interface.reference)
             columns[interface.dofs] = A @ _member_translations(body, interface, u_mesh)  # (3)
+        is_known[interface.dofs] = True
+    length = np.sqrt(np.asarray(body.recovery.matrix.power(2).sum(axis=0)).ravel())
+    rest = np.flatnonzero(~is_known & (length > 0))
+    if len(rest):  # (4)
+        T, size = body.recovery.matrix[:, rest], length[rest]
+        N = (T.T @ T).toarray() / np.outer(size, size)
+        b = (T.T @ (u_mesh - body.recovery.matrix @ columns)) / size[:, None]
+        columns[rest] = np.linalg.solve(N, b) / size[:, None]
     return CoupledField(columns, departure)
 
 
