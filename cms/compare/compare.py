@@ -17,10 +17,16 @@ from cms.compare.comparison import Comparison, FullResults, Point, SetResult
 from cms.compare.coordinates import Coordinates, ReferenceBasis
 from cms.compare.drawing import draw_modes
 from cms.compare.evaluation import Reference, judge_subset
-from cms.compare.free_shapes import free_shapes
-from cms.compare.full_model import FullModel, read_full_model, reference_digest, solve_full_model, write_full_model
-from cms.compare.pulse import Pulse, default_pulse, pulse_response
-from cms.compare.response import full_response
+from cms.compare.free_shapes import judged_subset
+from cms.compare.full_model import (
+    FullModel,
+    read_full_model,
+    reference_digest,
+    solve_full_model,
+    static_labels,
+    write_full_model,
+)
+from cms.compare.pulse import Pulse, default_pulse
 from cms.compare.subsets import SUBSETS
 from cms.compare.verdicts import answer, is_good, ranking, set_sentence, shown_point
 from cms.errors import CmsError, CompareError
@@ -28,11 +34,14 @@ from cms.families import Families
 from cms.fe_body import FEBody
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
+from cms.quality.frf import DAMPING, LOWEST, frequency_grid
+from cms.quality.port_model import FrequencyResponse, modal_response
+from cms.quality.ports import Ports
+from cms.quality.transient import Snapshots
 from cms.words import nearest
 
 __all__ = ["compare"]
 
-DAMPING = 0.02  #: ratio of every mode in response and motion, full and reduced alike
 Stage = Callable[[str], AbstractContextManager[Any]]
 
 
@@ -45,6 +54,7 @@ def compare(
     n_reference: int = 10,
     damping: float = DAMPING,
     pulse_at: str | None = None,
+    motion: Snapshots | None = None,
     cache: Path | None = None,
     stage: Stage | None = None,
 ) -> Comparison:
@@ -71,6 +81,8 @@ def compare(
         Ratio of every mode in response and motion.
     pulse_at
         Interface the force pulse of the motion acts on; the first by default.
+    motion
+        Reference motion for the deformation error; the response to the pulse by default.
     cache
         File that keeps the solution of the full model for the next comparison; None: nothing is kept.
     stage
@@ -90,48 +102,87 @@ def compare(
     pulse = default_pulse(body, pulse_at)
     with Families(body) as families:
         with clock("full model"):
-            full, was_cached, digest = full_model(families, pulse, band, n_reference, cache)
-            motion = pulse_response(full.omega2, full.Phi[body.b], pulse, band=full.band, damping=damping)
-            reference = Reference(full, motion, full_response(body, full, damping=damping), 1 / body.units.time)
-            basis = ReferenceBasis(body, full.columns, full.rigid.shape[1], float(full.omega2[0]))
+            full, was_cached, digest = full_model(families, pulse, band, n_reference, damping, motion, cache)
+            reference = reference_of(families, full, damping)
+            basis = ReferenceBasis(
+                families, Ports.of_body(body), full.columns, full.rigid.shape[1], float(full.omega2[0])
+            )
         results = []
         for name, extra in options.items():
             with clock(name):
                 results.append(set_result(name, extra, counts, families, basis, reference))
     order = ranking(results)
-    hertz = 1 / body.units.time
-    n_band = full.n_band
     with clock("surface"):
-        drawing = draw_modes(body, full.Phi[:, :n_band])
+        drawing = draw_modes(body, full.Phi)
     return Comparison(
         name=body.name,
         units=body.units,
         n_dof=body.n_dof,
         n_nodes=len(body.nodes),
         interfaces=tuple((i.name, i.kind, len(i.nodes)) for i in body.interfaces),
-        full=FullResults(
-            frequencies_hz=full.frequencies * hertz,
-            n_band=n_band,
-            band_hz=full.band * hertz,
-            response_hz=reference.response.omega / (2 * np.pi) * hertz,
-            response=reference.response.drawn(reference.response.H),
-            response_words=reference.response.words,
-            damping=damping,
-            t=motion.t * body.units.time,
-            force=motion.force,
-            motion_words=f"{pulse.where}, {motion.duration * body.units.time:.3g} s long",
-            mass=full.mass,
-            held_mass=full.held_mass,
-            was_cached=was_cached,
-            digest=digest,
+        full=full_results(
+            reference, full, damping, was_cached=was_cached, digest=digest,
+            motion=motion_words(pulse, full, body) if motion is None else "a given motion",
+            force=pulse.force(full.t, full.band) if motion is None else None,
         ),
         sets=tuple(results),
         ranking=order,
-        sentence=answer(results, order, full.band * hertz),
+        sentence=answer(results, order, full.band / body.units.time),
         drawing=drawing,
         seconds=clock.seconds,
         provenance=provenance(body, families),
+    )  # fmt: skip
+
+
+def reference_of(families: Families, full: FullModel, damping: float) -> Reference:
+    """Return what every set is judged by."""
+    body = families.body
+    time_ = body.units.time
+    names = tuple(interface.name for interface in body.interfaces)
+    grid = frequency_grid(LOWEST * float(full.frequencies[0]) / time_, full.band / time_)
+    return Reference(
+        full=full,
+        response=modal_response(full.ports(names), grid, damping=damping, time=time_),
+        damping=damping,
+        port_names=names,
+        static_labels=static_labels(families, full),
+        length=body.length or 1.0,
+        time=time_,
     )
+
+
+def full_results(
+    reference: Reference,
+    full: FullModel,
+    damping: float,
+    *,
+    was_cached: bool,
+    digest: str,
+    motion: str,
+    force: Array | None,
+) -> FullResults:
+    """Return what reports show of the full model."""
+    response: FrequencyResponse = reference.response
+    return FullResults(
+        frequencies_hz=full.frequencies / reference.time,
+        n_band=full.n_band,
+        band_hz=full.band / reference.time,
+        response_hz=response.frequencies,
+        response_error=full.port_error,
+        damping=damping,
+        t=full.t * reference.time,
+        force=force,
+        motion_words=motion,
+        mass=full.mass,
+        held_mass=full.held_mass,
+        was_cached=was_cached,
+        digest=digest,
+    )
+
+
+def motion_words(pulse: Pulse, full: FullModel, body: FEBody) -> str:
+    """Say what moves the body."""
+    return f"{pulse.words}, {1e3 * pulse.duration(full.band) * body.units.time:.3g} ms long"
 
 
 def check_request(
@@ -154,16 +205,23 @@ def check_request(
 
 
 def full_model(
-    families: Families, pulse: Pulse, band: float | None, n_reference: int, cache: Path | None
+    families: Families,
+    pulse: Pulse,
+    band: float | None,
+    n_reference: int,
+    damping: float,
+    motion: Snapshots | None,
+    cache: Path | None,
 ) -> tuple[FullModel, bool, str]:
     """Return the solution of the full model, whether it was found in the cache, and its digest."""
     body = families.body
-    digest = reference_digest(body, band, n_reference, pulse.direction.tolist())
+    given = None if motion is None else [part.tobytes() for part in (motion.columns, motion.amplitudes, motion.t)]
+    digest = reference_digest(body, band, n_reference, damping, pulse.at, given)
     found = None if cache is None else read_full_model(cache, digest)
     if found is not None:
         return found, True, digest
     scaled = None if band is None else band * body.units.time  # cycles per time unit
-    full = solve_full_model(families, pulse, n_modes=n_reference, band=scaled)
+    full = solve_full_model(families, pulse, n_modes=n_reference, band=scaled, damping=damping, motion=motion)
     if cache is not None:
         write_full_model(cache, full, digest)
     return full, False, digest
@@ -210,10 +268,9 @@ def judged_points(
 
     def judge(n_modes: int, c: Coordinates, T: Array, labels: tuple[str, ...], groups: Sequence[str]) -> None:
         rigid = c.reference[:, reference.full.parts["rigid"]]
-        shapes = free_shapes(c, T, rigid, basis.omega2)
-        dropped = tuple(labels[k] for k in shapes.redundant)
-        records = judge_subset(reference, c, shapes, dropped)
-        points.append(Point(n_modes, len(labels), shapes.n_q, dropped, records, is_good(records)))
+        subset = judged_subset(c, T, labels, rigid, basis.omega2)
+        records = judge_subset(reference, c, subset)
+        points.append(Point(n_modes, len(labels), subset.n_q, subset.basis.dropped, records, is_good(records)))
         families_of_columns.append({group: list(groups).count(group) for group in dict.fromkeys(groups)})
 
     def made(n_modes: int) -> ModeSet:

@@ -57,11 +57,10 @@ class FullResults:
     n_band: int  #: how many of them are in the band
     band_hz: float  #: highest frequency of the comparison
     response_hz: Array  #: frequencies of the response, (n_f,)
-    response: Array  #: magnitude of the entry that is drawn, (n_f,) [length / force]
-    response_words: str
+    response_error: float  #: estimated error of the full model's own response, over its size
     damping: float  #: ratio of every mode in response and motion
     t: Array  #: of the motion, (n_t,) [s]
-    force: Array  #: of the pulse, its peak 1, (n_t,)
+    force: Array | None  #: of the pulse, its peak 1, (n_t,); None for a given motion
     motion_words: str
     mass: Array  #: of the body in x, y, z and about those axes through the centre of mass, (6,)
     held_mass: Array  #: of it, what moves while the interfaces are held, (6,)

@@ -8,16 +8,18 @@ the Euclidean norm, and differences of displacements are accurate to roundoff, w
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as la
 
 from cms.arrays import Array
-from cms.fe_body import FEBody
+from cms.families import Families
 from cms.independent import Columns, gram, independent_columns
+from cms.quality.ports import Ports
 from cms.sparse_product import SymmetricProduct
 from cms.tall import inner, subtract
 
 __all__ = ["Coordinates", "ReferenceBasis"]
 
-NOISE = 1e-12  #: W-length of what is left of a unit column, below which it is rounding
+NOISE = 1e-11  #: W-length of what is left of a unit column, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +29,9 @@ class Coordinates:
     K: Array  #: Qᵀ K Q, (n_Q, n_Q)
     M: Array  #: Qᵀ M Q, (n_Q, n_Q)
     nodal: Array  #: Qᵀ Q over the translations, (n_Q, n_Q)
+    MGM: Array  #: Qᵀ M G M Q, G the elastic flexibility of the free body, (n_Q, n_Q)
     at_b: Array  #: rows of Q at the boundary dofs, (n_b, n_Q)
+    at_ports: Array  #: motion of the reference points of the interfaces with Q, (6 n_ports, n_Q)
     reference: Array  #: the reference columns, (n_Q, n_reference)
     columns: Array  #: the columns of the mode set, (n_Q, n_columns)
 
@@ -35,13 +39,15 @@ class Coordinates:
 class ReferenceBasis:
     """The part of Q that all mode sets of a body share: the span of the reference columns."""
 
-    def __init__(self, body: FEBody, columns: Array, n_rigid: int, omega2: float) -> None:
+    def __init__(self, families: Families, ports: Ports, columns: Array, n_rigid: int, omega2: float) -> None:
         """Make the basis.
 
         Parameters
         ----------
-        body
-            A coupled body.
+        families
+            Of a coupled body.
+        ports
+            The reference points of its interfaces.
         columns
             Displacements the sets are judged by, (n_dof, n_reference).
         n_rigid
@@ -49,11 +55,14 @@ class ReferenceBasis:
         omega2
             omega_1² of W [1/s²].
         """
-        self.body, self.n_rigid, self.omega2 = body, n_rigid, omega2
+        body = families.body
+        self.body, self.families, self.ports = body, families, ports
+        self.n_rigid, self.omega2 = n_rigid, omega2
         self._K, self._M = SymmetricProduct(body.K), SymmetricProduct(body.M)
         given = self._products(columns)
         self._Q, _ = independent_columns(given, body, omega2)
         self._reference = self._inner(self._Q, given)
+        self._GM = families.flexibility(self._Q.MX)
         self._weight = ((body.dofs[:, 1] >= 0) & (body.dofs[:, 1] < 3)).astype(float)[:, None]
 
     def coordinates(self, columns: Array) -> Coordinates:
@@ -66,13 +75,14 @@ class ReferenceBasis:
         Q, V = self._Q, self._products(columns)
         T_Q = self._inner(Q, V)
         left = self._remainder(V)
-        V_rest = self._products(left)
+        basis = self._products(left)
         if left.shape[1]:
-            subtract(left, Q.X, self._inner(Q, V_rest))  # once more: the difference lost leading digits
-            basis, _ = independent_columns(self._products(left), self.body, self.omega2)
-            T_V = self._inner(basis, V)
-        else:
-            basis, T_V = V_rest, np.zeros((0, V.X.shape[1]))
+            # nearly dependent columns lose their orthogonality to the reference when they are brought to unit length
+            basis, _ = independent_columns(self._without_reference(basis), self.body, self.omega2)
+            basis = self._without_reference(basis)
+            G = self._inner(basis, basis)
+            basis = basis @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
+        T_V = self._inner(basis, V)
         reference = np.vstack([self._reference, np.zeros((len(T_V), self._reference.shape[1]))])
         M = _joined(Q.X, Q.MX, basis.X, basis.MX)
         N = reference[:, : self.n_rigid]
@@ -81,7 +91,9 @@ class ReferenceBasis:
             K=elastic.T @ _joined(Q.X, Q.KX, basis.X, basis.KX) @ elastic,
             M=M,
             nodal=_joined(Q.X, self._weight * Q.X, basis.X, self._weight * basis.X),
+            MGM=_joined(Q.MX, self._GM, basis.MX, self.families.flexibility(basis.MX)),
             at_b=np.hstack([Q.X[self.body.b], basis.X[self.body.b]]),
+            at_ports=np.hstack([self.ports.A @ Q.X, self.ports.A @ basis.X]),
             reference=reference,
             columns=np.vstack([T_Q, T_V]),
         )
@@ -100,6 +112,11 @@ class ReferenceBasis:
         left = np.sqrt(np.maximum(self._length2(self._products(rest)), 0.0))
         is_new = (left > NOISE) & (length > 0)
         return np.ascontiguousarray(rest[:, is_new] / left[is_new])
+
+    def _without_reference(self, V: Columns) -> Columns:
+        rest = V.X.copy()
+        subtract(rest, self._Q.X, self._inner(self._Q, V))
+        return self._products(rest)
 
     def _length2(self, V: Columns) -> Array:
         return np.einsum("nk,nk->k", V.X, V.KX) + self.omega2 * np.einsum("nk,nk->k", V.X, V.MX)

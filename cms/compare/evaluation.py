@@ -1,4 +1,4 @@
-"""One mode set with one number of modes, judged in small coordinates against the full model."""
+"""One mode set with one number of modes, judged in small coordinates by the records of `cms.quality`."""
 
 from dataclasses import dataclass
 
@@ -7,15 +7,21 @@ import scipy.linalg as la
 
 from cms.arrays import Array
 from cms.compare.coordinates import Coordinates
-from cms.compare.free_shapes import FreeShapes
+from cms.compare.free_shapes import Subset
 from cms.compare.full_model import FullModel
-from cms.compare.pulse import Motion
-from cms.compare.response import Response, interface_response
-from cms.quality.record import QualityRecord, information, judge
+from cms.quality.completeness import NO_ENERGY, StaticCompleteness, completeness_records
+from cms.quality.conditioning import conditioning_record, dropped_record
+from cms.quality.deformation import DeformationError, deformation_record, lengths, nodal_lengths, relative
+from cms.quality.free_basis import FreeBasis
+from cms.quality.frequencies import FrequencyComparison, clusters, frequency_records, mac, span_share
+from cms.quality.frf import ResponseComparison, compare_responses, response_record
+from cms.quality.port_model import FrequencyResponse, PortModel, modal_response
+from cms.quality.record import QualityRecord, judge
+from cms.quality.residuals import ResidualBounds, residual_record
 
 __all__ = ["Reference", "judge_subset"]
 
-ZERO_SHAPE = 1e-9  #: displacement of the interfaces, of a unit shape, below which they are held
+HELD = 1e-9  #: motion of the interfaces over the largest, of a combination of unit shapes, below which they are held
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,157 +29,152 @@ class Reference:
     """What every subset is judged by; the same for all sets."""
 
     full: FullModel
-    motion: Motion
-    response: Response  #: of the full model at the interfaces
-    hertz: float  #: Hz of one cycle per time unit of the body
+    response: FrequencyResponse  #: of the full model at its ports
+    damping: float  #: ratio of every mode in it
+    port_names: tuple[str, ...]
+    static_labels: tuple[tuple[str, ...], tuple[str, ...]]  #: of the loads of Psi_A and Psi_H
+    length: float  #: of the body, that makes rotations comparable to translations
+    time: float  #: [s] of the body's time unit
 
 
-def judge_subset(reference: Reference, c: Coordinates, shapes: FreeShapes, dropped: tuple[str, ...]) -> tuple[
-    QualityRecord, ...
-]:  # fmt: skip
+def judge_subset(reference: Reference, c: Coordinates, subset: Subset) -> tuple[QualityRecord, ...]:
     """Return the records of a subset: frequencies, shapes, statics, response, motion, mass, bound, columns."""
-    parts = reference.full.parts
-    targets = {name: c.reference[:, part] for name, part in parts.items()}
+    basis = subset.basis
+    targets = {name: c.reference[:, part] for name, part in reference.full.parts.items()}
+    root = nodal_root(c)
     return (
-        frequency_record(reference, shapes),
-        shape_record(reference, c, shapes, targets["Phi"]),
-        static_record("static-interface", "interface load", c, shapes, targets["Psi_A"]),
-        static_record("static-inertia", "rigid-body acceleration", c, shapes, targets["Psi_H"]),
-        response_record(reference, c, shapes, targets["rigid"]),
-        motion_record(reference, c, shapes, targets),
-        mass_record(reference, c, shapes, targets["directions"]),
-        condition_record(shapes),
-        dropped_record(dropped),
+        *frequency_part(reference, c, basis, targets["Phi"], root),
+        *static_part(reference, c, basis, targets),
+        response_part(reference, c, basis),
+        motion_part(reference, c, basis, targets["moved"], root),
+        mass_part(reference, c, basis, targets["directions"]),
+        residual_part(reference, c, basis),
+        conditioning_record(subset.condition, subset.n_columns),
+        dropped_record(basis, subset.n_columns),
     )
 
 
-def frequency_record(reference: Reference, shapes: FreeShapes) -> QualityRecord:
-    """Error of the elastic free frequencies in the band, in their order: bounds from above (Rayleigh-Ritz)."""
-    full, n = reference.full, reference.full.n_band
-    exact = full.frequencies[:n]
-    found = np.full(n, np.nan)
-    count = min(n, len(shapes.omega2))
-    found[:count] = np.sqrt(np.maximum(shapes.omega2[:count], 0.0)) / (2 * np.pi)
-    error = found / exact - 1
-    data = {
-        "frequencies_hz": found * reference.hertz,
-        "errors": error,
-        "mean": float(np.abs(np.where(np.isnan(error), 1.0, error)).mean()),
-    }
-    if count < n:
-        reason = f"it has only {count} elastic frequencies; the band holds {n}"
-        return judge("frequency-error", np.inf, reason, data)
-    worst = int(np.abs(error).argmax())
-    reason = f"largest at mode {worst + 1} ({exact[worst] * reference.hertz:.5g} Hz): {error[worst]:+.2%}"
-    return judge("frequency-error", float(np.abs(error).max()), reason, data)
+def nodal_root(c: Coordinates) -> Array:
+    """Return L with Lᵀ L = Qᵀ Q over the translations, (n_Q, n_Q): L x has the lengths of the nodal field of x."""
+    values, vectors = la.eigh(c.nodal)
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 
 
-def shape_record(reference: Reference, c: Coordinates, shapes: FreeShapes, Phi: Array) -> QualityRecord:
-    """Mass-weighted MAC of the free modes in the band with those of the subset; each takes its best partner."""
-    n = reference.full.n_band
-    exact = Phi[:, :n]
-    found = shapes.shapes[:, : n + 10]
-    mac = (exact.T @ c.M @ found) ** 2
-    mac /= np.einsum("nk,nk->k", exact, c.M @ exact)[:, None]
-    mac /= np.einsum("nk,nk->k", found, c.M @ found)[None, :]
-    missing = 1 - mac.max(axis=1, initial=0.0)
-    worst = int(missing.argmax())
-    reason = f"least alike is mode {worst + 1}: MAC {1 - missing[worst]:.4f}"
-    return judge("mac", float(max(missing[worst], 0.0)), reason, {"mac": mac, "missing": missing})
+def frequency_part(
+    reference: Reference, c: Coordinates, basis: FreeBasis, Phi: Array, root: Array
+) -> tuple[QualityRecord, ...]:
+    """Free-free frequencies and shapes in the band; see `cms.quality.frequencies.compare_frequencies`."""
+    from scipy.optimize import linear_sum_assignment
+
+    n, time = reference.full.n_band, reference.time
+    full, reduced = reference.full.frequencies[:n] / time, basis.frequencies(time)
+    error, partner_error = np.full(n, np.nan), np.full(n, np.nan)
+    common = min(n, len(reduced))
+    error[:common] = reduced[:common] / full[:common] - 1
+    shapes = basis.vibrating
+    massed = np.minimum(mac(Phi, shapes, c.M @ shapes), 1.0)
+    a, b = root @ Phi, root @ shapes
+    partner = np.full(n, -1, np.int64)
+    rows, columns = linear_sum_assignment(-massed)
+    partner[rows] = columns
+    partner_error[rows] = reduced[columns] / full[rows] - 1
+    recovered, recovered_nodal = np.zeros(n), np.zeros(n)
+    for cluster in clusters(full):
+        members = partner[cluster]
+        members = members[members >= 0]
+        recovered[cluster] = massed[np.ix_(cluster, members)].sum(axis=1)
+        recovered_nodal[cluster] = span_share(a[:, cluster], b[:, members])
+    comparison = FrequencyComparison(
+        full, reduced, error, massed, mac(a, b), partner, partner_error, np.minimum(recovered, 1.0), recovered_nodal
+    )
+    return frequency_records(comparison, reference.full.band / time)
 
 
-def static_record(name: str, load: str, c: Coordinates, shapes: FreeShapes, targets: Array) -> QualityRecord:
-    """Part of static responses outside the span, in the energy norm: the error of the reduced static response."""
-    elastic = np.hstack([shapes.shapes / np.sqrt(shapes.omega2), shapes.static])
-    left = targets - elastic @ (elastic.T @ (c.K @ targets))
-    size = np.einsum("nk,nk->k", targets, c.K @ targets)
-    rest = np.einsum("nk,nk->k", left, c.K @ left)
-    is_loaded = size > 1e-24 * size.max(initial=0.0)
-    errors = np.sqrt(np.maximum(rest[is_loaded], 0.0) / size[is_loaded])
-    if not len(errors):
-        return information(name, f"no {load} deforms the body")
-    return judge(name, float(errors.max()), f"largest of {len(errors)} {load}s: {errors.max():.2g}", {"errors": errors})
-
-
-def response_record(reference: Reference, c: Coordinates, shapes: FreeShapes, rigid: Array) -> QualityRecord:
-    """Frequency response at the interfaces against the full model's, at every frequency of the band."""
-    exact = reference.response
-    rows = c.at_b[exact.dofs]
-    H = interface_response(
-        exact.omega, rows @ rigid, rows @ shapes.shapes, shapes.omega2,
-        rows @ shapes.static @ (rows @ shapes.static).T, exact.damping,
+def static_part(
+    reference: Reference, c: Coordinates, basis: FreeBasis, targets: dict[str, Array]
+) -> tuple[QualityRecord, ...]:
+    """Static completeness for interface loads and rigid-body accelerations."""
+    interface_loads, inertia_loads = reference.static_labels
+    return completeness_records(
+        StaticCompleteness(
+            interface_loads, energy_error(c, basis, targets["Psi_A"]),
+            inertia_loads, energy_error(c, basis, targets["Psi_H"]),
+        )
     )  # fmt: skip
-    errors = exact.distance(H)
-    worst = int(errors.argmax())
-    f = exact.omega / (2 * np.pi) * reference.hertz
-    reason = f"mean over the band {errors.mean():.2g}, largest {errors[worst]:.2g} at {f[worst]:.4g} Hz"
-    data = {"errors": errors, "magnitude": exact.drawn(H), "largest": float(errors[worst])}
-    return judge("frequency-response", float(errors.mean()), reason, data)
 
 
-def motion_record(reference: Reference, c: Coordinates, shapes: FreeShapes, targets: dict[str, Array]) -> QualityRecord:
-    """Deformation error epsilon(t) of the pulse response in the K, M and nodal norm (THEORY §8)."""
-    motion = reference.motion
-    s = targets["Phi"] @ motion.modes + targets["u_pulse"] @ motion.static
-    data: dict[str, Array | float] = {}
-    for norm, A in (("K", c.K), ("M", c.M), ("nodal", c.nodal)):
-        data[f"epsilon_{norm}"] = deformation_error(s, shapes.span, A)
-    largest = {norm: float(data[f"epsilon_{norm}"].max()) for norm in ("K", "M", "nodal")}  # type: ignore[union-attr]
-    when = motion.t[int(np.argmax(data["epsilon_K"]))]
-    reason = (
-        f"largest {largest['K']:.2g} in energy (at {when:.3g} of the body's time unit), {largest['M']:.2g} in mass, "
-        f"{largest['nodal']:.2g} at the nodes"
+def energy_error(c: Coordinates, basis: FreeBasis, U: Array) -> Array:
+    """Relative energy error of the best approximation of columns U without rigid motion, (k,); NaN: no energy."""
+    E = U - basis.Phi @ ((basis.Phi.T @ (c.K @ U)) / basis.omega2[:, None])
+    energy, error = (np.einsum("nk,nk->k", X, c.K @ X) for X in (U, E))
+    has_energy = energy > NO_ENERGY * energy.max(initial=0.0)
+    return np.sqrt(np.maximum(error, 0.0) / np.where(has_energy, energy, np.nan))
+
+
+def response_part(reference: Reference, c: Coordinates, basis: FreeBasis) -> QualityRecord:
+    """Response at the interfaces over the band."""
+    model = PortModel(
+        reference.port_names, basis.omega2, basis.is_massive, c.at_ports @ basis.Phi, c.at_ports @ basis.N
     )
-    data |= {f"largest_{norm}": value for norm, value in largest.items()}
-    return judge("deformation-error", largest["K"], reason, data)
+    full = reference.response
+    reduced = modal_response(model, full.frequencies, damping=reference.damping, time=reference.time)
+    error = compare_responses(full, reduced, reference.length)
+    return response_record(ResponseComparison(full, reduced, error, reference.full.port_error))
 
 
-def deformation_error(s: Array, span: Array, A: Array) -> Array:
-    """Return min over x of |s - span x|_A / max_t |s|_A for every column of s, (n_t,).
-
-    The directions without A-length (rigid-body motion in the K-norm) are left out of the span by their size.
-    """
-    G = span.T @ A @ span
-    values, vectors = la.eigh((G + G.T) / 2)
-    is_seen = values > 1e-13 * values.max(initial=0.0)
-    B = span @ (vectors[:, is_seen] / np.sqrt(values[is_seen]))
-    left = s - B @ (B.T @ (A @ s))
-    left -= B @ (B.T @ (A @ left))
-    size = np.sqrt(np.maximum(np.einsum("nt,nt->t", s, A @ s), 0.0))
-    rest = np.sqrt(np.maximum(np.einsum("nt,nt->t", left, A @ left), 0.0))
-    return np.asarray(rest / (size.max() or 1.0))
+def motion_part(reference: Reference, c: Coordinates, basis: FreeBasis, U: Array, root: Array) -> QualityRecord:
+    """Deformation error of the reference motion; see `cms.quality.deformation.deformation_error`."""
+    a, X = reference.full.amplitudes, basis.vibrating
+    in_M = U - X @ (X.T @ (c.M @ U))
+    in_K = U - basis.Phi @ ((basis.Phi.T @ (c.K @ U)) / basis.omega2[:, None])
+    error = {"M": lengths(in_M, c.M @ in_M, a), "K": lengths(in_K, c.K @ in_K, a)}
+    size = {"M": lengths(U, c.M @ U, a), "K": lengths(U, c.K @ U, a)}
+    error["nodal"], size["nodal"] = nodal_lengths(root @ U, root @ basis.N, root @ basis.Phi, a)
+    deformation: DeformationError = relative(reference.full.t, error, size)
+    return deformation_record(deformation)
 
 
-def mass_record(reference: Reference, c: Coordinates, shapes: FreeShapes, directions: Array) -> QualityRecord:
-    """Effective mass of the subset's shapes with the interfaces held, against all fixed-interface modes."""
+def mass_part(reference: Reference, c: Coordinates, basis: FreeBasis, directions: Array) -> QualityRecord:
+    """Effective mass of the subset's shapes with all interfaces held, against that of all fixed-interface modes."""
     full = reference.full
-    B = shapes.span
-    at_b = c.at_b @ B
-    _, sizes, Vt = la.svd(at_b)
-    rank = int((sizes > ZERO_SHAPE * sizes.max(initial=0.0)).sum())
+    B = np.hstack([basis.N, basis.Phi])
+    B = B / np.linalg.norm(B, axis=0)
+    _, sizes, Vt = la.svd(c.at_b @ B)
+    rank = int((sizes > HELD * sizes.max(initial=0.0)).sum())
     held = B @ Vt[rank:].T
     carried = np.zeros(6)
     if held.shape[1]:
         G_M = held.T @ c.M @ held
         values, vectors = la.eigh((G_M + G_M.T) / 2)
         has_mass = values > 1e-12 * values.max(initial=0.0)
-        participation = (vectors[:, has_mass] / np.sqrt(values[has_mass])).T @ held.T @ c.M @ directions
-        carried = (participation**2).sum(axis=0)
-    has_mass = full.held_mass > 1e-12 * full.mass
-    remainder = np.where(has_mass, 1 - carried / np.where(has_mass, full.held_mass, 1.0), 0.0)
-    names = ("x", "y", "z", "about x", "about y", "about z")
-    worst = int(remainder.argmax())
-    reason = f"most is missing {'along' if worst < 3 else ''} {names[worst]}".replace("  ", " ")
-    data = {"carried": carried, "remainder": remainder}
-    return judge("effective-mass", float(max(remainder[worst], 0.0)), f"{reason}: {remainder[worst]:.1%}", data)
+        L = (vectors[:, has_mass] / np.sqrt(values[has_mass])).T @ (held.T @ (c.M @ directions))
+        carried = (L**2).sum(axis=0)
+    can_move = full.held_mass > 1e-12 * np.repeat([full.mass[:3].max(), full.mass[3:].max()], 3)
+    share = np.where(can_move, carried / np.where(can_move, full.held_mass, 1.0), 1.0)
+    remainder = np.clip(1 - share, 0.0, 1.0)
+    names = ("along x", "along y", "along z", "about x", "about y", "about z")
+    worst = int(remainder[:3].argmax())
+    reason = (
+        f"with all interfaces held the modes carry {100 * share[worst]:.1f} % of what moves {names[worst]}; "
+        + ", ".join(f"{name} {100 * s:.0f} %" for name, s in zip(names, share, strict=True))
+    )
+    data = {"carried": carried, "share": share, "remainder": remainder}
+    return judge("effective-mass", float(remainder[worst]), reason, data)
 
 
-def condition_record(shapes: FreeShapes) -> QualityRecord:
-    """Condition of the independent columns at unit length in the norm of K + omega_1² M."""
-    return judge("conditioning", shapes.condition, f"condition {shapes.condition:.2g} of the columns that are kept")
+def residual_part(reference: Reference, c: Coordinates, basis: FreeBasis) -> QualityRecord:
+    """Residual bound of the frequencies in the band; see `cms.quality.residuals`.
 
-
-def dropped_record(dropped: tuple[str, ...]) -> QualityRecord:
-    """Columns that depend on others."""
-    reason = f"{len(dropped)}: {', '.join(dropped)}" if dropped else "all columns are independent"
-    return judge("dropped-columns", float(len(dropped)), reason, {"labels": "; ".join(dropped)})
+    |phi - theta G M phi|²_K / theta = theta phiᵀ M G M phi - 1 for phiᵀ M phi = 1, known to about 1e-8 in the bound.
+    """
+    frequencies = basis.frequencies(reference.time)
+    if not len(frequencies):
+        return residual_record(ResidualBounds(*(np.zeros(0),) * 3))
+    n = max(1, int((frequencies <= reference.full.band / reference.time).sum()))
+    theta, phi = basis.omega2[:n], basis.Phi[:, :n]
+    b = np.sqrt(np.maximum(theta * np.einsum("nk,nl,lk->k", phi, c.MGM, phi, optimize=True) - 1.0, 0.0))
+    ratio = theta[:, None] / basis.omega2[basis.is_massive][None]
+    ratio[np.arange(n), np.arange(n)] = np.inf
+    gap = np.abs(ratio - 1).min(axis=1, initial=np.inf)
+    estimate = np.minimum(b, b**2 / np.where(gap > 0, gap, np.finfo(float).tiny))
+    return residual_record(ResidualBounds(frequencies[:n], b, estimate))

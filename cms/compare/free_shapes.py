@@ -10,25 +10,23 @@ from cms.compare.coordinates import Coordinates
 from cms.errors import ModeSetError
 from cms.finishing import elastic_eigenvectors
 from cms.independent import RANK_TOLERANCE
+from cms.quality.free_basis import FreeBasis
 
-__all__ = ["FreeShapes", "free_shapes", "independent_subset"]
+__all__ = ["Subset", "independent_subset", "judged_subset"]
 
 
 @dataclass(frozen=True, eq=False)
-class FreeShapes:
-    """M-orthonormal, K-diagonal elastic shapes of the free reduced body, without rigid-body motion."""
+class Subset:
+    """Some columns of a mode set, as free-free shapes in small coordinates."""
 
-    omega2: Array  #: ascending, (n_massive,) [1/s²]
-    shapes: Array  #: coordinates of those shapes, (n_Q, n_massive)
-    static: Array  #: shapes without mass, K-orthonormal, (n_Q, n_static)
-    span: Array  #: W-orthonormal basis of the subset and the rigid-body modes, (n_Q, n)
-    redundant: IntArray  #: columns of the subset that depend on the others, ascending
-    condition: float  #: of the independent columns at unit W-length, in that norm [-]
+    basis: FreeBasis  #: rows are coordinates over Q, (n_Q, …), not dofs
+    condition: float  #: of the independent columns at unit length in the W-norm [-]
+    n_columns: int
 
     @property
     def n_q(self) -> int:
         """Number of independent elastic shapes: the generalised coordinates of the reduced body."""
-        return len(self.omega2) + self.static.shape[1]
+        return len(self.basis.omega2)
 
 
 def independent_subset(T: Array) -> tuple[Array, IntArray, float]:
@@ -41,12 +39,11 @@ def independent_subset(T: Array) -> tuple[Array, IntArray, float]:
     Q, R, pivots = la.qr(unit, mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
     rank = int((sizes > RANK_TOLERANCE).sum())
-    kept = np.linalg.svd(R[:rank, :rank], compute_uv=False)
-    condition = float(kept[0] / kept[-1]) if rank else np.inf
+    condition = float(np.linalg.cond(R[:rank, :rank])) if rank else np.inf
     return Q[:, :rank], np.sort(pivots[rank:]).astype(np.int64), condition
 
 
-def free_shapes(c: Coordinates, T: Array, rigid: Array, omega2_1: float) -> FreeShapes:
+def judged_subset(c: Coordinates, T: Array, labels: tuple[str, ...], rigid: Array, omega2_1: float) -> Subset:
     """Solve the free-free problem of the span of columns T and the rigid-body modes.
 
     (1) independent columns U of T
@@ -57,6 +54,8 @@ def free_shapes(c: Coordinates, T: Array, rigid: Array, omega2_1: float) -> Free
     ----------
     T
         Columns of the subset, (n_Q, k).
+    labels
+        Of those columns, (k,).
     rigid
         M-orthonormal rigid-body modes N, (n_Q, n_r).
     omega2_1
@@ -74,16 +73,9 @@ def free_shapes(c: Coordinates, T: Array, rigid: Array, omega2_1: float) -> Free
     is_massive = np.asarray(has_mass, dtype=bool)
     if not Z.shape[1]:
         raise ModeSetError(f"its {T.shape[1]} columns hold only rigid-body motion; add modes")
-    Y = U @ Z
-    omega2 = np.einsum("nk,nl,lk->k", Y, c.K, Y, optimize=True)
-    massive, static = Y[:, is_massive], Y[:, ~is_massive]
-    order = np.argsort(omega2[is_massive])
-    span, _ = np.linalg.qr(np.hstack([rigid, Y]))
-    return FreeShapes(
-        omega2=omega2[is_massive][order],
-        shapes=massive[:, order],
-        static=static / np.sqrt(omega2[~is_massive]),
-        span=span,
-        redundant=redundant,
-        condition=condition,
-    )
+    Phi = U @ Z
+    omega2 = np.einsum("nk,nl,lk->k", Phi, c.K, Phi, optimize=True)
+    order = np.lexsort((omega2, ~is_massive))
+    dropped = tuple(labels[k] for k in redundant)
+    basis = FreeBasis(Phi[:, order], omega2[order], is_massive[order], rigid, dropped)
+    return Subset(basis, condition, T.shape[1])

@@ -16,6 +16,11 @@ from cms.errors import CompareError
 from cms.families import Families
 from cms.fe_body import FEBody
 from cms.paths import replace_file
+from cms.quality.completeness import acceleration_labels
+from cms.quality.port_model import PortModel
+from cms.quality.ports import Ports
+from cms.quality.reference_response import reference_response
+from cms.quality.transient import Snapshots, transient
 from cms.rigid_modes import geometric_rigid_modes
 
 __all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model", "write_full_model"]
@@ -23,35 +28,39 @@ __all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model
 log = logging.getLogger(__name__)
 
 VERSION = "1"  #: of what is computed; a file of another version is made anew
-MODES_ABOVE_BAND = 4  #: free modes found for each one in the band: what lies above answers nearly statically there
-FEWEST_MODES = 24
+MODES_BEYOND = 2.0  #: multiple of the band up to which free modes follow a motion dynamically
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
 
 
 @dataclass(frozen=True, eq=False)
 class FullModel:
-    """Free modes, static responses and a short motion of the full model.
+    """Free modes, static responses, response of the interfaces and a motion of the full model.
 
-    Frequencies are in cycles per time unit of the body, displacements over all its dofs.
+    Frequencies are in cycles per time unit of the body, displacements over all its dofs, without rigid-body motion.
     """
 
     band: float  #: highest frequency of the comparison
-    omega2: Array  #: elastic free modes, more than the band holds, (n_modes,) [1/s²]
+    omega2: Array  #: elastic free modes, to twice the band, (n_modes,) [1/s²]
     rigid: Array  #: M-orthonormal rigid-body modes, (n_dof, n_r)
-    Phi: Array  #: M-orthonormal elastic free modes, (n_dof, n_modes)
-    Psi_A: Array  #: attachment modes without rigid-body motion: static interface loads, (n_dof, n_e)
-    Psi_H: Array  #: inertia-relief modes without rigid-body motion: static inertia loads, (n_dof, n_r)
-    G_bb: Array  #: elastic flexibility of the free body at the boundary, (n_b, n_b) [m/N]
-    u_pulse: Array  #: elastic static response of the free body to the pulse, (n_dof, 1)
+    Phi: Array  #: M-orthonormal elastic free modes in the band, (n_dof, n_band)
+    Psi_A: Array  #: attachment modes: static interface loads, (n_dof, n_e)
+    Psi_H: Array  #: inertia-relief modes: static inertia loads, (n_dof, n_r)
+    moved: Array  #: columns of the motion, (n_dof, k)
+    amplitudes: Array  #: of those columns, (k, n_t)
+    t: Array  #: of the motion, (n_t,) [time unit]
+    port_omega2: Array  #: modes of the response at the interfaces, (n,) [1/s²]
+    port_is_massive: Array  #: 1 where such a mode has mass, (n,)
+    port_modes: Array  #: those modes at the ports, (6 n_ports, n)
+    port_rigid: Array  #: rigid-body modes at the ports, (6 n_ports, n_r)
+    port_error: float  #: estimated error of that response at the top of the band, over its size
     directions: Array  #: geometric rigid-body modes about the centre of mass, (n_dof, 6)
     held_mass: Array  #: of those directions, what moves while the interfaces are held, (6,) [kg, kg m²]
     mass: Array  #: of those directions, of the whole body, (6,) [kg, kg m²]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "band", float(self.band))
         for field in fields(self):
-            if field.name != "band":
-                object.__setattr__(self, field.name, frozen(getattr(self, field.name)))
+            value = getattr(self, field.name)
+            object.__setattr__(self, field.name, float(value) if field.type is float else frozen(value))
 
     @property
     def frequencies(self) -> Array:
@@ -61,13 +70,13 @@ class FullModel:
     @property
     def n_band(self) -> int:
         """Number of elastic free modes in the band."""
-        return int((self.frequencies <= self.band * (1 + 1e-9)).sum())
+        return self.Phi.shape[1]
 
     @property
     def parts(self) -> dict[str, slice]:
         """Where the families stand in `columns`."""
         slices, at = {}, 0
-        for name in ("rigid", "Phi", "Psi_A", "Psi_H", "u_pulse", "directions"):
+        for name in ("rigid", "Phi", "Psi_A", "Psi_H", "moved", "directions"):
             width = getattr(self, name).shape[1]
             slices[name], at = slice(at, at + width), at + width
         return slices
@@ -77,8 +86,14 @@ class FullModel:
         """All displacements side by side, (n_dof, n_columns)."""
         return np.hstack([getattr(self, name) for name in self.parts])
 
+    def ports(self, names: tuple[str, ...]) -> PortModel:
+        """Return the body as it is seen at its interfaces of those names."""
+        return PortModel(names, self.port_omega2, self.port_is_massive > 0.5, self.port_modes, self.port_rigid)
 
-def solve_full_model(families: Families, pulse: Pulse, *, n_modes: int, band: float | None) -> FullModel:
+
+def solve_full_model(
+    families: Families, pulse: Pulse, *, n_modes: int, band: float | None, damping: float, motion: Snapshots | None
+) -> FullModel:
     """Solve the full model.
 
     Parameters
@@ -91,6 +106,10 @@ def solve_full_model(families: Families, pulse: Pulse, *, n_modes: int, band: fl
         Elastic free modes the band holds, where no band is given.
     band
         Highest frequency [cycles per time unit of the body]; None: that of mode n_modes.
+    damping
+        Ratio of every mode in the motion.
+    motion
+        A reference motion instead of the response to the pulse.
 
     Raises
     ------
@@ -98,33 +117,47 @@ def solve_full_model(families: Families, pulse: Pulse, *, n_modes: int, band: fl
         If no elastic mode lies in the band.
     """
     body = families.body
-    n_most = body.n_dof - families.Psi_R.shape[1] - 1
-    if band is not None:
-        n_band = len(families.free_modes(cutoff=band).omega2)
-        if n_band == 0:
-            first = families.free_modes(n_modes=1).frequencies[0] / body.units.time
-            raise CompareError(
-                f"band: up to {band / body.units.time:g} Hz, but the first elastic mode of body {body.name!r} is at "
-                f"{first:.6g} Hz; choose a band that holds modes"
-            )
-    else:
-        n_band = min(n_modes, n_most)
-    modes = families.free_modes(n_modes=min(max(MODES_ABOVE_BAND * n_band, FEWEST_MODES), n_most))
+    if band is None:
+        n_most = body.n_dof - families.Psi_R.shape[1]
+        band = float(families.free_modes(n_modes=min(n_modes, n_most)).frequencies[-1]) * (1 + 1e-9)
+    modes = families.free_modes(cutoff=MODES_BEYOND * band)
+    n_band = int((modes.frequencies <= band).sum())
+    if n_band == 0:
+        first = families.free_modes(n_modes=1).frequencies[0] / body.units.time
+        raise CompareError(
+            f"band: up to {band / body.units.time:g} Hz, but the first elastic mode of body {body.name!r} is at "
+            f"{first:.6g} Hz; choose a band that holds modes"
+        )
+    response = reference_response(families, Ports.of_body(body), band)
+    if motion is None:
+        load = pulse.load(body, band=band, first=float(modes.frequencies[0]))
+        motion = transient(families, load, cutoff=MODES_BEYOND * band / body.units.time, damping=damping)
     directions = centered_directions(body)
-    Psi_U = families.Psi_U
     return FullModel(
-        band=float(modes.frequencies[n_band - 1]) if band is None else band,
+        band=band,
         omega2=modes.omega2,
         rigid=families.free.N,
-        Phi=modes.Phi,
+        Phi=modes.Phi[:, :n_band],
         Psi_A=deformation(families, families.Psi_A),
         Psi_H=deformation(families, families.Psi_H),
-        G_bb=Psi_U[body.b],
-        u_pulse=Psi_U @ pulse.direction[:, None],
+        moved=deformation(families, motion.columns),
+        amplitudes=motion.amplitudes,
+        t=motion.t,
+        port_omega2=response.model.omega2,
+        port_is_massive=response.model.is_massive,
+        port_modes=response.model.modes,
+        port_rigid=response.model.rigid,
+        port_error=response.error,
         directions=directions,
         held_mass=held_mass(families, directions),
         mass=np.einsum("nk,nk->k", directions, body.M @ directions),
     )
+
+
+def static_labels(families: Families, full: FullModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names of the loads of Psi_A and Psi_H."""
+    held = families.held_labels("load")
+    return tuple(held[k] for k in families.free.e), acceleration_labels(full.Psi_H.shape[1])
 
 
 def deformation(families: Families, u: Array) -> Array:
@@ -170,10 +203,14 @@ def held_mass(families: Families, directions: Array) -> Array:
 
 def reference_digest(body: FEBody, *asked: object) -> str:
     """Return a digest of all that the reference solution depends on: matrices, dofs, interfaces, what was asked for."""
-    digest = hashlib.sha256(repr((VERSION, asked)).encode())
+    digest = hashlib.sha256(repr((VERSION, body.units.name, asked)).encode())
     for matrix in (body.K, body.M):
         for array in (matrix.data, matrix.indices, matrix.indptr):
             digest.update(np.ascontiguousarray(array).data)
+    for interface in body.interfaces:
+        digest.update(interface.name.encode())
+        for part in (interface.nodes, interface.reference, interface.weights):
+            digest.update(np.ascontiguousarray(part).data)  # type: ignore[type-var]
     for part in (body.nodes, body.dofs, body.b):
         digest.update(np.ascontiguousarray(part).data)
     return digest.hexdigest()

@@ -1,0 +1,226 @@
+"""Charts of a comparison as plotly figures in plain types: {"data": […], "layout": {…}}."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.compare.comparison import Comparison, Point, SetResult
+from cms.quality.limits import LIMITS
+from cms.quality.record import plain
+from cms.report.palette import FULL_MODEL, style_of
+
+__all__ = [
+    "convergence_chart",
+    "deformation_chart",
+    "effective_mass_chart",
+    "mac_chart",
+    "response_chart",
+    "response_error_chart",
+]
+
+FLOOR = 1e-10  #: least value that is drawn on a logarithmic axis of errors; what is below is rounding
+DIRECTIONS = ("x", "y", "z", "about x", "about y", "about z")
+INK, GRID = "#3d4650", "#e3e7eb"
+
+Chart = dict[str, Any]
+
+
+def convergence_chart(comparison: Comparison, name: str) -> Chart:
+    """Value of one record against the number of modes (or of coordinates), one line a set, and its limit."""
+    traces = []
+    for k, result in enumerate(comparison.sets):
+        known = [(p, p.record(name).value) for p in result.points if math.isfinite(p.record(name).value)]
+        if not known:
+            continue
+        style = style_of(k)
+        traces.append(
+            {
+                "type": "scatter", "mode": "lines+markers", "name": result.name,
+                "x": [p.n_modes for p, _ in known], "y": [max(value, FLOOR) for _, value in known],
+                "customdata": [[p.n_modes, p.n_q, value] for p, value in known],
+                "hovertemplate": f"{result.name}<br>%{{customdata[0]}} modes, %{{customdata[1]}} coordinates"
+                                 "<br>%{customdata[2]:.3g}<extra></extra>",
+                "line": {"color": style.color, "width": 2, "dash": style.dash},
+                "marker": {"symbol": style.symbol, "size": 7, "color": style.color},
+            }
+        )  # fmt: skip
+    tolerance = LIMITS[name].tolerance
+    layout = base_layout("vibration modes", "error [-]")
+    layout["yaxis"] |= log_axis([y for trace in traces for y in trace["y"]] + ([tolerance] if tolerance else []))
+    layout["xaxis"]["rangemode"] = "tozero"
+    if tolerance:
+        layout |= limit_line(tolerance)
+    return {"data": traces, "layout": layout}
+
+
+def response_chart(comparison: Comparison) -> Chart:
+    """Magnitude of the drawn entry of the response: the full model, and every set at its shown point."""
+    full, units = comparison.full, comparison.units
+    traces = [
+        line(full.response_hz, full.response, "full model", FULL_MODEL, width=4, opacity=0.35, hover="%{y:.3g}"),
+        *[
+            line(full.response_hz, point.record("frequency-response").data["magnitude"], legend(result, point),
+                 style_of(k).color, dash=style_of(k).dash, hover="%{y:.3g}")
+            for k, result, point in shown(comparison)
+        ],
+    ]  # fmt: skip
+    layout = base_layout("frequency [Hz]", f"displacement / force [{units.length_symbol}/{units.force_symbol}]")
+    layout["yaxis"] |= {"type": "log", "exponentformat": "power", "dtick": 1}
+    layout["height"] = 430
+    return {"data": traces, "layout": layout}
+
+
+def response_error_chart(comparison: Comparison) -> Chart:
+    """Relative error of the whole response matrix of the interfaces at every frequency."""
+    traces = [
+        line(comparison.full.response_hz, np.maximum(point.record("frequency-response").data["errors"], FLOOR),
+             legend(result, point), style_of(k).color, dash=style_of(k).dash, hover="%{y:.2g}")
+        for k, result, point in shown(comparison)
+    ]  # fmt: skip
+    layout = base_layout("frequency [Hz]", "relative error [-]")
+    layout["yaxis"] |= log_axis([y for trace in traces for y in trace["y"]])
+    return {"data": traces, "layout": layout}
+
+
+def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
+    """Deformation error over time of every set at its shown point, and the force that makes the motion."""
+    full = comparison.full
+    traces: list[Chart] = [
+        {
+            "type": "scatter", "mode": "lines", "name": "force / peak", "x": plain(full.t * 1e3), "y": plain(full.force),
+            "yaxis": "y2", "line": {"color": "#9aa5b1", "width": 1}, "fill": "tozeroy", "fillcolor": "rgba(154,165,177,.18)",
+            "hovertemplate": "%{y:.2f}",
+        }
+    ]  # fmt: skip
+    traces += [
+        line(full.t * 1e3, np.maximum(point.record("deformation-error").data[f"epsilon_{norm}"], FLOOR),
+             legend(result, point), style_of(k).color, dash=style_of(k).dash, hover="%{y:.2g}")
+        for k, result, point in shown(comparison)
+    ]  # fmt: skip
+    tolerance = LIMITS["deformation-error"].tolerance
+    layout = base_layout("time [ms]", "deformation error \u03b5(t) [-]")
+    values = [y for trace in traces[1:] for y in trace["y"] if y > FLOOR]
+    layout["yaxis"] |= log_axis([*values, tolerance or 1.0])
+    layout["yaxis2"] = {
+        "overlaying": "y", "side": "right", "range": [0, 4], "showgrid": False, "showticklabels": False,
+        "zeroline": False, "fixedrange": True,
+    }  # fmt: skip
+    layout["height"] = 400
+    if tolerance:
+        layout |= limit_line(tolerance)
+    return {"data": traces, "layout": layout}
+
+
+def effective_mass_chart(comparison: Comparison) -> Chart:
+    """Share of the effective mass that every set carries while its interfaces are held, by direction."""
+    traces = []
+    for k, result, point in shown(comparison):
+        remainder = np.asarray(point.record("effective-mass").data["remainder"], dtype=float)
+        traces.append(
+            {
+                "type": "bar", "name": legend(result, point), "x": list(DIRECTIONS), "y": plain(100 * (1 - remainder)),
+                "marker": {"color": style_of(k).color, "pattern": {"shape": PATTERNS[k % len(PATTERNS)], "size": 5,
+                                                                    "fgcolor": "white", "fillmode": "overlay"}},
+                "hovertemplate": f"{result.name}<br>%{{x}}: %{{y:.1f}} %<extra></extra>",
+            }
+        )  # fmt: skip
+    layout = base_layout("direction", "effective mass carried [%]")
+    layout |= {"barmode": "group", "bargap": 0.25, "height": 360}
+    layout["yaxis"] |= {"range": [0, 105]}
+    layout["xaxis"] |= {"showgrid": False}
+    return {"data": traces, "layout": layout}
+
+
+PATTERNS = ("", "/", "\\", "x", ".", "-", "|", "+")
+
+
+def mac_chart(result: SetResult, point: Point, frequencies_hz: Array) -> Chart:
+    """MAC of the free modes of the full model (down) and those of a set (across)."""
+    mac = np.asarray(point.record("mac").data["mac"])
+    n, k = mac.shape
+    k = min(k, n + 4)
+    trace: Chart = {
+        "type": "heatmap", "z": plain(mac[:, :k]), "x": list(range(1, k + 1)), "y": list(range(1, n + 1)),
+        "zmin": 0, "zmax": 1, "colorscale": [[0, "#f7fafc"], [0.5, "#6ea3cf"], [1, "#08306b"]], "showscale": False,
+        "xgap": 1, "ygap": 1,
+        "customdata": [[f"{f:.5g}" for _ in range(k)] for f in frequencies_hz[:n]],
+        "hovertemplate": "full model %{y} (%{customdata} Hz)<br>set %{x}<br>MAC %{z:.4f}<extra></extra>",
+    }  # fmt: skip
+    layout = base_layout(f"mode of {legend(result, point)}", "mode of the full model")
+    layout["xaxis"] |= {"dtick": 1 if k <= 16 else 5, "showgrid": False, "constrain": "domain"}
+    layout["yaxis"] |= {
+        "autorange": "reversed", "dtick": 1 if n <= 16 else 5, "showgrid": False, "scaleanchor": "x",
+        "constrain": "domain",
+    }  # fmt: skip
+    layout |= {"height": 330, "showlegend": False, "margin": {"l": 50, "r": 10, "t": 10, "b": 48}}
+    return {"data": [trace], "layout": layout}
+
+
+# Parts ----------------------------------------------------------------------------------------------------------------
+
+
+def shown(comparison: Comparison) -> list[tuple[int, SetResult, Point]]:
+    """Return the sets that have a shown point, with their number (which gives the style)."""
+    return [(k, result, result.detail) for k, result in enumerate(comparison.sets) if result.detail is not None]
+
+
+def legend(result: SetResult, point: Point) -> str:
+    """Return the name of a set and its number of modes."""
+    return f"{result.name}, {point.n_modes}"
+
+
+def line(
+    x: Array, y: Array, name: str, color: str, *, dash: str = "solid", width: float = 2, opacity: float = 1.0,
+    hover: str,
+) -> Chart:  # fmt: skip
+    """Return a line."""
+    return {
+        "type": "scatter", "mode": "lines", "name": name, "x": plain(np.asarray(x)), "y": plain(np.asarray(y)),
+        "line": {"color": color, "width": width, "dash": dash}, "opacity": opacity, "hovertemplate": hover,
+    }  # fmt: skip
+
+
+def base_layout(x: str, y: str) -> Chart:
+    """Return what all charts share."""
+    axis = {
+        "gridcolor": GRID, "linecolor": "#9aa5b1", "ticks": "outside", "tickcolor": "#9aa5b1", "zeroline": False,
+        "automargin": True, "showline": True,
+    }  # fmt: skip
+    return {
+        "height": 330, "margin": {"l": 62, "r": 14, "t": 12, "b": 48}, "paper_bgcolor": "white", "plot_bgcolor": "white",
+        "font": {"family": "Inter, 'Segoe UI', system-ui, -apple-system, 'Helvetica Neue', Arial, sans-serif",
+                 "size": 12.5, "color": INK},
+        "xaxis": {**axis, "title": {"text": x, "standoff": 8}},
+        "yaxis": {**axis, "title": {"text": y, "standoff": 8}},
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0, "font": {"size": 12}},
+        "hoverlabel": {"bgcolor": "white", "bordercolor": "#9aa5b1", "font": {"color": INK}},
+        "hovermode": "closest",
+    }  # fmt: skip
+
+
+def log_axis(values: list[float]) -> Chart:
+    """Return a logarithmic axis of errors over whole decades that hold the values."""
+    positive = [value for value in values if value and value > 0]
+    low = math.floor(math.log10(min(positive, default=1e-3)) + 1e-9)
+    high = math.ceil(math.log10(max(positive, default=1.0)) - 1e-9)
+    high = max(high, low + 1)
+    return {
+        "type": "log", "range": [low - 0.15, high + 0.1], "exponentformat": "power",
+        "dtick": 1 if high - low <= 7 else 2,
+    }  # fmt: skip
+
+
+def limit_line(tolerance: float) -> Chart:
+    """Return the line of a limit and its word."""
+    return {
+        "shapes": [
+            {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": tolerance, "y1": tolerance,
+             "line": {"color": "#5b6770", "width": 1.5, "dash": "dash"}, "layer": "below"}
+        ],
+        "annotations": [
+            {"xref": "paper", "x": 1, "xanchor": "right", "y": math.log10(tolerance), "yanchor": "bottom",
+             "text": f"limit {tolerance:g}", "showarrow": False, "font": {"size": 11, "color": "#5b6770"}}
+        ],
+    }  # fmt: skip
