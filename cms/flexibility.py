@@ -12,8 +12,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from cms.arrays import Array, IntArray
-from cms.errors import BodyError
-from cms.factorization import Inertia
+from cms.errors import BodyError, EigenError
+from cms.factorization import Inertia, factorize
 from cms.fe_body import FEBody
 from cms.fixed_interface import FixedInterfaceBody, moving_nodes
 from cms.submatrix import principal_block
@@ -22,6 +22,7 @@ from cms.tall import combine, inner
 __all__ = ["BoundaryConditions", "CondensedBody", "Flexibility"]
 
 RIGID_ENERGY = 1e-14  #: squared motion against the conditions, below which a rigid-body motion is free
+COUNTED = 1e-11  #: eigenvalue of the scaled boundary block against its largest, above which its sign is certain
 SINGULAR = 1e-13  #: least eigenvalue of the scaled condensed stiffness, below which there is a mechanism
 
 
@@ -130,6 +131,37 @@ class Flexibility:
         """Return z_e of the loads g_e on the condensed stiffness, (n_e, k)."""
         size, factor = self._factor
         return g * 0.0 if not len(size) else size[:, None] * la.cho_solve(factor, size[:, None] * g)
+
+    def count_below(self, sigma: float) -> int:
+        """Elastic modes below sigma [1/s²], by the inertia of K - sigma M, block by block.
+
+        Negative eigenvalues of K_II - sigma M_II, which one more factorisation counts, and of the rest condensed onto
+        z, which is small and dense; less those of the multipliers and the rigid-body motions.
+
+        Raises
+        ------
+        EigenError
+            If pivots are zero within rounding, so that they cannot be counted.
+        """
+        fixed, conditions = self.condensed.fixed, self.conditions
+        i, h, Z = fixed.i, fixed.b, conditions.Z
+        body = fixed.body
+        A_hz = (body.K[:, h] - sigma * body.M[:, h]) @ Z
+        A_zz = Z.T @ A_hz[h]
+        for load, factor in ((conditions.K_load, 1.0), (conditions.M_load, -sigma)):
+            if load is not None:
+                A_zz = A_zz + factor * (Z.T @ load @ Z)
+        with factorize(sp.csc_array(fixed.K_ii - sigma * fixed.M_ii), definite=False) as shifted:
+            inertia = shifted.inertia
+            A_zz = A_zz - A_hz[i].T @ shifted.solve(A_hz[i]) if A_zz.size else A_zz
+        size = 1 / np.sqrt(np.where(np.diag(A_zz) != 0, np.abs(np.diag(A_zz)), 1.0))
+        values = la.eigvalsh((A_zz + A_zz.T) / 2 * np.outer(size, size)) if A_zz.size else np.zeros(0)
+        if inertia.n_zero or (len(values) and np.abs(values).min() < COUNTED * np.abs(values).max()):
+            raise EigenError(
+                "eigenmodes: pivots are zero within rounding, so that modes cannot be counted there; ask for another "
+                "number of modes, or do without the proof"
+            )
+        return inertia.n_negative + int((values < 0).sum()) - fixed.n_multipliers - self.n_rigid
 
     def expand(self, x: Array) -> Array:
         """Return displacement columns over all dofs, (n_dof, k), of columns x, (n, k)."""

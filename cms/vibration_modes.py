@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from cms.arrays import Array
-from cms.eigen import EigenResult, eigenmodes
+from cms.eigen import EigenResult, counting_shift, eigenmodes
+from cms.errors import EigenError
 from cms.fixed_interface import FixedInterfaceBody
 from cms.flexibility import Flexibility
+from cms.shift_inverted import Wanted
 
 __all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
 
@@ -40,10 +42,36 @@ def elastic_modes(
     Free modes are those of a free boundary, loaded modes those of K + K_load, M + M_load, mixed ones hold some boundary
     dofs. Rigid-body motions the conditions leave free are known beforehand, so they are not among them.
     """
-    modes = eigenmodes(
-        flexibility.K, flexibility.M, n_modes=n_modes, cutoff=cutoff, factorization=flexibility, verify=verify
-    )
+    modes = eigenmodes(flexibility.K, flexibility.M, n_modes=n_modes, cutoff=cutoff, factorization=flexibility)
+    if verify:
+        modes = _proven(flexibility, modes, cutoff)
     return replace(modes, Phi=flexibility.expand(modes.Phi))
+
+
+def _proven(flexibility: Flexibility, modes: EigenResult, cutoff: float | None) -> EigenResult:
+    """Return the modes once their number agrees with the inertia, which counts them boundary and interior apart.
+
+    The proof of `eigenmodes` factorises K - sigma M as a whole. At the reference node of a distributing interface that
+    has neither mass nor stiffness, only multipliers, and its pivots there are zero.
+    """
+    k = len(modes.omega2)
+    wanted = Wanted(k, None) if cutoff is None else Wanted(None, (2 * np.pi * cutoff) ** 2)
+    last, sigma = counting_shift(modes.omega2, k, wanted, 0.0)
+    for n_extra in (4, 12, 36):  # a gap to count in lies beyond the modes that were asked for
+        try:
+            more = eigenmodes(flexibility.K, flexibility.M, n_modes=k + n_extra, factorization=flexibility)
+        except EigenError:  # there are no more modes
+            break
+        last, sigma = counting_shift(more.omega2, k, wanted, 0.0)
+        if last < k + n_extra:
+            break
+    n_below = flexibility.count_below(sigma)
+    if n_below != last:
+        raise EigenError(
+            f"eigenmodes: found {last} modes below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, but the inertia counts "
+            f"{n_below}; ask for more modes"
+        )
+    return replace(modes, is_proven=True)
 
 
 def no_modes(n_dof: int) -> EigenResult:
