@@ -3,14 +3,20 @@
 from collections.abc import Callable
 
 from cms.mode_set import ModeSet
+from cms.mode_sets.assumed import assumed_modes
 from cms.mode_sets.attachment import attachment, unrestrained_attachment
+from cms.mode_sets.balanced import balanced_truncation
 from cms.mode_sets.craig_bampton import craig_bampton, craig_bampton_ir, guyan
 from cms.mode_sets.free_interface import craig_chang, dual_craig_bampton, herting, macneal, normal_modes, rubin
+from cms.mode_sets.krylov import krylov
 from cms.mode_sets.loaded_interface import benfield_hruda
+from cms.mode_sets.user_basis import user_basis
 
 __all__ = [
     "MODE_SETS",
+    "assumed_modes",
     "attachment",
+    "balanced_truncation",
     "benfield_hruda",
     "craig_bampton",
     "craig_bampton_ir",
@@ -18,10 +24,12 @@ __all__ = [
     "dual_craig_bampton",
     "guyan",
     "herting",
+    "krylov",
     "macneal",
     "normal_modes",
     "rubin",
     "unrestrained_attachment",
+    "user_basis",
 ]
 
 MODE_SETS: dict[str, Callable[..., ModeSet]] = {
@@ -37,4 +45,8 @@ MODE_SETS: dict[str, Callable[..., ModeSet]] = {
     "attachment": attachment,
     "unrestrained-attachment": unrestrained_attachment,
     "normal": normal_modes,
+    "krylov": krylov,
+    "balanced-truncation": balanced_truncation,
+    "assumed-modes": assumed_modes,
+    "user-basis": user_basis,
 }

@@ -23,7 +23,7 @@ __all__ = ["user_basis"]
 def user_basis(
     body: FEBody,
     *,
-    columns: Array | str | os.PathLike[str],
+    columns: Array | str | os.PathLike[str] | None = None,
     labels: Sequence[str] | None = None,
     frequencies: Array | None = None,
     families: "Families | None" = None,
@@ -52,6 +52,8 @@ def user_basis(
         If the file cannot be read, or shape, labels or numbers do not fit the body.
     """
     body.require_coupled()
+    if columns is None:
+        raise ModeSetError(f"user_basis: body {body.name!r}: columns: missing; give an array, or a .npy or .npz file")
     options = {"columns": "given as an array"}
     if isinstance(columns, str | os.PathLike):
         path = Path(columns)

@@ -106,7 +106,7 @@ def test_a_good_job_is_read(job_file):
     ("n_modes = 12", "n_modes = -1", "reduction.n_modes = -1: expected a whole number, 0 or more"),
     ("n_modes = 12", "n_modes = 12\ncutoff = 100.0", "reduction: expected either n_modes"),
     ("n_modes = 12", "", "or cutoff (up to which frequency in Hz), got neither"),
-    ("n_modes = 12", 'n_modes = 12\nset = "craig-bamton"', "did you mean 'craig-bampton'? choices: attachment"),
+    ("n_modes = 12", 'n_modes = 12\nset = "craig-bamton"', "did you mean 'craig-bampton'? choices: assumed-modes"),
     ("n_modes = 12", 'n_modes = 12\nset = "guyan"', "mode set 'guyan' has no option n_modes"),
     ('at = "big_end"', 'at = "big_ent"', "\"big_ent\": there is no such interface; did you mean 'big_end'?"),
     ('frame = "nodal"', 'frame = "tisserand"', 'belongs to frame = "nodal"'),

@@ -92,6 +92,7 @@ def test_columns_over_the_mesh_are_brought_to_the_coupled_body(body, modes):
         (np.full((54, 1), np.nan), "NaN"),
         (np.ones((54, 1), complex), "real numbers"),
         ("nowhere.npz", "no such file"),
+        (None, "columns: missing; give an array"),
     ],
 )
 def test_columns_that_do_not_fit_are_refused(body, columns, text):
