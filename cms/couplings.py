@@ -268,8 +268,8 @@ def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
         without = interface.nodes[~has_dofs[interface.nodes]]
         if len(without):
             raise BodyError(
-                f"body {body.name!r}: interface {interface.name!r}: {len(without)} member nodes have no dofs, first node "
-                f"{without[0]}: they follow a rigid link; take the node that leads them"
+                f"body {body.name!r}: interface {interface.name!r}: {len(without)} member nodes have no dofs, first "
+                f"node {without[0]}: they follow a rigid link; take the node that leads them"
             )
 
 

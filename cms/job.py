@@ -8,6 +8,16 @@ from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, 
 
 from cms.errors import JobError
 from cms.fe_body import INTERFACE_KINDS
+from cms.job_beams import (
+    PLANES,
+    BeamSection,
+    LinkSection,
+    MassSection,
+    SpringSection,
+    TieSection,
+    check_beams,
+    names,
+)
 from cms.job_reduction import ReductionSection, mode_set_options, named_interfaces
 from cms.load_cases import LOAD_CASE_KINDS
 from cms.paths import near_file
@@ -29,14 +39,6 @@ Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
 
 
-def names(value: Any) -> Any:
-    """Return one name or a list of names as a tuple of names."""
-    words = [value] if isinstance(value, str) else value
-    if not isinstance(words, list | tuple) or not words or not all(isinstance(w, str) and w for w in words):
-        raise ValueError('expected the name of a group, or a list of names: "a" or ["a", "b"]')
-    return tuple(words)
-
-
 def accepted(value: Any) -> tuple[str, ...]:
     """Return kinds of findings of the mesh report that the user has looked at and accepts."""
     words = names(value)
@@ -56,12 +58,17 @@ class BodySection(Table):
     name: Name | None = Field(None, description="the name of the body, text; default: the name of the job file")
     mesh: Path | None = Field(None, description="the path of a mesh file, relative to the job file")
     matrices: Path | None = Field(None, description="the path of an .npz file with M, K, nodes, dofs")
+    nodes: Path | None = Field(None, description="the path of a table of nodes, for beams")
+    lines: Path | None = Field(None, description="the path of a table of lines, for beams")
+    plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"the plane beams deform in, one of {', '.join(PLANES)}; default: space"
+    )
     units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
         description=f"the unit system of the numbers, one of {', '.join(UNIT_SYSTEMS)}"
     )
     accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
 
-    @field_validator("mesh", "matrices", mode="before")
+    @field_validator("mesh", "matrices", "nodes", "lines", mode="before")
     @classmethod
     def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
         if not isinstance(value, str) or not value:
@@ -73,8 +80,14 @@ class BodySection(Table):
 
     @model_validator(mode="after")
     def _one_source(self) -> "BodySection":
-        if (self.mesh is None) == (self.matrices is None):
-            raise ValueError(f"expected either mesh or matrices, got {'both' if self.mesh else 'neither'}")
+        if (self.nodes is None) != (self.lines is None):
+            raise ValueError(f"{'lines' if self.nodes else 'nodes'}: missing; tables of nodes and lines come together")
+        given = [key for key in ("mesh", "matrices", "lines") if getattr(self, key) is not None]
+        if len(given) != 1:
+            got = "both" if given == ["mesh", "matrices"] else " and ".join(given) or "neither"
+            raise ValueError(
+                f"expected either mesh or matrices, got {got}; beams may have tables of nodes and lines instead"
+            )
         return self
 
 
@@ -132,6 +145,9 @@ class InterfaceSection(Table):
     nearest: NearestSection | None = Field(None, description="a table {point}")
     reference: Vector3 | None = Field(None, description="the reference point, [x, y, z]")
     triad: Matrix3 | None = Field(None, description="the axes of the interface, [x axis, y axis, z axis]")
+    on: choice("part", lambda: ("solid", "lines")) | None = Field(  # type: ignore[valid-type]
+        None, description="solid or lines: what it is on, where a body has both"
+    )
 
     @property
     def selection(self) -> str:
@@ -214,33 +230,65 @@ class Job(Table):
 
     body: BodySection = Field(description="a table [body] with mesh and units")
     materials: dict[str, MaterialSection] = Field({}, description="tables [materials.NAME]")
+    sections: dict[str, BeamSection] = Field({}, description="tables [sections.NAME] of beams")
+    masses: dict[str, MassSection] = Field({}, description="tables [masses.NAME]")
+    springs: dict[str, SpringSection] = Field({}, description="tables [springs.NAME]")
+    links: dict[str, LinkSection] = Field({}, description="tables [links.NAME]")
+    ties: dict[str, TieSection] = Field({}, description="tables [ties.NAME] of beams to a solid")
     interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")
     load_cases: dict[str, LoadCaseSection] = Field({}, description="tables [load_cases.NAME]")
     reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
     damping: DampingSection | None = Field(None, description="a table [damping] with ratio, or alpha and beta")
 
+    @property
+    def materials_of_cells(self) -> dict[str, MaterialSection]:
+        """The materials of solid cells: all, but for those that only sections of beams name."""
+        if self.sections and not self.ties:
+            return {}
+        named = {section.material for section in self.sections.values()}
+        return {
+            name: material
+            for name, material in self.materials.items()
+            if name not in named or "cells" in material.model_fields_set or len(self.materials) == 1
+        }
+
     @model_validator(mode="after")
     def _fits_together(self) -> "Job":
-        if self.body.mesh and not self.materials:
+        if not self.body.matrices and not self.materials:
             raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
+        attached = {"masses": self.masses, "springs": self.springs, "links": self.links, "ties": self.ties}
+        check_beams(self.sections, attached, self.materials)
+        if self.body.lines and not self.sections:
+            raise ValueError("sections: missing; lines need at least one table [sections.NAME]")
+        if self.body.matrices and (self.sections or self.body.plane):
+            raise ValueError("sections: matrices have their elements inside; remove the tables, and plane")
+        if self.body.plane and (self.ties or not self.sections):
+            raise ValueError("body.plane: belongs to beams alone; remove it")
+        if self.body.lines and self.ties:
+            raise ValueError("ties: belong to a mesh of solid and lines; remove the tables")
+        for name, interface in self.interfaces.items():
+            if (interface.on is not None) != bool(self.ties):
+                what = "missing; solid or lines?" if self.ties else "only where beams are tied to a solid; remove it"
+                raise ValueError(f"interfaces.{name}.on: {what}")
         if self.body.matrices and self.materials:
             raise ValueError("materials: matrices have their material inside; remove the tables [materials.NAME]")
         if self.body.matrices and self.interfaces:
             raise ValueError(
                 "interfaces: matrices bring their interfaces in the .npz file (interface/NAME/nodes); remove the tables"
             )
-        if len(self.materials) > 1:
-            everywhere = [name for name, material in self.materials.items() if material.cells == ("all",)]
+        of_cells = self.materials_of_cells
+        if len(of_cells) > 1:
+            everywhere = [name for name, material in of_cells.items() if material.cells == ("all",)]
             if everywhere:
                 raise ValueError(
-                    f'materials.{everywhere[0]}: cells = "all", but there are {len(self.materials)} materials; '
+                    f'materials.{everywhere[0]}: cells = "all", but there are {len(of_cells)} materials; '
                     "name the group of cells of each"
                 )
         for where, name in named_interfaces(self.reduction).items():
-            if self.body.mesh and name not in self.interfaces:
+            if not self.body.matrices and name not in self.interfaces:
                 raise ValueError(f"reduction.{where}: there is no such interface{nearest(name, self.interfaces)}")
         for name, case in self.load_cases.items():
-            if self.body.mesh and case.at is not None and case.at not in self.interfaces:
+            if not self.body.matrices and case.at is not None and case.at not in self.interfaces:
                 raise ValueError(
                     f'load_cases.{name}.at = "{case.at}": there is no such interface{nearest(case.at, self.interfaces)}'
                 )

@@ -14,6 +14,7 @@ from cms.arrays import Array, IntArray
 from cms.fe_body import FEBody
 from cms.load_cases import LoadCase
 from cms.rigid_modes import rigid_motion_of_points
+from fe_models.beams.line_mesh import LineMesh
 from fe_models.boundary import boundary_facets, facet_weights, first_of_equal_rows
 from fe_models.cell_shapes import quadrature, shape_values
 from fe_models.errors import LoadError
@@ -25,7 +26,7 @@ __all__ = ["gravity_load", "interface_load", "nodal_load", "pressure_load", "sel
 UNREACHED = 1e-9  #: share of a force or torque that the nodes fail to carry, above which it is refused
 
 
-def pressure_load(body: FEBody, mesh: Mesh, name: str, selection: Selection, pressure: float) -> LoadCase:
+def pressure_load(body: FEBody, mesh: Mesh | LineMesh, name: str, selection: Selection, pressure: float) -> LoadCase:
     """Make the load case of a uniform pressure on facets of the surface.
 
     f_n = -p ∫ N_n n dA with n dA = ∂x/∂xi × ∂x/∂eta: polynomial for every face, so the quadrature is exact; the
@@ -36,7 +37,7 @@ def pressure_load(body: FEBody, mesh: Mesh, name: str, selection: Selection, pre
     body
         The body of that mesh, its nodes first.
     mesh
-        Solid mesh.
+        Solid mesh; lines have no faces.
     name
         Of the load case.
     selection
@@ -53,6 +54,8 @@ def pressure_load(body: FEBody, mesh: Mesh, name: str, selection: Selection, pre
     """
     where = f"load case {name!r}"
     value = float(_finite(f"{where}: pressure", pressure, ()))
+    if isinstance(mesh, LineMesh):
+        raise LoadError(f"{where}: lines have no faces to press on; give the force at nodes or an interface")
     _require_mesh_of(body, mesh, where)
     facets = selected_facets(mesh, selection)
     if not facets:
@@ -153,7 +156,7 @@ def interface_load(
 
 def selection_load(
     body: FEBody,
-    mesh: Mesh,
+    mesh: Mesh | LineMesh,
     name: str,
     selection: Selection,
     *,
@@ -264,7 +267,7 @@ def _require_outward(mesh: Mesh, where: str, kind: str, rows: IntArray) -> None:
         )
 
 
-def _require_mesh_of(body: FEBody, mesh: Mesh, where: str) -> None:
+def _require_mesh_of(body: FEBody, mesh: Mesh | LineMesh, where: str) -> None:
     n = len(mesh.nodes)
     if len(body.nodes) < n or not np.array_equal(body.nodes[:n], mesh.nodes):
         raise LoadError(f"{where}: the mesh is not that of body {body.name!r}; pass the mesh the body was made of")

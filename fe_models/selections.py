@@ -186,10 +186,12 @@ def candidates(mesh: Mesh | LineMesh) -> IntArray:
     return np.arange(len(mesh.nodes)) if isinstance(mesh, LineMesh) else boundary_nodes(mesh)
 
 
-def selected_facets(mesh: Mesh, selection: Selection) -> dict[str, IntArray]:
+def selected_facets(mesh: Mesh | LineMesh, selection: Selection) -> dict[str, IntArray]:
     """Return face type -> facets of a selection: those of a face group, else boundary facets with all nodes chosen."""
     if isinstance(selection, FaceGroup):
         return selection.facets(mesh)
+    if isinstance(mesh, LineMesh):
+        return {}
     chosen = np.zeros(len(mesh.nodes), dtype=bool)
     chosen[selection.members(mesh)] = True
     whole = {kind: facets[chosen[facets].all(axis=1)] for kind, facets in boundary_facets(mesh).items()}

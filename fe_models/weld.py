@@ -221,7 +221,10 @@ def _followers(where: str, body: FEBody, pairs: list[tuple[IntArray, IntArray]])
         if roots[0] == roots[1]:
             raise BodyError(f"{where}: a joint joins what is joined already; remove one of the joints")
         leader[roots[1]] = roots[0]
-    slaves, rows, columns, values = [], [], [], []
+    slaves: list[int] = []
+    rows: list[int] = []
+    columns: list[int] = []
+    values: list[float] = []
     for node in leader:
         root = _root(leader, node)
         motion = np.eye(6)

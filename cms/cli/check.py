@@ -37,8 +37,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
     """Check a reduced body against the full model and the mode set of a job, with one factorisation."""
     from cms.cli.console import stages
     from cms.cli.job_mode_set import job_mode_set
-    from cms.cli.reduce_job import uncoupled_body
-    from cms.couplings import couple
+    from cms.cli.reduce_job import coupled_body, uncoupled_body
     from cms.families import Families
     from cms.job import read_job
     from cms.quality.full_reference import FullReference, usable_band
@@ -49,7 +48,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
         uncoupled = uncoupled_body(job, clock)
         require_same_units(uncoupled, reduced)
         with clock("couple interfaces"):
-            body = couple(uncoupled)
+            body = coupled_body(job, uncoupled)
         with Families(body) as families:
             with clock(f"mode set {job.reduction.set}"):
                 modes = job_mode_set(body, job.reduction, families=families)

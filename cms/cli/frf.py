@@ -103,8 +103,7 @@ def checked_output(path: Path, request: FrfRequest) -> Path:
 def full_response(request: FrfRequest, reduced: ReducedBody, frequencies: Array, damping: float) -> FrequencyResponse:
     """Compute the response of the full model of a job between the two interfaces."""
     from cms.cli.console import stages
-    from cms.cli.reduce_job import uncoupled_body
-    from cms.couplings import couple
+    from cms.cli.reduce_job import coupled_body, uncoupled_body
     from cms.families import Families
     from cms.job import read_job
     from cms.quality.port_model import modal_response
@@ -118,7 +117,7 @@ def full_response(request: FrfRequest, reduced: ReducedBody, frequencies: Array,
         uncoupled = uncoupled_body(job, clock)
         require_same_units(uncoupled, reduced)
         with clock("couple interfaces"):
-            body = couple(uncoupled)
+            body = coupled_body(job, uncoupled)
         names = tuple(dict.fromkeys((request.excited, request.answering)))
         ports = Ports.of_body(body, names)
         with clock("full model"), Families(body) as families:

@@ -15,10 +15,11 @@ from cms.reduced_body import ReducedBody
 from cms.units import unit_system
 
 if TYPE_CHECKING:
+    from fe_models.beams.line_mesh import LineMesh
     from fe_models.material import Material
     from fe_models.mesh import Mesh
 
-__all__ = ["job_body", "reduce_job", "uncoupled_body"]
+__all__ = ["coupled_body", "job_body", "reduce_job", "uncoupled_body"]
 
 
 def reduce_job(
@@ -53,16 +54,30 @@ def reduce_job(
 
 def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
     """Run a job up to the coupled body: read, check, assemble, couple the interfaces."""
-    from cms.couplings import couple
-
     stages = stages or Stages()
     body = uncoupled_body(job, stages, on_report=on_report)
     with stages("couple interfaces"):
+        return coupled_body(job, body)
+
+
+def coupled_body(job: Job, body: FEBody) -> FEBody:
+    """Couple the interfaces of the body of a job, and make it planar where that is asked for."""
+    from cms.couplings import couple
+    from cms.job_beams import PLANES
+
+    if job.body.plane is None:
         return couple(body)
+    from fe_models.planar import planar
+
+    return planar(couple(body), normal=PLANES[job.body.plane])
 
 
 def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
     """Run a job up to the body whose interfaces are still to be coupled."""
+    if job.sections and not job.ties:
+        from cms.cli.job_beams import body_of_frame
+
+        return body_of_frame(job, stages, on_report)
     if job.body.mesh is not None:
         return body_of_mesh(job, job.body.mesh, stages, on_report)
     if job.body.matrices is not None:
@@ -87,11 +102,15 @@ def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
             on_report(report)
         report.raise_for_errors(accept=job.body.accept)
         mesh = drop_unused_nodes(mesh)
-        interfaces = interfaces_of(job, mesh)
+        interfaces = () if job.ties else interfaces_of(job, mesh)
     name = str(job.body.name)
     with stages("assemble") as advance:
         body = solid_body(mesh, materials, name=name, units=units, interfaces=interfaces, progress=advance)
-        return body.with_load_cases(*load_cases_of(job, body, mesh))
+    if job.ties:
+        from cms.cli.job_beams import body_of_mixed
+
+        body = body_of_mixed(job, stages, body, mesh, on_report)
+    return body.with_load_cases(*load_cases_of(job, body, mesh))
 
 
 def body_of_matrices(job: Job, path: Path, stages: Stages) -> FEBody:
@@ -109,11 +128,11 @@ def materials_of(job: Job) -> "Material | dict[str, Material]":
 
     made = {
         name: Material(name, E=section.young, nu=section.poisson, rho=section.density)
-        for name, section in job.materials.items()
+        for name, section in job.materials_of_cells.items()
     }
-    if [section.cells for section in job.materials.values()] == [("all",)]:
+    if [section.cells for section in job.materials_of_cells.values()] == [("all",)]:
         return next(iter(made.values()))
-    return {group: made[name] for name, section in job.materials.items() for group in section.cells}
+    return {group: made[name] for name, section in job.materials_of_cells.items() for group in section.cells}
 
 
 def interfaces_of(job: Job, mesh: "Mesh") -> tuple[Interface, ...]:
@@ -155,12 +174,12 @@ def selection_of(key: str, given: Any) -> Any:
     return selection(given) if isinstance(given, str) else selection(**given.model_dump())
 
 
-def load_cases_of(job: Job, body: FEBody, mesh: "Mesh | None" = None) -> tuple[LoadCase, ...]:
+def load_cases_of(job: Job, body: FEBody, mesh: "Mesh | LineMesh | None" = None) -> tuple[LoadCase, ...]:
     """Return the load cases of the job on this body, not yet coupled."""
     return tuple(load_case_of(name, section, body, mesh) for name, section in job.load_cases.items())
 
 
-def load_case_of(name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | None") -> LoadCase:
+def load_case_of(name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | None") -> LoadCase:
     """Return one load case; the job has checked that its keys fit its kind."""
     from fe_models import loads
 

@@ -167,7 +167,10 @@ def link_rigidly(body: FEBody, links: Iterable[RigidLink]) -> FEBody:
     row_of = np.full((len(body.nodes), 6), -1, np.int64)
     real = np.flatnonzero(body.dofs[:, 1] >= 0)
     row_of[body.dofs[real, 0], body.dofs[real, 1]] = real
-    slaves, rows, columns, values = [], [], [], []
+    slaves: list[int] = []
+    rows: list[int] = []
+    columns: list[int] = []
+    values: list[float] = []
     for node in leader:
         root, steps = node, 0
         while root in leader:
@@ -216,7 +219,7 @@ class Elements:
         self.K_local = stiffness_about_shear_center(K, shear_center)  #: over local dofs of the centroid, (n, 12, 12)
         self.mass_per_length = rho * A + per_line([p.added_mass for p in used])
         zero = np.zeros_like(L)
-        has_rotary = per_line([p.rotary_inertia for p in used]) > 0
+        has_rotary = np.array([p.rotary_inertia for p in used], dtype=bool)[of_line]
         polar = rho * (Iy + Iz) / 2  # J = diag(2 polar, 0, 0) has E = polar diag(-1, 1, 1)
         self.moments_per_length = np.where(
             has_rotary[:, None], np.stack([zero, rho * Iz, rho * Iy], axis=1), np.stack([-polar, polar, polar], axis=1)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import Array
+from cms.arrays import Array, IntArray
 from cms.words import nearest
 from fe_models.beams.line_mesh import LineMesh
 from fe_models.errors import MeshError
@@ -136,7 +136,7 @@ def _node(row: dict[str, str], key: str, place: dict[int, int]) -> int:
     return place[number]
 
 
-def _orientation(row: dict[str, str], pair: Array, X: Array, place: dict[int, int]) -> Array:
+def _orientation(row: dict[str, str], pair: IntArray, X: Array, place: dict[int, int]) -> Array:
     """Vector towards the local y axis, from the row's own vector or its third node; NaN: default."""
     given = [key for key in ("vx", "vy", "vz") if row.get(key)]
     if row.get("third"):
