@@ -35,6 +35,7 @@ from .initial import ConsistentState as ConsistentState
 from .initial import consistent_state as consistent_state
 from .integration import Progress as Progress
 from .integration import integrate as integrate
+from .integration import resume as resume
 from .integrators import GeneralizedAlpha as GeneralizedAlpha
 from .joints import FixedJoint as FixedJoint
 from .joints import RevoluteJoint as RevoluteJoint

@@ -4,23 +4,25 @@ import logging
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, fields
 from importlib.metadata import PackageNotFoundError, version
 from math import ceil
+from pathlib import Path
 
 import numpy as np
 
 from floatframe.arrays import number
-from floatframe.errors import ConvergenceError, ModelError
+from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.flexible_body import FlexibleBody
-from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.integrators.generalized_alpha import Carry, GeneralizedAlpha
 from floatframe.kernels.model import Rows, new_work
-from floatframe.results import BodyEntry, Head, MemorySource, ResultsWriter, arrays_of
+from floatframe.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
+from floatframe.results import SEGMENTS, BodyEntry, Head, MemorySource, ResultsWriter, arrays_of, last_restart
 from floatframe.state import State
 from floatframe.system import System
 from floatframe.trajectory import Trajectory, read_results
 
-__all__ = ["Progress", "integrate"]
+__all__ = ["Progress", "integrate", "resume"]
 
 log = logging.getLogger(__name__)
 
@@ -108,37 +110,116 @@ def integrate(
     work = new_work(system.compiled.model)
     carry, rows = integrator.observe(system, t_start, carry, work)
     writer = None if output is None else ResultsWriter(output, head)
-    kept = [rows]
+    run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer)
+    run.keep(rows)
     if writer is not None:
-        writer.append(rows)
-    n_done, closed = 0, time.monotonic()
-    failure = None
-    try:
-        while n_done < n_total and failure is None:
-            n_batch = min(batch_steps, n_total - n_done)
-            carry, rows, n_good, failure = integrator.advance(
-                system, carry, work, t0=t_start, h=step, first=n_done, n_steps=n_batch, every=output_every
+        writer.close_segment(restart_record(carry, 0))
+    return run.advance(carry, 0, batch_steps, progress)
+
+
+def resume(
+    system: System,
+    output: str | os.PathLike[str],
+    *,
+    progress: Callable[[Progress], None] | None = None,
+) -> Trajectory:
+    """Go on with a run that was interrupted, to the motion it would have become, bit for bit.
+
+    Parameters
+    ----------
+    system
+        The system that was run.
+    output
+        The results file the run was to write; its segments are beside it.
+    progress
+        As in `integrate`.
+
+    Raises
+    ------
+    ResultsError
+        If there is nothing to resume, or the segments are those of another system.
+    ConvergenceError
+        If a step fails.
+    """
+    head, record = last_restart(output)
+    run = dict(head.run)
+    integrator = GeneralizedAlpha(**{part.name: run[part.name] for part in fields(GeneralizedAlpha)})
+    if run.get("digest") != system_digest(system, integrator):
+        raise ResultsError(
+            f"{output}: the interrupted run was of another system than {system.name!r}, or it has changed since; "
+            "resume it with the files it was begun with, or run it anew"
+        )
+    if record is None:
+        raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
+    carry, n_done = carry_of_record(record, system)
+    path = Path(output)
+    writer = ResultsWriter(path.with_name(path.name.removesuffix(SEGMENTS)), head, goes_on=True)
+    n_total = round((run["t_end"] - run["t_start"]) / run["h"])
+    again = Run(
+        system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer
+    )  # fmt: skip
+    return again.advance(carry, n_done, BATCH_STEPS, progress)
+
+
+@dataclass
+class Run:
+    """One motion being computed, and where its results go."""
+
+    system: System
+    integrator: GeneralizedAlpha
+    head: Head
+    t_start: float
+    t_end: float
+    h: float
+    n_total: int
+    output_every: int
+    writer: ResultsWriter | None
+    kept: list[Rows] = field(default_factory=list)
+
+    def keep(self, rows: Rows) -> None:
+        """Take rows of results."""
+        if self.writer is None:
+            self.kept.append(rows)
+        else:
+            self.writer.append(rows)
+
+    def advance(
+        self, carry: Carry, n_done: int, batch_steps: int, progress: Callable[[Progress], None] | None
+    ) -> Trajectory:
+        """Take the steps that are left, in batches that end where a run can go on; return the motion."""
+        work = new_work(self.system.compiled.model)
+        self.integrator.observe(self.system, self.t_start + n_done * self.h, carry, work)  # the iterate to begin from
+        closed = time.monotonic()
+        failure = None
+        try:
+            while n_done < self.n_total and failure is None:
+                if n_done % RESTART_STEPS == 0:
+                    work.factors[:] = 0.0  # made anew, as after a resumption
+                    if self.writer is not None and n_done and time.monotonic() - closed > SEGMENT_SECONDS:
+                        self.writer.close_segment(restart_record(carry, n_done))
+                        closed = time.monotonic()
+                n_batch = min(batch_steps, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
+                carry, rows, n_good, failure = self.integrator.advance(
+                    self.system, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
+                    every=self.output_every,
+                )  # fmt: skip
+                n_done += n_good
+                self.keep(rows)
+                if progress is not None:
+                    t = self.t_start + n_done * self.h
+                    progress(Progress(t, self.t_end, n_done, self.n_total, carry.n_iterations))
+        except BaseException:
+            if self.writer is not None:
+                self.writer.close_segment(restart_record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
+            raise
+        if failure is not None:
+            raise stopped(
+                self.system, self.head, self.kept, self.writer, failure, self.t_start + n_done * self.h, self.h
             )
-            n_done += n_good
-            if writer is None:
-                kept.append(rows)
-            else:
-                writer.append(rows)
-                if time.monotonic() - closed > SEGMENT_SECONDS:
-                    writer.close_segment()
-                    closed = time.monotonic()
-            if progress is not None:
-                progress(Progress(t_start + n_done * step, t_end, n_done, n_total, carry.n_iterations))
-    except BaseException:
-        if writer is not None:
-            writer.close_segment()
-        raise
-    if failure is not None:
-        raise stopped(system, head, kept, writer, failure, t_start + n_done * step, step)
-    if writer is None:
-        return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=True)
-    writer.finish()
-    return read_results(writer.path)
+        if self.writer is None:
+            return Trajectory(self.head, MemorySource(joint_rows(self.system, self.kept)), is_complete=True)
+        self.writer.finish()
+        return read_results(self.writer.path)
 
 
 def stopped(system, head, kept, writer, failure, t: float, h: float) -> ConvergenceError:
@@ -188,6 +269,7 @@ def head_of(system: System, integrator: GeneralizedAlpha, t_start: float, t_end:
         "h": h,
         "output_every": every,
         "gravity": [float(x) for x in compiled.model.gravity],
+        "digest": system_digest(system, integrator),
         "floatframe": release,
     }
     return Head(

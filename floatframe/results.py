@@ -20,12 +20,22 @@ from cms.arrays import Array
 from floatframe.errors import ResultsError
 from floatframe.kernels.model import N_DRIFTS, Rows
 
-__all__ = ["ArraySource", "BodyEntry", "FileSource", "Head", "MemorySource", "ResultsWriter", "open_results"]
+__all__ = [
+    "ArraySource",
+    "BodyEntry",
+    "FileSource",
+    "Head",
+    "MemorySource",
+    "ResultsWriter",
+    "last_restart",
+    "open_results",
+]
 
 FORMAT = "floatframe-results"
 VERSION = 1  #: of the format; a reader refuses greater ones
 SEGMENTS = ".segments"  #: added to the name of the results file
 UNFINISHED = ".unfinished"  #: added to the name of a file being written
+RESTART = "restart"  #: group in a segment with the memory of the integrator at its end
 
 DATASETS = {  # name in the file -> field of Rows, what it is
     "t": ("t", "time"),
@@ -112,7 +122,8 @@ class ResultsWriter:
         If the folder or a file cannot be written.
     """
 
-    def __init__(self, path: str | os.PathLike[str], head: Head) -> None:
+    def __init__(self, path: str | os.PathLike[str], head: Head, *, goes_on: bool = False) -> None:
+        """Begin with an empty folder of segments, or go on after the last restart record of the one that is there."""
         self.path = Path(path)
         self.head = head
         self.folder = self.path.with_name(self.path.name + SEGMENTS)
@@ -122,7 +133,7 @@ class ResultsWriter:
             raise ResultsError(f"results file {str(self.path)!r}: expected a file name, got a folder")
         if not self.path.parent.is_dir():
             raise ResultsError(f"results file {str(self.path)!r}: no such folder {str(self.path.parent)!r}; make it")
-        self.guarded(self.begin)
+        self.guarded(self.go_on if goes_on else self.begin)
 
     def begin(self) -> None:
         """Make an empty folder of segments with the head."""
@@ -130,6 +141,15 @@ class ResultsWriter:
             shutil.rmtree(self.folder)
         self.folder.mkdir()
         self.write_file(self.folder / "head.h5", lambda file: write_head(file, self.head, is_complete=False))
+
+    def go_on(self) -> None:
+        """Take away what comes after the last restart record: it will be computed again."""
+        for path in self.folder.glob(f"*{UNFINISHED}"):
+            path.unlink()
+        paths = segment_paths(self.folder)
+        while paths and not has_restart(paths[-1]):
+            paths.pop().unlink()
+        self.n_segments = len(paths)
 
     def guarded(self, action: Callable[[], None]) -> None:
         """Run an action; say in words why it cannot write."""
@@ -157,8 +177,8 @@ class ResultsWriter:
         if len(rows.t):
             self.open_rows.append(rows)
 
-    def close_segment(self) -> None:
-        """Write the open segment, if it holds anything."""
+    def close_segment(self, restart: Mapping[str, Array] | None = None) -> None:
+        """Write the open segment, if it holds anything, with a record from which the run can go on."""
         if not self.open_rows:
             return
         arrays = arrays_of(self.open_rows)
@@ -168,6 +188,8 @@ class ResultsWriter:
             file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
             for name, array in arrays.items():
                 file.create_dataset(name, data=array)
+            for name, array in (restart or {}).items():
+                file.create_dataset(f"{RESTART}/{name}", data=array)
 
         self.guarded(lambda: self.write_file(self.folder / f"{self.n_segments:06d}.h5", fill))
         self.n_segments += 1
@@ -255,8 +277,39 @@ def open_segments(folder: Path) -> tuple[Head, FileSource]:
             head, _ = read_head(folder, file)
     except (OSError, KeyError, ValueError, TypeError) as error:
         raise ResultsError(f"{folder}: not the segments of a run: {error}") from error
-    paths = sorted(path for path in folder.glob("[0-9]*.h5"))
-    return head, FileSource(tuple(paths), row_shapes(head))
+    return head, FileSource(tuple(segment_paths(folder)), row_shapes(head))
+
+
+def segment_paths(folder: Path) -> list[Path]:
+    """Return the closed segments in their order."""
+    return sorted(folder.glob("[0-9]*.h5"))
+
+
+def has_restart(path: Path) -> bool:
+    """Whether a run can go on after this segment."""
+    with h5py.File(path, "r") as file:
+        return RESTART in file
+
+
+def last_restart(path: str | os.PathLike[str]) -> tuple[Head, dict[str, Array] | None]:
+    """Return the head of an interrupted run and its last restart record, None if it came to none.
+
+    Raises
+    ------
+    ResultsError
+        If there are no segments: the run was never begun, or it is complete.
+    """
+    path = Path(path)
+    folder = path if path.name.endswith(SEGMENTS) else path.with_name(path.name + SEGMENTS)
+    if not folder.is_dir():
+        state = "the run is complete" if path.is_file() else "no run to this name was begun"
+        raise ResultsError(f"{path}: nothing to resume: there is no folder {str(folder)!r}; {state}")
+    head, source = open_segments(folder)
+    for segment in reversed(source.paths):
+        with h5py.File(segment, "r") as file:
+            if RESTART in file:
+                return head, {name: dataset[...] for name, dataset in file[RESTART].items()}
+    return head, None
 
 
 def open_results(path: str | os.PathLike[str]) -> tuple[Head, FileSource, bool]:

@@ -212,7 +212,9 @@ def campbell_command(
         replace_file(path, ("\n".join(lines) + "\n").encode())
     else:
         picture = io.BytesIO()
-        plot_campbell(locus, time_unit=model.units.time).get_figure(root=True).savefig(picture, format=kind, dpi=130)
+        figure = plot_campbell(locus, time_unit=model.units.time).get_figure(root=True)
+        assert figure is not None
+        figure.savefig(picture, format=kind, dpi=130)
         replace_file(path, picture.getvalue())
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 

@@ -10,6 +10,9 @@ from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_e
 from floatframe.cli import analyses
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from floatframe.integration import Progress
     from floatframe.trajectory import Trajectory
 
 __all__ = ["app"]
@@ -33,29 +36,59 @@ def run_command(
     """
     from floatframe.errors import ResultsError
     from floatframe.flexible_body import FlexibleBody
-    from floatframe.integration import Progress, integrate
-    from floatframe.results import SEGMENTS
+    from floatframe.integration import integrate
     from floatframe.system_file import read_system
 
     model, options = read_system(system)
     sources = [Path(body.source) for body in model.bodies if isinstance(body, FlexibleBody) and body.source]
     path = output_path(output, system.with_suffix(".h5"), ResultsError, overwrite_of=(system, *sources))
-    last: list[Progress] = []
+    compute(
+        model.name,
+        path,
+        lambda on_progress: integrate(
+            model, options.integrator, options.t_end, options.h, output=path, output_every=options.output_every,
+            progress=on_progress,
+        ),
+    )  # fmt: skip
+
+
+@app.command("resume")
+@guarded
+def resume_command(
+    system: Annotated[Path, typer.Argument(help="System file (TOML) of the run that was interrupted.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file the run was to write.")] = None,
+) -> None:
+    """Go on with a run that was interrupted or killed, to the motion it would have become.
+
+    Without -o the results stand beside the system file: swing.toml gives swing.h5.
+
+    Example: floatframe resume swing.toml -o swing.h5
+    """
+    from floatframe.integration import resume
+    from floatframe.system_file import read_system
+
+    model, _ = read_system(system)
+    path = output or system.with_suffix(".h5")
+    compute(model.name, path, lambda on_progress: resume(model, path, progress=on_progress))
+
+
+def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], Trajectory]") -> None:
+    """Run a motion with a progress bar; print what it is, or where the part of it is that an interruption left."""
+    from floatframe.results import SEGMENTS
+
+    last: list[Any] = []
     began = time.perf_counter()
     try:
-        with stages(remaining=True) as clock, clock(f"{model.name}: motion") as advance:
+        with stages(remaining=True) as clock, clock(f"{name}: motion") as advance:
 
-            def on_progress(progress: Progress) -> None:
+            def on_progress(progress: "Progress") -> None:
                 last[:] = [progress]
                 advance(progress.n_steps / progress.n_total)
 
-            trajectory = integrate(
-                model, options.integrator, options.t_end, options.h, output=path, output_every=options.output_every,
-                progress=on_progress,
-            )  # fmt: skip
+            trajectory = run(on_progress)
     except KeyboardInterrupt:
         segments = Path(f"{path}{SEGMENTS}")
-        kept = f"the motion so far is in {segments}, which plot, animate and info can read"
+        kept = f"the motion so far is in {segments}, which plot, animate and info can read; floatframe resume goes on"
         print_error(f"interrupted; {kept if segments.is_dir() else 'nothing was written'}")
         raise typer.Exit(INTERRUPTED) from None
     print_run(trajectory, last[0] if last else None, time.perf_counter() - began)
