@@ -16,7 +16,7 @@ from cms.arrays import Array
 from cms.compare.comparison import Comparison, FullResults, Point, SetResult
 from cms.compare.coordinates import Coordinates, ReferenceBasis
 from cms.compare.drawing import draw_modes
-from cms.compare.evaluation import Reference, judge_subset
+from cms.compare.evaluation import Reference, drawn_entry, judge_subset
 from cms.compare.free_shapes import judged_subset
 from cms.compare.full_model import (
     FullModel,
@@ -42,6 +42,7 @@ from cms.words import nearest
 
 __all__ = ["compare"]
 
+POINTS = 800  #: frequencies of the response: peaks are drawn round
 Stage = Callable[[str], AbstractContextManager[Any]]
 
 
@@ -139,10 +140,12 @@ def reference_of(families: Families, full: FullModel, damping: float) -> Referen
     body = families.body
     time_ = body.units.time
     names = tuple(interface.name for interface in body.interfaces)
-    grid = frequency_grid(LOWEST * float(full.frequencies[0]) / time_, full.band / time_)
+    grid = frequency_grid(LOWEST * float(full.frequencies[0]) / time_, full.band / time_, POINTS)
+    response = modal_response(full.ports(names), grid, damping=damping, time=time_)
     return Reference(
         full=full,
-        response=modal_response(full.ports(names), grid, damping=damping, time=time_),
+        response=response,
+        drawn=drawn_entry(response),
         damping=damping,
         port_names=names,
         static_labels=static_labels(families, full),
@@ -163,11 +166,14 @@ def full_results(
 ) -> FullResults:
     """Return what reports show of the full model."""
     response: FrequencyResponse = reference.response
+    out, into = reference.drawn
     return FullResults(
         frequencies_hz=full.frequencies / reference.time,
         n_band=full.n_band,
         band_hz=full.band / reference.time,
         response_hz=response.frequencies,
+        response=np.abs(response.H[:, out, into]),
+        response_words=f"force at {place(response.inputs[into])}, displacement at {place(response.outputs[out])}",
         response_error=full.port_error,
         damping=damping,
         t=full.t * reference.time,
@@ -178,6 +184,12 @@ def full_results(
         was_cached=was_cached,
         digest=digest,
     )
+
+
+def place(label: str) -> str:
+    """Return 'small_end along z' of 'small_end uz'."""
+    name, component = label.rsplit(" ", 1)
+    return f"{name} {'about' if component.startswith('r') else 'along'} {component[-1]}"
 
 
 def motion_words(pulse: Pulse, full: FullModel, body: FEBody) -> str:

@@ -57,6 +57,8 @@ class FullResults:
     n_band: int  #: how many of them are in the band
     band_hz: float  #: highest frequency of the comparison
     response_hz: Array  #: frequencies of the response, (n_f,)
+    response: Array  #: magnitude of the entry that is drawn, (n_f,) [length / force]
+    response_words: str  #: which that is
     response_error: float  #: estimated error of the full model's own response, over its size
     damping: float  #: ratio of every mode in response and motion
     t: Array  #: of the motion, (n_t,) [s]
@@ -74,7 +76,7 @@ class Drawing:
 
     nodes: Array  #: (n, 3) [length unit]
     triangles: IntArray  #: (n_tri, 3)
-    lines: IntArray  #: (n_lines, 2)
+    lines: IntArray  #: sharp edges of the surface, or the elements of a body without one, (n_lines, 2)
     shapes: Array  #: free modes in the band, largest displacement 1, (n_modes, n, 3)
     n_triangles_full: int  #: of the surface before it was thinned out for the screen
 

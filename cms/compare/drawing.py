@@ -5,6 +5,7 @@ import numpy as np
 from cms.arrays import Array, IntArray
 from cms.compare.comparison import Drawing
 from cms.fe_body import FEBody
+from cms.rendering.shape import surface_edges
 
 __all__ = ["draw_modes", "thinned_surface"]
 
@@ -22,7 +23,7 @@ def draw_modes(body: FEBody, Phi: Array) -> Drawing:
     """
     moved = np.moveaxis(body.translations(Phi), 2, 0)
     triangles = thinned_surface(body.nodes, body.surface)
-    lines = stiffness_lines(body) if not len(body.surface) else np.zeros((0, 2), np.int64)
+    lines = sharp_edges(body.nodes, triangles) if len(triangles) else stiffness_lines(body)
     used, inverse = np.unique(np.concatenate([triangles.ravel(), lines.ravel()]), return_inverse=True)
     shapes = moved[:, used]
     largest = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0.0)
@@ -34,6 +35,12 @@ def draw_modes(body: FEBody, Phi: Array) -> Drawing:
         shapes=shapes,
         n_triangles_full=len(body.surface),
     )
+
+
+def sharp_edges(nodes: Array, triangles: IntArray) -> IntArray:
+    """Return the sharp edges of a surface, (n_lines, 2)."""
+    ends, _, is_sharp = surface_edges(nodes, triangles)
+    return ends[is_sharp]
 
 
 def thinned_surface(nodes: Array, triangles: IntArray, most: int = MOST_TRIANGLES) -> IntArray:

@@ -1,6 +1,6 @@
 """One mode set with one number of modes, judged in small coordinates by the records of `cms.quality`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
@@ -19,7 +19,7 @@ from cms.quality.port_model import FrequencyResponse, PortModel, modal_response
 from cms.quality.record import QualityRecord, judge
 from cms.quality.residuals import ResidualBounds, residual_record
 
-__all__ = ["Reference", "judge_subset"]
+__all__ = ["Reference", "drawn_entry", "judge_subset"]
 
 HELD = 1e-9  #: motion of the interfaces over the largest, of a combination of unit shapes, below which they are held
 
@@ -32,6 +32,7 @@ class Reference:
     response: FrequencyResponse  #: of the full model at its ports
     damping: float  #: ratio of every mode in it
     port_names: tuple[str, ...]
+    drawn: tuple[int, int]  #: entry of the response that is drawn: output, input
     static_labels: tuple[tuple[str, ...], tuple[str, ...]]  #: of the loads of Psi_A and Psi_H
     length: float  #: of the body, that makes rotations comparable to translations
     time: float  #: [s] of the body's time unit
@@ -119,7 +120,17 @@ def response_part(reference: Reference, c: Coordinates, basis: FreeBasis) -> Qua
     full = reference.response
     reduced = modal_response(model, full.frequencies, damping=reference.damping, time=reference.time)
     error = compare_responses(full, reduced, reference.length)
-    return response_record(ResponseComparison(full, reduced, error, reference.full.port_error))
+    record = response_record(ResponseComparison(full, reduced, error, reference.full.port_error))
+    drawn = (slice(None), *reference.drawn)
+    data = {**record.data, "drawn": np.abs(reduced.H[drawn]), "drawn_full": np.abs(full.H[drawn])}
+    return replace(record, data=data)
+
+
+def drawn_entry(full: FrequencyResponse) -> tuple[int, int]:
+    """Choose the entry to draw: force on the first port, answer of the last, in the translation that answers most."""
+    size = [np.abs(full.H[:, len(full.outputs) - 6 + k, k]).mean() for k in range(3)]
+    k = int(np.argmax(size))
+    return len(full.outputs) - 6 + k, k
 
 
 def motion_part(reference: Reference, c: Coordinates, basis: FreeBasis, U: Array, root: Array) -> QualityRecord:

@@ -210,7 +210,7 @@ def reference_digest(body: FEBody, *asked: object) -> str:
     for interface in body.interfaces:
         digest.update(interface.name.encode())
         for part in (interface.nodes, interface.reference, interface.weights):
-            digest.update(np.ascontiguousarray(part).data)  # type: ignore[type-var]
+            digest.update(np.ascontiguousarray(part).data)
     for part in (body.nodes, body.dofs, body.b):
         digest.update(np.ascontiguousarray(part).data)
     return digest.hexdigest()

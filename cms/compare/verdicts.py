@@ -6,8 +6,20 @@ from cms.compare.comparison import Point, SetResult
 from cms.quality.limits import LIMITS
 from cms.quality.record import QualityRecord
 
-__all__ = ["DECIDING", "DOUBTS", "answer", "is_good", "number_words", "ranking", "set_sentence", "shown_point"]
+__all__ = [
+    "DECIDING",
+    "DOUBTS",
+    "answer",
+    "crossings",
+    "is_good",
+    "modes_words",
+    "number_words",
+    "ranking",
+    "set_sentence",
+    "shown_point",
+]
 
+EXACT = 1e-8  #: value that reads as exact in a sentence
 #: records that decide whether a set is good enough, and what they are called in a sentence
 DECIDING = {
     "frequency-error": "free frequencies",
@@ -90,7 +102,7 @@ def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> s
     assert point is not None
     records = {record.name: record for record in point.records}
     told = [
-        f"{DECIDING[name]} to {number_words(records[name].value)}"
+        f"{DECIDING[name]} {'exact' if records[name].value < EXACT else 'to ' + number_words(records[name].value)}"
         for name in ("frequency-error", "frequency-response", "deformation-error")
         if name in records and records[name].verdict == "pass"
     ]
@@ -113,6 +125,29 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
+def crossings(sets: Sequence[SetResult], name: str) -> str:
+    """Say from how many modes on each set keeps the limit of a record: 'Within the limit: a from 4 modes on.'"""
+    limit = LIMITS[name].tolerance
+    if limit is None:
+        return ""
+    kept: dict[int, list[str]] = {}
+    never = []
+    for result in sets:
+        if not result.points:
+            continue
+        last = max(
+            (k for k, p in enumerate(result.points) if p.record(name).verdict not in ("pass", "info")), default=-1
+        )
+        if last + 1 < len(result.points):
+            kept.setdefault(result.points[last + 1].n_modes, []).append(result.name)
+        else:
+            never.append(result.name)
+    parts = [f"{listed(names)} from {n_modes} modes on" for n_modes, names in sorted(kept.items())]
+    if never:
+        parts.append(f"not {listed(never)}")
+    return f"Within the limit of {number_words(limit)}: {'; '.join(parts)}." if parts else ""
+
+
 def modes_words(n_modes: int) -> str:
     """Return '1 vibration mode', '4 vibration modes', 'no vibration modes'."""
     return f"{n_modes or 'no'} vibration mode{'' if n_modes == 1 else 's'}"
@@ -123,7 +158,7 @@ def number_words(value: float | None) -> str:
     if value is None:
         return "none"
     if value != value or value in (float("inf"), float("-inf")):
-        return "incomplete"
+        return "with modes missing"
     if value == 0:
         return "0"
     if value < 1e-4:

@@ -12,6 +12,7 @@ from cms.quality.record import plain
 from cms.report.palette import FULL_MODEL, style_of
 
 __all__ = [
+    "MAC_HEIGHT",
     "convergence_chart",
     "deformation_chart",
     "effective_mass_chart",
@@ -20,16 +21,21 @@ __all__ = [
     "response_error_chart",
 ]
 
-FLOOR = 1e-10  #: least value that is drawn on a logarithmic axis of errors; what is below is rounding
+FLOOR = 1e-10  #: least error that is drawn over time or frequency; what is below is rounding
+DECADES = 4  #: below its limit that the chart of a record reaches; smaller values stand at its lower end
 DIRECTIONS = ("x", "y", "z", "about x", "about y", "about z")
 INK, GRID = "#3d4650", "#e3e7eb"
+
+MAC_HEIGHT = 270
 
 Chart = dict[str, Any]
 
 
 def convergence_chart(comparison: Comparison, name: str) -> Chart:
     """Value of one record against the number of modes (or of coordinates), one line a set, and its limit."""
-    traces = []
+    tolerance = LIMITS[name].tolerance
+    floor = 10.0 ** math.floor(math.log10(tolerance or 1.0) - DECADES)
+    traces: list[Chart] = []
     for k, result in enumerate(comparison.sets):
         known = [(p, p.record(name).value) for p in result.points if math.isfinite(p.record(name).value)]
         if not known:
@@ -38,7 +44,7 @@ def convergence_chart(comparison: Comparison, name: str) -> Chart:
         traces.append(
             {
                 "type": "scatter", "mode": "lines+markers", "name": result.name,
-                "x": [p.n_modes for p, _ in known], "y": [max(value, FLOOR) for _, value in known],
+                "x": [p.n_modes for p, _ in known], "y": [max(value, floor) for _, value in known],
                 "customdata": [[p.n_modes, p.n_q, value] for p, value in known],
                 "hovertemplate": f"{result.name}<br>%{{customdata[0]}} modes, %{{customdata[1]}} coordinates"
                                  "<br>%{customdata[2]:.3g}<extra></extra>",
@@ -46,8 +52,8 @@ def convergence_chart(comparison: Comparison, name: str) -> Chart:
                 "marker": {"symbol": style.symbol, "size": 7, "color": style.color},
             }
         )  # fmt: skip
-    tolerance = LIMITS[name].tolerance
     layout = base_layout("vibration modes", "error [-]")
+    layout |= {"height": 290, "showlegend": False}
     layout["yaxis"] |= log_axis([y for trace in traces for y in trace["y"]] + ([tolerance] if tolerance else []))
     layout["xaxis"]["rangemode"] = "tozero"
     if tolerance:
@@ -61,7 +67,7 @@ def response_chart(comparison: Comparison) -> Chart:
     traces = [
         line(full.response_hz, full.response, "full model", FULL_MODEL, width=4, opacity=0.35, hover="%{y:.3g}"),
         *[
-            line(full.response_hz, point.record("frequency-response").data["magnitude"], legend(result, point),
+            line(full.response_hz, point.record("frequency-response").data["drawn"], legend(result, point),
                  style_of(k).color, dash=style_of(k).dash, hover="%{y:.3g}")
             for k, result, point in shown(comparison)
         ],
@@ -75,7 +81,7 @@ def response_chart(comparison: Comparison) -> Chart:
 def response_error_chart(comparison: Comparison) -> Chart:
     """Relative error of the whole response matrix of the interfaces at every frequency."""
     traces = [
-        line(comparison.full.response_hz, np.maximum(point.record("frequency-response").data["errors"], FLOOR),
+        line(comparison.full.response_hz, np.maximum(point.record("frequency-response").data["error"], FLOOR),
              legend(result, point), style_of(k).color, dash=style_of(k).dash, hover="%{y:.2g}")
         for k, result, point in shown(comparison)
     ]  # fmt: skip
@@ -87,22 +93,22 @@ def response_error_chart(comparison: Comparison) -> Chart:
 def deformation_chart(comparison: Comparison, norm: str = "K") -> Chart:
     """Deformation error over time of every set at its shown point, and the force that makes the motion."""
     full = comparison.full
-    traces: list[Chart] = [
-        {
-            "type": "scatter", "mode": "lines", "name": "force / peak", "x": plain(full.t * 1e3), "y": plain(full.force),
-            "yaxis": "y2", "line": {"color": "#9aa5b1", "width": 1}, "fill": "tozeroy", "fillcolor": "rgba(154,165,177,.18)",
-            "hovertemplate": "%{y:.2f}",
-        }
-    ]  # fmt: skip
-    traces += [
-        line(full.t * 1e3, np.maximum(point.record("deformation-error").data[f"epsilon_{norm}"], FLOOR),
+    force: Chart = {
+        "type": "scatter", "mode": "lines", "name": "force / peak", "x": plain(full.t * 1e3), "y": plain(full.force),
+        "yaxis": "y2", "line": {"color": "#9aa5b1", "width": 1}, "fill": "tozeroy",
+        "fillcolor": "rgba(154,165,177,.18)", "hovertemplate": "%{y:.2f}",
+    }  # fmt: skip
+    traces = [
+        line(full.t * 1e3, np.maximum(point.record("deformation-error").data["error"][norm], FLOOR),
              legend(result, point), style_of(k).color, dash=style_of(k).dash, hover="%{y:.2g}")
         for k, result, point in shown(comparison)
     ]  # fmt: skip
     tolerance = LIMITS["deformation-error"].tolerance
     layout = base_layout("time [ms]", "deformation error \u03b5(t) [-]")
-    values = [y for trace in traces[1:] for y in trace["y"] if y > FLOOR]
-    layout["yaxis"] |= log_axis([*values, tolerance or 1.0])
+    largest = [max(trace["y"]) for trace in traces] + [tolerance or 1.0]
+    layout["yaxis"] |= log_axis([min(largest) / 100, max(largest)])
+    if full.force is not None:
+        traces.insert(0, force)
     layout["yaxis2"] = {
         "overlaying": "y", "side": "right", "range": [0, 4], "showgrid": False, "showticklabels": False,
         "zeroline": False, "fixedrange": True,
@@ -140,7 +146,7 @@ def mac_chart(result: SetResult, point: Point, frequencies_hz: Array) -> Chart:
     """MAC of the free modes of the full model (down) and those of a set (across)."""
     mac = np.asarray(point.record("mac").data["mac"])
     n, k = mac.shape
-    k = min(k, n + 4)
+    k = min(k, n + 2)
     trace: Chart = {
         "type": "heatmap", "z": plain(mac[:, :k]), "x": list(range(1, k + 1)), "y": list(range(1, n + 1)),
         "zmin": 0, "zmax": 1, "colorscale": [[0, "#f7fafc"], [0.5, "#6ea3cf"], [1, "#08306b"]], "showscale": False,
@@ -148,14 +154,19 @@ def mac_chart(result: SetResult, point: Point, frequencies_hz: Array) -> Chart:
         "customdata": [[f"{f:.5g}" for _ in range(k)] for f in frequencies_hz[:n]],
         "hovertemplate": "full model %{y} (%{customdata} Hz)<br>set %{x}<br>MAC %{z:.4f}<extra></extra>",
     }  # fmt: skip
-    layout = base_layout(f"mode of {legend(result, point)}", "mode of the full model")
-    layout["xaxis"] |= {"dtick": 1 if k <= 16 else 5, "showgrid": False, "constrain": "domain"}
+    layout = base_layout("mode of the set", "mode of the full model")
+    layout["xaxis"] |= {"tick0": 1, "dtick": dtick(k), "showgrid": False, "constrain": "domain"}
     layout["yaxis"] |= {
-        "autorange": "reversed", "dtick": 1 if n <= 16 else 5, "showgrid": False, "scaleanchor": "x",
+        "autorange": "reversed", "tick0": 1, "dtick": dtick(n), "showgrid": False, "scaleanchor": "x",
         "constrain": "domain",
     }  # fmt: skip
-    layout |= {"height": 330, "showlegend": False, "margin": {"l": 50, "r": 10, "t": 10, "b": 48}}
+    layout |= {"height": MAC_HEIGHT, "showlegend": False, "margin": {"l": 50, "r": 10, "t": 8, "b": 44}}
     return {"data": [trace], "layout": layout}
+
+
+def dtick(n: int) -> int:
+    """Return the step of the numbers at an axis of n modes."""
+    return 1 if n <= 10 else 2 if n <= 20 else 5
 
 
 # Parts ----------------------------------------------------------------------------------------------------------------
@@ -186,10 +197,11 @@ def base_layout(x: str, y: str) -> Chart:
     """Return what all charts share."""
     axis = {
         "gridcolor": GRID, "linecolor": "#9aa5b1", "ticks": "outside", "tickcolor": "#9aa5b1", "zeroline": False,
-        "automargin": True, "showline": True,
+        "automargin": True, "showline": True, "tickfont": {"size": 11.5},
     }  # fmt: skip
     return {
-        "height": 330, "margin": {"l": 62, "r": 14, "t": 12, "b": 48}, "paper_bgcolor": "white", "plot_bgcolor": "white",
+        "height": 330, "margin": {"l": 62, "r": 14, "t": 12, "b": 48},
+        "paper_bgcolor": "white", "plot_bgcolor": "white",
         "font": {"family": "Inter, 'Segoe UI', system-ui, -apple-system, 'Helvetica Neue', Arial, sans-serif",
                  "size": 12.5, "color": INK},
         "xaxis": {**axis, "title": {"text": x, "standoff": 8}},
@@ -221,6 +233,7 @@ def limit_line(tolerance: float) -> Chart:
         ],
         "annotations": [
             {"xref": "paper", "x": 1, "xanchor": "right", "y": math.log10(tolerance), "yanchor": "bottom",
-             "text": f"limit {tolerance:g}", "showarrow": False, "font": {"size": 11, "color": "#5b6770"}}
+             "text": f"limit {tolerance:g}", "showarrow": False,
+             "bgcolor": "rgba(255,255,255,.75)", "borderpad": 1, "font": {"size": 11, "color": "#5b6770"}}
         ],
     }  # fmt: skip

@@ -15,7 +15,7 @@ VERSION = 1
 
 def comparison_json(comparison: Comparison) -> str:
     """Return a comparison as JSON text; numbers that are not finite are null."""
-    return json.dumps(comparison_record(comparison), indent=1, ensure_ascii=False, allow_nan=False)
+    return json.dumps(comparison_record(comparison), ensure_ascii=False, allow_nan=False)
 
 
 def comparison_record(comparison: Comparison) -> dict[str, Any]:

@@ -44,7 +44,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Cell] | tuple[str, Se
     lines = []
     for row in rows:
         style, cells = row if isinstance(row, tuple) and row and isinstance(row[0], str) else ("", row)
-        lines.append(f'<tr class="{style}">' + "".join(_cell(cell) for cell in cells) + "</tr>")  # type: ignore[arg-type]
+        lines.append(f'<tr class="{style}">' + "".join(_cell(cell) for cell in cells) + "</tr>")
     return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{"".join(lines)}</tbody></table></div>'
 
 

@@ -46,7 +46,7 @@ def encoded(values: np.ndarray) -> str:
 
 def still_pictures(comparison: Comparison, modes: int) -> list[tuple[str, str]]:
     """Return the first modes as pictures: (title, PNG in base64); fewer where none can be drawn."""
-    pictures = []
+    pictures: list[tuple[str, str]] = []
     with tempfile.TemporaryDirectory(prefix="report-") as folder:
         for k in range(min(modes, len(comparison.drawing.shapes))):
             title = f"mode {k + 1}, {comparison.full.frequencies_hz[k]:.5g} Hz"

@@ -35,7 +35,7 @@
       if (plain.a > 0.0) { color = vec4(plain.rgb * plain.a, plain.a); return; }
       vec3 n = normalize(cross(dFdx(place), dFdy(place)));
       if (n.z > 0.0) n = -n;
-      float light = 0.42 + 0.5 * max(dot(n, normalize(vec3(-0.35, 0.55, -0.8))), 0.0) + 0.14 * max(dot(n, vec3(0.7, 0.2, -0.68)), 0.0);
+      float light = 0.58 + 0.42 * max(dot(n, normalize(vec3(-0.35, 0.55, -0.8))), 0.0) + 0.14 * max(dot(n, vec3(0.7, 0.2, -0.68)), 0.0);
       vec3 base = texture(map, vec2(clamp(size * share, 0.002, 0.998), 0.5)).rgb;
       color = vec4(base * light, 1.0);
     }`;
