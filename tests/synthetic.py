@@ -3,7 +3,11 @@
 import numpy as np
 
 from cms.invariants import moments_from_gram
+from cms.load_cases import ReducedLoadCase
+from cms.nodal_sums import NodalSums
 from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.source_columns import source_columns
+from cms.stress_modes import PointStress
 from cms.units import unit_system
 
 
@@ -23,10 +27,13 @@ def synthetic_reduced_body(*, n_q: int = 5, n_nodes: int = 40, seed: int = 0, un
         )
         for name, kind, members in [("big_end", "rigid", [0, 3, 5]), ("kleines Auge/2 µ", "distributing", [7])]
     )
+    more = np.random.default_rng(seed + 1000)
+    volume = more.uniform(0.5, 2.0, n_nodes)
+    volume_Phi = volume[:, None, None] * Phi
     return ReducedBody(
         name="synthetic",
         units=unit_system(units),
-        frame=BodyFrame("nodal", rng.normal(size=3), np.eye(3), "big_end"),
+        frame=BodyFrame("nodal", rng.normal(size=3), np.eye(3), "big_end", [[3, c] for c in range(6)]),
         M=np.eye(n_q),
         K=np.diag((2 * np.pi * frequencies) ** 2),
         D=np.diag(0.02 * 2 * np.pi * frequencies),
@@ -41,4 +48,23 @@ def synthetic_reduced_body(*, n_q: int = 5, n_nodes: int = 40, seed: int = 0, un
         surface=rng.integers(0, n_nodes, size=(60, 3)),
         interfaces=interfaces,
         provenance={"mesh": "rod.msh", "note": "", "größe/µ": "ü" * 300},
+        columns=source_columns(
+            ("constraint big_end ux", "fixed-interface 1", "fixed-interface 2"),
+            ("constraint", "fixed-interface", "fixed-interface"),
+            more.normal(size=(3, n_q)),
+            1e5 * more.normal(size=(3, n_q)),
+        ),
+        nodal_sums=NodalSums(
+            w=volume.sum(),
+            S=volume @ nodes,
+            R=nodes.T @ (volume[:, None] * nodes),
+            U1=volume_Phi.sum(axis=0),
+            U2=np.cross(nodes[:, :, None], volume_Phi, axisa=1, axisb=1, axisc=1).sum(axis=0),
+        ),
+        load_cases=(
+            ReducedLoadCase("weight", "gravity", more.normal(size=3), more.normal(size=3), more.normal(size=n_q)),
+            ReducedLoadCase("Zünden/1", "pressure", more.normal(size=3), more.normal(size=3), more.normal(size=n_q)),
+        ),
+        stress=more.normal(size=(n_nodes, 6, n_q)),
+        point_stress=PointStress(("shaft 1 top", "shaft 1 µ"), more.normal(size=(2, 3)), more.normal(size=(2, 6, n_q))),
     )

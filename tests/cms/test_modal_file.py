@@ -1,4 +1,5 @@
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -9,11 +10,22 @@ import h5py
 import numpy as np
 import pytest
 
-from cms import modal_file, sealed_hdf5
-from cms.errors import ModalFileError
+from cms import modal_content, modal_file, sealed_hdf5
+from cms.couplings import couple
+from cms.damping import RampDamping
+from cms.errors import ModalFileError, UnitsError
+from cms.fe_body import Interface
+from cms.frames import NodalFrame
 from cms.invariants import Moments
-from cms.modal_file import digest, read, write
+from cms.modal_file import convert_units, digest, read, write
+from cms.mode_sets import craig_bampton
 from cms.reduced_body import ReducedBody
+from cms.reduction import reduce
+from cms.units import UNIT_SYSTEMS, unit_system
+from fe_models.loads import gravity_load, interface_load
+from fe_models.material import Material
+from fe_models.solid import solid_body
+from tests.bodies import box_mesh, distorted
 from tests.synthetic import synthetic_reduced_body
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "modal_file.md"
@@ -49,6 +61,117 @@ def test_reading_returns_what_was_written_bit_for_bit(tmp_path, n_q):
     body = synthetic_reduced_body(n_q=n_q)
     write(body, tmp_path / "a.h5")
     assert differences(body, read(tmp_path / "a.h5")) == []
+
+
+def test_what_a_body_lacks_stays_absent(body, tmp_path):
+    bare = replace(body, columns=None, nodal_sums=None, load_cases=(), stress=None, point_stress=None,
+                   frame=replace(body.frame, dofs=np.zeros((0, 2), int)),
+                   interfaces=[replace(i, has_rotation=False) for i in body.interfaces])  # fmt: skip
+    write(bare, tmp_path / "a.h5")
+    assert differences(bare, read(tmp_path / "a.h5")) == []
+
+
+def test_a_file_of_version_1_is_read_as_it_was_written():
+    """Written by the program of that version from the same point masses."""
+    old = read(Path(__file__).parent / "data" / "version_1.h5")
+    new = synthetic_reduced_body(n_q=2, n_nodes=10)
+    bare = replace(new, columns=None, nodal_sums=None, load_cases=(), stress=None, point_stress=None,
+                   frame=replace(new.frame, dofs=np.zeros((0, 2), int)))  # fmt: skip
+    assert differences(bare, old) == []
+
+
+def bar_in(units):
+    """Return a reduced bar of 1 m in a unit system."""
+    metre = 1 / units.to_si(length=1)
+    newton = 1 / units.to_si(mass=1, length=1, time=-2)
+    mesh = distorted(box_mesh(4, 1, 1, 1.0, 0.08, 0.05, "hexahedron"), amount=0.2)
+    mesh = replace(mesh, nodes=mesh.nodes * metre)
+    steel = Material("steel", E=2.1e11 * newton / metre**2, nu=0.3, rho=7850.0 / units.to_si(mass=1, length=-3))
+    ends = [Interface(n, k, mesh.node_sets[n], np.array([x, 0.03, 0.02]) * metre)
+            for n, k, x in (("left", "rigid", 0.0), ("right", "distributing", 1.02))]  # fmt: skip
+    body = solid_body(mesh, steel, name="bar", units=units, interfaces=ends)
+    fall = np.array([1.0, 2.0, -9.81]) / units.to_si(length=1, time=-2)
+    wrench = {"force": np.array([5.0, 1, 2]) * newton, "torque": np.ones(3) * newton * metre}
+    pull = interface_load(body, "pull", "right", **wrench)
+    body = couple(body.with_load_cases(gravity_load(body, "weight", fall), pull))
+    held = ((1, 0), (1, 1), (1, 2), (18, 1), (18, 2), (2, 0))  # so that nothing vanishes that is compared
+    frame = NodalFrame(dofs=held, origin=tuple(np.array([0.1, 0.2, 0.3]) * metre))
+    return reduce(body, craig_bampton(body, n_modes=3), frame=frame, damping=RampDamping())
+
+
+@pytest.mark.parametrize("system", ["m-kg-s", "in-slinch-s", "mm-g-ms"])
+def test_a_body_in_other_units_is_that_of_the_model_in_those_units(system):
+    """The same steel bar built, loaded, damped and reduced in two unit systems."""
+    made = [bar_in(unit_system(name)) for name in ("mm-t-s", system)]
+    converted = convert_units(made[0], system)
+    assert converted.units == made[1].units
+    sign = np.sign(np.einsum("nck,nck->k", converted.Phi, made[1].Phi))
+    assert len(compare(converted, made[1], sign)) == 40
+
+
+def compare(a, b, sign, where="body"):
+    """Compare every array of two bodies, but for the signs of modes (the last axes of length n_q); return the names."""
+    names = []
+    for field in fields(a):
+        x, y, name = getattr(a, field.name), getattr(b, field.name), f"{where}.{field.name}"
+        if field.name in ("provenance", "units", "labels"):
+            continue
+        if is_dataclass(x):
+            names += compare(x, y, sign, name)
+        elif isinstance(x, tuple) and x and is_dataclass(x[0]):
+            for k, pair in enumerate(zip(x, y, strict=True)):
+                names += compare(*pair, sign, f"{name}[{k}]")
+        elif isinstance(x, np.ndarray | float):
+            y = np.array(y, dtype=float)
+            for axis in range(y.ndim if "freq" not in name else 0):  # the axes of modes
+                if y.shape[axis] == len(sign) and (axis == y.ndim - 1 or y.shape[-2:] == (len(sign), len(sign))):
+                    y = y * sign.reshape([-1 if k == axis else 1 for k in range(y.ndim)])
+            scale = np.abs(y).max(initial=0.0) or 1.0
+            np.testing.assert_allclose(np.asarray(x) / scale, y / scale, rtol=0, atol=1e-8, err_msg=name)
+            names.append(name)
+        else:
+            assert x == y, name
+    return names
+
+
+def test_units_on_reading_and_back(body, tmp_path):
+    write(body, tmp_path / "a.h5")
+    assert differences(body, read(tmp_path / "a.h5", units="mm-t-s")) == []
+    metres = read(tmp_path / "a.h5", units="m-kg-s")
+    assert metres.units.name == "m-kg-s"
+    assert metres.provenance["units converted from"] == "mm-t-s"
+    np.testing.assert_allclose(metres.moments.m, body.moments.m * 1e3, rtol=1e-15)
+    np.testing.assert_allclose(metres.nodes, body.nodes / 1e3, rtol=1e-15)
+    back = convert_units(metres, body.units)
+    for name in ("Phi", "K", "stress"):
+        np.testing.assert_allclose(getattr(back, name), getattr(body, name), rtol=1e-14)
+    with pytest.raises(UnitsError, match="did you mean 'm-kg-s'"):
+        read(tmp_path / "a.h5", units="m-kgs")
+
+
+def test_the_energy_of_a_motion_is_the_same_in_all_units(body):
+    """q̇ᵀ M q̇, qᵀ K q, q̇ᵀ D q (times the time unit) and h·q are joules, with q in mass^(1/2) length."""
+    rng = np.random.default_rng(4)
+    q, q_dot = rng.normal(size=(2, body.n_q))
+    joules = []
+    for name in UNIT_SYSTEMS:
+        other = convert_units(body, name)
+        u = other.units
+        unit_q = np.sqrt(u.mass / body.units.mass) * u.length / body.units.length
+        x, x_dot = q / unit_q, q_dot / unit_q * u.time / body.units.time
+        works = [case.h @ x for case in other.load_cases]
+        joules.append(np.array([x_dot @ other.M @ x_dot, x @ other.K @ x, x_dot @ other.D @ x, *works]))
+        joules[-1] *= u.to_si(mass=1, length=2, time=-2)
+    for energies in joules[1:]:
+        np.testing.assert_allclose(energies, joules[0], rtol=1e-12)
+
+
+def test_sums_of_nodes_that_count_one_keep_their_count_in_other_units(body):
+    counted = convert_units(replace(body, nodal_sums=replace(body.nodal_sums, is_volume=False)), "m-kg-s").nodal_sums
+    assert counted.w == body.nodal_sums.w
+    np.testing.assert_allclose(counted.S, np.asarray(body.nodal_sums.S) * 1e-3, rtol=1e-14)
+    by_volume = convert_units(body, "m-kg-s").nodal_sums
+    np.testing.assert_allclose(by_volume.S, np.asarray(body.nodal_sums.S) * 1e-12, rtol=1e-14)
 
 
 def test_odd_numbers_survive(body, tmp_path):
@@ -170,11 +293,11 @@ def test_other_files_are_refused_with_words(tmp_path, path):
 
 
 def test_a_newer_version_is_refused_by_its_number(body, tmp_path, monkeypatch):
-    monkeypatch.setattr(modal_file, "VERSION", 2)
+    monkeypatch.setattr(modal_file, "VERSION", 3)
     write(body, tmp_path / "new.h5")
     monkeypatch.undo()
     for file in (tmp_path / "new.h5", repacked(tmp_path / "new.h5")):
-        with pytest.raises(ModalFileError, match="format version 2, this program reads versions up to 1"):
+        with pytest.raises(ModalFileError, match="format version 3, this program reads versions up to 2"):
             read(file)
     (tmp_path / "new.h5").write_bytes(b"floatframe modal-file 12\nbytes 9\nof a kind that does not exist yet")
     with pytest.raises(ModalFileError, match="format version 12"):
@@ -187,8 +310,9 @@ def written_with(content, path):
 
 
 def test_a_missing_dataset_and_a_wrong_invariant_are_refused_even_when_sealed(body, tmp_path):
-    content = modal_file.content_of(body)
-    for name in ("/modes/M", "/nodes/Phi", "/interfaces/1/Psi", "/invariants/C3"):
+    content = modal_content.content_of(body, modal_file.VERSION)
+    for name in ("/modes/M", "/nodes/Phi", "/interfaces/1/Psi", "/invariants/C3", "/frame/dofs", "/load_cases/1/h",
+                 "/stress/nodal", "/stress/points/names", "/columns/F", "/nodal_sums/U2"):  # fmt: skip
         rest = {path: d for path, d in content.datasets.items() if path != name}
         with pytest.raises(ModalFileError, match=f"dataset {name} is missing"):
             written_with(replace(content, datasets=rest), tmp_path / "a.h5")
@@ -289,14 +413,15 @@ def test_every_dataset_has_a_unit_and_a_description_and_is_in_the_specification(
         for name in names:
             assert file[name].attrs["unit"].decode()
             assert file[name].attrs["description"].decode()
-            general = f"/{name}".replace("/interfaces/0", "/interfaces/<i>").replace("/interfaces/1", "/interfaces/<i>")
+            general = re.sub(r"/\d+/", "/<i>/", f"/{name}")
             assert f"`{general}`" in table, general
 
 
 def test_every_attribute_is_in_the_specification(path):
     table = DOCUMENT.read_text(encoding="utf-8")
     with h5py.File(path) as file:
-        for group in ("/", "units", "frame", "moments", "interfaces", "interfaces/0"):
+        groups = ("units", "frame", "moments", "interfaces", "interfaces/0", "load_cases", "load_cases/0", "nodal_sums")
+        for group in ("/", *groups, "stress"):
             for name in file[group].attrs:
                 assert f"`{name}`" in table, f"{group}: {name}"
 
