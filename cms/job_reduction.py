@@ -7,10 +7,12 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
+from cms.axis_functions import AXIS_FUNCTIONS
+from cms.extra_columns import EXTRA_COLUMNS
 from cms.mode_sets import MODE_SETS
 from cms.paths import near_file
 from cms.static_modes import COMPONENTS
-from cms.toml_file import Table, Vector3, choice, is_no_number
+from cms.toml_file import Range, Table, Vector3, choice, is_no_number
 from cms.words import nearest
 
 __all__ = [
@@ -24,7 +26,15 @@ __all__ = [
 ]
 
 FRAMES = ("nodal", "tisserand")
-SET_OPTIONS = ("n_modes", "cutoff", "verify", "free", "loads", "neighbours")  #: keys that belong to some mode sets
+MEASURE_NAMES = ("frequency", "frf")  #: of `cms.mode_selection`, whose import would cost every command its time
+SET_OPTIONS = (
+    "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
+    "load_cases", "damping_ratio", "n_rich", "functions", "n_axial", "n_bending", "n_torsion", "axis", "point",
+    "poisson", "columns",
+)  # fmt: skip
+#: keys that belong to some mode sets
+AUTO = "auto"  #: instead of a number of modes: as few as meet error over band
+AUTO_OPTIONS = ("error", "band", "measure")  #: keys that belong to n_modes = "auto"
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
@@ -61,9 +71,39 @@ def amount_or_matrix(value: Any) -> Rows:
     return (amount(value),)
 
 
+def count_or_auto(value: Any) -> Any:
+    """Return a number of modes, or "auto"."""
+    if value != AUTO and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
+        raise ValueError('expected a whole number, 0 or more, of vibration modes, or "auto"')
+    return value
+
+
+def shift_list(value: Any) -> tuple[float, ...]:
+    """Return one expansion frequency or a list of them."""
+    values = value if isinstance(value, list | tuple) else [value]
+    if not values or any(is_no_number(x) or x < 0 for x in values):
+        raise ValueError("expected a list of frequencies, 0 or more, in Hz")
+    return tuple(float(x) for x in values)
+
+
+def extras(value: Any) -> tuple[str, ...]:
+    """Return one kind of extra columns or a list of kinds."""
+    words = [value] if isinstance(value, str) else value
+    if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
+        raise ValueError(f"expected a list, each once, of {', '.join(EXTRA_COLUMNS)}")
+    for word in words:
+        if word not in EXTRA_COLUMNS:
+            raise ValueError(f"unknown extra columns {word!r}{nearest(str(word), EXTRA_COLUMNS)}")
+    return tuple(words)
+
+
 Components = Annotated[tuple[str, ...], BeforeValidator(components)]
 Amount = Annotated[tuple[float, float, float], BeforeValidator(amount)]
 AmountOrMatrix = Annotated[Rows, BeforeValidator(amount_or_matrix)]
+CountOrAuto = Annotated[int | str, BeforeValidator(count_or_auto)]
+Count = Annotated[int, Field(ge=0)]
+Shifts = Annotated[tuple[float, ...], BeforeValidator(shift_list)]
+Extras = Annotated[tuple[str, ...], BeforeValidator(extras)]
 
 
 class LoadSection(Table):
@@ -119,8 +159,13 @@ class ReductionSection(Table):
     set: choice("mode set", lambda: tuple(MODE_SETS)) = Field(  # type: ignore[valid-type]
         "craig-bampton", description="the name of a mode set"
     )
-    n_modes: Annotated[int, Field(ge=0)] | None = Field(
-        None, description="a whole number, 0 or more, of vibration modes"
+    n_modes: CountOrAuto | None = Field(None, description='a whole number, 0 or more, of vibration modes, or "auto"')
+    error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description='a number between 0 and 1, the error that n_modes = "auto" meets'
+    )
+    band: Range | None = Field(None, description="two frequencies in Hz, [from, to]")
+    measure: choice("measure", lambda: MEASURE_NAMES) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(MEASURE_NAMES)}"
     )
     cutoff: Positive | None = Field(None, description="a number above 0, the highest frequency of the modes [Hz]")
     verify: bool | None = Field(None, description="true or false: prove that no mode was missed")
@@ -129,17 +174,55 @@ class ReductionSection(Table):
     )
     loads: dict[str, LoadSection] | None = Field(None, description="tables [reduction.loads.INTERFACE]")
     neighbours: list[NeighbourSection] | None = Field(None, description="tables [[reduction.neighbours]]")
+    n_blocks: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="a whole number, 1 or more, of Krylov blocks at every shift"
+    )
+    shifts: Shifts | None = Field(None, description="a list of frequencies, 0 or more, in Hz")
+    tolerance: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number between 0 and 1")
+    load_cases: bool | None = Field(None, description="true or false: whether load cases are among the Krylov loads")
+    damping_ratio: Annotated[float, Field(ge=0)] | None = Field(
+        None, description="a number, 0 or more, of critical damping, for balancing"
+    )
+    n_rich: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="a whole number, 1 or more, of free modes to balance"
+    )
+    functions: choice("functions", lambda: tuple(AXIS_FUNCTIONS)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(AXIS_FUNCTIONS)}"
+    )
+    n_axial: Count | None = Field(None, description="a whole number, 0 or more, of functions along the axis")
+    n_bending: Count | None = Field(None, description="a whole number, 0 or more, of functions for each direction")
+    n_torsion: Count | None = Field(None, description="a whole number, 0 or more, of functions of torsion")
+    axis: Vector3 | None = Field(None, description="the direction of the axis, [x, y, z]")
+    point: Vector3 | None = Field(None, description="a point on the axis, [x, y, z]")
+    poisson: Annotated[float, Field(gt=-1, le=0.5)] | None = Field(
+        None, description="a number between -1 and 0.5, Poisson's ratio"
+    )
+    columns: Path | None = Field(None, description="the path of a .npy or .npz file of columns, relative to the job")
+    extra: Extras | None = Field(None, description=f"a list of extra columns, of {', '.join(EXTRA_COLUMNS)}")
+    interface_modes: Count | None = Field(
+        None, description="a whole number, 0 or more, of modes of each all-node interface"
+    )
+    interface_cutoff: Positive | None = Field(
+        None, description="a number above 0, the highest frequency of interface modes [Hz]"
+    )
+    interfaces_together: bool | None = Field(None, description="true or false: one problem for all all-node interfaces")
     frame: choice("frame", lambda: FRAMES) = Field(  # type: ignore[valid-type]
         "tisserand", description=f"one of {', '.join(FRAMES)}"
     )
     at: Name | None = Field(None, description="the name of an interface, which carries a nodal frame")
     origin: Vector3 | None = Field(None, description="the origin of the body frame in mesh coordinates, [x, y, z]")
 
+    @field_validator("columns", mode="before")
+    @classmethod
+    def _file_beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
+        return NeighbourSection._beside_the_job(value, info)
+
     @model_validator(mode="after")
     def _options_of_the_set(self) -> "ReductionSection":
         allowed = mode_set_options(self.set)
+        of_auto = self._options_of_auto()
         for key in SET_OPTIONS:
-            if getattr(self, key) is not None and key not in allowed:
+            if getattr(self, key) is not None and key not in allowed and key not in of_auto:
                 raise ValueError(f"mode set {self.set!r} has no option {key}{nearest(key, allowed)}")
         if {"n_modes", "cutoff"} <= set(allowed) and (self.n_modes is None) == (self.cutoff is None):
             given = "neither" if self.n_modes is None else "both"
@@ -151,9 +234,27 @@ class ReductionSection(Table):
             )
         if self.set == "normal" and self.n_modes == 0:
             raise ValueError("mode set 'normal' with n_modes = 0 holds only rigid-body motion; choose n_modes >= 1")
+        if "columns" in allowed and self.columns is None:
+            raise ValueError(f"mode set {self.set!r} needs columns: the path of a .npy or .npz file")
+        if self.interface_modes is not None and self.interface_cutoff is not None:
+            raise ValueError("expected either interface_modes or interface_cutoff, got both")
+        if self.interfaces_together is not None and self.interface_modes is None and self.interface_cutoff is None:
+            raise ValueError("interfaces_together belongs to interface_modes or interface_cutoff; got neither")
         if self.at is not None and self.frame != "nodal":
             raise ValueError(f'at = "{self.at}" belongs to frame = "nodal"; got frame = "{self.frame}"')
         return self
+
+    def _options_of_auto(self) -> tuple[str, ...]:
+        """Return the keys that n_modes = "auto" takes; refuse them without it, and it without them."""
+        if self.n_modes == AUTO:
+            for key in ("error", "band"):
+                if getattr(self, key) is None:
+                    raise ValueError(f'n_modes = "auto" needs {key}: which error over which band is accepted?')
+            return AUTO_OPTIONS
+        for key in ("error", "measure"):
+            if getattr(self, key) is not None:
+                raise ValueError(f'{key} belongs to n_modes = "auto"; got n_modes = {self.n_modes}')
+        return ()
 
 
 def mode_set_options(name: str) -> tuple[str, ...]:

@@ -5,12 +5,15 @@ from typing import Any
 import numpy as np
 
 from cms.arrays import Array
+from cms.characteristic_modes import with_characteristic_modes
+from cms.extra_columns import EXTRA_COLUMNS
 from cms.families import Families
 from cms.fe_body import FEBody
 from cms.interface_loads import InterfaceLoad, condensed_load
-from cms.job_reduction import LoadSection, NeighbourSection, ReductionSection, mode_set_options
+from cms.job_reduction import AUTO, LoadSection, NeighbourSection, ReductionSection, mode_set_options
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
+from cms.mode_sets.selection import families_of
 
 __all__ = ["job_mode_set"]
 
@@ -28,13 +31,54 @@ def job_mode_set(body: FEBody, reduction: ReductionSection, *, families: Familie
     CmsError, FeModelsError
         If the set cannot be made with these options, or a neighbour cannot be read.
     """
+    with families_of(body, families) as families:
+        options = set_options(body, reduction)
+
+        def added(modes: ModeSet) -> ModeSet:
+            return with_additions(body, modes, reduction, families)
+
+        if reduction.n_modes != AUTO:
+            return added(MODE_SETS[reduction.set](body, **options, families=families))
+        from cms.mode_selection import select_modes
+
+        has_additions = reduction.extra or reduction.interface_modes is not None or reduction.interface_cutoff
+        return select_modes(
+            body,
+            set=reduction.set,
+            error=reduction.error or 0.0,
+            band=reduction.band or (0.0, 0.0),
+            measure=reduction.measure or "frequency",
+            options=options,
+            added=added if has_additions else None,
+            families=families,
+        ).modes
+
+
+def with_additions(body: FEBody, modes: ModeSet, reduction: ReductionSection, families: Families) -> ModeSet:
+    """Reduce all-node interfaces to their characteristic modes and add extra columns, as the job asks for."""
+    if reduction.interface_modes is not None or reduction.interface_cutoff is not None:
+        cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * body.units.time
+        modes = with_characteristic_modes(
+            modes, body, n_modes=reduction.interface_modes, cutoff=cutoff, together=bool(reduction.interfaces_together)
+        )
+    for name in reduction.extra or ():
+        modes = EXTRA_COLUMNS[name](modes, body, families=families)
+    return modes
+
+
+def set_options(body: FEBody, reduction: ReductionSection) -> dict[str, Any]:
+    """Return the options of the set as its function takes them: frequencies in cycles per time unit of the body."""
     options: dict[str, Any] = {}
+    time = body.units.time
+    is_auto = reduction.n_modes == AUTO
     for key in mode_set_options(reduction.set):
         value = getattr(reduction, key)
-        if value is None:
+        if value is None or (is_auto and key in ("n_modes", "band")):
             continue
         if key == "cutoff":
-            options[key] = value * body.units.time  # cycles per time unit of the body
+            options[key] = value * time
+        elif key in ("shifts", "band"):
+            options[key] = tuple(x * time for x in value)
         elif key == "loads":
             made = [load_of(name, section) for name, section in value.items()]
             options["loads"] = [*options.get("loads", []), *made]
@@ -42,7 +86,7 @@ def job_mode_set(body: FEBody, reduction: ReductionSection, *, families: Familie
             options["loads"] = [*options.get("loads", []), *(neighbour_load(body, section) for section in value)]
         else:
             options[key] = value
-    return MODE_SETS[reduction.set](body, **options, families=families)
+    return options
 
 
 def load_of(name: str, section: LoadSection) -> InterfaceLoad:

@@ -63,8 +63,11 @@ def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any
 def coupled_body(job: Job, body: FEBody) -> FEBody:
     """Couple the interfaces of the body of a job, and make it planar where that is asked for."""
     from cms.couplings import couple
+    from cms.extra_columns import CENTRIFUGAL, centrifugal_loads
     from cms.job_beams import PLANES
 
+    if CENTRIFUGAL in (job.reduction.extra or ()):
+        body = body.with_load_cases(*centrifugal_loads(body))  # rigid interfaces eliminate what they act on
     if job.body.plane is None:
         return couple(body)
     from fe_models.planar import planar
