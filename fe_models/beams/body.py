@@ -318,7 +318,9 @@ def _orientations(mesh: LineMesh, used: tuple[BeamProperty, ...], of_line: IntAr
     of_property = np.array(own, dtype=float).reshape(-1, 3)[of_line]
     if mesh.orientations is None:
         return of_property
-    return np.where(np.isnan(mesh.orientations).any(axis=1)[:, None], of_property, mesh.orientations)
+    own_line = np.asarray(mesh.orientations)
+    has_none = np.isnan(own_line.sum(axis=1))
+    return np.where(has_none[:, None], of_property, own_line)
 
 
 def _require_known_nodes(

@@ -58,6 +58,8 @@ def read_tables(nodes: str | Path, lines: str | Path) -> LineMesh:
     for k, row in enumerate(node_rows):
         for name in row.get("sets", "").split():
             node_sets.setdefault(name, []).append(k)
+    for name, rows in line_sets.items():
+        node_sets.setdefault(name, np.unique(pairs[rows]).tolist())
     orientations = np.array([_orientation(row, pair, X, place) for row, pair in zip(line_rows, pairs, strict=True)])
     offsets = np.array([[_real(row, key) for key in OFFSET_COLUMNS] for row in line_rows]).reshape(-1, 2, 3)
     used = np.zeros(len(X), dtype=bool)
