@@ -40,6 +40,8 @@ def check_body(reduced: ReducedBody) -> tuple[QualityRecord, ...]:
     Returns
     -------
     tuple of QualityRecord
-        One for each of `BODY_CHECKS`, in their order.
+        One for each of `BODY_CHECKS`, in their order; a body without positive mass is asked for its inertia only.
     """
+    if not reduced.moments.m > 0:
+        return (check_inertia_tensor(reduced),)
     return tuple(check(reduced) for check in BODY_CHECKS)

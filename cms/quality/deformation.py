@@ -24,6 +24,7 @@ from cms.rigid_modes import rigid_motion_of_points
 __all__ = ["NORMS", "DeformationError", "deformation_error", "deformation_record", "nodal_deformation_error"]
 
 NORMS = ("M", "K", "nodal")
+NO_DEFORMATION = 1e-10  #: M-length of a motion without its rigid part over that with it, below which it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,8 @@ def deformation_error(body: FEBody, basis: FreeBasis, snapshots: Snapshots) -> D
     U, a = snapshots.columns, snapshots.amplitudes
     if len(U) != body.n_dof:
         raise QualityError(f"deformation error: snapshots over {len(U)} dofs, body {body.name!r} has {body.n_dof}")
-    without_rigid = U - basis.N @ (basis.N.T @ (body.M @ U))
+    M_U = body.M @ U
+    without_rigid = U - basis.N @ (basis.N.T @ M_U)
     X = basis.vibrating
     in_M = without_rigid - X @ (X.T @ (body.M @ without_rigid))
     in_K = without_rigid - basis.Phi @ ((basis.Phi.T @ (body.K @ without_rigid)) / basis.omega2[:, None])
@@ -70,6 +72,8 @@ def deformation_error(body: FEBody, basis: FreeBasis, snapshots: Snapshots) -> D
         "M": lengths(without_rigid, body.M @ without_rigid, a),
         "K": lengths(without_rigid, body.K @ without_rigid, a),
     }
+    if not size["M"].max() > NO_DEFORMATION * lengths(U, M_U, a).max():
+        raise QualityError(f"deformation error: the reference motion does not deform body {body.name!r}")
     rows, rigid, shapes = (
         body.translations(part).reshape(-1, part.shape[1]) for part in (without_rigid, basis.N, basis.Phi)
     )
@@ -128,7 +132,7 @@ def relative(t: Array, error: Mapping[str, Array], size: Mapping[str, Array]) ->
     largest = {norm: float(values.max()) for norm, values in size.items()}
     for norm, value in largest.items():
         if not value > 0:
-            raise QualityError(f"deformation error: the reference motion does not deform the body (norm {norm})")
+            raise QualityError(f"deformation error: the reference motion has no size in the norm {norm}")
     return DeformationError(
         t,
         {norm: values / largest[norm] for norm, values in error.items()},

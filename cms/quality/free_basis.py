@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as la
 
 from cms.arrays import Array, frozen
 from cms.families import Families
@@ -13,7 +14,7 @@ from cms.independent import Columns, gram, independent_columns
 from cms.mode_set import ModeSet
 from cms.reduced_body import BodyFrame
 from cms.sparse_product import SymmetricProduct
-from cms.tall import combine
+from cms.tall import combine, inner
 
 __all__ = ["FreeBasis", "free_basis", "ritz_basis"]
 
@@ -70,8 +71,9 @@ def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
 def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:
     """Rayleigh-Ritz in the span of columns without rigid-body motion.
 
-    (1) W-orthonormal columns Q, W = K + omega_1² M, redundant ones dropped
-    (2) Qᵀ M Q y = mu y; omega² = (1 - omega_1² mu) / mu, and the static ones (mu = 0) last
+    (1) W-orthonormal columns Q, W = K + omega_1² M, redundant ones dropped; what rounding has made of rigid-body
+        motion in the small remainders of nearly redundant columns is taken off
+    (2) Qᵀ M Q y = mu Qᵀ W Q y; omega² = (1 - omega_1² mu) / mu, and the static ones (mu = 0) last
 
     Parameters
     ----------
@@ -86,10 +88,12 @@ def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:
     has_mass = mass > 0
     omega2_1 = float((stiffness[has_mass] / mass[has_mass]).min())
     Q, _ = independent_columns(columns, body, omega2_1)  # (1)
-    mu, Y = np.linalg.eigh(gram(Q.X, Q.MX))  # (2)
+    E = Q.X - combine(N, inner(N, Q.MX))
+    G_M = gram(E, SymmetricProduct(body.M) @ E)
+    mu, Y = la.eigh(G_M, gram(E, Q.KX) + omega2_1 * G_M)  # (2)
     mu, Y = mu[::-1], Y[:, ::-1]
     is_massive = mu * omega2_1 > MASSLESS
     size = np.where(is_massive, 1 / np.sqrt(np.where(is_massive, mu, 1.0)), 1.0)
-    Phi = combine(Q.X, Y * size)
+    Phi = combine(E, Y * size)
     omega2 = np.where(is_massive, 1 / np.where(is_massive, mu, 1.0) - omega2_1, 1.0)
     return FreeBasis(Phi, omega2, is_massive, N)

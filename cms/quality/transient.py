@@ -25,6 +25,9 @@ from cms.rigid_modes import geometric_rigid_modes
 __all__ = ["LoadHistory", "Snapshots", "interface_forces", "support_acceleration", "transient"]
 
 
+NO_LOAD = 1e-10  #: part of a load that is not in balance with rigid acceleration, below which it is rounding
+
+
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
     """Loads f(t) = F p(t), p linear between the times."""
@@ -160,11 +163,13 @@ def transient_basis(families: Families, F: Array, cutoff: float, held: Sequence[
     def solve(f: Array) -> Array:
         return flexibility.expand(flexibility.solve(f if T is None else T.T @ f))
 
+    on_free = F if T is None else T.T @ F
+    balanced = on_free - flexibility.M_N @ (flexibility.N.T @ on_free)
+    if not np.linalg.norm(balanced) > NO_LOAD * np.linalg.norm(on_free):
+        raise QualityError(f"transient: the load does not deform body {body.name!r}; hold an interface, or load one")
     static = solve(F)
     X = np.hstack([modes.Phi, static, solve(body.M @ static)])
     X = X[:, np.linalg.norm(X, axis=0) > 0]
-    if not X.shape[1]:
-        raise QualityError(f"transient: the load does not deform body {body.name!r}")
     return ritz_basis(body, X, flexibility.expand(flexibility.N))
 
 
