@@ -15,10 +15,11 @@ T_END, H = 0.0299, 2e-5  # one period of the clamped bar: 3.516/(2 pi) sqrt(EI/(
 
 @pytest.fixture(scope="module")
 def parts():
-    """Return a steel bar of 1 m, held at one end, reduced in a nodal and in the mean-axis frame."""
+    """Return a steel bar of 1 m, held at one end, reduced in a nodal, in the mean-axis and in the Buckens frame."""
     coupled = cms.couple(bar(nx=10))
     modes = cms.craig_bampton(coupled, n_modes=4)
-    return [cms.reduce(coupled, modes, frame=frame) for frame in (cms.NodalFrame("left"), cms.TisserandFrame())]
+    frames = (cms.NodalFrame("left"), cms.TisserandFrame(), cms.BuckensFrame())
+    return [cms.reduce(coupled, modes, frame=frame) for frame in frames]
 
 
 def tip_path(part, force):
@@ -31,11 +32,12 @@ def tip_path(part, force):
     return interface_positions(motion, "bar", part, "right"), motion
 
 
-def test_tip_motion_is_that_of_the_other_frame_but_for_second_order(parts):
+@pytest.mark.parametrize("other", [1, 2], ids=["tisserand", "buckens"])
+def test_tip_motion_is_that_of_the_other_frame_but_for_second_order(parts, other):
     """Halving the load quarters the difference."""
     differences, deflections = [], []
     for force in (4000.0, 2000.0):
-        first, second = (tip_path(part, force)[0] for part in parts)
+        first, second = (tip_path(part, force)[0] for part in (parts[0], parts[other]))
         differences.append(np.abs(first - second).max())
         deflections.append(np.abs(first - first[0]).max())
     assert deflections[0] > 0.04  # of a length of 1
@@ -66,3 +68,10 @@ def test_a_body_keeps_its_motion_when_its_kept_nodes_are_dropped(parts):
                    surface=parts[0].surface[:0], stress=parts[0].stress[:0],
                    interfaces=[replace(i, members=[]) for i in parts[0].interfaces])  # fmt: skip
     np.testing.assert_array_equal(tip_path(bare, 40.0)[0], tip_path(parts[0], 40.0)[0])
+
+
+def test_a_converted_part_moves_as_the_part_reduced_in_that_frame(parts):
+    """The file alone carries a part into another frame; what is left of the difference is the Newton tolerance."""
+    converted = cms.convert_frame(parts[0], cms.BuckensFrame())
+    expected, _ = tip_path(parts[2], 2000.0)
+    assert np.abs(tip_path(converted, 2000.0)[0] - expected).max() < 1e-6 * np.abs(expected - expected[0]).max()
