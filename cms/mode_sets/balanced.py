@@ -22,6 +22,7 @@ __all__ = ["balanced_truncation"]
 FEWEST_RICH = 60  #: free modes of the rich basis, at least
 RICH_FACTOR = 3  #: free modes of the rich basis for each mode asked for
 NOTHING_LEFT = 1e-7  #: length of a residual attachment mode, of the whole one, below which it is rounding
+STIFF = 1e-12  #: compliance of a boundary dof, of the largest, below which it is rounding
 REPORTED = 12  #: singular values in the options of the set; all of them are in its data
 
 
@@ -39,7 +40,8 @@ def balanced_truncation(
     (1) rich basis: free modes and residual attachment modes, M-orthonormal and K-diagonal, in which the Lyapunov
         equation is small
     (2) damping: that of the body projected, and a modal ratio, since without damping there is no Gramian
-    (3) loads and responses: unit forces on all boundary dofs, moments at a lever of the body length
+    (3) loads and responses at all boundary dofs, each in the unit in which its own static elastic response is 1, so
+        that a stiff direction and a soft one, a force and a moment, count alike
     (4) position-velocity balancing (`cms.balancing`): one symmetric projection, ranked by its singular values
 
     The number of directions is that of `n_modes`, or as many as leave a part of at most `tolerance` of the sum of the
@@ -94,7 +96,12 @@ def balanced_truncation(
         D = np.diag(2 * damping_ratio * np.sqrt(rich.omega2))
         if body.D is not None:
             D = D + gram(rich.Phi, body.D @ rich.Phi)
-        system = balance(rich.omega2, D, (boundary_scale(body)[:, None] * rich.Phi[body.b]).T)
+        at_b = rich.Phi[body.b]
+        compliance = np.einsum("bk,bk->b", at_b, at_b / rich.omega2)
+        levered = compliance * boundary_scale(body) ** 2
+        is_elastic = levered > STIFF * levered.max()
+        scale = np.where(is_elastic, 1 / np.sqrt(np.where(is_elastic, compliance, 1.0)), 0.0)
+        system = balance(rich.omega2, D, (scale[:, None] * at_b).T)
         sigma = system.position_velocity
         if n_modes is None:
             left = 1 - np.cumsum(sigma) / sigma.sum()

@@ -10,7 +10,7 @@ from cms.balancing import balance
 from cms.couplings import couple
 from cms.errors import ModeSetError
 from cms.mode_sets.balanced import balanced_truncation
-from cms.receptance import boundary_scale, largest_error, receptance_of_modes
+from cms.receptance import largest_error, receptance_of_modes
 from tests.bodies import bar, chain
 
 ROUNDOFF = 1e-12
@@ -140,7 +140,7 @@ def test_frequency_response_errors_fall_with_the_number_of_directions(body):
     at = np.linspace(0.0, np.sqrt(omega2[12]) / (2 * np.pi), 80)
     reference = receptance_of_modes(body, Phi[:, 6:], omega2[6:], loss=0.02).at(at)
     errors = []
-    for n_modes in (6, 12, 20, 30):
+    for n_modes in (6, 12, 20, 30, 40):
         V = balanced_truncation(body, n_modes=n_modes).columns[:, 6:]
         found, Y = la.eigh(V.T @ (body.K @ V), V.T @ (body.M @ V))
         errors.append(largest_error(receptance_of_modes(body, V @ Y, found, loss=0.02).at(at), reference))
@@ -160,11 +160,18 @@ def test_a_rich_basis_of_all_modes_gives_the_singular_values_of_the_full_body():
     body = couple(chain(8))
     omega2, Phi = la.eigh(body.K.toarray(), body.M.toarray())
     omega2, Phi = omega2[1:], Phi[:, 1:]
-    B = (boundary_scale(body)[:, None] * Phi[body.b]).T
+    B = Phi[body.b].T
+    B = B / np.sqrt(np.einsum("kb,kb->b", B, B / omega2[:, None]))  # every static response is 1
     exact, _ = square_root_balancing(*first_order(omega2, np.diag(0.04 * np.sqrt(omega2)), B), r=2)
     modes = balanced_truncation(body, n_modes=3, damping_ratio=0.02)
     assert_allclose(modes.data["hankel"], exact, rtol=1e-6, atol=1e-9 * exact[0])
     assert modes.options["Hankel singular values"].startswith(f"{exact[0]:.4g}, {exact[1]:.4g}")
+
+
+def test_every_boundary_dof_counts_alike(body):
+    """Unit static responses: the signed Hankel singular values sum to half their number, whatever their stiffness."""
+    modes = balanced_truncation(body, n_modes=3)
+    assert_allclose((modes.data["hankel"] * modes.data["hankel signs"]).sum(), len(body.b) / 2, rtol=1e-6)
 
 
 def test_damping_of_the_body_counts():
