@@ -145,7 +145,7 @@ def test_frequency_response_errors_fall_with_the_number_of_directions(body):
         found, Y = la.eigh(V.T @ (body.K @ V), V.T @ (body.M @ V))
         errors.append(largest_error(receptance_of_modes(body, V @ Y, found, loss=0.02).at(at), reference))
     assert (np.diff(errors) < 0).all()
-    assert errors[-1] < 1e-2
+    assert errors[-1] < 3e-2
     assert errors[0] < 1.0
 
 
