@@ -12,6 +12,7 @@ from floatframe.cli import analyses
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from cms.cli.console import Stages
     from floatframe.integration import Progress
     from floatframe.trajectory import Trajectory
 
@@ -79,13 +80,15 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
     last: list[Any] = []
     began = time.perf_counter()
     try:
-        with stages(remaining=True) as clock, clock(f"{name}: motion") as advance:
+        with stages(remaining=True) as clock:
+            load_kernels(clock)
+            with clock(f"{name}: motion") as advance:
 
-            def on_progress(progress: "Progress") -> None:
-                last[:] = [progress]
-                advance(progress.n_steps / progress.n_total)
+                def on_progress(progress: "Progress") -> None:
+                    last[:] = [progress]
+                    advance(progress.n_steps / progress.n_total)
 
-            trajectory = run(on_progress)
+                trajectory = run(on_progress)
     except KeyboardInterrupt:
         segments = Path(f"{path}{SEGMENTS}")
         kept = f"the motion so far is in {segments}, which plot, animate and info can read; floatframe resume goes on"
@@ -93,6 +96,18 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
         raise typer.Exit(INTERRUPTED) from None
     print_run(trajectory, last[0] if last else None, time.perf_counter() - began)
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def load_kernels(clock: "Stages") -> None:
+    """Load the compiled code; say so while it is compiled, which happens once after an installation."""
+    began = time.perf_counter()
+    with clock("compiled code (made at first use)"):
+        from floatframe.kernels.entry import prepare
+
+        is_new = prepare()
+    if is_new:
+        seconds = time.perf_counter() - began
+        typer.echo(f"note: compiled the code of the motion in {seconds:.0f} s; later runs find it ready", err=True)
 
 
 def print_run(trajectory: "Trajectory", progress: Any, seconds: float | None) -> None:

@@ -1,6 +1,7 @@
 """Compiled kernels: the only modules that import numba; import them only when a motion is computed.
 
-Inner functions are compiled with the entry that calls them and not cached on their own; entries are cached on disk.
+Inner functions are compiled with the entry that calls them and not cached on their own (kernels/compilation.py);
+entries are cached on disk.
 numba checks only the file of a cached function for changes, so each entry holds the digest of all sources of this
 folder in a closure, which makes it part of the key of its cache: no entry is ever run with stale inner functions.
 """

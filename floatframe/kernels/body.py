@@ -14,14 +14,14 @@ W_ab = S_ab q and s = S + 1C q:
 One pass over S_ab (9 n² numbers) and one over 4C (3 n²) carry the cost.
 """
 
-from floatframe.kernels.compilation import inner
+from floatframe.kernels.compilation import inner, view
 from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, MASS, S_AB, STIFFNESS
 from floatframe.kernels.rotation import cross
 
 __all__ = ["body_forces", "body_mass_product", "body_tangent", "first_moment", "modal_term"]
 
 
-@inner
+@view
 def block(model, i, which, size):
     """Return a constant block of body i as a view of the flat store."""
     start = model.block0[model.kind[i], which]

@@ -6,17 +6,18 @@ One entry, since numba compiles and links everything below an entry once more fo
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import types
 
-from cms.arrays import Array
+from cms.arrays import Array, IntArray
 from floatframe.kernels import source_digest
+from floatframe.kernels.compilation import entry
 from floatframe.kernels.connection import constraint_rates
 from floatframe.kernels.diagnostics import power
 from floatframe.kernels.evaluation import evaluate, linearize
 from floatframe.kernels.generalized_alpha import DONE, SINGULAR_BODY, SINGULAR_CONNECTION, advance, write_row
 from floatframe.kernels.model import Memory, Model, Rows, Work, new_rows
 from floatframe.kernels.schur import correction, factorize_bodies
-from floatframe.kernels.structure import pack_memory, pack_model, pack_rows, pack_work
+from floatframe.kernels.structure import as_memory, as_model, as_rows, as_work, table_of
 
 __all__ = [
     "Outcome",
@@ -24,6 +25,7 @@ __all__ = [
     "evaluate_and_linearize",
     "newton_correction",
     "observe_state",
+    "prepare",
     "rates_of_constraints",
 ]
 
@@ -43,11 +45,11 @@ class Outcome(NamedTuple):
 def make_entry(digest):
     """Return the cached entry; the digest of the sources enters its key, see the package docstring."""
 
-    def run(what, model_data, work_data, memory_data, rows_data, numbers, integers, out):
+    def run(what, model_table, work_table, memory_table, rows_table, numbers, integers, out):
         if digest == 0:
             return DONE, 0, 0, -1, 0.0
-        model, work = pack_model(model_data), pack_work(work_data)
-        memory, rows = pack_memory(memory_data), pack_rows(rows_data)
+        model, work = as_model(model_table), as_work(work_table)
+        memory, rows = as_memory(memory_table), as_rows(rows_table)
         if what == ADVANCE:
             return advance(
                 model,
@@ -85,46 +87,73 @@ def make_entry(digest):
         return DONE, 0, 0, -1, 0.0
 
     try:
-        return njit(run, cache=True, error_model="numpy")
+        return entry(run)
     except RuntimeError:  # nowhere to keep the cache: compiled anew in each process
-        return njit(run, error_model="numpy")
+        return entry(run, cache=False)
 
 
 run = make_entry(source_digest())
+
+TABLE = types.Array(types.int64, 1, "C")
+SIGNATURE = (
+    types.int64,
+    *[TABLE] * 4,
+    types.Array(types.float64, 1, "C"),
+    types.Array(types.int64, 1, "C"),
+    types.Array(types.float64, 2, "C"),
+)
 
 NOTHING = np.zeros(0)
 NO_INTEGERS = np.zeros(0, np.int64)
 NO_OUT = np.zeros((0, 0))
 
 
-def no_memory(model: Model) -> Memory:
-    """Return an empty memory, for entries that need none."""
+def prepare() -> bool:
+    """Load the kernels from the cache, or compile them; return whether they were compiled now.
+
+    Otherwise this happens with the first call. Calls after it find everything ready.
+    """
+    before = sum(run.stats.cache_misses.values())
+    run.compile(SIGNATURE)
+    return sum(run.stats.cache_misses.values()) > before
+
+
+def call(
+    what: int, model: Model, work: Work, memory: Memory, rows: Rows, numbers: Array, integers: IntArray, out: Array
+) -> Outcome:
+    """Run the entry; all arrays live until it returns."""
+    tables = [table_of(data) for data in (model, work, memory, rows)]
+    return Outcome(*run(what, *tables, numbers, integers, out))
+
+
+def no_memory() -> Memory:
+    """Return an empty memory, for what needs none."""
     return Memory(np.zeros((0, 3)), np.zeros((0, 4)), *(np.zeros(0) for _ in range(7)))
 
 
 def evaluate_and_linearize(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> None:
     """Write residuals and derivatives for the iterate in `work`; rows of wrenches weighted by c_k if above 0."""
     numbers = np.array([c_m, c_d, c_k])
-    run(LINEARIZE, model, work, no_memory(model), new_rows(model, 0), numbers, NO_INTEGERS, NO_OUT)
+    call(LINEARIZE, model, work, no_memory(), new_rows(model, 0), numbers, NO_INTEGERS, NO_OUT)
 
 
 def rates_of_constraints(model: Model, work: Work) -> tuple[Array, Array]:
     """Return for every row the rate of the held quantity, and its second rate at zero u_dot, both (n_w,)."""
     out = np.zeros((2, len(work.w)))
-    run(RATES, model, work, no_memory(model), new_rows(model, 0), np.zeros(3), NO_INTEGERS, out)
+    call(RATES, model, work, no_memory(), new_rows(model, 0), np.zeros(3), NO_INTEGERS, out)
     return out[0], out[1]
 
 
 def newton_correction(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> Outcome:
     """Write the Newton correction (y, mu) for the iterate in `work`."""
     numbers = np.array([c_m, c_d, c_k])
-    return Outcome(*run(CORRECT, model, work, no_memory(model), new_rows(model, 0), numbers, NO_INTEGERS, NO_OUT))
+    return call(CORRECT, model, work, no_memory(), new_rows(model, 0), numbers, NO_INTEGERS, NO_OUT)
 
 
 def observe_state(model: Model, work: Work, memory: Memory, t: float) -> Rows:
     """Return the results at the state in the memory; the power at it goes into the memory."""
     rows = new_rows(model, 1)
-    run(OBSERVE, model, work, memory, rows, np.array([t]), NO_INTEGERS, NO_OUT)
+    call(OBSERVE, model, work, memory, rows, np.array([t]), NO_INTEGERS, NO_OUT)
     return rows
 
 
@@ -147,4 +176,4 @@ def advance_steps(
     """Advance the memory by n_steps of the generalized-alpha method; see `kernels.generalized_alpha.advance`."""
     numbers = np.array([t0, h, tolerance, length, *coefficients])
     integers = np.array([first, n_steps, every, max_iterations], np.int64)
-    return Outcome(*run(ADVANCE, model, work, memory, rows, numbers, integers, NO_OUT))
+    return call(ADVANCE, model, work, memory, rows, numbers, integers, NO_OUT)

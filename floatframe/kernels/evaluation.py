@@ -1,7 +1,7 @@
 """Evaluation of the whole system at one iterate: residuals, and their derivatives body by body."""
 
 from floatframe.kernels.body import body_forces, body_tangent
-from floatframe.kernels.compilation import inner, merged
+from floatframe.kernels.compilation import inner
 from floatframe.kernels.connection import connection_derivatives, connection_rows
 from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, rotate, wrench_to_body
 from floatframe.kernels.rotation import right_jacobian
@@ -42,7 +42,7 @@ def load_wrench(model, work, k):
             F[3 + a] = t[a]
 
 
-@merged
+@inner
 def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
     """Write the tangent of body i into H, (6 + n, 6 + n), with all wrenches on it held fixed in space or in markers.
 

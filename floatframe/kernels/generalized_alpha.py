@@ -2,7 +2,7 @@
 
 import math
 
-from floatframe.kernels.compilation import inner, merged
+from floatframe.kernels.compilation import inner
 from floatframe.kernels.diagnostics import diagnose, power
 from floatframe.kernels.evaluation import evaluate
 from floatframe.kernels.model import MASS, STIFFNESS
@@ -134,7 +134,7 @@ def roundoff_floor(model, work, length):
     return total * ROUNDOFF * ROUNDOFF
 
 
-@merged
+@inner
 def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length):
     """Advance the memory by one step.
 
@@ -230,7 +230,7 @@ def write_row(model, work, memory, t, rows):
     rows.diagnostics[k, 11] = memory.work[1]
 
 
-@merged
+@inner
 def advance(model, work, memory, t0, h, first, n_steps, every, coefficients, tolerance, max_iterations, length, rows):
     """Advance by n_steps, the first of them number `first` from t0; write a row after every `every`-th.
 

@@ -1,17 +1,24 @@
-"""The model and the working arrays as the inner functions see them: one pointer each instead of hundreds of arguments.
+"""The model and the working arrays as the kernels see them: each is one pointer to a table of addresses and shapes.
 
-Python hands plain tuples of arrays to the entries; an entry packs each into a structure and passes that on. (Passed
-on as tuples they would cost each inner function some nine hundred machine arguments, and minutes of compilation.)
+A table has for each field of the kind (`Model`, `Work`, ...) the address of its array, then its shape; a kernel that
+reads `work.m_r` gets the array back from there. Tables and arrays belong to Python, so that the kernels count no
+references; numbers in a table do not change while a kernel runs, so that they may be kept in registers.
 """
 
 import numpy as np
-from numba import typeof, types
-from numba.experimental import structref
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
+from numba.np.arrayobj import make_array, populate_array
 
-from floatframe.kernels.compilation import merged
+from cms.arrays import IntArray
+from floatframe.kernels.block import Block
 from floatframe.kernels.model import Memory, Model, Rows, Work
 
-__all__ = ["pack_memory", "pack_model", "pack_rows", "pack_work"]
+__all__ = ["as_memory", "as_model", "as_rows", "as_work", "table_of"]
 
 N_DIMENSIONS = {  # of the fields that are not vectors
     "S": 2, "J0": 3, "block0": 2, "is_diagonal": 2, "m_position": 2, "m_triad": 3, "row_x": 2, "row_y": 2,
@@ -21,30 +28,80 @@ N_DIMENSIONS = {  # of the fields that are not vectors
     "P": 3, "V": 3, "Z": 3, "p": 2,
 }  # fmt: skip
 N_DIMENSIONS_ROWS = {"r": 3, "p": 3, "q": 2, "u": 2, "u_dot": 2, "w": 2, "diagnostics": 2, "drift": 3}
+WORD = ir.IntType(64)
 
 
-@structref.register
-class Structure(types.StructRef):
-    """A heap object with named arrays."""
+class Structure(types.Type):
+    """A pointer to a table, with a named array for each field."""
+
+    def __init__(self, kind):
+        self.fields = {}  # name: (type of the array, where its address stands)
+        n_dimensions = N_DIMENSIONS_ROWS if kind is Rows else N_DIMENSIONS
+        place = 0
+        for name, annotation in kind.__annotations__.items():
+            number = types.int64 if "int" in str(annotation).lower() else types.float64
+            n = n_dimensions.get(name, 1)
+            self.fields[name] = (Block(number, n), place)
+            place += 1 + n
+        super().__init__(f"Structure({kind.__name__})")
 
 
-def packer(kind, n_dimensions):
-    """Return a compiled function from a tuple of arrays to the structure with the same fields.
-
-    The assignments are written out as source text, since numba knows no loop over the names of fields.
-    """
-    fields = []
-    for name, annotation in kind.__annotations__.items():
-        dtype = np.int64 if "int" in str(annotation) else np.float64
-        fields.append((name, typeof(np.zeros((1,) * n_dimensions.get(name, 1), dtype))))
-    lines = [f"    packed.{name} = data.{name}" for name, _ in fields]
-    text = "\n".join(["def pack(data):", "    packed = new(structure)", *lines, "    return packed"])
-    scope = {"new": structref.new, "structure": Structure(fields)}
-    exec(text, scope)
-    return merged(scope["pack"])
+register_model(Structure)(models.OpaqueModel)
 
 
-pack_model = packer(Model, N_DIMENSIONS)
-pack_work = packer(Work, N_DIMENSIONS)
-pack_memory = packer(Memory, N_DIMENSIONS)
-pack_rows = packer(Rows, N_DIMENSIONS_ROWS)
+@infer_getattr
+class StructureFields(AttributeTemplate):
+    """Types of the fields."""
+
+    key = Structure
+
+    def generic_resolve(self, structure, name):
+        """Return the type of a field, None if there is none of that name."""
+        return structure.fields.get(name, (None,))[0]
+
+
+@lower_getattr_generic(Structure)
+def get_field(context, builder, structure, pointer, name):
+    """Return the array of a field, made of the address and the shape in the table."""
+    kind, place = structure.fields[name]
+    table = builder.bitcast(pointer, WORD.as_pointer())
+    words = []
+    for k in range(1 + kind.ndim):
+        word = builder.load(cgutils.gep_inbounds(builder, table, place + k))
+        word.set_metadata("invariant.load", builder.module.add_metadata([]))
+        words.append(word)
+    array = make_array(kind)(context, builder)
+    item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    shape, strides = words[1:], [WORD(item)]
+    for n in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], n))
+    data = builder.inttoptr(words[0], context.get_data_type(kind.dtype).as_pointer())
+    populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
+    return array._getvalue()
+
+
+def converter(kind):
+    """Return a compiled function from a table to the structure of that kind."""
+    structure = Structure(kind)
+
+    @intrinsic
+    def convert(typing_context, table):
+        def generate(context, builder, signature, arguments):
+            array = make_array(signature.args[0])(context, builder, arguments[0])
+            return builder.bitcast(array.data, cgutils.voidptr_t)
+
+        return structure(table), generate
+
+    return convert
+
+
+as_model, as_work, as_memory, as_rows = converter(Model), converter(Work), converter(Memory), converter(Rows)
+
+
+def table_of(data: Model | Work | Memory | Rows) -> IntArray:
+    """Return addresses and shapes of the arrays, which the caller keeps alive."""
+    words: list[int] = []
+    for array in data:
+        words.append(array.__array_interface__["data"][0])
+        words += array.shape
+    return np.array(words, np.int64)
