@@ -25,6 +25,8 @@ from .errors import (
 from .errors import (
     SystemFileError as SystemFileError,
 )
+from .export import export_csv as export_csv
+from .export import export_vtk as export_vtk
 from .flexible_body import FlexibleBody as FlexibleBody
 from .forces import Gravity as Gravity
 from .forces import PointForce as PointForce
@@ -42,6 +44,10 @@ from .joints import RevoluteJoint as RevoluteJoint
 from .joints import SphericalJoint as SphericalJoint
 from .markers import Marker as Marker
 from .rigid_body import RigidBody as RigidBody
+from .sensors import interface_motion as interface_motion
+from .sensors import largest_von_mises as largest_von_mises
+from .sensors import nodal_stress as nodal_stress
+from .sensors import point_motion as point_motion
 from .state import State as State
 from .system import System as System
 from .trajectory import Trajectory as Trajectory

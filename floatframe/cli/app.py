@@ -251,4 +251,40 @@ def animate_command(
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
+@app.command("export")
+@guarded
+def export_command(
+    file: ResultsFile,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="A .csv table, or a .pvd series.")] = None,
+    every: Annotated[int, typer.Option(min=1, help="Take every so many output times (.pvd).")] = 1,
+) -> None:
+    """Write a motion for other programs: a table, or deformed surfaces with stress for ParaView.
+
+    Without -o a table stands beside the results: swing.h5 gives swing.csv.
+
+    Example: floatframe export swing.h5 -o swing.csv
+
+    Example: floatframe export swing.h5 -o swing.pvd --every 10
+    """
+    from floatframe.animation import bodies_of
+    from floatframe.errors import ResultsError
+    from floatframe.export import export_csv, export_vtk
+    from floatframe.trajectory import read_results
+
+    trajectory = read_results(file)
+    path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file,))
+    bodies = bodies_of(trajectory)
+    if path.suffix.lower() == ".csv":
+        export_csv(trajectory, path, bodies)
+        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    elif path.suffix.lower() == ".pvd":
+        with stages(remaining=True) as clock, clock("surfaces") as advance:
+            written = export_vtk(
+                trajectory, bodies, path, every=every, on_frame=lambda done, all_: advance(done / all_)
+            )
+        say(f"wrote {path} and {len(written) - 1} surfaces in {path.with_suffix('')}")
+    else:
+        raise ResultsError(f"--output {path}: expected a file name that ends in .csv or .pvd")
+
+
 analyses.register(app)
