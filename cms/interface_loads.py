@@ -103,7 +103,14 @@ def condensed_load(neighbour: FEBody, interfaces: Mapping[str, str]) -> Interfac
     to_motion = la.block_diag(*[_to_interface_axes(interface) for interface in shared])
     with Families(replace(neighbour, interfaces=shared)) as families:
         Psi = families.Psi_C[:, : 6 * len(shared)] @ to_motion.T
-    return InterfaceLoad(tuple(interfaces), _gram(Psi, neighbour.M @ Psi), _gram(Psi, neighbour.K @ Psi))
+        rigid = to_motion @ families.Psi_R[families.body.b]
+    # a free body has no energy in its rigid-body motions: rounding there would be a spring, or a negative one
+    size = np.where(np.arange(len(rigid)) % 6 < 3, 1.0, 1 / neighbour.length)
+    elastic = la.null_space((rigid / size[:, None]).T)
+    keep = (size[:, None] * elastic) @ (elastic.T / size)
+    return InterfaceLoad(
+        tuple(interfaces), _gram(Psi, neighbour.M @ Psi), keep.T @ _gram(Psi, neighbour.K @ Psi) @ keep
+    )
 
 
 def boundary_load(body: FEBody, loads: Sequence[InterfaceLoad]) -> tuple[Array, Array]:
