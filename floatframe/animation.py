@@ -83,7 +83,7 @@ def bodies_of(trajectory: Trajectory) -> dict[str, ReducedBody]:
                 raise ResultsError(
                     f"body {entry.name!r}: {entry.source} has changed since the motion was computed; run it again"
                 )
-            found[entry.name] = read(entry.source)
+            found[entry.name] = read(entry.source, units=trajectory.units)
     return found
 
 

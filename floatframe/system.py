@@ -52,8 +52,8 @@ class System:
             if isinstance(body, FlexibleBody) and body.reduced.units != self.units:
                 raise ModelError(
                     f"{where}: flexible body {body.name!r} is in units {body.reduced.units.name!r}, but "
-                    f"the system in {self.units.name!r}; give the system the units of the body, or "
-                    "reduce the body again in those of the system"
+                    f"the system in {self.units.name!r}; give the system the units of the body, or read the body in "
+                    f"those of the system: cms.read(file, units={self.units.name!r})"
                 )
 
     @cached_property

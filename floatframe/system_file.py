@@ -8,6 +8,7 @@
 All of them raise `FloatframeError`, whose text is one message for the user.
 """
 
+import logging
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,11 +18,11 @@ import numpy as np
 from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
 from cms.errors import CmsError
-from cms.modal_file import read
+from cms.modal_file import convert_units, read
 from cms.paths import near_file
 from cms.reduced_body import ReducedBody
 from cms.toml_file import Matrix3, Table, Vector3, choice, numbers, read_toml, validated
-from cms.units import UNIT_SYSTEMS, unit_system
+from cms.units import UNIT_SYSTEMS, Units, unit_system
 from cms.words import nearest
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
 from floatframe.flexible_body import FlexibleBody
@@ -35,6 +36,8 @@ from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.system import Body, System
 
 __all__ = ["RunOptions", "read_system"]
+
+log = logging.getLogger(__name__)
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
@@ -245,20 +248,21 @@ def read_system(path: str | os.PathLike[str]) -> tuple[System, RunOptions]:
     data = validated(SystemFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)
     files: dict[Path, ReducedBody] = {}
     try:
-        bodies = [body_of(name, section, files) for name, section in data.bodies.items()]
+        units = unit_system(data.system.units)
+        bodies = [body_of(name, section, files, units) for name, section in data.bodies.items()]
         joints = [joint_of(name, section) for name, section in data.joints.items()]
         forces: list[Force] = [force_of(name, section) for name, section in data.forces.items()]
         if any(data.system.gravity):
             forces.insert(0, Gravity(np.array(data.system.gravity)))
-        system = System(bodies, joints, forces, unit_system(data.system.units), data.system.name or path.stem)
+        system = System(bodies, joints, forces, units, data.system.name or path.stem)
         _ = system.compiled  # markers and interfaces are looked up here
     except (FloatframeError, CmsError) as error:
         raise SystemFileError(f"{path}: {error}") from error
     return system, RunOptions(**data.run.model_dump())
 
 
-def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody]) -> Body:
-    """Return the body of a table; a modal file is read once for all its instances."""
+def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody], units: Units) -> Body:
+    """Return the body of a table; a modal file is read once for all its instances, and converted to the units."""
     if section.euler_parameters is not None:
         orientation = np.array(section.euler_parameters)
     else:
@@ -275,9 +279,13 @@ def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody]) -> 
         return RigidBody(name, section.mass, np.array(section.inertia), center_of_mass=np.array(center), **motion)
     if section.file not in files:
         try:
-            files[section.file] = read(section.file)
+            reduced = read(section.file)
+            files[section.file] = convert_units(reduced, units)
         except CmsError as error:
             raise ModelError(f"bodies.{name}.file: {error}") from error
+        if reduced.units != units:
+            log.warning("%s is in units %s: converted to those of the system, %s", section.file, reduced.units.name,
+                        units.name)  # fmt: skip
     return FlexibleBody(name, files[section.file], source=str(section.file.resolve()), **motion)
 
 

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from cms.modal_file import write
+from floatframe.animation import bodies_of
 from floatframe.cli.app import app
 from floatframe.cli.record import run_record
 from floatframe.energy_balance import balance_defect, energy_scale
@@ -231,10 +232,14 @@ def test_a_damaged_modal_file_is_refused(folder):
     assert sorted(contents(folder)) == sorted(before)
 
 
-def test_bodies_in_other_units_are_refused(folder):
+def test_bodies_in_other_units_are_converted_with_a_note(folder, caplog):
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "spin.toml").write_text(FLEXIBLE.replace("mm-t-s", "m-kg-s"))
-    assert_refused(run("run", folder / "spin.toml"), "mm-t-s", "m-kg-s")
+    result = run("run", folder / "spin.toml", "-o", folder / "spin.h5")
+    assert result.exit_code == 0
+    assert "part.h5 is in units mm-t-s: converted to those of the system, m-kg-s" in caplog.text
+    part = bodies_of(read_results(folder / "spin.h5"))["part"]
+    assert_allclose(part.nodes, synthetic_reduced_body().nodes / 1000, rtol=1e-14)
 
 
 def test_the_output_is_checked_before_the_work(folder):

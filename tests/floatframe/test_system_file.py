@@ -117,7 +117,6 @@ def test_file_becomes_the_system_it_describes(write):
         ("h = 1e-3", "h = 0", "run.h = 0: expected a number above 0"),
         ("rho_inf = 0.7", "rho_inf = 1.7", "run.rho_inf = 1.7"),
         ("[system]", "[system", "not valid TOML"),
-        ("units = \"m-kg-s\"", "units = \"mm-t-s\"", "flexible body 'rod' is in units 'm-kg-s'"),
     ],
 )  # fmt: skip
 def test_mistakes_are_answered_with_key_value_and_choices(write, old, new, words):
@@ -130,6 +129,32 @@ def test_a_damaged_modal_file_is_named_with_its_key(write, tmp_path):
     (tmp_path / "rod.h5").write_bytes(b"nothing")
     with pytest.raises(SystemFileError, match=r"bodies\.rod\.file: .*rod\.h5"):
         read_system(path)
+
+
+MILLIMETRES = [
+    ("m-kg-s", "mm-t-s"), ("-9.81", "-9810"), ("position = [0, 0, 1]", "position = [0, 0, 1000]"), ("2.0", "2.0e-3"),
+    ("[[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]", "[[100, 0, 0], [0, 100, 0], [0, 0, 100]]"),
+    ("position = [1, 0, 1]", "position = [1000, 0, 1000]"), ("[2, 0, 0]", "[2000, 0, 0]"),
+    ("stiffness = 10", "stiffness = 0.01"), ("damping = 0.5", "damping = 0.5e-3"),
+]  # fmt: skip
+
+
+def test_a_file_in_other_units_is_converted_with_a_note_and_moves_the_same(write, caplog):
+    """The same pendulum written in metres and in millimetres, both with the file in metres."""
+    motions = []
+    for changes in ([], MILLIMETRES):
+        system, run = read_system(write(*changes))
+        motions.append(integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every))
+    assert [r.getMessage().split("rod.h5 ")[1] for r in caplog.records] == [
+        "is in units m-kg-s: converted to those of the system, mm-t-s"
+    ]
+    metres, millimetres = motions
+    for name in ("rod", "bob"):
+        a, b = metres.body(name).r, millimetres.body(name).r
+        assert np.abs(a - a[0]).max() > 1e-3
+        assert_allclose(b / 1000, a, rtol=0, atol=1e-7 * np.abs(a - a[0]).max())
+    q = metres.body("rod").q  # mass^(1/2) length
+    assert_allclose(millimetres.body("rod").q * np.sqrt(1e3) * 1e-3, q, rtol=0, atol=1e-6 * np.abs(q).max())
 
 
 def test_two_instances_read_their_file_once(write):
