@@ -18,6 +18,8 @@ from .frf import frequency_grid as frequency_grid
 from .frf import response_comparison as response_comparison
 from .full_reference import FullReference as FullReference
 from .full_reference import usable_band as usable_band
+from .held_mass import HeldMass as HeldMass
+from .held_mass import held_mass as held_mass
 from .interface_stiffening import InterfaceStiffening as InterfaceStiffening
 from .interface_stiffening import interface_stiffening as interface_stiffening
 from .limits import LIMITS as LIMITS

@@ -1,6 +1,6 @@
 """Everything a reduced body can be asked without its full model."""
 
-from cms.quality.effective_mass import check_effective_mass
+from cms.quality.effective_mass import check_driven_mass
 from cms.quality.identities import (
     check_energy_shares,
     check_frame_condition,
@@ -27,7 +27,7 @@ BODY_CHECKS = (
     check_rigid_interfaces,
     check_interface_motions,
     check_energy_shares,
-    check_effective_mass,
+    check_driven_mass,
     check_step_size,
     check_damping,
     check_dropped_columns,

@@ -12,7 +12,7 @@ from cms.quality.record import QualityRecord, information, judge
 from cms.reduced_body import ReducedBody
 from cms.rigid_modes import rigid_motion_of_points
 
-__all__ = ["EffectiveMass", "check_effective_mass", "effective_mass"]
+__all__ = ["EffectiveMass", "check_driven_mass", "effective_mass"]
 
 DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
@@ -70,31 +70,31 @@ def total_scale(total: Array) -> Array:
     return np.repeat([total[:3].max(), total[3:].max()], 3)
 
 
-def check_effective_mass(reduced: ReducedBody) -> QualityRecord:
-    """Largest share of translational mass that no mode represents, over the interfaces that can be held."""
+def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
+    """Largest share of translational mass in no mode, over the interfaces that can be held.
+
+    It holds the mass that rides on the interface in the full model too, and what higher modes would carry; the full
+    model tells them apart ("effective-mass").
+    """
     if reduced.n_q == 0:
-        return information("effective-mass", "the body has no modes")
-    found = [
-        effective_mass(reduced, interface.name)
-        for interface in reduced.interfaces
-        if can_be_held(reduced, interface.name)
-    ]
-    if not found:
-        return information("effective-mass", "the body has no interface that could be driven")
+        return information("driven-mass", "the body has no modes")
+    held = [interface.name for interface in reduced.interfaces if can_be_held(reduced, interface.name)]
+    if not held:
+        return information("driven-mass", "the body has no interface that could be driven")
+    found = [effective_mass(reduced, name) for name in held]
     largest = max(found, key=lambda one: one.remainder[:3].max())
     remainder = largest.remainder
     axis = int(np.argmax(remainder[:3]))
-    reason = (
-        f"driven at {largest.at!r} along {'xyz'[axis]}, the modes carry {100 * (1 - remainder[axis]):.1f} % of "
-        "the mass; " + ", ".join(f"{name} {100 * (1 - r):.0f} %" for name, r in zip(DIRECTIONS, remainder, strict=True))
+    reason = f"driven at {largest.at!r}, the modes carry of mass and inertia " + ", ".join(
+        f"{name} {100 * (1 - r):.0f} %" for name, r in zip(DIRECTIONS, remainder, strict=True)
     )
     data = {
-        "interfaces": [one.at for one in found],
+        "interfaces": held,
         "remainder": np.array([one.remainder for one in found]),
         "frequencies_hz": [one.frequencies for one in found],
         "share": [one.share for one in found],
     }
-    return judge("effective-mass", remainder[axis], reason, data)
+    return judge("driven-mass", remainder[axis], reason, data)
 
 
 def can_be_held(reduced: ReducedBody, at: str) -> bool:

@@ -52,10 +52,7 @@ LIMITS: dict[str, Limit] = {
         "add constraint or attachment modes: joints at these interfaces meet a body that cannot follow",
     ),
     "energy-shares": Limit("energy shares of the sources sum to one", 1e-9, 1e-3, REDUCE_AGAIN),
-    "effective-mass": Limit(
-        "effective mass that the modes leave out", 0.1, None,
-        "add fixed-interface modes or inertia-relief modes, or accept it if the missing direction is not driven",
-    ),
+    "driven-mass": Limit("mass that does not vibrate when one interface is driven", None, None, ""),
     "dropped-columns": Limit(
         "redundant columns that were dropped", None, None,
         "",
@@ -112,6 +109,10 @@ LIMITS: dict[str, Limit] = {
     "residual-bound": Limit(
         "guaranteed distance of the frequencies in the band to true ones", 0.1, None,
         "keep more modes; the true error is at most this and mostly near its square",
+    ),
+    "effective-mass": Limit(
+        "effective mass of vibration with the interfaces held that the modes leave out", 0.1, None,
+        "add fixed-interface modes or inertia-relief modes, or accept it if the missing direction is not driven",
     ),
     "conditioning": Limit(
         "condition of the mode set's columns", 1e8, 1e13,

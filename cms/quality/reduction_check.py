@@ -12,6 +12,7 @@ from cms.quality.frequencies import compare_frequencies, frequency_records
 from cms.quality.frf import response_comparison, response_record
 from cms.quality.full_reference import FullReference, usable_band
 from cms.quality.full_shapes import full_shapes, same_body_record
+from cms.quality.held_mass import held_mass, held_mass_record
 from cms.quality.interface_stiffening import interface_stiffening, stiffening_record
 from cms.quality.mass_properties import check_grounding, check_invariants, check_mass_properties
 from cms.quality.port_model import port_model
@@ -80,6 +81,7 @@ def check_reduction(
     if body.interfaces:
         records.append(response_record(response_comparison(reference, port_model(reduced))))
     records.append(residual_record(residual_bounds(reference, basis)))
+    records.append(held_mass_record(held_mass(reference, basis)))
     condition, _ = column_condition(body, modes, float(basis.omega2[0]))
     records += [conditioning_record(condition, modes.columns.shape[1]), dropped_record(basis, modes.columns.shape[1])]
     if uncoupled is not None and any(interface.kind != "nodes" for interface in uncoupled.interfaces):

@@ -18,6 +18,7 @@ from cms.quality.errors import QualityError
 from cms.quality.free_basis import FreeBasis, free_basis, ritz_basis
 from cms.quality.frequencies import compare_frequencies, mac
 from cms.quality.full_reference import FullReference, usable_band
+from cms.quality.held_mass import held_mass
 from cms.quality.interface_stiffening import interface_stiffening
 from cms.quality.mass_properties import check_grounding, rigid_mass_matrix
 from cms.quality.reduction_check import check_reduction
@@ -208,6 +209,22 @@ def test_the_rigid_mass_of_a_file_is_that_of_the_mass_matrix_about_the_mesh_orig
     Psi_R = geometric_rigid_modes(body)
     wanted = Psi_R.T @ (body.M @ Psi_R)
     assert_allclose(rigid_mass_matrix(reduced), wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
+
+
+def test_effective_masses_with_the_interfaces_held_are_those_of_the_fixed_modes(body, reference):
+    """L_k² of a dense solution with the interfaces held; over all modes they sum to the held mass of the full model."""
+    i = body.i
+    lam, Phi = la.eigh(body.K.toarray()[np.ix_(i, i)], body.M.toarray()[np.ix_(i, i)])
+    d = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    wanted = (Phi.T @ (body.M @ d)[i]) ** 2
+    found = held_mass(reference, basis_of(reference, craig_bampton(body, n_modes=7)))
+    assert_allclose(found.frequencies, np.sqrt(lam[:7]) / (2 * np.pi), rtol=1e-7)
+    assert_allclose(found.mass, wanted[:7], rtol=0, atol=1e-7 * wanted.max())
+    assert_allclose(found.total, wanted.sum(axis=0), rtol=1e-8)
+    assert_allclose(found.rigid[:3], 15.7, rtol=1e-9)
+    none = held_mass(reference, basis_of(reference, guyan(body)))
+    assert none.mass.shape[0] == 0
+    assert_allclose(none.remainder, 1, rtol=1e-9)
 
 
 def test_a_spring_to_the_ground_is_found_with_the_frequency_of_the_swing(body):
