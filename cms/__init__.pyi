@@ -1,3 +1,4 @@
+from .centrifugal import centrifugal_loads as centrifugal_loads
 from .characteristic_modes import with_characteristic_modes as with_characteristic_modes
 from .couplings import couple as couple
 from .damping import ModalDamping as ModalDamping
@@ -5,7 +6,6 @@ from .damping import PerModeDamping as PerModeDamping
 from .damping import RampDamping as RampDamping
 from .damping import RayleighDamping as RayleighDamping
 from .errors import CmsError as CmsError
-from .extra_columns import centrifugal_loads as centrifugal_loads
 from .extra_columns import with_centrifugal as with_centrifugal
 from .extra_columns import with_load_cases as with_load_cases
 from .families import Families as Families

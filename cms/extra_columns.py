@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from cms.arrays import Array
+from cms.centrifugal import CENTRIFUGAL, centrifugal_loads
 from cms.errors import ModeSetError
 from cms.families import Families
 from cms.fe_body import FEBody
@@ -14,10 +15,8 @@ from cms.mode_set import ModeSet
 from cms.mode_sets.selection import families_of
 from cms.words import nearest
 
-__all__ = ["CENTRIFUGAL", "EXTRA_COLUMNS", "centrifugal_loads", "with_centrifugal", "with_load_cases"]
+__all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
 
-CENTRIFUGAL = "centrifugal"  #: kind of the load cases of `centrifugal_loads`
-PRODUCTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: omega_a omega_b, one load each
 IN_THE_SPAN = 1e-6  #: part of a response, in the energy norm, below which the set has it already
 ROUNDING = 1e-13  #: energy, of that of the dofs one by one, below which a column is rigid-body motion
 
@@ -93,31 +92,6 @@ def with_centrifugal(modes: ModeSet, body: FEBody, *, families: Families | None 
 
 
 EXTRA_COLUMNS: dict[str, Callable[..., ModeSet]] = {"load-cases": with_load_cases, "centrifugal": with_centrifugal}
-
-
-def centrifugal_loads(body: FEBody) -> tuple[LoadCase, ...]:
-    """Return the loads -∫ ρ [e_a × (e_b × c) + e_b × (e_a × c)] / 2 of the products omega_a omega_b, a load case each.
-
-    The field is linear in the position c, which isoparametric elements interpolate exactly, so f = M u with its nodal
-    values is exact for consistent mass. It has no curl, so nodal rotations take none of it; couples of a beam's section
-    are left out. The origin does not matter: another one adds a uniform field, which a rigid-body acceleration
-    balances. A rotation ω loads the body with Σ over a, b of omega_a omega_b f_ab: the mixed ones count twice.
-
-    Parameters
-    ----------
-    body
-        Before coupling, where it will have rigid interfaces.
-    """
-    cases = []
-    node, component = body.dofs.T
-    is_translation = (component >= 0) & (component < 3)
-    for product in PRODUCTS:
-        a, b = (np.eye(3)["xyz".index(letter)] for letter in product)
-        field = -(np.cross(a, np.cross(b, body.nodes)) + np.cross(b, np.cross(a, body.nodes))) / 2
-        u = np.zeros(body.n_dof)
-        u[is_translation] = field[node[is_translation], component[is_translation]]
-        cases.append(LoadCase(f"{CENTRIFUGAL} {product}", CENTRIFUGAL, body.M @ u))
-    return tuple(cases)
 
 
 def _with_responses(

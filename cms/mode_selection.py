@@ -273,10 +273,10 @@ def _sentence(
     modes = "no vibration modes are" if chosen.n_modes == 0 else f"{chosen.n_modes} modes are the fewest"
     text = (
         f"{name}: {modes} needed for {words} of at most {error:g} from {band[0]:g} to {band[1]:g} Hz: "
-        f"{chosen.error:.2g} with these {chosen.n_columns} columns, {chosen.where}"
+        f"{chosen.error:.3g} with these {chosen.n_columns} columns, {chosen.where}"
     ).replace("fewest needed", "fewest")
     if before is not None:
-        text += f"; {before.error:.2g} with one mode less"
+        text += f"; {before.error:.3g} with one mode less"
     return text
 
 

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.linalg.lapack import dpstrf
 
 from cms.arrays import Array
+from cms.centrifugal import CENTRIFUGAL
 from cms.errors import FactorizationError, ModeSetError
 from cms.factorization import factorize
 from cms.families import Families
@@ -68,7 +69,7 @@ def krylov(
     band
         Frequencies (from, to) over which the error is estimated [Hz].
     load_cases
-        Whether the body's load cases are among the loads.
+        Whether the body's load cases are among the loads; centrifugal ones never are, their response is static.
     families
         Mode families to share; made and freed here by default.
 
@@ -81,7 +82,7 @@ def krylov(
     _check(n_modes, n_blocks, shifts, tolerance, band)
     body.require_coupled()
     require_interfaces("krylov", body)
-    cases = body.load_cases if load_cases else ()
+    cases = [case for case in body.load_cases if load_cases and case.kind != CENTRIFUGAL]
     F_extra = np.array([case.f for case in cases]).T if cases else np.zeros((body.n_dof, 0))
     with ExitStack() as stack:
         families = stack.enter_context(families_of(body, families))

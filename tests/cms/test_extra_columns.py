@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cms.centrifugal import centrifugal_loads
 from cms.couplings import couple
 from cms.errors import ModeSetError
-from cms.extra_columns import centrifugal_loads, with_centrifugal, with_load_cases
+from cms.extra_columns import with_centrifugal, with_load_cases
 from cms.families import Families
 from cms.fe_body import Interface
 from cms.load_cases import LoadCase

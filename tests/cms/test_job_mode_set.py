@@ -5,9 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
+from cms.centrifugal import centrifugal_loads
 from cms.cli.job_mode_set import job_mode_set
 from cms.couplings import couple
-from cms.extra_columns import centrifugal_loads, with_centrifugal, with_load_cases
+from cms.extra_columns import with_centrifugal, with_load_cases
 from cms.job import ReductionSection
 from cms.job_reduction import MEASURE_NAMES
 from cms.load_cases import LoadCase

@@ -123,9 +123,9 @@ def test_the_sentence_says_what_was_chosen_and_why(body, families):
     n, columns = found.n_modes, 12 + found.n_modes
     assert found.sentence.startswith(
         f"craig-bampton: {n} modes are the fewest for a frequency error of at most 0.002 from 0 to 2500 Hz: "
-        f"{found.error:.2g} with these {columns} columns, largest at free mode "
+        f"{found.error:.3g} with these {columns} columns, largest at free mode "
     )
-    assert found.sentence.endswith(f"; {found.history[-2].error:.2g} with one mode less")
+    assert found.sentence.endswith(f"; {found.history[-2].error:.3g} with one mode less")
     assert found.modes.options["selected"] == found.sentence
 
 
@@ -179,7 +179,9 @@ def test_bad_options_are_refused(body, families, options, text):
 
 def test_an_error_that_cannot_be_met_tells_the_best():
     body = couple(bar(nx=2, kind="hexahedron"))
-    with pytest.raises(ModeSetError, match=r"does not meet a frequency error of 1e-09 .* with up to 11 modes; the best was 1"):
+    with pytest.raises(
+        ModeSetError, match=r"does not meet a frequency error of 1e-09 .* with up to 11 modes; the best was 1"
+    ):
         select_modes(body, error=1e-9, band=(0.0, 20_000.0))
 
 
