@@ -129,6 +129,21 @@ def view_command(
         say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
+@app.command("modes")
+@guarded
+def modes_command(
+    job: Annotated[Path, typer.Argument(help="Job file (TOML), see docs/job_file.md.")],
+    json: Annotated[bool, typer.Option("--json", help="Write the list as JSON, for other programs.")] = False,
+) -> None:
+    """List the modes of a job in words: which columns and shapes, in which order, in which frame; writes no file.
+
+    Example: cms modes rod.toml
+    """
+    from cms.cli.modes import list_modes
+
+    list_modes(job, as_json=json)
+
+
 @app.command("check")
 @guarded
 def check_command(

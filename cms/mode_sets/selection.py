@@ -86,8 +86,9 @@ def checked_modes(
     modes = find(n_modes=n_modes, cutoff=cutoff, verify=verify)
     if cutoff is not None and not len(modes.frequencies):
         first = find(n_modes=1, cutoff=None, verify=False).frequencies[0]
+        in_hertz = f"{cutoff / body.units.time:g} Hz, {first / body.units.time:.6g} Hz"
         raise ModeSetError(
             f"{name}: cutoff = {cutoff:g} lies below the first {kind} mode of body {body.name!r}, at {first:.6g} "
-            "(cycles per time unit of the body); choose a higher cutoff, or n_modes = 0"
+            f"({in_hertz}); choose a higher cutoff, or n_modes = 0"
         )
     return modes

@@ -1,0 +1,95 @@
+"""The command `cms modes`: the modes of a job in words: which columns, which shapes, which order, which frame."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from cms.cli.console import print_table, say, stages
+from cms.cli.record import body_record
+from cms.mode_set import ModeSet
+from cms.reduced_body import ReducedBody
+
+__all__ = ["list_modes", "mode_record"]
+
+FRAME_WORDS = {
+    "tisserand": "mean axes: the elastic shapes carry no linear and no angular momentum",
+    "nodal": "attached to nodes: six dofs there do not deform",
+    "buckens": "best fit: the elastic shapes have no mean translation and rotation of the nodes",
+}
+
+
+def list_modes(path: Path, *, as_json: bool) -> None:
+    """Make the mode set and the reduced body of a job, and print what they consist of; writes no file."""
+    from cms.cli.job_mode_set import job_mode_set
+    from cms.cli.reduce_job import frame_of, job_body
+    from cms.job import read_job
+    from cms.reduction import reduce
+
+    job = read_job(path)
+    with stages() as clock:
+        body = job_body(job, clock)
+        with clock(f"mode set {job.reduction.set}"):
+            modes = job_mode_set(body, job.reduction)
+        with clock("reduce"):
+            reduced = reduce(body, modes, frame=frame_of(job), stress=False)
+    record = mode_record(modes, reduced)
+    if as_json:
+        typer.echo(json.dumps(record, indent=2))
+    else:
+        print_modes(record)
+
+
+def mode_record(modes: ModeSet, reduced: ReducedBody) -> dict[str, Any]:
+    """Return the columns of a mode set and the modes of its reduced body, in plain types; frequencies in Hz."""
+    dropped = reduced.provenance.get("mode set redundant", "none").split("; ")
+    reduced_record = body_record(reduced)
+    return {
+        "body": reduced.name,
+        "set": modes.name,
+        "options": dict(modes.options),
+        "columns": [
+            {
+                "number": k + 1,
+                "label": label,
+                "frequency_hz": None if np.isnan(frequency) else float(frequency / reduced.units.time),
+                "dropped": label in dropped,
+            }
+            for k, (label, frequency) in enumerate(zip(modes.labels, modes.frequencies, strict=True))
+        ],
+        "rigid_body_motions_removed": int(reduced.provenance.get("mode set rigid-body motions removed", 0)),
+        "frame": reduced_record["frame"],
+        "modes": reduced_record["modes"],
+        "free_frequencies_hz": reduced_record["free_frequencies_hz"],
+    }
+
+
+def print_modes(record: dict[str, Any]) -> None:
+    """Print the record of `mode_record`."""
+    columns, n_dropped = record["columns"], sum(column["dropped"] for column in record["columns"])
+    say(f"Body {record['body']}, mode set {record['set']}: {len(columns)} columns, in this order")
+    print_table(
+        "Columns of the mode set",
+        ("column>", "Hz>", "what it is", ""),
+        [(c["number"], _hertz(c["frequency_hz"]), c["label"], "dropped" if c["dropped"] else "") for c in columns],
+    )
+    frame, n_rigid = record["frame"], record["rigid_body_motions_removed"]
+    at = f" at interface {frame['at']}" if frame["at"] else ""
+    say(f"{n_dropped} redundant columns dropped; {n_rigid} rigid-body motions removed, which the frame carries.")
+    say(f"Frame B: {frame['kind']}{at} ({FRAME_WORDS.get(frame['kind'], 'see docs/theory.md')});")
+    say(f"origin at ({', '.join(f'{x:.6g}' for x in frame['origin'])}) in mesh coordinates.\n")
+    print_table(
+        "Modes of the reduced body, the frame B held, by ascending frequency; static shapes last",
+        ("mode>", "Hz>", "energy from"),
+        [(mode["number"], _hertz(mode["frequency_hz"]), mode["label"]) for mode in record["modes"]],
+    )
+    free = ", ".join(_hertz(f) for f in record["free_frequencies_hz"])
+    say(f"The free body (no frame held) vibrates at [Hz]: {free or 'none'}")
+    options = [(key, value) for key, value in record["options"].items()]
+    print_table("Options", ("", ""), options)
+
+
+def _hertz(value: float | None) -> str:
+    return "static" if value is None else f"{value:.6g}"
