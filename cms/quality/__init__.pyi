@@ -5,6 +5,7 @@ from .deformation import DeformationError as DeformationError
 from .deformation import deformation_error as deformation_error
 from .deformation import deformation_record as deformation_record
 from .deformation import nodal_deformation_error as nodal_deformation_error
+from .deformation import recovered_displacements as recovered_displacements
 from .effective_mass import EffectiveMass as EffectiveMass
 from .effective_mass import effective_mass as effective_mass
 from .errors import QualityError as QualityError
@@ -43,3 +44,4 @@ from .transient import Snapshots as Snapshots
 from .transient import interface_forces as interface_forces
 from .transient import support_acceleration as support_acceleration
 from .transient import transient as transient
+from .transient import transient_in as transient_in

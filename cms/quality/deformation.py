@@ -21,7 +21,14 @@ from cms.quality.transient import Snapshots
 from cms.reduced_body import ReducedBody
 from cms.rigid_modes import rigid_motion_of_points
 
-__all__ = ["NORMS", "DeformationError", "deformation_error", "deformation_record", "nodal_deformation_error"]
+__all__ = [
+    "NORMS",
+    "DeformationError",
+    "deformation_error",
+    "deformation_record",
+    "nodal_deformation_error",
+    "recovered_displacements",
+]
 
 NORMS = ("M", "K", "nodal")
 NO_DEFORMATION = 1e-10  #: M-length of a motion without its rigid part over that with it, below which it is rounding
@@ -101,6 +108,44 @@ def nodal_deformation_error(reduced: ReducedBody, u: Array, t: Array) -> Deforma
     shapes = reduced.Phi.reshape(-1, reduced.n_q)
     error, size = nodal_lengths(u.reshape(-1, len(t)), rigid, shapes, np.eye(len(t)))
     return relative(t, {"nodal": error}, {"nodal": size})
+
+
+def recovered_displacements(source: ReducedBody, q: Array, into: ReducedBody) -> Array:
+    """Displacements of the kept nodes in a motion of one reduced body, in the axes of another of the same part.
+
+    Parameters
+    ----------
+    source
+        The body that moved, of a richer mode set.
+    q
+        Its modal coordinates over time, as a floatframe trajectory has them, (n_t, n_q).
+    into
+        The body that is judged; its kept nodes must be among those of the source.
+
+    Returns
+    -------
+    Array
+        For `nodal_deformation_error` of `into`, (n_kept, 3, n_t) [m].
+
+    Raises
+    ------
+    QualityError
+        If the modes do not fit, or a node is missing.
+    """
+    if q.ndim != 2 or q.shape[1] != source.n_q:
+        raise QualityError(
+            f"body {source.name!r}: has {source.n_q} modes, expected q (n_t, {source.n_q}), got {q.shape}"
+        )
+    row_of = {int(node): k for k, node in enumerate(source.node_ids)}
+    missing = [int(node) for node in into.node_ids if int(node) not in row_of]
+    if missing:
+        raise QualityError(
+            f"body {source.name!r}: lacks {len(missing)} nodes of {into.name!r}, first node {missing[0]}; both must be "
+            "reduced from one model"
+        )
+    rows = [row_of[int(node)] for node in into.node_ids]
+    turn = into.frame.axes.T @ source.frame.axes
+    return np.asarray(np.einsum("ab,nbk,tk->nat", turn, source.Phi[rows], q, optimize=True))
 
 
 def nodal_lengths(rows: Array, rigid: Array, shapes: Array, a: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from cms.quality.free_basis import FreeBasis, ritz_basis
 from cms.quality.ports import Ports
 from cms.rigid_modes import geometric_rigid_modes
 
-__all__ = ["LoadHistory", "Snapshots", "interface_forces", "support_acceleration", "transient"]
+__all__ = ["LoadHistory", "Snapshots", "interface_forces", "support_acceleration", "transient", "transient_in"]
 
 
 NO_LOAD = 1e-10  #: part of a load that is not in balance with rigid acceleration, below which it is rounding
@@ -137,9 +137,26 @@ def transient(
     body = families.body
     if load.F.shape[0] != body.n_dof:
         raise QualityError(f"transient: loads over {load.F.shape[0]} dofs, body {body.name!r} has {body.n_dof}")
-    if not (cutoff > 0 and 0 <= damping < 1):
-        raise QualityError(f"transient: cutoff = {cutoff}, damping = {damping}; expected above 0, and 0 to below 1")
+    if not cutoff > 0:
+        raise QualityError(f"transient: cutoff = {cutoff}; expected a frequency above 0 [Hz]")
     basis = transient_basis(families, load.F, cutoff * body.units.time, held)
+    return transient_in(basis, load, damping=damping, is_preloaded=is_preloaded)
+
+
+def transient_in(basis: FreeBasis, load: LoadHistory, *, damping: float = 0.0, is_preloaded: bool = False) -> Snapshots:
+    """Integrate a free body in the span of a mode set: a Guyan-reduced or otherwise richer reference, step (3) alone.
+
+    Parameters
+    ----------
+    basis
+        `free_basis` of the mode set.
+    damping, is_preloaded
+        As `transient`.
+    """
+    if load.F.shape[0] != len(basis.Phi):
+        raise QualityError(f"transient: loads over {load.F.shape[0]} dofs, the mode set has {len(basis.Phi)}")
+    if not 0 <= damping < 1:
+        raise QualityError(f"transient: damping = {damping}; expected 0 to below 1")
     p = (basis.Phi.T @ load.F) @ load.p
     q = modal_motion(basis, p, float(load.t[1] - load.t[0]), damping, is_preloaded=is_preloaded)
     return Snapshots(basis.Phi, q, load.t)

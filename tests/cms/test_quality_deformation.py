@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from cms.couplings import couple
 from cms.families import Families
 from cms.frames import NodalFrame, TisserandFrame
+from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS, craig_bampton, guyan
 from cms.quality.deformation import NORMS, deformation_error, deformation_record, nodal_deformation_error
 from cms.quality.errors import QualityError
@@ -20,6 +21,7 @@ from cms.quality.transient import (
     modal_motion,
     support_acceleration,
     transient,
+    transient_in,
 )
 from cms.reduction import reduce
 from cms.rigid_modes import geometric_rigid_modes
@@ -118,6 +120,17 @@ def test_all_interfaces_can_be_held_under_an_acceleration(body, families):
     found = transient(families, load, cutoff=5000.0, held=["left", "right"], damping=0.05).u[:, -1]
     wanted = -9.81 * families.Psi_H @ np.linalg.lstsq(families.Psi_R, geometric_rigid_modes(body)[:, 2], rcond=None)[0]
     assert_allclose(found, wanted, rtol=0, atol=1e-4 * np.abs(wanted).max())
+
+
+def test_a_motion_in_the_full_space_is_that_of_the_full_model_and_guyan_is_another(body, families, pulse, snapshots):
+    every = ModeSet("unit", np.eye(body.n_dof), [f"dof {k}" for k in range(body.n_dof)], np.full(body.n_dof, np.nan))
+    full = transient_in(free_basis(body, every, families), pulse).u
+    size = np.abs(full).max()
+    assert np.abs(snapshots.u - full).max() < 1e-4 * size
+    basis = free_basis(body, guyan(body), families)
+    condensed = transient_in(basis, pulse)
+    assert np.abs(condensed.u - full).max() > 1e-2 * size
+    assert deformation_error(body, basis, condensed).largest("K") < 1e-7
 
 
 def test_more_modes_change_the_reference_little(families, pulse, snapshots):
