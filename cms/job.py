@@ -18,6 +18,7 @@ from cms.job_beams import (
     check_beams,
     names,
 )
+from cms.job_damping import DampingSection
 from cms.job_reduction import ReductionSection, mode_set_options, named_interfaces
 from cms.load_cases import LOAD_CASE_KINDS
 from cms.paths import near_file
@@ -25,7 +26,7 @@ from cms.toml_file import Matrix3, Range, Table, Vector3, choice, read_toml, val
 from cms.units import UNIT_SYSTEMS
 from cms.words import nearest
 
-__all__ = ["SELECTIONS", "Job", "ReductionSection", "mode_set_options", "read_job"]
+__all__ = ["SELECTIONS", "DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
 
 SELECTIONS = ("faces", "nodes", "plane", "cylinder", "box", "nearest")  #: keys that select the nodes of an interface
 ACCEPTABLE = ("overlap", "parts", "transition", "units")  #: errors of the mesh report that may be meant
@@ -205,26 +206,6 @@ class LoadCaseSection(Table):
         return self
 
 
-class DampingSection(Table):
-    """[damping]: modal ratio or Rayleigh."""
-
-    ratio: Annotated[float, Field(ge=0)] | None = Field(
-        None, description="a number, 0 or more, of critical damping (0.01 is 1 %)"
-    )
-    alpha: Annotated[float, Field(ge=0)] | None = Field(
-        None, description="a number, 0 or more, of D = alpha M + beta K"
-    )
-    beta: Annotated[float, Field(ge=0)] | None = Field(None, description="a number, 0 or more, of D = alpha M + beta K")
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> "DampingSection":
-        rayleigh = [key for key in ("alpha", "beta") if getattr(self, key) is not None]
-        if (self.ratio is None) == (not rayleigh):
-            got = "none of them" if self.ratio is None else f"ratio and {', '.join(rayleigh)}"
-            raise ValueError(f"expected either ratio, or alpha and beta; got {got}")
-        return self
-
-
 class Job(Table):
     """A reduction job: one body, its materials, its interfaces, and how to reduce it."""
 
@@ -238,7 +219,9 @@ class Job(Table):
     interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")
     load_cases: dict[str, LoadCaseSection] = Field({}, description="tables [load_cases.NAME]")
     reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
-    damping: DampingSection | None = Field(None, description="a table [damping] with ratio, or alpha and beta")
+    damping: DampingSection | None = Field(
+        None, description="a table [damping] with ratio, ratios, ramp, or alpha and beta"
+    )
 
     @property
     def materials_of_cells(self) -> dict[str, MaterialSection]:

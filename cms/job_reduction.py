@@ -12,7 +12,7 @@ from cms.extra_columns import EXTRA_COLUMNS
 from cms.mode_sets import MODE_SETS
 from cms.paths import near_file
 from cms.static_modes import COMPONENTS
-from cms.toml_file import Range, Table, Vector3, choice, is_no_number
+from cms.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
 from cms.words import nearest
 
 __all__ = [
@@ -25,7 +25,7 @@ __all__ = [
     "named_interfaces",
 ]
 
-FRAMES = ("nodal", "tisserand")
+FRAMES = ("nodal", "tisserand", "buckens")
 MEASURE_NAMES = ("frequency", "frf")  #: of `cms.mode_selection`, whose import would cost every command its time
 SET_OPTIONS = (
     "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
@@ -153,6 +153,18 @@ class NeighbourSection(Table):
         return value
 
 
+def held_dofs(value: Any) -> tuple[tuple[int, int], ...]:
+    """Return six pairs of node and component."""
+    pairs = value if isinstance(value, list | tuple) else ()
+    good = [isinstance(p, list | tuple) and len(p) == 2 and all(type(x) is int and x >= 0 for x in p) for p in pairs]
+    if len(pairs) != 6 or not all(good) or any(component > 5 for _, component in pairs):
+        raise ValueError("expected six pairs [node, component 0-5], nodes counted from 0")
+    return tuple((node, component) for node, component in pairs)
+
+
+HeldDofs = Annotated[tuple[tuple[int, int], ...], BeforeValidator(held_dofs)]
+
+
 class ReductionSection(Table):
     """[reduction]: the mode set, its options, and the body frame."""
 
@@ -210,7 +222,10 @@ class ReductionSection(Table):
         "tisserand", description=f"one of {', '.join(FRAMES)}"
     )
     at: Name | None = Field(None, description="the name of an interface, which carries a nodal frame")
+    dofs: HeldDofs | None = Field(None, description="six pairs [node, component 0-5], which a nodal frame holds")
     origin: Vector3 | None = Field(None, description="the origin of the body frame in mesh coordinates, [x, y, z]")
+    axes: Matrix3 | None = Field(None, description="the axes of the body frame, [x axis, y axis, z axis]")
+    stress: bool | None = Field(None, description="true or false: whether to keep the stress of the modes")
 
     @field_validator("columns", mode="before")
     @classmethod
@@ -242,6 +257,9 @@ class ReductionSection(Table):
             raise ValueError("interfaces_together belongs to interface_modes or interface_cutoff; got neither")
         if self.at is not None and self.frame != "nodal":
             raise ValueError(f'at = "{self.at}" belongs to frame = "nodal"; got frame = "{self.frame}"')
+        if self.dofs is not None and (self.frame != "nodal" or self.at is not None):
+            got = f'at = "{self.at}"' if self.at is not None else f'frame = "{self.frame}"'
+            raise ValueError(f'dofs belong to frame = "nodal" without at; got {got}')
         return self
 
     def _options_of_auto(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from cms.reduced_body import ReducedBody
 from cms.units import unit_system
 
 if TYPE_CHECKING:
+    from cms.frames import Frame
     from fe_models.beams.line_mesh import LineMesh
     from fe_models.material import Material
     from fe_models.mesh import Mesh
@@ -49,7 +50,8 @@ def reduce_job(
     with stages(f"mode set {job.reduction.set}"):
         modes = job_mode_set(coupled, job.reduction)
     with stages("reduce"):
-        return reduce(coupled, modes, frame=frame_of(job), damping=damping_of(job))
+        damping = None if job.damping is None else job.damping.damping
+        return reduce(coupled, modes, frame=frame_of(job), damping=damping, stress=job.reduction.stress is not False)
 
 
 def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
@@ -62,8 +64,8 @@ def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any
 
 def coupled_body(job: Job, body: FEBody) -> FEBody:
     """Couple the interfaces of the body of a job, and make it planar where that is asked for."""
+    from cms.centrifugal import CENTRIFUGAL, centrifugal_loads
     from cms.couplings import couple
-    from cms.extra_columns import CENTRIFUGAL, centrifugal_loads
     from cms.job_beams import PLANES
 
     if CENTRIFUGAL in (job.reduction.extra or ()):
@@ -199,22 +201,11 @@ def load_case_of(name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh 
     return loads.selection_load(body, mesh, name, chosen, force=force, torque=torque, reference=section.reference)
 
 
-def frame_of(job: Job) -> Any:
+def frame_of(job: Job) -> "Frame":
     """Return the body frame of the job."""
-    from cms.frames import NodalFrame, TisserandFrame
+    from cms.frames import FRAMES, NodalFrame
 
     reduction = job.reduction
     if reduction.frame == "nodal":
-        return NodalFrame(reduction.at, reduction.origin)
-    return TisserandFrame(reduction.origin)
-
-
-def damping_of(job: Job) -> Any:
-    """Return the damping of the job, or None."""
-    from cms.damping import ModalDamping, RayleighDamping
-
-    if job.damping is None:
-        return None
-    if job.damping.ratio is not None:
-        return ModalDamping(job.damping.ratio)
-    return RayleighDamping(job.damping.alpha or 0.0, job.damping.beta or 0.0)
+        return NodalFrame(reduction.at, reduction.origin, reduction.axes, reduction.dofs)
+    return FRAMES[reduction.frame](origin=reduction.origin, axes=reduction.axes)

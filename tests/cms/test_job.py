@@ -5,7 +5,10 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from cms.cli.job_mode_set import load_of
+from cms.cli.reduce_job import frame_of
+from cms.damping import ModalDamping, PerModeDamping, RampDamping, RayleighDamping
 from cms.errors import JobError
+from cms.frames import BuckensFrame, NodalFrame
 from cms.job import (
     BodySection,
     DampingSection,
@@ -111,7 +114,7 @@ def test_a_good_job_is_read(job_file):
     ('at = "big_end"', 'at = "big_ent"', "\"big_ent\": there is no such interface; did you mean 'big_end'?"),
     ('frame = "nodal"', 'frame = "tisserand"', 'belongs to frame = "nodal"'),
     ('frame = "nodal"', 'frame = "modal"', "unknown frame; did you mean 'nodal'?"),
-    ("ratio = 0.01", "ratio = 0.01\nalpha = 1.0", "expected either ratio, or alpha and beta; got ratio and alpha"),
+    ("ratio = 0.01", "ratio = 0.01\nalpha = 1.0", "expected either ratio, ratios, ramp, or alpha and beta; got rat"),
     ("[damping]", "[dampning]", "dampning: unknown key; did you mean 'damping'?"),
     ("[reduction]", "[reductio]", "reductio: unknown key; did you mean 'reduction'?"),
     ("[damping]", "[interfaces.x]\nkind='rigid'\nbox=3\n[damping]", "interfaces.x.box = 3: expected a table {lo, hi}"),
@@ -127,6 +130,16 @@ def test_a_good_job_is_read(job_file):
     ('at = "small_end"\n', "", "expected exactly one of at, faces, nodes"),
     ('at = "small_end"', 'at = "smal_end"', "pull.at = \"smal_end\": there is no such interface; did you mean"),
     ('at = "small_end"', 'at = "small_end"\nreference = [0,0,0]', "an interface has its own"),
+    ("ratio = 0.01", "ratios = [0.01, -1]", "damping.ratios = [0.01, -1]: expected a list of numbers, 0 or mo"),
+    ("ratio = 0.01", "ramp = false", "damping.ramp = false: expected true, or pairs"),
+    ("ratio = 0.01", "ramp = [[100, 0.1], [50, 0.2]]", "expected true, or pairs [frequency in Hz, ratio below it]"),
+    ("ratio = 0.01", "ramp = [[100, -0.1]]", "expected true, or pairs [frequency in Hz, ratio below it]"),
+    ("ratio = 0.01", "ratio = 0.01\nabove = 1", "damping: above belongs to ramp; got ratio"),
+    ("ratio = 0.01", "ratio = 0.01\nramp = true", "expected either ratio, ratios, ramp, or alpha and beta; got"),
+    ('at = "big_end"', "dofs = [[0, 0]]", "expected six pairs [node, component 0-5], nodes counted from 0"),
+    ('at = "big_end"', "dofs = [[0,0],[0,1],[0,2],[1,0],[1,1],[1,6]]", "expected six pairs [node, component 0-5]"),
+    ('at = "big_end"', 'at = "big_end"\ndofs = [[0,0],[0,1],[0,2],[1,0],[1,1],[2,0]]', "without at; got at = "),
+    ('at = "big_end"', "axes = [[1, 0, 0]]", "reduction.axes = [[1, 0, 0]]: expected three rows"),
     ('[body]', '[body]\naccept = ["part"]', "'part' is not a finding that can be accepted; did you mean 'parts'?"),
     ('[body]', '[body]\nname = 3', "body.name = 3: expected the name of the body"),
     ('[body]', "body = 3\n[bodi]", "body = 3: expected a table [body]"),
@@ -215,13 +228,36 @@ def test_matrices_bring_their_interfaces_and_no_material(job_file, tmp_path):
         read_job(job_file(text + '[interfaces.a]\nkind = "nodes"\nnodes = "left"\n'))
 
 
+def test_dampings_and_frames_of_a_job_are_those_of_the_library(job_file):
+    def damping(text):
+        return read_job(job_file(GOOD.replace("ratio = 0.01", text))).damping.damping
+
+    assert damping("ratio = 0.02") == ModalDamping(0.02)
+    assert damping("ratios = [0.01, 0.02]") == PerModeDamping((0.01, 0.02))
+    assert damping("ramp = true") == RampDamping(((100.0, 0.01), (1000.0, 0.1)), 1.0)
+    assert damping("ramp = [[50, 0.02]]\nabove = 0.5") == RampDamping(((50.0, 0.02),), 0.5)
+    assert damping("beta = 1e-5") == RayleighDamping(0.0, 1e-5)
+    turned = "axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]"
+    job = read_job(
+        job_file(GOOD.replace('frame = "nodal"\nat = "big_end"', f'frame = "buckens"\n{turned}\nstress = false'))
+    )
+    axes = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    assert frame_of(job) == BuckensFrame(axes=axes)
+    assert job.reduction.stress is False
+    assert frame_of(read_job(job_file(GOOD))) == NodalFrame("big_end")
+    dofs = "dofs = [[0,0],[0,1],[0,2],[1,0],[1,1],[2,0]]"
+    held = frame_of(read_job(job_file(GOOD.replace('at = "big_end"', dofs))))
+    assert held == NodalFrame(dofs=((0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (2, 0)))
+
+
 def test_every_key_is_documented():
     text = DOCUMENT.read_text(encoding="utf-8")
     for table in (BodySection, MaterialSection, InterfaceSection, LoadCaseSection, ReductionSection, DampingSection):
         for key in table.model_fields:
             assert f"| `{key}` |" in text, f"{table.__name__}: {key}"
+    headings = " ".join(line for line in text.splitlines() if line.startswith("## "))
     for key in Job.model_fields:
-        assert f"## [{key}" in text
+        assert f"[{key}" in headings
 
 
 def test_the_documented_job_is_valid(job_file):
