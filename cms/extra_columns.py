@@ -130,7 +130,7 @@ def _with_responses(
 
 
 def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.ndarray]:
-    """Parts of the responses U to F that V cannot give, in the energy norm, and which of them count."""
+    """Parts of the responses U to F that neither V nor those before can give, K-orthonormal, and which of them count."""
     KV = body.K @ V
     G = V.T @ KV
     diagonal = np.abs(body.K.diagonal())
@@ -143,7 +143,12 @@ def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.
     rest = U
     for _ in range(2):  # twice is enough
         rest = rest - V @ np.linalg.lstsq(G, KV.T @ rest, rcond=ROUNDING)[0]
-    left = np.abs(np.einsum("nk,nk->k", rest, body.K @ rest))
-    # a load that rigid-body acceleration balances leaves rounding alone: far less than its dofs would do one by one
-    is_new = (left > IN_THE_SPAN**2 * energy) & (energy > IN_THE_SPAN**2 * local)
-    return rest[:, is_new], is_new
+    new, is_new = np.zeros((len(U), 0)), np.zeros(U.shape[1], bool)
+    for k in range(U.shape[1]):
+        x = rest[:, [k]] - new @ (new.T @ (body.K @ rest[:, [k]]))  # responses to proportional loads count once
+        left = abs(float(x[:, 0] @ (body.K @ x[:, 0])))
+        # a load that rigid-body acceleration balances leaves rounding alone: far less than its dofs would do one by one
+        is_new[k] = left > IN_THE_SPAN**2 * energy[k] and energy[k] > IN_THE_SPAN**2 * local[k]
+        if is_new[k]:
+            new = np.hstack([new, x / np.sqrt(left)])
+    return new, is_new

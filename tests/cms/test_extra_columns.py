@@ -16,7 +16,7 @@ from cms.reduction import reduce
 from cms.units import unit_system
 from fe_models.material import Material
 from fe_models.solid import solid_body
-from tests.bodies import bar, box_mesh, with_interfaces
+from tests.bodies import bar, beam, box_mesh, with_interfaces
 
 ROUNDOFF = 1e-12
 
@@ -86,6 +86,14 @@ def test_no_column_is_redundant_in_the_finished_basis(body):
 def test_adding_the_load_cases_twice_adds_nothing(body):
     once = with_load_cases(craig_bampton(body, n_modes=2), body)
     assert with_load_cases(once, body).columns.shape == once.columns.shape
+
+
+def test_proportional_loads_add_one_column():
+    """A straight beam takes the same centrifugal load about both axes across it, and none about its own."""
+    body = couple(beam(6))
+    more = with_centrifugal(craig_bampton(body, n_modes=0), body)
+    assert more.columns.shape[1] == 12 + 2 * 3  # yy or zz, xz, xy
+    assert reduce(body, more).provenance["mode set redundant"] == "none"
 
 
 def test_load_cases_can_be_named(body):
