@@ -130,7 +130,7 @@ def _with_responses(
 
 
 def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.ndarray]:
-    """Parts of the responses U to F that neither V nor those before can give, K-orthonormal, and which of them count."""
+    """K-orthonormal parts of the responses U to F that neither V nor those before can give, and which of them count."""
     KV = body.K @ V
     G = V.T @ KV
     diagonal = np.abs(body.K.diagonal())
