@@ -378,6 +378,49 @@ def test_offset_line_is_the_line_at_its_place_with_rigid_arms():
         assert_allclose(body.M.toarray(), one.M.toarray(), rtol=0, atol=ROUNDOFF * np.abs(one.M.data).max())
 
 
+def test_a_point_mass_has_the_inertia_it_was_given():
+    """Parallel axes: about the node J + m (d² 1 - d dᵀ)."""
+    J = np.array([[3.0, 0.2, 0.1], [0.2, 2.0, -0.3], [0.1, -0.3, 4.0]])
+    d = np.array([0.3, -0.2, 0.5])
+    mesh = fm.LineMesh([(0, 0, 0), (1, 0, 0)], np.zeros((0, 2), int))
+    spring = fm.Spring((0, 1), np.ones(6))
+    masses = [fm.PointMass(0, 2.0, J, d), fm.PointMass(1, 1.0, 1.0)]
+    M = fm.beam_body(mesh, {}, name="mass", units=SI, point_masses=masses, springs=[spring]).M.toarray()[:6, :6]
+    skew = np.array([[0, -d[2], d[1]], [d[2], 0, -d[0]], [-d[1], d[0], 0]])
+    expected = np.block([[2 * np.eye(3), -2 * skew], [2 * skew, J - 2 * skew @ skew]])
+    assert_allclose(M, expected, rtol=0, atol=1e-13)
+
+
+def test_both_shear_areas_act_in_their_own_plane():
+    shape = fm.ISection(0.1, 0.2, 0.006, 0.01)
+    section = shape.properties(0.3)
+    body = straight(1, shape, 0.5)
+    for dof, inertia, area in ((7, section.Iz, section.A_sy), (8, section.Iy, section.A_sz)):
+        u = static_solution(body, np.arange(6), dof, 1.0)[dof, 0]
+        assert_allclose(u, 0.5**3 / (3 * STEEL.E * inertia) + 0.5 / (STEEL.mu * area), rtol=1e-9)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Eccentric:
+    """A tube whose shear centre is said to lie elsewhere."""
+
+    def properties(self, nu):
+        return dataclasses.replace(fm.Tube(0.02, 0.003).properties(nu), shear_center=(0.03, -0.01))
+
+
+def test_torsion_stress_is_that_about_the_shear_center():
+    body = straight(2, Eccentric())
+    f = np.zeros((body.n_dof, 1))
+    f[13], f[15] = 1.0, 0.01  # a unit force along y at (y, z) = (0.03, -0.01) does not twist: M = -z F
+    free = np.arange(6, body.n_dof)
+    u = np.zeros((body.n_dof, 1))
+    u[free] = np.linalg.solve(body.K.toarray()[np.ix_(free, free)], f[free])
+    stress = body.element_model.nodal_stress(body.mesh_displacement(u))[:, :, 0]
+    y, z = body.nodes[:, 1], body.nodes[:, 2]
+    twist = (y * stress[:, 4] - z * stress[:, 5])[np.hypot(y, z) > 0.019]  # shear of V alone is odd over the ring
+    assert abs(twist.sum()) < 1e-9 * np.abs(twist).max()
+
+
 def test_links_of_links_follow_the_first_leader():
     nodes = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)]
     mesh = fm.LineMesh(nodes, [(0, 1)])

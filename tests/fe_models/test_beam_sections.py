@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -182,3 +184,86 @@ def test_polygons_that_are_not_simple_are_refused():
 def test_impossible_sections_are_refused(make, words):
     with pytest.raises(SectionError, match=words):
         make()
+
+
+def warping_torsion_constant(shape, n):
+    """Second road: J = min over the warping w of ∫ (w_y - z)² + (w_z + y)², quadratic quads; from above."""
+    import skfem
+    from skfem.helpers import dot, grad
+
+    b, h, web, flange = shape.width, shape.height, shape.web, shape.flange
+    is_box = isinstance(shape, fm.BoxSection)
+
+    def cuts(*edges):
+        parts = [np.linspace(lo, hi, n + 1) for lo, hi in pairwise(edges)]
+        return np.unique(np.round(np.concatenate(parts), 12))
+
+    if is_box:
+        y, z = (
+            cuts(-b / 2, -b / 2 + web, 0, b / 2 - web, b / 2),
+            cuts(-h / 2, -h / 2 + flange, 0, h / 2 - flange, h / 2),
+        )
+    else:
+        y, z = cuts(-b / 2, -web / 2, 0, web / 2, b / 2), cuts(-h / 2, -h / 2 + flange, 0, h / 2 - flange, h / 2)
+    mesh = skfem.MeshQuad.init_tensor(y, z)
+    middle = mesh.p[:, mesh.t].mean(axis=1)
+    in_height = np.abs(middle[1]) < h / 2 - flange
+    outside = in_height & ((np.abs(middle[0]) < b / 2 - web) if is_box else (np.abs(middle[0]) > web / 2))
+    mesh = mesh.remove_elements(np.flatnonzero(outside))
+    basis = skfem.Basis(mesh, skfem.ElementQuad2(), intorder=6)
+    K = skfem.BilinearForm(lambda u, v, _: dot(grad(u), grad(v))).assemble(basis)
+    f = skfem.LinearForm(lambda v, w: w.x[1] * grad(v)[0] - w.x[0] * grad(v)[1]).assemble(basis)
+    warping = skfem.solve(*skfem.condense(K, f, D=np.array([0])))
+    polar = skfem.Functional(lambda w: w.x[0] ** 2 + w.x[1] ** 2).assemble(basis)
+    return polar - f @ warping
+
+
+@pytest.mark.parametrize(
+    ("shape", "bound"),
+    [
+        (fm.BoxSection(0.05, 0.08, 0.004, 0.006), 0.035),
+        (fm.BoxSection(0.1, 0.1, 0.005, 0.005), 0.025),
+        (fm.ISection(0.1, 0.2, 0.0056, 0.0085), 0.07),
+        (fm.ISection(0.2, 0.2, 0.009, 0.015), 0.05),
+    ],
+)
+def test_torsion_constants_of_walls_lie_within_a_few_percent_of_the_solved_warping(shape, bound):
+    exact = warping_torsion_constant(shape, 6)
+    assert abs(shape.properties(NU).J / exact - 1) < bound
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=SECTION_IDS)
+def test_shear_stress_turns_with_the_torque_and_points_along_the_force(shape):
+    section = shape.properties(NU)
+    y, z = section.points.T
+    tau = section.stress[:, 1:]
+    moment = y * tau[:, 1, 3] - z * tau[:, 0, 3]  # of a unit torque about x
+    if isinstance(shape, fm.ISection):  # the inner faces of the flanges run back
+        moment = moment[np.abs(np.abs(z) - shape.height / 2) < 1e-12]
+    assert (moment >= 0).all()
+    assert (moment > 0).any()
+    assert (tau[:, 0, 1] >= -1e-12 / section.A).all()
+    assert (tau[:, 1, 2] >= -1e-12 / section.A).all()
+    assert tau[:, 0, 1].max() > 1 / section.A  # more than the mean
+    assert tau[:, 1, 2].max() > 1 / section.A
+
+
+def test_a_box_turned_by_a_right_angle_has_its_stresses_exchanged():
+    upright, lying = fm.BoxSection(0.05, 0.08, 0.004, 0.006), fm.BoxSection(0.08, 0.05, 0.006, 0.004)
+    a, b = upright.properties(NU), lying.properties(NU)
+    assert_allclose([a.A_sy, a.A_sz, a.Iy, a.J], [b.A_sz, b.A_sy, b.Iz, b.J], rtol=1e-12)
+    side, top = 1, 3  # middles of the walls y = b/2 and z = h/2
+    assert_allclose(a.stress[side, 2, 2], b.stress[top, 1, 1], rtol=1e-12)
+    assert_allclose(a.stress[side, 2, 3], -b.stress[top, 1, 3], rtol=1e-12)
+    flow = a.stress[side, 2, 3] * 0.004  # Bredt: torque = 2 A_m q
+    assert_allclose(2 * 0.046 * 0.074 * flow, 1.0, rtol=1e-12)
+
+
+def test_cowpers_coefficients_with_poisson_have_not_changed():
+    """Alarm beside the check at nu = 0: m = 0.6, n = 0.5 in Cowper's formulas of I and box, by hand."""
+    m, n2 = 0.6, 0.25
+    web = (12 + 43.2 + 54 + 19.44) + 0.3 * (11 + 39.6 + 48.6 + 19.44)
+    i = 13 * 2.8**2 / (web + 30 * n2 * (m + m**2) + 1.5 * n2 * (8 * m + 9 * m**2))
+    box = 13 * 2.8**2 / (web + 10 * n2 * (3.3 * m + 3 * m**2))
+    assert_allclose(i_shear_coefficient(0.2, 0.004, 0.1, 0.0024, 0.3), i, rtol=1e-12)
+    assert_allclose(box_shear_coefficient(0.2, 0.004, 0.1, 0.0024, 0.3), box, rtol=1e-12)

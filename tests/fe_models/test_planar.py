@@ -59,6 +59,13 @@ def test_interface_with_three_dofs_turns_with_its_node(spatial):
     assert slopes == in_space
 
 
+def test_loads_keep_their_resultants(spatial):
+    load = fm.gravity_load(spatial, "weight", (1.0, 2.0, 3.0))
+    flat = fm.planar(spatial.with_load_cases(load))
+    resultant = geometric_rigid_modes(flat).T @ flat.load_cases[0].f
+    assert_allclose(resultant, geometric_rigid_modes(spatial).T @ load.f, rtol=0, atol=1e-9)
+
+
 def test_every_axis_can_be_the_normal():
     for normal, kept in ((0, (1, 2, 3)), (1, (0, 2, 4)), (2, (0, 1, 5))):
         body = fm.planar(cms.couple(straight(3, interfaces=("start", "end"))), normal=normal)
