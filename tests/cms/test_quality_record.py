@@ -1,5 +1,6 @@
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,6 +38,15 @@ def test_every_limit_that_judges_says_what_to_do(name):
     limit = LIMITS[name]
     assert limit.tolerance is None or limit.action
     assert limit.failing is None or limit.failing >= limit.tolerance
+
+
+def test_the_documentation_states_every_limit_as_the_code_does():
+    rows = {}
+    for line in (Path(__file__).parents[2] / "docs" / "quality.md").read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.split("|")]
+        if line.startswith("| `"):
+            rows[cells[1].strip("`")] = [None if cell == "-" else float(cell) for cell in cells[-3:-1]]
+    assert rows == {name: [limit.tolerance, limit.failing] for name, limit in LIMITS.items()}
 
 
 def test_an_unknown_name_is_refused_with_the_nearest():
