@@ -66,28 +66,58 @@ def reduce_and_write(job: "Job", path: Path) -> "ReducedBody":
 def info_command(
     file: ModalFile,
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
+    units: Annotated[str | None, typer.Option(help="Show numbers in another unit system, such as m-kg-s.")] = None,
 ) -> None:
-    """Show what is in a modal file: mass, inertia, units, frame, modes, interfaces, provenance.
+    """Show what is in a modal file: mass, inertia, units, frame, modes, interfaces, load cases, provenance.
 
     Example: cms info rod.h5 --json
+
+    Example: cms info rod.h5 --units m-kg-s
     """
     if json:
-        typer.echo(info_record(file))
+        typer.echo(info_record(file, units))
         return
     from cms.modal_file import digest, read
 
-    print_body(read(file), everything=True)
+    print_body(read(file, units=units), everything=True)
     say(f"digest {digest(file)}")
 
 
-def info_record(file: Path) -> str:
+@app.command("frame")
+@guarded
+def frame_command(
+    file: ModalFile,
+    to: Annotated[str, typer.Option("--to", help="Body frame: tisserand, buckens or nodal.")],
+    at: Annotated[str | None, typer.Option("--at", help="Interface that carries a nodal frame.")] = None,
+    origin: Annotated[str | None, typer.Option(help="Origin of the frame in mesh coordinates, x,y,z.")] = None,
+    axes: Annotated[str | None, typer.Option(help="Axes of the frame in mesh axes, x,y,z;x,y,z;x,y,z.")] = None,
+    damping: Annotated[
+        float | None, typer.Option(help="Ratio of the new modes; default: the damping of the file, carried over.")
+    ] = None,
+    units: Annotated[str | None, typer.Option(help="Write numbers in another unit system, such as m-kg-s.")] = None,
+    output: Output = None,
+) -> None:
+    """Convert a modal file to another body frame, from the file alone; its modes are diagonalised afresh.
+
+    Without -o the file stands beside the old one: rod.h5 gives rod_tisserand.h5.
+
+    Example: cms frame rod.h5 --to tisserand -o rod_t.h5
+
+    Example: cms frame rod.h5 --to nodal --at big_end
+    """
+    from cms.cli.frame import FrameRequest, run_frame
+
+    print_body(run_frame(FrameRequest(file, to, at, origin, axes, damping, units, output)))
+
+
+def info_record(file: Path, units: str | None = None) -> str:
     """Return what is in a modal file as JSON text."""
     import json
 
     from cms.cli.record import body_record
     from cms.modal_file import digest, read
 
-    return json.dumps({**body_record(read(file)), "digest": digest(file)}, indent=2)
+    return json.dumps({**body_record(read(file, units=units)), "digest": digest(file)}, indent=2)
 
 
 @app.command("view")
@@ -200,6 +230,46 @@ def frf_command(
     )
 
 
+@app.command("compare")
+@guarded
+def compare_command(
+    job: Annotated[Path, typer.Argument(help="Job file (TOML) of the body, see docs/job_file.md.")],
+    sets: Annotated[
+        str, typer.Option(help="Mode sets with commas between.")
+    ] = "guyan,craig-bampton,craig-bampton-ir,rubin",
+    modes: Annotated[
+        str, typer.Option(help="Numbers of vibration modes: from:to, from:to:step, or a list with commas.")
+    ] = "0:20",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder of the report; default: beside the job.")
+    ] = None,
+    band: Annotated[float | None, typer.Option(help="Highest frequency that counts [Hz].")] = None,
+    reference_modes: Annotated[int, typer.Option(help="Without --band: elastic free modes that count.")] = 10,
+    load: Annotated[
+        list[str] | None,
+        typer.Option(help="Neighbour at an interface, for loaded sets: NAME:mass=1.2,stiffness=1e4; repeatable."),
+    ] = None,
+    pulse_at: Annotated[str | None, typer.Option(help="Interface the force pulse of the motion acts on.")] = None,
+    motion: Annotated[
+        Path | None, typer.Option(help="Reference motion instead of the pulse: .npz with u (n_dof, n_t) and t [s].")
+    ] = None,
+    stills: Annotated[int, typer.Option(min=0, help="Still pictures of mode shapes in the report.")] = 4,
+) -> None:
+    """Compare mode sets with the full model: which one is good enough, with how few modes, and why.
+
+    The full model is solved once and kept in the folder of the report, so that a repeat is quick.
+
+    Example: cms compare rod.toml --sets craig-bampton,craig-bampton-ir,rubin --modes 0:30 -o compare
+
+    Example: cms compare rod.toml --sets rubin,benfield-hruda --load small_end:mass=1e-3 --band 5000
+    """
+    from cms.cli.compare import CompareRequest, run_compare
+
+    run_compare(
+        CompareRequest(job, sets, modes, output, band, reference_modes, tuple(load or ()), pulse_at, motion, stills)
+    )
+
+
 @app.command("demo")
 @guarded
 def demo_command(
@@ -230,6 +300,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("units", f"{body.units.name} (force {body.units.force_symbol}, stress {body.units.stress_symbol})"),
         ("frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
         ("origin of B", f"{vector(frame['origin'], size)} {length} (mesh coordinates)"),
+        *[(f"{a} axis of B", f"{vector(axis, 1.0)} (mesh axes)") for a, axis in turned_axes(frame["axes"])],
         ("mass", f"{record['mass']:.6g} {mass}"),
         ("centre of mass", f"{vector(record['center_of_mass']['B'], size)} {length} (in B)"),
         ("", f"{vector(record['center_of_mass']['mesh'], size)} {length} (mesh coordinates)"),
@@ -239,6 +310,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("principal moments", f"{vector(record['principal_moments'])} {inertia}"),
         ("mass moments", "exact" if record["moments_are_exact"] else "approximate (from bare matrices)"),
         ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
+        ("stress of modes", stress_words(record["stress"])),
     ]
     print_table("Body", ("", ""), rows)
     print_table(
@@ -251,13 +323,36 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     )
     free = ", ".join(hertz(f) for f in record["free_frequencies_hz"])
     say(f"Free-free frequencies [Hz]: {free or 'none'}\n")
+    if selected := record["provenance"].get("mode set selected"):
+        say(f"Selected: {selected}\n")
     print_table(
         "Interfaces",
         ("name", "kind", "nodes>", f"position in B [{length}]"),
         [(i["name"], i["kind"], i["nodes"], vector(i["position"], size)) for i in record["interfaces"]],
     )
+    force = body.units.force_symbol
+    if record["load_cases"]:
+        print_table(
+            "Load cases (of amplitude 1, in B)",
+            ("name", "kind", f"force [{force}]", f"torque about the origin [{force} {length}]"),
+            [(c["name"], c["kind"], vector(c["force"]), vector(c["torque"])) for c in record["load_cases"]],
+        )
     if everything:
         print_table("Provenance", ("", ""), list(record["provenance"].items()))
+
+
+def turned_axes(axes: Any) -> list[tuple[str, Any]]:
+    """Return the axes of B by name, columns of their matrix; none where they are those of the mesh."""
+    columns = [[row[k] for row in axes] for k in range(3)]
+    unit = [[float(i == k) for i in range(3)] for k in range(3)]
+    return [] if columns == unit else list(zip("xyz", columns, strict=True))
+
+
+def stress_words(stress: Any) -> str:
+    """Return where the stress of the modes is known."""
+    places = ["at the kept nodes"] if stress["nodal"] else []
+    places += [f"at {stress['points']} points"] if stress["points"] else []
+    return " and ".join(places) or "not kept"
 
 
 def print_times(clock: "Stages") -> None:

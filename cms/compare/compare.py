@@ -29,7 +29,7 @@ from cms.compare.full_model import (
 from cms.compare.pulse import Pulse, default_pulse
 from cms.compare.subsets import SUBSETS
 from cms.compare.verdicts import answer, is_good, ranking, set_sentence, shown_point
-from cms.errors import CmsError, CompareError
+from cms.errors import CmsError, CompareError, ModeSetError
 from cms.families import Families
 from cms.fe_body import FEBody
 from cms.mode_set import ModeSet
@@ -251,7 +251,7 @@ def set_result(
     began = time.perf_counter()
     words = first_sentence(MODE_SETS[name].__doc__)
     try:
-        points, columns = judged_points(name, options, counts, families, basis, reference)
+        points, columns, refused = judged_points(name, options, counts, families, basis, reference)
     except (CmsError, np.linalg.LinAlgError) as error:
         return SetResult(name, words, (), None, "error", f"could not be made: {error}")
     shown = shown_point(points)
@@ -259,8 +259,8 @@ def set_result(
     verdict: Literal["pass", "fail"] = "pass" if any(point.is_good for point in points) else "fail"
     chosen = columns[shown] if shown is not None else {}
     return SetResult(
-        name, words, kept, shown, verdict, set_sentence(points), chosen, seconds=time.perf_counter() - began
-    )  # fmt: skip
+        name, words, kept, shown, verdict, set_sentence(points) + refused, chosen, time.perf_counter() - began
+    )
 
 
 def judged_points(
@@ -270,13 +270,19 @@ def judged_points(
     families: Families,
     basis: ReferenceBasis,
     reference: Reference,
-) -> tuple[list[Point], list[dict[str, int]]]:
-    """Return the points of one set and the number of columns of each family in each."""
+) -> tuple[list[Point], list[dict[str, int]], str]:
+    """Return the points of one set, the number of columns of each family in each, and words about those refused."""
     make = MODE_SETS[name]
     takes = inspect.signature(make).parameters
     body = families.body
     asked = sorted(set(counts)) if "n_modes" in takes else [0]
-    points, families_of_columns = [], []
+    points: list[Point] = []
+    families_of_columns: list[dict[str, int]] = []
+    refused: dict[int, str] = {}
+
+    def made(n_modes: int) -> ModeSet:
+        counted = {"n_modes": n_modes} if "n_modes" in takes else {}
+        return make(body, **counted, **options, families=families)
 
     def judge(n_modes: int, c: Coordinates, T: Array, labels: tuple[str, ...], groups: Sequence[str]) -> None:
         rigid = c.reference[:, reference.full.parts["rigid"]]
@@ -285,34 +291,39 @@ def judged_points(
         points.append(Point(n_modes, len(labels), subset.n_q, subset.basis.dropped, records, is_good(records)))
         families_of_columns.append({group: list(groups).count(group) for group in dict.fromkeys(groups)})
 
-    def made(n_modes: int) -> ModeSet:
-        counted = {"n_modes": n_modes} if "n_modes" in takes else {}
-        return make(body, **counted, **options, families=families)
+    most: tuple[ModeSet, Coordinates] | None = None
+    for n_modes in reversed(asked):
+        try:
+            if most is None or name not in SUBSETS:
+                modes = made(n_modes)
+                most = modes, basis.coordinates(modes.columns)
+            modes, c = most
+            if name in SUBSETS:
+                C, labels = SUBSETS[name](modes, np.asarray(modes.columns[body.b]), n_modes)
+                group_of = dict(zip(modes.labels, modes.groups, strict=True))
+                judge(n_modes, c, c.columns @ C, labels, [group_of[label] for label in labels])
+            else:
+                judge(n_modes, c, c.columns, modes.labels, modes.groups)
+        except CmsError as error:
+            refused[n_modes] = str(error)
+    if not points:
+        raise ModeSetError("; ".join(dict.fromkeys(refused.values())))
+    return points[::-1], families_of_columns[::-1], refused_words(refused)
 
-    if name in SUBSETS:
-        modes = made(asked[-1])
-        c = basis.coordinates(modes.columns)
-        at_b = np.asarray(modes.columns[body.b])
-        group_of = dict(zip(modes.labels, modes.groups, strict=True))
-        for n_modes in asked:
-            C, labels = SUBSETS[name](modes, at_b, n_modes)
-            judge(n_modes, c, c.columns @ C, labels, [group_of[label] for label in labels])
-    else:
-        for n_modes in asked:
-            modes = made(n_modes)
-            c = basis.coordinates(modes.columns)
-            judge(n_modes, c, c.columns, modes.labels, modes.groups)
-    return points, families_of_columns
+
+def refused_words(refused: Mapping[int, str]) -> str:
+    """Say which numbers of modes could not be had; the first reason stands for all."""
+    if not refused:
+        return ""
+    numbers = ", ".join(str(n) for n in sorted(refused))
+    return f"; not possible with {numbers}: {refused[max(refused)]}"
 
 
 def without_curves(point: Point) -> Point:
-    """Return the point with the values and sentences of its records; of the arrays the frequencies stay."""
-    return replace(
-        point,
-        records=tuple(
-            record if record.name == "frequency-error" else replace(record, data={}) for record in point.records
-        ),
-    )
+    """Return the point with the values and sentences of its records; frequencies and effective masses stay."""
+    kept = ("frequency-error", "effective-mass")
+    records = (record if record.name in kept else replace(record, data={}) for record in point.records)
+    return replace(point, records=tuple(records))
 
 
 def first_sentence(text: str | None) -> str:

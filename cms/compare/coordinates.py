@@ -28,7 +28,7 @@ class Coordinates:
 
     K: Array  #: Qᵀ K Q, (n_Q, n_Q)
     M: Array  #: Qᵀ M Q, (n_Q, n_Q)
-    nodal: Array  #: Qᵀ Q over the translations, (n_Q, n_Q)
+    nodal: Array  #: Qᵀ Q over the translations of all nodes, (n_Q, n_Q)
     MGM: Array  #: Qᵀ M G M Q, G the elastic flexibility of the free body, (n_Q, n_Q)
     at_b: Array  #: rows of Q at the boundary dofs, (n_b, n_Q)
     at_ports: Array  #: motion of the reference points of the interfaces with Q, (6 n_ports, n_Q)
@@ -63,7 +63,7 @@ class ReferenceBasis:
         self._Q, _ = independent_columns(given, body, omega2)
         self._reference = self._inner(self._Q, given)
         self._GM = families.flexibility(self._Q.MX)
-        self._weight = ((body.dofs[:, 1] >= 0) & (body.dofs[:, 1] < 3)).astype(float)[:, None]
+        self._nodal = self._translations(self._Q.X)
 
     def coordinates(self, columns: Array) -> Coordinates:
         """Return the coordinates of a mode set's columns, (n_dof, n_columns), beside the reference.
@@ -87,16 +87,21 @@ class ReferenceBasis:
         M = _joined(Q.X, Q.MX, basis.X, basis.MX)
         N = reference[:, : self.n_rigid]
         elastic = np.eye(len(M)) - N @ (N.T @ M)  # rounding of K times a rigid-body motion is not energy
+        moved = self._translations(basis.X)
         return Coordinates(
             K=elastic.T @ _joined(Q.X, Q.KX, basis.X, basis.KX) @ elastic,
             M=M,
-            nodal=_joined(Q.X, self._weight * Q.X, basis.X, self._weight * basis.X),
+            nodal=_joined(self._nodal, self._nodal, moved, moved),
             MGM=_joined(Q.MX, self._GM, basis.MX, self.families.flexibility(basis.MX)),
             at_b=np.hstack([Q.X[self.body.b], basis.X[self.body.b]]),
             at_ports=np.hstack([self.ports.A @ Q.X, self.ports.A @ basis.X]),
             reference=reference,
             columns=np.vstack([T_Q, T_V]),
         )
+
+    def _translations(self, X: Array) -> Array:
+        """Return the translations of all nodes, those of rigid interfaces among them, (3 n_nodes, k)."""
+        return self.body.translations(X).reshape(3 * len(self.body.nodes), X.shape[1])
 
     def _products(self, X: Array) -> Columns:
         return Columns(X, self._K @ X, self._M @ X, np.eye(X.shape[1]))

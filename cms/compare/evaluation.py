@@ -56,7 +56,7 @@ def judge_subset(reference: Reference, c: Coordinates, subset: Subset) -> tuple[
 
 
 def nodal_root(c: Coordinates) -> Array:
-    """Return L with Lᵀ L = Qᵀ Q over the translations, (n_Q, n_Q): L x has the lengths of the nodal field of x."""
+    """Return L, (n_Q, n_Q), with Lᵀ L = Qᵀ Q over the translations of the nodes: L x is as long as that field of x."""
     values, vectors = la.eigh(c.nodal)
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 

@@ -8,7 +8,7 @@ import scipy.linalg as la
 from cms.arrays import Array, IntArray
 from cms.compare.coordinates import Coordinates
 from cms.errors import ModeSetError
-from cms.finishing import elastic_eigenvectors
+from cms.finishing import RIGID_ENERGY, elastic_eigenvectors
 from cms.independent import RANK_TOLERANCE
 from cms.quality.free_basis import FreeBasis
 
@@ -68,11 +68,11 @@ def judged_subset(c: Coordinates, T: Array, labels: tuple[str, ...], rigid: Arra
     """
     U, redundant, condition = independent_subset(T)  # (1)
     U = U - rigid @ (rigid.T @ (c.M @ U))  # (2)
+    if not (np.linalg.norm(U, axis=0) ** 2 > RIGID_ENERGY).any():
+        raise ModeSetError(f"its {T.shape[1]} columns hold only rigid-body motion; add modes")
     G_K, G_M = U.T @ c.K @ U, U.T @ c.M @ U
     Z, has_mass, _ = elastic_eigenvectors((G_K + G_K.T) / 2, (G_M + G_M.T) / 2, omega2_1)  # (3)
     is_massive = np.asarray(has_mass, dtype=bool)
-    if not Z.shape[1]:
-        raise ModeSetError(f"its {T.shape[1]} columns hold only rigid-body motion; add modes")
     Phi = U @ Z
     omega2 = np.einsum("nk,nl,lk->k", Phi, c.K, Phi, optimize=True)
     order = np.lexsort((omega2, ~is_massive))

@@ -229,7 +229,7 @@ def read_full_model(path: Path, digest: str) -> FullModel | None:
     if not path.is_file():
         return None
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as file:
             if bytes(file["digest"]).hex() != digest:
                 return None
             return FullModel(**{field.name: file[field.name] for field in fields(FullModel)})

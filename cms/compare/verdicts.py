@@ -85,7 +85,7 @@ def ranking(sets: Sequence[SetResult]) -> tuple[str, ...]:
 
 def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> str:
     """Say which set to take."""
-    band = f"up to {band_hz:.4g} Hz"
+    band = f"up to {band_hz:.5g} Hz"
     if not order:
         tried = [result for result in sets if result.detail is not None]
         if not tried:
@@ -126,7 +126,7 @@ def listed(words: Sequence[str]) -> str:
 
 
 def crossings(sets: Sequence[SetResult], name: str) -> str:
-    """Say from how many modes on each set keeps the limit of a record: 'Within the limit: a from 4 modes on.'"""
+    """Say from how many modes on each set keeps the limit of a record."""
     limit = LIMITS[name].tolerance
     if limit is None:
         return ""

@@ -63,7 +63,7 @@ def columns_section(comparison: Comparison) -> Section:
         name = Cell(result.name, "name", markup=swatch(k))
         if point is None:
             rows.append(
-                ("", [name, Cell(result.words, note=sentence_case(result.sentence)), *[Cell("\u2013", "n blank")] * 5])
+                ("", [name, Cell(result.words, note=sentence_case(result.sentence)), *[Cell("\u2013", "n blank")] * 6])
             )
             continue
         made = ", ".join(f"{count} {family}" for family, count in result.columns.items())
@@ -76,12 +76,14 @@ def columns_section(comparison: Comparison) -> Section:
             Cell(str(point.n_q), "n"),
             verdict_cell(point.record("residual-bound")),
             Cell(factor(point.record("conditioning").value), f"n {point.record('conditioning').verdict}"),
+            Cell(seconds(result.seconds), "n"),
         ]
         rows.append(("", cells))
-    headings = ["set", "columns", "columns>", "dropped>", "coordinates>", "residual bound>", "condition>"]
+    headings = ["set", "columns", "columns>", "dropped>", "coordinates>", "residual bound>", "condition>", "time>"]
     lead = (
         "What every set consists of at its shown number of modes. Coordinates are the independent elastic shapes that "
-        "are left when redundant columns and rigid-body motion are taken out."
+        "are left when redundant columns and rigid-body motion are taken out; the time is that of the set with the "
+        "most modes and of judging all numbers of modes."
     )
     return Section("columns", "Columns, rank and conditioning", "Columns", table(headings, rows), lead)
 

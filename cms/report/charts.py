@@ -10,6 +10,7 @@ from cms.compare.comparison import Comparison, Point, SetResult
 from cms.quality.limits import LIMITS
 from cms.quality.record import plain
 from cms.report.palette import FULL_MODEL, style_of
+from cms.report.words import share
 
 __all__ = [
     "MAC_HEIGHT",
@@ -74,6 +75,7 @@ def response_chart(comparison: Comparison) -> Chart:
     ]  # fmt: skip
     layout = base_layout("frequency [Hz]", f"displacement / force [{units.length_symbol}/{units.force_symbol}]")
     layout["yaxis"] |= {"type": "log", "exponentformat": "power", "dtick": 1}
+    layout["xaxis"] |= {"exponentformat": "none"}
     layout["height"] = 430
     return {"data": traces, "layout": layout}
 
@@ -86,6 +88,7 @@ def response_error_chart(comparison: Comparison) -> Chart:
         for k, result, point in shown(comparison)
     ]  # fmt: skip
     layout = base_layout("frequency [Hz]", "relative error [-]")
+    layout["xaxis"] |= {"exponentformat": "none"}
     layout["yaxis"] |= log_axis([y for trace in traces for y in trace["y"]])
     return {"data": traces, "layout": layout}
 
@@ -233,7 +236,7 @@ def limit_line(tolerance: float) -> Chart:
         ],
         "annotations": [
             {"xref": "paper", "x": 1, "xanchor": "right", "y": math.log10(tolerance), "yanchor": "bottom",
-             "text": f"limit {tolerance:g}", "showarrow": False,
+             "text": f"limit {share(tolerance)}", "showarrow": False,
              "bgcolor": "rgba(255,255,255,.75)", "borderpad": 1, "font": {"size": 11, "color": "#5b6770"}}
         ],
     }  # fmt: skip

@@ -16,7 +16,7 @@ from cms.report.evidence import (
 from cms.report.html import Cell, Section, page, table, text
 from cms.report.parts import COLUMNS, MARKS, limit_words, sentence_case, swatch, verdict_cell
 from cms.report.shapes import shapes_json
-from cms.report.words import count, seconds, share
+from cms.report.words import count, hertz, share
 
 __all__ = ["comparison_html"]
 
@@ -59,7 +59,7 @@ def header(comparison: Comparison) -> str:
     facts = (
         f"{count(comparison.n_dof)} dofs, {count(comparison.n_nodes)} nodes; interfaces {ends}; {full.n_band} elastic "
         f"free modes "
-        f"up to {full.band_hz:.4g} Hz; mass {full.mass[0]:.4g} {units.mass_symbol}"
+        f"up to {hertz(full.band_hz)} Hz; mass {full.mass[0]:.4g} {units.mass_symbol}"
     )
     best = comparison.set(comparison.ranking[0]).detail if comparison.ranking else None
     figures = ""
@@ -84,9 +84,9 @@ def header(comparison: Comparison) -> str:
 
 def verdict_section(comparison: Comparison) -> Section:
     """Verdict of every set with the numbers it rests on."""
-    headings = ["set", "verdict", "modes>", "coordinates>", *(f"{COLUMNS[name]}>" for name in DECIDING), "time>"]
+    headings = ["set", "verdict", "modes>", "coordinates>", *(f"{COLUMNS[name]}>" for name in DECIDING)]
     limits = [Cell("limit", "name"), Cell(""), Cell(""), Cell("")]
-    limits += [Cell(limit_words(name), "n") for name in DECIDING] + [Cell("")]
+    limits += [Cell(limit_words(name), "n") for name in DECIDING]
     rows: list[tuple[str, Sequence[Cell]]] = [("", limits)]
     for k, result in enumerate(comparison.sets):
         point = result.detail
@@ -97,7 +97,6 @@ def verdict_section(comparison: Comparison) -> Section:
         else:
             cells += [Cell(str(point.n_modes), "n"), Cell(str(point.n_q), "n")]
             cells += [verdict_cell(point.record(name)) for name in DECIDING]
-        cells.append(Cell(seconds(result.seconds) if result.seconds else "", "n"))
         rows.append(("has-why", cells))
         reason = Cell("", note=sentence_case(result.sentence), span=len(headings))
         rows.append(("why-row", [reason]))
@@ -110,7 +109,4 @@ def verdict_section(comparison: Comparison) -> Section:
     )
 
 
-VERDICT_NOTE = (
-    "Green keeps the limit, amber misses it, red misses it by far. Time: to make the set with the most modes and to "
-    "judge all numbers of modes."
-)
+VERDICT_NOTE = "Green keeps the limit, amber misses it, red misses it by far."

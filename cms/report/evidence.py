@@ -90,8 +90,8 @@ def frequency_section(comparison: Comparison) -> Section:
             cells.append(Cell(signed_percent(error), f"n {error_kind(error)}", note=hertz(reduced)))
         rows.append(cells)
     lead = (
-        f"Elastic frequencies of the free body up to {full.band_hz:.4g} Hz, recomputed from every reduced body at the "
-        "number of modes that stands beside its name: the error, and below it the frequency [Hz]."
+        f"Elastic frequencies of the free body up to {hertz(full.band_hz)} Hz, recomputed from every reduced body at "
+        "the number of modes that stands beside its name: the error, and below it the frequency [Hz]."
     )
     return Section("frequencies", "Free-free frequencies", "Frequencies", table(headings, rows), lead)
 

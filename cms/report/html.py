@@ -34,8 +34,8 @@ class Section:
 
 
 def text(words: object) -> str:
-    """Return text as HTML."""
-    return html.escape(str(words))
+    """Return text as HTML; a number stays with its percent sign."""
+    return html.escape(str(words)).replace(" %", "\u00a0%")
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[Cell] | tuple[str, Sequence[Cell]]]) -> str:

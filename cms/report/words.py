@@ -17,7 +17,7 @@ def share(value: float) -> str:
     if math.isnan(value):
         return "\u2013"
     if math.isinf(value):
-        return "modes missing"
+        return "missing"
     if value == 0:
         return "0"
     if abs(value) >= 9.995:

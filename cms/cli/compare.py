@@ -1,0 +1,264 @@
+"""The command `cms compare`: mode sets of one job against its full model; table, HTML, JSON and CSV."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cms.cli.console import print_table, say, stages
+from cms.errors import CompareError
+from cms.words import nearest
+
+if TYPE_CHECKING:
+    from cms.compare.comparison import Comparison
+    from cms.fe_body import FEBody
+    from cms.job import Job
+    from cms.quality.transient import Snapshots
+
+__all__ = ["CompareRequest", "parse_load", "parse_sets", "run_compare"]
+
+LOAD_KEYS = ("mass", "inertia", "stiffness", "rotational_stiffness")
+FILES = {"html": "comparison.html", "json": "comparison.json", "csv": "comparison.csv"}
+CACHE = "full_model.npz"
+#: headings of the deciding records in the table
+SHORT = {
+    "frequency-error": "frequency",
+    "mac": "1-MAC",
+    "static-interface": "static",
+    "static-inertia": "inertia",
+    "frequency-response": "response",
+    "deformation-error": "\u03b5(t)",
+}
+
+
+@dataclass(frozen=True)
+class CompareRequest:
+    """What the command was asked for."""
+
+    job: Path
+    sets: str
+    modes: str
+    output: Path | None
+    band: float | None
+    n_reference: int
+    loads: tuple[str, ...]
+    pulse_at: str | None
+    motion: Path | None
+    stills: int
+
+
+def run_compare(request: CompareRequest) -> None:
+    """Compare, print the verdicts, and write the report.
+
+    Raises
+    ------
+    CompareError
+        If what was asked for cannot be compared.
+    """
+    from cms.compare.compare import check_request, compare
+    from cms.compare.mode_counts import mode_counts
+    from cms.job import read_job
+    from cms.quality.frf import DAMPING
+
+    require_job(request.job)
+    counts = mode_counts(request.modes)
+    names = parse_sets(request.sets)
+    check_request(dict.fromkeys(names), counts, request.band, request.n_reference, DAMPING)
+    loads = [parse_load(text) for text in request.loads]
+    job = read_job(request.job)
+    folder = output_folder(request.output or request.job.with_name(f"{request.job.stem}_comparison"))
+    reports: list[Any] = []
+    try:
+        with stages() as clock:
+            body = body_of(job, clock, reports)
+            options = options_of(job, body, names, loads)
+            motion = None if request.motion is None else read_motion(request.motion, body)
+            comparison = compare(
+                body, options, counts, band=request.band, n_reference=request.n_reference, pulse_at=request.pulse_at,
+                motion=motion, cache=folder / CACHE, stage=clock,
+            )  # fmt: skip
+            with clock("report"):
+                written = write_report(folder, comparison, request.stills)
+    finally:
+        for report in reports:
+            print_table("Mesh", ("", ""), report.rows())
+    print_comparison(comparison)
+    for path in written:
+        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def require_job(path: Path) -> None:
+    """Refuse a modal file, or bare matrices, with the words of what is needed."""
+    if path.suffix.lower() in (".h5", ".hdf5"):
+        raise CompareError(
+            f"{path}: a modal file holds no full model to compare with; give the job (.toml) it was made from, or "
+            f"judge the file alone: cms check {path}"
+        )
+    if path.suffix.lower() in (".npz", ".msh", ".inp", ".bdf", ".vtu"):
+        raise CompareError(
+            f"{path}: expected a job file (.toml) that names this file, its interfaces and units; see docs/job_file.md"
+        )
+
+
+def parse_sets(text: str) -> tuple[str, ...]:
+    """Return the names of mode sets with commas between, each once.
+
+    Raises
+    ------
+    CompareError
+        If a name is unknown or stands twice.
+    """
+    from cms.mode_sets import MODE_SETS
+
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise CompareError(f"--sets {text!r}: expected names of mode sets with commas between{nearest('', MODE_SETS)}")
+    for name in names:
+        if name not in MODE_SETS:
+            raise CompareError(f"--sets {text!r}: unknown mode set {name!r}{nearest(name, MODE_SETS)}")
+        if names.count(name) > 1:
+            raise CompareError(f"--sets {text!r}: {name!r} stands there twice")
+    return tuple(names)
+
+
+def parse_load(text: str) -> Any:
+    """Return the load of INTERFACE:mass=1.2,stiffness=1e4 as `cms.point_load` makes it.
+
+    Raises
+    ------
+    CompareError
+        If the text is not of this form.
+    """
+    from cms.interface_loads import point_load
+
+    name, _, rest = text.partition(":")
+    values: dict[str, float] = {}
+    for part in filter(None, (word.strip() for word in rest.split(","))):
+        key, _, number = (word.strip() for word in part.partition("="))
+        if key not in LOAD_KEYS:
+            raise CompareError(f"--load {text!r}: unknown key {key!r}{nearest(key, LOAD_KEYS)}")
+        try:
+            values[key] = float(number)
+        except ValueError:
+            raise CompareError(f"--load {text!r}: {key} = {number!r}; expected a number") from None
+    if not name or not values:
+        raise CompareError(f"--load {text!r}: expected INTERFACE:mass=…,stiffness=…, of {', '.join(LOAD_KEYS)}")
+    return point_load(name, **values)
+
+
+def output_folder(path: Path) -> Path:
+    """Return the folder of the report, made if its parent is there.
+
+    Raises
+    ------
+    CompareError
+        If it is a file, or cannot be made.
+    """
+    if path.exists() and not path.is_dir():
+        raise CompareError(f"--output {path}: this is a file; expected a folder for the report")
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as error:
+        raise CompareError(f"--output {path}: cannot be made: {error.strerror}; choose another folder") from error
+    return path
+
+
+def body_of(job: "Job", clock: Any, reports: list[Any]) -> "FEBody":
+    """Return the coupled body of the job."""
+    from cms.cli.reduce_job import job_body
+
+    return job_body(job, clock, on_report=reports.append)
+
+
+def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[Any]) -> Mapping[str, dict[str, Any]]:
+    """Return the options of every set: those of the job for its own set, loads for the sets that take them."""
+    from cms.cli.job_mode_set import set_options
+    from cms.job_reduction import mode_set_options
+
+    options: dict[str, dict[str, Any]] = {}
+    for name in names:
+        section = job.reduction.model_copy(update={"set": name, "n_modes": None, "cutoff": None, "verify": None})
+        given = set_options(body, section)
+        if name != job.reduction.set:
+            given = {key: value for key, value in given.items() if key == "loads"}
+        if loads and "loads" in mode_set_options(name):
+            given["loads"] = loads
+        options[name] = given
+    return options
+
+
+def read_motion(path: Path, body: "FEBody") -> "Snapshots":
+    """Read a reference motion: an .npz file with u, (n_dof, n_t), over the dofs of the coupled body, and t, (n_t,) [s].
+
+    Raises
+    ------
+    CompareError
+        If the file is not of this form.
+    """
+    import zipfile
+    from io import BytesIO
+
+    import numpy as np
+
+    from cms.errors import CmsError
+    from cms.quality.transient import Snapshots
+
+    try:
+        with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as file:
+            u, t = np.asarray(file["u"], dtype=float), np.asarray(file["t"], dtype=float)
+    except (ValueError, KeyError, zipfile.BadZipFile, EOFError) as error:
+        raise CompareError(
+            f"{path}: expected an .npz file with u, ({body.n_dof}, n_t), and t, (n_t,) [s]; {error}"
+        ) from error
+    if u.ndim != 2 or u.shape != (body.n_dof, len(t)) or t.ndim != 1 or not len(t):
+        raise CompareError(
+            f"{path}: u has shape {u.shape}, t {t.shape}; expected ({body.n_dof}, n_t) over the dofs of the coupled "
+            "body, and (n_t,)"
+        )
+    if not (np.isfinite(u).all() and np.isfinite(t).all()):
+        raise CompareError(f"{path}: u and t: expected finite numbers")
+    try:
+        return Snapshots.of_displacements(u, t / body.units.time)
+    except CmsError as error:
+        raise CompareError(f"{path}: {error}") from error
+
+
+def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Path]:
+    """Write HTML, JSON and CSV; return their paths."""
+    from cms.paths import replace_file
+    from cms.report import comparison_csv, comparison_html, comparison_json
+
+    texts = {
+        "html": comparison_html(comparison, stills=stills),
+        "json": comparison_json(comparison),
+        "csv": comparison_csv(comparison),
+    }
+    paths = []
+    for kind, text in texts.items():
+        paths.append(folder / FILES[kind])
+        replace_file(paths[-1], text.encode("utf-8"))
+    return paths
+
+
+def print_comparison(comparison: "Comparison") -> None:
+    """Print the answer, the verdicts with their numbers, and the reasons."""
+    from cms.compare.verdicts import DECIDING
+    from cms.report.parts import MARKS
+    from cms.report.words import hertz, seconds, share
+
+    full = comparison.full
+    say(f"{comparison.sentence}\n")
+    rows = []
+    for result in comparison.sets:
+        point = result.detail
+        numbers = ["", "", *[""] * len(DECIDING)]
+        if point is not None:
+            numbers = [str(point.n_modes), str(point.n_q), *(share(point.record(name).value) for name in DECIDING)]
+        rows.append((result.name, MARKS[result.verdict], *numbers, seconds(result.seconds)))
+    headings = ("set", "verdict", "modes>", "coord.>", *(f"{SHORT[name]}>" for name in DECIDING), "time>")
+    title = f"Mode sets of {comparison.name} up to {hertz(full.band_hz)} Hz ({full.n_band} elastic free modes)"
+    print_table(title, headings, rows)
+    for result in comparison.sets:
+        say(f"{result.name}: {result.sentence}")
+    source = "taken from an earlier comparison" if full.was_cached else "solved"
+    say(f"\nfull model {source} in {seconds(comparison.seconds['full model'])}")
