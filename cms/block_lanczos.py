@@ -12,12 +12,14 @@ import scipy.linalg as la
 
 from cms.arrays import Array
 from cms.sparse_product import SymmetricProduct
-from cms.tall import combine, inner, subtract
+from cms.tall import combine, inner, ordered, subtract
 
 __all__ = ["BlockLanczos", "RitzPairs"]
 
 DEPENDENT = 1e-10  #: length of a new direction against the block it came from, below which it is rounding
-CANCELLATION = 1e-6  #: part of a squared length that is left; below it the lengths are measured again
+TAME = 1e-3  #: shortest to longest new direction, above which one pass leaves them orthogonal to 1e-13
+SETTLED = 1e-12  #: part of the shortest new direction that a pass may take off without a new product by M
+ROUNDOFF = 1e-14  #: defect of M-orthonormal columns that is left as it is
 MAX_PASSES = 5
 
 
@@ -27,19 +29,23 @@ class RitzPairs:
 
     theta: Array  #: (m,) [s²]
     S: Array  #: vectors over the basis, (m, m)
+    coupling: Array  #: of S x - theta x over the next block, (b, m) [s²]
     residuals: Array  #: |S x - theta x|_M / |theta| of unit x, by the recurrence, (m,)
 
 
 class BlockLanczos:
     """A growing M-orthonormal basis V with its projection T = Vᵀ M S V, and the block that comes next.
 
-    (1) W = S V_j                                        one block solve
-    (2) C = Vᵀ M W; W <- W - V C; twice: full reorthogonalisation, level-3 products
-    (3) W = V_{j+1} R by the eigenvectors of Wᵀ M W, dependent directions dropped
-    (4) T gains C as its last block column; R couples to the next block
-    (5) thick restart when the basis is full: V <- V S of the leading Ritz pairs, whose residuals all lie in V_{j+1}
+    (1) W = S V_j                                                 one block solve
+    (2) A = V_jᵀ M W; W <- W - V Rᵀ - V_j A                       the recurrence: R couples V_j to the basis before it
+    (3) C = Vᵀ M W; W <- W - V C                                  full reorthogonalisation of what is left
+    (4) W = V_{j+1} R by the eigenvectors of Wᵀ M W, dependent directions dropped; (3) and (4) again where W was nearly
+        dependent
+    (5) T gains the block column [Rᵀ; A] + C; R of (4) couples to the next block
+    (6) thick restart when the basis is full: V <- V X of the leading Ritz pairs, whose residuals all lie in V_{j+1}
 
-    Full reorthogonalisation costs a few percent of the solves and leaves no spurious copies to sort out.
+    Full reorthogonalisation leaves no spurious copies to sort out; one pass is enough because (2) has taken off all
+    that is not rounding. Blocks lie in Fortran order, the basis by rows: solver and products read them as they are.
     """
 
     def __init__(
@@ -51,9 +57,9 @@ class BlockLanczos:
         self._rows = np.empty((min(capacity, n) + block, n))  # V.T: rows are the basis vectors
         self._T = np.zeros((len(self._rows), len(self._rows)))
         self._random = np.random.default_rng(0)
-        self._next = self._start()  # (V_{j+1}, M V_{j+1})
-        self._R = np.zeros((self._next[0].shape[1], 0))  # coupling of the next block to all of V
-        self._ritz: RitzPairs | None = None
+        self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself follows V in the rows
+        self._R = np.zeros((self._M_next.shape[1], 0))  # coupling of the next block to all of V
+        self._coupled = 0  # first column of V it is coupled to
 
     @property
     def V(self) -> Array:
@@ -61,9 +67,14 @@ class BlockLanczos:
         return self._rows[: self.m].T
 
     @property
+    def V_and_next(self) -> Array:
+        """The basis and the block that comes next, (n, m + b)."""
+        return self._rows[: self.m + self._M_next.shape[1]].T
+
+    @property
     def is_exhausted(self) -> bool:
         """Whether V spans everything the operator can reach."""
-        return self._next[0].shape[1] == 0
+        return self._M_next.shape[1] == 0
 
     @property
     def capacity(self) -> int:
@@ -75,34 +86,41 @@ class BlockLanczos:
         size = min(capacity, self.n) + self.block
         if size > len(self._rows):
             rows, T = np.empty((size, self.n)), np.zeros((size, size))
-            rows[: self.m], T[: self.m, : self.m] = self._rows[: self.m], self._T[: self.m, : self.m]
+            used = self.V_and_next.shape[1]
+            rows[:used], T[: self.m, : self.m] = self._rows[:used], self._T[: self.m, : self.m]
             self._rows, self._T = rows, T
 
-    def advance(self) -> RitzPairs:
-        """Add the next block to the basis; return the Ritz pairs of the larger basis."""
-        new, M_new = self._next
-        first, last = self.m, self.m + new.shape[1]
-        self._rows[first:last] = new.T
+    def advance(self) -> None:
+        """Add the next block to the basis."""
+        M_new = self._M_next
+        first, last = self.m, self.m + M_new.shape[1]
+        block = slice(first, last)
         self.m = last
-        W, C, R, M_W = self._orthonormalize(self._apply(M_new), wants_coupling=True)
-        self._T[:last, first:last] = C
-        self._T[first:last, :last] = C.T
-        diagonal = self._T[first:last, first:last]
-        self._T[first:last, first:last] = (diagonal + diagonal.T) / 2
-        self._R = np.zeros((W.shape[1], last))
-        self._R[:, first:last] = R
-        if W.shape[1] == 0 and last < self.n:  # an invariant subspace: look for what the start did not contain
-            W, M_W = self._start()
-            self._R = np.zeros((W.shape[1], last))
-        self._next = W, M_W
-        return self.ritz()
+        W = self._apply(M_new)  # (1)
+        A = inner(M_new, W)  # (2)
+        near = np.concatenate([self._R[:, self._coupled :].T, A])
+        subtract(W, self.V[:, self._coupled :], near)
+        C, R, M_next = self._append(W, np.linalg.norm(near, axis=0).max())  # (3), (4)
+        C[self._coupled :] += near  # (5)
+        self._T[:last, block] = C
+        self._T[block, :last] = C.T
+        self._T[block, block] = (C[block] + C[block].T) / 2
+        self._R = np.zeros((len(R), last))
+        self._R[:, block] = R
+        self._coupled = first
+        if len(R) == 0 and last < self.n:  # an invariant subspace: look for what the start did not contain
+            M_next = self._start()
+            self._R = np.zeros((M_next.shape[1], last))
+            self._coupled = last
+        self._M_next = M_next
 
     def ritz(self) -> RitzPairs:
         """Eigenpairs of T with their residuals |R s|."""
         theta, S = la.eigh(self._T[: self.m, : self.m])
         theta, S = theta[::-1], S[:, ::-1]
         scale = np.maximum(np.abs(theta), np.finfo(float).tiny)
-        return RitzPairs(theta, S, np.linalg.norm(self._R @ S, axis=0) / scale)
+        coupling = self._R @ S
+        return RitzPairs(theta, S, coupling, np.linalg.norm(coupling, axis=0) / scale)
 
     def restart(self, ritz: RitzPairs, keep: int) -> None:
         """Keep the span of the leading Ritz vectors only; the next block stays."""
@@ -110,57 +128,63 @@ class BlockLanczos:
         for first in range(0, self.n, 65536):  # in place, in slices: no second basis in memory
             part = slice(first, first + 65536)
             self._rows[:keep, part] = S @ self._rows[: self.m, part]
+        self._rows[keep : keep + len(self._R)] = self._rows[self.m : self.m + len(self._R)]
         self._T[: self.m, : self.m] = 0.0
         self._T[np.arange(keep), np.arange(keep)] = ritz.theta[:keep]
         self._R = self._R @ S.T
+        self._coupled = 0
         self.m = keep
 
     def _apply(self, M_x: Array) -> Array:
         self.n_solves += M_x.shape[1]
-        return self.solve(M_x)
+        return ordered(self.solve(M_x), "F")
 
-    def _start(self) -> tuple[Array, Array]:
-        """Return an M-orthonormal random block in the range of the operator and orthogonal to V, and M times it."""
+    def _start(self) -> Array:
+        """Append an M-orthonormal random block in the range of the operator, orthogonal to V; return M times it."""
         width = min(self.block, self.n - self.m)
-        random = self._random.standard_normal((self.n, width))
-        W, _, _, M_W = self._orthonormalize(self._apply(self.M @ random), wants_coupling=False)
-        return W, M_W
+        random = self._random.standard_normal((width, self.n)).T
+        _, _, M_W = self._append(self._apply(self.M @ random), 0.0)
+        return M_W
 
-    def _orthonormalize(self, W: Array, *, wants_coupling: bool) -> tuple[Array, Array, Array, Array]:
-        """Split W = V C + V_new R; return V_new, C, R, M V_new (steps 2 and 3)."""
+    def _append(self, W: Array, length: float) -> tuple[Array, Array, Array]:
+        """Split W = V C + V_next R, V_next in the rows after V; return C, R, M V_next (steps 3 and 4). W is lost.
+
+        `length` is that of what was taken off W before: a remainder is rounding by its measure.
+        """
         V = self.V
-        C_sum = np.zeros((self.m, W.shape[1])) if wants_coupling else np.zeros((self.m, 0))
+        C_sum = np.zeros((self.m, W.shape[1]))
         R_sum = np.eye(W.shape[1])
         M_W = self.M @ W
-        largest = np.nan
         for k_pass in range(MAX_PASSES):
             C = inner(V, M_W)
-            gram = inner(W, M_W)
-            before = np.diag(gram)
-            gram = gram - C.T @ C  # of W - V C, as long as little cancels
+            gram = _symmetric(inner(W, M_W))
+            longest = np.sqrt(max(np.diag(gram).max(initial=0.0), 0.0))
             subtract(W, V, C)
-            if wants_coupling:
-                C_sum += C @ R_sum
-            if k_pass == 0 and not _is_safe(gram, before):
+            C_sum += C @ R_sum
+            gram -= C.T @ C  # of W - V C, as long as little cancels
+            taken = np.abs(C).max(initial=0.0)
+            if not taken**2 <= SETTLED**2 * la.eigvalsh(gram)[0]:
                 M_W = self.M @ W
-                gram = inner(W, M_W)
-            length2, U = la.eigh((gram + gram.T) / 2)
-            if k_pass == 0:
-                largest = np.sqrt(max(before.max(initial=0.0), 0.0))
-            floor = DEPENDENT * largest if k_pass == 0 else 0.1
+                gram = _symmetric(inner(W, M_W))
+            length2, U = la.eigh(gram)
+            floor = DEPENDENT * max(length, longest) if k_pass == 0 else 0.1
             kept = length2 > floor**2
             scaled = U[:, kept] / np.sqrt(length2[kept])
-            W = combine(W, scaled)
+            W, M_W = combine(W, scaled), combine(M_W, scaled)
             R_sum = (U[:, kept] * np.sqrt(length2[kept])).T @ R_sum
             if not kept.any():
                 break
-            if k_pass and length2.min() > 0.9:  # the pass changed nothing but rounding
-                M_W = combine(M_W, scaled)
+            if length2[kept][0] > (TAME * longest) ** 2:
+                defect = _symmetric(inner(W, M_W))
+                if np.abs(defect - np.eye(len(defect))).max() > ROUNDOFF:
+                    U = la.cholesky(defect)
+                    W, M_W = (combine(X, la.solve_triangular(U, np.eye(len(U)))) for X in (W, M_W))
+                    R_sum = U @ R_sum
                 break
             M_W = self.M @ W
-        return W, C_sum, R_sum, M_W[:, : W.shape[1]]
+        self._rows[self.m : self.m + W.shape[1]] = W.T
+        return C_sum, R_sum, M_W
 
 
-def _is_safe(gram: Array, before: Array) -> bool:
-    """Whether the squared lengths left after the projection are still accurate."""
-    return bool(len(gram) and la.eigvalsh((gram + gram.T) / 2)[0] > CANCELLATION * before.max())
+def _symmetric(G: Array) -> Array:
+    return (G + G.T) / 2

@@ -55,7 +55,7 @@ def eigenmodes(
     cutoff: float | None = None,
     factorization: Inverse | None = None,
     shift: float | None = None,
-    tolerance: float = 1e-6,
+    tolerance: float = 1e-5,
     verify: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> EigenResult:
@@ -127,10 +127,10 @@ def eigenmodes(
         k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
         residuals, method = modes.residuals, search.description
         n_solves, solver = operator.n_solves, factorization.description
-        del search  # frees the basis before the modes are expanded
-    omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)))
-    Phi = modes.expand()
-    Phi = combine(Phi, orientation(Phi, omega2)[:, :k])
+        omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)))
+        Phi = modes.expand()
+        del search, modes  # the basis
+    Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
     method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"

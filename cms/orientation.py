@@ -29,7 +29,11 @@ def orientation(Phi: Array, omega2: Array) -> Array:
     gaps = np.abs(np.diff(omega2, prepend=-np.inf))
     starts = np.flatnonzero(gaps > MULTIPLE * np.abs(omega2))
     for first, last in zip(starts, [*starts[1:], k], strict=True):
-        Z[first:last, first:last] = _standard_rotation(Phi[:, first:last])
+        if last == first + 1:
+            size = np.abs(Phi[:, first])
+            Z[first, first] = -1.0 if Phi[np.argmax(size > 0.99 * size.max()), first] < 0 else 1.0
+        else:
+            Z[first:last, first:last] = _standard_rotation(Phi[:, first:last])
     return Z
 
 

@@ -13,7 +13,9 @@ from cms.inverse import Inverse
 from cms.sparse_product import SymmetricProduct
 from cms.tall import combine, inner
 
-__all__ = ["Modes", "ShiftInverted", "Wanted", "refined_modes"]
+__all__ = ["Modes", "ShiftInverted", "Wanted", "measured_residual", "refined_modes"]
+
+SAMPLES = 4  #: columns for the measurement of all residuals together
 
 
 @dataclass(frozen=True)
@@ -61,13 +63,13 @@ class ShiftInverted:
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes as coefficients of an expanded block: the wanted ones, and a few guards after them."""
+    """Modes as coefficients of a block of columns: the wanted ones, and a few guards after them."""
 
     omega2: Array  #: ascending, (n_wanted + n_guards,)
     n_wanted: int
-    residuals: Array  #: of the block before its last inverse iteration, (n_wanted,)
-    Y: Array  #: (n, n_wanted + n_guards)
-    Z: Array  #: coefficients, M-orthonormal Phi = Y Z
+    residuals: Array  #: of the wanted ones before the last improvement, (n_wanted,)
+    Y: Array  #: (n, p)
+    Z: Array  #: coefficients, M-orthonormal Phi = Y Z, (p, n_wanted + n_guards)
 
     def expand(self) -> Array:
         """Return the M-orthonormal modes Phi, (n, n_wanted + n_guards)."""
@@ -92,3 +94,25 @@ def refined_modes(operator: ShiftInverted, X: Array, theta: Array, n_wanted: int
     G = inner(Y, operator.M_product @ Y)
     mu, Z = la.eigh((H + H.T) / 2, (G + G.T) / 2)
     return Modes(mu + operator.shift, n_wanted, residuals, Y, Z)
+
+
+def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, float]:
+    """Measure (Σ_j |r_j|_M²)^½ of the wanted modes, r_j = x_j - (omega_j² - sigma) S x_j, with few columns.
+
+    The sum Σ ± r_j with random signs has the expected squared length Σ |r_j|² in any norm. Mean over `SAMPLES` sums.
+
+    Returns
+    -------
+    residual
+        In the M-norm: an estimate of the root of the sum, and by it a bound of each |r_j|_M.
+    defect
+        The same without M, as a part of the columns themselves: it also sees what has no mass.
+    """
+    k = modes.n_wanted
+    Z, above_shift = modes.Z[:, :k], modes.omega2[:k] - operator.shift
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(k, SAMPLES))
+    r = combine(modes.Y, Z @ signs)
+    size = np.linalg.norm(r)
+    r -= operator.solve(operator.M_product @ combine(modes.Y, Z @ (above_shift[:, None] * signs)))
+    squared = np.einsum("nk,nk->", r, operator.M_product @ r)
+    return float(np.sqrt(max(squared, 0.0) )), float(np.linalg.norm(r) / size) if size else 0.0

@@ -1,11 +1,13 @@
 """Products of a large symmetric sparse matrix with blocks of columns, in threads (SciPy's own use one)."""
 
 from concurrent.futures import ThreadPoolExecutor
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
 
 from cms.arrays import Array
+from cms.tall import ordered
 from cms.threads import n_threads
 
 __all__ = ["SymmetricProduct"]
@@ -26,10 +28,11 @@ class SymmetricProduct:
         self._pool = ThreadPoolExecutor(n_parts) if n_parts > 1 else None
 
     def __matmul__(self, x: Array) -> Array:
-        """Return A x in C order, x (n, k) in any order."""
+        """Return A x in the order of x, (n, k)."""
+        order: Literal["C", "F"] = "F" if x.flags.f_contiguous else "C"
         result = np.empty(x.shape)
         for first in range(0, x.shape[1], COLUMNS):
-            block = np.ascontiguousarray(x[:, first : first + COLUMNS])
+            block = np.ascontiguousarray(ordered(x[:, first : first + COLUMNS], "C"))
             target = result[:, first : first + COLUMNS]
 
             def multiply(k: int, block: Array = block, target: Array = target) -> None:
@@ -39,7 +42,7 @@ class SymmetricProduct:
                 multiply(0)
             else:
                 list(self._pool.map(multiply, range(len(self._parts))))
-        return result
+        return ordered(result, order)
 
 
 def _rows(A: sp.csc_array, first: int, last: int) -> sp.csr_array:

@@ -8,15 +8,17 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
 from cms.arrays import Array
 from cms.threads import n_threads
 
-__all__ = ["combine", "inner", "subtract"]
+__all__ = ["combine", "inner", "ordered", "subtract"]
 
 SMALL = 20_000  #: rows below which threads cost more than they bring
+SLICE = 8192  #: rows at a time; what is made of them on the way stays in the cache
 
 
 def inner(X: Array, Y: Array) -> Array:
@@ -25,12 +27,16 @@ def inner(X: Array, Y: Array) -> Array:
     return np.sum(parts, axis=0)
 
 
-def combine(X: Array, C: Array) -> Array:
-    """Return X C in C order, (n, l)."""
-    result = np.empty((len(X), C.shape[1]))
+def combine(X: Array, C: Array, *, order: Literal["C", "F"] | None = None) -> Array:
+    """Return X C, (n, l), in the order of X or the one given."""
+    order = order or _order(X)
+    result = np.empty((len(X), C.shape[1]), order=order)
 
     def multiply(rows: slice) -> None:
-        np.matmul(X[rows], C, out=result[rows])
+        if order == "C":
+            np.matmul(X[rows], C, out=result[rows])
+        else:
+            np.matmul(C.T, X[rows].T, out=result[rows].T)
 
     _by_rows(len(X), multiply)
     return result
@@ -38,11 +44,37 @@ def combine(X: Array, C: Array) -> Array:
 
 def subtract(Y: Array, X: Array, C: Array) -> None:
     """Take X C from Y, (n, l), in place."""
+    order = _order(Y)
 
     def update(rows: slice) -> None:
-        Y[rows] -= X[rows] @ C
+        for first in range(rows.start, rows.stop, SLICE):
+            part = slice(first, min(first + SLICE, rows.stop))
+            if order == "C":
+                Y[part] -= X[part] @ C
+            else:
+                Y.T[:, part] -= C.T @ X.T[:, part]
 
     _by_rows(len(X), update)
+
+
+def ordered(X: Array, order: Literal["C", "F"]) -> Array:
+    """Return X, (n, k), in C or Fortran order; NumPy's own copy of a tall array misses the cache at every entry."""
+    if _order(X) == order:
+        return X
+    result = np.empty(X.shape, order=order)
+
+    def copy(rows: slice) -> None:
+        for first in range(rows.start, rows.stop, SLICE):
+            part = slice(first, min(first + SLICE, rows.stop))
+            result[part] = X[part]
+
+    _by_rows(len(X), copy)
+    return result
+
+
+def _order(X: Array) -> Literal["C", "F"]:
+    """Return the order in which X lies, or nearly lies (a part of its rows or columns)."""
+    return "C" if X.strides[1] <= X.strides[0] else "F"
 
 
 def _by_rows(n: int, work: Callable[[slice], Array | None]) -> list:
