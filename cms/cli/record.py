@@ -29,7 +29,7 @@ def in_hertz(body: ReducedBody, frequencies: Array) -> Array:
 
 
 def body_record(body: ReducedBody) -> dict[str, Any]:
-    """Return name, units, mass properties, frame, modes, interfaces and provenance, in plain types.
+    """Return name, units, mass properties, frame, modes, interfaces, load cases and provenance, in plain types.
 
     Numbers are in the units of the body, but frequencies are in Hz; infinite ones (massless shapes) are None. The
     centre of mass is given in B and in mesh coordinates, the inertia tensor about it in axes of B.
@@ -46,7 +46,13 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
         "inertia_about_center_of_mass": central_inertia(moments).tolist(),
         "principal_moments": np.linalg.eigvalsh(central_inertia(moments)).tolist(),
         "moments_are_exact": moments.is_exact,
-        "frame": {"kind": frame.kind, "at": frame.at, "origin": frame.origin.tolist(), "axes": frame.axes.tolist()},
+        "frame": {
+            "kind": frame.kind,
+            "at": frame.at,
+            "dofs": frame.dofs.tolist(),
+            "origin": frame.origin.tolist(),
+            "axes": frame.axes.tolist(),
+        },
         "modes": [
             {
                 "number": k + 1,
@@ -67,6 +73,20 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
             }
             for interface in body.interfaces
         ],
+        "load_cases": [
+            {
+                "name": case.name,
+                "kind": case.kind,
+                "force": case.force.tolist(),
+                "torque": case.torque.tolist(),
+                "modal_forces": case.h.tolist(),
+            }
+            for case in body.load_cases
+        ],
+        "stress": {
+            "nodal": body.stress is not None,
+            "points": 0 if body.point_stress is None else len(body.point_stress.names),
+        },
         "kept_nodes": len(body.nodes),
         "surface_triangles": len(body.surface),
         "provenance": dict(body.provenance),

@@ -16,8 +16,10 @@ from typer.testing import CliRunner
 from cms.cli.app import app
 from cms.cli.record import body_record, central_inertia
 from cms.cli.reduce_job import reduce_job
+from cms.frame_conversion import convert_frame
+from cms.frames import TisserandFrame
 from cms.job import read_job
-from cms.modal_file import read, write
+from cms.modal_file import VERSION, read, write
 from cms.sealed_hdf5 import Content, write_sealed
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
@@ -152,8 +154,61 @@ def test_matrices_reduce_without_a_mesh(folder):
 def test_info_prints_what_is_in_the_file(modal_file):
     result = run("info", modal_file)
     assert result.exit_code == 0, result.output
-    for word in ("synthetic", "mm-t-s", "nodal at big_end", "kleines Auge/2 µ", "fixed-interface", "rod.msh", "digest"):
+    for word in ("synthetic", "mm-t-s", "nodal at big_end", "kleines Auge/2 µ", "fixed-interface", "rod.msh", "digest",
+                 "Zünden/1", "pressure", "torque about the origin", "at the kept nodes and at 2 points"):  # fmt: skip
         assert word in result.stdout
+
+
+def test_info_in_other_units(modal_file):
+    result = run("info", modal_file, "--units", "m-kg-s")
+    assert result.exit_code == 0, result.output
+    body = synthetic_reduced_body()
+    for word in ("m-kg-s", f"{body.moments.m * 1000:.6g} kg", "units converted from"):
+        assert word in result.stdout
+    record = json.loads(run("info", modal_file, "--units", "m-kg-s", "--json").stdout)
+    assert_allclose(record["load_cases"][0]["force"], body.load_cases[0].force, rtol=1e-14)  # mm t/s² are newtons too
+    assert_allclose(record["load_cases"][0]["torque"], body.load_cases[0].torque / 1000, rtol=1e-14)
+    assert_refused(run("info", modal_file, "--units", "m-kg"), "did you mean 'm-kg-s'?")
+
+
+def test_frame_writes_the_body_in_the_other_frame(modal_file, tmp_path):
+    path = tmp_path / "rod.h5"
+    path.write_bytes(modal_file.read_bytes())
+    result = run("frame", path, "--to", "tisserand")
+    assert result.exit_code == 0, result.output
+    assert "tisserand" in result.stdout
+    expected = convert_frame(read(path), TisserandFrame())
+    written = read(tmp_path / "rod_tisserand.h5")
+    assert_allclose(written.Phi, expected.Phi, rtol=0, atol=0)
+    options = ["--origin", "1,2,3", "--axes", "0,1,0;-1,0,0;0,0,1", "--damping", "0.03", "--units", "m-kg-s"]
+    result = run("frame", path, "--to", "buckens", *options, "-o", tmp_path / "b.h5")
+    assert result.exit_code == 0, result.output
+    assert "x axis of B" in result.stdout
+    body = read(tmp_path / "b.h5")
+    assert body.frame.kind == "buckens"
+    assert_allclose(body.frame.origin, [1, 2, 3], rtol=0, atol=0)
+    assert_allclose(body.frame.axes, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], rtol=0, atol=0)
+    assert_allclose(np.diag(body.D), 2 * 0.03 * np.sqrt(np.diag(body.K)), rtol=1e-12)
+    assert body.units.name == "m-kg-s"
+
+
+def test_frame_refuses_what_it_cannot_do(modal_file, tmp_path):
+    path = tmp_path / "rod.h5"
+    path.write_bytes(modal_file.read_bytes())
+    before = contents(tmp_path)
+    for options, words in [
+        (("--to", "tiserand"), "unknown frame; did you mean 'tisserand'?"),
+        (("--to", "tisserand", "--at", "big_end"), "belongs to --to nodal"),
+        (("--to", "nodal", "--at", "big_ent"), "did you mean 'big_end'?"),
+        (("--to", "buckens", "--origin", "1,2"), "expected three numbers with commas"),
+        (("--to", "buckens", "--axes", "1,0,0;0,1,0"), "expected three axes"),
+        (("--to", "buckens", "--axes", "1,0,0;0,1,0;0,0,-1"), "three orthonormal right-handed axes"),
+        (("--to", "buckens", "--damping", "-1"), "ratio = -1.0; expected 0 or more"),
+        (("--to", "buckens", "--units", "m-kg"), "did you mean 'm-kg-s'?"),
+        (("--to", "buckens", "-o", path), "this is the input"),
+    ]:
+        assert_refused(run("frame", path, *options), words)
+        assert contents(tmp_path) == before
 
 
 def test_info_json_is_the_record(modal_file):
@@ -366,8 +421,8 @@ def test_other_and_newer_and_missing_files_are_refused(tmp_path, modal_file):
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1.0
     assert_refused(run("info", tmp_path / "other.h5"), "HDF5 of another program")
-    write_sealed(Content("modal-file", 2, {}), tmp_path / "new.h5")
-    assert_refused(run("info", tmp_path / "new.h5"), "format version 2", "update")
+    write_sealed(Content("modal-file", VERSION + 1, {}), tmp_path / "new.h5")
+    assert_refused(run("info", tmp_path / "new.h5"), f"format version {VERSION + 1}", "update")
     assert_refused(run("info", modal_file.with_name("baz.h5")), "did you mean 'bar.h5'?")
 
 
@@ -468,7 +523,7 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
     script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
     result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
-    for command in ("reduce", "info", "view", "demo"):
+    for command in ("reduce", "info", "frame", "view", "demo"):
         assert command in result.stdout
     loaded = result.stdout[result.stdout.rindex("[") :]
     for heavy in ("numpy", "scipy", "h5py", "pydantic", "meshio", "skfem", "pyvista", "numba", "matplotlib"):

@@ -58,10 +58,12 @@ def test_rayleigh_mixes_mass_and_stiffness_and_massless_shapes_have_no_ratio():
 def test_the_ratios_are_those_of_the_modes_of_the_frame():
     body = couple(bar(nx=4, kind="hexahedron"))
     modes = craig_bampton(body, n_modes=2)
+    hertz = reduce(body, modes).frequencies
+    low, high = hertz[1] + 1.0, hertz[3] + 1.0
     for frame in (None, NodalFrame("left")):
-        reduced = reduce(body, modes, frame=frame, damping=RampDamping(((500.0, 0.02), (3000.0, 0.05))))
-        expected = np.where(reduced.frequencies < 500, 0.02, np.where(reduced.frequencies < 3000, 0.05, 1.0))
-        assert len(set(expected)) == 3
+        reduced = reduce(body, modes, frame=frame, damping=RampDamping(((low, 0.02), (high, 0.05))))
+        expected = np.where(reduced.frequencies < low, 0.02, np.where(reduced.frequencies < high, 0.05, 1.0))
+        assert set(expected) == {0.02, 0.05, 1.0}
         assert_allclose(ratios_of(reduced.D, reduced.K), expected, rtol=1e-12)
 
 
