@@ -30,6 +30,8 @@ def check_file(file: Path, job: Path | None, *, band: float | None, as_json: boo
         typer.echo(json.dumps(quality_report(reduced, records), indent=2))
     else:
         print_records(reduced, records)
+        if job is None:
+            say("Not asked: frequencies, statics and responses against the full model; give its job with --job.")
     return int(has_failed(records))
 
 

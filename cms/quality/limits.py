@@ -102,6 +102,10 @@ LIMITS: dict[str, Limit] = {
         "static response to rigid-body accelerations, error in energy norm", 0.05, None,
         "add inertia-relief modes (six columns), or keep more vibration modes",
     ),
+    "static-load-cases": Limit(
+        "static response to the load cases of the body, error in energy norm", 0.05, None,
+        "add residual vectors of the load cases named, or keep more modes",
+    ),
     "frequency-response": Limit(
         "frequency response at the interfaces, relative error over the band", 0.05, 0.3,
         "keep more modes, or hold the band lower",

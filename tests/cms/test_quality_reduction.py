@@ -10,6 +10,7 @@ from cms.couplings import couple
 from cms.errors import CmsError
 from cms.families import Families
 from cms.frames import NodalFrame, TisserandFrame
+from cms.load_cases import LoadCase
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS, craig_bampton, guyan
 from cms.quality.completeness import energy_error, static_completeness
@@ -18,7 +19,7 @@ from cms.quality.errors import QualityError
 from cms.quality.free_basis import FreeBasis, free_basis, ritz_basis
 from cms.quality.frequencies import compare_frequencies, mac
 from cms.quality.full_reference import FullReference, usable_band
-from cms.quality.held_mass import held_mass
+from cms.quality.held_mass import held_mass, held_mass_record
 from cms.quality.interface_stiffening import interface_stiffening
 from cms.quality.mass_properties import check_grounding, rigid_mass_matrix
 from cms.quality.reduction_check import check_reduction
@@ -161,6 +162,28 @@ def test_fixed_modes_answer_accelerations_in_proportion_to_their_energy(body, re
     assert_allclose(found.inertia, wanted, rtol=1e-6)
 
 
+def test_load_cases_are_answered_by_their_residual_vectors_only(body):
+    """Pressure in the middle of the bar is no interface load; gravity does not deform a free body."""
+    middle = int(np.flatnonzero((body.dofs[:, 1] == 2) & (np.abs(body.nodes[body.dofs[:, 0], 0] - 0.5) < 0.01))[0])
+    push = LoadCase("push", "force", np.eye(body.n_dof)[middle])
+    gravity = LoadCase("gravity", "gravity", body.M @ geometric_rigid_modes(body)[:, 2])
+    loaded = body.with_load_cases(push, gravity)
+    with FullReference(loaded, band=BAND) as reference:
+        poor = craig_bampton(loaded, n_modes=1)
+        found = static_completeness(reference, basis_of(reference, poor))
+        vector = reference.families.flexibility(push.f[:, None])
+        rich = ModeSet(
+            "rich", np.hstack([poor.columns, vector]), (*poor.labels, "residual 1"), np.r_[poor.frequencies, np.nan]
+        )
+        answered = static_completeness(reference, basis_of(reference, rich))
+        records = records_of(loaded, poor, reduce(loaded, poor), reference)
+    assert found.load_cases == ("push", "gravity")
+    assert found.load_case[0] > 0.05
+    assert np.isnan(found.load_case[1])
+    assert answered.load_case[0] < 1e-9
+    assert records["static-load-cases"].verdict == "warn"
+
+
 def test_the_energy_error_agrees_with_a_dense_least_squares(body, reference):
     rng = np.random.default_rng(3)
     U = np.linalg.solve(body.K.toarray() + 1e6 * body.M.toarray(), rng.normal(size=(body.n_dof, 4)))
@@ -222,6 +245,9 @@ def test_effective_masses_with_the_interfaces_held_are_those_of_the_fixed_modes(
     assert_allclose(found.mass, wanted[:7], rtol=0, atol=1e-7 * wanted.max())
     assert_allclose(found.total, wanted.sum(axis=0), rtol=1e-8)
     assert_allclose(found.rigid[:3], 15.7, rtol=1e-9)
+    judged, known = (held_mass_record(found, is_static_complete=c) for c in (False, True))
+    assert (judged.verdict, known.verdict) == ("warn", "info")
+    assert known.reason.endswith("the rest answers statically")
     none = held_mass(reference, basis_of(reference, guyan(body)))
     assert none.mass.shape[0] == 0
     assert_allclose(none.remainder, 1, rtol=1e-9)
