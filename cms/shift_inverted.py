@@ -115,4 +115,4 @@ def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, flo
     size = np.linalg.norm(r)
     r -= operator.solve(operator.M_product @ combine(modes.Y, Z @ (above_shift[:, None] * signs)))
     squared = np.einsum("nk,nk->", r, operator.M_product @ r)
-    return float(np.sqrt(max(squared, 0.0) )), float(np.linalg.norm(r) / size) if size else 0.0
+    return float(np.sqrt(max(squared, 0.0) / SAMPLES)), float(np.linalg.norm(r) / size) if size else 0.0
