@@ -49,8 +49,8 @@ def assumed_modes(
     is sampled at the nodes. The terms in brackets are the lateral contraction that a solid needs, or its bending
     stiffness is that of a bar whose sides are held, (1 - nu) / ((1 + nu) (1 - 2 nu)) times too large. They are tied to
     the strain if `poisson` is given; otherwise each is a column of its own, with nu = 1 and a free amplitude. Where all
-    nodes lie on the axis they vanish and are left out. Degrees 0 (and 1 for bending) are rigid-body motion and come as
-    Psi_R. [1]_
+    nodes lie on one line along the axis, as those of a beam, they are left out. Degrees 0 (and 1 for bending) are
+    rigid-body motion and come as Psi_R. [1]_
 
     Parameters
     ----------
@@ -97,6 +97,9 @@ def assumed_modes(
     if not np.ptp(span) > 0:
         raise ModeSetError(f"assumed_modes: body {body.name!r} has no length along ({_numbers(t)})")
 
+    moving = body.dofs[body.dofs[:, 1] >= 0, 0]  # nodes of a beam's skin follow, and have no dofs of their own
+    has_sections = bool(np.ptp(r[moving], axis=0).max() > NEGLIGIBLE * np.ptp(span))
+
     columns, labels, groups = [], [], []
     for motion, direction, first in (
         ("axial", None, 1),
@@ -109,7 +112,7 @@ def assumed_modes(
             continue
         group = motion if direction is None else f"{motion} along ({_numbers(direction)})"
         for k, name in enumerate(f.names):
-            for what, shape in _fields(motion, f, k, t, direction, r, poisson):
+            for what, shape in _fields(motion, f, k, t, direction, r, poisson if has_sections else 0.0):
                 columns.append(_sample(shape, node, component))
                 labels.append(f"{group}{what} {name}")
                 groups.append(group + what)

@@ -10,6 +10,7 @@ from cms.mode_sets.assumed import assumed_modes
 from cms.reduction import reduce
 from cms.rigid_modes import geometric_rigid_modes
 from tests.bodies import STEEL, bar, beam, box_mesh
+from tests.fe_models.frames import straight
 
 ROUNDOFF = 1e-12
 SPAN = np.array([-0.3, 1.1])
@@ -134,6 +135,14 @@ def test_beam_rotations_follow_the_slope(thin):
 
 def test_a_beam_needs_no_contraction_columns(thin):
     assert assumed_modes(thin, n_modes=3).columns.shape[1] == 6 + 3 * 4
+
+
+def test_nodes_beside_the_centroid_need_no_contraction_columns_either():
+    """A beam whose nodes lie beside its centroid: bent about the centroid, and moved along at the nodes."""
+    body = couple(straight(n=12, interfaces=("start", "end"), offset=(0.0, 0.03)))
+    modes = assumed_modes(body, n_modes=8)
+    assert modes.columns.shape[1] == 6 + 8 * 4
+    assert_allclose(reduce(body, modes).free_frequencies[:4], frequencies(body)[:4], rtol=1e-3)
 
 
 def test_the_set_turns_with_the_body(solid):

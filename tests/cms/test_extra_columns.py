@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import fe_models as fm
 from cms.centrifugal import centrifugal_loads
 from cms.couplings import couple
 from cms.errors import ModeSetError
@@ -17,6 +18,7 @@ from cms.units import unit_system
 from fe_models.material import Material
 from fe_models.solid import solid_body
 from tests.bodies import bar, beam, box_mesh, with_interfaces
+from tests.fe_models.frames import STEEL, straight
 
 ROUNDOFF = 1e-12
 
@@ -133,6 +135,20 @@ def test_centrifugal_loads_sum_to_the_force_of_any_rotation():
     total = sum(p * case.f for p, case in zip(products, centrifugal_loads(body), strict=True))
     field = -np.cross(w, np.cross(w, body.nodes))
     assert_allclose(total, body.M @ field.ravel(), rtol=0, atol=ROUNDOFF * np.abs(total).max() * 10)
+
+
+def test_a_flat_beam_takes_the_torque_that_turns_it_into_the_plane_of_rotation():
+    """f_yz = -rho (c_y e_z + c_z e_y) / 2 has the torque -rho (∫ y² - ∫ z²) / 2 about the axis of the beam."""
+    body = straight(n=5, section=fm.Rectangle(0.02, 0.05), length=1.3)
+    loads = {case.name: case.f.reshape(-1, 6) for case in centrifugal_loads(body)}
+    width, height = np.ptp(body.nodes[6:, 1]), np.ptp(body.nodes[6:, 2])  # of the skin
+    second = STEEL.rho * width * height / 12 * np.array([width**2, height**2])
+    assert_allclose(loads["centrifugal yz"][:, 3].sum(), -1.3 * (second[0] - second[1]) / 2, rtol=1e-9)
+    # and the loads are those of the exact moments for any displacement
+    u = np.random.default_rng(2).normal(size=(body.n_dof, 2))
+    P = body.element_model.mass_gram(body.mesh_displacement(u))[1:4, 4:].reshape(3, 3, 2)
+    found = loads["centrifugal xz"].ravel() @ u
+    assert_allclose(found, -(P[0, 2] + P[2, 0]) / 2, rtol=0, atol=ROUNDOFF * np.abs(P).max() * 10)
 
 
 def test_a_spinning_rod_stretches_as_it_should():
