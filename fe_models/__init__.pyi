@@ -8,6 +8,7 @@ from .beams.interfaces import NodeIndices as NodeIndices
 from .beams.interfaces import line_interface as line_interface
 from .beams.line_mesh import LineMesh as LineMesh
 from .beams.line_mesh import straight_line as straight_line
+from .beams.section_points import section_points as section_points
 from .beams.sections import BoxSection as BoxSection
 from .beams.sections import Circle as Circle
 from .beams.sections import GeneralSection as GeneralSection

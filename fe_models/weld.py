@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from cms.arrays import Array, IntArray
 from cms.elimination import eliminate_dofs
 from cms.errors import BodyError
-from cms.fe_body import ElementModel, FEBody, Interface, Recovery
+from cms.fe_body import ElementModel, FEBody, Interface, Recovery, StressPointModel
 from cms.load_cases import LoadCase
 from cms.rigid_modes import rigid_motion_of_points
 
@@ -41,20 +41,42 @@ class WeldedModel:
             gram += part.mass_gram(u[rows])
         return gram
 
-    def nodal_stress(self, u: Array) -> Array:
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return the stress at the nodes of all parts, (n_nodes, 6, k); zero at reference nodes."""
         stresses = []
-        for part, rows, n_nodes in zip(self.parts, self._rows(), self.n_nodes, strict=True):
+        first = np.cumsum([0, *self.n_nodes])
+        for part, rows, begin, n_nodes in zip(self.parts, self._rows(), first[:-1], self.n_nodes, strict=True):
             stress = np.zeros((n_nodes, 6, np.shape(u)[1]))
             if part.has_nodal_stress:
-                own = part.nodal_stress(u[rows])
+                inside = None if nodes is None else nodes[(nodes >= begin) & (nodes < begin + n_nodes)] - begin
+                own = part.nodal_stress(u[rows], nodes=inside)
                 stress[: len(own)] = own
             stresses.append(stress)
         return np.concatenate(stresses)
 
     def _rows(self) -> list[slice]:
-        ends = np.cumsum([0, *self.n_mesh_dof])
-        return [slice(begin, end) for begin, end in pairwise(ends.tolist())]
+        return mesh_rows(self.n_mesh_dof)
+
+
+@dataclass(frozen=True, eq=False)
+class WeldedPoints:
+    """The stress points of the parts that have some (`cms.fe_body.StressPointModel`)."""
+
+    parts: tuple[tuple[str, StressPointModel, slice], ...]  #: name of the part, its points, its rows of the mesh dofs
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One per point: "frame: line 3 end point 5"."""
+        return tuple(f"{body}: {name}" for body, points, _ in self.parts for name in points.names)
+
+    @property
+    def positions(self) -> Array:
+        """Undeformed, mesh axes, (n_points, 3) [m]."""
+        return np.concatenate([points.positions for _, points, _ in self.parts])
+
+    def stress(self, u: Array) -> Array:
+        """Return the stress, (n_points, 6, k) [Pa], of columns over the mesh dofs."""
+        return np.concatenate([points.stress(u[rows]) for _, points, rows in self.parts])
 
 
 def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, name: str) -> FEBody:
@@ -97,6 +119,11 @@ def weld(bodies: Sequence[FEBody], joints: Iterable[tuple[Place, Place]], *, nam
     side_by_side = _side_by_side(name, bodies, joined, first_dof, first_node)
     slaves, T_s = _followers(where, side_by_side, pairs)
     return eliminate_dofs(side_by_side, slaves, T_s) if len(slaves) else side_by_side
+
+
+def mesh_rows(n_mesh_dof: tuple[int, ...]) -> list[slice]:
+    """Return the rows of each part among the mesh dofs of all."""
+    return [slice(begin, end) for begin, end in pairwise(np.cumsum([0, *n_mesh_dof]).tolist())]
 
 
 def _require_fit(where: str, bodies: tuple[FEBody, ...]) -> None:
@@ -163,6 +190,12 @@ def _side_by_side(
         for body in bodies
     ]
     volumes = [body.node_volumes for body in bodies]
+    n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
+    points = tuple(
+        (body.name, body.stress_points, rows)
+        for body, rows in zip(bodies, mesh_rows(n_mesh_dof), strict=True)
+        if body.stress_points is not None
+    )
     models = [body.element_model for body in bodies]
     return FEBody(
         name=name,
@@ -178,7 +211,7 @@ def _side_by_side(
         if any(model is None for model in models)
         else WeldedModel(
             tuple(model for model in models if model is not None),
-            tuple(recovery.matrix.shape[0] for recovery in recoveries),
+            n_mesh_dof,
             tuple(len(body.nodes) for body in bodies),
         ),
         recovery=Recovery(
@@ -186,6 +219,7 @@ def _side_by_side(
             _numbered([recovery.dofs for recovery in recoveries], first_node),
         ),
         load_cases=tuple(load_cases),
+        stress_points=WeldedPoints(points) if points else None,
         node_volumes=None if any(v is None for v in volumes) else np.concatenate([v for v in volumes if v is not None]),
         provenance={f"{body.name}: {key}": value for body in bodies for key, value in body.provenance.items()},
     )

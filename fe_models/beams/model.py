@@ -59,7 +59,7 @@ class BeamModel:
         local = self.geometry.T @ np.asarray(u)[self.dofs]
         return end_forces_at_centroid(self.K_local @ local)
 
-    def nodal_stress(self, u: Array) -> Array:
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return the stress at the skin nodes, the mean of both lines where they share one; zero at nodes of the axis.
 
         sigma_xx from N, My, Mz; tau from torsion and shear as the section gives it; turned into mesh axes.
@@ -76,17 +76,29 @@ class BeamModel:
             lines = np.flatnonzero(self.of_line == number)
             if not len(lines):
                 continue
-            turn = _stress_directions(self.geometry.R[lines])
-            y_s, z_s = section.shear_center
             for end in range(2):
-                at_end = forces[lines, end].copy()
-                at_end[:, 3] += z_s * at_end[:, 1] - y_s * at_end[:, 2]  # torsion about the shear centre
-                local = np.einsum("psf,nfk->npsk", section.stress, at_end)
                 rows = self.skin.ring_start[lines, end, None] + np.arange(len(section.points))
-                np.add.at(stress, rows, np.einsum("ncs,npsk->npck", turn, local))
+                np.add.at(stress, rows, self.stress_at_end(lines, forces[lines, end]))
                 np.add.at(count, rows, 1.0)
         stress /= np.maximum(count, 1.0)[:, None, None]
         return np.concatenate([np.zeros((self.n_nodes, 6, k)), stress])
+
+    def stress_at_end(self, lines: IntArray, forces: Array) -> Array:
+        """Return the stress at the section points of lines of one section, (n, n_points, 6, k) [Pa], mesh axes.
+
+        Parameters
+        ----------
+        lines
+            Of one section, (n,).
+        forces
+            Section forces at one end of them, (n, 6, k).
+        """
+        section = self.sections[self.of_line[lines[0]]]
+        y_s, z_s = section.shear_center
+        about = np.array(forces)
+        about[:, 3] += z_s * about[:, 1] - y_s * about[:, 2]  # torsion about the shear centre
+        local = np.einsum("psf,nfk->npsk", section.stress, about)
+        return np.einsum("ncs,npsk->npck", _stress_directions(self.geometry.R[lines]), local)
 
     def _require_rows(self, where: str, u: Array) -> None:
         if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:

@@ -163,8 +163,8 @@ class ISection:
     def properties(self, nu: float) -> SectionProperties:
         """Return the properties; J is the sum of the three rectangles.
 
-        Fillets and junctions are left out: J is 2 to 4 % low for sharp-cornered rolled profiles, 9 % where the walls are
-        a tenth of the width.
+        Fillets and junctions are left out: J is 2 to 4 % low for sharp-cornered rolled profiles, 9 % where the walls
+        are a tenth of the width.
         """
         b, h, t_w, t_f = self.width, self.height, self.web, self.flange
         h_w, h_m = h - 2 * t_f, h - t_f

@@ -313,6 +313,22 @@ def test_torsion_of_a_tube_is_pure_shear_along_its_wall():
     assert_allclose(stress[outer, :4], 0, rtol=0, atol=1e-9 * radius / J)
 
 
+def test_section_points_show_each_end_of_a_line_by_itself():
+    """A force in the middle: the shear stress jumps there, and the mean of both is what the skin shows."""
+    body = fm.section_points(straight(2), [0, 1])
+    u = static_solution(body, np.r_[0:6, 12:18], 7, 1.0)
+    stress = body.stress_points.stress(body.mesh_displacement(u))[:, :, 0].reshape(2, 2, 8, 6)
+    V = 0.5 / RECTANGLE.properties(0.3).A * 1.5
+    assert_allclose(stress[0, 1, 3, 5], V, rtol=1e-9)  # point 3 is the middle of the upper side
+    assert_allclose(stress[1, 0, 3, 5], -V, rtol=1e-9)
+    assert body.stress_points.names[8 + 3] == "line 0 end point 3"
+    assert_allclose(body.stress_points.positions[8 + 3], [0.5, 0, 0.015], rtol=0, atol=1e-15)
+    with pytest.raises(BeamError, match=r"expected lines 0\.\.1"):
+        fm.section_points(body, [2])
+    with pytest.raises(BeamError, match="is no frame"):
+        fm.section_points(bodies.bar(1, 1, 1), [0])
+
+
 def test_stress_turns_with_the_frame():
     R = Rotation.from_rotvec([0.3, 0.9, -0.4]).as_matrix()
     item = fm.BeamProperty(RECTANGLE, STEEL, orientation=tuple(R[:, 1]))

@@ -88,6 +88,20 @@ def test_solid_and_beam_in_line_swing_like_a_beam_alone(kind):
     assert_allclose(reduced.moments.J0[2, 2], J_z, rtol=1e-9)
 
 
+def test_stress_points_of_the_parts_stay_with_them():
+    first = fm.section_points(line((0, 0, 0), (1, 0, 0), 2, "first", {"a": "start", "b": "end"}), [1])
+    second = line((1, 0, 0), (1, 1, 0), 2, "second", {"c": "start"})
+    body = fm.weld([second, first], [(("first", "b"), ("second", "c"))], name="whole")
+    points = body.stress_points
+    assert points.names[0] == "first: line 1 start point 0"
+    u = np.random.default_rng(0).normal(size=(body.n_dof, 2))
+    stress = points.stress(body.mesh_displacement(u))
+    skin = body.element_model.nodal_stress(body.mesh_displacement(u))
+    for position, value in zip(points.positions[8:], stress[8:], strict=True):  # the far end: one line only
+        node = np.flatnonzero((np.abs(body.nodes - position).max(axis=1) < 1e-12) & (np.abs(skin).sum(axis=(1, 2)) > 0))
+        assert min(np.abs(skin[k] - value).max() for k in node) <= 1e-9 * np.abs(value).max()
+
+
 def test_joints_far_apart_are_joined_by_a_rigid_arm():
     first = line((0, 0, 0), (1, 0, 0), 2, "first", {"a": "start", "b": "end"})
     second = line((1, 0.5, 0), (1, 1.5, 0), 2, "second", {"c": "start"})
