@@ -41,13 +41,16 @@ class ElementModel(Protocol):
             (4 + 3 k, 4 + 3 k) [kg × units of the products]; u_x of all columns first, then u_y, u_z.
         """
 
-    def nodal_stress(self, u: Array) -> Array:
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Stress at the nodes, averaged over the adjoining elements of one material.
 
         Parameters
         ----------
         u
             Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
+        nodes
+            Whose stress is wanted; None: that of all. Nodes of an interface may be beyond the mesh: they have none. The
+            others may show zero.
 
         Returns
         -------

@@ -50,7 +50,7 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
     modes = np.zeros((len(nodes), 6, Phi.shape[1]))
     for begin in range(0, Phi.shape[1], COLUMNS_AT_ONCE):
         columns = slice(begin, begin + COLUMNS_AT_ONCE)
-        everywhere = model.nodal_stress(body.mesh_displacement(Phi[:, columns]))
+        everywhere = model.nodal_stress(body.mesh_displacement(Phi[:, columns]), nodes=nodes)
         on_mesh = nodes < len(everywhere)
         modes[on_mesh, :, columns] = everywhere[nodes[on_mesh]]
     return turned_stress(modes, axes)

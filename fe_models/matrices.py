@@ -45,7 +45,7 @@ class ScalarMassModel:
         put_translations(translations, self.dofs, u)
         return scalar_mass_gram(self.M_s, self.nodes, translations)
 
-    def nodal_stress(self, u: Array) -> Array:
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Refuse: matrices do not know the elements."""
         raise BodyError(
             f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "

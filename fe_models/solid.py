@@ -51,10 +51,13 @@ class SolidModel:
         """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
         return scalar_mass_gram(self.M_s, self.mesh.nodes, np.asarray(u).reshape(len(self.mesh.nodes), 3, -1))
 
-    def nodal_stress(self, u: Array) -> Array:
-        """Return the stress at the nodes, (n_nodes, 6, k) [Pa], xx yy zz yz xz xy, of columns u, (3 n_nodes, k)."""
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return the stress at the nodes, (n_nodes, 6, k) [Pa], xx yy zz yz xz xy, of columns u, (3 n_nodes, k).
+
+        Only the elements at `nodes` are visited where these are given; the other nodes show zero.
+        """
         require_rows("nodal_stress", u, 3 * len(self.mesh.nodes))
-        return nodal_stress(self.mesh, self.materials, self.of_cell, self.of_node, u)
+        return nodal_stress(self.mesh, self.materials, self.of_cell, self.of_node, u, nodes=nodes)
 
 
 def solid_body(

@@ -16,7 +16,13 @@ __all__ = ["nodal_stress", "stiffest_at_nodes"]
 
 
 def nodal_stress(
-    mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray], of_node: IntArray, u: Array
+    mesh: Mesh,
+    materials: tuple[Material, ...],
+    of_cell: Mapping[str, IntArray],
+    of_node: IntArray,
+    u: Array,
+    *,
+    nodes: IntArray | None = None,
 ) -> Array:
     """Return the stress at the nodes, (n_nodes, 6, k) [Pa], of displacement columns u, (3 n_nodes, k) [m].
 
@@ -35,28 +41,36 @@ def nodal_stress(
         The material whose stress each node shows, (n_nodes,); see `stiffest_at_nodes`.
     u
         Displacement columns, dof 3 i + c is component c of node i, (3 n_nodes, k).
+    nodes
+        Whose stress is wanted: only their elements are visited, the other nodes show zero; None: all.
     """
     from fe_models.stress_kernels import add_element_stress, volume_at_nodes
 
     lame = np.array([[material.lam, material.mu] for material in materials])
     volume = np.zeros(len(mesh.nodes))
+    wanted = np.ones(len(mesh.nodes), dtype=bool)
+    if nodes is not None:
+        wanted[:] = False
+        wanted[nodes[nodes < len(wanted)]] = True
     fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
     n_columns = fields.shape[2]
     stress = np.zeros((len(mesh.nodes), 6, n_columns))
     cuts = np.linspace(0, n_columns, min(n_threads(), n_columns) + 1).astype(int) if n_columns else np.zeros(1, int)
     with ThreadPoolExecutor(n_threads()) as pool:  # a thread owns its columns: no two write to one entry
-        for kind, cells in mesh.cells.items():
+        for kind, all_cells in mesh.cells.items():
+            is_wanted = np.ones(len(all_cells), bool) if nodes is None else wanted[all_cells].any(axis=1)
+            cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
             if not len(cells):
                 continue
             element = reference_element(kind)
             table = element.stress
-            volume_at_nodes(mesh.nodes, cells, of_cell[kind], of_node, table.gradients, table.weights, volume)
+            volume_at_nodes(mesh.nodes, cells, material, of_node, table.gradients, table.weights, volume)
             futures = [
                 pool.submit(
                     add_element_stress,
                     mesh.nodes,
                     cells,
-                    of_cell[kind],
+                    material,
                     of_node,
                     lame,
                     table.gradients,
@@ -71,7 +85,8 @@ def nodal_stress(
             ]
             for future in futures:
                 future.result()
-    stress /= volume[:, None, None]
+    np.divide(stress, volume[:, None, None], out=stress, where=volume[:, None, None] > 0)
+    stress[~wanted] = 0.0
     return stress
 
 

@@ -14,7 +14,9 @@ from cms.frames import NodalFrame, TisserandFrame
 from cms.mode_sets import craig_bampton, guyan
 from cms.reduction import reduce
 from cms.stress_modes import turned_stress, von_mises
-from tests.bodies import bar
+from cms.units import unit_system
+from fe_models.solid import solid_body
+from tests.bodies import ALUMINIUM, STEEL, bar, box_mesh, distorted
 
 TURNED = ((0.0, 1.0, 0.0), (-0.6, 0.0, 0.8), (0.8, 0.0, 0.6))
 
@@ -115,3 +117,15 @@ def test_stress_is_left_out_on_demand_and_where_it_is_unknown(body):
     assert reduced.point_stress is None
     assert convert_frame(reduced, NodalFrame("left")).stress is None
     assert reduce(replace(body, element_model=None), guyan(body)).stress is None
+
+
+def test_stress_at_chosen_nodes_is_that_of_all():
+    """Two materials, so that what adjoins a node matters; the nodes left out show zero."""
+    mesh = distorted(box_mesh(3, 2, 2, kind="tetra10"), amount=0.2)
+    body = solid_body(mesh, {"left half": STEEL, "right half": ALUMINIUM}, name="box", units=unit_system("m-kg-s"))
+    u = np.random.default_rng(0).normal(size=(body.n_dof, 3))
+    everywhere = body.element_model.nodal_stress(u)
+    chosen = np.random.default_rng(1).choice(len(mesh.nodes), 12, replace=False)
+    here = body.element_model.nodal_stress(u, nodes=np.r_[chosen, len(mesh.nodes) + 1])
+    assert_allclose(here[chosen], everywhere[chosen], rtol=1e-12)
+    assert_allclose(np.delete(here, chosen, axis=0), 0, rtol=0, atol=0)
