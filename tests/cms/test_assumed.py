@@ -142,7 +142,7 @@ def test_nodes_beside_the_centroid_need_no_contraction_columns_either():
     body = couple(straight(n=12, interfaces=("start", "end"), offset=(0.0, 0.03)))
     modes = assumed_modes(body, n_modes=8)
     assert modes.columns.shape[1] == 6 + 8 * 4
-    assert_allclose(reduce(body, modes).free_frequencies[:4], frequencies(body)[:4], rtol=1e-3)
+    assert_allclose(reduce(body, modes).free_frequencies[:4], frequencies(body)[:4], rtol=2e-3)  # but for shear
 
 
 def test_the_set_turns_with_the_body(solid):
