@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array
+from cms.arrays import Array, IntArray
 from cms.damping import Damping, modal_damping
 from cms.errors import BodyError
 from cms.finishing import elastic_eigenvectors
@@ -115,7 +115,7 @@ def condition_of(reduced: ReducedBody, frame: Frame) -> tuple[Array, BodyFrame]:
         return least(sums.w, c, N_c, sums.U1, sums.U2), placed("buckens", frame, in_mesh(reduced.frame, c))
     rows, u, held = nodal_condition(reduced, frame)
     default = center if frame.at is None else in_mesh(reduced.frame, reduced.interface(frame.at).position)
-    return np.linalg.solve(rows, u), placed("nodal", frame, default, held)
+    return np.asarray(np.linalg.solve(rows, u)), placed("nodal", frame, default, held)
 
 
 def least(weight: float, c: Array, N_c: Array, U1: Array, U2: Array) -> Array:
@@ -127,7 +127,7 @@ def least(weight: float, c: Array, N_c: Array, U1: Array, U2: Array) -> Array:
     return np.vstack([U1 / weight - np.cross(theta, c, axisa=0, axisc=0), theta])
 
 
-def nodal_condition(reduced: ReducedBody, frame: NodalFrame) -> tuple[Array, Array, Array]:
+def nodal_condition(reduced: ReducedBody, frame: NodalFrame) -> tuple[Array, Array, IntArray]:
     """Return rigid motions and shapes at the six held dofs, (6, 6) and (6, n_q), and the dofs (node, component)."""
     where = f"reduced body {reduced.name!r}: nodal frame"
     if frame.dofs is not None:
@@ -155,7 +155,7 @@ def nodal_condition(reduced: ReducedBody, frame: NodalFrame) -> tuple[Array, Arr
     return motion[chosen], u[chosen], named if (named >= 0).all() else np.zeros((0, 2), np.int64)
 
 
-def interface_dofs(reduced: ReducedBody, interface: ReducedInterface) -> tuple[Array, Array, Array, Array, Array]:
+def interface_dofs(reduced: ReducedBody, interface: ReducedInterface) -> tuple[Array, IntArray, Array, Array, IntArray]:
     """Return the dofs an interface offers to a nodal frame: points, components, rigid motions, shapes, nodes.
 
     In mesh axes. The six of its reference point; the translations of the members where it has no such node (kind

@@ -57,8 +57,11 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
         "/provenance": dict(body.provenance),
     }
     for k, interface in enumerate(body.interfaces):
-        kinds = {"name": interface.name, "kind": interface.kind, "has_rotation": int(interface.has_rotation)}
-        attributes[f"/interfaces/{k}"] = kinds
+        attributes[f"/interfaces/{k}"] = {
+            "name": interface.name,
+            "kind": interface.kind,
+            "has_rotation": int(interface.has_rotation),
+        }
     for k, case in enumerate(body.load_cases):
         attributes[f"/load_cases/{k}"] = {"name": case.name, "kind": case.kind}
     if body.columns is not None:

@@ -37,7 +37,8 @@ class BodyFrame:
         object.__setattr__(self, "origin", frozen(self.origin))
         object.__setattr__(self, "axes", frozen(self.axes))
         object.__setattr__(self, "dofs", frozen_int(self.dofs))
-        require_shape("body frame: dofs", self.dofs, (len(self.dofs), 2))
+        if self.dofs.shape != (len(self.dofs), 2):
+            raise BodyError(f"body frame: dofs: expected (n, 2) of (node, component), got {self.dofs.shape}")
         require_shape("body frame: origin", self.origin, (3,))
         require_shape("body frame: axes", self.axes, (3, 3))
         require_finite("body frame: origin", self.origin)

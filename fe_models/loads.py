@@ -281,7 +281,7 @@ def _finite(where: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     array = np.asarray(values, dtype=float)
     if array.shape != shape or not np.isfinite(array).all():
         expected = f"{shape[0]} finite numbers" if shape else "a finite number"
-        raise LoadError(f"{where}: expected {expected}, got {values}")
+        raise LoadError(f"{where}: expected {expected}, got {values!r}")
     return array
 
 
