@@ -78,8 +78,8 @@ class BeamModel:
                 continue
             for end in range(2):
                 rows = self.skin.ring_start[lines, end, None] + np.arange(len(section.points))
-                np.add.at(stress, rows, self.stress_at_end(lines, forces[lines, end]))
-                np.add.at(count, rows, 1.0)
+                stress[rows] += self.stress_at_end(lines, forces[lines, end])  # a ring joins one end to one start
+                count[rows] += 1.0
         stress /= np.maximum(count, 1.0)[:, None, None]
         return np.concatenate([np.zeros((self.n_nodes, 6, k)), stress])
 
@@ -97,8 +97,9 @@ class BeamModel:
         y_s, z_s = section.shear_center
         about = np.array(forces)
         about[:, 3] += z_s * about[:, 1] - y_s * about[:, 2]  # torsion about the shear centre
-        local = np.einsum("psf,nfk->npsk", section.stress, about)
-        return np.einsum("ncs,npsk->npck", _stress_directions(self.geometry.R[lines]), local)
+        table = np.einsum("ncs,psf->npcf", _stress_directions(self.geometry.R[lines]), section.stress)
+        n, n_points = table.shape[:2]
+        return np.asarray((table.reshape(n, 6 * n_points, 6) @ about).reshape(n, n_points, 6, -1))
 
     def _require_rows(self, where: str, u: Array) -> None:
         if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:

@@ -40,7 +40,9 @@ def make_skin(
         Their outlines.
     """
     size = float(np.linalg.norm(np.ptp(nodes, axis=0))) or 1.0
-    rings: dict[tuple[int, int], list[tuple[Array, Array, int, int]]] = {}  # (node, section) -> ends that lie there
+    rings: dict[
+        tuple[int, int], list[tuple[Array, Array, int, int]]
+    ] = {}  # (node, section) -> ends nothing continues yet
     points, mover, triangles = [], [], []
     start = np.zeros((len(lines), 2), np.int64)
     uses: dict[int, list[tuple[int, int]]] = {}
@@ -49,18 +51,25 @@ def make_skin(
         outline = sections[section].points
         for end, node in enumerate(pair):
             X, R = geometry.ends[line, end], geometry.R[line]
-            here = rings.setdefault((int(node), int(section)), [])
-            continued = [
-                first_other
-                for X_other, R_other, other_end, first_other in here
-                if other_end != end and np.abs(X - X_other).max() <= SAME * size and np.abs(R - R_other).max() <= SAME
-            ]
-            first = continued[0] if continued else n_points
-            if not continued:
+            open_rings = rings.setdefault((int(node), int(section)), [])
+            match = next(
+                (
+                    place
+                    for place, (X_other, R_other, other_end, _) in enumerate(open_rings)
+                    if other_end != end
+                    and np.abs(X - X_other).max() <= SAME * size
+                    and np.abs(R - R_other).max() <= SAME
+                ),
+                None,
+            )
+            if match is None:
+                first = n_points
                 points.append(X + outline @ R[:, 1:].T)
                 mover.append(np.full(len(outline), node))
                 n_points += len(outline)
-                here.append((X, R, end, first))
+                open_rings.append((X, R, end, first))
+            else:
+                first = open_rings.pop(match)[3]
             start[line, end] = first
             uses.setdefault(first, []).append((line, end))
         for loop, turn in zip(sections[section].loops, (1, *[-1] * len(sections[section].loops)), strict=False):
