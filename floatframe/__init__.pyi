@@ -39,9 +39,18 @@ from .integration import Progress as Progress
 from .integration import integrate as integrate
 from .integration import resume as resume
 from .integrators import GeneralizedAlpha as GeneralizedAlpha
+from .joints import ConstantOrientation as ConstantOrientation
+from .joints import CylindricalJoint as CylindricalJoint
+from .joints import DistanceJoint as DistanceJoint
 from .joints import FixedJoint as FixedJoint
+from .joints import PlanarJoint as PlanarJoint
+from .joints import PointOnLine as PointOnLine
+from .joints import PointOnPlane as PointOnPlane
+from .joints import PrismaticJoint as PrismaticJoint
 from .joints import RevoluteJoint as RevoluteJoint
+from .joints import ScrewJoint as ScrewJoint
 from .joints import SphericalJoint as SphericalJoint
+from .joints import UniversalJoint as UniversalJoint
 from .markers import Marker as Marker
 from .rigid_body import RigidBody as RigidBody
 from .sensors import interface_motion as interface_motion
@@ -50,5 +59,6 @@ from .sensors import nodal_stress as nodal_stress
 from .sensors import point_motion as point_motion
 from .state import State as State
 from .system import System as System
+from .time_functions import TimeFunction as TimeFunction
 from .trajectory import Trajectory as Trajectory
 from .trajectory import read_results as read_results

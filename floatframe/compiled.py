@@ -10,12 +10,13 @@ from floatframe.elimination import plan_elimination
 from floatframe.errors import ModelError
 from floatframe.flexible_body import FlexibleBody
 from floatframe.forces import Gravity, PointForce, SpringDamper
-from floatframe.joints.rows import SPRING, Row
+from floatframe.joints.rows import MOMENT, NO_MOMENT, SPRING, Row
 from floatframe.kernels.model import Model
 from floatframe.marker_data import MarkerData, find_marker, joint_markers, marker_pose, marker_shapes, n_q_of
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
 from floatframe.system import System
+from floatframe.time_functions import N_COEFFICIENTS
 
 __all__ = ["CompiledSystem", "compile_system"]
 
@@ -59,12 +60,14 @@ def compile_system(system: System) -> CompiledSystem:
     rows: list[Row] = []
     springs: list[list[float]] = []
     a_of, b_of, spring_of, connection_of, sign = [], [], [], [], []
+    moment: list[int] = []
     for joint in system.joints:
         a, b = joint_markers(system, joint, placed)
-        _, A_a = marker_pose(a, placed, n_q)
-        _, A_b = marker_pose(b, placed, n_q)
+        r_a, A_a = marker_pose(a, placed, n_q)
+        r_b, A_b = marker_pose(b, placed, n_q)
         sizes.append(joint.size)
-        rows.extend(joint.rows(A_a, A_b))
+        rows.extend(joint.rows(A_a, A_b, r_b - r_a))
+        moment += [MOMENT if joint.size >= MOMENT + 3 else NO_MOMENT, joint.moment_b]
         spring_of.append(-1)
         a_of.append(len(markers))
         b_of.append(len(markers) + 1)
@@ -78,7 +81,8 @@ def compile_system(system: System) -> CompiledSystem:
         b = find_marker(system, f"{where}: marker_b", spring.marker_b)
         free_length = spring_length(where, spring, a, b, placed, n_q)
         sizes.append(3)
-        rows.extend(Row(SPRING, axis, np.zeros(3)) for axis in np.eye(3))
+        rows.extend(Row(SPRING, axis) for axis in np.eye(3))
+        moment += [NO_MOMENT] * 2
         spring_of.append(len(springs))
         springs.append([spring.stiffness, spring.damping, free_length, spring.preload])
         a_of.append(len(markers))
@@ -92,6 +96,7 @@ def compile_system(system: System) -> CompiledSystem:
         load_marker.append(len(markers))
         markers.append(find_marker(system, f"force {load.name!r}: marker", load.marker))
         connection_of.append(-1)
+        moment.append(NO_MOMENT)
         sign.append(0.0)
 
     ends_of = [
@@ -117,6 +122,7 @@ def compile_system(system: System) -> CompiledSystem:
         psi=psi,
         m_connection=connection_of_marker,
         m_sign=np.array(sign, dtype=float),
+        m_moment=integers(moment),
         m_follower=integers([0] * (len(markers) - len(loads)) + [int(load.is_follower) for load in loads]),
         m_x0=m_x0,
         end0=offsets(np.array([len(group) for group in ends_of])),
@@ -129,7 +135,10 @@ def compile_system(system: System) -> CompiledSystem:
         row_kind=integers([row.kind for row in rows]),
         row_x=stacked([row.x for row in rows], (3,)),
         row_y=stacked([row.y for row in rows], (3,)),
+        row_z=stacked([row.z for row in rows], (3,)),
         row_c=np.array([row.c for row in rows], dtype=float),
+        row_part=integers([row.part for row in rows]),
+        **motion_arrays(rows),
         springs=stacked(springs, (4,)),
         l_marker=integers(load_marker),
         l_force=stacked([load.force for load in loads], (3,)),
@@ -144,6 +153,18 @@ def compile_system(system: System) -> CompiledSystem:
         placed=placed,
         length=system_length(markers, placed, n_q, model),
     )
+
+
+def motion_arrays(rows: list[Row]) -> dict[str, Array | IntArray]:
+    """Return the functions of time of the rows, one after another."""
+    motions = [row.motion for row in rows if row.motion is not None]
+    number = iter(range(len(motions)))
+    return {
+        "row_motion": integers([-1 if row.motion is None else next(number) for row in rows]),
+        "piece0": offsets(integers([len(motion.begins) for motion in motions])),
+        "piece_t": np.concatenate([*(motion.begins for motion in motions), np.zeros(0)]),
+        "piece": np.concatenate([*(motion.pieces for motion in motions), np.zeros((0, N_COEFFICIENTS))]),
+    }
 
 
 def place(system: System) -> State:

@@ -19,8 +19,8 @@ from cms.arrays import Array
 from floatframe.arrays import array_of_shape
 from floatframe.compiled import CompiledSystem
 from floatframe.errors import ModelError
-from floatframe.joints.rows import DOT, GAUGE, POINT, SPRING
-from floatframe.kernels.model import STIFFNESS, Work, new_work
+from floatframe.joints.rows import HELD, HELD_DISTANCES
+from floatframe.kernels.model import STIFFNESS, Model, Work, new_work
 from floatframe.linearization import (
     displaced,
     highest_frequency,
@@ -58,8 +58,8 @@ class ConsistentState:
     w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
 
 
-def consistent_state(system: System, state: State | None = None) -> ConsistentState:
-    """Return a consistent state near a given one, or near the bodies as placed.
+def consistent_state(system: System, state: State | None = None, *, t: float = 0.0) -> ConsistentState:
+    """Return a consistent state near a given one, or near the bodies as placed, for prescribed motions at time t.
 
     Raises
     ------
@@ -69,6 +69,7 @@ def consistent_state(system: System, state: State | None = None) -> ConsistentSt
     compiled = system.compiled
     state = compiled.placed if state is None else checked(compiled, state)
     work = new_work(compiled.model)
+    work.time[0] = t
     state = assembled(compiled, work, state)
     require_independent_constraints(compiled, work, state)
     state = with_compatible_velocities(compiled, work, state)
@@ -89,10 +90,10 @@ def checked(compiled: CompiledSystem, state: State) -> State:
 def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
     """(1): return the state with all joints closed."""
     model = compiled.model
-    holds = np.isin(model.row_kind, (POINT, DOT))
+    holds = np.isin(model.row_kind, HELD)
     if not holds.any():
         return state
-    scale = np.where(model.row_kind == POINT, compiled.length, 1.0)
+    scale = np.where(np.isin(model.row_kind, HELD_DISTANCES), compiled.length, 1.0)
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, state)
         parts = linearized(model, work, 1.0, 0.0, 0.0)
@@ -121,7 +122,8 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
     for c, name in enumerate(compiled.joint_names):
         rows = slice(int(model.c_w0[c]), int(model.c_w0[c + 1]))
         kind, g = model.row_kind[rows], error[rows]
-        gap, angle = np.linalg.norm(g[kind == POINT]), np.linalg.norm(g[kind == DOT])
+        is_distance = np.isin(kind, HELD_DISTANCES)
+        gap, angle = np.linalg.norm(g[is_distance]), np.linalg.norm(g[~is_distance])
         words.append((gap / compiled.length + angle, f"joint {name!r} is open by {gap:.4g} and {angle:.4g} rad"))
     words.sort(reverse=True)
     return ", ".join(text for size, text in words[:3] if size > 1e-9)
@@ -130,7 +132,7 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
 def require_independent_constraints(compiled: CompiledSystem, work: Work, state: State) -> None:
     """Raise `ModelError` naming the joints if some constraints repeat others (rank of G M⁻¹ Gᵀ)."""
     model = compiled.model
-    holds = np.isin(model.row_kind, (POINT, DOT))
+    holds = np.isin(model.row_kind, HELD)
     if not holds.any():
         return
     set_iterate(work, state)
@@ -183,46 +185,63 @@ def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> t
     set_iterate(work, state)
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     _, bias = rates_of_constraints(model, work)
-    rows = -np.where(np.isin(model.row_kind, (GAUGE, SPRING)), work.g, bias)
+    rows = -np.where(np.isin(model.row_kind, HELD), bias, work.g)
     y, w = solve(with_mass_for_all(model, parts.H), parts, -work.residual, rows)
     return in_ground_axes(model, state, y), w
 
 
-def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState) -> Array:
-    """Return d(u_dot)/dt at a consistent state, (n_u,), by a central difference along the motion.
+def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float = 0.0) -> Array:
+    """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference along the motion.
 
-    The step is a thousandth of the shortest time in the system, so that its error is 1e-6 of the fastest rate.
+    The step is a thousandth of the shortest time in the system, so that its error is 1e-6 of the fastest rate. The
+    difference is central, but forward in time where motions are prescribed, since they may begin at t.
     """
     model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
     work = new_work(model)
     turning = max((float(np.linalg.norm(state.u[k + 3 : k + 6])) for k in model.u0[:-1]), default=0.0)
     falling = max(float(np.linalg.norm(u_dot[k : k + 3])) / compiled.length for k in model.u0[:-1])
     swinging = max(float(np.linalg.norm(u_dot[k + 3 : k + 6])) for k in model.u0[:-1])
-    fastest = max(highest_frequency(model), turning, np.sqrt(falling), np.sqrt(swinging))
+    fastest = max(highest_frequency(model), turning, np.sqrt(falling), np.sqrt(swinging), fastest_motion(model))
     if fastest == 0.0:
         return np.zeros_like(u_dot)
     s = 1e-3 / fastest
-    sides = []
-    for step in (s, -s):
+
+    def u_dot_after(step: float) -> Array:
         moved = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
-        moved = State(moved.r, moved.p, moved.q, state.u + step * u_dot)
-        sides.append(solve_accelerations(compiled, work, moved)[0])
-    return (sides[0] - sides[1]) / (2 * s)
+        work.time[0] = t + step
+        return solve_accelerations(compiled, work, State(moved.r, moved.p, moved.q, state.u + step * u_dot))[0]
+
+    if len(model.piece_t):
+        return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
+    return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)
 
 
-def velocity_correction(compiled: CompiledSystem, state: State, after: State, h: float, beta: float) -> Array:
-    """Return the change of u, (n_u,), with which one step of size h from `state` closes the joints open in `after`.
+def fastest_motion(model: Model) -> float:
+    """Return the highest rate of prescribed motions: of their sines, or one over the shortest piece [1/s]."""
+    fastest = float(np.abs(model.piece[:, 7]).max(initial=0.0))
+    for first, last in zip(model.piece0[:-1], model.piece0[1:], strict=True):
+        lengths = np.diff(model.piece_t[first:last])
+        fastest = max(fastest, 1 / float(lengths.min()) if len(lengths) else 1.0)
+    return fastest
+
+
+def velocity_correction(
+    compiled: CompiledSystem, state: State, after: State, h: float, beta: float, t: float = 0.0
+) -> Array:
+    """Return the change of u, (n_u,), with which a step of size h from `state` at t closes the joints open in `after`.
 
     G du = -g(after)/h, with the weights of one step, M + beta h² K.
     """
     model = compiled.model
     work = new_work(model)
-    holds = np.isin(model.row_kind, (POINT, DOT))
+    holds = np.isin(model.row_kind, HELD)
     if not holds.any():
         return np.zeros(len(work.u))
+    work.time[0] = t + h
     set_iterate(work, after)
     linearized(model, work, 1.0, 0.0, 0.0)
     gap = np.where(holds, work.g, 0.0)
+    work.time[0] = t
     set_iterate(work, state)
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     H = []

@@ -71,7 +71,11 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
         row = work.J_row[12 * o : 12 * (o + n)].reshape(12, n)
         w = slice(int(model.c_w0[c]), int(model.c_w0[c + 1]))
         u = slice(int(model.u0[i]), int(model.u0[i + 1]))
-        J[w, u] = J[w, u].toarray() + model.m_sign[m] * (R4[:6, :6] @ column)[:size]
+        carried = model.m_sign[m] * (R4[:6, :6] @ column)
+        for part, place in ((0, 0), (3, int(model.m_moment[m]))):
+            if place >= 0:
+                k = slice(w.start + place, w.start + place + 3)
+                J[k, u] = J[k, u].toarray() + carried[part : part + 3]
         G[w, u] = G[w, u].toarray() + work.P[m, :size] @ R4 @ row
     blocks = [work.V[c, :size, :size].copy() for c, size in enumerate(model.c_size)]
     V = sp.csr_array(sp.block_diag(blocks)) if blocks else sp.csr_array((0, 0))

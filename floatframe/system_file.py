@@ -10,7 +10,7 @@ All of them raise `FloatframeError`, whose text is one message for the user.
 
 import logging
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,8 +29,9 @@ from floatframe.flexible_body import FlexibleBody
 from floatframe.forces import FORCES, Force, Gravity, PointForce, SpringDamper
 from floatframe.ground import GROUND
 from floatframe.integrators import GeneralizedAlpha
-from floatframe.joints import JOINTS, FixedJoint, Joint, RevoluteJoint, SphericalJoint
+from floatframe.joints import JOINTS, Joint
 from floatframe.markers import Marker, Place
+from floatframe.motion_section import MotionSection
 from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.system import Body, System
@@ -42,7 +43,10 @@ log = logging.getLogger(__name__)
 Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-KEYS_OF_JOINTS = {"fixed": ("rotation",), "revolute": ("axis", "axis_b"), "spherical": ()}
+KEYS_OF_JOINTS = {
+    kind: tuple(field.name for field in fields(joint) if field.name not in ("name", "marker_a", "marker_b"))
+    for kind, joint in JOINTS.items()
+}
 KEYS_OF_FORCES = {
     "point-force": ("body", "marker", "triad", "force", "torque", "is_follower"),
     "spring-damper": ("body_a", "marker_a", "body_b", "marker_b", "stiffness", "damping", "free_length", "preload"),
@@ -134,14 +138,23 @@ class JointSection(Table):
     axis: Vector3 | None = Field(None, description="the axis in the axes of marker_a, [x, y, z]")
     axis_b: Vector3 | None = Field(None, description="the axis in the axes of marker_b, [x, y, z]; default: as placed")
     rotation: Matrix3 | None = Field(None, description="the held rotation, three rows; default: as placed")
+    lead: float | None = Field(None, description="a number other than 0, the advance of a screw for one turn")
+    distance: Positive | None = Field(None, description="a number above 0, the length of a rod; default: as placed")
+    motions: dict[str, MotionSection] | None = Field(
+        None, description="tables [joints.NAME.motions.COORDINATE], functions of time"
+    )
 
     @model_validator(mode="after")
     def _fits_the_type(self) -> "JointSection":
-        for key in ("axis", "axis_b", "rotation"):
+        for key in ("axis", "axis_b", "rotation", "lead", "distance", "motions"):
             if getattr(self, key) is not None and key not in KEYS_OF_JOINTS[self.type]:
                 raise ValueError(f"a {self.type} joint has no key {key}{nearest(key, KEYS_OF_JOINTS[self.type])}")
-        if self.type == "revolute" and self.axis is None:
-            raise ValueError("axis: missing; a revolute joint needs its axis in the axes of marker_a, [x, y, z]")
+        if "axis" in KEYS_OF_JOINTS[self.type] and self.axis is None:
+            raise ValueError(f"axis: missing; a {self.type} joint needs its axis in the axes of marker_a, [x, y, z]")
+        if self.type == "universal" and self.axis_b is None:
+            raise ValueError("axis_b: missing; a universal joint needs its axis in the axes of marker_b, [x, y, z]")
+        if self.type == "screw" and self.lead is None:
+            raise ValueError("lead: missing; a screw joint needs its advance for one turn")
         if self.marker_a is None and self.marker_b is None:
             raise ValueError("expected marker_a or marker_b or both: the interface or position where the joint is")
         return self
@@ -305,12 +318,14 @@ def joint_of(name: str, section: JointSection) -> Joint:
         (section.body_b, section.marker_b, section.triad_b),
     ):
         ends.append(body if place is None else marker_of(body, place, triad))
-    if section.type == "revolute":
-        axis_b = None if section.axis_b is None else np.array(section.axis_b)
-        return RevoluteJoint(name, ends[0], ends[1], axis=np.array(section.axis), axis_b=axis_b)
-    if section.type == "fixed":
-        return FixedJoint(name, ends[0], ends[1], None if section.rotation is None else np.array(section.rotation))
-    return SphericalJoint(name, ends[0], ends[1])
+    options: dict[str, Any] = {}
+    for key in KEYS_OF_JOINTS[section.type]:
+        value = getattr(section, key)
+        if key == "motions":
+            options[key] = {coordinate: table.function() for coordinate, table in (value or {}).items()}
+        elif value is not None:
+            options[key] = value if isinstance(value, float) else np.array(value)
+    return JOINTS[section.type](name, ends[0], ends[1], **options)
 
 
 def force_of(name: str, section: ForceSection) -> Force:

@@ -132,7 +132,7 @@ class Trajectory:
             raise ResultsError(f"trajectory: no joint or spring {name!r}{nearest(name, self.connection_names)}")
         c = self.connection_names.index(name)
         w = self.source.read("w")[:, self.head.w0[c] : self.head.w0[c + 1]]
-        moment = w[:, 3:6] if w.shape[1] == 6 else np.zeros((len(w), 3))
+        moment = w[:, 3:6] if w.shape[1] >= 6 else np.zeros((len(w), 3))
         return Reaction(w[:, :3], moment)
 
     def drift(self, name: str) -> Drift:

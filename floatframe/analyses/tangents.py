@@ -21,7 +21,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.arrays import Array
-from floatframe.joints.rows import DOT, POINT
+from floatframe.joints.rows import HELD
 from floatframe.kernels.model import Model, Work
 from floatframe.linearization import linearized
 from floatframe.rotations import tilde
@@ -41,7 +41,7 @@ class Tangents:
 
 def held_rows(model: Model) -> np.ndarray:
     """Return which rows hold a distance or an angle, (n_w,) bool; the others say what a wrench is."""
-    return np.isin(model.row_kind, (POINT, DOT))
+    return np.isin(model.row_kind, HELD)
 
 
 def tangents(model: Model, work: Work) -> Tangents:

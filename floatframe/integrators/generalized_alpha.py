@@ -82,8 +82,8 @@ class GeneralizedAlpha:
 
     def start(self, system: System, t: float, state: State | None = None) -> Carry:
         """Return the memory at the beginning: the state made consistent, its accelerations and their rates."""
-        consistent = consistent_state(system, state)
-        rates = acceleration_rates(system.compiled, consistent)
+        consistent = consistent_state(system, state, t=t)
+        rates = acceleration_rates(system.compiled, consistent, t)
         return Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
@@ -127,7 +127,7 @@ class GeneralizedAlpha:
         from floatframe.kernels.entry import advance_steps
 
         compiled = system.compiled
-        carry = self.prepared(system, carry, h)
+        carry = self.prepared(system, carry, h, t0 + first * h)
         memory = memory_of(carry)
         n_rows = (first + n_steps) // every - first // every
         rows = new_rows(compiled.model, n_rows)
@@ -161,7 +161,7 @@ class GeneralizedAlpha:
         failure = None if outcome.status == 0 else self.explain(system, work, outcome)
         return after, rows, outcome.n_steps, failure
 
-    def prepared(self, system: System, carry: Carry, h: float) -> Carry:
+    def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
         """Return the memory with its algorithmic accelerations for steps of size h.
 
         At the start: a = u_dot + (alpha_m - alpha_f) h d(u_dot)/dt, where rates of modes that h does not resolve are
@@ -177,7 +177,7 @@ class GeneralizedAlpha:
         a = carry.u_dot + (alpha_m - alpha_f) * h * rates
         x = h * carry.state.u + h**2 * (0.5 * a + beta * h * rates)
         after = displaced(compiled.model, carry.state, x)
-        shift = velocity_correction(compiled, carry.state, after, h, beta)
+        shift = velocity_correction(compiled, carry.state, after, h, beta, t)
         return replace(carry, state=replace(carry.state, u=carry.state.u + shift), a=a, h=h)
 
     def explain(self, system: System, work: Work, outcome: tuple) -> Failure:

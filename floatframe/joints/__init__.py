@@ -1,11 +1,61 @@
 """Joints: one file each; `JOINTS` is the registry for the system file."""
 
+from floatframe.joints.constant_orientation import ConstantOrientation
+from floatframe.joints.cylindrical import CylindricalJoint
+from floatframe.joints.distance import DistanceJoint
 from floatframe.joints.fixed import FixedJoint
+from floatframe.joints.planar import PlanarJoint
+from floatframe.joints.point_on_line import PointOnLine
+from floatframe.joints.point_on_plane import PointOnPlane
+from floatframe.joints.prismatic import PrismaticJoint
 from floatframe.joints.revolute import RevoluteJoint
+from floatframe.joints.screw import ScrewJoint
 from floatframe.joints.spherical import SphericalJoint
+from floatframe.joints.universal import UniversalJoint
 
-__all__ = ["JOINTS", "FixedJoint", "Joint", "RevoluteJoint", "SphericalJoint"]
+__all__ = [
+    "JOINTS",
+    "ConstantOrientation",
+    "CylindricalJoint",
+    "DistanceJoint",
+    "FixedJoint",
+    "Joint",
+    "PlanarJoint",
+    "PointOnLine",
+    "PointOnPlane",
+    "PrismaticJoint",
+    "RevoluteJoint",
+    "ScrewJoint",
+    "SphericalJoint",
+    "UniversalJoint",
+]
 
-Joint = FixedJoint | RevoluteJoint | SphericalJoint
+Joint = (
+    ConstantOrientation
+    | CylindricalJoint
+    | DistanceJoint
+    | FixedJoint
+    | PlanarJoint
+    | PointOnLine
+    | PointOnPlane
+    | PrismaticJoint
+    | RevoluteJoint
+    | ScrewJoint
+    | SphericalJoint
+    | UniversalJoint
+)
 
-JOINTS = {"fixed": FixedJoint, "revolute": RevoluteJoint, "spherical": SphericalJoint}
+JOINTS = {
+    "constant-orientation": ConstantOrientation,
+    "cylindrical": CylindricalJoint,
+    "distance": DistanceJoint,
+    "fixed": FixedJoint,
+    "planar": PlanarJoint,
+    "point-on-line": PointOnLine,
+    "point-on-plane": PointOnPlane,
+    "prismatic": PrismaticJoint,
+    "revolute": RevoluteJoint,
+    "screw": ScrewJoint,
+    "spherical": SphericalJoint,
+    "universal": UniversalJoint,
+}

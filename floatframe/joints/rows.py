@@ -1,23 +1,68 @@
 """The rows of which joints are made: every joint is a short list of them, and the kernels know only rows.
 
-A joint between markers A and B has as unknown the wrench w that acts on A (and its opposite on B), in ground axes:
-a force (3), or a force and a moment (6). Each joint has as many rows as unknowns, so that no row of a body depends
-on another body and bodies can be eliminated one by one with the exact tangent:
+A joint between markers A and B has as unknown a wrench in ground axes: the force F on A (and its opposite on B), the
+moment M on A, the moment N whose opposite acts on B. It has as many rows as unknowns, so that no row of a body depends
+on another body and bodies can be eliminated one by one with the exact tangent. With E = A_A x, Z = A_A z, D = A_B y,
+d = r_B - r_A and f(t) the prescribed motion of a row (constant c without):
 
-    POINT k    r_A - r_B = 0, component k in ground axes          closes a point
-    DOT x y    (A_A x) · (A_B y) - c = 0                          closes an angle
-    GAUGE x    (A_A x) · moment = 0                               no moment about a free axis
+    held      POINT x      r_A - r_B = 0, along x in ground axes       closes a point
+              DOT x y      E · D = c                                   closes an angle
+              TURN x z y   (E cos f + Z sin f) · D = 0                 turns D to the angle f(t) from Z towards -E
+              SLIDE x      E · d = f                                   distance along an axis of A
+              DISTANCE     |d| = f                                     distance of the points
+              SCREW x z y  E · d = c th                                th the angle of D from Z, about the axis E
+    wrench    GAUGE x      E · part = 0                                none along what is free, part one of F, M, N
+              GAUGE_B y    D · part = 0                                the same about an axis of B
+              THREAD x     E · (N + c F) = 0                           of a screw
+              ARM x        M - N - d × F = 0, along x in ground axes   forces on A and B balance about one point
+              ROD x        F - mu d = 0, along x in ground axes        force along the line of the points
+
+Joints whose points coincide need one moment (N = M), the others take the force at the point of B and have ARM rows.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from cms.arrays import Array
+from floatframe.time_functions import TimeFunction
 
-__all__ = ["DOT", "GAUGE", "POINT", "SPRING", "Row", "point_rows"]
+__all__ = [
+    "ARM",
+    "DISTANCE",
+    "DOT",
+    "FORCE",
+    "GAUGE",
+    "GAUGE_B",
+    "HELD",
+    "HELD_DISTANCES",
+    "MOMENT",
+    "MOMENT_B",
+    "NO_MOMENT",
+    "POINT",
+    "ROD",
+    "SCREW",
+    "SLIDE",
+    "SPRING",
+    "THREAD",
+    "TURN",
+    "Row",
+    "arm_rows",
+    "orientation_rows",
+    "point_rows",
+    "slide_row",
+    "turn_row",
+]
 
-POINT, DOT, GAUGE, SPRING = 0, 1, 2, 3  #: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
+#: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
+POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD = range(12)
+HELD = (POINT, DOT, TURN, SLIDE, DISTANCE, SCREW)  #: rows that hold something; the others say what the wrench is
+HELD_DISTANCES = (POINT, SLIDE, DISTANCE, SCREW)  #: those in the unit of length
+FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
+NO_MOMENT = -1  #: in place of a part: nothing acts there
+
+ZERO = np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +70,44 @@ class Row:
     """One row of a joint."""
 
     kind: int
-    x: Array  #: direction in the axes of marker A, (3,); for POINT the ground axis
-    y: Array  #: direction in the axes of marker B, (3,)
-    c: float = 0.0  #: value of the product that is held
+    x: Array = field(default_factory=lambda: ZERO)  #: direction in the axes of marker A, (3,); POINT, ARM, ROD: ground
+    y: Array = field(default_factory=lambda: ZERO)  #: direction in the axes of marker B, (3,)
+    c: float = 0.0  #: value that is held, or slope of a screw
+    z: Array = field(default_factory=lambda: ZERO)  #: second direction in the axes of marker A, (3,)
+    part: int = FORCE  #: of the wrench: FORCE, MOMENT or MOMENT_B
+    motion: TimeFunction | None = None  #: prescribed motion of the held quantity; None: c
 
 
 def point_rows() -> tuple[Row, ...]:
     """Return the three rows that hold the points of two markers together."""
-    return tuple(Row(POINT, axis, np.zeros(3)) for axis in np.eye(3))
+    return tuple(Row(POINT, axis) for axis in np.eye(3))
+
+
+def arm_rows() -> tuple[Row, ...]:
+    """Return the three rows that balance the wrenches on two markers that are apart."""
+    return tuple(Row(ARM, axis) for axis in np.eye(3))
+
+
+def orientation_rows(R_AB: Array) -> tuple[Row, ...]:
+    """Return the three rows that hold the rotation from marker axes B to A.
+
+    x_A·y' = y_A·z' = z_A·x' = 0 with the axes x', y', z' fixed in B that coincide with x_A, y_A, z_A.
+    """
+    in_b = R_AB.T  # columns: the axes of A as they lie in B
+    x, y, z = np.eye(3)
+    return tuple(Row(DOT, a, b) for a, b in ((x, in_b[:, 1]), (y, in_b[:, 2]), (z, in_b[:, 0])))
+
+
+def slide_row(axis: Array, motions: Mapping[str, TimeFunction], name: str) -> Row:
+    """Return the row of a free distance along an axis of A: prescribed, or without force."""
+    return Row(SLIDE, axis, motion=motions[name]) if name in motions else Row(GAUGE, axis, part=FORCE)
+
+
+def turn_row(axis: Array, frame: tuple[Array, Array, Array], part: int, motions: Mapping, name: str) -> Row:
+    """Return the row of a free angle about an axis of A: prescribed, or without moment.
+
+    frame: two directions of A, normal to the axis with x × z along it, and the direction of B that is along z at
+    angle zero.
+    """
+    x, z, y = frame
+    return Row(TURN, x, y, z=z, motion=motions[name]) if name in motions else Row(GAUGE, axis, part=part)

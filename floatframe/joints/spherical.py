@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from cms.arrays import Array
-from floatframe.joints.rows import Row, point_rows
+from floatframe.joints.rows import NO_MOMENT, Row, point_rows
 from floatframe.markers import Place
 
 __all__ = ["SphericalJoint"]
@@ -17,8 +17,10 @@ class SphericalJoint:
     marker_a: Place
     marker_b: Place
 
-    size = 3  #: components of the reaction: force
+    size = 3  #: components of the unknown wrench: force
+    moment_b = NO_MOMENT  #: there is none
+    coordinates = ()
 
-    def rows(self, A_a: Array, A_b: Array) -> tuple[Row, ...]:
-        """Return the rows; the axes of the markers do not matter."""
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows; axes and places of the markers do not matter."""
         return point_rows()

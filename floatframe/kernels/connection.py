@@ -1,18 +1,32 @@
 """Residual rows of joints and spring-dampers in terms of the motion of their two markers.
 
-The rows of a connection have its wrench w as unknown (see joints/rows.py). Rows that hold a position are in its unit;
-rows that say what the wrench is (GAUGE, SPRING) are multiplied by c_k, so that their unknown is c_k dw:
+The rows of a connection have its wrench w as unknown (see joints/rows.py). Rows that hold something are in its unit;
+rows that say what the wrench is are multiplied by c_k, so that their unknown is c_k dw. A spring-damper has
 
-    GAUGE     e · moment = 0, e = A_A x           derivative by phi_A: e × moment, by the moment: e
     SPRING    F - s d = 0, s = k (l - l_0) + c l_dot + preload, d = (r_B - r_A)/l
 """
 
 import math
 
-from floatframe.joints.rows import DOT, POINT
+from floatframe.joints.rows import (
+    ARM,
+    DISTANCE,
+    DOT,
+    GAUGE,
+    GAUGE_B,
+    MOMENT,
+    MOMENT_B,
+    POINT,
+    ROD,
+    SCREW,
+    SLIDE,
+    THREAD,
+    TURN,
+)
 from floatframe.kernels.compilation import inner
 from floatframe.kernels.marker import marker_acceleration_bias, rotate
 from floatframe.kernels.rotation import cross
+from floatframe.kernels.time_function import time_function
 
 __all__ = ["connection_derivatives", "connection_rows", "constraint_rates", "row_rate", "spring_tension"]
 
@@ -41,65 +55,202 @@ def spring_tension(model, work, c):
 
 
 @inner
+def prescribed(model, work, k):
+    """Return the motion of row k at the time of the iterate, its rate and its second rate; its constant without."""
+    if model.row_motion[k] < 0:
+        return model.row_c[k], 0.0, 0.0
+    return time_function(model, model.row_motion[k], work.time[0])
+
+
+@inner
+def direction_of_a(model, work, k, a):
+    """Return the direction of marker A in row k, ground axes; that of a prescribed angle turns with time."""
+    x = model.row_x[k]
+    if model.row_kind[k] == TURN:
+        angle, _, _ = prescribed(model, work, k)
+        z, c, s = model.row_z[k], math.cos(angle), math.sin(angle)
+        return rotate(work.m_A[a], c * x[0] + s * z[0], c * x[1] + s * z[1], c * x[2] + s * z[2])
+    return rotate(work.m_A[a], x[0], x[1], x[2])
+
+
+@inner
+def distance(work, a, b):
+    """Return r_B - r_A."""
+    return (work.m_r[b, 0] - work.m_r[a, 0], work.m_r[b, 1] - work.m_r[a, 1], work.m_r[b, 2] - work.m_r[a, 2])
+
+
+@inner
+def screw_angle(model, work, k, a, b):
+    """Return the angle of D about Z × (-E), and its derivative by a rotation of A (of B: the opposite).
+
+    th = atan2(S, C), S = -E·D, C = Z·D.
+    """
+    x, y, z = model.row_x[k], model.row_y[k], model.row_z[k]
+    e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
+    z0, z1, z2 = rotate(work.m_A[a], z[0], z[1], z[2])
+    d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+    S, C = -(e0 * d0 + e1 * d1 + e2 * d2), z0 * d0 + z1 * d1 + z2 * d2
+    p0, p1, p2 = cross(e0, e1, e2, d0, d1, d2)
+    q0, q1, q2 = cross(z0, z1, z2, d0, d1, d2)
+    f = -1.0 / (S * S + C * C)
+    return math.atan2(S, C), f * (C * p0 + S * q0), f * (C * p1 + S * q1), f * (C * p2 + S * q2)
+
+
+@inner
+def screw_axis(model, work, k, a):
+    """Return the axis x × z of a screw, ground axes."""
+    x, z = model.row_x[k], model.row_z[k]
+    n0, n1, n2 = cross(x[0], x[1], x[2], z[0], z[1], z[2])
+    return rotate(work.m_A[a], n0, n1, n2)
+
+
+@inner
 def connection_rows(model, work, c, c_k):
     """Write the residual of connection c, and its wrench on both markers."""
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
-    for k in range(size):
-        work.m_wrench[a, k] += work.w[w0 + k]
-        work.m_wrench[b, k] -= work.w[w0 + k]
+    w = work.w[w0 : w0 + size]
+    for k in range(3):
+        work.m_wrench[a, k] += w[k]
+        work.m_wrench[b, k] -= w[k]
+        if model.m_moment[a] >= 0:
+            work.m_wrench[a, 3 + k] += w[model.m_moment[a] + k]
+        if model.m_moment[b] >= 0:
+            work.m_wrench[b, 3 + k] -= w[model.m_moment[b] + k]
     if model.c_spring[c] >= 0:
         tension, _, _ = spring_tension(model, work, c)
         for k in range(3):
             work.g[w0 + k] = c_k * (work.w[w0 + k] - tension * (work.m_r[b, k] - work.m_r[a, k]))
         return
+    r0, r1, r2 = distance(work, a, b)
     for k in range(w0, w0 + size):
-        x = model.row_x[k]
-        if model.row_kind[k] == POINT:
-            work.g[k] = (
-                x[0] * (work.m_r[a, 0] - work.m_r[b, 0])
-                + x[1] * (work.m_r[a, 1] - work.m_r[b, 1])
-                + x[2] * (work.m_r[a, 2] - work.m_r[b, 2])
-            )
-            continue
-        e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
-        if model.row_kind[k] == DOT:
+        kind, x, part = model.row_kind[k], model.row_x[k], model.row_part[k]
+        if kind == POINT:
+            work.g[k] = -(x[0] * r0 + x[1] * r1 + x[2] * r2)
+        elif kind == ARM:
+            n0, n1, n2 = cross(r0, r1, r2, w[0], w[1], w[2])
+            n0, n1, n2 = w[MOMENT] - n0, w[MOMENT + 1] - n1, w[MOMENT + 2] - n2
+            if size > MOMENT_B:
+                n0, n1, n2 = n0 - w[MOMENT_B], n1 - w[MOMENT_B + 1], n2 - w[MOMENT_B + 2]
+            work.g[k] = c_k * (x[0] * n0 + x[1] * n1 + x[2] * n2)
+        elif kind == ROD:
+            work.g[k] = c_k * (x[0] * (w[0] - w[3] * r0) + x[1] * (w[1] - w[3] * r1) + x[2] * (w[2] - w[3] * r2))
+        elif kind == DISTANCE:
+            length, _, _ = prescribed(model, work, k)
+            work.g[k] = 0.5 * ((r0 * r0 + r1 * r1 + r2 * r2) / length - length)
+        elif kind == SCREW:
+            slope = model.row_c[k]
+            angle, _, _, _ = screw_angle(model, work, k, a, b)
+            e0, e1, e2 = screw_axis(model, work, k, a)
+            along = e0 * r0 + e1 * r1 + e2 * r2
+            turns = math.floor((along / slope - angle) / (2 * math.pi) + 0.5)
+            work.g[k] = along - slope * (angle + 2 * math.pi * turns)
+        elif kind == GAUGE_B:
             y = model.row_y[k]
-            d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
-            work.g[k] = e0 * d0 + e1 * d1 + e2 * d2 - model.row_c[k]
+            e0, e1, e2 = rotate(work.m_A[b], y[0], y[1], y[2])
+            work.g[k] = c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2])
         else:
-            work.g[k] = c_k * (e0 * work.w[w0 + 3] + e1 * work.w[w0 + 4] + e2 * work.w[w0 + 5])
+            e0, e1, e2 = direction_of_a(model, work, k, a)
+            if kind == GAUGE:
+                work.g[k] = c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2])
+            elif kind == THREAD:
+                slope = model.row_c[k]
+                work.g[k] = c_k * (
+                    e0 * (w[MOMENT_B] + slope * w[0])
+                    + e1 * (w[MOMENT_B + 1] + slope * w[1])
+                    + e2 * (w[MOMENT_B + 2] + slope * w[2])
+                )
+            elif kind == SLIDE:
+                value, _, _ = prescribed(model, work, k)
+                work.g[k] = e0 * r0 + e1 * r1 + e2 * r2 - value
+            else:  # DOT, TURN
+                y = model.row_y[k]
+                d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+                held = model.row_c[k] if kind == DOT else 0.0
+                work.g[k] = e0 * d0 + e1 * d1 + e2 * d2 - held
+
+
+@inner
+def put_pair(P_a, P_b, r, column, factor, x0, x1, x2):
+    """Write factor * x into a row of P at A, and its opposite at B."""
+    P_a[r, column], P_a[r, column + 1], P_a[r, column + 2] = factor * x0, factor * x1, factor * x2
+    P_b[r, column], P_b[r, column + 1], P_b[r, column + 2] = -factor * x0, -factor * x1, -factor * x2
 
 
 @inner
 def connection_derivatives(model, work, c, c_k):
     """Write P at both markers and V of connection c."""
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
-    P_a, P_b, V = work.P[a], work.P[b], work.V[c]
-    P_a[:, :] = 0.0
-    P_b[:, :] = 0.0
-    V[:, :] = 0.0
+    P_a, P_b, V, w = work.P[a], work.P[b], work.V[c], work.w[w0 : w0 + size]
+    for r in range(size):
+        for j in range(12):
+            P_a[r, j] = 0.0
+            P_b[r, j] = 0.0
+        for j in range(size):
+            V[r, j] = 0.0
     if model.c_spring[c] >= 0:
         spring_derivatives(model, work, c, c_k)
         return
+    r0, r1, r2 = distance(work, a, b)
     for r in range(size):
         k = w0 + r
-        x = model.row_x[k]
-        if model.row_kind[k] == POINT:
+        kind, x, part = model.row_kind[k], model.row_x[k], model.row_part[k]
+        if kind == POINT:
+            put_pair(P_a, P_b, r, 0, 1.0, x[0], x[1], x[2])
+        elif kind == ARM:  # x·(M - N - d × F) = x·(M - N) - (x × d)·F, and (x × d)·F = d·(F × x)
+            n0, n1, n2 = cross(x[0], x[1], x[2], r0, r1, r2)
+            V[r, 0], V[r, 1], V[r, 2] = -n0, -n1, -n2
+            n0, n1, n2 = cross(w[0], w[1], w[2], x[0], x[1], x[2])
+            put_pair(P_a, P_b, r, 0, c_k, n0, n1, n2)
             for j in range(3):
-                P_a[r, j] = x[j]
-                P_b[r, j] = -x[j]
-            continue
-        e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
-        if model.row_kind[k] == DOT:
+                V[r, MOMENT + j] = x[j]
+                if size > MOMENT_B:
+                    V[r, MOMENT_B + j] = -x[j]
+        elif kind == ROD:
+            for j in range(3):
+                V[r, j] = x[j]
+            V[r, 3] = -(x[0] * r0 + x[1] * r1 + x[2] * r2)
+            put_pair(P_a, P_b, r, 0, c_k * w[3], x[0], x[1], x[2])
+        elif kind == DISTANCE:
+            length, _, _ = prescribed(model, work, k)
+            put_pair(P_a, P_b, r, 0, -1.0 / length, r0, r1, r2)
+        elif kind == SCREW:
+            e0, e1, e2 = screw_axis(model, work, k, a)
+            put_pair(P_a, P_b, r, 0, -1.0, e0, e1, e2)
+            _, t0, t1, t2 = screw_angle(model, work, k, a, b)
+            put_pair(P_a, P_b, r, 3, -model.row_c[k], t0, t1, t2)
+            n0, n1, n2 = cross(e0, e1, e2, r0, r1, r2)
+            P_a[r, 3] += n0
+            P_a[r, 4] += n1
+            P_a[r, 5] += n2
+        elif kind == GAUGE_B:
             y = model.row_y[k]
-            d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
-            n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
-            P_a[r, 3], P_a[r, 4], P_a[r, 5] = n0, n1, n2
-            P_b[r, 3], P_b[r, 4], P_b[r, 5] = -n0, -n1, -n2
+            e0, e1, e2 = rotate(work.m_A[b], y[0], y[1], y[2])
+            n0, n1, n2 = cross(e0, e1, e2, w[part], w[part + 1], w[part + 2])
+            P_b[r, 3], P_b[r, 4], P_b[r, 5] = c_k * n0, c_k * n1, c_k * n2
+            V[r, part], V[r, part + 1], V[r, part + 2] = e0, e1, e2
         else:
-            n0, n1, n2 = cross(e0, e1, e2, work.w[w0 + 3], work.w[w0 + 4], work.w[w0 + 5])
-            P_a[r, 3], P_a[r, 4], P_a[r, 5] = c_k * n0, c_k * n1, c_k * n2
-            V[r, 3], V[r, 4], V[r, 5] = e0, e1, e2
+            e0, e1, e2 = direction_of_a(model, work, k, a)
+            if kind == GAUGE:
+                n0, n1, n2 = cross(e0, e1, e2, w[part], w[part + 1], w[part + 2])
+                P_a[r, 3], P_a[r, 4], P_a[r, 5] = c_k * n0, c_k * n1, c_k * n2
+                V[r, part], V[r, part + 1], V[r, part + 2] = e0, e1, e2
+            elif kind == THREAD:
+                slope = model.row_c[k]
+                n0, n1, n2 = cross(
+                    e0, e1, e2,
+                    w[MOMENT_B] + slope * w[0], w[MOMENT_B + 1] + slope * w[1], w[MOMENT_B + 2] + slope * w[2],
+                )  # fmt: skip
+                P_a[r, 3], P_a[r, 4], P_a[r, 5] = c_k * n0, c_k * n1, c_k * n2
+                V[r, MOMENT_B], V[r, MOMENT_B + 1], V[r, MOMENT_B + 2] = e0, e1, e2
+                V[r, 0], V[r, 1], V[r, 2] = slope * e0, slope * e1, slope * e2
+            elif kind == SLIDE:
+                put_pair(P_a, P_b, r, 0, -1.0, e0, e1, e2)
+                P_a[r, 3], P_a[r, 4], P_a[r, 5] = cross(e0, e1, e2, r0, r1, r2)
+            else:  # DOT, TURN
+                y = model.row_y[k]
+                d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+                n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
+                put_pair(P_a, P_b, r, 3, 1.0, n0, n1, n2)
 
 
 @inner
@@ -129,22 +280,50 @@ def spring_derivatives(model, work, c, c_k):
 
 
 @inner
+def moving_direction(model, work, k, a):
+    """Return E, E_dot less omega_A × E, and E_ddot less alpha and omega terms, of row k: nine numbers, ground axes."""
+    e0, e1, e2 = direction_of_a(model, work, k, a)
+    if model.row_kind[k] != TURN:
+        return e0, e1, e2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    angle, rate, second = prescribed(model, work, k)
+    x, z, c, s = model.row_x[k], model.row_z[k], math.cos(angle), math.sin(angle)
+    n0, n1, n2 = rotate(work.m_A[a], c * z[0] - s * x[0], c * z[1] - s * x[1], c * z[2] - s * x[2])
+    square = rate * rate
+    return (
+        e0, e1, e2, rate * n0, rate * n1, rate * n2,
+        second * n0 - square * e0, second * n1 - square * e1, second * n2 - square * e2,
+    )  # fmt: skip
+
+
+@inner
 def row_rate(model, work, k, a, b):
     """Return the rate of the held quantity of row k between markers a and b; zero for rows that hold none."""
-    x = model.row_x[k]
-    if model.row_kind[k] == POINT:
-        return (
-            x[0] * (work.m_v[a, 0] - work.m_v[b, 0])
-            + x[1] * (work.m_v[a, 1] - work.m_v[b, 1])
-            + x[2] * (work.m_v[a, 2] - work.m_v[b, 2])
-        )
-    if model.row_kind[k] == DOT:
-        y = model.row_y[k]
-        e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
+    kind, x, y = model.row_kind[k], model.row_x[k], model.row_y[k]
+    o, p = work.m_omega[a], work.m_omega[b]
+    v0, v1, v2 = work.m_v[b, 0] - work.m_v[a, 0], work.m_v[b, 1] - work.m_v[a, 1], work.m_v[b, 2] - work.m_v[a, 2]
+    if kind == POINT:
+        return -(x[0] * v0 + x[1] * v1 + x[2] * v2)
+    r0, r1, r2 = distance(work, a, b)
+    if kind == DISTANCE:
+        length, rate, _ = prescribed(model, work, k)
+        square = r0 * r0 + r1 * r1 + r2 * r2
+        return (r0 * v0 + r1 * v1 + r2 * v2) / length - 0.5 * rate * (square / (length * length) + 1.0)
+    if kind == SCREW:
+        e0, e1, e2 = screw_axis(model, work, k, a)
+        _, t0, t1, t2 = screw_angle(model, work, k, a, b)
+        f0, f1, f2 = cross(o[0], o[1], o[2], e0, e1, e2)
+        turning = t0 * (o[0] - p[0]) + t1 * (o[1] - p[1]) + t2 * (o[2] - p[2])
+        return f0 * r0 + f1 * r1 + f2 * r2 + e0 * v0 + e1 * v1 + e2 * v2 - model.row_c[k] * turning
+    if kind == DOT or kind == TURN or kind == SLIDE:
+        e0, e1, e2, f0, f1, f2, _, _, _ = moving_direction(model, work, k, a)
+        n0, n1, n2 = cross(o[0], o[1], o[2], e0, e1, e2)
+        f0, f1, f2 = f0 + n0, f1 + n1, f2 + n2
+        if kind == SLIDE:
+            _, rate, _ = prescribed(model, work, k)
+            return f0 * r0 + f1 * r1 + f2 * r2 + e0 * v0 + e1 * v1 + e2 * v2 - rate
         d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
-        n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
-        o, p = work.m_omega[a], work.m_omega[b]
-        return n0 * (o[0] - p[0]) + n1 * (o[1] - p[1]) + n2 * (o[2] - p[2])
+        h0, h1, h2 = cross(p[0], p[1], p[2], d0, d1, d2)
+        return f0 * d0 + f1 * d1 + f2 * d2 + e0 * h0 + e1 * h1 + e2 * h2
     return 0.0
 
 
@@ -152,31 +331,47 @@ def row_rate(model, work, k, a, b):
 def row_acceleration(model, work, k, a, b, bias_a, bias_b):
     """Return the second rate of the held quantity of row k for given accelerations (6) of both markers.
 
-    DOT: (al_a × e + w_a × (w_a × e))·d + 2 (w_a × e)·(w_b × d) + e·(al_b × d + w_b × (w_b × d)).
+    E_ddot·D + 2 E_dot·D_dot + E·D_ddot with E_ddot = al × E + w × (w × E) + 2 w × E' + E'', E' and E'' the rates in A;
+    the second rate of the angle of a screw is that of parallel axes.
     """
-    x = model.row_x[k]
-    if model.row_kind[k] == POINT:
-        return x[0] * (bias_a[0] - bias_b[0]) + x[1] * (bias_a[1] - bias_b[1]) + x[2] * (bias_a[2] - bias_b[2])
-    if model.row_kind[k] == DOT:
-        y = model.row_y[k]
-        e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
-        d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
-        o, p = work.m_omega[a], work.m_omega[b]
+    kind, x, y = model.row_kind[k], model.row_x[k], model.row_y[k]
+    c0, c1, c2 = bias_b[0] - bias_a[0], bias_b[1] - bias_a[1], bias_b[2] - bias_a[2]
+    if kind == POINT:
+        return -(x[0] * c0 + x[1] * c1 + x[2] * c2)
+    o, p = work.m_omega[a], work.m_omega[b]
+    v0, v1, v2 = work.m_v[b, 0] - work.m_v[a, 0], work.m_v[b, 1] - work.m_v[a, 1], work.m_v[b, 2] - work.m_v[a, 2]
+    r0, r1, r2 = distance(work, a, b)
+    if kind == DISTANCE:
+        L, rate, second = prescribed(model, work, k)
+        square, slope = r0 * r0 + r1 * r1 + r2 * r2, r0 * v0 + r1 * v1 + r2 * v2
+        own = (v0 * v0 + v1 * v1 + v2 * v2 + r0 * c0 + r1 * c1 + r2 * c2) / L - 2 * slope * rate / (L * L)
+        return own + square * rate * rate / (L * L * L) - 0.5 * second * (square / (L * L) + 1.0)
+    if kind == DOT or kind == TURN or kind == SLIDE or kind == SCREW:
+        e0, e1, e2, t0, t1, t2, s0, s1, s2 = moving_direction(model, work, k, a)
+        if kind == SCREW:
+            e0, e1, e2 = screw_axis(model, work, k, a)
         f0, f1, f2 = cross(o[0], o[1], o[2], e0, e1, e2)
-        h0, h1, h2 = cross(p[0], p[1], p[2], d0, d1, d2)
-        ff0, ff1, ff2 = cross(o[0], o[1], o[2], f0, f1, f2)
-        hh0, hh1, hh2 = cross(p[0], p[1], p[2], h0, h1, h2)
+        n0, n1, n2 = cross(o[0], o[1], o[2], f0 + 2 * t0, f1 + 2 * t1, f2 + 2 * t2)
         a0, a1, a2 = cross(bias_a[3], bias_a[4], bias_a[5], e0, e1, e2)
+        a0, a1, a2 = a0 + n0 + s0, a1 + n1 + s1, a2 + n2 + s2
+        f0, f1, f2 = f0 + t0, f1 + t1, f2 + t2
+        if kind == SLIDE or kind == SCREW:
+            along = a0 * r0 + a1 * r1 + a2 * r2 + 2 * (f0 * v0 + f1 * v1 + f2 * v2) + e0 * c0 + e1 * c1 + e2 * c2
+            if kind == SLIDE:
+                _, _, second = prescribed(model, work, k)
+                return along - second
+            _, t0, t1, t2 = screw_angle(model, work, k, a, b)
+            turning = t0 * (bias_a[3] - bias_b[3]) + t1 * (bias_a[4] - bias_b[4]) + t2 * (bias_a[5] - bias_b[5])
+            return along - model.row_c[k] * turning
+        d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+        h0, h1, h2 = cross(p[0], p[1], p[2], d0, d1, d2)
+        hh0, hh1, hh2 = cross(p[0], p[1], p[2], h0, h1, h2)
         b0, b1, b2 = cross(bias_b[3], bias_b[4], bias_b[5], d0, d1, d2)
         return (
-            (a0 + ff0) * d0
-            + (a1 + ff1) * d1
-            + (a2 + ff2) * d2
+            a0 * d0 + a1 * d1 + a2 * d2
             + 2 * (f0 * h0 + f1 * h1 + f2 * h2)
-            + e0 * (b0 + hh0)
-            + e1 * (b1 + hh1)
-            + e2 * (b2 + hh2)
-        )
+            + e0 * (b0 + hh0) + e1 * (b1 + hh1) + e2 * (b2 + hh2)
+        )  # fmt: skip
     return 0.0
 
 

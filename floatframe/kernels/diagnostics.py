@@ -2,7 +2,7 @@
 
 import math
 
-from floatframe.joints.rows import DOT, POINT
+from floatframe.joints.rows import DISTANCE, DOT, POINT, SCREW, SLIDE, TURN
 from floatframe.kernels.body import body_mass_product, first_moment, modal_term
 from floatframe.kernels.compilation import inner
 from floatframe.kernels.connection import row_rate, spring_tension
@@ -73,10 +73,11 @@ def diagnose(model, work, out, drift):
             continue
         a, b = model.c_a[c], model.c_b[c]
         for k in range(model.c_w0[c], model.c_w0[c + 1]):
-            if model.row_kind[k] == POINT:
+            kind = model.row_kind[k]
+            if kind in (POINT, SLIDE, DISTANCE, SCREW):
                 drift[c, 0] += work.g[k] ** 2
                 drift[c, 2] += row_rate(model, work, k, a, b) ** 2
-            elif model.row_kind[k] == DOT:
+            elif kind in (DOT, TURN):
                 drift[c, 1] += work.g[k] ** 2
                 drift[c, 3] += row_rate(model, work, k, a, b) ** 2
         for k in range(N_DRIFTS):
@@ -84,15 +85,35 @@ def diagnose(model, work, out, drift):
 
 
 @inner
+def drive_power(model, work, c):
+    """Return the power of the wrenches of a joint on its bodies if it prescribes a motion; else none."""
+    w0, a, b = model.c_w0[c], model.c_a[c], model.c_b[c]
+    is_driven = False
+    for k in range(w0, model.c_w0[c + 1]):
+        is_driven = is_driven or model.row_motion[k] >= 0
+    total = 0.0
+    if is_driven:
+        for k in range(3):
+            total += work.w[w0 + k] * (work.m_v[a, k] - work.m_v[b, k])
+            if model.m_moment[a] >= 0:
+                total += work.w[w0 + model.m_moment[a] + k] * work.m_omega[a, k]
+            if model.m_moment[b] >= 0:
+                total -= work.w[w0 + model.m_moment[b] + k] * work.m_omega[b, k]
+    return total
+
+
+@inner
 def power(model, work):
-    """Return the power of the point forces, and that taken by dampers and modal damping (positive)."""
+    """Return the power of point forces and of drives, and that taken by dampers and modal damping (positive)."""
     loads, dissipated = 0.0, 0.0
     for k in range(model.l_marker.shape[0]):
         m = model.l_marker[k]
         for a in range(3):
             loads += work.m_wrench[m, a] * work.m_v[m, a] + work.m_wrench[m, 3 + a] * work.m_omega[m, a]
     for c in range(model.c_size.shape[0]):
-        if model.c_spring[c] >= 0:
+        if model.c_spring[c] < 0:
+            loads += drive_power(model, work, c)
+        else:
             _, damping, _, _ = model.springs[model.c_spring[c]]
             _, _, rate = spring_tension(model, work, c)
             dissipated += damping * rate * rate

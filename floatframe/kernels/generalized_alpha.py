@@ -215,6 +215,7 @@ def accept(model, work, memory, h, alpha_m, alpha_f):
 def write_row(model, work, memory, t, rows):
     """Evaluate at the state in the memory and write the next row of the results."""
     k = work.counts[4]
+    work.time[0] = t
     work.counts[4] += 1
     load_state(model, work, memory)
     evaluate(model, work, 1.0)
@@ -240,6 +241,7 @@ def advance(model, work, memory, t0, h, first, n_steps, every, coefficients, tol
     work.counts[4] = 0
     excess = 0.0
     for k in range(n_steps):
+        work.time[0] = t0 + (first + k + 1) * h
         status, index, excess = one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length)
         if status != DONE:
             return status, k, work.counts[4], index, excess

@@ -22,6 +22,7 @@ __all__ = [
     "N_BLOCKS",
     "N_DIAGNOSTICS",
     "N_DRIFTS",
+    "N_W",
     "STIFFNESS",
     "S_AB",
     "Memory",
@@ -34,6 +35,7 @@ __all__ = [
 
 C1, C2, C3, S_AB, C4, MASS, STIFFNESS, DAMPING = range(8)  #: columns of `Model.block0`
 N_BLOCKS = 8
+N_W = 9  #: most components of the wrench of a connection
 N_DIAGNOSTICS = 12  #: kinetic, strain, gravity, springs, linear momentum (3), angular about the origin (3), work (2)
 N_DRIFTS = 4  #: of a joint: distance, angle, their rates
 
@@ -63,20 +65,27 @@ class Model(NamedTuple):
     psi: Array
     m_connection: IntArray  #: connection of which it is an end, -1 for none, (n_m,)
     m_sign: Array  #: +1 at end A, -1 at end B: sign of the wrench, (n_m,)
+    m_moment: IntArray  #: where the moment on it begins in the wrench of its connection, -1 for none, (n_m,)
     m_follower: IntArray  #: whether its wrench turns with it, (n_m,)
     m_x0: IntArray  #: Σ (6 + n_q) over the ends before it, (n_m,)
     end0: IntArray  #: ends of body i are ends[end0[i]:end0[i + 1]], (n_b + 1,)
     ends: IntArray
     # connections
-    c_size: IntArray  #: number of wrench components = rows: 3 or 6, (n_c,)
+    c_size: IntArray  #: number of wrench components = rows, up to N_W, (n_c,)
     c_w0: IntArray  #: first of them, (n_c + 1,)
     c_a: IntArray  #: marker A, (n_c,)
     c_b: IntArray  #: marker B, (n_c,)
     c_spring: IntArray  #: row of `springs`, -1 for a joint, (n_c,)
-    row_kind: IntArray  #: POINT, DOT, GAUGE or SPRING, (n_w,)
+    row_kind: IntArray  #: see joints/rows.py, (n_w,)
     row_x: Array  #: (n_w, 3)
     row_y: Array  #: (n_w, 3)
+    row_z: Array  #: (n_w, 3)
     row_c: Array  #: (n_w,)
+    row_part: IntArray  #: where the part of the wrench begins of which it speaks, (n_w,)
+    row_motion: IntArray  #: its function of time, -1 for none, (n_w,)
+    piece0: IntArray  #: first piece of each function of time, and the end, (n_functions + 1,)
+    piece_t: Array  #: where it begins, (n_pieces,)
+    piece: Array  #: its coefficients, see time_functions.py, (n_pieces, 9)
     springs: Array  #: stiffness, damping, free length, preload, (n_springs, 4)
     # loads
     l_marker: IntArray  #: (n_l,)
@@ -107,6 +116,7 @@ class Work(NamedTuple):
     u_dot: Array  #: accelerations, (n_u,)
     theta: Array  #: rotation since the beginning of the step, (n_b, 3)
     w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+    time: Array  #: of the iterate, (1,)
     # bodies
     a_B: Array  # noqa: N815  #: acceleration of the frame origin minus gravity, body axes, (n_b, 3)
     J: Array  #: J(q), (n_b, 3, 3)
@@ -130,8 +140,8 @@ class Work(NamedTuple):
     m_bias: Array  #: acceleration and angular acceleration at zero u_dot, ground axes, (n_m, 6)
     # connections
     g: Array  #: residual of the rows, scaled, (n_w,)
-    P: Array  #: derivative of the rows by marker motion (r, phi, v, omega), ground axes, (n_m, 6, 12)
-    V: Array  #: derivative of the rows by their own wrench, (n_c, 6, 6)
+    P: Array  #: derivative of the rows by marker motion (r, phi, v, omega), ground axes, (n_m, N_W, 12)
+    V: Array  #: derivative of the rows by their own wrench, (n_c, N_W, N_W)
     # linear algebra
     H: Array  #: tangent of each body, then its LU factors, flat
     pivot: IntArray  #: (n_u,)
@@ -169,6 +179,7 @@ def new_work(model: Model) -> Work:
         u_dot=zeros(n_u),
         theta=zeros(n_b, 3),
         w=zeros(n_w),
+        time=zeros(1),
         a_B=zeros(n_b, 3),
         J=zeros(n_b, 3, 3),
         turning=zeros(n_b, 3, 3),
@@ -189,8 +200,8 @@ def new_work(model: Model) -> Work:
         m_wrench=zeros(n_m, 6),
         m_bias=zeros(n_m, 6),
         g=zeros(n_w),
-        P=zeros(n_m, 6, 12),
-        V=zeros(n_c, 6, 6),
+        P=zeros(n_m, N_W, 12),
+        V=zeros(n_c, N_W, N_W),
         H=zeros(int(model.h0[-1])),
         pivot=np.zeros(n_u, np.int64),
         J_row=zeros(12 * n_x),

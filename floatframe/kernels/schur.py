@@ -73,14 +73,17 @@ def assemble(model, work, c_k):
             for part in range(0, n_motion, 3):  # row r of P in body axes
                 for k in range(3):
                     turned[part + k] = P[r, part] * R[0, k] + P[r, part + 1] * R[1, k] + P[r, part + 2] * R[2, k]
-            for part in range(0, columns, 3):
+            for part in range(0, 6, 3):
+                w_part = 0 if part == 0 else model.m_moment[b]
+                if w_part < 0:
+                    continue
                 x0, x1, x2 = 0.0, 0.0, 0.0
                 for k in range(n_motion):
                     x0 += turned[k] * Z[k, part]
                     x1 += turned[k] * Z[k, part + 1]
                     x2 += turned[k] * Z[k, part + 2]
                 for k in range(3):
-                    s[o + r * columns + part + k] += sign * (x0 * R[k, 0] + x1 * R[k, 1] + x2 * R[k, 2])
+                    s[o + r * columns + w_part + k] += sign * (x0 * R[k, 0] + x1 * R[k, 1] + x2 * R[k, 2])
 
 
 @inner
@@ -192,9 +195,15 @@ def correction(model, work, c_k, is_new):
             m = model.ends[e]
             c = model.m_connection[m]
             o, w0, sign = model.m_x0[m], model.c_w0[c], model.m_sign[m]
-            size = model.c_size[c]
-            for part in range(0, size, 3):
-                x0, x1, x2 = mu[w0 + part], mu[w0 + part + 1], mu[w0 + part + 2]
+            size = 6
+            for part in range(0, 6, 3):
+                w_part = w0
+                if part == 3:
+                    if model.m_moment[m] < 0:
+                        size = 3
+                        break
+                    w_part = w0 + model.m_moment[m]
+                x0, x1, x2 = mu[w_part], mu[w_part + 1], mu[w_part + 2]
                 for k in range(3):
                     motion[part + k] = sign * (R[0, k] * x0 + R[1, k] * x1 + R[2, k] * x2)
             for r in range(n):

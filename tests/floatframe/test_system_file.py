@@ -161,3 +161,75 @@ def test_two_instances_read_their_file_once(write):
     path = write(("[bodies.bob]", '[bodies.rod2]\nfile = "rod.h5"\nposition = [5, 0, 0]\n\n[bodies.bob]'))
     system, _ = read_system(path)
     assert system.bodies[0].reduced is system.bodies[1].reduced
+
+
+DRIVEN = """
+[system]
+units = "m-kg-s"
+
+[bodies.nut]
+mass = 2.0
+inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]
+
+[bodies.bob]
+mass = 2.0
+inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]
+position = [1, 0, 0]
+
+[joints.thread]
+type = "screw"
+body_a = "ground"
+body_b = "nut"
+marker_b = [0, 0, 0]
+axis = [0, 0, 1]
+lead = 0.2
+
+[joints.thread.motions.angle]
+type = "cycloidal-spin-up"
+omega = 4
+duration = 1.0
+
+[joints.rod]
+type = "distance"
+body_a = "nut"
+marker_a = [0, 0, 0]
+body_b = "bob"
+marker_b = [0, 0, 0]
+
+[run]
+t_end = 0.1
+h = 1e-2
+"""
+
+
+def test_prescribed_motions_come_from_tables(tmp_path):
+    path = tmp_path / "screw.toml"
+    path.write_text(DRIVEN)
+    system, run = read_system(path)
+    screw, rod = system.joints
+    assert (type(screw).__name__, type(rod).__name__, screw.lead) == ("ScrewJoint", "DistanceJoint", 0.2)
+    assert_allclose(screw.motions["angle"](1.0, 1), 4.0, rtol=1e-12, atol=0)
+    motion = integrate(system, run.integrator, run.t_end, run.h)
+    angle = screw.motions["angle"](motion.t[-1])
+    assert_allclose(motion.body("nut").r[-1, 2], 0.2 * angle / (2 * np.pi), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("lead = 0.2", "", "lead: missing; a screw joint needs its advance"),
+        ("lead = 0.2", "lead = 0", "lead: expected a number other than zero"),
+        ("omega = 4", "omgea = 4", "motions.angle.omgea: .*did you mean .omega"),
+        ("omega = 4", "", "omega: missing; expected a number, the angular frequency"),
+        ("omega = 4", "omega = 4\nphase = 1", "a cycloidal-spin-up motion has no key phase"),
+        ("motions.angle", "motions.turn", "no coordinate 'turn'; choices: angle"),
+        ('"cycloidal-spin-up"', '"cycloid"', 'type = "cycloid": unknown type of motion; choices'),
+        ("duration = 1.0", "duration = 0", "duration: expected a number > 0"),
+    ],
+)
+def test_mistakes_in_motions_are_answered_with_key_value_and_choices(tmp_path, old, new, words):
+    path = tmp_path / "screw.toml"
+    assert old in DRIVEN
+    path.write_text(DRIVEN.replace(old, new))
+    with pytest.raises(SystemFileError, match=words):
+        read_system(path)

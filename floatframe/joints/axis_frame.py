@@ -1,0 +1,64 @@
+"""Axes of joints: one direction fixed in both markers, and what is normal to it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.arrays import unit_vector
+from floatframe.errors import ModelError
+from floatframe.time_functions import TimeFunction, constant
+
+__all__ = ["axis_in_b", "checked_axes", "checked_motions", "normals_of", "turning_frame"]
+
+
+def normals_of(axis: Array) -> tuple[Array, Array]:
+    """Return two unit vectors normal to the axis and to each other, each (3,); they and the axis are right-handed."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def axis_in_b(axis: Array, axis_b: Array | None, A_a: Array, A_b: Array) -> Array:
+    """Return the axis in the axes of marker B: as given, or the same direction as placed, (3,)."""
+    return A_b.T @ A_a @ axis if axis_b is None else axis_b
+
+
+def turning_frame(axis: Array, axis_b: Array, A_a: Array, A_b: Array) -> tuple[Array, Array, Array]:
+    """Return directions x, z of A with x × z = axis, and y of B that lies along z at angle zero: as placed.
+
+    If the axis of B is given and placed elsewhere, y is the direction normal to it nearest to z.
+    """
+    x, z = normals_of(axis)
+    y = A_b.T @ A_a @ z
+    y = y - (y @ axis_b) * axis_b
+    if np.linalg.norm(y) < 1e-3:
+        y = normals_of(axis_b)[0]
+    return x, z, y / np.linalg.norm(y)
+
+
+def checked_axes(joint: Any) -> None:
+    """Make `axis` and `axis_b` of a joint unit vectors; `ModelError` if one has no direction."""
+    for name in ("axis", "axis_b"):
+        if getattr(joint, name, None) is not None:  # not every joint has an axis of B
+            object.__setattr__(joint, name, unit_vector(f"joint {joint.name!r}: {name}", getattr(joint, name)))
+
+
+def checked_motions(joint: Any) -> None:
+    """Bring `motions` of a joint into the form name: `TimeFunction`; `ModelError` for unknown coordinates."""
+    where = f"joint {joint.name!r}: motions"
+    if not isinstance(joint.motions, Mapping):
+        raise ModelError(f"{where}: expected a dict from coordinates to functions of time, got {joint.motions!r}")
+    motions = {}
+    for name, motion in joint.motions.items():
+        if name not in joint.coordinates:
+            raise ModelError(f"{where}: no coordinate {name!r}; choices: {', '.join(joint.coordinates)}")
+        motions[name] = constant(motion) if isinstance(motion, int | float) else motion
+        if not isinstance(motions[name], TimeFunction):
+            raise ModelError(
+                f"{where}: {name}: expected a function of floatframe.time_functions or a number, got {motion!r}; a "
+                "Python function can be sampled with floatframe.time_functions.sampled"
+            )
+    object.__setattr__(joint, "motions", motions)

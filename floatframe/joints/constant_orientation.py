@@ -1,0 +1,37 @@
+"""Constant orientation: two bodies move without turning against each other."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.arrays import rotation_of
+from floatframe.joints.rows import FORCE, GAUGE, MOMENT, Row, orientation_rows
+from floatframe.markers import Place
+
+__all__ = ["ConstantOrientation"]
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantOrientation:
+    """Holds the orientation of marker B in marker A; three constraints.
+
+    The held orientation is the one in which the bodies were placed, unless `rotation` gives it.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    rotation: Array | None = None  #: R_AB from marker axes B to A that is held, (3, 3); None: as placed
+
+    size = 6  #: components of the unknown wrench
+    moment_b = MOMENT  #: where the moment on B begins in it
+
+    def __post_init__(self) -> None:
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", rotation_of(f"joint {self.name!r}: rotation", self.rotation))
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        R_AB = A_a.T @ A_b if self.rotation is None else self.rotation
+        return (*(Row(GAUGE, axis, part=FORCE) for axis in np.eye(3)), *orientation_rows(R_AB))

@@ -1,0 +1,50 @@
+"""The cylindrical joint: translation along an axis and rotation about it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
+from floatframe.joints.rows import DOT, MOMENT_B, SLIDE, Row, arm_rows, slide_row, turn_row
+from floatframe.markers import Place
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["CylindricalJoint"]
+
+
+@dataclass(frozen=True, eq=False)
+class CylindricalJoint:
+    """Leaves marker B to slide along an axis and to turn about it; four constraints.
+
+    The point of B stays on the line through the point of A. Coordinates: `distance` of the points along the axis,
+    `angle` of B about it, zero as placed.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
+    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: where the moment on B begins in it
+    coordinates = ("distance", "angle")
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        frame = turning_frame(self.axis, axis_b, A_a, A_b)
+        return (
+            *arm_rows(),
+            *(Row(SLIDE, n) for n in normals_of(self.axis)),
+            *(Row(DOT, self.axis, n) for n in normals_of(axis_b)),
+            slide_row(self.axis, self.motions, "distance"),
+            turn_row(self.axis, frame, MOMENT_B, self.motions, "angle"),
+        )

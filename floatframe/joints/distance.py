@@ -1,0 +1,51 @@
+"""The rod: two points at a distance."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.arrays import number
+from floatframe.errors import ModelError
+from floatframe.joints.axis_frame import checked_motions
+from floatframe.joints.rows import DISTANCE, NO_MOMENT, ROD, Row
+from floatframe.markers import Place
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["DistanceJoint"]
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceJoint:
+    """Holds the points of two markers at a distance, as a massless rod does; one constraint.
+
+    Coordinate `distance`.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    distance: float | None = None  #: [m]; None: as placed
+    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+
+    size = 4  #: components of the unknown wrench
+    moment_b = NO_MOMENT  #: where the moment on B begins in it
+    coordinates = ("distance",)
+
+    def __post_init__(self) -> None:
+        if self.distance is not None:
+            value = number(f"joint {self.name!r}: distance", self.distance, above=0.0)
+            object.__setattr__(self, "distance", value)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for markers placed with r_B - r_A = d, (3,) in ground axes."""
+        distance = float(np.linalg.norm(d)) if self.distance is None else self.distance
+        if np.linalg.norm(d) == 0:
+            raise ModelError(
+                f"joint {self.name!r}: its points coincide as placed, so that the rod has no direction; move one, or "
+                "use a spherical joint"
+            )
+        held = Row(DISTANCE, c=distance, motion=self.motions.get("distance"))
+        return (*(Row(ROD, axis) for axis in np.eye(3)), held)

@@ -1,0 +1,51 @@
+"""The planar joint: motion in a plane."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
+from floatframe.joints.rows import DOT, MOMENT_B, SLIDE, Row, arm_rows, slide_row, turn_row
+from floatframe.markers import Place
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["PlanarJoint"]
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarJoint:
+    """Keeps the point of marker B in a plane of marker A and the normals parallel; three constraints.
+
+    Coordinates: `first` and `second`, of the point of B in the plane, along the two directions of
+    `normals_of(axis)`; `angle` of B about the normal, zero as placed.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal, in the axes of marker A
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
+    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: where the moment on B begins in it
+    coordinates = ("first", "second", "angle")
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        first, second = normals_of(self.axis)
+        return (
+            *arm_rows(),
+            Row(SLIDE, self.axis),
+            *(Row(DOT, self.axis, n) for n in normals_of(axis_b)),
+            slide_row(first, self.motions, "first"),
+            slide_row(second, self.motions, "second"),
+            turn_row(self.axis, turning_frame(self.axis, axis_b, A_a, A_b), MOMENT_B, self.motions, "angle"),
+        )

@@ -1,0 +1,42 @@
+"""The prismatic joint (slider): one translation along an axis."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.joints.axis_frame import checked_axes, checked_motions, normals_of
+from floatframe.joints.rows import MOMENT_B, SLIDE, Row, arm_rows, orientation_rows, slide_row
+from floatframe.markers import Place
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["PrismaticJoint"]
+
+
+@dataclass(frozen=True, eq=False)
+class PrismaticJoint:
+    """Leaves marker B to slide along an axis of marker A without turning; five constraints.
+
+    The point of B stays on the line through the point of A. The held orientation is the one in which the bodies were
+    placed. Coordinate `distance`: of the point of B from that of A, along the axis.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: where the moment on B begins in it
+    coordinates = ("distance",)
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        held = (Row(SLIDE, n) for n in normals_of(self.axis))
+        return (*arm_rows(), *held, *orientation_rows(A_a.T @ A_b), slide_row(self.axis, self.motions, "distance"))

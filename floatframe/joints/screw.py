@@ -1,0 +1,60 @@
+"""The screw joint: rotation about an axis and translation along it in a fixed ratio."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.arrays import number
+from floatframe.errors import ModelError
+from floatframe.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
+from floatframe.joints.rows import DOT, MOMENT_B, SCREW, SLIDE, THREAD, TURN, Row, arm_rows
+from floatframe.markers import Place
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["ScrewJoint"]
+
+
+@dataclass(frozen=True, eq=False)
+class ScrewJoint:
+    """Leaves marker B to turn about an axis and slide along it, `lead` for each turn; five constraints.
+
+    The point of B stays on the line through the point of A. Coordinates: `angle` of B about the axis, zero as placed;
+    `distance` = lead angle/(2 pi) of the points along the axis: they are to be placed one in the other.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
+    axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
+    lead: float = 1.0  #: distance along the axis for one turn, above zero for a right-handed screw [m]
+    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: where the moment on B begins in it
+    coordinates = ("angle",)
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        lead = number(f"joint {self.name!r}: lead", self.lead)
+        if lead == 0:
+            raise ModelError(f"joint {self.name!r}: lead: expected a number other than zero; use a revolute joint")
+        object.__setattr__(self, "lead", lead)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
+        x, z, y = turning_frame(self.axis, axis_b, A_a, A_b)
+        slope = self.lead / (2 * np.pi)
+        motion = self.motions.get("angle")
+        drive = Row(THREAD, self.axis, c=slope) if motion is None else Row(TURN, x, y, z=z, motion=motion)
+        return (
+            *arm_rows(),
+            *(Row(SLIDE, n) for n in normals_of(self.axis)),
+            *(Row(DOT, self.axis, n) for n in normals_of(axis_b)),
+            Row(SCREW, x, y, c=slope, z=z),
+            drive,
+        )

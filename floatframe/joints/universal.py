@@ -1,0 +1,54 @@
+"""The universal joint (Cardan, Hooke): two axes that meet at right angles."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.errors import ModelError
+from floatframe.joints.axis_frame import checked_axes, checked_motions
+from floatframe.joints.rows import DOT, GAUGE_B, MOMENT, Row, point_rows, turn_row
+from floatframe.markers import Place
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["UniversalJoint"]
+
+
+@dataclass(frozen=True, eq=False)
+class UniversalJoint:
+    """Holds two points together and an axis of marker A at a right angle to one of marker B; four constraints.
+
+    Coordinate `angle`: of the cross about the axis of A, zero as placed.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: in the axes of marker A, (3,)
+    axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: in the axes of marker B, (3,)
+    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+
+    size = 6  #: components of the unknown wrench
+    moment_b = MOMENT  #: where the moment on B begins in it
+    coordinates = ("angle",)
+
+    def __post_init__(self) -> None:
+        checked_axes(self)
+        checked_motions(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        # the axis of B as placed gives angle zero: the direction z of A that lies along it
+        z = A_a.T @ A_b @ self.axis_b
+        z = z - (z @ self.axis) * self.axis
+        if np.linalg.norm(z) < 1e-3:
+            raise ModelError(f"joint {self.name!r}: expected axes at about a right angle as placed, got parallel ones")
+        z = z / np.linalg.norm(z)
+        frame = (np.cross(z, self.axis), z, self.axis_b)
+        return (
+            *point_rows(),
+            Row(DOT, self.axis, self.axis_b),
+            turn_row(self.axis, frame, MOMENT, self.motions, "angle"),
+            Row(GAUGE_B, y=self.axis_b, part=MOMENT),
+        )
