@@ -11,6 +11,7 @@ from cms.fe_body import FEBody, Interface
 from cms.independent import gram
 from cms.mode_set import ModeSet
 from cms.rigid_modes import geometric_rigid_modes
+from cms.sparse_product import SymmetricProduct
 from cms.tall import combine
 
 __all__ = ["with_characteristic_modes"]
@@ -146,7 +147,7 @@ def _characteristic(
     body: FEBody, Psi_C: Array, part: _Part, n_modes: int | None, cutoff: float | None
 ) -> tuple[Array, Array]:
     """Lowest deforming modes of the constraint modes and their frequencies: (1) to (3)."""
-    K_c, M_c = gram(Psi_C, body.K @ Psi_C), gram(Psi_C, body.M @ Psi_C)
+    K_c, M_c = (gram(Psi_C, SymmetricProduct(A) @ Psi_C) for A in (body.K, body.M))
     n, n_r = part.R.shape
     Q, _ = la.qr(M_c @ part.R)
     X = Q[:, n_r:]  # Rᵀ M_c X = 0

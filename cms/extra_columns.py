@@ -13,6 +13,7 @@ from cms.fe_body import FEBody
 from cms.load_cases import LoadCase, load_columns
 from cms.mode_set import ModeSet
 from cms.mode_sets.selection import families_of
+from cms.sparse_product import SymmetricProduct
 from cms.words import nearest
 
 __all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
@@ -131,7 +132,8 @@ def _with_responses(
 
 def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.ndarray]:
     """K-orthonormal parts of the responses U to F that neither V nor those before can give, and which of them count."""
-    KV = body.K @ V
+    K = SymmetricProduct(body.K)
+    KV = K @ V
     G = V.T @ KV
     diagonal = np.abs(body.K.diagonal())
     size = np.sqrt(np.maximum(np.diag(G), 0.0))
@@ -145,8 +147,8 @@ def _not_in_span(body: FEBody, V: Array, U: Array, F: Array) -> tuple[Array, np.
         rest = rest - V @ np.linalg.lstsq(G, KV.T @ rest, rcond=ROUNDING)[0]
     new, is_new = np.zeros((len(U), 0)), np.zeros(U.shape[1], bool)
     for k in range(U.shape[1]):
-        x = rest[:, [k]] - new @ (new.T @ (body.K @ rest[:, [k]]))  # responses to proportional loads count once
-        left = abs(float(x[:, 0] @ (body.K @ x[:, 0])))
+        x = rest[:, [k]] - new @ (new.T @ (K @ rest[:, [k]]))  # responses to proportional loads count once
+        left = abs(float(x[:, 0] @ (K @ x)[:, 0]))
         # a load that rigid-body acceleration balances leaves rounding alone: far less than its dofs would do one by one
         is_new[k] = left > IN_THE_SPAN**2 * energy[k] and energy[k] > IN_THE_SPAN**2 * local[k]
         if is_new[k]:

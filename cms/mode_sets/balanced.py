@@ -15,6 +15,7 @@ from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import mode_set, rigid_block, static_block
 from cms.mode_sets.selection import families_of, require_interfaces
 from cms.receptance import boundary_scale
+from cms.sparse_product import SymmetricProduct
 from cms.tall import combine
 
 __all__ = ["balanced_truncation"]
@@ -141,7 +142,9 @@ def rich_basis(families: Families, n_free: int) -> RichBasis:
     is_left = _stiffness(body, residual) > NOTHING_LEFT**2 * _stiffness(body, families.Psi_U)
     V = np.hstack([modes.Phi, residual[:, is_left]])
     omega2_1 = float(modes.omega2[0])
-    Q, _ = independent_columns(Columns(V, body.K @ V, body.M @ V, np.eye(V.shape[1])), body, omega2_1)
+    Q, _ = independent_columns(
+        Columns(V, SymmetricProduct(body.K) @ V, SymmetricProduct(body.M) @ V, np.eye(V.shape[1])), body, omega2_1
+    )
     G_K = gram(Q.X, Q.KX)
     Z, is_massive, _ = elastic_eigenvectors(G_K, gram(Q.X, Q.MX), omega2_1)
     Z = Z[:, is_massive]

@@ -20,6 +20,7 @@ from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import mode_set, rigid_block, static_block
 from cms.mode_sets.selection import families_of, require_interfaces
 from cms.receptance import boundary_scale, largest_error, receptance_of_pencil
+from cms.sparse_product import SymmetricProduct
 
 __all__ = ["krylov"]
 
@@ -130,7 +131,8 @@ class _Span:
 
     def __init__(self, families: Families, *, deflation: float) -> None:
         self.body, self.families, self.deflation = families.body, families, deflation
-        self.columns = _products(self.body, np.zeros((self.body.n_dof, 0)))
+        self._K, self._M = SymmetricProduct(self.body.K), SymmetricProduct(self.body.M)
+        self.columns = self._products(np.zeros((self.body.n_dof, 0)))
         self.labels: list[str] = []
         self.groups: list[str] = []
         self.omega2 = 0.0
@@ -156,9 +158,9 @@ class _Span:
 
     def _orthonormal(self, X: Array) -> Columns:
         """Return W-orthonormal directions of elastic columns X that are not in the span: (3)."""
-        body, free = self.body, self.families.free
+        free = self.families.free
         X = X - free.N @ (free.M_N.T @ X)
-        block = _products(body, X)
+        block = self._products(X)
         stiffness = np.einsum("nk,nk->k", X, block.KX)
         mass = np.einsum("nk,nk->k", X, block.MX)
         if self.omega2 == 0.0:
@@ -167,7 +169,7 @@ class _Span:
         size = np.sqrt(np.maximum(stiffness + self.omega2 * mass, 0.0))
         is_there = size > np.finfo(float).tiny
         X = X[:, is_there] / size[is_there]
-        block = _products(body, X)
+        block = self._products(X)
         for _ in range(2):  # twice is enough
             block = self._without_span(block)
         rest = np.einsum("nk,nk->k", block.X, block.KX + self.omega2 * block.MX)
@@ -178,23 +180,22 @@ class _Span:
         factor, pivots, rank, _ = dpstrf(G, tol=self.deflation**2, lower=0)
         Z = np.zeros((len(G), rank))
         Z[pivots[:rank] - 1] = la.solve_triangular(np.triu(factor[:rank, :rank]), np.eye(rank))
-        block = _products(body, block.X @ Z)
+        block = self._products(block.X @ Z)
         block = self._without_span(block)  # the smaller the remainder was, the more of the span its rounding carries
         G = gram(block.X, block.KX) + self.omega2 * gram(block.X, block.MX)
-        return _products(body, block.X @ la.solve_triangular(la.cholesky(G), np.eye(rank)))
+        return self._products(block.X @ la.solve_triangular(la.cholesky(G), np.eye(rank)))
 
     def _without_span(self, block: Columns) -> Columns:
-        return _products(self.body, block.X - self.columns.X @ self.columns.inner(block, self.omega2))
+        return self._products(block.X - self.columns.X @ self.columns.inner(block, self.omega2))
+
+    def _products(self, X: Array) -> Columns:
+        return Columns(X, self._K @ X, self._M @ X, np.zeros((0, X.shape[1])))  # nothing asks where a column came from
 
     def receptance(self, band: tuple[float, float]) -> np.ndarray:
         """Elastic receptance of the boundary over the band, (n_f, n_b, n_b)."""
         b = boundary_scale(self.body)[:, None] * self.columns.X[self.body.b]
         K, M = gram(self.columns.X, self.columns.KX), gram(self.columns.X, self.columns.MX)
         return receptance_of_pencil(b, K, M, loss=LOSS, omega2=self.omega2).at(np.linspace(*band, BAND_POINTS))
-
-
-def _products(body: FEBody, X: Array) -> Columns:
-    return Columns(X, body.K @ X, body.M @ X, np.zeros((0, X.shape[1])))  # nothing asks where a column came from
 
 
 def _static_expansion(families: Families, F_extra: Array) -> _Expansion:

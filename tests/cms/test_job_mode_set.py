@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
 from cms.centrifugal import centrifugal_loads
+from cms.cli.app import print_body
 from cms.cli.job_mode_set import job_mode_set
 from cms.couplings import couple
 from cms.extra_columns import with_centrifugal, with_load_cases
@@ -17,6 +18,7 @@ from cms.mode_sets import assumed_modes, balanced_truncation, craig_bampton, kry
 from cms.reduction import reduce
 from cms.units import unit_system
 from tests.bodies import bar
+from tests.synthetic import synthetic_reduced_body
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +79,12 @@ def test_a_job_chooses_the_number_of_modes(body):
     expected = select_modes(body, error=1e-2, band=(0.0, 1.5e6))
     same(found, expected.modes)
     assert reduce(body, found).provenance["mode set selected"] == expected.sentence
+
+
+def test_the_choice_is_shown(capsys):
+    chosen = "rubin: 12 modes are the fewest"
+    print_body(replace(synthetic_reduced_body(), provenance={"mode set selected": chosen}))
+    assert f"Selected: {chosen}" in capsys.readouterr().out
 
 
 def test_a_job_reduces_interfaces_of_nodes_before_it_counts_modes():
