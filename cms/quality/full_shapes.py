@@ -1,7 +1,8 @@
 """The modes of a modal file over all dofs of its full model, found again in the span of a mode set.
 
 A file keeps its modes at some nodes only. Where those determine x in phi_file = [Psi_R Phi] x, the full shapes follow,
-in any frame; what is left at the nodes says whether file, model and mode set belong together.
+in any frame; what is left at the nodes says whether file, model and mode set belong together. Where they do not (a beam
+that keeps its ends), the mode set is finished again in the frame the file names, and taken if it fits the kept nodes.
 """
 
 from dataclasses import dataclass
@@ -9,15 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.arrays import Array, frozen
+from cms.errors import BodyError, ModeSetError
 from cms.fe_body import FEBody
+from cms.finishing import finish
+from cms.frames import FRAMES, Frame, NodalFrame, frame_condition
+from cms.mode_set import ModeSet
 from cms.quality.free_basis import FreeBasis
 from cms.quality.ports import Ports
 from cms.quality.record import QualityRecord, information, judge
-from cms.reduced_body import ReducedBody
+from cms.reduced_body import BodyFrame, ReducedBody
 
 __all__ = ["FullShapes", "full_shapes", "same_body_record"]
 
 WELL_DETERMINED = 1e-7  #: smallest over largest singular value of the nodal rows, below which x is not determined
+FITS = 1e-6  #: misfit at the kept nodes, above which a mode set finished again is not the file's
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,33 +38,67 @@ class FullShapes:
 
 
 def full_shapes(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> FullShapes | None:
-    """Find the file's modes in the span of rigid motion and a mode set; None where its nodes do not determine them."""
-    names = tuple(interface.name for interface in reduced.interfaces)
+    """Find the file's modes over all dofs of a mode set's body; None where they cannot be known."""
     if len(reduced.node_ids) and reduced.node_ids.max() >= len(body.nodes):
         return None
     X = np.hstack([basis.N, basis.Phi])
-    axes, length = reduced.frame.axes, body.length or 1.0
+    wanted = np.vstack([reduced.Phi.reshape(-1, reduced.n_q), *(i.Psi for i in reduced.interfaces)])
+    wanted = motion_scale(body, reduced)[:, None] * wanted
+    rows = kept_motion(body, reduced, X)
+    size = np.linalg.norm(rows, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    x, _, rank, singular = np.linalg.lstsq(rows / size, wanted, rcond=None)
+    if rank == X.shape[1] and singular[-1] > WELL_DETERMINED * singular[0]:
+        return FullShapes(X @ (x / size[:, None]), misfit(rows / size @ x, wanted))
+    again = finished_again(body, basis, reduced)
+    if again is None or again.shape[1] != reduced.n_q:
+        return None
+    distance = misfit(kept_motion(body, reduced, again), wanted)
+    return FullShapes(again, distance) if distance < FITS else None
+
+
+def kept_motion(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
+    """Motion of the kept nodes and reference points with columns X, axes of B, rotations times the length, (n, k)."""
+    axes = reduced.frame.axes
     at_nodes = body.translations(X)[reduced.node_ids]
     rows = [np.einsum("ba,nbk->nak", axes, at_nodes).reshape(-1, X.shape[1])]
-    wanted = [reduced.Phi.reshape(-1, reduced.n_q)]
-    if names:
-        turn = np.kron(np.eye(2), axes.T)
-        for name in names:
-            motion = turn @ (Ports.of_body(body, [name]).A @ X)
-            motion[3:] *= length
-            target = reduced.interface(name).Psi.copy()
-            target[3:] *= length
-            rows.append(motion)
-            wanted.append(target)
-    A, B = np.vstack(rows), np.vstack(wanted)
-    size = np.linalg.norm(A, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    x, _, rank, singular = np.linalg.lstsq(A / size, B, rcond=None)
-    if rank < A.shape[1] or singular[-1] < WELL_DETERMINED * singular[0]:
+    turn = np.kron(np.eye(2), axes.T)
+    rows += [turn @ (Ports.of_body(body, [interface.name]).A @ X) for interface in reduced.interfaces]
+    return motion_scale(body, reduced)[:, None] * np.vstack(rows)
+
+
+def motion_scale(body: FEBody, reduced: ReducedBody) -> Array:
+    """1 for translations, the body length for rotations, one per kept motion, (n,)."""
+    length = body.length or 1.0
+    return np.concatenate([np.ones(3 * len(reduced.nodes)), *[np.repeat([1.0, length], 3)] * len(reduced.interfaces)])
+
+
+def misfit(found: Array, wanted: Array) -> float:
+    """Largest distance over the largest motion of each mode."""
+    largest = np.abs(wanted).max(axis=0, initial=0.0)
+    return float((np.abs(found - wanted).max(axis=0) / np.where(largest > 0, largest, 1.0)).max(initial=0.0))
+
+
+def finished_again(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> Array | None:
+    """Finish the span of the mode set in the frame that the file names, (n_dof, n_q); None if that cannot be done."""
+    n = basis.Phi.shape[1]
+    modes = ModeSet("again", basis.Phi, [f"shape {k + 1}" for k in range(n)], np.full(n, np.nan))
+    try:
+        return finish(body, modes, frame_condition(body, named_frame(reduced.frame))).Phi
+    except (BodyError, ModeSetError):
         return None
-    largest = np.abs(B).max(axis=0, initial=0.0)
-    misfit = np.abs(A / size @ x - B).max(axis=0) / np.where(largest > 0, largest, 1.0)
-    return FullShapes(X @ (x / size[:, None]), float(misfit.max(initial=0.0)))
+
+
+def named_frame(frame: BodyFrame) -> Frame:
+    """Return the frame that a file names."""
+    x, y, z = frame.origin.tolist()
+    axes = tuple(tuple(float(v) for v in axis) for axis in frame.axes.T)
+    if frame.kind == "nodal":
+        dofs = None if frame.at or not len(frame.dofs) else tuple((int(n), int(c)) for n, c in frame.dofs)
+        return NodalFrame(frame.at or None, (x, y, z), axes, dofs)  # type: ignore[arg-type]
+    if frame.kind not in FRAMES:
+        raise BodyError(f"frame kind {frame.kind!r} is unknown; expected one of {', '.join(FRAMES)}")
+    return FRAMES[frame.kind](origin=(x, y, z), axes=axes)
 
 
 def same_body_record(body: FEBody, basis: FreeBasis, reduced: ReducedBody, shapes: FullShapes | None) -> QualityRecord:

@@ -13,6 +13,7 @@ __all__ = [
     "check_free_frequencies",
     "check_inertia_tensor",
     "check_modal_mass",
+    "mode_size",
 ]
 
 
@@ -43,21 +44,34 @@ def check_frame_condition(reduced: ReducedBody) -> QualityRecord:
         k = int(np.argmax(np.maximum(linear, angular)))
         reason = f"largest momentum of a mode is {value:.1e} of what its mass could carry (mode {k + 1})"
         return judge("frame-condition", value, reason, {"linear": linear, "angular": angular})
-    if frame.kind == "nodal" and frame.at:
-        held = reduced.interface(frame.at).Psi
-        motion = np.linalg.norm(held[:3], axis=0)
-        size = np.linalg.norm(reduced.Phi, axis=1).max(axis=0, initial=0.0)
-        others = [np.linalg.norm(i.Psi[:3], axis=0) for i in reduced.interfaces]
-        size = np.max([size, *others], axis=0)
-        length = body_length(reduced)
-        turning = np.linalg.norm(held[3:], axis=0) * length
-        relative = np.maximum(motion, turning) / np.where(size > 0, size, 1.0)
-        reason = (
-            f"interface {frame.at!r}, which carries the frame, moves by {relative.max():.1e} of the largest "
-            f"displacement of a mode (mode {int(np.argmax(relative)) + 1})"
-        )
-        return judge("frame-condition", relative.max(), reason, {"motion": relative})
+    if frame.kind == "nodal":
+        motion, where = held_motion(reduced)
+        if len(motion):
+            relative = np.abs(motion).max(axis=0) / mode_size(reduced)
+            reason = (
+                f"{where}, which carry the frame, move by {relative.max():.1e} of the largest displacement of a mode "
+                f"(mode {int(np.argmax(relative)) + 1})"
+            )
+            return judge("frame-condition", relative.max(), reason, {"motion": relative})
     return information("frame-condition", f"a {frame.kind} frame leaves no condition that the file alone could show")
+
+
+def held_motion(reduced: ReducedBody) -> tuple[Array, str]:
+    """Motions with q that a nodal frame holds at zero, as far as the file has them, (n, n_q) [m], and what they are.
+
+    The six of an interface with a reference point, rotations times the body length, or held translations of kept nodes.
+    """
+    frame = reduced.frame
+    if frame.at and reduced.interface(frame.at).kind != "nodes":
+        scale = np.repeat([1.0, body_length(reduced)], 3)
+        return scale[:, None] * reduced.interface(frame.at).Psi, f"the six motions of interface {frame.at!r}"
+    row_of = {int(node): k for k, node in enumerate(reduced.node_ids)}
+    rows = [
+        frame.axes[component] @ reduced.Phi[row_of[int(node)]]
+        for node, component in frame.dofs
+        if component < 3 and int(node) in row_of
+    ]
+    return np.array(rows).reshape(-1, reduced.n_q), f"{len(rows)} held translations"
 
 
 def check_free_frequencies(reduced: ReducedBody) -> QualityRecord:
@@ -119,6 +133,16 @@ def momenta(reduced: ReducedBody) -> tuple[Array, Array]:
     inertia = np.trace(moments.J0) - 2 * moments.m * float(center @ center)
     linear = np.linalg.norm(moments.C1, axis=0) / np.sqrt(moments.m)
     return linear / mass, np.linalg.norm(angular, axis=0) / np.sqrt(max(inertia, np.finfo(float).tiny)) / mass
+
+
+def mode_size(reduced: ReducedBody) -> Array:
+    """Largest displacement of each mode that the file shows, at least that of a rigid body of its mass, (n_q,).
+
+    A mode of unit modal mass moves by 1 / sqrt(m) in the mean, though it may leave all kept nodes at rest.
+    """
+    size = np.linalg.norm(reduced.Phi, axis=1).max(axis=0, initial=0.0)
+    at_ports = [np.linalg.norm(interface.Psi[:3], axis=0) for interface in reduced.interfaces]
+    return np.asarray(np.max([size, np.full(reduced.n_q, 1 / np.sqrt(reduced.moments.m)), *at_ports], axis=0))
 
 
 def body_length(reduced: ReducedBody) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 
 from cms.arrays import Array
 from cms.quality.free_pencil import port_rows, stiffness_scale
-from cms.quality.identities import body_length
+from cms.quality.identities import body_length, mode_size
 from cms.quality.record import QualityRecord, information, judge
 from cms.reduced_body import ReducedBody, ReducedInterface
 from cms.rigid_modes import rigid_motion_of_points
@@ -33,8 +33,7 @@ def rigid_defect(reduced: ReducedBody, interface: ReducedInterface) -> float:
     """Largest departure of the members from rigid motion, over the largest displacement of the mode."""
     motion = rigid_motion_of_points(reduced.nodes[interface.members], interface.position) @ interface.Psi
     own = reduced.Phi[interface.members]
-    size = np.linalg.norm(reduced.Phi, axis=1).max(axis=0)
-    return float((np.abs(own - motion) / np.where(size > 0, size, 1.0)).max())
+    return float((np.abs(own - motion) / mode_size(reduced)).max())
 
 
 def check_interface_motions(reduced: ReducedBody) -> QualityRecord:

@@ -17,7 +17,10 @@ from cms.quality.step_size import step_size
 from cms.reduction import reduce
 from tests.bodies import bar, beam
 
-FRAMES = [TisserandFrame(), NodalFrame("left"), NodalFrame("right"), NodalFrame()]
+FRAMES = [
+    TisserandFrame(), NodalFrame("left"), NodalFrame("right"), NodalFrame(),
+    NodalFrame("left", axes=((0, 1, 0), (0, 0, 1), (1, 0, 0))),
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +62,18 @@ def test_a_good_body_passes_in_every_frame(body, frame, n_modes):
     found = verdicts(reduced)
     assert {name for name, verdict in found.items() if verdict == "fail"} == set()
     assert {name for name, verdict in found.items() if verdict == "warn"} == set()
+
+
+def test_a_frame_on_nodes_of_an_interface_is_held_there():
+    whole = bar(nx=4, kind="hexahedron")
+    corners = replace(whole.interfaces[0], kind="nodes")
+    body = couple(replace(whole, interfaces=(corners, whole.interfaces[1])))
+    reduced = reduce(body, craig_bampton(body, n_modes=3), frame=NodalFrame("left"))
+    records = {r.name: r for r in check_body(reduced)}
+    assert records["frame-condition"].verdict == "pass"
+    assert "6 held translations" in records["frame-condition"].reason
+    moved = replace(reduced, Phi=reduced.Phi + 0.01 * np.abs(reduced.Phi).max())
+    assert {r.name: r for r in check_body(moved)}["frame-condition"].verdict == "fail"
 
 
 def test_a_beam_of_few_nodes_passes():

@@ -106,7 +106,10 @@ def test_every_kind_of_interface_has_a_port(mixed):
         assert (np.linalg.norm(own.H - found.H[:3], axis=(1, 2)) < 1e-3 * size).all()
 
 
-@pytest.mark.parametrize("frame", [TisserandFrame(), NodalFrame("left"), NodalFrame()], ids=str)
+TURNED = TisserandFrame(origin=(0.4, 0.0, 0.1), axes=((0, 1, 0), (0, 0, 1), (1, 0, 0)))
+
+
+@pytest.mark.parametrize("frame", [TisserandFrame(), NodalFrame("left"), NodalFrame(), TURNED], ids=str)
 @pytest.mark.parametrize("damping", [None, 0.03])
 def test_the_response_of_a_file_does_not_depend_on_its_frame(body, frame, damping):
     reduced = reduce(body, unit_set(body), frame=frame)

@@ -5,11 +5,12 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 from cms.couplings import couple
 from cms.errors import CmsError
 from cms.families import Families
-from cms.frames import NodalFrame, TisserandFrame
+from cms.frames import BuckensFrame, NodalFrame, TisserandFrame
 from cms.load_cases import LoadCase
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS, craig_bampton, guyan
@@ -19,6 +20,7 @@ from cms.quality.errors import QualityError
 from cms.quality.free_basis import FreeBasis, free_basis, ritz_basis
 from cms.quality.frequencies import compare_frequencies, mac
 from cms.quality.full_reference import FullReference, usable_band
+from cms.quality.full_shapes import full_shapes
 from cms.quality.held_mass import held_mass, held_mass_record
 from cms.quality.interface_stiffening import interface_stiffening
 from cms.quality.mass_properties import check_grounding, rigid_mass_matrix
@@ -309,7 +311,15 @@ def test_stiffening_needs_interfaces_that_can_change(body):
 # All of it -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("frame", [TisserandFrame(), NodalFrame("left")], ids=str)
+AXES = tuple(map(tuple, Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix().round(15).tolist()))
+TURNED = [
+    NodalFrame("left", origin=(0.1, 0.2, 0.3), axes=AXES),
+    TisserandFrame(axes=AXES),
+    BuckensFrame(origin=(0.3, 0.0, 0.0), axes=AXES),
+]
+
+
+@pytest.mark.parametrize("frame", [TisserandFrame(), NodalFrame("left"), *TURNED], ids=str)
 def test_a_good_reduction_passes_every_check(body, uncoupled, reference, frame):
     modes = MODE_SETS["craig-bampton-ir"](body, n_modes=20, families=reference.families)
     found = records_of(body, modes, reduce(body, modes, frame=frame), reference, uncoupled=uncoupled)
@@ -362,6 +372,21 @@ def test_a_grounded_model_is_not_compared_as_a_free_one(body):
     assert found[-2].name == "grounding"
     assert found[-2].verdict == "fail"
     assert "frequency-error" not in {r.name for r in found}
+
+
+@pytest.mark.parametrize("frame", [TisserandFrame(), NodalFrame("left"), NodalFrame(), *TURNED[:2]], ids=str)
+def test_modes_at_the_ends_of_a_beam_are_found_over_all_of_it(frame):
+    ends = couple(beam(n=6))
+    modes = craig_bampton(ends, n_modes=8)
+    reduced = reduce(ends, modes, frame=frame)
+    with FullReference(ends, band=300.0) as reference:
+        basis = basis_of(reference, modes)
+        found = full_shapes(ends, basis, reduced)
+        assert found is not None
+        assert_allclose(found.Phi.T @ (ends.K @ found.Phi), reduced.K, rtol=0, atol=1e-8 * reduced.K.max())
+        assert found.misfit < 1e-8
+        records = records_of(ends, modes, reduced, reference)
+    assert records["invariants"].verdict == records["frame-condition"].verdict.replace("info", "pass") == "pass"
 
 
 def test_the_default_band_is_the_highest_kept_mode_over_one_and_a_half(body):
