@@ -15,6 +15,7 @@ from cms.mode_set import ModeSet
 from cms.orientation import orientation
 from cms.source_columns import SourceColumns, source_columns
 from cms.sparse_product import SymmetricProduct
+from cms.tall import combine
 
 __all__ = ["FinishedBasis", "finish"]
 
@@ -83,8 +84,9 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
             f"{where}: shapes are M-orthonormal to {defect:.1e} only, expected {ORTHONORMAL_DEFECT:.0e}; "
             "its columns are too ill-conditioned"
         )
-    Z = Z @ orientation(Q_frame @ Z, omega2)
-    Phi = Q_frame @ Z
+    Phi = combine(Q_frame, Z)
+    turn = orientation(Phi, omega2)
+    Z, Phi = Z @ turn, combine(Phi, turn)
     A = Q.T @ Z
     return FinishedBasis(
         Phi=Phi,

@@ -12,6 +12,7 @@ from scipy.linalg.lapack import dpstrf
 
 from cms.arrays import Array, IntArray
 from cms.fe_body import FEBody
+from cms.tall import combine, inner
 
 __all__ = ["Columns", "gram", "independent_columns"]
 
@@ -30,7 +31,7 @@ class Columns:
     T: Array  #: coefficients over the columns of the mode set, (n_columns, k)
 
     def __matmul__(self, Z: Array) -> "Columns":
-        return Columns(self.X @ Z, self.KX @ Z, self.MX @ Z, self.T @ Z)
+        return Columns(combine(self.X, Z), combine(self.KX, Z), combine(self.MX, Z), self.T @ Z)
 
     def __sub__(self, other: "Columns") -> "Columns":
         return Columns(self.X - other.X, self.KX - other.KX, self.MX - other.MX, self.T - other.T)
@@ -44,12 +45,12 @@ class Columns:
 
     def inner(self, other: "Columns", omega2: float) -> Array:
         """Return selfᵀ (K + omega² M) other."""
-        return self.X.T @ other.KX + omega2 * (self.X.T @ other.MX)
+        return inner(self.X, other.KX) + omega2 * inner(self.X, other.MX)
 
 
 def gram(X: Array, AX: Array) -> Array:
     """Return Xᵀ A X of a symmetric A, with the rounding of its two halves averaged."""
-    G = X.T @ AX
+    G = inner(X, AX)
     return (G + G.T) / 2
 
 

@@ -8,12 +8,15 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cms.arrays import Array
 from cms.threads import n_threads
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 __all__ = ["combine", "inner", "ordered", "subtract"]
 
@@ -82,9 +85,17 @@ def _by_rows(n: int, work: Callable[[slice], Array | None]) -> list:
     if n_parts == 1:
         return [work(slice(0, n))]
     bounds = np.linspace(0, n, n_parts + 1).astype(int)
-    return list(_pool().map(work, [slice(a, b) for a, b in pairwise(bounds)]))
+    with _numpy_blas().limit(limits=1):
+        return list(_pool().map(work, [slice(a, b) for a, b in pairwise(bounds)]))
 
 
 @cache
 def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(n_threads())
+
+
+@cache
+def _numpy_blas() -> "ThreadpoolController":
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController().select(internal_api="openblas")
