@@ -6,6 +6,7 @@ that keeps its ends), the mode set is finished again in the frame the file names
 """
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from cms.arrays import Array, frozen
 from cms.errors import BodyError, ModeSetError
 from cms.fe_body import FEBody
 from cms.finishing import finish
-from cms.frames import FRAMES, Frame, NodalFrame, frame_condition
+from cms.frames import FRAMES, Axes, Frame, NodalFrame, frame_condition
 from cms.mode_set import ModeSet
 from cms.quality.free_basis import FreeBasis
 from cms.quality.ports import Ports
@@ -82,7 +83,7 @@ def misfit(found: Array, wanted: Array) -> float:
 def finished_again(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> Array | None:
     """Finish the span of the mode set in the frame that the file names, (n_dof, n_q); None if that cannot be done."""
     n = basis.Phi.shape[1]
-    modes = ModeSet("again", basis.Phi, [f"shape {k + 1}" for k in range(n)], np.full(n, np.nan))
+    modes = ModeSet("again", basis.Phi, tuple(f"shape {k + 1}" for k in range(n)), np.full(n, np.nan))
     try:
         return finish(body, modes, frame_condition(body, named_frame(reduced.frame))).Phi
     except (BodyError, ModeSetError):
@@ -92,10 +93,10 @@ def finished_again(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> Arra
 def named_frame(frame: BodyFrame) -> Frame:
     """Return the frame that a file names."""
     x, y, z = frame.origin.tolist()
-    axes = tuple(tuple(float(v) for v in axis) for axis in frame.axes.T)
+    axes = cast(Axes, tuple(tuple(float(v) for v in axis) for axis in frame.axes.T))
     if frame.kind == "nodal":
         dofs = None if frame.at or not len(frame.dofs) else tuple((int(n), int(c)) for n, c in frame.dofs)
-        return NodalFrame(frame.at or None, (x, y, z), axes, dofs)  # type: ignore[arg-type]
+        return NodalFrame(frame.at or None, (x, y, z), axes, dofs)
     if frame.kind not in FRAMES:
         raise BodyError(f"frame kind {frame.kind!r} is unknown; expected one of {', '.join(FRAMES)}")
     return FRAMES[frame.kind](origin=(x, y, z), axes=axes)
