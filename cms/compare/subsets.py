@@ -7,7 +7,7 @@ import numpy as np
 from cms.arrays import Array, IntArray
 from cms.mode_set import ModeSet
 
-__all__ = ["SUBSETS", "Subset", "column_subset", "residual_subset", "whole_set"]
+__all__ = ["SUBSETS", "Subset", "column_subset", "leading_subset", "residual_subset", "whole_set"]
 
 Subset = Callable[[ModeSet, Array, int], tuple[Array, tuple[str, ...]]]
 
@@ -50,6 +50,12 @@ def residual_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, t
     return C[:, kept], tuple(modes.labels[k] for k in kept)
 
 
+def leading_subset(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[str, ...]]:
+    """Take the columns the number of modes does not count, and the first of the others; as `column_subset`."""
+    n = min(int(modes.data["n_static"][0]) + n_modes, len(modes.labels))
+    return np.eye(len(modes.labels), n), modes.labels[:n]
+
+
 def whole_set(modes: ModeSet, at_b: Array, n_modes: int) -> tuple[Array, tuple[str, ...]]:
     """Take all columns: of a set without vibration modes."""
     return np.eye(len(modes.labels)), modes.labels
@@ -73,4 +79,5 @@ SUBSETS: dict[str, Subset] = {
     "rubin": residual_subset,
     "macneal": residual_subset,
     "dual-craig-bampton": residual_subset,
+    "krylov": leading_subset,
 }

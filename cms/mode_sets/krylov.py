@@ -107,7 +107,7 @@ def krylov(
                 if j > 0 and largest_error(history[-1], history[-2]) < tolerance:
                     break
         n_kept = span.n if n_modes is None else min(span.n, n_first + n_modes)
-        return _mode_set(families, span, expansions, n_kept, history, [case.name for case in cases])
+        return _mode_set(families, span, expansions, n_first, n_kept, history, [case.name for case in cases])
 
 
 @dataclass(eq=False)
@@ -256,6 +256,7 @@ def _mode_set(
     families: Families,
     span: _Span,
     expansions: list[_Expansion],
+    n_first: int,
     n_kept: int,
     history: list[np.ndarray],
     load_names: list[str],
@@ -270,5 +271,8 @@ def _mode_set(
     if len(history) > 1:
         options["estimated transfer-function error"] = f"{largest_error(history[-1], history[-2]):.3g}"
     columns = static_block(span.columns.X[:, :n_kept], span.labels[:n_kept], span.groups[:n_kept])
-    modes = mode_set("krylov", families, [rigid_block(families), columns], options=options)
-    return replace(modes, data={"omega2": np.array(span.omega2)})
+    rigid = rigid_block(families)
+    modes = mode_set("krylov", families, [rigid, columns], options=options)
+    # columns that n_modes does not count: with fewer of the others it is the set of fewer modes
+    n_static = np.array([float(rigid.columns.shape[1] + min(n_first, n_kept))])
+    return replace(modes, data={"omega2": np.array(span.omega2), "n_static": n_static})

@@ -5,6 +5,7 @@ import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
 
+from cms.compare.subsets import SUBSETS
 from cms.couplings import couple
 from cms.errors import ModeSetError
 from cms.families import Families
@@ -106,6 +107,23 @@ def test_one_block_at_zero_is_the_static_set(body):
     angles = la.subspace_angles(static / np.linalg.norm(static, axis=0), modes.columns)
     assert angles.max() < 1e-6
     assert modes.columns.shape[1] == 6 + 12
+
+
+def test_static_answers_to_interface_and_inertia_loads_are_exact(body):
+    with Families(body) as families:
+        V = krylov(body, n_modes=5, families=families).columns
+        for U in (families.Psi_A, families.Psi_H):
+            U, W = U / np.linalg.norm(U, axis=0), V / np.linalg.norm(V, axis=0)
+            rest = U - W @ np.linalg.lstsq(W, U, rcond=1e-13)[0]
+            assert_allclose(rest, 0, rtol=0, atol=max(1e-9, 1e3 * np.finfo(float).eps * np.linalg.cond(W)))
+
+
+@pytest.mark.parametrize("n_modes", [0, 3, 17])
+def test_the_set_of_fewer_modes_is_the_beginning_of_that_of_more(body, n_modes):
+    more, fewer = krylov(body, n_modes=20), krylov(body, n_modes=n_modes)
+    C, labels = SUBSETS["krylov"](more, more.columns[body.b], n_modes)
+    assert labels == fewer.labels
+    assert_allclose(more.columns @ C, fewer.columns, rtol=0, atol=1e-9 * np.abs(fewer.columns).max())
 
 
 def test_n_modes_counts_columns_beyond_the_static_ones(body):
