@@ -335,7 +335,10 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         print_table(
             "Load cases (of amplitude 1, in B)",
             ("name", "kind", f"force [{force}]", f"torque about the origin [{force} {length}]"),
-            [(c["name"], c["kind"], vector(c["force"]), vector(c["torque"])) for c in record["load_cases"]],
+            [
+                (c["name"], c["kind"], vector(c["force"], scale), vector(c["torque"], scale * size))
+                for c, scale in ((case, load_scale(case, record["mass"])) for case in record["load_cases"])
+            ],
         )
     if everything:
         print_table("Provenance", ("", ""), list(record["provenance"].items()))
@@ -346,6 +349,11 @@ def turned_axes(axes: Any) -> list[tuple[str, Any]]:
     columns = [[row[k] for row in axes] for k in range(3)]
     unit = [[float(i == k) for i in range(3)] for k in range(3)]
     return [] if columns == unit else list(zip("xyz", columns, strict=True))
+
+
+def load_scale(case: Any, mass: float) -> float:
+    """Return the size of the forces of a load case, also of one in balance: by its resultant and its modal forces."""
+    return max(map(abs, [*case["force"], *(h * mass**0.5 for h in case["modal_forces"])]), default=0.0)
 
 
 def stress_words(stress: Any) -> str:

@@ -157,6 +157,21 @@ def coefficients(other, reduced):
     return other.stress.reshape(-1, other.n_q), reduced.stress.reshape(-1, reduced.n_q)
 
 
+def test_without_volumes_every_mesh_node_counts_the_same(made):
+    body, _ = made
+    bare = replace(body, node_volumes=None)
+    modes = craig_bampton(bare, n_modes=5)
+    reduced = reduce(bare, modes, frame=BuckensFrame())
+    on_mesh = reduced.node_ids < len(body.nodes) - 2  # reference nodes come last and count nothing
+    u, c = reduced.Phi[on_mesh], reduced.nodes[on_mesh]
+    size = np.abs(u).max() * len(u)
+    assert_allclose(c.sum(axis=0), 0, rtol=0, atol=1e-12 * len(u))
+    assert_allclose(u.sum(axis=0), 0, rtol=0, atol=1e-12 * size)
+    assert_allclose(np.cross(c[..., None], u, axisa=1, axisb=1, axisc=1).sum(axis=0), 0, rtol=0, atol=1e-12 * size)
+    assert reduced.nodal_sums.w == on_mesh.sum()
+    assert_same_body(convert_frame(reduce(bare, modes, frame=NodalFrame("left")), BuckensFrame()), reduced)
+
+
 def test_free_frequencies_and_elastic_energy_do_not_depend_on_the_frame(made):
     """The pencil of a frame on its own does; with the six rigid-body motions added back it does not."""
     import scipy.linalg as la
