@@ -158,8 +158,8 @@ def reduced_interface(
     if len(interface.dofs) == 6 and len(np.unique(body.dofs[interface.dofs, 0])) == 1:  # a reference node
         Psi = Phi[interface.dofs]
         reference = body.nodes[body.dofs[interface.dofs[0], 0]]
-    elif (motion := interface_node_motion(body, interface, Phi)) is not None:
-        Psi, reference = motion, interface.reference
+    elif (motion := interface_node_motion(body, interface)) is not None:
+        Psi, reference = motion @ Phi, interface.reference
     else:
         members = body.translations(Phi)[interface.nodes]
         reference = interface.reference

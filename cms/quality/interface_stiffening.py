@@ -7,12 +7,13 @@ import numpy as np
 from cms.arrays import Array, frozen
 from cms.couplings import couple
 from cms.families import Families
-from cms.fe_body import FEBody
+from cms.fe_body import FEBody, Interface
 from cms.quality.errors import QualityError
 from cms.quality.ports import Ports
 from cms.quality.record import QualityRecord, judge
+from cms.reduction import are_spread
 
-__all__ = ["InterfaceStiffening", "interface_stiffening", "stiffening_record", "with_kind"]
+__all__ = ["InterfaceStiffening", "has_both_kinds", "interface_stiffening", "stiffening_record", "with_kind"]
 
 MODES = 6
 
@@ -42,19 +43,31 @@ class InterfaceStiffening:
         return self.compliance_distributing / np.where(self.compliance_rigid > 0, self.compliance_rigid, np.nan)
 
 
+def can_be_both(body: FEBody, interface: Interface) -> bool:
+    """Whether an interface can be rigid as well as distributing: three nodes or more, not on one line."""
+    return interface.kind != "nodes" and interface.dofs is None and are_spread(body.nodes[interface.nodes])
+
+
+def has_both_kinds(body: FEBody) -> bool:
+    """Whether the body has an interface that can be rigid as well as distributing."""
+    return any(can_be_both(body, interface) for interface in body.interfaces)
+
+
 def with_kind(body: FEBody, kind: str) -> FEBody:
-    """Return an uncoupled body with every interface that is not of kind "nodes" made of this kind.
+    """Return an uncoupled body with every interface that can be of both kinds made of this kind.
+
+    That is none of kind "nodes", and of beams none on a single node or line.
 
     Raises
     ------
     QualityError
         If the body is coupled already, or has only interfaces of kind "nodes".
     """
-    if body.recovery is not None:
+    if body.recovery is not None and body.interfaces and body.is_coupled:
         raise QualityError(f"body {body.name!r}: is coupled already; its interfaces cannot change kind any more")
-    if all(interface.kind == "nodes" for interface in body.interfaces):
+    if not has_both_kinds(body):
         raise QualityError(f"body {body.name!r}: has no rigid or distributing interface to compare")
-    interfaces = tuple(i if i.kind == "nodes" else replace(i, kind=kind) for i in body.interfaces)
+    interfaces = tuple(replace(i, kind=kind) if can_be_both(body, i) else i for i in body.interfaces)
     return replace(body, interfaces=interfaces)
 
 

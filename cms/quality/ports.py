@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from cms.arrays import Array
 from cms.couplings import mean_motion
 from cms.fe_body import FEBody, Interface
+from cms.node_motion import interface_node_motion
 from cms.quality.errors import QualityError
 
 __all__ = ["COMPONENTS", "Ports"]
@@ -56,13 +57,16 @@ class Ports:
 
 
 def port_matrix(body: FEBody, interface: Interface) -> sp.csr_array:
-    """Motion of the reference point with u, (6, n_dof): of its node, or the mean motion of the nodes.
+    """Motion of the reference point with u, (6, n_dof): of its node, of a node that moves it, or the mean motion.
 
     Nodes on one line have a mean translation only; their rotation rows are zero.
     """
     dofs = np.asarray(interface.dofs)
     if len(dofs) == 6 and len(np.unique(body.dofs[dofs, 0])) == 1:
         return sp.csr_array((np.ones(6), (body.dofs[dofs, 1], dofs)), shape=(6, body.n_dof))
+    motion = interface_node_motion(body, interface)
+    if motion is not None:
+        return motion
     points, weights = body.nodes[interface.nodes], np.asarray(interface.weights)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     rows = np.zeros((6, 3 * len(points)))

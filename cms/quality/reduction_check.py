@@ -13,7 +13,7 @@ from cms.quality.frf import response_comparison, response_record
 from cms.quality.full_reference import FullReference, usable_band
 from cms.quality.full_shapes import full_shapes, same_body_record
 from cms.quality.held_mass import held_mass, held_mass_record
-from cms.quality.interface_stiffening import interface_stiffening, stiffening_record
+from cms.quality.interface_stiffening import has_both_kinds, interface_stiffening, stiffening_record
 from cms.quality.mass_properties import check_grounding, check_invariants, check_mass_properties
 from cms.quality.port_model import port_model
 from cms.quality.record import QualityRecord
@@ -86,7 +86,7 @@ def check_reduction(
     records.append(held_mass_record(held_mass(reference, basis), is_static_complete=is_complete))
     condition, _ = column_condition(body, modes, float(basis.omega2[0]))
     records += [conditioning_record(condition, modes.columns.shape[1]), dropped_record(basis, modes.columns.shape[1])]
-    if uncoupled is not None and any(interface.kind != "nodes" for interface in uncoupled.interfaces):
+    if uncoupled is not None and has_both_kinds(uncoupled):
         records.append(stiffening_record(interface_stiffening(uncoupled)))
     if snapshots is not None:
         records.append(deformation_record(deformation_error(body, basis, snapshots)))

@@ -24,7 +24,7 @@ from fe_models.beams.line_mesh import LineMesh
 from fe_models.beams.model import BeamModel
 from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.sections import Section
-from fe_models.beams.skin import make_skin
+from fe_models.beams.skin import Skin, make_skin
 from fe_models.beams.slices import Slices
 from fe_models.errors import BeamError, SectionError
 from fe_models.material import Material
@@ -140,7 +140,7 @@ def beam_body(
             sp.vstack([sp.eye_array(6 * n_nodes), skin_rows(mesh.nodes, skin.points, skin.mover)], format="csr"),
             np.concatenate([node_dofs, skin_dofs]),
         ),
-        node_volumes=_node_volumes(mesh, geometry, np.array([s.A for s in sections])[of_line], len(skin.points)),
+        node_volumes=_node_volumes(n_nodes, geometry.length, of_line, sections, skin),
         provenance=_provenance(mesh, used, of_line, point_masses, springs, links),
     )
     return link_rigidly(body, links)
@@ -305,10 +305,16 @@ def skin_rows(nodes: Array, points: Array, mover: IntArray) -> sp.csr_array:
     return sp.csr_array((motion[is_set], (rows[is_set], columns[is_set])), shape=(3 * n, 6 * len(nodes)))
 
 
-def _node_volumes(mesh: LineMesh, geometry: LineGeometry, A: Array, n_skin: int) -> Array | None:
-    """Half of the volume of every line at each of its nodes; nothing at the skin, (n_nodes + n_skin,) [m³]."""
-    volumes = np.zeros(len(mesh.nodes) + n_skin)
-    np.add.at(volumes, mesh.lines.ravel(), np.repeat(A * geometry.length / 2, 2))
+def _node_volumes(
+    n_nodes: int, length: Array, of_line: IntArray, sections: tuple[SectionProperties, ...], skin: Skin
+) -> Array | None:
+    """Half of the volume of every line on the ring of points at each of its ends, (n_nodes + n_skin,) [m³]."""
+    volumes = np.zeros(n_nodes + len(skin.points))
+    for number, section in enumerate(sections):
+        lines = np.flatnonzero(of_line == number)
+        for end in range(2):
+            points = n_nodes + skin.ring_start[lines, end, None] + np.arange(len(section.points))
+            volumes[points] += section.A * length[lines, None] / (2 * len(section.points))
     return volumes if volumes.any() else None
 
 

@@ -461,6 +461,16 @@ def test_two_masses_on_a_spring_swing_at_their_frequency():
     assert_allclose(found, np.sqrt(1000 * (1 / 2 + 1 / 3)) / (2 * np.pi), rtol=1e-12)
 
 
+def test_a_straight_beam_has_a_buckens_frame():
+    """Its skin carries the volume, so the nodes with weight are not on one line."""
+    body = cms.couple(straight(6, interfaces=("start", "end")))
+    assert_allclose(body.node_volumes.sum(), RECTANGLE.properties(0.3).A, rtol=1e-12)
+    assert_allclose(body.node_volumes @ body.nodes / body.node_volumes.sum(), [0.5, 0, 0], rtol=0, atol=1e-12)
+    reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=4), frame=cms.BuckensFrame())
+    tisserand = cms.reduce(body, cms.craig_bampton(body, n_modes=4))
+    assert_allclose(reduced.free_frequencies, tisserand.free_frequencies, rtol=1e-8)
+
+
 def test_skin_is_closed_and_points_outward():
     """Every edge belongs to two triangles, and the enclosed volume is A L."""
     for shape in (
