@@ -28,7 +28,7 @@ from cms.words import nearest
 __all__ = ["MEASURES", "Selection", "Trial", "select_modes"]
 
 FEWEST = 8  #: modes of the first set that is made
-MOST = 400  #: modes at which the search gives up
+MOST = 300  #: modes at which the search gives up, by default
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,7 @@ def select_modes(
     measure: str = "frequency",
     options: Mapping[str, Any] | None = None,
     added: Callable[[ModeSet], ModeSet] | None = None,
+    most: int = MOST,
     families: Families | None = None,
 ) -> Selection:
     """Find the fewest modes with which a set meets an error over a band.
@@ -92,6 +93,8 @@ def select_modes(
         Of the set, beside the number of modes.
     added
         What is done to the set before it is judged, such as `with_load_cases`.
+    most
+        Number of modes at which the search gives up.
     families
         Mode families to share; made and freed here by default.
 
@@ -107,7 +110,7 @@ def select_modes(
         families = stack.enter_context(families_of(body, families))
         reference = stack.enter_context(FullReference(body, band=band[1], families=families))
         judge = MEASURES[measure](reference, band)
-        make = _Maker(set, body, families, options, added)
+        make = _Maker(set, body, families, options, added, most)
         search = _by_subspaces if set in SUBSETS and added is None else _by_bisection
         tried: dict[int, Trial] = {}
         for trial in search(make, judge, reference, error):
@@ -196,6 +199,7 @@ class _Maker:
     families: Families
     options: Mapping[str, Any]
     added: Callable[[ModeSet], ModeSet] | None
+    most: int
 
     def __call__(self, n_modes: int) -> ModeSet:
         modes = MODE_SETS[self.name](self.body, n_modes=n_modes, **self.options, families=self.families)
@@ -204,7 +208,7 @@ class _Maker:
     @property
     def n_most(self) -> int:
         """Number of modes above which no set can be made."""
-        return min(MOST, max(0, self.body.n_dof - len(self.body.b) - 1))
+        return min(self.most, max(0, self.body.n_dof - len(self.body.b) - 1))
 
 
 def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:

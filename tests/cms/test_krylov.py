@@ -172,6 +172,20 @@ def test_the_error_over_a_band_stops_the_blocks(finer):
     assert sizes[0] < sizes[1] < body.n_dof / 2
 
 
+@pytest.mark.parametrize("tolerance", [0.3, 0.1])
+def test_a_tolerance_without_a_band_leaves_out_what_the_span_has_but_for_so_much(body, tolerance):
+    """Another step of the recurrence from anywhere in the span leaves it by no more than about the tolerance."""
+    modes = krylov(body, tolerance=tolerance)
+    V, omega2 = modes.columns[:, 6:], modes.data["omega2"]
+    W = body.K + float(omega2[0]) * body.M
+    with Families(body) as families:
+        X = families.flexibility(body.M @ V)
+    size = np.sqrt(np.einsum("nk,nk->k", X, W @ X))
+    rest = X - V @ (V.T @ (W @ X))
+    assert (np.sqrt(np.einsum("nk,nk->k", rest, W @ rest)) < 3 * tolerance * size.max()).all()
+    assert 12 < V.shape[1] < body.n_dof - 6
+
+
 def test_frequencies_near_a_shift_come_out_best(body):
     full = np.sqrt(la.eigh(body.K.toarray(), body.M.toarray(), eigvals_only=True)[6:]) / (2 * np.pi)
     target = 8

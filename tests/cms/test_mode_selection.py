@@ -185,6 +185,12 @@ def test_an_error_that_cannot_be_met_tells_the_best():
         select_modes(body, error=1e-9, band=(0.0, 20_000.0))
 
 
+@pytest.mark.parametrize("name", ["craig-bampton", "craig-chang"])
+def test_the_search_gives_up_where_it_is_told_to(body, families, name):
+    with pytest.raises(ModeSetError, match=r"with up to 5 modes; the best was .* with 5"):
+        select_modes(body, set=name, error=1e-6, band=BAND, measure="frf", most=5, families=families)
+
+
 def test_the_chosen_set_is_the_set_itself(body, families):
     found = select_modes(body, error=2e-3, band=BAND, families=families)
     direct = craig_bampton(body, n_modes=found.n_modes, families=families)
