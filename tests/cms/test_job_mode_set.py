@@ -8,9 +8,10 @@ from pydantic import ValidationError
 from cms.centrifugal import centrifugal_loads
 from cms.cli.app import print_body
 from cms.cli.job_mode_set import job_mode_set
+from cms.cli.reduce_job import coupled_body
 from cms.couplings import couple
 from cms.extra_columns import with_centrifugal, with_load_cases
-from cms.job import ReductionSection
+from cms.job import Job, ReductionSection
 from cms.job_reduction import MEASURE_NAMES
 from cms.load_cases import LoadCase
 from cms.mode_selection import MEASURES, select_modes
@@ -79,6 +80,20 @@ def test_a_job_chooses_the_number_of_modes(body):
     expected = select_modes(body, error=1e-2, band=(0.0, 1.5e6))
     same(found, expected.modes)
     assert reduce(body, found).provenance["mode set selected"] == expected.sentence
+
+
+@pytest.mark.parametrize("extra", [None, ["load-cases"], ["centrifugal"]])
+def test_a_job_makes_centrifugal_loads_before_it_couples_where_they_are_asked_for(tmp_path, extra):
+    (tmp_path / "rod.msh").touch()
+    keys = {
+        "body": {"name": "bar", "mesh": "rod.msh", "units": "m-kg-s"},
+        "materials": {"steel": {"young": 2.1e11, "poisson": 0.3, "density": 7850.0}},
+        "reduction": {"n_modes": 1} | ({} if extra is None else {"extra": extra}),
+    }
+    free = bar(nx=2, kind="hexahedron")
+    coupled = coupled_body(Job.model_validate(keys, context=tmp_path), free)
+    names = [case.name for case in coupled.load_cases]
+    assert names == ([case.name for case in centrifugal_loads(free)] if extra == ["centrifugal"] else [])
 
 
 def test_the_choice_is_shown(capsys):
