@@ -138,6 +138,21 @@ def test_the_right_record_of_a_corrupted_body_fails(nodal, name, what, spoil):
     assert verdicts(spoil(nodal))[name] == "fail"
 
 
+def test_a_mode_with_linear_or_angular_momentum_is_not_in_mean_axes(tisserand):
+    """1C of one mode spoilt, then the antisymmetric part of P: 2C = (P_12 - P_21, ...) of one mode."""
+    C1, P = np.array(tisserand.moments.C1), np.array(tisserand.moments.P)
+    C1[2, 1] += 0.01 * np.sqrt(tisserand.moments.m)
+    size = 0.01 * np.sqrt(np.trace(tisserand.moments.J0))
+    P[0, 1, 3] += size / 2
+    P[1, 0, 3] -= size / 2
+    assert verdicts(tisserand)["frame-condition"] == "pass"
+    for changes, linear, angular in (({"C1": C1}, 0.01, 0.0), ({"P": P}, 0.0, 0.01)):
+        record = {r.name: r for r in check_body(with_moments(tisserand, **changes))}["frame-condition"]
+        assert record.verdict == "fail"
+        assert_allclose(record.data["linear"].max(), linear, rtol=0, atol=1e-9)
+        assert_allclose(record.data["angular"].max(), angular, rtol=0, atol=1e-9)
+
+
 def test_an_interface_that_lost_a_motion_is_named(body):
     whole = craig_bampton(body, n_modes=4)
     assert len(missing_motions(reduce(body, whole))) == 0

@@ -57,6 +57,7 @@ def test_a_good_file_passes_with_exit_code_0(folder):
     for word in ("free-frequencies", "Quality of bar", "tolerance", "pass"):
         assert word in result.stdout
     assert "fail" not in result.stdout
+    assert "give its job with --job" in result.stdout
 
 
 def test_a_wrong_sign_in_the_file_fails_with_exit_code_1(folder):
