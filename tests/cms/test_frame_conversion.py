@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 from cms.couplings import couple
 from cms.damping import ModalDamping, RayleighDamping
 from cms.errors import BodyError
+from cms.fe_body import FEBody, Interface
 from cms.frame_conversion import convert_frame
 from cms.frames import BuckensFrame, NodalFrame, TisserandFrame
 from cms.modal_file import read
@@ -34,7 +36,6 @@ SLACK = 1e-8  #: roundoff times the condition of M in another frame, relative to
 
 def uneven_bar(kinds=("rigid", "distributing")):
     """A bar of two densities with distorted cells and an interface of each kind, so that no two frames coincide."""
-    from cms.fe_body import Interface
     from cms.units import unit_system
     from fe_models.solid import solid_body
     from tests.bodies import ALUMINIUM, STEEL
@@ -334,3 +335,34 @@ def test_impossible_frames_are_refused():
     row = couple(chain())
     with pytest.raises(BodyError):
         reduce(row, craig_bampton(row, n_modes=1), frame=BuckensFrame())
+
+
+def test_static_shapes_without_mass_stay_static_in_every_frame():
+    """A massless node on springs beside the bar: its three shapes have no mass in either frame."""
+    free = bar(nx=3, kind="hexahedron")
+    n, N = len(free.nodes), free.n_dof
+    tip = np.array([1.3, 0.02, 0.02])
+    K = sp.block_diag([free.K, sp.csc_array((3, 3))]).tolil()
+    for k, node in enumerate(free.interfaces[1].nodes[:3]):
+        along = tip - free.nodes[node]
+        spring = 1e6 * (k + 1) * np.outer(along, along)
+        dofs = np.r_[3 * node + np.arange(3), N + np.arange(3)]
+        K[np.ix_(dofs, dofs)] += np.block([[spring, -spring], [-spring, spring]])
+    body = couple(
+        FEBody(
+            "bar with a light tip",
+            sp.block_diag([free.M, sp.csc_array((3, 3))]),
+            K,
+            np.vstack([free.nodes, tip]),
+            np.vstack([free.dofs, [[n, 0], [n, 1], [n, 2]]]),
+            (*free.interfaces, Interface("tip", "nodes", np.array([n]), tip)),
+            surface=free.surface,
+        )
+    )
+    modes = craig_bampton(body, n_modes=3)
+    expected = reduce(body, modes)
+    converted = convert_frame(reduce(body, modes, frame=NodalFrame("left")), TisserandFrame())
+    assert int((np.diag(expected.M) == 0).sum()) == 3
+    np.testing.assert_array_equal(converted.M, expected.M)
+    assert_allclose(converted.frequencies, expected.frequencies, rtol=SLACK)
+    assert_close(converted.Phi, expected.Phi * signs(converted, expected), "Phi")
