@@ -92,22 +92,28 @@ def krylov(
             for shift in dict.fromkeys(map(float, shifts))
         ]
         span = _Span(families, deflation=DEFLATION if tolerance is None or band is not None else tolerance)
-        n_first, history = 0, []
+        n_first, history, is_met = 0, [], False
         for j in range(MOST_BLOCKS if n_blocks is None else n_blocks):
             for expansion in expansions:
                 span.add(expansion, j)
             if j == 0:
                 n_first = span.n
             if all(expansion.is_exhausted for expansion in expansions):
+                is_met = True
                 break
             if n_modes is not None and span.n - n_first >= n_modes:
                 break
             if band is not None and tolerance is not None:
                 history.append(span.receptance(band))
                 if j > 0 and largest_error(history[-1], history[-2]) < tolerance:
+                    is_met = True
                     break
         n_kept = span.n if n_modes is None else min(span.n, n_first + n_modes)
-        return _mode_set(families, span, expansions, n_first, n_kept, history, [case.name for case in cases])
+        modes = _mode_set(families, span, expansions, n_first, n_kept, history, [case.name for case in cases])
+        if tolerance is None:
+            return modes
+        words = f"{tolerance:g}, {'met' if is_met else f'not met with {MOST_BLOCKS} blocks at every shift'}"
+        return replace(modes, options={**modes.options, "tolerance": words})
 
 
 @dataclass(eq=False)

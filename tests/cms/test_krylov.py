@@ -1,4 +1,5 @@
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -184,6 +185,13 @@ def test_a_tolerance_without_a_band_leaves_out_what_the_span_has_but_for_so_much
     rest = X - V @ (V.T @ (W @ X))
     assert (np.sqrt(np.einsum("nk,nk->k", rest, W @ rest)) < 3 * tolerance * size.max()).all()
     assert 12 < V.shape[1] < body.n_dof - 6
+
+
+def test_the_set_says_whether_its_tolerance_was_met(body, monkeypatch):
+    asked = {"tolerance": 1e-3, "band": (0.0, 3000.0)}
+    assert krylov(body, **asked).options["tolerance"] == "0.001, met"
+    monkeypatch.setattr(import_module("cms.mode_sets.krylov"), "MOST_BLOCKS", 1)
+    assert krylov(body, **asked).options["tolerance"] == "0.001, not met with 1 blocks at every shift"
 
 
 def test_frequencies_near_a_shift_come_out_best(body):
