@@ -151,6 +151,54 @@ def test_matrices_reduce_without_a_mesh(folder):
     assert_allclose(read(folder / "bar.h5").moments.m, 7850 * 0.05 * 0.04, rtol=1e-12)
 
 
+LOADS = """
+[load_cases.push]
+kind = "pressure"
+plane = {point = [100, 0, 0], normal = [1, 0, 0]}
+pressure = 2.0
+[load_cases.weight]
+kind = "gravity"
+acceleration = [0, 0, -9810]
+[load_cases.twist]
+kind = "force"
+at = "right"
+force = [0, 3, 0]
+torque = [40, 0, 0]
+[load_cases.side]
+kind = "force"
+box = {lo = [0, -1, -1], hi = [100, 0, 11]}
+force = [0, 0, 5]
+reference = [50, 0, 5]
+[reduction]
+stress = false
+axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+"""
+
+
+def test_reduce_keeps_the_load_cases_of_the_job_with_their_resultants(folder):
+    """Bar 100 x 10 x 10 mm, B at the middle of the left end with turned axes: x of B is y of the mesh."""
+    (folder / "bar.toml").write_text(JOB.replace("[reduction]\n", LOADS).replace("ratio = 0.01", "ramp = true"))
+    result = run("reduce", folder / "bar.toml", "-o", folder / "out.h5")
+    assert result.exit_code == 0, result.output
+    body = read(folder / "out.h5")
+    assert body.stress is None
+    to_B = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    weight = 7.85e-9 * 1e4 * 9810
+    for name, force, torque in [
+        ("push", [-200, 0, 0], [0, 0, 0]),
+        ("weight", [0, 0, -weight], [0, 50 * weight, 0]),
+        ("twist", [0, 3, 0], [40, 0, 300]),
+        ("side", [0, 0, 5], [-25, -250, 0]),
+    ]:
+        case = body.load_case(name)
+        assert_allclose(case.force, to_B @ force, rtol=0, atol=1e-9 * 200)
+        assert_allclose(case.torque, to_B @ torque, rtol=0, atol=1e-9 * 2e4)
+    Psi = body.interface("right").Psi
+    assert_allclose(body.load_case("twist").h, Psi.T @ np.r_[to_B @ [0, 3, 0], to_B @ [40, 0, 0]], rtol=0,
+                    atol=1e-9 * np.abs(Psi).max() * 40)  # fmt: skip
+    assert "Load cases" in result.stdout
+
+
 def test_info_prints_what_is_in_the_file(modal_file):
     result = run("info", modal_file)
     assert result.exit_code == 0, result.output
