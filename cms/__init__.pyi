@@ -20,6 +20,8 @@ from .interface_loads import condensed_load as condensed_load
 from .interface_loads import point_load as point_load
 from .invariants import Moments as Moments
 from .load_cases import LoadCase as LoadCase
+from .load_cases import ReducedLoadCase as ReducedLoadCase
+from .modal_file import convert_units as convert_units
 from .modal_file import read as read
 from .modal_file import write as write
 from .mode_selection import select_modes as select_modes
