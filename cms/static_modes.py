@@ -21,6 +21,8 @@ __all__ = [
 ]
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
+STIFF = 1e-14  #: compliance over the largest one (rotations times the body length squared), below which it is rounding
+STILL = 1e-24  #: the same of the energy of a response to inertia loads, where both factors are rounding
 BLOCK = 60  #: right-hand sides solved at once; wider blocks gain nothing measurable and cost memory
 
 
@@ -84,10 +86,15 @@ def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
     Returns
     -------
     Array
-        (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²].
+        (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²]; zero, not rounding, where
+        the body does not give way (a planar one, out of its plane).
     """
     Psi_H = np.zeros(Psi_R.shape)
-    Psi_H[fixed.i] = fixed.factorization.solve((fixed.body.M @ Psi_R)[fixed.i])
+    F = (fixed.body.M @ Psi_R)[fixed.i]
+    Psi_H[fixed.i] = fixed.factorization.solve(F)
+    is_rotation = np.arange(Psi_R.shape[1]) >= 3
+    energy = np.einsum("nk,nk->k", F, Psi_H[fixed.i]) / _unit(fixed.body, is_rotation)
+    Psi_H[:, energy <= STILL * energy.max(initial=0.0)] = 0.0
     return Psi_H
 
 
@@ -100,14 +107,19 @@ def unrestrained_attachment_modes(free: Flexibility) -> Array:
     Returns
     -------
     Array
-        (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N].
+        (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N]. Zero, not rounding,
+        where the free body answers a load by acceleration alone.
     """
     n_b, h = len(free.condensed.body.b), free.condensed.fixed.b
     on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
     on_boundary[free.e] = free.solve_boundary(np.eye(len(h), n_b)[free.e])
     u = combine(free.condensed.Psi_C, on_boundary)
     u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
-    return u - combine(free.N, free.M_N.T @ u)
+    u = u - combine(free.N, free.M_N.T @ u)
+    body, b = free.condensed.body, h[:n_b]
+    compliance = u[b, np.arange(n_b)] * _unit(body, body.dofs[b, 1] >= 3)
+    u[:, compliance <= STIFF * compliance.max(initial=0.0)] = 0.0
+    return u
 
 
 def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResult) -> Array:
@@ -127,7 +139,14 @@ def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResul
     """
     if not len(free_modes.omega2):
         return Psi_U
-    return Psi_U - combine(free_modes.Phi, (free_modes.Phi[body.b] / free_modes.omega2).T)
+    residual = Psi_U - combine(free_modes.Phi, (free_modes.Phi[body.b] / free_modes.omega2).T)
+    residual[:, ~Psi_U.any(axis=0)] = 0.0  # what does not give way leaves nothing
+    return residual
+
+
+def _unit(body: FEBody, is_rotation: np.ndarray) -> Array:
+    """What makes compliances comparable: the body length squared for rotations, else 1."""
+    return np.where(is_rotation, body.length**2 or 1.0, 1.0)
 
 
 def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models as fm
 from cms.errors import BodyError
+from cms.mode_sets import MODE_SETS
 from cms.rigid_modes import geometric_rigid_modes
 from tests.fe_models.frames import STEEL, straight
 
@@ -64,6 +65,29 @@ def test_loads_keep_their_resultants(spatial):
     flat = fm.planar(spatial.with_load_cases(load))
     resultant = geometric_rigid_modes(flat).T @ flat.load_cases[0].f
     assert_allclose(resultant, geometric_rigid_modes(spatial).T @ load.f, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["craig-bampton-ir", "herting", "rubin", "craig-chang", "unrestrained-attachment"])
+def test_columns_out_of_the_plane_are_dropped_and_not_made_of_rounding(spatial, name):
+    """Six boundary dofs in the plane: 3 deformations, 3 of inertia relief, 4 modes; the bob makes everything uneven."""
+    mesh = fm.straight_line((0, 0, 0), (1, 0, 0), 8)
+    ends = [fm.line_interface(mesh, end, fm.NodeSet(end)) for end in ("start", "end")]
+    bob = [fm.PointMass(8, 2.0, 0.01)]
+    body = fm.beam_body(
+        mesh,
+        fm.BeamProperty(fm.Tube(0.02, 0.003), STEEL),
+        name="b",
+        units=spatial.units,
+        interfaces=ends,
+        point_masses=bob,
+    )
+    flat = fm.planar(cms.couple(body), normal=1)
+    modes = MODE_SETS[name](flat, n_modes=4)
+    reduced = cms.reduce(flat, modes)
+    assert reduced.n_q == 10
+    dropped = reduced.provenance["mode set redundant"].split("; ")
+    assert len(dropped) == 3
+    assert {label.split()[-1] for label in dropped} == {"uy", "rx", "rz"}
 
 
 def test_every_axis_can_be_the_normal():
