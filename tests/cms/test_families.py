@@ -241,6 +241,12 @@ def test_the_inertia_proves_free_modes_complete():
     with Families(body) as f:
         assert f.free_modes(n_modes=5, verify=True).is_proven
         assert f.elastic_modes(BoundaryConditions(np.eye(18)[:, :5]), n_modes=4, verify=True).is_proven
+        heavy = np.diag([100.0 if dof % 6 < 3 else 1.0 for dof in range(18)])  # many frequencies fall by orders
+        loaded = BoundaryConditions(np.eye(18), None, heavy)
+        assert f.elastic_modes(loaded, n_modes=4, verify=True).is_proven
+        omega2 = f.elastic_modes(loaded, n_modes=6).omega2
+        assert f.flexibility_under(loaded).count_below((omega2[3] + omega2[4]) / 2) == 4
+        assert f.free.count_below((omega2[3] + omega2[4]) / 2) < 4
 
 
 def test_six_sets_share_one_factorisation(monkeypatch):

@@ -227,6 +227,14 @@ def test_every_set_passes_the_finishing_step_of_a_solid_with_three_interfaces(fr
             assert_allclose(reduced.free_frequencies[:3], full, rtol=5e-2)
 
 
+def test_modes_of_the_attachment_set_hold_the_determinate_dofs_alone(body, families):
+    modes = attachment(body, n_modes=3, families=families)
+    expected = constrained_spectrum(body, families.r)[:3]
+    assert_allclose((2 * np.pi * modes.frequencies[-3:]) ** 2, expected, rtol=1e-8)
+    assert_allclose(modes.columns[families.r, 6:], 0, rtol=0, atol=0)
+    assert modes.options["held"].count(",") == 5
+
+
 def test_loaded_modes_are_near_those_of_the_loaded_body(body, families):
     """With the loads on it the reduced body has their exact frequencies, where as many fixed modes miss them."""
     loads = [point_load(name, **load) for name, load in LOADS.items()]
