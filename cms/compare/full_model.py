@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 
 VERSION = "1"  #: of what is computed; a file of another version is made anew
 MODES_BEYOND = 2.0  #: multiple of the band up to which free modes follow a motion dynamically
+FIRST_SEARCH = 3  #: free modes found at first for each one in the band; mostly enough for twice its frequency
 MASS_TOLERANCE = 1e-10  #: relative residual of the solutions with M_II
 
 
@@ -92,7 +93,14 @@ class FullModel:
 
 
 def solve_full_model(
-    families: Families, pulse: Pulse, *, n_modes: int, band: float | None, damping: float, motion: Snapshots | None
+    families: Families,
+    pulse: Pulse,
+    *,
+    n_modes: int,
+    band: float | None,
+    damping: float,
+    motion: Snapshots | None,
+    n_expected: int = 0,
 ) -> FullModel:
     """Solve the full model.
 
@@ -110,6 +118,8 @@ def solve_full_model(
         Ratio of every mode in the motion.
     motion
         A reference motion instead of the response to the pulse.
+    n_expected
+        Free modes that will be asked for later: found at once here, they cost less than in two searches.
 
     Raises
     ------
@@ -119,6 +129,9 @@ def solve_full_model(
     body = families.body
     if band is None:
         n_most = body.n_dof - families.Psi_R.shape[1]
+        n_first = max(FIRST_SEARCH * n_modes, n_expected)
+        if n_first <= n_most // 4:  # a larger part of all modes is not worth a search beforehand
+            families.free_modes(n_modes=n_first)
         band = float(families.free_modes(n_modes=min(n_modes, n_most)).frequencies[-1]) * (1 + 1e-9)
     modes = families.free_modes(cutoff=MODES_BEYOND * band)
     n_band = int((modes.frequencies <= band).sum())

@@ -1,0 +1,116 @@
+"""The result of one mode set: its points for every number of modes, its verdict, or why it could not be made."""
+
+import inspect
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.compare.comparison import Point, SetResult
+from cms.compare.coordinates import Coordinates, ReferenceBasis
+from cms.compare.evaluation import Reference, judge_subset
+from cms.compare.free_shapes import judged_subset
+from cms.compare.subsets import SUBSETS
+from cms.compare.verdicts import is_good, set_sentence, shown_point
+from cms.errors import CmsError, ModeSetError
+from cms.families import Families
+from cms.mode_set import ModeSet
+from cms.mode_sets import MODE_SETS
+
+__all__ = ["set_result"]
+
+
+def set_result(
+    name: str,
+    options: Mapping[str, Any],
+    counts: Sequence[int],
+    families: Families,
+    basis: ReferenceBasis,
+    reference: Reference,
+) -> SetResult:
+    """Return the result of one set; where it cannot be made, its sentence says why."""
+    began = time.perf_counter()
+    words = first_sentence(MODE_SETS[name].__doc__)
+    try:
+        points, columns, refused = judged_points(name, options, counts, families, basis, reference)
+    except (CmsError, np.linalg.LinAlgError) as error:
+        return SetResult(name, words, (), None, "error", f"could not be made: {error}")
+    shown = shown_point(points)
+    kept = tuple(point if k == shown else without_curves(point) for k, point in enumerate(points))
+    verdict: Literal["pass", "fail"] = "pass" if any(point.is_good for point in points) else "fail"
+    chosen = columns[shown] if shown is not None else {}
+    return SetResult(
+        name, words, kept, shown, verdict, set_sentence(points) + refused, chosen, time.perf_counter() - began
+    )
+
+
+def judged_points(
+    name: str,
+    options: Mapping[str, Any],
+    counts: Sequence[int],
+    families: Families,
+    basis: ReferenceBasis,
+    reference: Reference,
+) -> tuple[list[Point], list[dict[str, int]], str]:
+    """Return the points of one set, the number of columns of each family in each, and words about those refused."""
+    make = MODE_SETS[name]
+    takes = inspect.signature(make).parameters
+    body = families.body
+    asked = sorted(set(counts)) if "n_modes" in takes else [0]
+    points: list[Point] = []
+    families_of_columns: list[dict[str, int]] = []
+    refused: dict[int, str] = {}
+
+    def made(n_modes: int) -> ModeSet:
+        counted = {"n_modes": n_modes} if "n_modes" in takes else {}
+        return make(body, **counted, **options, families=families)
+
+    def judge(n_modes: int, c: Coordinates, T: Array, labels: tuple[str, ...], groups: Sequence[str]) -> None:
+        rigid = c.reference[:, reference.full.parts["rigid"]]
+        subset = judged_subset(c, T, labels, rigid, basis.omega2)
+        records = judge_subset(reference, c, subset)
+        points.append(Point(n_modes, len(labels), subset.n_q, subset.basis.dropped, records, is_good(records)))
+        families_of_columns.append({group: list(groups).count(group) for group in dict.fromkeys(groups)})
+
+    most: tuple[ModeSet, Coordinates] | None = None
+    for n_modes in reversed(asked):
+        try:
+            if most is None or name not in SUBSETS:
+                modes = made(n_modes)
+                most = modes, basis.coordinates(modes.columns)
+            modes, c = most
+            if name in SUBSETS:
+                C, labels = SUBSETS[name](modes, np.asarray(modes.columns[body.b]), n_modes)
+                group_of = dict(zip(modes.labels, modes.groups, strict=True))
+                judge(n_modes, c, c.columns @ C, labels, [group_of[label] for label in labels])
+            else:
+                judge(n_modes, c, c.columns, modes.labels, modes.groups)
+        except CmsError as error:
+            refused[n_modes] = str(error)
+    if not points:
+        raise ModeSetError("; ".join(dict.fromkeys(refused.values())))
+    return points[::-1], families_of_columns[::-1], refused_words(refused)
+
+
+def refused_words(refused: Mapping[int, str]) -> str:
+    """Say which numbers of modes could not be had; the first reason stands for all."""
+    if not refused:
+        return ""
+    numbers = ", ".join(str(n) for n in sorted(refused))
+    return f"; not possible with {numbers}: {refused[max(refused)]}"
+
+
+def without_curves(point: Point) -> Point:
+    """Return the point with the values and sentences of its records; frequencies and effective masses stay."""
+    kept = ("frequency-error", "effective-mass")
+    records = (record if record.name in kept else replace(record, data={}) for record in point.records)
+    return replace(point, records=tuple(records))
+
+
+def first_sentence(text: str | None) -> str:
+    """Return the first line of a docstring without its marks."""
+    line = (text or "").strip().split("\n")[0]
+    return line.split(" [1]_")[0].rstrip(".")
