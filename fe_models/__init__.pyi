@@ -1,13 +1,13 @@
 from .beams.attachments import PointMass as PointMass
 from .beams.attachments import RigidLink as RigidLink
 from .beams.attachments import Spring as Spring
-from .beams.body import BeamProperty as BeamProperty
+from .beams.beam_property import BeamProperty as BeamProperty
 from .beams.body import beam_body as beam_body
-from .beams.body import link_rigidly as link_rigidly
 from .beams.interfaces import NodeIndices as NodeIndices
 from .beams.interfaces import line_interface as line_interface
 from .beams.line_mesh import LineMesh as LineMesh
 from .beams.line_mesh import straight_line as straight_line
+from .beams.links import link_rigidly as link_rigidly
 from .beams.section_points import section_points as section_points
 from .beams.sections import BoxSection as BoxSection
 from .beams.sections import Circle as Circle

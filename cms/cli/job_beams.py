@@ -15,7 +15,7 @@ from cms.units import unit_system
 from cms.words import nearest
 
 if TYPE_CHECKING:
-    from fe_models.beams.body import BeamProperty
+    from fe_models.beams.beam_property import BeamProperty
     from fe_models.beams.line_mesh import LineMesh
 
 __all__ = ["body_of_frame", "frame_interface", "frame_mesh"]
@@ -91,7 +91,7 @@ def frame_mesh(job: Job) -> "LineMesh":
 
 def properties_of(job: Job) -> "dict[str, BeamProperty]":
     """Return group of lines -> its section, material and theory."""
-    from fe_models.beams.body import BeamProperty
+    from fe_models.beams.beam_property import BeamProperty
     from fe_models.material import Material
 
     made: dict[str, BeamProperty] = {}

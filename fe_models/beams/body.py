@@ -1,58 +1,26 @@
 """A finite element body from a mesh of beams, point masses, springs and rigid links."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from cms.arrays import Array, IntArray
-from cms.elimination import eliminate_dofs
 from cms.fe_body import FEBody, Interface, Recovery
 from cms.rigid_modes import rigid_motion_of_points
 from cms.units import Units
-from cms.words import nearest
 from fe_models.beams.attachments import PointMass, RigidLink, Spring, point_slices, spring_matrix
-from fe_models.beams.axes import LineGeometry, line_geometry
-from fe_models.beams.element import (
-    interpolation,
-    local_stiffness,
-    shear_parameter,
-    stiffness_about_shear_center,
-)
+from fe_models.beams.axes import line_geometry
+from fe_models.beams.beam_property import BeamProperty, assign_properties, section_of
+from fe_models.beams.elements import Elements
 from fe_models.beams.line_mesh import LineMesh
+from fe_models.beams.links import link_rigidly
 from fe_models.beams.model import BeamModel
 from fe_models.beams.section_properties import SectionProperties
-from fe_models.beams.sections import Section
 from fe_models.beams.skin import Skin, make_skin
-from fe_models.beams.slices import Slices
-from fe_models.errors import BeamError, SectionError
-from fe_models.material import Material
+from fe_models.errors import BeamError
 
-__all__ = ["BeamProperty", "beam_body", "link_rigidly"]
-
-N_GAUSS = 4  #: exact for the square of a cubic, degree 6
-
-
-@dataclass(frozen=True, eq=False)
-class BeamProperty:
-    """Section, material and theory of a group of lines."""
-
-    section: Section
-    material: Material
-    offset: tuple[float, float] = (0.0, 0.0)  #: of the centroid from the line, local (y, z) [m]
-    orientation: tuple[float, float, float] | None = None  #: vector towards local y; None: that of the mesh, else z up
-    shear: bool = True  #: False: no shear deformation (Euler-Bernoulli)
-    rotary_inertia: bool = True  #: False: no rotary inertia of bending; that of torsion stays
-    added_mass: float = 0.0  #: per length, without stiffness [kg/m]
-
-    def __post_init__(self) -> None:
-        for name, size in (("offset", 2), ("orientation", 3)):
-            value = getattr(self, name)
-            if value is not None and (np.shape(value) != (size,) or not np.isfinite(value).all()):
-                raise SectionError(f"beam property: {name}: expected {size} finite numbers, got {value}")
-        if not 0 <= self.added_mass < np.inf:
-            raise SectionError(f"beam property: added_mass: expected zero or more, got {self.added_mass}")
+__all__ = ["beam_body"]
 
 
 def beam_body(
@@ -144,141 +112,6 @@ def beam_body(
         provenance=_provenance(mesh, used, of_line, point_masses, springs, links),
     )
     return link_rigidly(body, links)
-
-
-def link_rigidly(body: FEBody, links: Iterable[RigidLink]) -> FEBody:
-    """Return the body with the followers of rigid links eliminated: u = u_leader + theta × (c - c_leader).
-
-    A leader may itself follow another link: the chain is resolved to the node that leads all.
-
-    Raises
-    ------
-    BeamError
-        If a node follows two leaders or itself, a leader has not six dofs, or a follower has none.
-    """
-    leader: dict[int, int] = {}
-    for link in links:
-        for node in link.followers.tolist():
-            if node in leader:
-                raise BeamError(f"rigid links: node {node} follows two nodes, {leader[node]} and {link.node}; drop one")
-            leader[node] = link.node
-    if not leader:
-        return body
-    row_of = np.full((len(body.nodes), 6), -1, np.int64)
-    real = np.flatnonzero(body.dofs[:, 1] >= 0)
-    row_of[body.dofs[real, 0], body.dofs[real, 1]] = real
-    slaves: list[int] = []
-    rows: list[int] = []
-    columns: list[int] = []
-    values: list[float] = []
-    for node in leader:
-        root, steps = node, 0
-        while root in leader:
-            root, steps = leader[root], steps + 1
-            if steps > len(leader):
-                raise BeamError(f"rigid links: node {node} follows itself round a ring of links; open the ring")
-        if (row_of[root] < 0).any():
-            raise BeamError(f"rigid links: node {root} leads others, but has not six dofs")
-        mine = np.flatnonzero(row_of[node] >= 0)
-        if not len(mine):
-            raise BeamError(f"rigid links: node {node} follows node {root}, but has no dofs")
-        motion = np.eye(6)
-        motion[:3] = rigid_motion_of_points(body.nodes[node][None], body.nodes[root])[0]
-        first = len(slaves)
-        slaves += row_of[node, mine].tolist()
-        at = np.nonzero(motion[mine])
-        rows += (first + at[0]).tolist()
-        columns += row_of[root, at[1]].tolist()
-        values += motion[mine][at].tolist()
-    T_s = sp.csr_array((values, (rows, columns)), shape=(len(slaves), body.n_dof))
-    return eliminate_dofs(body, np.array(slaves), T_s)
-
-
-class Elements:
-    """The beam elements of a mesh, all at once: stiffness and slices."""
-
-    def __init__(
-        self,
-        geometry: LineGeometry,
-        used: tuple[BeamProperty, ...],
-        sections: tuple[SectionProperties, ...],
-        of_line: IntArray,
-    ) -> None:
-        def per_line(values: list) -> Array:
-            return np.array(values, dtype=float)[of_line]
-
-        self.geometry = geometry
-        E, G, rho = (per_line([getattr(p.material, key) for p in used]) for key in ("E", "mu", "rho"))
-        A, Iy, Iz, J, A_sy, A_sz = (
-            per_line([getattr(s, key) for s in sections]) for key in ("A", "Iy", "Iz", "J", "A_sy", "A_sz")
-        )
-        shear_center = per_line([s.shear_center for s in sections]).reshape(-1, 2)
-        L = geometry.length
-        Phi_y, Phi_z = shear_parameter(E * Iz, G * A_sy, L), shear_parameter(E * Iy, G * A_sz, L)
-        K = local_stiffness(E * A, G * J, E * Iy, E * Iz, Phi_y, Phi_z, L)
-        self.K_local = stiffness_about_shear_center(K, shear_center)  #: over local dofs of the centroid, (n, 12, 12)
-        self.mass_per_length = rho * A + per_line([p.added_mass for p in used])
-        zero = np.zeros_like(L)
-        has_rotary = np.array([p.rotary_inertia for p in used], dtype=bool)[of_line]
-        polar = rho * (Iy + Iz) / 2  # J = diag(2 polar, 0, 0) has E = polar diag(-1, 1, 1)
-        self.moments_per_length = np.where(
-            has_rotary[:, None], np.stack([zero, rho * Iz, rho * Iy], axis=1), np.stack([-polar, polar, polar], axis=1)
-        )
-        xi, weights = np.polynomial.legendre.leggauss(N_GAUSS)
-        self.xi, self.weights = (xi + 1) / 2, weights / 2
-        self.N = interpolation(self.xi, Phi_y, Phi_z, L, shear_center)
-
-    def stiffness(self) -> Array:
-        """Return the stiffness over the dofs of the nodes, (n, 12, 12)."""
-        K = self.geometry.T.transpose(0, 2, 1) @ self.K_local @ self.geometry.T
-        return np.asarray((K + K.transpose(0, 2, 1)) / 2)
-
-    def slices(self, dofs: IntArray) -> Slices:
-        """Return the slices at the Gauss points."""
-        geometry, n, p = self.geometry, len(self.N), N_GAUSS
-        R = geometry.R[:, None]
-        motion = self.N @ geometry.T[:, None]
-        motion = np.concatenate([R @ motion[:, :, :3], R @ motion[:, :, 3:]], axis=2)
-        length = geometry.length[:, None] * self.weights
-        first, second = geometry.ends[:, 0, None], geometry.ends[:, 1, None]
-        return Slices(
-            position=first + self.xi[:, None] * (second - first),
-            mass=self.mass_per_length[:, None] * length,
-            axes=np.broadcast_to(R, (n, p, 3, 3)),
-            moments=self.moments_per_length[:, None] * length[..., None],
-            motion=motion,
-            dofs=dofs,
-        )
-
-
-def section_of(item: BeamProperty) -> SectionProperties:
-    """Return the section properties for the material, without shear deformation where that is asked for."""
-    section = item.section.properties(item.material.nu)
-    return section if item.shear else replace(section, A_sy=np.inf, A_sz=np.inf)
-
-
-def assign_properties(
-    mesh: LineMesh, properties: BeamProperty | Mapping[str, BeamProperty]
-) -> tuple[tuple[BeamProperty, ...], IntArray]:
-    """Return the properties in use and the number of the property of every line, (n_lines,)."""
-    if isinstance(properties, BeamProperty):
-        return (properties,), np.zeros(len(mesh.lines), np.int64)
-    number = np.full(len(mesh.lines), -1, np.int64)
-    used = tuple(dict.fromkeys(properties.values()))
-    for group, item in properties.items():
-        if group not in mesh.line_sets:
-            raise SectionError(f"sections: the mesh has no group of lines {group!r}{nearest(group, mesh.line_sets)}")
-        rows, index = mesh.line_sets[group], used.index(item)
-        taken = rows[(number[rows] >= 0) & (number[rows] != index)]
-        if taken.size:
-            raise SectionError(f"sections: {taken.size} lines of group {group!r} have two, first line {taken[0]}")
-        number[rows] = index
-    missing = np.flatnonzero(number < 0)
-    if missing.size:
-        groups = [group for group, rows in mesh.line_sets.items() if np.isin(missing, rows).any()]
-        where = f"they are in the groups {', '.join(groups)}" if groups else "they are in no group"
-        raise SectionError(f"sections: {missing.size} lines have none, first line {missing[0]}; {where}")
-    return used, number
 
 
 def assembled(parts: list[tuple[IntArray, Array]], n_dof: int) -> sp.csc_array:
