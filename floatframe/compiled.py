@@ -9,16 +9,18 @@ from floatframe.body_types import body_types, integers, offsets, stacked, type_a
 from floatframe.elimination import plan_elimination
 from floatframe.errors import ModelError
 from floatframe.flexible_body import FlexibleBody
-from floatframe.forces import Gravity, PointForce, SpringDamper
-from floatframe.joints.rows import MOMENT, NO_MOMENT, SPRING, Row
+from floatframe.force_data import Functions, body_load_arrays, joint_force_arrays, with_forces
+from floatframe.forces import Gravity, JointForce, PointForce, SpringDamper
+from floatframe.joints.rows import DOT, MOMENT, NO_MOMENT, POINT, SLIDE, SPRING, Row
 from floatframe.kernels.model import Model
 from floatframe.marker_data import MarkerData, find_marker, joint_markers, marker_pose, marker_shapes, n_q_of
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
 from floatframe.system import System
-from floatframe.time_functions import N_COEFFICIENTS
 
 __all__ = ["CompiledSystem", "compile_system"]
+
+SOFT = 1e-9  #: by which redundant constraints give way, relative to what the mass moves in a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +63,19 @@ def compile_system(system: System) -> CompiledSystem:
     springs: list[list[float]] = []
     a_of, b_of, spring_of, connection_of, sign = [], [], [], [], []
     moment: list[int] = []
+    rates: list[int] = []  # of connections: whether their rows depend on velocities
+    owner: list[str] = []
+    spring_table: list[int] = []
+    functions = Functions()
     for joint in system.joints:
         a, b = joint_markers(system, joint, placed)
         r_a, A_a = marker_pose(a, placed, n_q)
         r_b, A_b = marker_pose(b, placed, n_q)
         sizes.append(joint.size)
-        rows.extend(joint.rows(A_a, A_b, r_b - r_a))
+        forces = [f for f in system.forces if isinstance(f, JointForce) and f.joint == joint.name]
+        rows.extend(with_forces(joint, joint.rows(A_a, A_b, r_b - r_a), forces))
+        rates.append(int(bool(forces)))
+        owner += [joint.name] * joint.size
         moment += [MOMENT if joint.size >= MOMENT + 3 else NO_MOMENT, joint.moment_b]
         spring_of.append(-1)
         a_of.append(len(markers))
@@ -82,6 +91,9 @@ def compile_system(system: System) -> CompiledSystem:
         free_length = spring_length(where, spring, a, b, placed, n_q)
         sizes.append(3)
         rows.extend(Row(SPRING, axis) for axis in np.eye(3))
+        rates.append(1)
+        owner += [spring.name] * 3
+        spring_table.append(functions.index(spring.characteristic))
         moment += [NO_MOMENT] * 2
         spring_of.append(len(springs))
         springs.append([spring.stiffness, spring.damping, free_length, spring.preload])
@@ -138,33 +150,46 @@ def compile_system(system: System) -> CompiledSystem:
         row_z=stacked([row.z for row in rows], (3,)),
         row_c=np.array([row.c for row in rows], dtype=float),
         row_part=integers([row.part for row in rows]),
-        **motion_arrays(rows),
+        row_soft=np.zeros(len(rows)),
+        row_motion=integers([functions.index(row.motion) for row in rows]),
+        **joint_force_arrays(system, rows, owner, functions),
+        c_rates=integers(rates),
+        spring_table=integers(spring_table),
+        l_factor=integers([functions.index(load.amplitude) for load in loads]),
+        **body_load_arrays(system, functions),
+        **functions.arrays(),
         springs=stacked(springs, (4,)),
         l_marker=integers(load_marker),
         l_force=stacked([load.force for load in loads], (3,)),
         l_torque=stacked([load.torque for load in loads], (3,)),
         **plan_elimination(sizes, ends_of, connection_of_marker)._asdict(),
     )
+    length = system_length(markers, placed, n_q, model)
+    model = model._replace(row_soft=row_softness(system, rows, model.mass[kind], length))
     return CompiledSystem(
         model=model,
         body_names=tuple(body.name for body in system.bodies),
         joint_names=tuple(joint.name for joint in system.joints),
         spring_names=tuple(spring.name for spring in dampers),
         placed=placed,
-        length=system_length(markers, placed, n_q, model),
+        length=length,
     )
 
 
-def motion_arrays(rows: list[Row]) -> dict[str, Array | IntArray]:
-    """Return the functions of time of the rows, one after another."""
-    motions = [row.motion for row in rows if row.motion is not None]
-    number = iter(range(len(motions)))
-    return {
-        "row_motion": integers([-1 if row.motion is None else next(number) for row in rows]),
-        "piece0": offsets(integers([len(motion.begins) for motion in motions])),
-        "piece_t": np.concatenate([*(motion.begins for motion in motions), np.zeros(0)]),
-        "piece": np.concatenate([*(motion.pieces for motion in motions), np.zeros((0, N_COEFFICIENTS))]),
-    }
+def row_softness(system: System, rows: list[Row], mass: Array, length: float) -> Array:
+    """Return the compliance of held rows, relative to c_k, for reactions of least norm; zero if none is asked for.
+
+    SOFT/m for distances and SOFT/(m length²) for angles, m the mean mass of the bodies.
+    """
+    soft = np.zeros(len(rows))
+    if system.redundant == "minimum-norm":
+        m = float(mass.mean())
+        for k, row in enumerate(rows):
+            if row.kind in (POINT, SLIDE) and row.motion is None:
+                soft[k] = SOFT / m
+            elif row.kind == DOT:
+                soft[k] = SOFT / (m * length**2)
+    return soft
 
 
 def place(system: System) -> State:
@@ -192,7 +217,7 @@ def spring_length(
     """Return the free length of a spring; `ModelError` if it has no direction as placed."""
     distance = float(np.linalg.norm(marker_pose(b, placed, n_q)[0] - marker_pose(a, placed, n_q)[0]))
     free_length = distance if spring.free_length is None else spring.free_length
-    if distance == 0 and (free_length > 0 or spring.preload != 0 or spring.damping != 0):
+    if distance == 0 and (free_length > 0 or spring.preload != 0 or spring.damping != 0 or spring.characteristic):
         raise ModelError(
             f"{where}: its markers coincide as placed, so that its tension has no direction; move one, or "
             "give free_length = 0 without damping and preload"

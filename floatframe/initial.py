@@ -13,12 +13,12 @@ W adds the stiffness, scaled, to the mass, so that (1) and (2) move bodies rathe
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from cms.arrays import Array
 from floatframe.arrays import array_of_shape
 from floatframe.compiled import CompiledSystem
 from floatframe.errors import ModelError
+from floatframe.freedoms import Mobility, constraint_mobility, scaled_constraints
 from floatframe.joints.rows import HELD, HELD_DISTANCES
 from floatframe.kernels.model import STIFFNESS, Model, Work, new_work
 from floatframe.linearization import (
@@ -40,13 +40,28 @@ __all__ = [
     "ConsistentState",
     "acceleration_rates",
     "consistent_state",
+    "mobility",
     "solve_accelerations",
     "velocity_correction",
 ]
 
 ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
 MOST_ITERATIONS = 30
+FRICTION_COEFFICIENT = 5  #: column of `Model.joint_forces`
 REDUNDANT = 1e-10  #: smallest eigenvalue of G M⁻¹ Gᵀ, scaled to a unit diagonal, of independent constraints
+
+
+def mobility(system: System) -> Mobility:
+    """Return the mobility of a system as placed, its joints closed first.
+
+    Raises
+    ------
+    ModelError
+        If the joints cannot be closed from the given positions.
+    """
+    compiled = system.compiled
+    work = new_work(compiled.model)
+    return constraint_mobility(compiled, work, assembled(compiled, work, compiled.placed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,34 +145,28 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
 
 
 def require_independent_constraints(compiled: CompiledSystem, work: Work, state: State) -> None:
-    """Raise `ModelError` naming the joints if some constraints repeat others (rank of G M⁻¹ Gᵀ)."""
+    """Raise `ModelError` naming the joints if some constraints repeat others, unless these are to share their load."""
     model = compiled.model
     holds = np.isin(model.row_kind, HELD)
-    if not holds.any():
+    if not holds.any() or model.row_soft.any():
         return
-    set_iterate(work, state)
-    parts = linearized(model, work, 1.0, 0.0, 0.0)
-    G = parts.G[np.flatnonzero(holds)]
-    S = np.zeros((G.shape[0], G.shape[0]))
-    for i, block in enumerate(with_mass_for_all(model, parts.H)):
-        G_i = G[:, model.u0[i] : model.u0[i + 1]]
-        used = np.unique(G_i.nonzero()[0])
-        dense = G_i.toarray()[used]
-        S[np.ix_(used, used)] += dense @ scipy.linalg.solve(block, dense.T, assume_a="sym")
-    size = np.sqrt(np.diag(S))
-    if (size == 0).any():
+    rows, _ = scaled_constraints(model, work, state)
+    if not rows.any(axis=1).all():
         raise ModelError("a joint acts on the ground alone")
-    values, vectors = np.linalg.eigh(S / np.outer(size, size))
+    values, vectors = np.linalg.eigh(rows @ rows.T)
     n_redundant = int((values < REDUNDANT).sum())
     if n_redundant == 0:
         return
     share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
     owner = np.repeat(np.arange(len(model.c_size)), model.c_size)[holds]
     involved = [name for c, name in enumerate(compiled.joint_names) if share[owner == c].sum() > 1e-6]
+    counts = constraint_mobility(compiled, work, state).redundant
+    told = ", ".join(f"{count} of joint {name!r}" for name, count in counts.items())
     raise ModelError(
         f"{n_redundant} of {int(holds.sum())} constraints repeat others, so that reactions are not "
-        f"unique: see joints {', '.join(repr(name) for name in involved)}; replace one of them by a joint "
-        "that holds less (a fixed joint by a revolute, a revolute by a spherical one)"
+        f"unique: see joints {', '.join(repr(name) for name in involved)} (in order, {told} repeat those before); "
+        "replace one by a joint that holds less (a fixed joint by a revolute, a revolute by a spherical one), or let "
+        'them share the load: redundant = "minimum-norm"'
     )
 
 
@@ -182,12 +191,23 @@ def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> t
     from floatframe.kernels.entry import rates_of_constraints
 
     model = compiled.model
-    set_iterate(work, state)
-    parts = linearized(model, work, 1.0, 0.0, 0.0)
-    _, bias = rates_of_constraints(model, work)
-    rows = -np.where(np.isin(model.row_kind, HELD), bias, work.g)
-    y, w = solve(with_mass_for_all(model, parts.H), parts, -work.residual, rows)
+    w = np.zeros(len(work.w))
+    for _ in range(MOST_ITERATIONS):
+        set_iterate(work, state, w=w)
+        parts = linearized(model, work, 1.0, 0.0, 0.0)
+        _, bias = rates_of_constraints(model, work)
+        rows = -np.where(np.isin(model.row_kind, HELD), bias, work.g)
+        y, change = solve(with_mass_for_all(model, parts.H), parts, -work.residual, rows)
+        w = w + change
+        # friction by the normal force is not linear in the reactions
+        if not has_normal_friction(model) or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
+            break
     return in_ground_axes(model, state, y), w
+
+
+def has_normal_friction(model: Model) -> bool:
+    """Whether some friction depends on the force in its joint."""
+    return bool((model.joint_forces[:, FRICTION_COEFFICIENT] > 0).any())
 
 
 def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float = 0.0) -> Array:

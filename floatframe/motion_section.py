@@ -1,5 +1,6 @@
 """Tables of the system file for functions of time: [joints.NAME.motions.COORDINATE]."""
 
+from collections.abc import Callable
 from inspect import signature
 from typing import Annotated, Any
 
@@ -20,7 +21,7 @@ from floatframe.time_functions import (
 
 __all__ = ["TIME_FUNCTIONS", "MotionSection"]
 
-TIME_FUNCTIONS = {
+TIME_FUNCTIONS: dict[str, Callable[..., TimeFunction]] = {
     "constant": constant,
     "polynomial": polynomial_of_time,
     "harmonic": harmonic,
@@ -77,6 +78,6 @@ class MotionSection(Table):
 
     def function(self) -> TimeFunction:
         """Return the function of the table."""
-        make: Any = TIME_FUNCTIONS[self.type]
+        make = TIME_FUNCTIONS[self.type]
         given = {key: getattr(self, key) for key in signature(make).parameters}
         return make(**{key: value for key, value in given.items() if value is not None})

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Body", "System"]
 
 Body = RigidBody | FlexibleBody
+REDUNDANT = ("refuse", "minimum-norm")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +39,15 @@ class System:
     forces: Sequence[Force] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     name: str = "system"
+    #: constraints that repeat others: "refuse" them by name, or share their reactions ("minimum-norm")
+    redundant: str = "refuse"
 
     def __post_init__(self) -> None:
         for part in ("bodies", "joints", "forces"):
             object.__setattr__(self, part, tuple(getattr(self, part)))
         where = f"system {self.name!r}"
+        if self.redundant not in REDUNDANT:
+            raise ModelError(f"{where}: redundant: expected one of {', '.join(REDUNDANT)}, got {self.redundant!r}")
         if not self.bodies:
             raise ModelError(f"{where}: expected at least one body, got none")
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))

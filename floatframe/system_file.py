@@ -26,7 +26,7 @@ from cms.units import UNIT_SYSTEMS, Units, unit_system
 from cms.words import nearest
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
 from floatframe.flexible_body import FlexibleBody
-from floatframe.forces import FORCES, Force, Gravity, PointForce, SpringDamper
+from floatframe.forces import FORCES, BodyLoad, Force, Gravity, JointForce, PointForce, SpringDamper
 from floatframe.ground import GROUND
 from floatframe.integrators import GeneralizedAlpha
 from floatframe.joints import JOINTS, Joint
@@ -34,7 +34,7 @@ from floatframe.markers import Marker, Place
 from floatframe.motion_section import MotionSection
 from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters_of_rotation_vector
-from floatframe.system import Body, System
+from floatframe.system import REDUNDANT, Body, System
 
 __all__ = ["RunOptions", "read_system"]
 
@@ -48,8 +48,20 @@ KEYS_OF_JOINTS = {
     for kind, joint in JOINTS.items()
 }
 KEYS_OF_FORCES = {
-    "point-force": ("body", "marker", "triad", "force", "torque", "is_follower"),
-    "spring-damper": ("body_a", "marker_a", "body_b", "marker_b", "stiffness", "damping", "free_length", "preload"),
+    "body-load": ("body", "load_case", "amplitude"),
+    "joint-force": tuple(field.name for field in fields(JointForce) if field.name != "name"),
+    "point-force": ("body", "marker", "triad", "force", "torque", "is_follower", "amplitude"),
+    "spring-damper": (
+        "body_a",
+        "marker_a",
+        "body_b",
+        "marker_b",
+        "stiffness",
+        "damping",
+        "free_length",
+        "preload",
+        "characteristic",
+    ),
 }
 
 
@@ -83,6 +95,9 @@ class SystemSection(Table):
         description=f"the unit system of all numbers, one of {', '.join(UNIT_SYSTEMS)}"
     )
     gravity: Vector3 = Field((0.0, 0.0, 0.0), description="the acceleration of free fall, [x, y, z]")
+    redundant: choice("way with redundant constraints", lambda: REDUNDANT) = Field(  # type: ignore[valid-type]
+        "refuse", description=f"one of {', '.join(REDUNDANT)}"
+    )
 
 
 class BodySection(Table):
@@ -179,7 +194,17 @@ class ForceSection(Table):
     stiffness: NotNegative | None = Field(None, description="a number, 0 or more, the stiffness of the spring")
     damping: NotNegative | None = Field(None, description="a number, 0 or more, the constant of the damper")
     free_length: NotNegative | None = Field(None, description="a number, 0 or more, the free length")
-    preload: float | None = Field(None, description="a number, the constant part of the tension")
+    preload: float | None = Field(None, description="a number, the constant part of the tension or force")
+    load_case: Name | None = Field(None, description="the name of a load case of the modal file")
+    amplitude: MotionSection | None = Field(None, description="a table, the factor as a function of time")
+    joint: Name | None = Field(None, description="the name of a joint")
+    coordinate: Name | None = Field(None, description="a coordinate of the joint")
+    free: float | None = Field(None, description="a number, the coordinate where the spring is free")
+    motor: MotionSection | None = Field(None, description="a table, the force as a function of time")
+    characteristic: MotionSection | None = Field(None, description="a table, the force as a function of the elongation")
+    friction: NotNegative | None = Field(None, description="a number, 0 or more, Coulomb friction")
+    friction_coefficient: NotNegative | None = Field(None, description="a number, 0 or more, friction by normal force")
+    friction_speed: Positive | None = Field(None, description="a number above 0, the speed of full friction")
 
     @model_validator(mode="after")
     def _fits_the_type(self) -> "ForceSection":
@@ -190,6 +215,10 @@ class ForceSection(Table):
         for key in ("body", "body_a", "body_b"):
             if key in allowed and getattr(self, key) is None:
                 raise ValueError(f'{key}: missing; expected the name of a body, or "ground"')
+        needed = {"body-load": ("load_case",), "joint-force": ("joint", "coordinate")}
+        for key in needed.get(self.type, ()):
+            if getattr(self, key) is None:
+                raise ValueError(f"{key}: missing; expected {type(self).model_fields[key].description}")
         if self.type == "point-force" and self.force is None and self.torque is None:
             raise ValueError("expected force or torque or both, got neither")
         return self
@@ -330,12 +359,33 @@ def joint_of(name: str, section: JointSection) -> Joint:
 
 def force_of(name: str, section: ForceSection) -> Force:
     """Return the force of a table."""
+    functions = {
+        key: None if table is None else table.function()
+        for key, table in (("amplitude", section.amplitude), ("characteristic", section.characteristic),
+                           ("motor", section.motor))
+    }  # fmt: skip
+    if section.type == "body-load":
+        assert section.body is not None  # checked by the table
+        assert section.load_case is not None
+        return BodyLoad(name, section.body, section.load_case, functions["amplitude"] or 1.0)
+    if section.type == "joint-force":
+        options = {
+            key: functions.get(key, getattr(section, key))
+            for key in KEYS_OF_FORCES["joint-force"]
+            if getattr(section, key) is not None
+        }
+        return JointForce(name, **options)
     if section.type == "point-force":
         assert section.body is not None  # checked by the table
         marker = marker_of(section.body, section.marker, section.triad)
         zero = (0.0, 0.0, 0.0)
         return PointForce(
-            name, marker, np.array(section.force or zero), np.array(section.torque or zero), bool(section.is_follower)
+            name,
+            marker,
+            np.array(section.force or zero),
+            np.array(section.torque or zero),
+            bool(section.is_follower),
+            functions["amplitude"],
         )
     assert section.body_a is not None  # checked by the table
     assert section.body_b is not None
@@ -347,4 +397,5 @@ def force_of(name: str, section: ForceSection) -> Force:
         section.damping or 0.0,
         section.free_length,
         section.preload or 0.0,
+        functions["characteristic"],
     )

@@ -160,15 +160,18 @@ def integrator_words(run: dict[str, Any]) -> str:
 @app.command("info")
 @guarded
 def info_command(
-    file: ResultsFile,
+    file: Annotated[Path, typer.Argument(help="A results file (.h5), or a system file (.toml).")],
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
 ) -> None:
-    """Show what is in a results file: system, run, energy balance, drift of the joints.
+    """Show what is in a results file: system, run, energy balance, drift of the joints; mobility of a system file.
 
     Example: floatframe info swing.h5 --json
     """
     from floatframe.trajectory import read_results
 
+    if file.suffix == ".toml":
+        print_mobility(file, as_json=json)
+        return
     trajectory = read_results(file)
     if json:
         import json as json_module
@@ -178,6 +181,42 @@ def info_command(
         typer.echo(json_module.dumps(run_record(trajectory), indent=2, ensure_ascii=True))
         return
     print_run(trajectory, None, None)
+
+
+def print_mobility(path: Path, *, as_json: bool) -> None:
+    """Print the mobility of a system file: counted, true, and constraints that repeat others."""
+    from floatframe.initial import mobility
+    from floatframe.system_file import read_system
+
+    system, _ = read_system(path)
+    found = mobility(system)
+    record = {
+        "system": system.name,
+        "bodies": found.n_bodies,
+        "modes": found.n_modes,
+        "constraints": found.n_constraints,
+        "gruebler": found.gruebler,
+        "mobility": found.mobility,
+        "redundant": found.n_redundant,
+        "redundant_by_joint": dict(found.redundant),
+    }
+    if as_json:
+        import json as json_module
+
+        typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))
+        return
+    told = ", ".join(f"{count} of {name}" for name, count in found.redundant.items()) or "none"
+    print_table(
+        "System",
+        ("", ""),
+        [
+            ("system", system.name),
+            ("bodies", f"{found.n_bodies}, {found.n_modes} modes"),
+            ("constraints", str(found.n_constraints)),
+            ("mobility", f"{found.mobility} (count of Gruebler {found.gruebler}), bodies taken as rigid"),
+            ("constraints that repeat others", told),
+        ],
+    )
 
 
 @app.command("plot")

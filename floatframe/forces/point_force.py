@@ -1,4 +1,4 @@
-"""A constant force and torque at a marker, fixed in space or in the body."""
+"""A force and torque at a marker, fixed in space or in the body."""
 
 from dataclasses import dataclass, field
 
@@ -6,7 +6,9 @@ import numpy as np
 
 from cms.arrays import Array
 from floatframe.arrays import array_of_shape
+from floatframe.errors import ModelError
 from floatframe.markers import Marker
+from floatframe.time_functions import TimeFunction
 
 __all__ = ["PointForce"]
 
@@ -20,8 +22,14 @@ class PointForce:
     force: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N]
     torque: Array = field(default_factory=lambda: np.zeros(3))  #: (3,) [N m]
     is_follower: bool = False  #: True: components in the axes of the (deformed) marker; False: in ground axes
+    amplitude: TimeFunction | None = None  #: a function of time by which both are multiplied; None: one
 
     def __post_init__(self) -> None:
+        if not isinstance(self.amplitude, TimeFunction | None):
+            raise ModelError(
+                f"force {self.name!r}: amplitude: expected a function of floatframe.time_functions, got "
+                f"{self.amplitude!r}"
+            )
         for name in ("force", "torque"):
             value = array_of_shape(f"force {self.name!r}: {name}", getattr(self, name), (3,))
             object.__setattr__(self, name, value)

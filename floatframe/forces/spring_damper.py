@@ -5,14 +5,16 @@ from dataclasses import dataclass
 from floatframe.arrays import number
 from floatframe.errors import ModelError
 from floatframe.markers import Marker
+from floatframe.time_functions import TimeFunction
 
 __all__ = ["SpringDamper"]
 
 
 @dataclass(frozen=True, eq=False)
 class SpringDamper:
-    """Tension k (l - l_0) + c l_dot + preload along the line of length l from marker A to marker B.
+    """Tension k (l - l_0) + c l_dot + preload + characteristic(l - l_0) along the line from marker A to marker B.
 
+    l is the length of that line.
     A spring whose markers coincide has no direction: give free_length = 0 and no preload there, or keep them apart.
     """
 
@@ -23,6 +25,7 @@ class SpringDamper:
     damping: float = 0.0  #: c [N s/m]
     free_length: float | None = None  #: l_0 [m]; None: the distance as placed
     preload: float = 0.0  #: constant part of the tension [N]
+    characteristic: TimeFunction | None = None  #: a function of l - l_0, such as a table [N]
 
     def __post_init__(self) -> None:
         where = f"force {self.name!r}"
@@ -32,5 +35,10 @@ class SpringDamper:
         if self.free_length is not None:
             value = number(f"{where}: free_length", self.free_length, at_least=0.0)
             object.__setattr__(self, "free_length", value)
-        if self.stiffness == 0 and self.damping == 0 and self.preload == 0:
+        if not isinstance(self.characteristic, TimeFunction | None):
+            raise ModelError(
+                f"{where}: characteristic: expected a function of floatframe.time_functions, such as table(x, force), "
+                f"got {self.characteristic!r}"
+            )
+        if self.stiffness == 0 and self.damping == 0 and self.preload == 0 and self.characteristic is None:
             raise ModelError(f"{where}: expected stiffness, damping or preload above zero, got none")

@@ -27,7 +27,7 @@ class DistanceJoint:
     marker_a: Place
     marker_b: Place
     distance: float | None = None  #: [m]; None: as placed
-    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
 
     size = 4  #: components of the unknown wrench
     moment_b = NO_MOMENT  #: where the moment on B begins in it
@@ -47,5 +47,5 @@ class DistanceJoint:
                 f"joint {self.name!r}: its points coincide as placed, so that the rod has no direction; move one, or "
                 "use a spherical joint"
             )
-        held = Row(DISTANCE, c=distance, motion=self.motions.get("distance"))
+        held = Row(DISTANCE, c=distance, motion=self.motions.get("distance"), coordinate="distance")
         return (*(Row(ROD, axis) for axis in np.eye(3)), held)

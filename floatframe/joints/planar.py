@@ -27,7 +27,7 @@ class PlanarJoint:
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal, in the axes of marker A
     axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
-    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: where the moment on B begins in it
@@ -44,7 +44,7 @@ class PlanarJoint:
         return (
             *arm_rows(),
             Row(SLIDE, self.axis),
-            *(Row(DOT, self.axis, n) for n in normals_of(axis_b)),
+            *(Row(DOT, self.axis, n, part=MOMENT_B) for n in normals_of(axis_b)),
             slide_row(first, self.motions, "first"),
             slide_row(second, self.motions, "second"),
             turn_row(self.axis, turning_frame(self.axis, axis_b, A_a, A_b), MOMENT_B, self.motions, "angle"),

@@ -25,7 +25,7 @@ class PointOnLine:
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
 
     size = 6  #: components of the unknown wrench
     moment_b = NO_MOMENT  #: where the moment on B begins in it

@@ -26,7 +26,7 @@ class PrismaticJoint:
     marker_a: Place
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
-    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: where the moment on B begins in it
@@ -39,4 +39,9 @@ class PrismaticJoint:
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
         held = (Row(SLIDE, n) for n in normals_of(self.axis))
-        return (*arm_rows(), *held, *orientation_rows(A_a.T @ A_b), slide_row(self.axis, self.motions, "distance"))
+        return (
+            *arm_rows(),
+            *held,
+            *orientation_rows(A_a.T @ A_b, MOMENT_B),
+            slide_row(self.axis, self.motions, "distance"),
+        )

@@ -28,7 +28,7 @@ class RevoluteJoint:
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
     axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
-    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: where the moment on B begins in it
@@ -42,5 +42,5 @@ class RevoluteJoint:
         """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         frame = turning_frame(self.axis, axis_b, A_a, A_b)
-        held = (Row(DOT, self.axis, n) for n in normals_of(axis_b))
+        held = (Row(DOT, self.axis, n, part=MOMENT) for n in normals_of(axis_b))
         return (*point_rows(), *held, turn_row(self.axis, frame, MOMENT, self.motions, "angle"))

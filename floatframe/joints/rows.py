@@ -12,6 +12,8 @@ d = r_B - r_A and f(t) the prescribed motion of a row (constant c without):
               DISTANCE     |d| = f                                     distance of the points
               SCREW x z y  E · d = c th                                th the angle of D from Z, about the axis E
     wrench    GAUGE x      E · part = 0                                none along what is free, part one of F, M, N
+              PUSH x       E · F + Q = 0                               force Q(s, s_dot, F, t) along a free distance
+              TWIST x z y  axis · part + Q = 0                         torque Q(th, th_dot, F, t) about a free angle
               GAUGE_B y    D · part = 0                                the same about an axis of B
               THREAD x     E · (N + c F) = 0                           of a screw
               ARM x        M - N - d × F = 0, along x in ground axes   forces on A and B balance about one point
@@ -21,7 +23,7 @@ Joints whose points coincide need one moment (N = M), the others take the force 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -41,14 +43,17 @@ __all__ = [
     "MOMENT_B",
     "NO_MOMENT",
     "POINT",
+    "PUSH",
     "ROD",
     "SCREW",
     "SLIDE",
     "SPRING",
     "THREAD",
     "TURN",
+    "TWIST",
     "Row",
     "arm_rows",
+    "loaded_row",
     "orientation_rows",
     "point_rows",
     "slide_row",
@@ -56,7 +61,7 @@ __all__ = [
 ]
 
 #: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
-POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD = range(12)
+POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
 HELD = (POINT, DOT, TURN, SLIDE, DISTANCE, SCREW)  #: rows that hold something; the others say what the wrench is
 HELD_DISTANCES = (POINT, SLIDE, DISTANCE, SCREW)  #: those in the unit of length
 FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
@@ -74,8 +79,9 @@ class Row:
     y: Array = field(default_factory=lambda: ZERO)  #: direction in the axes of marker B, (3,)
     c: float = 0.0  #: value that is held, or slope of a screw
     z: Array = field(default_factory=lambda: ZERO)  #: second direction in the axes of marker A, (3,)
-    part: int = FORCE  #: of the wrench: FORCE, MOMENT or MOMENT_B
+    part: int = FORCE  #: of the wrench: FORCE, MOMENT or MOMENT_B; of DOT: where its reaction is
     motion: TimeFunction | None = None  #: prescribed motion of the held quantity; None: c
+    coordinate: str = ""  #: of the joint to which the row belongs, "" for none
 
 
 def point_rows() -> tuple[Row, ...]:
@@ -88,19 +94,21 @@ def arm_rows() -> tuple[Row, ...]:
     return tuple(Row(ARM, axis) for axis in np.eye(3))
 
 
-def orientation_rows(R_AB: Array) -> tuple[Row, ...]:
+def orientation_rows(R_AB: Array, part: int = MOMENT) -> tuple[Row, ...]:
     """Return the three rows that hold the rotation from marker axes B to A.
 
     x_A·y' = y_A·z' = z_A·x' = 0 with the axes x', y', z' fixed in B that coincide with x_A, y_A, z_A.
     """
     in_b = R_AB.T  # columns: the axes of A as they lie in B
     x, y, z = np.eye(3)
-    return tuple(Row(DOT, a, b) for a, b in ((x, in_b[:, 1]), (y, in_b[:, 2]), (z, in_b[:, 0])))
+    return tuple(Row(DOT, a, b, part=part) for a, b in ((x, in_b[:, 1]), (y, in_b[:, 2]), (z, in_b[:, 0])))
 
 
 def slide_row(axis: Array, motions: Mapping[str, TimeFunction], name: str) -> Row:
     """Return the row of a free distance along an axis of A: prescribed, or without force."""
-    return Row(SLIDE, axis, motion=motions[name]) if name in motions else Row(GAUGE, axis, part=FORCE)
+    if name in motions:
+        return Row(SLIDE, axis, motion=motions[name], coordinate=name)
+    return Row(GAUGE, axis, part=FORCE, coordinate=name)
 
 
 def turn_row(axis: Array, frame: tuple[Array, Array, Array], part: int, motions: Mapping, name: str) -> Row:
@@ -110,4 +118,13 @@ def turn_row(axis: Array, frame: tuple[Array, Array, Array], part: int, motions:
     angle zero.
     """
     x, z, y = frame
-    return Row(TURN, x, y, z=z, motion=motions[name]) if name in motions else Row(GAUGE, axis, part=part)
+    if name in motions:
+        return Row(TURN, x, y, z=z, motion=motions[name], coordinate=name)
+    return Row(GAUGE, axis, y, z=z, part=part, coordinate=name)
+
+
+def loaded_row(row: Row) -> Row:
+    """Return the row of a free coordinate with forces along it, in place of the one without."""
+    if row.part == FORCE:
+        return replace(row, kind=PUSH)
+    return replace(row, kind=TWIST, x=np.cross(row.z, row.x))

@@ -30,7 +30,7 @@ class ScrewJoint:
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: in the axes of marker A, (3,)
     axis_b: Array | None = None  #: in the axes of marker B, (3,); None: as placed
     lead: float = 1.0  #: distance along the axis for one turn, above zero for a right-handed screw [m]
-    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: where the moment on B begins in it
@@ -50,11 +50,14 @@ class ScrewJoint:
         x, z, y = turning_frame(self.axis, axis_b, A_a, A_b)
         slope = self.lead / (2 * np.pi)
         motion = self.motions.get("angle")
-        drive = Row(THREAD, self.axis, c=slope) if motion is None else Row(TURN, x, y, z=z, motion=motion)
+        if motion is None:
+            drive = Row(THREAD, self.axis, y, c=slope, z=z, coordinate="angle")
+        else:
+            drive = Row(TURN, x, y, z=z, motion=motion, coordinate="angle")
         return (
             *arm_rows(),
             *(Row(SLIDE, n) for n in normals_of(self.axis)),
-            *(Row(DOT, self.axis, n) for n in normals_of(axis_b)),
+            *(Row(DOT, self.axis, n, part=MOMENT_B) for n in normals_of(axis_b)),
             Row(SCREW, x, y, c=slope, z=z),
             drive,
         )

@@ -27,7 +27,7 @@ class UniversalJoint:
     marker_b: Place
     axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: in the axes of marker A, (3,)
     axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: in the axes of marker B, (3,)
-    motions: Mapping[str, TimeFunction | float] = field(default_factory=dict)  #: prescribed motions, by coordinate
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: where the moment on B begins in it
@@ -48,7 +48,7 @@ class UniversalJoint:
         frame = (np.cross(z, self.axis), z, self.axis_b)
         return (
             *point_rows(),
-            Row(DOT, self.axis, self.axis_b),
+            Row(DOT, self.axis, self.axis_b, part=MOMENT),
             turn_row(self.axis, frame, MOMENT, self.motions, "angle"),
             Row(GAUGE_B, y=self.axis_b, part=MOMENT),
         )

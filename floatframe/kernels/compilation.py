@@ -58,7 +58,7 @@ class EntryLibrary(JITCodeLibrary):
 
     def finalize(self):
         """Link, optimise, make machine code."""
-        libraries = {}
+        libraries: dict = {}
         for library in self._linking_libraries:
             with_callees(library, libraries)
         self._linking_libraries = list(libraries)
@@ -89,11 +89,11 @@ def remembered_calls() -> Iterator[None]:
             known[key] = plain(self, context, args, kws)
         return known[key]
 
-    BaseFunction.get_call_type = get_call_type
+    BaseFunction.get_call_type = get_call_type  # type: ignore[method-assign]
     try:
         yield
     finally:
-        BaseFunction.get_call_type = plain
+        BaseFunction.get_call_type = plain  # type: ignore[method-assign]
 
 
 class KernelCompiler(CompilerBase):

@@ -1,7 +1,9 @@
 """Residual rows of joints and spring-dampers in terms of the motion of their two markers.
 
 The rows of a connection have its wrench w as unknown (see joints/rows.py). Rows that hold something are in its unit;
-rows that say what the wrench is are multiplied by c_k, so that their unknown is c_k dw. A spring-damper has
+rows that say what the wrench is are multiplied by c_k, so that their unknown is c_k dw. Held rows with `row_soft` s
+give way by s c_k times their own force, far below the tolerance of positions, so that redundant ones share their load.
+A spring-damper has
 
     SPRING    F - s d = 0, s = k (l - l_0) + c l_dot + preload, d = (r_B - r_A)/l
 """
@@ -17,18 +19,30 @@ from floatframe.joints.rows import (
     MOMENT,
     MOMENT_B,
     POINT,
+    PUSH,
     ROD,
     SCREW,
     SLIDE,
     THREAD,
     TURN,
+    TWIST,
 )
 from floatframe.kernels.compilation import inner
+from floatframe.kernels.coordinate_force import coordinate_force
 from floatframe.kernels.marker import marker_acceleration_bias, rotate
 from floatframe.kernels.rotation import cross
 from floatframe.kernels.time_function import time_function
 
-__all__ = ["connection_derivatives", "connection_rows", "constraint_rates", "row_rate", "spring_tension"]
+__all__ = [
+    "connection_derivatives",
+    "connection_rows",
+    "constraint_rates",
+    "loaded_axis",
+    "loaded_coordinate",
+    "normal_force",
+    "row_rate",
+    "spring_tension",
+]
 
 
 @inner
@@ -51,7 +65,11 @@ def spring_tension(model, work, c):
     if length == 0.0:
         return k, length, 0.0
     rate = (x0 * y0 + x1 * y1 + x2 * y2) / length
-    return (k * (length - free) + damping * rate + preload) / length, length, rate
+    tension = k * (length - free) + damping * rate + preload
+    if model.spring_table[model.c_spring[c]] >= 0:
+        value, _, _ = time_function(model, model.spring_table[model.c_spring[c]], length - free)
+        tension += value
+    return tension / length, length, rate
 
 
 @inner
@@ -105,6 +123,112 @@ def screw_axis(model, work, k, a):
 
 
 @inner
+def loaded_axis(model, work, k, a):
+    """Return the axis of a coordinate with forces, ground axes."""
+    if model.row_kind[k] == PUSH:
+        x = model.row_x[k]
+        return rotate(work.m_A[a], x[0], x[1], x[2])
+    return screw_axis(model, work, k, a)
+
+
+@inner
+def loaded_coordinate(model, work, k, a, b):
+    """Return value and rate of a coordinate with forces: distance along the axis of A, or angle about it."""
+    e0, e1, e2 = loaded_axis(model, work, k, a)
+    o, p = work.m_omega[a], work.m_omega[b]
+    if model.row_kind[k] == TWIST:
+        angle, _, _, _ = screw_angle(model, work, k, a, b)
+        return angle, e0 * (p[0] - o[0]) + e1 * (p[1] - o[1]) + e2 * (p[2] - o[2])
+    r0, r1, r2 = distance(work, a, b)
+    v0, v1, v2 = slip(work, a, b, r0, r1, r2)
+    return e0 * r0 + e1 * r1 + e2 * r2, e0 * v0 + e1 * v1 + e2 * v2
+
+
+@inner
+def slip(work, a, b, r0, r1, r2):
+    """Return the velocity of the point of B as seen from A: v_B - v_A - omega_A × d."""
+    o = work.m_omega[a]
+    n0, n1, n2 = cross(o[0], o[1], o[2], r0, r1, r2)
+    return (
+        work.m_v[b, 0] - work.m_v[a, 0] - n0,
+        work.m_v[b, 1] - work.m_v[a, 1] - n1,
+        work.m_v[b, 2] - work.m_v[a, 2] - n2,
+    )
+
+
+@inner
+def normal_force(w, e0, e1, e2):
+    """Return the size of the force normal to the axis, and its part along it."""
+    along = e0 * w[0] + e1 * w[1] + e2 * w[2]
+    square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] - along * along
+    return math.sqrt(max(square, 0.0)), along
+
+
+@inner
+def loaded_row(model, work, k, a, b, w, c_k):
+    """Return the residual of a PUSH or TWIST row."""
+    e0, e1, e2 = loaded_axis(model, work, k, a)
+    x, v = loaded_coordinate(model, work, k, a, b)
+    normal, _ = normal_force(w, e0, e1, e2)
+    Q, _, _, _ = coordinate_force(model, work, k, model.row_kind[k] == TWIST, x, v, normal)
+    part = model.row_part[k]
+    return c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2] + Q)
+
+
+@inner
+def loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """Write row r of P and V of a PUSH or TWIST row.
+
+    With e the axis, s the slip of B seen from A and n the size of the force normal to e:
+    PUSH   dx = e·(dr_B - dr_A) + (e × d)·dphi_A,   dv = e·(dv_B - dv_A) + (e × d)·domega_A
+           - (e × omega_A)·(dr_B - dr_A) + (e × s)·dphi_A
+    TWIST  dx by `screw_angle`,   dv = e·(domega_B - domega_A) + (e × (omega_B - omega_A))·dphi_A
+    """
+    o, p = work.m_omega[a], work.m_omega[b]
+    part, is_angle = model.row_part[k], model.row_kind[k] == TWIST
+    e0, e1, e2 = loaded_axis(model, work, k, a)
+    x, v = loaded_coordinate(model, work, k, a, b)
+    normal, along = normal_force(w, e0, e1, e2)
+    _, Q_x, Q_v, Q_n = coordinate_force(model, work, k, is_angle, x, v, normal)
+    V[r, part], V[r, part + 1], V[r, part + 2] = e0, e1, e2
+    n0, n1, n2 = cross(e0, e1, e2, w[part], w[part + 1], w[part + 2])
+    if Q_n != 0.0 and normal > 0.0:
+        f = Q_n / normal
+        V[r, 0] += f * (w[0] - along * e0)
+        V[r, 1] += f * (w[1] - along * e1)
+        V[r, 2] += f * (w[2] - along * e2)
+        m0, m1, m2 = cross(e0, e1, e2, w[0], w[1], w[2])
+        n0, n1, n2 = n0 - f * along * m0, n1 - f * along * m1, n2 - f * along * m2
+    if is_angle:
+        _, t0, t1, t2 = screw_angle(model, work, k, a, b)
+        put_pair(P_a, P_b, r, 3, c_k * Q_x, t0, t1, t2)
+        put_pair(P_a, P_b, r, 9, -c_k * Q_v, e0, e1, e2)
+        m0, m1, m2 = cross(e0, e1, e2, p[0] - o[0], p[1] - o[1], p[2] - o[2])
+        n0, n1, n2 = n0 + Q_v * m0, n1 + Q_v * m1, n2 + Q_v * m2
+    else:
+        r0, r1, r2 = distance(work, a, b)
+        s0, s1, s2 = slip(work, a, b, r0, r1, r2)
+        m0, m1, m2 = cross(e0, e1, e2, o[0], o[1], o[2])
+        put_pair(P_a, P_b, r, 0, c_k, Q_v * m0 - Q_x * e0, Q_v * m1 - Q_x * e1, Q_v * m2 - Q_x * e2)
+        put_pair(P_a, P_b, r, 6, -c_k * Q_v, e0, e1, e2)
+        m0, m1, m2 = cross(e0, e1, e2, r0, r1, r2)
+        P_a[r, 9], P_a[r, 10], P_a[r, 11] = c_k * Q_v * m0, c_k * Q_v * m1, c_k * Q_v * m2
+        n0, n1, n2 = n0 + Q_x * m0, n1 + Q_x * m1, n2 + Q_x * m2
+        m0, m1, m2 = cross(e0, e1, e2, s0, s1, s2)
+        n0, n1, n2 = n0 + Q_v * m0, n1 + Q_v * m1, n2 + Q_v * m2
+    P_a[r, 3] += c_k * n0
+    P_a[r, 4] += c_k * n1
+    P_a[r, 5] += c_k * n2
+
+
+@inner
+def put_pair(P_a, P_b, r, column, factor, x0, x1, x2):
+    """Write factor * x into a row of P at A, and its opposite at B."""
+    P_a[r, column], P_a[r, column + 1], P_a[r, column + 2] = factor * x0, factor * x1, factor * x2
+    P_b[r, column], P_b[r, column + 1], P_b[r, column + 2] = -factor * x0, -factor * x1, -factor * x2
+
+
+@inner
 def connection_rows(model, work, c, c_k):
     """Write the residual of connection c, and its wrench on both markers."""
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
@@ -125,7 +249,8 @@ def connection_rows(model, work, c, c_k):
     for k in range(w0, w0 + size):
         kind, x, part = model.row_kind[k], model.row_x[k], model.row_part[k]
         if kind == POINT:
-            work.g[k] = -(x[0] * r0 + x[1] * r1 + x[2] * r2)
+            force = x[0] * w[0] + x[1] * w[1] + x[2] * w[2]
+            work.g[k] = model.row_soft[k] * c_k * force - (x[0] * r0 + x[1] * r1 + x[2] * r2)
         elif kind == ARM:
             n0, n1, n2 = cross(r0, r1, r2, w[0], w[1], w[2])
             n0, n1, n2 = w[MOMENT] - n0, w[MOMENT + 1] - n1, w[MOMENT + 2] - n2
@@ -144,6 +269,8 @@ def connection_rows(model, work, c, c_k):
             along = e0 * r0 + e1 * r1 + e2 * r2
             turns = math.floor((along / slope - angle) / (2 * math.pi) + 0.5)
             work.g[k] = along - slope * (angle + 2 * math.pi * turns)
+        elif kind == PUSH or kind == TWIST:
+            work.g[k] = loaded_row(model, work, k, a, b, w, c_k)
         elif kind == GAUGE_B:
             y = model.row_y[k]
             e0, e1, e2 = rotate(work.m_A[b], y[0], y[1], y[2])
@@ -161,19 +288,16 @@ def connection_rows(model, work, c, c_k):
                 )
             elif kind == SLIDE:
                 value, _, _ = prescribed(model, work, k)
-                work.g[k] = e0 * r0 + e1 * r1 + e2 * r2 - value
+                force = e0 * w[0] + e1 * w[1] + e2 * w[2]
+                work.g[k] = e0 * r0 + e1 * r1 + e2 * r2 - value - model.row_soft[k] * c_k * force
             else:  # DOT, TURN
                 y = model.row_y[k]
                 d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
                 held = model.row_c[k] if kind == DOT else 0.0
                 work.g[k] = e0 * d0 + e1 * d1 + e2 * d2 - held
-
-
-@inner
-def put_pair(P_a, P_b, r, column, factor, x0, x1, x2):
-    """Write factor * x into a row of P at A, and its opposite at B."""
-    P_a[r, column], P_a[r, column + 1], P_a[r, column + 2] = factor * x0, factor * x1, factor * x2
-    P_b[r, column], P_b[r, column + 1], P_b[r, column + 2] = -factor * x0, -factor * x1, -factor * x2
+                if model.row_soft[k] > 0.0:
+                    n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
+                    work.g[k] += model.row_soft[k] * c_k * (n0 * w[part] + n1 * w[part + 1] + n2 * w[part + 2])
 
 
 @inner
@@ -196,6 +320,8 @@ def connection_derivatives(model, work, c, c_k):
         kind, x, part = model.row_kind[k], model.row_x[k], model.row_part[k]
         if kind == POINT:
             put_pair(P_a, P_b, r, 0, 1.0, x[0], x[1], x[2])
+            for j in range(3):
+                V[r, j] = model.row_soft[k] * x[j]
         elif kind == ARM:  # x·(M - N - d × F) = x·(M - N) - (x × d)·F, and (x × d)·F = d·(F × x)
             n0, n1, n2 = cross(x[0], x[1], x[2], r0, r1, r2)
             V[r, 0], V[r, 1], V[r, 2] = -n0, -n1, -n2
@@ -222,6 +348,8 @@ def connection_derivatives(model, work, c, c_k):
             P_a[r, 3] += n0
             P_a[r, 4] += n1
             P_a[r, 5] += n2
+        elif kind == PUSH or kind == TWIST:
+            loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V)
         elif kind == GAUGE_B:
             y = model.row_y[k]
             e0, e1, e2 = rotate(work.m_A[b], y[0], y[1], y[2])
@@ -246,11 +374,15 @@ def connection_derivatives(model, work, c, c_k):
             elif kind == SLIDE:
                 put_pair(P_a, P_b, r, 0, -1.0, e0, e1, e2)
                 P_a[r, 3], P_a[r, 4], P_a[r, 5] = cross(e0, e1, e2, r0, r1, r2)
+                V[r, 0], V[r, 1], V[r, 2] = -model.row_soft[k] * e0, -model.row_soft[k] * e1, -model.row_soft[k] * e2
             else:  # DOT, TURN
                 y = model.row_y[k]
                 d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
                 n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
                 put_pair(P_a, P_b, r, 3, 1.0, n0, n1, n2)
+                if model.row_soft[k] > 0.0:  # its change with the direction is left out: of second order
+                    f = model.row_soft[k]
+                    V[r, part], V[r, part + 1], V[r, part + 2] = f * n0, f * n1, f * n2
 
 
 @inner
@@ -260,8 +392,11 @@ def spring_derivatives(model, work, c, c_k):
     d(s d)/dr_B = (k - s/l) d dᵀ + (s/l) 1 + (c/l) d (v - l_dot d)ᵀ,  d(s d)/dv_B = c d dᵀ.
     """
     P_a, P_b, V = work.P[model.c_a[c]], work.P[model.c_b[c]], work.V[c]
-    k, damping, _, _ = model.springs[model.c_spring[c]]
-    x0, x1, x2, y0, y1, y2, _ = spring_line(model, work, c)
+    k, damping, free, _ = model.springs[model.c_spring[c]]
+    x0, x1, x2, y0, y1, y2, own_length = spring_line(model, work, c)
+    if model.spring_table[model.c_spring[c]] >= 0:
+        _, slope, _ = time_function(model, model.spring_table[model.c_spring[c]], own_length - free)
+        k += slope
     tension, length, rate = spring_tension(model, work, c)
     x, y = (x0, x1, x2), (y0, y1, y2)
     for r in range(3):

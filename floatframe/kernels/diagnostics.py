@@ -2,13 +2,15 @@
 
 import math
 
-from floatframe.joints.rows import DISTANCE, DOT, POINT, SCREW, SLIDE, TURN
+from floatframe.joints.rows import DISTANCE, DOT, POINT, PUSH, SCREW, SLIDE, TURN, TWIST
 from floatframe.kernels.body import body_mass_product, first_moment, modal_term
 from floatframe.kernels.compilation import inner
-from floatframe.kernels.connection import row_rate, spring_tension
+from floatframe.kernels.connection import loaded_axis, loaded_coordinate, normal_force, row_rate, spring_tension
+from floatframe.kernels.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
 from floatframe.kernels.marker import rotate, rotate_back
 from floatframe.kernels.model import DAMPING, N_DRIFTS, STIFFNESS
 from floatframe.kernels.rotation import cross
+from floatframe.kernels.time_function import time_function
 
 __all__ = ["diagnose", "power"]
 
@@ -77,6 +79,9 @@ def diagnose(model, work, out, drift):
             if kind in (POINT, SLIDE, DISTANCE, SCREW):
                 drift[c, 0] += work.g[k] ** 2
                 drift[c, 2] += row_rate(model, work, k, a, b) ** 2
+            elif kind == PUSH or kind == TWIST:
+                x, _ = loaded_coordinate(model, work, k, a, b)
+                out[3] += coordinate_strain(model, k, kind == TWIST, x)
             elif kind in (DOT, TURN):
                 drift[c, 1] += work.g[k] ** 2
                 drift[c, 3] += row_rate(model, work, k, a, b) ** 2
@@ -103,6 +108,39 @@ def drive_power(model, work, c):
 
 
 @inner
+def loaded_power(model, work, c):
+    """Return the power that enters by forces along coordinates of joint c, that taken by them, and their total."""
+    loads, dissipated, total = 0.0, 0.0, 0.0
+    w0, a, b = model.c_w0[c], model.c_a[c], model.c_b[c]
+    w = work.w[w0 : model.c_w0[c + 1]]
+    for k in range(w0, model.c_w0[c + 1]):
+        if model.row_kind[k] == PUSH or model.row_kind[k] == TWIST:
+            is_angle = model.row_kind[k] == TWIST
+            x, v = loaded_coordinate(model, work, k, a, b)
+            e0, e1, e2 = loaded_axis(model, work, k, a)
+            normal, _ = normal_force(w, e0, e1, e2)
+            Q, _, _, _ = coordinate_force(model, work, k, is_angle, x, v, normal)
+            given, taken = coordinate_power(model, work, k, is_angle, x, v, Q)
+            loads += given
+            dissipated += taken
+            total += Q * v
+    return loads, dissipated, total
+
+
+@inner
+def body_load_power(model, work, d):
+    """Return the power of load case d on its body."""
+    i, first = model.d_body[d], model.d_first[d]
+    u0, R, f = model.u0[i], work.R[i], model.d_values
+    factor, _, _ = time_function(model, model.d_factor[d], work.time[0])
+    v0, v1, v2 = rotate_back(R, work.u[u0], work.u[u0 + 1], work.u[u0 + 2])
+    total = f[first] * v0 + f[first + 1] * v1 + f[first + 2] * v2
+    for k in range(3, 6 + model.n_q[i]):
+        total += f[first + k] * work.u[u0 + k]
+    return factor * total
+
+
+@inner
 def power(model, work):
     """Return the power of point forces and of drives, and that taken by dampers and modal damping (positive)."""
     loads, dissipated = 0.0, 0.0
@@ -112,11 +150,23 @@ def power(model, work):
             loads += work.m_wrench[m, a] * work.m_v[m, a] + work.m_wrench[m, 3 + a] * work.m_omega[m, a]
     for c in range(model.c_size.shape[0]):
         if model.c_spring[c] < 0:
-            loads += drive_power(model, work, c)
+            driven = drive_power(model, work, c)
+            loads += driven
+            if model.c_rates[c]:
+                given, taken, total = loaded_power(model, work, c)
+                loads += given - (total if driven != 0.0 else 0.0)
+                dissipated += taken
         else:
             _, damping, _, _ = model.springs[model.c_spring[c]]
-            _, _, rate = spring_tension(model, work, c)
+            _, length, rate = spring_tension(model, work, c)
             dissipated += damping * rate * rate
+            if model.spring_table[model.c_spring[c]] >= 0:
+                value, _, _ = time_function(
+                    model, model.spring_table[model.c_spring[c]], length - model.springs[model.c_spring[c], 2]
+                )
+                loads -= value * rate
+    for d in range(model.d_body.shape[0]):
+        loads += body_load_power(model, work, d)
     for i in range(model.kind.shape[0]):
         n, u0 = model.n_q[i], model.u0[i]
         if n > 0:

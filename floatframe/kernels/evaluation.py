@@ -5,6 +5,7 @@ from floatframe.kernels.compilation import inner
 from floatframe.kernels.connection import connection_derivatives, connection_rows
 from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, rotate, wrench_to_body
 from floatframe.kernels.rotation import right_jacobian
+from floatframe.kernels.time_function import time_function
 
 __all__ = ["evaluate", "linearize", "tangent_of_body"]
 
@@ -24,6 +25,8 @@ def evaluate(model, work, c_k):
         body_forces(model, work, i)
     for m in range(model.m_body.shape[0]):
         wrench_to_body(model, work, m)
+    for d in range(model.d_body.shape[0]):
+        body_load(model, work, d)
     work.counts[0] += 1
 
 
@@ -32,6 +35,9 @@ def load_wrench(model, work, k):
     """Write the wrench of load k on its marker, ground axes."""
     m = model.l_marker[k]
     F, f, t = work.m_wrench[m], model.l_force[k], model.l_torque[k]
+    factor = 1.0
+    if model.l_factor[k] >= 0:
+        factor, _, _ = time_function(model, model.l_factor[k], work.time[0])
     if model.m_follower[m]:
         A = work.m_A[m]
         F[0], F[1], F[2] = rotate(A, f[0], f[1], f[2])
@@ -40,6 +46,17 @@ def load_wrench(model, work, k):
         for a in range(3):
             F[a] = f[a]
             F[3 + a] = t[a]
+    for a in range(6):
+        F[a] *= factor
+
+
+@inner
+def body_load(model, work, d):
+    """Subtract load case d, fixed in the axes of its body, from the residual."""
+    i, first = model.d_body[d], model.d_first[d]
+    factor, _, _ = time_function(model, model.d_factor[d], work.time[0])
+    for k in range(6 + model.n_q[i]):
+        work.residual[model.u0[i] + k] -= factor * model.d_values[first + k]
 
 
 @inner

@@ -83,14 +83,28 @@ class Model(NamedTuple):
     row_c: Array  #: (n_w,)
     row_part: IntArray  #: where the part of the wrench begins of which it speaks, (n_w,)
     row_motion: IntArray  #: its function of time, -1 for none, (n_w,)
+    row_soft: Array  #: compliance over c_k, zero but for redundant constraints, (n_w,)
+    row_force0: IntArray  #: forces along its coordinate: first, and the end, (n_w,)
+    row_force1: IntArray  #: (n_w,)
+    joint_forces: Array  #: columns as in kernels/coordinate_force.py, (n_joint_forces, 7)
+    joint_force_motor: IntArray  #: function of time, -1 for none, (n_joint_forces,)
+    joint_force_table: IntArray  #: function of the coordinate, -1 for none, (n_joint_forces,)
     piece0: IntArray  #: first piece of each function of time, and the end, (n_functions + 1,)
     piece_t: Array  #: where it begins, (n_pieces,)
     piece: Array  #: its coefficients, see time_functions.py, (n_pieces, 9)
+    c_rates: IntArray  #: whether its rows depend on velocities, (n_c,)
+    spring_table: IntArray  #: tension as a function of the elongation, -1 for none, (n_springs,)
     springs: Array  #: stiffness, damping, free length, preload, (n_springs, 4)
     # loads
     l_marker: IntArray  #: (n_l,)
+    l_factor: IntArray  #: function of time by which it is multiplied, -1 for one, (n_l,)
     l_force: Array  #: (n_l, 3)
     l_torque: Array  #: (n_l, 3)
+    # load cases on bodies
+    d_body: IntArray  #: (n_d,)
+    d_factor: IntArray  #: function of time, (n_d,)
+    d_first: IntArray  #: where force (3), torque (3), modal forces begin, (n_d,)
+    d_values: Array
     # block elimination of the connections, see kernels/schur.py
     order: IntArray  #: connections in the order of elimination, (n_c,)
     s_diagonal: IntArray  #: where the diagonal block begins in the store of blocks, (n_c,)

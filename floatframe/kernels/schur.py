@@ -67,7 +67,7 @@ def assemble(model, work, c_k):
         c, d = model.m_connection[a], model.m_connection[b]
         rows, columns, o = model.c_size[c], model.c_size[d], model.pair_block[p]
         R, P, Z, sign = work.R[model.m_body[a]], work.P[a], work.Z[p], model.m_sign[b]
-        n_motion = 12 if model.c_spring[c] >= 0 else 6
+        n_motion = 12 if model.c_rates[c] else 6
         turned = work.scratch[:12]
         for r in range(rows):
             for part in range(0, n_motion, 3):  # row r of P in body axes
@@ -173,7 +173,7 @@ def correction(model, work, c_k, is_new):
             m = model.ends[e]
             c = model.m_connection[m]
             o, w0 = model.m_x0[m], model.c_w0[c]
-            n_motion = 12 if model.c_spring[c] >= 0 else 6
+            n_motion = 12 if model.c_rates[c] else 6
             for r in range(n_motion):
                 total = 0.0
                 for k in range(n):

@@ -18,6 +18,7 @@ from floatframe import (
     System,
     consistent_state,
     integrate,
+    mobility,
 )
 from floatframe.initial import solve_accelerations
 from floatframe.kernels.entry import evaluate_and_linearize, rates_of_constraints
@@ -193,3 +194,46 @@ def test_modes_without_mass_move_as_springs():
     force = reaction.force[late] @ Psi[:3, 2]
     assert_allclose(K[2, 2] * body.q[late, 2], -(moment + force), rtol=0, atol=0.05 * np.abs(moment).max())
     assert np.abs(motion.energies.balance - motion.energies.balance[0]).max() < 0.02 * np.ptp(motion.energies.kinetic)
+
+
+def hinges(last):
+    return [*(RevoluteJoint(j.name, j.marker_a, j.marker_b, axis=(0, 1, 0)) for j in four_bar(last).joints)]
+
+
+def test_mobility_is_counted_and_true():
+    """A planar four-bar of hinges: Gruebler says -2, it moves in one way; 3 constraints of the last joint repeat."""
+    bodies = four_bar(SphericalJoint).bodies
+    found = mobility(System(bodies, hinges(SphericalJoint)))
+    assert (found.gruebler, found.mobility, found.n_freedoms) == (-2, 1, 1)
+    assert found.redundant == {"j4": 3}
+    free = mobility(four_bar(SphericalJoint))
+    assert (free.gruebler, free.mobility, free.redundant) == (0, 1, {"j4": 1})
+
+
+def test_redundant_joints_move_as_those_without_and_share_their_load():
+    """A parallelogram in its plane: the same motion; loads along the axes are none by symmetry of least norm."""
+    bodies = four_bar(SphericalJoint).bodies
+    gravity = [Gravity((0, 0, -9.81))]
+    joints = hinges(SphericalJoint)
+    full = System(bodies, joints, gravity, redundant="minimum-norm")
+    j1, _, j3, _ = joints
+    ball = SphericalJoint("j2", joints[1].marker_a, joints[1].marker_b)
+    plain = System(bodies, [j1, ball, j3, SphericalJoint("j4", joints[3].marker_a, joints[3].marker_b)], gravity)
+    first = integrate(full, GeneralizedAlpha(0.8, 1e-9), 0.3, 1e-3)
+    second = integrate(plain, GeneralizedAlpha(0.8, 1e-9), 0.3, 1e-3)
+    for body in ("crank", "rocker"):
+        assert_allclose(first.body(body).r, second.body(body).r, rtol=0, atol=1e-8)
+        assert_allclose(first.body(body).p, second.body(body).p, rtol=0, atol=1e-7)
+    assert first.drift("j4").distance.max() < 1e-9
+
+
+def test_a_door_on_two_hinges_hangs_on_both_alike():
+    """Two hinges on one line: the weight is shared half and half, by least norm."""
+    door = RigidBody("door", 4.0, np.eye(3), (0.5, 0, 0))
+    joints = [RevoluteJoint(f"h{k}", Marker(GROUND, position=(0, 0, z)), Marker("door", position=(0, 0, z)))
+              for k, z in enumerate((-1.0, 1.0))]  # fmt: skip
+    system = System([door], joints, [Gravity((0, 0, -9.81))], redundant="minimum-norm")
+    start = consistent_state(system)
+    assert_allclose(start.w[[2, 8]], -0.5 * 4.0 * 9.81, rtol=1e-6, atol=0)
+    with pytest.raises(ModelError, match="redundant: expected one of refuse, minimum-norm"):
+        System([door], joints, redundant="drop")

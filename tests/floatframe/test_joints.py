@@ -19,6 +19,7 @@ from floatframe import (
     PointOnLine,
     PointOnPlane,
     PrismaticJoint,
+    ResultsError,
     RevoluteJoint,
     RigidBody,
     ScrewJoint,
@@ -28,6 +29,7 @@ from floatframe import (
     consistent_state,
     integrate,
 )
+from floatframe.joint_results import joint_coordinate, joint_coordinates
 from floatframe.joints.rows import HELD
 from floatframe.kernels.entry import evaluate_and_linearize, rates_of_constraints
 from floatframe.kernels.model import new_work
@@ -257,3 +259,21 @@ def test_a_rod_without_direction_is_refused():
     body = RigidBody("b", 1.0, np.eye(3))
     with pytest.raises(ModelError, match="its points coincide as placed"):
         _ = System([body], [DistanceJoint("j", Marker(GROUND), Marker("b"))]).compiled
+
+
+def test_coordinates_of_driven_joints_are_their_motions_and_forces_those_of_newton():
+    """Rate and value as prescribed; torque I f'', force m f''; flexible bodies too."""
+    system = pair(DRIVEN["cylindrical"])
+    motion = integrate(system, GeneralizedAlpha(0.8, 1e-11), 0.3, 1e-3)
+    found = joint_coordinates(system, motion)
+    assert set(found) == {"j.distance", "j.angle"}
+    for coordinate in found.values():
+        assert_allclose(coordinate.value, [DRIVE(t) for t in motion.t], rtol=0, atol=1e-9)
+        assert_allclose(coordinate.rate, [DRIVE(t, 1) for t in motion.t], rtol=0, atol=1e-4)
+    wheel = RigidBody("wheel", 1.0, np.diag([0.4, 0.4, 0.7]))
+    hub = RevoluteJoint("hub", GROUND, Marker("wheel"), axis=(0, 0, 1), motions={"angle": harmonic(0.5, 4.0)})
+    one = System([wheel], [hub])
+    turned = joint_coordinate(one, integrate(one, GeneralizedAlpha(0.9, 1e-12), 1.0, 1e-3), "hub", "angle")
+    assert_allclose(turned.force, -0.7 * 16 * turned.value, rtol=0, atol=2e-4)
+    with pytest.raises(ResultsError, match="no coordinate 'turn'"):
+        joint_coordinate(one, integrate(one, GeneralizedAlpha(), 0.01, 1e-3), "hub", "turn")

@@ -1,0 +1,34 @@
+"""A load case of a modal file (pressure, field, nodal forces) as a force on its body."""
+
+from dataclasses import dataclass, field
+
+from floatframe.arrays import number
+from floatframe.errors import ModelError
+from floatframe.markers import Named
+from floatframe.time_functions import TimeFunction, constant
+
+__all__ = ["BodyLoad"]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyLoad:
+    """A load case of a flexible body times an amplitude; it turns with the body.
+
+    Its resultant acts at the undeformed body, its modal forces at the modes: the change of its torque with the
+    deformation, of first order, is left out.
+    """
+
+    name: str
+    body: str | Named  #: a flexible body
+    load_case: str  #: name in the modal file
+    amplitude: TimeFunction | float = field(default=1.0)  #: factor, or a function of time
+
+    def __post_init__(self) -> None:
+        if isinstance(self.amplitude, int | float):
+            value = number(f"force {self.name!r}: amplitude", self.amplitude)
+            object.__setattr__(self, "amplitude", constant(value))
+        if not isinstance(self.amplitude, TimeFunction):
+            raise ModelError(
+                f"force {self.name!r}: amplitude: expected a number or a function of floatframe.time_functions, got "
+                f"{self.amplitude!r}"
+            )

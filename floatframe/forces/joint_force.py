@@ -1,0 +1,50 @@
+"""Forces along the coordinate of a joint: torsional springs, dampers, motors, friction."""
+
+from dataclasses import dataclass
+
+from floatframe.arrays import number
+from floatframe.errors import ModelError
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["JointForce"]
+
+
+@dataclass(frozen=True, eq=False)
+class JointForce:
+    """A force or torque that acts to increase a free coordinate x of a joint (a distance or an angle).
+
+    Q = -k (x - x_0) - c x_dot + preload + motor(t) + characteristic(x - x_0) - (T + mu N) tanh(x_dot/v_0)
+
+    N is the size of the force in the joint normal to its axis. An angle enters between -pi and pi from its free value.
+    Regularised Coulomb friction creeps: it holds a load with x_dot below v_0.
+    """
+
+    name: str
+    joint: str  #: name of the joint
+    coordinate: str  #: of it, such as "angle"
+    stiffness: float = 0.0  #: k [N/m, N m/rad]
+    free: float = 0.0  #: x_0 [m, rad]
+    damping: float = 0.0  #: c [N s/m, N m s/rad]
+    preload: float = 0.0  #: [N, N m]
+    motor: TimeFunction | None = None  #: a function of time [N, N m]
+    characteristic: TimeFunction | None = None  #: a function of x - x_0, such as a table [N, N m]
+    friction: float = 0.0  #: T, of Coulomb [N, N m]
+    friction_coefficient: float = 0.0  #: mu; for an angle mu times the radius of the bearing [1, m]
+    friction_speed: float = 1e-3  #: v_0, where friction is at tanh(1) of its value [m/s, rad/s]
+
+    def __post_init__(self) -> None:
+        where = f"force {self.name!r}"
+        for name in ("stiffness", "damping", "friction", "friction_coefficient"):
+            object.__setattr__(self, name, number(f"{where}: {name}", getattr(self, name), at_least=0.0))
+        for name in ("free", "preload"):
+            object.__setattr__(self, name, number(f"{where}: {name}", getattr(self, name)))
+        speed = number(f"{where}: friction_speed", self.friction_speed, above=0.0)
+        object.__setattr__(self, "friction_speed", speed)
+        for name in ("motor", "characteristic"):
+            if not isinstance(getattr(self, name), TimeFunction | None):
+                raise ModelError(
+                    f"{where}: {name}: expected a function of floatframe.time_functions, got {getattr(self, name)!r}"
+                )
+        numbers = self.stiffness, self.damping, self.preload, self.friction, self.friction_coefficient
+        if not any(numbers) and self.motor is None and self.characteristic is None:
+            raise ModelError(f"{where}: expected at least one part above zero, got none")
