@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
+from cms.arrays import Array, IntArray
 from cms.reduced_body import ReducedBody
 from cms.stress_modes import von_mises
 from floatframe.errors import ResultsError
@@ -122,7 +122,7 @@ def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time
     return np.asarray(_stress_modes(body, reduced) @ trajectory.body(body).q[i_time])
 
 
-def largest_von_mises(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[Array, Array]:
+def largest_von_mises(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[Array, IntArray]:
     """Return the largest von Mises stress of the kept nodes over time, (n_t,) [Pa], and where it is, (n_t,) index."""
     require_same_modes(trajectory, body, reduced)
     modes, q = _stress_modes(body, reduced), trajectory.body(body).q
