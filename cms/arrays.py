@@ -50,7 +50,8 @@ def require_shape(where: str, array: Array, shape: tuple[int, ...]) -> None:
 
 def symmetric_csc(where: str, matrix: Any, n: int) -> sp.csc_array:
     """Return the matrix as CSC (n, n) with sorted indices after checking shape, finiteness and symmetry."""
-    csc = sp.csc_array(matrix)
+    # the compressed rows of a symmetric matrix are its compressed columns
+    csc = sp.csc_array(matrix.T if sp.issparse(matrix) and matrix.format == "csr" else matrix)
     require_shape(where, csc, (n, n))
     if not csc.has_canonical_format:
         csc = csc.copy()
