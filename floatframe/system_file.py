@@ -296,7 +296,8 @@ def read_system(path: str | os.PathLike[str]) -> tuple[System, RunOptions]:
         forces: list[Force] = [force_of(name, section) for name, section in data.forces.items()]
         if any(data.system.gravity):
             forces.insert(0, Gravity(np.array(data.system.gravity)))
-        system = System(bodies, joints, forces, units, data.system.name or path.stem)
+        name = data.system.name or path.stem
+        system = System(bodies, joints, forces, units, name, data.system.redundant)
         _ = system.compiled  # markers and interfaces are looked up here
     except (FloatframeError, CmsError) as error:
         raise SystemFileError(f"{path}: {error}") from error

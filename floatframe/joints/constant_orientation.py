@@ -26,6 +26,7 @@ class ConstantOrientation:
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: where the moment on B begins in it
+    coordinates = ()
 
     def __post_init__(self) -> None:
         if self.rotation is not None:

@@ -54,7 +54,7 @@ def is_number(block, kinds):
 def parts_of(builder, kind, index):
     """Return types and values of the parts of an index."""
     if isinstance(kind, types.BaseTuple):
-        return tuple(kind), [builder.extract_value(index, k) for k in range(len(kind))]
+        return tuple(kind), [builder.extract_value(index, k) for k in range(len(kind))]  # type: ignore[arg-type]
     return (kind,), [index]
 
 

@@ -233,3 +233,59 @@ def test_mistakes_in_motions_are_answered_with_key_value_and_choices(tmp_path, o
     path.write_text(DRIVEN.replace(old, new))
     with pytest.raises(SystemFileError, match=words):
         read_system(path)
+
+
+FORCES = """
+[forces.motor]
+type = "joint-force"
+joint = "pin"
+coordinate = "angle"
+damping = 0.2
+friction = 0.1
+
+[forces.motor.motor]
+type = "smooth-step"
+t_start = 0
+t_end = 1
+first = 0
+last = 2.0
+
+[forces.bump]
+type = "spring-damper"
+body_a = "bob"
+body_b = "ground"
+marker_b = [2, 1, 0]
+free_length = 1
+
+[forces.bump.characteristic]
+type = "table"
+t = [-1, 0, 1, 2]
+values = [-5, 0, 1, 8]
+
+[run]
+"""
+
+
+def test_forces_in_joints_and_tables_are_read(write):
+    system, _ = read_system(write(("[run]", FORCES), ("gravity =", 'redundant = "minimum-norm"\ngravity =')))
+    motor = next(force for force in system.forces if getattr(force, "name", "") == "motor")
+    bump = next(force for force in system.forces if getattr(force, "name", "") == "bump")
+    assert (motor.joint, motor.coordinate, motor.damping, motor.friction) == ("pin", "angle", 0.2, 0.1)
+    assert_allclose([motor.motor(0.5), bump.characteristic(2.0)], [1.0, 8.0], rtol=1e-12, atol=0)
+    assert system.redundant == "minimum-norm"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('joint = "pin"', "", "joint: missing; expected the name of a joint"),
+        ('joint = "pin"', 'joint = "pni"', "force 'motor': no joint 'pni'; did you mean 'pin'"),
+        ('coordinate = "angle"', 'coordinate = "distance"', "no coordinate 'distance' that can take a force"),
+        ("friction = 0.1", "friction = -1", "friction = -1: expected a number, 0 or more"),
+        ("damping = 0.2", "force = [1, 0, 0]", "a joint-force has no key force"),
+    ],
+)
+def test_mistakes_in_joint_forces_are_answered(write, old, new, words):
+    assert old in FORCES
+    with pytest.raises(SystemFileError, match=words):
+        read_system(write(("[run]", FORCES.replace(old, new))))
