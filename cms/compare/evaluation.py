@@ -127,9 +127,10 @@ def response_part(reference: Reference, c: Coordinates, basis: FreeBasis) -> Qua
 
 
 def drawn_entry(full: FrequencyResponse) -> tuple[int, int]:
-    """Choose the entry to draw: force on the first port, answer of the last, in the translation that answers most."""
-    size = [np.abs(full.H[:, len(full.outputs) - 6 + k, k]).mean() for k in range(3)]
-    k = int(np.argmax(size))
+    """Choose the entry to draw: force on the first port, answer of the last, in the translation with most peaks."""
+    curves = [np.abs(full.H[:, len(full.outputs) - 6 + k, k]) for k in range(3)]
+    peaks = [int(((h[1:-1] > h[:-2]) & (h[1:-1] > h[2:])).sum()) for h in curves]
+    k = int(np.argmax(peaks))
     return len(full.outputs) - 6 + k, k
 
 

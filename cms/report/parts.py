@@ -26,7 +26,7 @@ COLUMNS = {
     "static-interface": "static, interface loads",
     "static-inertia": "static, inertia loads",
     "frequency-response": "frequency response",
-    "deformation-error": "deformation \u03b5(t)",
+    "deformation-error": "motion, \u03b5(t)",
 }
 
 

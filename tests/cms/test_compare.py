@@ -14,6 +14,7 @@ from cms.cli.compare import parse_load
 from cms.compare.compare import compare
 from cms.compare.comparison import Point, SetResult
 from cms.compare.drawing import draw_modes, thinned_surface
+from cms.compare.evaluation import drawn_entry
 from cms.compare.full_model import centered_directions, held_mass
 from cms.compare.mode_counts import mode_counts
 from cms.compare.pulse import Pulse, default_pulse
@@ -25,7 +26,7 @@ from cms.interface_loads import point_load
 from cms.quality.conditioning import column_condition
 from cms.quality.frf import response_comparison
 from cms.quality.full_reference import FullReference
-from cms.quality.port_model import port_model
+from cms.quality.port_model import FrequencyResponse, port_model
 from cms.quality.record import information, judge
 from cms.quality.reduction_check import check_reduction
 from cms.quality.transient import Snapshots
@@ -188,6 +189,15 @@ def test_redundant_columns_are_named():
     assert len(point.dropped) == point.record("dropped-columns").value
     assert point.n_columns - len(point.dropped) == 5
     assert point.n_q == 4
+
+
+def test_the_drawn_response_is_that_with_most_resonances():
+    frequencies = np.linspace(1.0, 100.0, 500)
+    H = np.zeros((500, 12, 12), dtype=complex)
+    for k, resonances in enumerate(([20.0], [30.0, 50.0, 70.0], [40.0, 60.0])):
+        H[:, 6 + k, k] = sum(1 / (f**2 - frequencies**2 + 0.02j * f * frequencies) for f in resonances)
+    labels = tuple(f"{end} {c}" for end in ("left", "right") for c in ("ux", "uy", "uz", "rx", "ry", "rz"))
+    assert drawn_entry(FrequencyResponse(frequencies, H, labels, labels, "")) == (7, 1)
 
 
 # Verdicts ------------------------------------------------------------------------------------------------------------
