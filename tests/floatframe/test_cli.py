@@ -307,3 +307,17 @@ def test_help_names_the_commands_and_loads_nothing_heavy():
 
 def test_version():
     assert run("--version").stdout.startswith("floatframe ")
+
+
+def test_info_tells_the_mobility_of_a_system_file(tmp_path):
+    """A stick on two hinges of one line: six freedoms less five, and five constraints that repeat others."""
+    again = RIGID.replace("[run]", RIGID[RIGID.index("[joints.pin]") : RIGID.index("[run]")] + "[run]")
+    again = again.replace("[joints.pin]", "[joints.first]", 1)
+    path = tmp_path / "stick.toml"
+    path.write_text(again)
+    result = CliRunner().invoke(app, ["info", str(path), "--json"])
+    assert result.exit_code == 0, result.output
+    record = json.loads(result.stdout)
+    assert (record["gruebler"], record["mobility"]) == (-4, 1)
+    assert record["redundant_by_joint"] == {"pin": 5}
+    assert "constraints that repeat others   5 of pin" in CliRunner().invoke(app, ["info", str(path)]).stdout
