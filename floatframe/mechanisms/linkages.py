@@ -1,0 +1,144 @@
+"""Planar linkages in the xy plane with one degree of freedom and no redundant constraint."""
+
+import numpy as np
+
+from cms.reduced_body import ReducedBody
+from cms.units import Units, unit_system
+from floatframe.errors import ModelError
+from floatframe.ground import GROUND
+from floatframe.joints import Joint, PointOnLine, PrismaticJoint, RevoluteJoint, SphericalJoint, UniversalJoint
+from floatframe.markers import Marker
+from floatframe.mechanisms.rods import Rod
+from floatframe.rigid_body import RigidBody
+from floatframe.system import System
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["four_bar", "slider_crank"]
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def slider_crank(
+    *,
+    crank: float = 0.15,
+    rod: float = 0.3,
+    crank_mass: float = 0.5,
+    rod_mass: float = 0.2,
+    slider_mass: float = 0.1,
+    angle: float = 0.0,
+    speed: float = 0.0,
+    drive: TimeFunction | None = None,
+    flexible_rod: ReducedBody | None = None,
+    ends: tuple[str, str] = ("start", "end"),
+    units: Units | None = None,
+) -> System:
+    """Return a crank at the origin, a rod and a slider on the x axis.
+
+    Bodies "crank", "rod", "slider"; joints "main" (ground, crank), "pin" (crank, rod), "gudgeon" (rod, slider: a point
+    on the line of the pin) and "guide" (ground, slider).
+
+    Parameters
+    ----------
+    crank, rod
+        Lengths [m].
+    crank_mass, rod_mass, slider_mass
+        [kg]
+    angle
+        Of the crank to the x axis at the start [rad].
+    speed
+        Of the crank at the start [rad/s].
+    drive
+        Angle of the crank over time, from `angle` on; None: it turns freely.
+    flexible_rod
+        A reduced body in place of the rigid rod, its interfaces `ends` at the pin and at the slider.
+    ends
+        Interfaces of it.
+    units
+        Default: those of `flexible_rod`, or m-kg-s.
+    """
+    if not 0 < crank < rod:
+        raise ModelError(f"slider_crank: expected 0 < crank < rod, got crank = {crank:g}, rod = {rod:g}")
+    knee = crank * np.array([np.cos(angle), np.sin(angle), 0.0])
+    end = np.array([knee[0] + np.sqrt(rod**2 - knee[1] ** 2), 0.0, 0.0])
+    arm = Rod("crank", np.zeros(3), knee, crank_mass)
+    link = Rod("rod", knee, end, rod_mass, flexible_rod, ends)
+    block = RigidBody("slider", slider_mass, slider_mass * (0.1 * crank) ** 2 * np.eye(3), position=end)
+    assert isinstance(arm.body, RigidBody)
+    turning = RigidBody(
+        "crank",
+        arm.body.mass,
+        arm.body.inertia,
+        center_of_mass=arm.body.center_of_mass,
+        position=arm.body.position,
+        orientation=arm.body.orientation,
+        omega_B=speed * Z,
+    )
+    joints: list[Joint] = [
+        RevoluteJoint("main", GROUND, arm.start, axis=Z, motions={} if drive is None else {"angle": drive}),
+        RevoluteJoint("pin", arm.end, link.start, axis=Z),
+        PointOnLine("gudgeon", Marker("slider"), link.end, axis=Z),
+        PrismaticJoint("guide", Marker(GROUND), Marker("slider"), axis=np.array([1.0, 0.0, 0.0])),
+    ]
+    units = units or (flexible_rod.units if flexible_rod is not None else unit_system("m-kg-s"))
+    return System([turning, link.body, block], joints, [], units, "slider-crank")
+
+
+def four_bar(
+    *,
+    ground: float = 1.0,
+    crank: float = 0.3,
+    coupler: float = 0.9,
+    rocker: float = 0.7,
+    mass_per_length: float = 1.0,
+    angle: float = 1.0,
+    drive: TimeFunction | None = None,
+    flexible_coupler: ReducedBody | None = None,
+    ends: tuple[str, str] = ("start", "end"),
+    units: Units | None = None,
+) -> System:
+    """Return a four-bar linkage with its fixed hinges at the origin and on the x axis, the coupler above.
+
+    Bodies "crank", "coupler", "rocker"; joints "main" and "rest" (hinges on the ground), "pin" (crank, coupler) and
+    "knee" (a universal joint between coupler and rocker): no constraint is redundant.
+
+    Parameters
+    ----------
+    ground, crank, coupler, rocker
+        Lengths [m].
+    mass_per_length
+        Of the rigid bars [kg/m].
+    angle
+        Of the crank to the x axis at the start [rad].
+    drive
+        Angle of the crank over time, from `angle` on.
+    flexible_coupler, ends
+        A reduced body in place of the coupler, its interfaces at pin and knee.
+    units
+        Default: those of `flexible_coupler`, or m-kg-s.
+    """
+    start = crank * np.array([np.cos(angle), np.sin(angle), 0.0])
+    foot = np.array([ground, 0.0, 0.0])
+    span = foot - start
+    d = float(np.linalg.norm(span))
+    along = (d**2 + coupler**2 - rocker**2) / (2 * d)
+    height = coupler**2 - along**2
+    if height <= 0:
+        raise ModelError(
+            f"four_bar: bars of {crank:g}, {coupler:g}, {rocker:g} over {ground:g} do not close with the crank at "
+            f"{angle:g} rad; coupler and rocker would have to span {d:g}"
+        )
+    e = span / d
+    knee = start + along * e + np.sqrt(height) * np.array([-e[1], e[0], 0.0])
+    bars = [
+        Rod("crank", np.zeros(3), start, mass_per_length * crank),
+        Rod("coupler", start, knee, mass_per_length * coupler, flexible_coupler, ends),
+        Rod("rocker", foot, knee, mass_per_length * rocker),
+    ]
+    joints: list[Joint] = [
+        RevoluteJoint("main", GROUND, bars[0].start, axis=Z, motions={} if drive is None else {"angle": drive}),
+        SphericalJoint("pin", bars[0].end, bars[1].start),
+        UniversalJoint("knee", bars[2].end, bars[1].end, axis=Z, axis_b=np.array([0.0, 1.0, 0.0])),
+        RevoluteJoint("rest", Marker(GROUND, position=foot), bars[2].start, axis=Z),
+    ]
+    units = units or (flexible_coupler.units if flexible_coupler is not None else unit_system("m-kg-s"))
+    return System([bar.body for bar in bars], joints, [], units, "four-bar linkage")

@@ -1,0 +1,80 @@
+"""Slender rods as parts of mechanisms: rigid, or an instance of a reduced body."""
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.reduced_body import ReducedBody
+from floatframe.errors import ModelError
+from floatframe.flexible_body import FlexibleBody
+from floatframe.markers import Marker
+from floatframe.rigid_body import RigidBody
+from floatframe.rotations import euler_parameters, rotation_matrix
+from floatframe.system import Body
+
+__all__ = ["Rod", "between", "slender_inertia"]
+
+THICKNESS = 0.02  #: of a rigid rod, part of its length; gives it inertia about its axis
+
+
+def slender_inertia(mass: float, length: float) -> Array:
+    """Return the inertia of a round rod along x about its centre, (3, 3) [kg m²]."""
+    radius = THICKNESS * length / 2
+    across = mass * (length**2 / 12 + radius**2 / 4)
+    return np.diag([mass * radius**2 / 2, across, across])
+
+
+class Rod:
+    """A rod between two points of the xy plane, with markers at its ends; its x axis points from start to end."""
+
+    def __init__(
+        self,
+        name: str,
+        start: Array,
+        end: Array,
+        mass: float,
+        reduced: ReducedBody | None = None,
+        ends: tuple[str, str] = ("start", "end"),
+    ) -> None:
+        """Place the rod; a reduced body is laid with its interfaces `ends` on the two points."""
+        start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        self.length = float(np.linalg.norm(end - start))
+        self.body: Body
+        if reduced is None:
+            orientation = turned(end - start, np.array([1.0, 0.0, 0.0]))
+            self.body = RigidBody(
+                name,
+                mass,
+                slender_inertia(mass, self.length),
+                center_of_mass=np.array([self.length / 2, 0, 0]),
+                position=start,
+                orientation=orientation,
+            )
+            self.start, self.end = Marker(name), Marker(name, position=np.array([self.length, 0, 0]))
+            return
+        a, b = (between(reduced, interface) for interface in ends)
+        size = float(np.linalg.norm(b - a))
+        if abs(size - self.length) > 1e-3 * self.length:
+            raise ModelError(
+                f"rod {name!r}: its interfaces {ends[0]} and {ends[1]} are {size:.6g} apart, expected {self.length:.6g}"
+            )
+        orientation = turned(end - start, b - a)
+        position = start - rotation_matrix(orientation) @ a
+        self.body = FlexibleBody(name, reduced, position=position, orientation=orientation)
+        self.start, self.end = Marker(name, ends[0]), Marker(name, ends[1])
+
+
+def between(reduced: ReducedBody, interface: str) -> Array:
+    """Return the place of an interface in mesh axes, (3,)."""
+    return np.asarray(reduced.frame.origin + reduced.frame.axes @ reduced.interface(interface).position)
+
+
+def turned(to: Array, direction: Array) -> Array:
+    """Return Euler parameters of the least rotation that lays a direction along another, (4,)."""
+    a, b = direction / np.linalg.norm(direction), to / np.linalg.norm(to)
+    axis, cosine = np.cross(a, b), float(a @ b)
+    if cosine < -1 + 1e-12:  # half a turn, about z where that is possible
+        axis = np.array([0.0, 0.0, 1.0]) if abs(a[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+        axis = axis - (axis @ a) * a
+        return np.concatenate([[0.0], axis / np.linalg.norm(axis)])
+    tilde = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return euler_parameters(np.eye(3) + tilde + tilde @ tilde / (1 + cosine))

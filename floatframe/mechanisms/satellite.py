@@ -1,0 +1,55 @@
+"""A satellite: a rigid hub in free flight with two booms."""
+
+import numpy as np
+
+from cms.reduced_body import ReducedBody
+from cms.units import Units, unit_system
+from floatframe.joints import FixedJoint
+from floatframe.markers import Marker
+from floatframe.mechanisms.rods import Rod
+from floatframe.rigid_body import RigidBody
+from floatframe.system import System
+
+__all__ = ["satellite"]
+
+
+def satellite(
+    *,
+    hub_mass: float = 100.0,
+    hub_radius: float = 0.5,
+    boom_length: float = 5.0,
+    boom_mass: float = 2.0,
+    spin: float = 0.0,
+    boom: ReducedBody | None = None,
+    ends: tuple[str, str] = ("start", "end"),
+    units: Units | None = None,
+) -> System:
+    """Return a hub (a ball) with two equal booms along +x and -x, fixed to its surface; it spins about z.
+
+    Parameters
+    ----------
+    hub_mass, hub_radius
+        [kg, m]
+    boom_length, boom_mass
+        Of rigid booms [m, kg]; with `boom` the length is that between its interfaces.
+    spin
+        Angular velocity of the hub about z at the start [rad/s]; the booms are made to follow.
+    boom
+        A reduced body for both booms, two instances of one.
+    ends
+        Interfaces of it at the hub and at the tip.
+    units
+        Default: those of `boom`, or m-kg-s.
+    """
+    if boom is not None:
+        boom_length = float(np.linalg.norm(np.subtract(*(boom.interface(end).position for end in ends))))
+    hub = RigidBody("hub", hub_mass, 0.4 * hub_mass * hub_radius**2 * np.eye(3), omega_B=np.array([0, 0, spin]))
+    bodies: list = [hub]
+    joints = []
+    for name, sign in (("right", 1.0), ("left", -1.0)):
+        root = np.array([sign * hub_radius, 0.0, 0.0])
+        part = Rod(name, root, root + sign * np.array([boom_length, 0.0, 0.0]), boom_mass, boom, ends)
+        bodies.append(part.body)
+        joints.append(FixedJoint(f"{name} root", Marker("hub", position=root), part.start))
+    units = units or (boom.units if boom is not None else unit_system("m-kg-s"))
+    return System(bodies, joints, [], units, "satellite")

@@ -1,0 +1,57 @@
+"""The heavy symmetric top on a fixed point."""
+
+import numpy as np
+
+from floatframe.forces import Gravity
+from floatframe.ground import GROUND
+from floatframe.joints import SphericalJoint
+from floatframe.markers import Marker
+from floatframe.rigid_body import RigidBody
+from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.system import System
+
+__all__ = ["spinning_top"]
+
+
+def spinning_top(
+    *,
+    mass: float = 1.0,
+    arm: float = 0.1,
+    inertia: tuple[float, float] = (0.002, 0.001),
+    tilt: float = 0.5,
+    spin: float = 300.0,
+    precession: float = 0.0,
+    gravity: float = 9.81,
+) -> System:
+    """Return a body "top" on a spherical joint "tip" at the origin, its z axis tilted about x, under gravity along -z.
+
+    Parameters
+    ----------
+    mass
+        [kg]
+    arm
+        Distance of the centre of mass from the tip [m].
+    inertia
+        Moments about the centre of mass, across and along the axis [kg m²].
+    tilt
+        Angle of the axis from the vertical [rad].
+    spin
+        Angular velocity about its axis [rad/s].
+    precession
+        Angular velocity about the vertical at the start [rad/s].
+    gravity
+        [m/s²]
+    """
+    across, along = inertia
+    up = np.array([0.0, np.sin(tilt), np.cos(tilt)])  # the vertical in body axes
+    body = RigidBody(
+        "top",
+        mass,
+        np.diag([across, across, along]),
+        center_of_mass=np.array([0.0, 0.0, arm]),
+        orientation=euler_parameters_of_rotation_vector(np.array([tilt, 0.0, 0.0])),
+        omega_B=np.array([0.0, 0.0, spin]) + precession * up,
+    )
+    return System(
+        [body], [SphericalJoint("tip", GROUND, Marker("top"))], [Gravity(np.array([0, 0, -gravity]))], name="top"
+    )

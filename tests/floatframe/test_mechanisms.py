@@ -1,0 +1,119 @@
+"""Ready mechanisms: mobility, closed-form kinematics, frequencies and invariants of their motion."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from floatframe import (
+    GeneralizedAlpha,
+    ModelError,
+    consistent_state,
+    integrate,
+    linearize,
+    mobility,
+    static_equilibrium,
+    system_modes,
+)
+from floatframe.joint_results import joint_coordinate
+from floatframe.mechanisms import chain, double_pendulum, four_bar, pendulum, satellite, slider_crank, spinning_top
+from floatframe.rotations import rotation_matrix
+from floatframe.sensors import point_motion
+from floatframe.time_functions import cycloidal_spin_up, polynomial_of_time
+
+
+@pytest.mark.parametrize(
+    ("system", "freedom"),
+    [
+        (pendulum(), 1),
+        (double_pendulum(), 2),
+        (chain(4), 4),
+        (slider_crank(angle=0.7), 1),
+        (four_bar(), 1),
+        (spinning_top(), 3),
+        (satellite(), 6),
+    ],
+    ids=lambda value: value.name if hasattr(value, "name") else "",
+)
+def test_mechanism_has_its_degrees_of_freedom_and_no_redundant_constraint(system, freedom):
+    found = mobility(system)
+    assert found.mobility == freedom
+    assert not found.redundant
+
+
+def test_slider_goes_where_the_crank_says():
+    r, l = 0.15, 0.3  # noqa: E741
+    system = slider_crank(crank=r, rod=l, drive=cycloidal_spin_up(20.0, 0.2))
+    motion = integrate(system, GeneralizedAlpha(0.8), 0.4, 1e-3)
+    phi = joint_coordinate(system, motion, "main", "angle").value
+    exact = r * np.cos(phi) + np.sqrt(l**2 - (r * np.sin(phi)) ** 2)
+    assert phi[-1] > 5
+    assert_allclose(point_motion(motion, "slider", (0, 0, 0)).position[:, 0], exact, rtol=0, atol=1e-9)
+
+
+def test_torque_of_the_drive_does_the_work_that_the_mechanism_gains():
+    system = slider_crank(drive=cycloidal_spin_up(20.0, 0.2), angle=0.3)
+    motion = integrate(system, GeneralizedAlpha(0.9), 0.3, 2e-4)
+    main = joint_coordinate(system, motion, "main", "angle")
+    work = np.sum(np.diff(main.t) * (main.force[1:] * main.rate[1:] + main.force[:-1] * main.rate[:-1]) / 2)
+    assert_allclose(work, motion.energies.kinetic[-1], rtol=2e-3)
+
+
+def test_rocker_follows_the_loop_equation():
+    d, a, b, c = 1.0, 0.3, 0.9, 0.7
+    system = four_bar(ground=d, crank=a, coupler=b, rocker=c, angle=1.0, drive=polynomial_of_time([0.0, 8.0]))
+    motion = integrate(system, GeneralizedAlpha(0.8), 0.8, 1e-3)
+    tip = point_motion(motion, "rocker", (c, 0, 0)).position
+    start = point_motion(motion, "crank", (a, 0, 0)).position
+    assert_allclose(np.linalg.norm(tip - start, axis=1), b, rtol=0, atol=1e-9)
+    theta = 1.0 + 8.0 * motion.t
+    assert_allclose(start[:, :2], a * np.stack([np.cos(theta), np.sin(theta)], 1), rtol=0, atol=1e-9)
+    # the rocker by the loop equation, on the branch it starts on
+    span = np.array([d, 0]) - start[:, :2]
+    length = np.linalg.norm(span, axis=1)
+    along = (length**2 + b**2 - c**2) / (2 * length)
+    e = span / length[:, None]
+    exact = start[:, :2] + along[:, None] * e + np.sqrt(b**2 - along**2)[:, None] * np.stack([-e[:, 1], e[:, 0]], 1)
+    assert_allclose(tip[:, :2], exact, rtol=0, atol=1e-8)
+
+
+def test_bars_that_do_not_close_are_refused():
+    with pytest.raises(ModelError, match="do not close"):
+        four_bar(ground=3.0, crank=0.3, coupler=0.9, rocker=0.7)
+    with pytest.raises(ModelError, match="expected 0 < crank < rod"):
+        slider_crank(crank=0.4, rod=0.3)
+
+
+def test_slow_precession_of_the_top_is_steady():
+    """A p² cos(tilt) - C omega_3 p + m g arm = 0, moments about the tip, omega_3 the whole spin along the axis."""
+    m, arm, across, along, tilt, g, total = 1.0, 0.1, 0.002, 0.001, 0.5, 9.81, 300.0
+    A = across + m * arm**2
+    c = np.cos(tilt)
+    p = min(np.roots([A * c, -along * total, m * g * arm]).real)
+    system = spinning_top(tilt=tilt, spin=total - p * c, precession=p)
+    motion = integrate(system, GeneralizedAlpha(1.0, 1e-12), 0.5, 5e-5)
+    axis = np.array([rotation_matrix(e)[:, 2] for e in motion.body("top").p[::500]])
+    t = motion.t[::500]
+    assert_allclose(np.arccos(axis[:, 2]), tilt, rtol=0, atol=1e-4)
+    angle = np.unwrap(np.arctan2(axis[:, 1], axis[:, 0]))
+    assert_allclose(angle - angle[0], p * t, rtol=0, atol=2e-3)
+
+
+def test_chain_hangs_and_swings_like_the_double_pendulum_pencil():
+    rest = static_equilibrium(chain(2))
+    modes = system_modes(linearize(chain(2), rest))
+    M = np.array([[4 / 3, 1 / 2], [1 / 2, 1 / 3]])
+    radius = 0.01
+    M += np.eye(2) * radius**2 / 4  # the rods are a little thick
+    K = 9.81 * np.diag([1.5, 0.5])
+    exact = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)).real)
+    assert_allclose(np.sort(modes.frequencies), np.sort(exact) / (2 * np.pi), rtol=1e-6)
+
+
+def test_satellite_keeps_its_spin():
+    consistent = consistent_state(satellite(spin=2.0))
+    omega = consistent.state.u.reshape(3, 6)[:, 3:]
+    # booms follow the hub, angular momentum is shared by least change of motion
+    axes = [rotation_matrix(p) for p in consistent.state.p]
+    in_ground = np.array([R @ w for R, w in zip(axes, omega, strict=True)])
+    assert_allclose(in_ground, np.broadcast_to(in_ground[0], (3, 3)), rtol=0, atol=1e-12)
+    assert 0 < in_ground[0, 2] < 2.0
