@@ -251,7 +251,7 @@ def compare_command(
     ] = None,
     pulse_at: Annotated[str | None, typer.Option(help="Interface the force pulse of the motion acts on.")] = None,
     motion: Annotated[
-        Path | None, typer.Option(help="Reference motion instead of the pulse: .npz with u (n_dof, n_t) and t [s].")
+        Path | None, typer.Option(help="Reference motion instead of the pulse: .npz with u (n_dof, n_t) and t in s.")
     ] = None,
     stills: Annotated[int, typer.Option(min=0, help="Still pictures of mode shapes in the report.")] = 4,
 ) -> None:
