@@ -3,6 +3,7 @@
 Exit codes: 0 done, 1 a fault of the program, 2 something the user can put right, 130 interrupted.
 """
 
+import errno
 import functools
 import logging
 import os
@@ -35,6 +36,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 FAULT, USER_ERROR, INTERRUPTED = 1, 2, 130
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 show_tracebacks = ContextVar("show_tracebacks", default=False)  #: the option --debug
 PIPE_WIDTH = 160  #: columns of tables that are not written to a terminal
 
@@ -120,6 +122,11 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
                 raise typer.Exit(USER_ERROR) from None
             if isinstance(error, OSError) and error.filename is not None:
                 print_error(f"{error.filename}: {error.strerror}")
+                raise typer.Exit(USER_ERROR) from None
+            if isinstance(error, OSError) and error.errno in NO_SPACE:  # such as the cache of compiled code
+                print_error(
+                    f"a file cannot be written: {error.strerror}; free space on the disk, or lift the limit on file sizes"
+                )
                 raise typer.Exit(USER_ERROR) from None
             print_error(bug(error))
             if show_tracebacks.get():
