@@ -125,7 +125,7 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
                 raise typer.Exit(USER_ERROR) from None
             if isinstance(error, OSError) and error.errno in NO_SPACE:  # such as the cache of compiled code
                 print_error(
-                    f"a file cannot be written: {error.strerror}; free space on the disk, or lift the limit on file sizes"
+                    f"a file cannot be written: {error.strerror}; free space on the disk, or lift its limit"
                 )
                 raise typer.Exit(USER_ERROR) from None
             print_error(bug(error))
