@@ -3,6 +3,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -271,20 +272,15 @@ def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder, resul
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     ) as process:
-        segments = folder / "swing.h5.segments"
         try:
-            process.wait(timeout=0.2)
-        except subprocess.TimeoutExpired:
-            for _ in range(600):
-                if (segments / "000000.h5").is_file():
-                    break
-                try:
-                    process.wait(timeout=0.2)
-                except subprocess.TimeoutExpired:
-                    continue
-                break
-        process.send_signal(signal.SIGINT)
-        _, error = process.communicate(timeout=60)
+            segments = folder / "swing.h5.segments"
+            deadline = time.monotonic() + 120
+            while not (segments / "000001.h5").is_file() and process.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.1)  # the first segment holds the start, the second one steps
+            process.send_signal(signal.SIGINT)
+            _, error = process.communicate(timeout=60)
+        finally:
+            process.kill()
     assert process.returncode == 130, error
     assert error.startswith("error: interrupted")
     assert "Traceback" not in error
