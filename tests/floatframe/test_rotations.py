@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from floatframe.kernels import rotation as kernels
+from floatframe.kernels.compilation import entry
 from floatframe.rotations import (
     euler_parameter_rates,
     euler_parameters,
@@ -67,8 +67,7 @@ def test_rates_of_euler_parameters_are_those_of_the_matrix():
     assert_allclose(R_dot, rotation_matrix(p) @ tilde(omega), rtol=0, atol=1e-9)
 
 
-@njit
-def compiled_functions(theta, v, p, out):
+def all_functions(theta, v, p, out):
     kernels.exp_matrix(theta, out[0])
     kernels.right_jacobian(theta, out[1])
     kernels.left_jacobian(theta, out[2])
@@ -77,6 +76,9 @@ def compiled_functions(theta, v, p, out):
     turned = np.zeros(4)
     kernels.rotate_euler_parameters(p, theta, turned)
     kernels.matrix_of_euler_parameters(turned, out[5])
+
+
+compiled_functions = entry(all_functions, cache=False)  # inner functions have no machine code of their own
 
 
 @pytest.mark.parametrize("theta", VECTORS)
