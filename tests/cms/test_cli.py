@@ -30,6 +30,11 @@ PROGRAM = [sys.executable, "-c", "from cms.cli import main; main()"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
 
 
+def heed_interrupts():
+    """A process started in the background of a shell ignores SIGINT, and its children after it; ours must not."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def bar():
     return box_mesh(6, 2, 2, 100.0, 10.0, 10.0, "hexahedron")
 
@@ -553,6 +558,7 @@ def test_a_killed_run_leaves_the_old_file(folder):
         [*program, "reduce", "bar.toml", "-o", "out.h5"],
         cwd=folder,
         env=ENVIRONMENT,
+        preexec_fn=heed_interrupts,
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -75,6 +75,11 @@ def results(tmp_path_factory) -> Path:
     return folder / "swing.h5"
 
 
+def heed_interrupts():
+    """A process started in the background of a shell ignores SIGINT, and its children after it; ours must not."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def run(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
@@ -268,6 +273,7 @@ def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder, resul
         [*PROGRAM, "run", "swing.toml"],
         cwd=folder,
         env=ENVIRONMENT,
+        preexec_fn=heed_interrupts,
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
