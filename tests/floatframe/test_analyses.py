@@ -13,6 +13,7 @@ from floatframe import (
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
+    JointForce,
     Marker,
     ModelError,
     PointForce,
@@ -34,6 +35,8 @@ from floatframe.analyses import (
     system_modes,
 )
 from floatframe.linearization import displaced
+from floatframe.mechanisms import slider_crank
+from floatframe.mechanisms.rods import slender_inertia
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
 from floatframe.state import State
 from tests.floatframe.bodies import PointMasses, random_point_masses, reduced_body, stiffness
@@ -318,6 +321,66 @@ def test_preload_stiffens_as_a_string_does():
     system = System([rod()], [RevoluteJoint("hinge", GROUND, Marker("rod"), axis=(0, 0, 1))], [pull])
     exact = np.sqrt(T * 1.0 / (2.0 / 3)) / (2 * np.pi)
     assert_allclose(system_modes(linearize(system)).frequencies, [exact], rtol=1e-9)
+
+
+def test_torsional_spring_in_a_hinge_gives_frequency_damping_and_twist():
+    J, k, c, preload = 2.0 / 3, 15.0, 0.4, 3.0
+    hinge = RevoluteJoint("hinge", GROUND, Marker("rod"), axis=(0, 0, 1))
+    spring = JointForce("spring", "hinge", "angle", stiffness=k, damping=c, preload=preload)
+    system = System([rod()], [hinge], [spring])
+    rest = static_equilibrium(system)
+    twist = rotation_log(rotation_matrix(rest.state.p[0]))
+    assert_allclose(np.abs(twist), [0, 0, preload / k], rtol=1e-7, atol=1e-9)
+    modes = system_modes(linearize(system, rest))
+    assert_allclose(modes.natural_frequencies, np.sqrt(k / J) / (2 * np.pi), rtol=1e-8)
+    assert_allclose(modes.damping_ratios, c / (2 * np.sqrt(k * J)), rtol=1e-8)
+
+
+@pytest.mark.parametrize("damping", [0.0, 4.0])
+def test_slider_crank_rests_and_swings_as_its_energy_in_the_crank_angle_says(damping):
+    """Hinges, slider and a pin on a line, all loaded: potential and kinetic energy over one angle, by differences."""
+    r, length, m_c, m_r, m_s, g, k, free = 0.15, 0.3, 0.5, 0.2, 0.4, 9.81, 60.0, 0.2
+    plain = slider_crank(crank=r, rod=length, crank_mass=m_c, rod_mass=m_r, slider_mass=m_s, angle=-0.9)
+    spring = SpringDamper("spring", Marker(GROUND, position=(0.75, 0, 0)), Marker("slider"), k, 0.0, free)
+    system = System(plain.bodies, plain.joints, [Gravity((0, -g, 0)), spring])
+
+    def places(phi):
+        pin = r * np.array([np.cos(phi), np.sin(phi)])
+        slider = np.array([pin[0] + np.sqrt(length**2 - pin[1] ** 2), 0.0])
+        return pin, slider
+
+    def potential(phi):
+        pin, slider = places(phi)
+        stretch = abs(0.75 - slider[0]) - free
+        return g * (m_c * pin[1] / 2 + m_r * (pin[1] + slider[1]) / 2) + k * stretch**2 / 2
+
+    def inertia(phi, s=1e-5):
+        (p1, s1), (p0, s0) = places(phi + s), places(phi - s)
+        d_pin, d_slider = (p1 - p0) / (2 * s), (s1 - s0) / (2 * s)
+        turn = [np.arctan2(*(b - a)[::-1]) for a, b in ((p1, s1), (p0, s0))]
+        J_c, J_r = slender_inertia(m_c, r)[2, 2] + m_c * r**2 / 4, slender_inertia(m_r, length)[2, 2]
+        middle = (d_pin + d_slider) / 2
+        return J_c + m_r * middle @ middle + J_r * ((turn[0] - turn[1]) / (2 * s)) ** 2 + m_s * d_slider @ d_slider
+
+    rest = static_equilibrium(system)
+    along = rotation_matrix(rest.state.p[0]) @ [1, 0, 0]
+    phi = np.arctan2(along[1], along[0])
+    s = 1e-4
+    slope = (potential(phi + s) - potential(phi - s)) / (2 * s)
+    curvature = (potential(phi + s) - 2 * potential(phi) + potential(phi - s)) / s**2
+    assert abs(slope) < 1e-6
+    assert curvature > 0.1
+    exact = np.sqrt(curvature / inertia(phi)) / (2 * np.pi)
+    if damping == 0.0:
+        assert_allclose(system_modes(linearize(system, rest)).frequencies, [exact], rtol=1e-5)
+        return
+    # a damper at the slider takes damping x_slider'² of the crank angle
+    damper = replace(spring, damping=damping)
+    damped = System(plain.bodies, plain.joints, [Gravity((0, -g, 0)), damper])
+    modes = system_modes(linearize(damped, static_equilibrium(damped)))
+    rate = (places(phi + s)[1][0] - places(phi - s)[1][0]) / (2 * s)
+    ratio = damping * rate**2 / (2 * np.sqrt(curvature * inertia(phi)))
+    assert_allclose(modes.damping_ratios, ratio, rtol=1e-5)
 
 
 def hanging(stiffness_, mass=2.0, other=2.0):

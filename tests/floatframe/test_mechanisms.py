@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import cms
+import fe_models as fm
 from floatframe import (
+    FlexibleBody,
     GeneralizedAlpha,
     ModelError,
     consistent_state,
@@ -16,8 +19,8 @@ from floatframe import (
 )
 from floatframe.joint_results import joint_coordinate
 from floatframe.mechanisms import chain, double_pendulum, four_bar, pendulum, satellite, slider_crank, spinning_top
-from floatframe.rotations import rotation_matrix
-from floatframe.sensors import point_motion
+from floatframe.rotations import rotation_exp, rotation_matrix
+from floatframe.sensors import interface_motion, point_motion
 from floatframe.time_functions import cycloidal_spin_up, polynomial_of_time
 
 
@@ -117,3 +120,47 @@ def test_satellite_keeps_its_spin():
     in_ground = np.array([R @ w for R, w in zip(axes, omega, strict=True)])
     assert_allclose(in_ground, np.broadcast_to(in_ground[0], (3, 3)), rtol=0, atol=1e-12)
     assert 0 < in_ground[0, 2] < 2.0
+
+
+def stiff_rod(length=1.0, mass=1.0):
+    """A reduced rod as slender as the rigid ones and nearly as stiff, its interfaces with axes of their own."""
+    radius = 0.01 * length
+    light = fm.Material("light", E=1e13, nu=0.3, rho=mass / (np.pi * radius**2 * length))
+    mesh = fm.straight_line((0.1, 0.2, 0.0), (0.1, 0.2, length), 6)  # along z, away from the origin of the mesh
+    triads = [rotation_exp(np.array(v)) for v in ((0.3, -0.5, 0.8), (-1.0, 0.2, 0.4))]
+    ends = [
+        fm.line_interface(mesh, name, fm.NodeIndices((k,)), triad=triad)
+        for name, k, triad in zip(("start", "end"), (0, 6), triads, strict=True)
+    ]
+    body = fm.beam_body(
+        mesh, fm.BeamProperty(fm.Circle(radius), light), name="rod", units=cms.unit_system("m-kg-s"), interfaces=ends
+    )
+    coupled = cms.couple(body)
+    return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=2))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda rod: chain(3, angles=(0.4, -0.3, 1.0), rod=rod),
+        lambda rod: satellite(spin=3.0, boom=rod, boom_length=1.0, boom_mass=1.0),
+        lambda rod: slider_crank(crank=0.4, rod=1.0, rod_mass=1.0, angle=0.5, speed=3.0, flexible_rod=rod),
+        lambda rod: four_bar(ground=1.2, crank=0.3, coupler=1.0, rocker=0.9, flexible_coupler=rod,
+                             drive=polynomial_of_time([0.0, 3.0])),
+    ],
+    ids=["chain", "satellite", "slider-crank", "four-bar"],
+)  # fmt: skip
+def test_mechanism_of_nearly_rigid_reduced_rods_moves_as_the_rigid_one(make):
+    """Laid on its points whatever its mesh axes and the triads of its interfaces."""
+    rigid, flexible = make(None), make(stiff_rod())
+    assert any(isinstance(body, FlexibleBody) for body in flexible.bodies)
+    motions = [integrate(system, GeneralizedAlpha(0.8), 0.4, 2e-3) for system in (rigid, flexible)]
+    for body in rigid.bodies:
+        if isinstance(flexible.body(body.name), FlexibleBody):
+            part = flexible.body(body.name).reduced
+            exact = point_motion(motions[0], body.name, (1.0, 0, 0)).position
+            found = interface_motion(motions[1], body.name, part, "end").position
+        else:
+            exact, found = (point_motion(motion, body.name, (1.0, 0, 0)).position for motion in motions)
+        assert np.ptp(exact, axis=0).max() > 0.05
+        assert_allclose(found, exact, rtol=0, atol=2e-4)

@@ -18,6 +18,7 @@ from floatframe import (
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
+    JointForce,
     Marker,
     ResultsError,
     SphericalJoint,
@@ -27,6 +28,8 @@ from floatframe import (
     read_results,
     resume,
 )
+from floatframe.mechanisms import slider_crank
+from floatframe.time_functions import cycloidal_spin_up
 from tests.floatframe.bodies import random_point_masses, reduced_body, stiffness
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -81,6 +84,19 @@ def test_resumed_run_is_the_uninterrupted_one_bit_for_bit(tmp_path, whole, at):
     assert 0 < len(left.t) < len(whole.t)
     assert_same(resume(swing(), tmp_path / "run.h5"), whole)
     assert not (tmp_path / "run.h5.segments").exists()
+
+
+def test_driven_mechanism_with_friction_goes_on_at_the_time_it_stopped(tmp_path):
+    """Drives depend on time, joints carry moments, friction on the normal force: all of it is in the record."""
+
+    def driven():
+        plain = slider_crank(drive=cycloidal_spin_up(30.0, 1.0), angle=0.2)
+        friction = JointForce("rub", "guide", "distance", friction_coefficient=0.2, friction_speed=0.05)
+        return System(plain.bodies, plain.joints, [Gravity((0, -9.81, 0)), friction])
+
+    whole_run = integrate(driven(), GeneralizedAlpha(0.8), T_END, H, output_every=7)
+    interrupted(tmp_path / "run.h5", 0.9, driven())
+    assert_same(resume(driven(), tmp_path / "run.h5"), whole_run)
 
 
 def test_run_interrupted_twice_still_ends_as_one(tmp_path, whole):
