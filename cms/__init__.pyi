@@ -15,6 +15,7 @@ from .frame_conversion import convert_frame as convert_frame
 from .frames import BuckensFrame as BuckensFrame
 from .frames import NodalFrame as NodalFrame
 from .frames import TisserandFrame as TisserandFrame
+from .geometric_stiffness import GeometricStiffness as GeometricStiffness
 from .interface_loads import InterfaceLoad as InterfaceLoad
 from .interface_loads import condensed_load as condensed_load
 from .interface_loads import point_load as point_load

@@ -60,8 +60,14 @@ def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None
     ------
     BodyError
         If the body does not hold what the frame rests on: an unknown interface, one without rotation, no weighted sums
-        (a file of version 1) for a Buckens frame; or if a rigid-body motion is among its shapes.
+        (a file of version 1) for a Buckens frame; if a rigid-body motion is among its shapes; or if it has a geometric
+        stiffness, which is that of modes in their own frame.
     """
+    if reduced.geometric is not None:
+        raise BodyError(
+            f"reduced body {reduced.name!r}: its geometric stiffness is that of modes in their own frame; reduce it "
+            "anew in the other frame, or leave it out (replace(body, geometric=None))"
+        )
     C, target = condition_of(reduced, frame)  # (1)
     Y, M_R = rigid_mass(reduced.moments)
     M = reduced.M - C.T @ Y - Y.T @ C + C.T @ M_R @ C  # (2)

@@ -8,6 +8,7 @@ import numpy as np
 
 from cms.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from cms.errors import BodyError
+from cms.geometric_stiffness import GeometricStiffness
 from cms.invariants import Moments
 from cms.load_cases import ReducedLoadCase
 from cms.nodal_sums import NodalSums
@@ -99,6 +100,7 @@ class ReducedBody:
     #: left out, or unknown. Zero at reference nodes, which belong to no element
     stress: Array | None = None
     point_stress: PointStress | None = None  #: stress of the modes at named points; None: left out, or there are none
+    geometric: GeometricStiffness | None = None  #: for geometric stiffening; None: left out, or not known
 
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"
@@ -137,6 +139,13 @@ class ReducedBody:
             widths["nodal sums"] = (np.asarray(self.nodal_sums.U1).shape[1],)
         if self.point_stress is not None:
             widths["stress points"] = (np.asarray(self.point_stress.modes).shape[2],)
+        if self.geometric is not None:
+            widths["geometric stiffness"] = (self.geometric.n_q,)
+            if self.geometric.n_interfaces != len(self.interfaces):
+                raise BodyError(
+                    f"{where}: {len(self.interfaces)} interfaces, but geometric stiffness of "
+                    f"{self.geometric.n_interfaces}"
+                )
         for name, width in widths.items():
             if width != (n,):
                 raise BodyError(f"{where}: {n} modes, but {name} of {width[0]}")

@@ -55,6 +55,7 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
         load_cases=tuple(replace(case, h=case.h[k]) for case in body.load_cases),
         stress=None if body.stress is None else body.stress[:, :, k],
         point_stress=None,
+        geometric=None if body.geometric is None else body.geometric.of_modes(k),
     )
 
 
