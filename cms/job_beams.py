@@ -170,9 +170,7 @@ class TieSection(Table):
         return self
 
 
-def check_beams(
-    sections: Mapping[str, BeamSection], others: Mapping[str, Any], materials: Mapping[str, Any]
-) -> None:
+def check_beams(sections: Mapping[str, BeamSection], others: Mapping[str, Any], materials: Mapping[str, Any]) -> None:
     """Raise `ValueError` unless every section has a material and its lines, and nothing is attached to no beams."""
     for kind, tables in others.items():
         if tables and not sections:

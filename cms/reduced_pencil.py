@@ -81,18 +81,23 @@ def macneal_pencil(
         As for `rubin`.
     """
     with families_of(body, families) as families:
-        modes = rubin(body, n_modes=n_modes, cutoff=cutoff, families=families)
-        n_r, n_b = families.Psi_R.shape[1], len(body.b)
-        n = modes.columns.shape[1]
-        residual = slice(n - n_b, n)
-        L = modes.columns[body.b]
-        M, K = np.zeros((n, n)), np.zeros((n, n))
-        M[:n_r, :n_r] = gram(families.Psi_R, body.M @ families.Psi_R)
-        free = np.arange(n_r, n - n_b)
-        M[free, free] = 1.0
-        K[free, free] = (2 * np.pi * modes.frequencies[free]) ** 2
-        K[residual, residual] = _symmetric(L[:, residual])
-        return ReducedPencil("macneal", M, K, modes.labels, L)
+        return _macneal_pencil(families, rubin(body, n_modes=n_modes, cutoff=cutoff, families=families))
+
+
+def _macneal_pencil(families: Families, modes: ModeSet) -> ReducedPencil:
+    """Return MacNeal's pencil of Rubin's columns."""
+    body = families.body
+    n_r, n_b = families.Psi_R.shape[1], len(body.b)
+    n = modes.columns.shape[1]
+    residual = slice(n - n_b, n)
+    L = modes.columns[body.b]
+    M, K = np.zeros((n, n)), np.zeros((n, n))
+    M[:n_r, :n_r] = gram(families.Psi_R, body.M @ families.Psi_R)
+    free = np.arange(n_r, n - n_b)
+    M[free, free] = 1.0
+    K[free, free] = (2 * np.pi * modes.frequencies[free]) ** 2
+    K[residual, residual] = _symmetric(L[:, residual])
+    return ReducedPencil("macneal", M, K, modes.labels, L)
 
 
 def dual_craig_bampton_pencil(
@@ -116,8 +121,8 @@ def dual_craig_bampton_pencil(
         As for `rubin`.
     """
     with families_of(body, families) as families:
-        macneal = macneal_pencil(body, n_modes=n_modes, cutoff=cutoff, families=families)
         modes = rubin(body, n_modes=n_modes, cutoff=cutoff, families=families)
+        macneal = _macneal_pencil(families, modes)
         n_b, n = len(body.b), len(macneal.labels)
         force = slice(n - n_b, n)
         Psi_d = modes.columns[:, force]

@@ -12,7 +12,7 @@ from cms.paths import replace_file
 from cms.reduced_body import ReducedBody
 from cms.stress_modes import von_mises
 from floatframe.errors import ResultsError
-from floatframe.recovery import require_same_modes
+from floatframe.recovery import elastic_displacements, require_same_modes
 from floatframe.rotations import rotation_matrix
 from floatframe.sensors import interface_motion
 from floatframe.trajectory import Trajectory
@@ -42,13 +42,12 @@ def motion_table(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | Non
         put(f"{name} velocity", motion.v, f"{m}/{s}")
         put(f"{name} omega_B", motion.omega_B, f"rad/{s}")
     for name, reduced in (bodies or {}).items():
-        q = trajectory.body(name).q
         for interface in reduced.interfaces:
             where = f"{name} {interface.name}"
             place = interface_motion(trajectory, name, reduced, interface.name)
             put(f"{where} position", place.position, m)
             put(f"{where} velocity", place.velocity, f"{m}/{s}")
-            put(f"{where} elastic", q @ interface.Psi[:3].T, m)
+            put(f"{where} elastic", elastic_displacements(trajectory, name, reduced, interface.name), m)
     for name in trajectory.connection_names:
         reaction = trajectory.reaction(name)
         put(f"{name} force", reaction.force, N)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.console import commands, guarded, output_path, print_table, say, stages
+from cms.cli.console import commands, guarded, output_path, print_table, say, stages, vector_words
 
 if TYPE_CHECKING:
     from cms.cli.console import Stages
@@ -299,15 +299,15 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("name", record["name"]),
         ("units", f"{body.units.name} (force {body.units.force_symbol}, stress {body.units.stress_symbol})"),
         ("frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
-        ("origin of B", f"{vector(frame['origin'], size)} {length} (mesh coordinates)"),
-        *[(f"{a} axis of B", f"{vector(axis, 1.0)} (mesh axes)") for a, axis in turned_axes(frame["axes"])],
+        ("origin of B", f"{vector_words(frame['origin'], size)} {length} (mesh coordinates)"),
+        *[(f"{a} axis of B", f"{vector_words(axis, 1.0)} (mesh axes)") for a, axis in turned_axes(frame["axes"])],
         ("mass", f"{record['mass']:.6g} {mass}"),
-        ("centre of mass", f"{vector(record['center_of_mass']['B'], size)} {length} (in B)"),
-        ("", f"{vector(record['center_of_mass']['mesh'], size)} {length} (mesh coordinates)"),
-        ("inertia about it", f"{vector(tensor[0], largest)} {inertia} (axes of B)"),
-        ("", vector(tensor[1], largest)),
-        ("", vector(tensor[2], largest)),
-        ("principal moments", f"{vector(record['principal_moments'])} {inertia}"),
+        ("centre of mass", f"{vector_words(record['center_of_mass']['B'], size)} {length} (in B)"),
+        ("", f"{vector_words(record['center_of_mass']['mesh'], size)} {length} (mesh coordinates)"),
+        ("inertia about it", f"{vector_words(tensor[0], largest)} {inertia} (axes of B)"),
+        ("", vector_words(tensor[1], largest)),
+        ("", vector_words(tensor[2], largest)),
+        ("principal moments", f"{vector_words(record['principal_moments'])} {inertia}"),
         ("mass moments", "exact" if record["moments_are_exact"] else "approximate (from bare matrices)"),
         ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
         ("stress of modes", stress_words(record["stress"])),
@@ -328,7 +328,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     print_table(
         "Interfaces",
         ("name", "kind", "nodes>", f"position in B [{length}]"),
-        [(i["name"], i["kind"], i["nodes"], vector(i["position"], size)) for i in record["interfaces"]],
+        [(i["name"], i["kind"], i["nodes"], vector_words(i["position"], size)) for i in record["interfaces"]],
     )
     force = body.units.force_symbol
     if record["load_cases"]:
@@ -336,7 +336,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
             "Load cases (of amplitude 1, in B)",
             ("name", "kind", f"force [{force}]", f"torque about the origin [{force} {length}]"),
             [
-                (c["name"], c["kind"], vector(c["force"], scale), vector(c["torque"], scale * size))
+                (c["name"], c["kind"], vector_words(c["force"], scale), vector_words(c["torque"], scale * size))
                 for c, scale in ((case, load_scale(case, record["mass"])) for case in record["load_cases"])
             ],
         )
@@ -367,12 +367,6 @@ def print_times(clock: "Stages") -> None:
     """Print the time of each stage."""
     rows = [(name, f"{seconds:.2f}") for name, seconds in clock.seconds.items()]
     print_table("Time", ("stage", "s>"), [*rows, ("all", f"{sum(clock.seconds.values()):.2f}")])
-
-
-def vector(values: Any, scale: float | None = None) -> str:
-    """Return numbers in one line; what is rounding beside the scale (default: the greatest of them) reads 0."""
-    scale = max((abs(value) for value in values), default=0.0) if scale is None else scale
-    return "(" + ", ".join(f"{value if abs(value) > 1e-12 * scale else 0:.6g}" for value in values) + ")"
 
 
 def hertz(value: float | None) -> str:

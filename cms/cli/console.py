@@ -29,6 +29,7 @@ __all__ = [
     "run",
     "say",
     "stages",
+    "vector_words",
     "version_option",
 ]
 
@@ -124,9 +125,7 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
                 print_error(f"{error.filename}: {error.strerror}")
                 raise typer.Exit(USER_ERROR) from None
             if isinstance(error, OSError) and error.errno in NO_SPACE:  # such as the cache of compiled code
-                print_error(
-                    f"a file cannot be written: {error.strerror}; free space on the disk, or lift its limit"
-                )
+                print_error(f"a file cannot be written: {error.strerror}; free space on the disk, or lift its limit")
                 raise typer.Exit(USER_ERROR) from None
             print_error(bug(error))
             if show_tracebacks.get():
@@ -272,3 +271,9 @@ def stages(*, remaining: bool = False) -> Iterator[Stages]:
     columns = [TextColumn("{task.description:<28}"), BarColumn(bar_width=30), TaskProgressColumn(), TimeElapsedColumn()]
     with Progress(*columns, *([TimeRemainingColumn()] if remaining else []), console=console, transient=True) as show:
         yield Stages(show)
+
+
+def vector_words(values: Any, scale: float | None = None) -> str:
+    """Return numbers in one line; what is rounding beside the scale (default: the greatest of them) reads 0."""
+    scale = max((abs(value) for value in values), default=0.0) if scale is None else scale
+    return "(" + ", ".join(f"{value if abs(value) > 1e-12 * scale else 0:.6g}" for value in values) + ")"

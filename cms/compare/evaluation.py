@@ -13,7 +13,7 @@ from cms.quality.completeness import NO_ENERGY, StaticCompleteness, completeness
 from cms.quality.conditioning import conditioning_record, dropped_record
 from cms.quality.deformation import DeformationError, deformation_record, lengths, nodal_lengths, relative
 from cms.quality.free_basis import FreeBasis
-from cms.quality.frequencies import FrequencyComparison, clusters, frequency_records, mac, span_share
+from cms.quality.frequencies import compare_shapes, frequency_records, mac
 from cms.quality.frf import ResponseComparison, compare_responses, response_record
 from cms.quality.port_model import FrequencyResponse, PortModel, modal_response
 from cms.quality.record import QualityRecord, judge
@@ -64,30 +64,11 @@ def nodal_root(c: Coordinates) -> Array:
 def frequency_part(
     reference: Reference, c: Coordinates, basis: FreeBasis, Phi: Array, root: Array
 ) -> tuple[QualityRecord, ...]:
-    """Free-free frequencies and shapes in the band; see `cms.quality.frequencies.compare_frequencies`."""
-    from scipy.optimize import linear_sum_assignment
-
-    n, time = reference.full.n_band, reference.time
-    full, reduced = reference.full.frequencies[:n] / time, basis.frequencies(time)
-    error, partner_error = np.full(n, np.nan), np.full(n, np.nan)
-    common = min(n, len(reduced))
-    error[:common] = reduced[:common] / full[:common] - 1
-    shapes = basis.vibrating
+    """Free-free frequencies and shapes in the band; see `cms.quality.frequencies`."""
+    n, time, shapes = reference.full.n_band, reference.time, basis.vibrating
     massed = np.minimum(mac(Phi, shapes, c.M @ shapes), 1.0)
-    a, b = root @ Phi, root @ shapes
-    partner = np.full(n, -1, np.int64)
-    rows, columns = linear_sum_assignment(-massed)
-    partner[rows] = columns
-    partner_error[rows] = reduced[columns] / full[rows] - 1
-    recovered, recovered_nodal = np.zeros(n), np.zeros(n)
-    for cluster in clusters(full):
-        members = partner[cluster]
-        members = members[members >= 0]
-        recovered[cluster] = massed[np.ix_(cluster, members)].sum(axis=1)
-        recovered_nodal[cluster] = span_share(a[:, cluster], b[:, members])
-    comparison = FrequencyComparison(
-        full, reduced, error, massed, mac(a, b), partner, partner_error, np.minimum(recovered, 1.0), recovered_nodal
-    )
+    full, reduced = reference.full.frequencies[:n] / time, basis.frequencies(time)
+    comparison = compare_shapes(full, reduced, massed, root @ Phi, root @ shapes)
     return frequency_records(comparison, reference.full.band / time)
 
 

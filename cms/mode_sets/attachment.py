@@ -6,7 +6,7 @@ from cms.families import Families
 from cms.fe_body import FEBody
 from cms.flexibility import BoundaryConditions
 from cms.mode_set import ModeSet
-from cms.mode_sets.blocks import mode_set, rigid_block, static_block, vibration_block
+from cms.mode_sets.blocks import boundary_block, mode_set, rigid_block, static_block, vibration_block
 from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
 from cms.static_modes import boundary_groups, boundary_labels
 
@@ -93,10 +93,9 @@ def unrestrained_attachment(
             cutoff=cutoff,
             verify=verify,
         )
-        family = "unrestrained attachment"
         blocks = [
             rigid_block(families),
-            static_block(families.Psi_U, boundary_labels(body, family), boundary_groups(body, family)),
+            boundary_block(body, families.Psi_U, "unrestrained attachment"),
             vibration_block("free", modes),
         ]
         return mode_set("unrestrained-attachment", families, blocks, modes=modes, cutoff=cutoff)

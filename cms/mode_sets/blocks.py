@@ -8,9 +8,20 @@ import numpy as np
 from cms.arrays import Array
 from cms.eigen import EigenResult
 from cms.families import Families
+from cms.fe_body import FEBody
 from cms.mode_set import ModeSet
+from cms.static_modes import boundary_groups, boundary_labels
 
-__all__ = ["Block", "constraint_block", "mode_set", "rigid_block", "static_block", "vibration_block"]
+__all__ = [
+    "Block",
+    "boundary_block",
+    "constraint_block",
+    "inertia_relief_block",
+    "mode_set",
+    "rigid_block",
+    "static_block",
+    "vibration_block",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +39,11 @@ def static_block(columns: Array, labels: Sequence[str], groups: Sequence[str]) -
     return Block(columns, tuple(labels), tuple(groups), np.full(columns.shape[1], np.nan))
 
 
+def boundary_block(body: FEBody, columns: Array, family: str) -> Block:
+    """Return static columns of a family, one for each boundary dof."""
+    return static_block(columns, boundary_labels(body, family), boundary_groups(body, family))
+
+
 def constraint_block(families: Families) -> Block:
     """Return the constraint modes."""
     return static_block(families.Psi_C, families.held_labels("constraint"), families.held_groups("constraint"))
@@ -35,8 +51,17 @@ def constraint_block(families: Families) -> Block:
 
 def rigid_block(families: Families) -> Block:
     """Return the rigid-body modes."""
-    labels = families.rigid_labels("rigid-body")
-    return static_block(families.Psi_R, labels, ["rigid-body"] * len(labels))
+    return _rigid_block(families, families.Psi_R, "rigid-body")
+
+
+def inertia_relief_block(families: Families) -> Block:
+    """Return the static responses to rigid-body accelerations with B held."""
+    return _rigid_block(families, families.Psi_H, "inertia-relief")
+
+
+def _rigid_block(families: Families, columns: Array, family: str) -> Block:
+    labels = families.rigid_labels(family)
+    return static_block(columns, labels, [family] * len(labels))
 
 
 def vibration_block(kind: str, modes: EigenResult, columns: Array | None = None) -> Block:

@@ -10,7 +10,7 @@ from cms.fe_body import FEBody
 from cms.flexibility import BoundaryConditions
 from cms.mixed_boundary import free_directions
 from cms.mode_set import ModeSet
-from cms.mode_sets.blocks import Block, constraint_block, mode_set, static_block, vibration_block
+from cms.mode_sets.blocks import Block, constraint_block, inertia_relief_block, mode_set, vibration_block
 from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
 
 __all__ = ["craig_bampton", "craig_bampton_ir", "guyan"]
@@ -84,9 +84,7 @@ def craig_bampton_ir(
     with families_of(body, families) as families:
         require_interfaces("craig_bampton_ir", body)
         block, modes = _held_modes("craig_bampton_ir", families, n_modes, cutoff, verify, free or {})
-        labels = families.rigid_labels("inertia-relief")
-        relief = static_block(families.Psi_H, labels, ["inertia-relief"] * len(labels))
-        blocks = [constraint_block(families), relief, block]
+        blocks = [constraint_block(families), inertia_relief_block(families), block]
         return mode_set("craig-bampton-ir", families, blocks, modes=modes, cutoff=cutoff, options=_free_words(free))
 
 

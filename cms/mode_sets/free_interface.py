@@ -10,9 +10,16 @@ from cms.eigen import EigenResult
 from cms.families import Families
 from cms.fe_body import FEBody
 from cms.mode_set import ModeSet
-from cms.mode_sets.blocks import Block, constraint_block, mode_set, rigid_block, static_block, vibration_block
+from cms.mode_sets.blocks import (
+    Block,
+    boundary_block,
+    constraint_block,
+    inertia_relief_block,
+    mode_set,
+    rigid_block,
+    vibration_block,
+)
 from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
-from cms.static_modes import boundary_groups, boundary_labels
 from cms.tall import combine
 
 __all__ = ["craig_chang", "dual_craig_bampton", "herting", "macneal", "normal_modes", "rubin"]
@@ -139,9 +146,7 @@ def craig_chang(
         interface = combine(residual, _pseudo_inverse(residual[b]))
         rigid, free = rigid_block(families), vibration_block("free", modes)
         blocks = [
-            static_block(
-                interface, boundary_labels(body, "residual interface"), boundary_groups(body, "residual interface")
-            ),
+            boundary_block(body, interface, "residual interface"),
             replace(rigid, columns=rigid.columns - combine(interface, rigid.columns[b])),
             replace(free, columns=free.columns - combine(interface, free.columns[b])),
         ]
@@ -164,10 +169,9 @@ def herting(
     with families_of(body, families) as families:
         require_interfaces("herting", body)
         modes = _free_modes("herting", families, n_modes, cutoff, verify)
-        labels = families.rigid_labels("inertia-relief")
         blocks = [
             constraint_block(families),
-            static_block(families.Psi_H, labels, ["inertia-relief"] * len(labels)),
+            inertia_relief_block(families),
             vibration_block("free", modes, families.without_boundary(modes.Phi)),
         ]
         return mode_set("herting", families, blocks, modes=modes, cutoff=cutoff)
@@ -180,10 +184,7 @@ def _free_modes(name: str, families: Families, n_modes: int | None, cutoff: floa
 
 
 def _residual_block(families: Families, modes: EigenResult) -> Block:
-    body, family = families.body, "residual attachment"
-    return static_block(
-        families.residual_attachment(modes), boundary_labels(body, family), boundary_groups(body, family)
-    )
+    return boundary_block(families.body, families.residual_attachment(modes), "residual attachment")
 
 
 def _pseudo_inverse(G: Array) -> Array:

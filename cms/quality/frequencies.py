@@ -10,7 +10,7 @@ from cms.quality.free_basis import FreeBasis
 from cms.quality.full_reference import FullReference
 from cms.quality.record import QualityRecord, judge
 
-__all__ = ["FrequencyComparison", "compare_frequencies", "frequency_records", "mac"]
+__all__ = ["FrequencyComparison", "compare_frequencies", "compare_shapes", "frequency_records", "mac"]
 
 CLUSTER = 1e-3  #: relative gap between two frequencies below which only the plane of their shapes is compared
 
@@ -52,20 +52,34 @@ def mac(A: Array, B: Array, M_B: Array | None = None) -> Array:
 
 
 def compare_frequencies(reference: FullReference, basis: FreeBasis) -> FrequencyComparison:
-    """Compare the free-free modes of a mode set with those of the full model in its band.
-
-    Shapes of multiple or nearly equal frequencies are known up to a rotation only, so `recovered` takes the part of a
-    full shape in the span of all partners of its cluster.
-    """
+    """Compare the free-free modes of a mode set with those of the full model in its band."""
     body, n = reference.body, reference.n_band
     full, Phi = reference.frequencies[:n], reference.modes.Phi[:, :n]
     reduced, shapes = basis.frequencies(body.units.time), basis.vibrating
+    a, b = (body.translations(X).reshape(-1, X.shape[1]) for X in (Phi, shapes))
+    return compare_shapes(full, reduced, mac(Phi, shapes, body.M @ shapes), a, b)
+
+
+def compare_shapes(full: Array, reduced: Array, massed: Array, a: Array, b: Array) -> FrequencyComparison:
+    """Compare frequencies and shapes of two models.
+
+    Shapes of multiple or nearly equal frequencies are known up to a rotation only, so `recovered` takes the part of a
+    full shape in the span of all partners of its cluster.
+
+    Parameters
+    ----------
+    full, reduced
+        Frequencies, ascending, (n_full,) and (n_reduced,) [Hz].
+    massed
+        Mass-weighted MAC of their shapes, (n_full, n_reduced).
+    a, b
+        Translations of all nodes in the shapes, in any coordinates that keep their scalar products, (n, n_full) and
+        (n, n_reduced).
+    """
+    n = len(full)
     error = np.full(n, np.nan)
     common = min(n, len(reduced))
     error[:common] = reduced[:common] / full[:common] - 1
-    massed = mac(Phi, shapes, body.M @ shapes)
-    a, b = (body.translations(X).reshape(-1, X.shape[1]) for X in (Phi, shapes))
-    nodal = mac(a, b)
     partner = np.full(n, -1, np.int64)
     rows, columns = linear_sum_assignment(-massed)
     partner[rows] = columns
@@ -78,7 +92,7 @@ def compare_frequencies(reference: FullReference, basis: FreeBasis) -> Frequency
         recovered[cluster] = massed[np.ix_(cluster, members)].sum(axis=1)
         recovered_nodal[cluster] = span_share(a[:, cluster], b[:, members])
     return FrequencyComparison(
-        full, reduced, error, massed, nodal, partner, partner_error, np.minimum(recovered, 1.0), recovered_nodal
+        full, reduced, error, massed, mac(a, b), partner, partner_error, np.minimum(recovered, 1.0), recovered_nodal
     )
 
 

@@ -11,7 +11,7 @@ with Omega = diag(omega~, omega~, 0) and Omega' = diag(omega~, 0, 0) for every b
     M eta + C nu + K xi - Jᵀ dw = 0      bodies
     G_x xi + G_v nu + V dw = 0           rows: V = 0 and G_v = 0 for what joints hold
 
-(derivation: docs/theory.md, "Small motions about a steady one"). Rows with V, which say what a wrench is (a moment
+(derivation: docs/analyses.md, "Small motions about a steady one"). Rows with V, which say what a wrench is (a moment
 about a free axis, the tension of a spring), are solved for their wrench and put into K and C here.
 """
 

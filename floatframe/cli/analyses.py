@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
 
 if TYPE_CHECKING:
     from floatframe.analyses import Channel, Equilibrium, LinearSystem
@@ -56,11 +56,13 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
         "Equilibrium",
         ("body", f"origin [{units.length_symbol}]", "rotation vector [rad]", "largest modal coordinate>"),
         [
-            (b["name"], numbers(b["position"]), numbers(b["rotation_vector"]), f"{b['largest_q']:.4g}")
+            (b["name"], vector_words(b["position"]), vector_words(b["rotation_vector"]), f"{b['largest_q']:.4g}")
             for b in record["bodies"]
         ],
     )
     if record["reactions"]:
+        force = max(abs(value) for r in record["reactions"] for value in r["force"])
+        moment = max(force * model.compiled.length, *(abs(value) for r in record["reactions"] for value in r["moment"]))
         print_table(
             "Reactions on markers A, ground axes",
             (
@@ -68,7 +70,10 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
                 f"force [{units.force_symbol}]",
                 f"moment [{units.force_symbol} {units.length_symbol}]",
             ),
-            [(r["name"], numbers(r["force"]), numbers(r["moment"])) for r in record["reactions"]],
+            [
+                (r["name"], vector_words(r["force"], force), vector_words(r["moment"], moment))
+                for r in record["reactions"]
+            ],
         )
     say(f"{'stable' if is_stable else 'unstable: the least push makes it leave'}; forces out of balance by "
         f"{record['residual']:.1e} of those at work, {record['n_iterations']} iterations")  # fmt: skip
@@ -329,12 +334,6 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
         "residual": rest.residual,
         "n_iterations": rest.n_iterations,
     }
-
-
-def numbers(values: Any) -> str:
-    """Return a vector in one line; what is rounding beside the largest number reads 0."""
-    scale = max((abs(value) for value in values), default=0.0)
-    return "(" + ", ".join(f"{value if abs(value) > 1e-9 * scale else 0:.6g}" for value in values) + ")"
 
 
 def damping_words(mode: dict[str, Any]) -> str:

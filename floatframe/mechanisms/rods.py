@@ -1,5 +1,7 @@
 """Slender rods as parts of mechanisms: rigid, or an instance of a reduced body."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from cms.arrays import Array
@@ -8,10 +10,10 @@ from floatframe.errors import ModelError
 from floatframe.flexible_body import FlexibleBody
 from floatframe.markers import Marker
 from floatframe.rigid_body import RigidBody
-from floatframe.rotations import euler_parameters, rotation_matrix
+from floatframe.rotations import euler_parameters, rotation_matrix, tilde
 from floatframe.system import Body
 
-__all__ = ["Rod", "between", "slender_inertia"]
+__all__ = ["Rod", "between", "slender_inertia", "turning"]
 
 THICKNESS = 0.02  #: of a rigid rod, part of its length; gives it inertia about its axis
 
@@ -76,5 +78,12 @@ def turned(to: Array, direction: Array) -> Array:
         axis = np.array([0.0, 0.0, 1.0]) if abs(a[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
         axis = axis - (axis @ a) * a
         return np.concatenate([[0.0], axis / np.linalg.norm(axis)])
-    tilde = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return euler_parameters(np.eye(3) + tilde + tilde @ tilde / (1 + cosine))
+    turn = tilde(axis)
+    return euler_parameters(np.eye(3) + turn + turn @ turn / (1 + cosine))
+
+
+def turning(body: Body, omega: Array) -> Body:
+    """Return the body with the velocities of a rigid rotation about the origin of ground, omega in ground axes."""
+    return replace(
+        body, velocity=np.cross(omega, body.position), omega_B=rotation_matrix(body.orientation).T @ np.asarray(omega)
+    )

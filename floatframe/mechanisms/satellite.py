@@ -6,7 +6,7 @@ from cms.reduced_body import ReducedBody
 from cms.units import Units, unit_system
 from floatframe.joints import FixedJoint
 from floatframe.markers import Marker
-from floatframe.mechanisms.rods import Rod
+from floatframe.mechanisms.rods import Rod, turning
 from floatframe.rigid_body import RigidBody
 from floatframe.system import System
 
@@ -24,7 +24,7 @@ def satellite(
     ends: tuple[str, str] = ("start", "end"),
     units: Units | None = None,
 ) -> System:
-    """Return a hub (a ball) with two equal booms along +x and -x, fixed to its surface; it spins about z.
+    """Return a hub (a ball) with two equal booms along +x and -x, fixed to its surface; all spins about z.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def satellite(
     boom_length, boom_mass
         Of rigid booms [m, kg]; with `boom` the length is that between its interfaces.
     spin
-        Angular velocity of the hub about z at the start [rad/s]; the booms are made to follow.
+        Angular velocity about z at the start, of hub and booms, which are undeformed [rad/s].
     boom
         A reduced body for both booms, two instances of one.
     ends
@@ -43,13 +43,13 @@ def satellite(
     """
     if boom is not None:
         boom_length = float(np.linalg.norm(np.subtract(*(boom.interface(end).position for end in ends))))
-    hub = RigidBody("hub", hub_mass, 0.4 * hub_mass * hub_radius**2 * np.eye(3), omega_B=np.array([0, 0, spin]))
-    bodies: list = [hub]
+    bodies: list = [RigidBody("hub", hub_mass, 0.4 * hub_mass * hub_radius**2 * np.eye(3))]
     joints = []
     for name, sign in (("right", 1.0), ("left", -1.0)):
         root = np.array([sign * hub_radius, 0.0, 0.0])
         part = Rod(name, root, root + sign * np.array([boom_length, 0.0, 0.0]), boom_mass, boom, ends)
         bodies.append(part.body)
         joints.append(FixedJoint(f"{name} root", Marker("hub", position=root), part.start))
+    bodies = [turning(body, np.array([0.0, 0.0, spin])) for body in bodies]
     units = units or (boom.units if boom is not None else unit_system("m-kg-s"))
     return System(bodies, joints, [], units, "satellite")

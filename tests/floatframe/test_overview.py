@@ -43,8 +43,9 @@ def test_panels_draw_the_numbers_of_the_motion(body, motion):
     assert_array_equal(curves(plot_loads(motion))["pin"], np.linalg.norm(motion.reaction("pin").force, axis=1))
     name = body.interfaces[1].name
     displacement = elastic_displacements(motion, "part", body, name)
-    assert_array_equal(curves(plot_deformation(motion, {"part": body}))[f"part {name}"],
-                       np.linalg.norm(displacement, axis=1))
+    assert_array_equal(
+        curves(plot_deformation(motion, {"part": body}))[f"part {name}"], np.linalg.norm(displacement, axis=1)
+    )
     drawn = curves(plot_places(motion, {"part": body}))
     assert_array_equal(drawn[f"part {name} x"], interface_positions(motion, "part", body, name)[:, 0])
     assert "part big_end x" not in drawn  # it is pinned
@@ -66,8 +67,14 @@ def test_of_many_curves_the_largest_are_drawn():
 
 def test_the_overview_has_a_panel_for_each_kind_of_result(body, motion):
     labels = [ax.get_ylabel().split(" [")[0] for ax in plot_overview(motion, {"part": body}).axes]
-    assert labels == ["position", "energy", "elastic displacement", "error of the energy balance / largest energy",
-                      "force in joints and springs", "drift of joints"]
+    assert labels == [
+        "position",
+        "energy",
+        "elastic displacement",
+        "error of the energy balance / largest energy",
+        "force in joints and springs",
+        "drift of joints",
+    ]
     assert any(ax.get_ylabel().startswith("modal") for ax in plot_overview(motion).axes)
     rigid = System([RigidBody("ball", 1.0, np.eye(3), velocity=(1, 0, 0))])
     fewer = plot_overview(integrate(rigid, GeneralizedAlpha(), t_end=0.01, h=1e-3))
