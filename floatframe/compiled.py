@@ -14,6 +14,7 @@ from floatframe.forces import Gravity, JointForce, PointForce, SpringDamper
 from floatframe.joints.rows import DOT, MOMENT, NO_MOMENT, POINT, SLIDE, SPRING, Row
 from floatframe.kernels.model import Model
 from floatframe.marker_data import MarkerData, find_marker, joint_markers, marker_pose, marker_shapes, n_q_of
+from floatframe.mass_checks import require_inertia
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
 from floatframe.system import System
@@ -32,6 +33,7 @@ class CompiledSystem:
     joint_names: tuple[str, ...]
     spring_names: tuple[str, ...]
     placed: State  #: the state as given, before it is made consistent
+    coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
     length: float  #: size of the system as placed [m]; scales rotations against translations
 
     @property
@@ -48,6 +50,7 @@ def compile_system(system: System) -> CompiledSystem:
     ModelError
         If a joint or force names what does not exist, or has two markers on one body.
     """
+    require_inertia(system.bodies)
     placed = place(system)
     types, kind = body_types(system.bodies)
     model_types = type_arrays(types)
@@ -172,6 +175,7 @@ def compile_system(system: System) -> CompiledSystem:
         joint_names=tuple(joint.name for joint in system.joints),
         spring_names=tuple(spring.name for spring in dampers),
         placed=placed,
+        coordinates=tuple(row.coordinate for row in rows),
         length=length,
     )
 

@@ -17,6 +17,7 @@ import numpy as np
 from cms.arrays import Array
 from floatframe.arrays import array_of_shape
 from floatframe.compiled import CompiledSystem
+from floatframe.constraint_words import conflict_of_drives, open_joints
 from floatframe.errors import ModelError
 from floatframe.freedoms import Mobility, constraint_mobility, scaled_constraints
 from floatframe.joints.rows import HELD, HELD_DISTANCES
@@ -48,6 +49,7 @@ __all__ = [
 ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
 MOST_ITERATIONS = 30
 FRICTION_COEFFICIENT = 5  #: column of `Model.joint_forces`
+NEAR_BY = 1e-3  #: rad, and part of the size of the system: a small way from a position
 REDUNDANT = 1e-10  #: smallest eigenvalue of G M⁻¹ Gᵀ, scaled to a unit diagonal, of independent constraints
 
 
@@ -124,24 +126,14 @@ def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
         state = displaced(model, state, in_ground_axes(model, state, y))
     if np.abs(error / scale).max() <= 1e-9:
         return state
+    conflict = conflict_of_drives(compiled, work, state)
+    if conflict:
+        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+    reach = ", and that the drives stay within reach" if (model.row_motion[holds] >= 0).any() else ""
     raise ModelError(
-        f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the "
-        "bodies nearer to their joints, or check lengths and axes"
+        f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the bodies "
+        f"nearer to their joints, or check lengths and axes{reach}"
     )
-
-
-def open_joints(compiled: CompiledSystem, error: Array) -> str:
-    """Return the joints that are open most, in words."""
-    model = compiled.model
-    words = []
-    for c, name in enumerate(compiled.joint_names):
-        rows = slice(int(model.c_w0[c]), int(model.c_w0[c + 1]))
-        kind, g = model.row_kind[rows], error[rows]
-        is_distance = np.isin(kind, HELD_DISTANCES)
-        gap, angle = np.linalg.norm(g[is_distance]), np.linalg.norm(g[~is_distance])
-        words.append((gap / compiled.length + angle, f"joint {name!r} is open by {gap:.4g} and {angle:.4g} rad"))
-    words.sort(reverse=True)
-    return ", ".join(text for size, text in words[:3] if size > 1e-9)
 
 
 def require_independent_constraints(compiled: CompiledSystem, work: Work, state: State) -> None:
@@ -157,9 +149,18 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, state:
     n_redundant = int((values < REDUNDANT).sum())
     if n_redundant == 0:
         return
+    conflict = conflict_of_drives(compiled, work, state)
+    if conflict:
+        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
     share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
     owner = np.repeat(np.arange(len(model.c_size)), model.c_size)[holds]
     involved = [name for c, name in enumerate(compiled.joint_names) if share[owner == c].sum() > 1e-6]
+    if is_singular_position(compiled, work, state, n_redundant):
+        raise ModelError(
+            f"a singular position: {n_redundant} of {int(holds.sum())} constraints repeat others here, but not a "
+            f"little way along the motion (see joints {', '.join(repr(name) for name in involved)}), so that it could "
+            "go on in more than one way; begin in another position"
+        )
     counts = constraint_mobility(compiled, work, state).redundant
     told = ", ".join(f"{count} of joint {name!r}" for name, count in counts.items())
     raise ModelError(
@@ -168,6 +169,32 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, state:
         "replace one by a joint that holds less (a fixed joint by a revolute, a revolute by a spherical one), or let "
         'them share the load: redundant = "minimum-norm"'
     )
+
+
+def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_redundant: int) -> bool:
+    """Whether fewer constraints repeat others a thousandth of a radian along the motions that the joints allow."""
+    model = compiled.model
+    holds = np.isin(model.row_kind, HELD)
+    set_iterate(work, state)
+    G = linearized(model, work, 1.0, 0.0, 0.0).G.toarray()[holds]
+    modal = np.ones(G.shape[1], dtype=bool)
+    for u0 in model.u0[:-1]:
+        modal[u0 : u0 + 6] = False
+        G[:, u0 + 3 : u0 + 6] /= compiled.length
+    _, values, right = np.linalg.svd(G[:, ~modal])
+    allowed = right[int((values > REDUNDANT * values.max(initial=0.0)).sum()) :]
+    if not len(allowed):
+        return False
+    y = np.zeros(G.shape[1])
+    y[~modal] = NEAR_BY * np.random.default_rng(0).normal(size=len(allowed)) @ allowed
+    for u0 in model.u0[:-1]:
+        y[u0 : u0 + 3] *= compiled.length
+    try:
+        near = assembled(compiled, work, displaced(model, state, in_ground_axes(model, state, y)))
+    except ModelError:
+        return False
+    rows, _ = scaled_constraints(model, work, near)
+    return int((np.linalg.eigvalsh(rows @ rows.T) < REDUNDANT).sum()) < n_redundant
 
 
 def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: State) -> State:

@@ -19,6 +19,7 @@ from floatframe.kernels.model import Rows, new_work
 from floatframe.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.results import SEGMENTS, BodyEntry, Head, MemorySource, ResultsWriter, arrays_of, last_restart
 from floatframe.state import State
+from floatframe.step_advice import step_advice
 from floatframe.system import System
 from floatframe.trajectory import Trajectory, read_results
 
@@ -105,6 +106,9 @@ def integrate(
     step = (t_end - t_start) / n_total
     if abs(step - h) > 1e-9 * h:
         log.info("h = %g does not divide the time from %g to %g: h = %.9g is used", h, t_start, t_end, step)
+    advice = step_advice(system, step)
+    if advice is not None and advice.n_followed == 0:
+        log.warning("system %r: %s", system.name, advice.words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
     carry = integrator.start(system, t_start, state)
     work = new_work(system.compiled.model)
@@ -225,6 +229,9 @@ class Run:
 def stopped(system, head, kept, writer, failure, t: float, h: float) -> ConvergenceError:
     """Return the error of a failed step, with the motion so far."""
     words = f"system {system.name!r}: the step of {h:g} from t = {t:.9g} failed: {failure.words}"
+    advice = step_advice(system, h)
+    if advice is not None:
+        words += f"; {advice.words}"
     if writer is None:
         trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False)
     else:

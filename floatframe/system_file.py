@@ -35,6 +35,7 @@ from floatframe.motion_section import MotionSection
 from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.system import REDUNDANT, Body, System
+from floatframe.unit_hints import unit_hints
 
 __all__ = ["RunOptions", "read_system"]
 
@@ -299,6 +300,8 @@ def read_system(path: str | os.PathLike[str]) -> tuple[System, RunOptions]:
         name = data.system.name or path.stem
         system = System(bodies, joints, forces, units, name, data.system.redundant)
         _ = system.compiled  # markers and interfaces are looked up here
+        for hint in unit_hints(system):
+            log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:
         raise SystemFileError(f"{path}: {error}") from error
     return system, RunOptions(**data.run.model_dump())

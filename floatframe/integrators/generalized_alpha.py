@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cms.arrays import Array
+from floatframe.constraint_words import open_joints
 from floatframe.errors import ModelError
 from floatframe.initial import acceleration_rates, consistent_state, velocity_correction
 from floatframe.kernels.model import MASS, STIFFNESS, Memory, Model, Rows, Work, new_rows, new_work
-from floatframe.linearization import displaced, highest_frequency, modal_diagonals
+from floatframe.linearization import displaced, modal_diagonals
 from floatframe.state import State
 from floatframe.system import System
 
@@ -196,10 +197,10 @@ class GeneralizedAlpha:
         words = f"Newton's method did not converge in {self.max_iterations} iterations"
         if np.isfinite(excess):
             words += f" (last correction {excess:.2g} times the allowed one)"
-        highest = highest_frequency(compiled.model)
-        if highest > 0:
-            words += f"; the fastest mode has a period of {2 * np.pi / highest:.3g}"
-        words += "; choose a smaller h, or look for a singular position or an error in the system"
+        gaps = open_joints(compiled, work.g)
+        if gaps and np.isfinite(work.g).all():
+            words += f"; {gaps}"
+        words += "; choose a smaller h, or look for a singular position, a drive out of reach or an error in the system"
         return Failure(words, excess)
 
 

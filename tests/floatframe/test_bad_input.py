@@ -1,0 +1,245 @@
+"""Systems that cannot be: one message that says what, where and what to do, exit code 2, and nothing half-written."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from floatframe import (
+    GROUND,
+    ConvergenceError,
+    FlexibleBody,
+    GeneralizedAlpha,
+    Gravity,
+    JointForce,
+    Marker,
+    ModelError,
+    RevoluteJoint,
+    RigidBody,
+    SphericalJoint,
+    System,
+    UniversalJoint,
+    consistent_state,
+    integrate,
+)
+from floatframe.cli.app import app
+from floatframe.mechanisms import slider_crank
+from floatframe.mechanisms.rods import slender_inertia
+from floatframe.step_advice import step_advice
+from floatframe.time_functions import polynomial_of_time
+from tests.floatframe.bodies import random_point_masses, reduced_body
+
+CRANK = """
+[system]
+units = "m-kg-s"
+gravity = [0, -9.81, 0]
+
+[bodies.crank]
+mass = 1.0
+inertia = [[1e-3, 0, 0], [0, 0.01, 0], [0, 0, 0.01]]
+center_of_mass = [0.1, 0, 0]
+rotation_vector = [0, 0, 1.5707963267948966]
+
+[bodies.rod]
+mass = 1.0
+inertia = [[1e-3, 0, 0], [0, 0.03, 0], [0, 0, 0.03]]
+center_of_mass = [0.3, 0, 0]
+position = [0, 0.2, 0]
+rotation_vector = [0, 0, -0.339836909454]
+
+[bodies.block]
+mass = 1.0
+inertia = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
+position = [0.565685424949, 0, 0]
+
+[joints.main]
+type = "revolute"
+body_a = "ground"
+body_b = "crank"
+marker_a = [0, 0, 0]
+axis = [0, 0, 1]
+
+[joints.pin]
+type = "revolute"
+body_a = "crank"
+body_b = "rod"
+marker_a = [0.2, 0, 0]
+axis = [0, 0, 1]
+
+[joints.gudgeon]
+type = "point-on-line"
+body_a = "block"
+body_b = "rod"
+marker_a = [0, 0, 0]
+marker_b = [0.6, 0, 0]
+axis = [0, 0, 1]
+
+[joints.guide]
+type = "prismatic"
+body_a = "ground"
+body_b = "block"
+marker_a = [0, 0, 0]
+marker_b = [0, 0, 0]
+axis = [1, 0, 0]
+
+[run]
+t_end = 0.5
+h = 1e-3
+"""
+TURN = '\n[joints.main.motions.angle]\ntype = "polynomial"\ncoefficients = [0.0, 4.0]\n'
+PUSH = '\n[joints.guide.motions.distance]\ntype = "polynomial"\ncoefficients = [{}, {}]\n'
+
+
+def refused(folder, text, command="run"):
+    """Run the command on a file that it must refuse; return the message."""
+    (folder / "crank.toml").write_text(text)
+    result = CliRunner().invoke(app, [command, str(folder / "crank.toml")])
+    assert result.exit_code == 2, result.output
+    errors = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1
+    assert "Traceback" not in result.output
+    return errors[0]
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    # impossible assembly: the rod is too short to reach
+    ("marker_a = [0, 0, 0]\nmarker_b = [0, 0, 0]", "marker_a = [0, 2, 0]\nmarker_b = [0, 0, 0]",
+     ["cannot be closed", "is open by", "check lengths"]),
+    # unknown names
+    ('body_b = "rod"\nmarker_a = [0.2', 'body_b = "rot"\nmarker_a = [0.2', ["joints.pin.body_b", "did you mean 'rod'"]),
+    ("[run]", '[forces.motor]\ntype = "joint-force"\njoint = "mian"\ncoordinate = "angle"\npreload = 1.0\n[run]',
+     ["no joint 'mian'", "did you mean 'main'"]),
+    ("[run]", '[forces.motor]\ntype = "joint-force"\njoint = "main"\ncoordinate = "angel"\npreload = 1.0\n[run]',
+     ["no coordinate 'angel'", "did you mean 'angle'"]),
+    ("marker_a = [0.2, 0, 0]", 'marker_a = "end"', ["body 'crank' is not flexible and has no interface 'end'"]),
+    # no mass, no inertia about an axis
+    ("mass = 1.0\ninertia = [[1e-3, 0, 0], [0, 0.03", "mass = 0\ninertia = [[1e-3, 0, 0], [0, 0.03",
+     ["bodies.rod.mass = 0: expected a number above 0"]),
+    ("inertia = [[1e-3, 0, 0], [0, 0.03, 0]", "inertia = [[0, 0, 0], [0, 0.03, 0]",
+     ["'rod'", "no inertia about its axis [1, 0, 0]", "distance joint"]),
+])  # fmt: skip
+def test_impossible_systems_are_refused_by_the_command(tmp_path, old, new, words):
+    assert CRANK.count(old) == 1
+    message = refused(tmp_path, CRANK.replace(old, new))
+    for word in words:
+        assert word in message
+    assert [path.name for path in tmp_path.iterdir()] == ["crank.toml"]
+
+
+@pytest.mark.parametrize("place", [0.565685424949, 0.7])
+def test_drives_that_prescribe_one_motion_are_named_whether_they_agree_or_not(tmp_path, place):
+    message = refused(tmp_path, CRANK.replace("\n[run]", TURN + PUSH.format(place, 0.0) + "\n[run]"))
+    assert "conflicting drives: the drive of 'distance' of joint 'guide' and the drive of 'angle' of" in message
+    assert "take one away" in message
+
+
+def test_a_drive_against_what_the_joints_hold_is_named():
+    bar = RigidBody("bar", 1.0, np.eye(3))
+    hinges = [
+        RevoluteJoint("one", GROUND, Marker("bar"), axis=(0, 0, 1)),
+        RevoluteJoint("two", GROUND, Marker("bar", position=(1, 0, 0)), axis=(0, 0, 1), motions={"angle": 0.0}),
+    ]
+    with pytest.raises(ModelError, match="the drive of 'angle' of joint 'two' prescribes what the joints"):
+        consistent_state(System([bar], hinges))
+
+
+def test_a_drive_past_the_reach_of_the_mechanism_tells_time_joint_and_advice_and_keeps_the_results(tmp_path):
+    """The block goes outward from 0.566 to 0.8 = crank + rod, the dead point, which it reaches after 0.047 at 5."""
+    message = refused(tmp_path, CRANK.replace("\n[run]", PUSH.format(0.565685424949, 5.0) + "\n[run]"))
+    for words in ("from t = 0.0", "joint 'g", "singular position", "a drive out of reach", "the motion so far is in"):
+        assert words in message
+    assert (tmp_path / "crank.h5.segments").is_dir()
+    result = CliRunner().invoke(app, ["info", str(tmp_path / "crank.h5.segments")])
+    assert result.exit_code == 0
+    assert "did not reach its end" in result.stdout
+
+
+def parallelogram(angle):
+    """Two equal cranks and a coupler as long as the ground; flat at angle 0, where it could fold over."""
+    tip = 0.3 * np.array([np.cos(angle), np.sin(angle), 0])
+    turn = [np.cos(angle / 2), 0, 0, np.sin(angle / 2)]
+
+    def bar(name, length, **placed):
+        return RigidBody(name, 1.0, slender_inertia(1.0, length), center_of_mass=(length / 2, 0, 0), **placed)
+
+    bodies = [bar("crank", 0.3, orientation=turn), bar("coupler", 1.0, position=tip),
+              bar("rocker", 0.3, position=(1, 0, 0), orientation=turn)]  # fmt: skip
+    joints = [
+        RevoluteJoint("main", GROUND, Marker("crank")),
+        SphericalJoint("pin", Marker("crank", position=(0.3, 0, 0)), Marker("coupler")),
+        UniversalJoint("knee", Marker("rocker", position=(0.3, 0, 0)), Marker("coupler", position=(1.0, 0, 0)),
+                       axis=(0, 0, 1), axis_b=(0, 1, 0)),
+        RevoluteJoint("rest", Marker(GROUND, position=(1, 0, 0)), Marker("rocker")),
+    ]  # fmt: skip
+    return System(bodies, joints)
+
+
+def test_a_singular_position_at_the_start_is_told_from_redundant_joints():
+    consistent_state(parallelogram(0.4))
+    with pytest.raises(ModelError, match=r"a singular position: .* begin in another position"):
+        consistent_state(parallelogram(0.0))
+
+
+def test_gravity_of_another_unit_system_is_noted(tmp_path, caplog):
+    path = tmp_path / "crank.toml"
+    path.write_text(CRANK.replace('"m-kg-s"', '"mm-t-s"').replace("t_end = 0.5", "t_end = 1e-3"))
+    CliRunner().invoke(app, ["run", str(path)])
+    assert "gravity is 9.81 mm/s², but on earth 9806.65: is it in other units?" in caplog.text
+
+
+def test_inertia_of_a_giant_is_noted(tmp_path, caplog):
+    path = tmp_path / "crank.toml"
+    path.write_text(CRANK.replace("inertia = [[1e-3, 0, 0], [0, 0.03, 0], [0, 0, 0.03]]",
+                                  "inertia = [[1e4, 0, 0], [0, 3e5, 0], [0, 0, 3e5]]"))  # fmt: skip
+    CliRunner().invoke(app, ["info", str(path)])
+    assert "rigid body 'rod' has mass and inertia of a part with a radius of gyration of 548 m" in caplog.text
+    caplog.clear()
+    path.write_text(CRANK)
+    CliRunner().invoke(app, ["info", str(path)])
+    assert not caplog.text
+
+
+POINTS = random_point_masses(3, 5, softness=1e-3)
+OMEGA = 2 * np.pi * np.array([5.0, 40.0, 1000.0])
+
+
+def vibrating():
+    K = np.diag(np.diag(POINTS.moments().M) * OMEGA**2)
+    pin = SphericalJoint("pin", GROUND, Marker("rod", "end_a"))
+    return System([FlexibleBody("rod", reduced_body(POINTS, K))], [pin], [Gravity((0, 0, -9.81))])
+
+
+def test_what_a_step_size_follows_of_the_modes_is_said_in_numbers():
+    advice = step_advice(vibrating(), 1e-3)
+    assert (advice.n_modes, advice.n_followed, advice.n_unseen) == (3, 2, 1)
+    np.testing.assert_allclose([advice.slowest, advice.fastest], [5.0, 1000.0], rtol=1e-12)
+    np.testing.assert_allclose([advice.h_slowest, advice.h_fastest], [1 / 100, 1 / 20000], rtol=1e-12)
+    assert "follows 2 of 3 modes" in advice.words
+    assert "mode 3 of body 'rod', has 1 steps in its period of 0.001: h = 0.01 follows the slowest mode" in advice.words
+    assert step_advice(slider_crank(), 1e-3) is None
+
+
+def test_a_step_size_that_follows_no_mode_is_noted_and_one_that_fails_is_advised(caplog):
+    integrate(vibrating(), GeneralizedAlpha(), 0.1, 0.05)
+    assert "h = 0.05 follows 0 of 3 modes" in caplog.text
+    caplog.clear()
+    integrate(vibrating(), GeneralizedAlpha(), 0.01, 0.005)
+    assert not caplog.text
+    with pytest.raises(ConvergenceError, match=r"h = 0.5 follows 0 of 3 modes .* h = 0.01 follows the slowest mode"):
+        integrate(vibrating(), GeneralizedAlpha(max_iterations=2), 1.0, 0.5)
+
+
+def test_a_mode_without_mass_and_stiffness_is_named():
+    K = np.diag([4.0, 9.0, 0.0])
+    body = reduced_body(POINTS, K)
+    M = np.array(body.M)
+    M[2] = M[:, 2] = 0.0
+    with pytest.raises(ModelError, match=r"body 'rod': mode 3 .* has neither mass nor stiffness"):
+        _ = System([FlexibleBody("rod", replace(body, M=M))]).compiled
+
+
+def test_a_motor_on_a_driven_coordinate_is_refused():
+    system = slider_crank(drive=polynomial_of_time([0.0, 5.0]))
+    with pytest.raises(ModelError, match="the coordinate 'angle' of joint 'main' is prescribed"):
+        _ = System(system.bodies, system.joints, [JointForce("motor", "main", "angle", preload=1.0)]).compiled
