@@ -1,3 +1,5 @@
+from .assumed_beam import beam_from_assumed_modes as beam_from_assumed_modes
+from .beam_line import BeamLine as BeamLine
 from .centrifugal import centrifugal_loads as centrifugal_loads
 from .characteristic_modes import with_characteristic_modes as with_characteristic_modes
 from .couplings import couple as couple

@@ -5,6 +5,7 @@ from .beams.beam_property import BeamProperty as BeamProperty
 from .beams.body import beam_body as beam_body
 from .beams.interfaces import NodeIndices as NodeIndices
 from .beams.interfaces import line_interface as line_interface
+from .beams.line_law import beam_line as beam_line
 from .beams.line_mesh import LineMesh as LineMesh
 from .beams.line_mesh import straight_line as straight_line
 from .beams.links import link_rigidly as link_rigidly
