@@ -22,7 +22,7 @@ from cms.job_damping import DampingSection
 from cms.job_reduction import ReductionSection, mode_set_options, named_interfaces
 from cms.load_cases import LOAD_CASE_KINDS
 from cms.paths import near_file
-from cms.toml_file import Matrix3, Range, Table, Vector3, choice, read_toml, validated
+from cms.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, read_toml, validated
 from cms.units import UNIT_SYSTEMS
 from cms.words import nearest
 
@@ -53,6 +53,33 @@ Names = Annotated[tuple[str, ...], BeforeValidator(names)]
 Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted)]
 
 
+class PartSection(Table):
+    """[body] part: one of several parts of the mesh, cut across an axis; its cuts are node sets cut_1, cut_2, ..."""
+
+    number: Annotated[int, Field(ge=1)] = Field(description="a whole number from 1, which part")
+    of: Annotated[int, Field(ge=2)] | None = Field(
+        None, description="a whole number, 2 or more, the number of parts of equal length"
+    )
+    at: tuple[float, ...] | None = Field(None, description="a list of numbers, the places of the cuts along the axis")
+    axis: Vector3 | None = Field(None, description="the direction across which is cut, [x, y, z]; default: the longest")
+
+    @field_validator("at", mode="before")
+    @classmethod
+    def _list(cls, value: Any) -> Any:
+        if not isinstance(value, list) or not value or any(is_no_number(x) for x in value):
+            raise ValueError("expected a list of numbers, the places of the cuts along the axis")
+        return tuple(float(x) for x in value)
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> "PartSection":
+        if (self.of is None) == (self.at is None):
+            raise ValueError(f"expected either of or at, got {'both' if self.of else 'neither'}")
+        n = self.of or len(self.at or ()) + 1
+        if self.number > n:
+            raise ValueError(f"number: there are {n} parts, got number {self.number}")
+        return self
+
+
 class BodySection(Table):
     """[body]: where the model comes from."""
 
@@ -64,6 +91,7 @@ class BodySection(Table):
     plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
         None, description=f"the plane beams deform in, one of {', '.join(PLANES)}; default: space"
     )
+    part: PartSection | None = Field(None, description="a table {number, of or at, axis}: one part of the mesh alone")
     units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
         description=f"the unit system of the numbers, one of {', '.join(UNIT_SYSTEMS)}"
     )
@@ -83,6 +111,8 @@ class BodySection(Table):
     def _one_source(self) -> "BodySection":
         if (self.nodes is None) != (self.lines is None):
             raise ValueError(f"{'lines' if self.nodes else 'nodes'}: missing; tables of nodes and lines come together")
+        if self.part is not None and self.matrices is not None:
+            raise ValueError("part: matrices cannot be cut; remove it, or give the mesh")
         given = [key for key in ("mesh", "matrices", "lines") if getattr(self, key) is not None]
         if len(given) != 1:
             got = "both" if given == ["mesh", "matrices"] else " and ".join(given) or "neither"
@@ -247,6 +277,8 @@ class Job(Table):
             raise ValueError("sections: matrices have their elements inside; remove the tables, and plane")
         if self.body.plane and (self.ties or not self.sections):
             raise ValueError("body.plane: belongs to beams alone; remove it")
+        if self.body.part and self.ties:
+            raise ValueError("body.part: beams tied to a solid cannot be cut; remove it, or cut one without the other")
         if self.body.lines and self.ties:
             raise ValueError("ties: belong to a mesh of solid and lines; remove the tables")
         for name, interface in self.interfaces.items():

@@ -82,5 +82,8 @@ from .selections import (
     Plane as Plane,
 )
 from .solid import solid_body as solid_body
+from .split import Cut as Cut
+from .split import Split as Split
+from .split import split_mesh as split_mesh
 from .unused_nodes import drop_unused_nodes as drop_unused_nodes
 from .weld import weld as weld

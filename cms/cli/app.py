@@ -270,6 +270,38 @@ def compare_command(
     )
 
 
+@app.command("split")
+@guarded
+def split_command(
+    job: Annotated[Path, typer.Argument(help="Job file (TOML) of the whole body.")],
+    n: Annotated[int | None, typer.Option("--parts", "-n", help="Number of parts of equal length.")] = None,
+    at: Annotated[str | None, typer.Option(help="Instead of -n: places of the cuts along the axis, as 40,80.")] = None,
+    axis: Annotated[
+        str | None, typer.Option(help="Direction across which is cut: x, y, z or x,y,z; default: the longest.")
+    ] = None,
+    cut: Annotated[str, typer.Option(help="Interfaces at the cuts: rigid or distributing.")] = "rigid",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write to.")] = None,
+    reduce: Annotated[bool, typer.Option("--reduce", help="Reduce the parts at once.")] = False,
+) -> None:
+    """Split a body into parts with an interface at each cut, so that large deflections are carried by several frames.
+
+    Writes a job for every part, and a system file that joins them. Without -o: rod.toml gives the folder rod_parts.
+
+    Example: cms split blade.toml -n 4 --reduce
+
+    Example: cms split rod.toml --at 40,80 --axis x
+    """
+    from cms.cli.split import SplitRequest, direction_of, places_of, split_job
+    from cms.job import read_job
+
+    files = split_job(SplitRequest(job, n, places_of(at), direction_of(axis), cut, output))
+    for path in files:
+        say(f"wrote {path}")
+    if reduce:
+        for path in files[:-1]:
+            reduce_and_write(read_job(path), path.with_suffix(".h5"))
+
+
 @app.command("demo")
 @guarded
 def demo_command(

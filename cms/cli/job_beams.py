@@ -44,13 +44,13 @@ def body_of_frame(
     interfaces
         Instead of those of the job; its load cases are then left to the caller, too.
     """
-    from cms.cli.reduce_job import load_cases_of
+    from cms.cli.reduce_job import load_cases_of, part_of_mesh
     from fe_models.beams.body import beam_body
     from fe_models.beams.frame_report import report_frame
 
     units = unit_system(job.body.units)
     with stages("read lines"):
-        mesh = frame_mesh(job)
+        mesh = part_of_mesh(job, frame_mesh(job))
     properties = properties_of(job)
     masses, springs, links = attachments_of(job, mesh)
     with stages("check lines"):

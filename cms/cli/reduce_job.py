@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from fe_models.beams.line_mesh import LineMesh
     from fe_models.material import Material
     from fe_models.mesh import Mesh
+    from fe_models.split import AnyMesh
 
 __all__ = ["coupled_body", "job_body", "reduce_job", "uncoupled_body"]
 
@@ -100,7 +101,7 @@ def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
     units = unit_system(job.body.units)
     materials = materials_of(job)
     with stages("read mesh"):
-        mesh = read_mesh(path)
+        mesh = part_of_mesh(job, read_mesh(path))
     with stages("check mesh"):
         report = report_mesh(mesh, materials, units=units)
         if on_report is not None:
@@ -116,6 +117,14 @@ def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
 
         body = body_of_mixed(job, stages, body, mesh, on_report)
     return body.with_load_cases(*load_cases_of(job, body, mesh))
+
+
+def part_of_mesh(job: Job, mesh: "AnyMesh") -> "AnyMesh":
+    """Return the part of the mesh that the job asks for, by default all of it."""
+    from fe_models.split import split_mesh
+
+    part = job.body.part
+    return mesh if part is None else split_mesh(mesh, part.of, at=part.at, axis=part.axis).parts[part.number - 1]
 
 
 def body_of_matrices(job: Job, path: Path, stages: Stages) -> FEBody:

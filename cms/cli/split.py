@@ -1,0 +1,300 @@
+"""`cms split`: the job of one body becomes jobs of its parts, and the system that joins them again."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cms.errors import JobError
+from cms.job import Job, read_job
+from cms.job_reduction import FRAMES, named_interfaces
+from cms.paths import replace_file
+
+if TYPE_CHECKING:
+    from fe_models.split import Cut
+
+__all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
+
+CUT_KINDS = ("rigid", "distributing")
+COORDINATE = 1e-9  #: of the size of the mesh, by which coordinates of the same node may differ
+
+
+@dataclass(frozen=True)
+class SplitRequest:
+    """What `cms split` was asked for."""
+
+    job: Path
+    n: int | None = None
+    at: tuple[float, ...] | None = None  #: places of the cuts along the axis
+    axis: tuple[float, float, float] | None = None
+    kind: str = "rigid"  #: of the interfaces at the cuts
+    folder: Path | None = None  #: default: NAME_parts beside the job
+
+
+def direction_of(text: str | None) -> tuple[float, float, float] | None:
+    """Return the direction that is meant by x, y, z or three numbers."""
+    from cms.cli.frame import numbers
+
+    if text is None:
+        return None
+    if text in ("x", "y", "z"):
+        x, y, z = np.eye(3)["xyz".index(text)]
+        return float(x), float(y), float(z)
+    return numbers("--axis", text)
+
+
+def places_of(text: str | None) -> tuple[float, ...] | None:
+    """Return the places of the cuts that are meant by numbers with commas between them."""
+    if text is None:
+        return None
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise JobError(f"--at {text}: expected numbers with commas between them, as 40,80") from None
+
+
+def split_job(request: SplitRequest) -> list[Path]:
+    """Write a job for every part, and a system file that joins them with fixed joints; return the files.
+
+    Raises
+    ------
+    JobError
+        If the body cannot be cut so: an interface, a load or an attachment lies on two parts.
+    MeshError
+        If the mesh cannot be cut into so many parts.
+    """
+    import tomlkit
+
+    from fe_models.split import split_mesh
+
+    job = read_job(request.job)
+    if request.kind not in CUT_KINDS:
+        raise JobError(f"--cut {request.kind}: expected one of {', '.join(CUT_KINDS)}")
+    if job.body.part is not None:
+        raise JobError(f"{request.job}: body.part: this is a part already; split the whole body")
+    folder = request.folder or request.job.with_name(f"{request.job.stem}_parts")
+    if folder.exists() and not folder.is_dir():
+        raise JobError(f"--output {folder}: this is a file; expected a folder")
+    mesh = mesh_of(job)
+    split = split_mesh(mesh, request.n, at=request.at, axis=request.axis)
+    homes = homes_of(job, mesh, split.parts)
+    files: dict[Path, str] = {}
+    for k, part in enumerate(split.parts):
+        document = tomlkit.parse(request.job.read_text(encoding="utf-8-sig"))
+        edit_job(
+            document, job, part,
+            number=k + 1, request=request, folder=folder, axis=split.axis,
+            cuts=[split.cuts[j] for j in (k - 1, k) if 0 <= j < len(split.cuts)],
+            inside=[name for name, home in homes.items() if home == k],
+        )  # fmt: skip
+        files[folder / f"part_{k + 1}.toml"] = tomlkit.dumps(document)
+    files[folder / "system.toml"] = system_text(job, len(split.parts))
+    folder.mkdir(parents=True, exist_ok=True)
+    for path, text in files.items():
+        replace_file(path, text.encode())
+    return list(files)
+
+
+def mesh_of(job: Job) -> Any:
+    """Read the mesh of a job that can be cut: of solid cells, or of lines."""
+    from cms.cli.job_beams import frame_mesh
+    from fe_models.importers import read_mesh
+    from fe_models.unused_nodes import drop_unused_nodes
+
+    if job.body.matrices is not None:
+        raise JobError("body.matrices: bare matrices cannot be cut; give the mesh they were made of")
+    if job.ties:
+        raise JobError("ties: beams tied to a solid cannot be cut; cut one without the other")
+    if job.sections:
+        return frame_mesh(job)
+    if job.body.mesh is None:
+        raise JobError("job: expected a mesh, got none")
+    return drop_unused_nodes(read_mesh(job.body.mesh))
+
+
+def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...]) -> dict[str, int]:
+    """Return interface -> number of the part it is on, from 0; `JobError` if it is on two, or on a cut."""
+    from cms.cli.job_beams import frame_interface
+    from cms.cli.reduce_job import interface_of
+    from fe_models.errors import InterfaceError
+
+    maker = frame_interface if job.sections else interface_of
+    tolerance = COORDINATE * float(np.ptp(mesh.nodes, axis=0).max())
+    homes: dict[str, int] = {}
+    for name, section in job.interfaces.items():
+        whole = mesh.nodes[maker(name, section, mesh).nodes]
+        for k, part in enumerate(parts):
+            try:
+                there = part.nodes[maker(name, section, part).nodes]
+            except InterfaceError:
+                continue
+            if len(there) == len(whole) and np.abs(there - whole).max() <= tolerance:
+                homes[name] = k
+                on_cut = [cut for cut, nodes in part.node_sets.items() if cut.startswith("cut_") and shares(
+                    part.nodes[nodes], there, tolerance)]  # fmt: skip
+                if on_cut:
+                    raise JobError(
+                        f"interfaces.{name}: it has nodes on {on_cut[0]}; a node can follow one interface only: take "
+                        "another number of parts or another axis"
+                    )
+        if name not in homes:
+            raise JobError(
+                f"interfaces.{name}: its {len(whole)} nodes do not lie on one part alone; take fewer parts, or another "
+                "axis"
+            )
+    return homes
+
+
+def shares(A: np.ndarray, B: np.ndarray, tolerance: float) -> bool:
+    """Return whether two sets of points have one in common."""
+    from scipy.spatial import cKDTree
+
+    return bool(np.isfinite(cKDTree(A).query(B, distance_upper_bound=tolerance)[0]).any())
+
+
+def edit_job(
+    document: Any,
+    job: Job,
+    part: Any,
+    *,
+    number: int,
+    request: SplitRequest,
+    folder: Path,
+    axis: np.ndarray,
+    cuts: "list[Cut]",
+    inside: list[str],
+) -> None:
+    """Turn the job of the whole body into that of a part; comments and order of the file stay."""
+    import tomlkit
+
+    body = document["body"]
+    body["name"] = f"{job.body.name}_{number}"
+    for key in ("mesh", "nodes", "lines"):
+        if key in body:
+            body[key] = os.path.relpath(getattr(job.body, key), folder).replace(os.sep, "/")
+    table = tomlkit.inline_table()
+    where = {"of": request.n} if request.at is None else {"at": list(request.at)}
+    table.update({"number": number, **where, "axis": [float(x) for x in axis]})
+    body["part"] = table
+    keep_groups(document, "materials", "cells", getattr(part, "cell_sets", {}))
+    keep_groups(document, "sections", "lines", getattr(part, "line_sets", {}))
+    used = {section.material for name, section in job.sections.items() if name in document.get("sections", {})}
+    if job.sections and None not in used:
+        keep(document, "materials", [name for name in job.materials if name in used])
+    keep(document, "interfaces", inside)
+    interfaces = document.setdefault("interfaces", tomlkit.table(is_super_table=True))
+    for cut in cuts:
+        interface = tomlkit.table()
+        interface.update({"kind": request.kind, "nodes": cut.name, "reference": [float(x) for x in cut.point]})
+        interfaces[cut.name] = interface
+    for key in ("masses", "springs", "links"):
+        keep(document, key, attached(getattr(job, key), key, part))
+    keep(document, "load_cases", loads_on(job, part, inside, request))
+    edit_reduction(document["reduction"], job, [*inside, *(cut.name for cut in cuts)])
+
+
+def edit_reduction(reduction: Any, job: Job, interfaces: list[str]) -> None:
+    """Leave out what the table says of interfaces of other parts; a nodal frame goes to an interface of this one."""
+    for key in ("free", "loads"):
+        if key in reduction:
+            for name in [name for name in reduction[key] if name not in interfaces]:
+                del reduction[key][name]
+            if not len(reduction[key]):
+                del reduction[key]
+    if "neighbours" in reduction and any(
+        name not in interfaces for where, name in named_interfaces(job.reduction).items() if "neighbours" in where
+    ):
+        raise JobError("reduction.neighbours: they name interfaces of several parts; remove the table")
+    if (
+        reduction.get("frame", FRAMES[0]) == "nodal"
+        and reduction.get("at") not in interfaces
+        and "dofs" not in reduction
+    ):
+        reduction["frame"] = "nodal"
+        reduction["at"] = interfaces[0]
+
+
+def keep(document: Any, key: str, names: list[str]) -> None:
+    """Keep the named tables of a table of tables; drop it where none is left."""
+    if key not in document:
+        return
+    for name in [name for name in document[key] if name not in names]:
+        del document[key][name]
+    if not len(document[key]):
+        del document[key]
+
+
+def keep_groups(document: Any, key: str, groups_key: str, groups: Mapping[str, Any]) -> None:
+    """Keep the tables of a table of tables that name groups of this part, with those groups alone."""
+    for name in list(document.get(key, {})):
+        given = document[key][name].get(groups_key, "all")
+        names = [given] if isinstance(given, str) else list(given)
+        there = [group for group in names if group == "all" or group in groups]
+        if not there:
+            del document[key][name]
+        elif there != names:
+            document[key][name][groups_key] = there
+
+
+def attached(tables: Mapping[str, Any], key: str, part: Any) -> list[str]:
+    """Return the attachments that are on this part; `JobError` if one is on a cut, where two parts would have it."""
+    on_cut = [set(nodes.tolist()) for name, nodes in part.node_sets.items() if name.startswith("cut_")]
+    names = []
+    for name, table in tables.items():
+        groups = [*getattr(table, "nodes", ()), *getattr(table, "followers", ())]
+        groups += [table.node] if getattr(table, "node", None) else []
+        there = [group for group in groups if group in part.node_sets]
+        if any(set(part.node_sets[group].tolist()) & cut for group in there for cut in on_cut) and key != "links":
+            raise JobError(
+                f"{key}.{name}: it is on a node of a cut, which two parts have; take another number of parts"
+            )
+        if there and len(there) < len(groups):
+            raise JobError(f"{key}.{name}: its nodes are on two parts; take another number of parts, or another axis")
+        if there:
+            names.append(name)
+    return names
+
+
+def loads_on(job: Job, part: Any, inside: list[str], request: SplitRequest) -> list[str]:
+    """Return the load cases of this part: gravity, pressure on its faces, forces at its interfaces."""
+    names = []
+    for name, case in job.load_cases.items():
+        if case.kind == "gravity" or (case.at is not None and case.at in inside):
+            names.append(name)
+        elif case.kind == "pressure" and case.faces is not None:
+            if case.faces in part.face_sets:
+                names.append(name)
+        elif case.at is None:
+            raise JobError(
+                f"load_cases.{name}: whose part it is cannot be told from {case.selection}; remove it from "
+                f"{request.job.name}, split, and add it to the jobs of the parts"
+            )
+    return names
+
+
+def system_text(job: Job, n: int) -> str:
+    """Return a system file of the parts, joined at their cuts where they were drawn."""
+    name = job.body.name
+    lines = [
+        f"# {name} in {n} parts, each with a frame of its own. Reduce them first: cms reduce part_1.toml, ...",
+        "[system]",
+        f'units = "{job.body.units}"',
+        "gravity = [0, 0, 0]",
+        "",
+    ]
+    for k in range(1, n + 1):
+        lines += [f"[bodies.{name}_{k}]", f'file = "part_{k}.h5"', ""]
+    for k in range(1, n):
+        lines += [
+            f"[joints.cut_{k}]",
+            'type = "fixed"',
+            f'body_a = "{name}_{k}"',
+            f'marker_a = "cut_{k}"',
+            f'body_b = "{name}_{k + 1}"',
+            f'marker_b = "cut_{k}"',
+            "",
+        ]
+    return "\n".join([*lines, "[run]", "t_end = 1.0", "h = 1e-3", ""])

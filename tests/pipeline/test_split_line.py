@@ -1,0 +1,221 @@
+"""A body in parts, joined again: the same body as long as the cuts do not change it."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+import cms
+from cms.cli.app import app
+from cms.cli.reduce_job import job_body, reduce_job
+from cms.cli.split import SplitRequest, split_job
+from cms.errors import JobError
+from cms.families import Families
+from cms.job import read_job
+from floatframe import linearize, static_equilibrium, system_modes
+from floatframe.system_file import read_system
+from tests.bodies import box_mesh
+from tests.decks import write_deck
+
+BEAM = """
+# a mast
+[body]
+nodes = "nodes.csv"
+lines = "lines.csv"
+units = "m-kg-s"
+
+[materials.steel]   # of everything
+young = 210e9
+poisson = 0.3
+density = 7850
+
+[sections.mast]
+shape = "tube"
+radius = 0.03
+thickness = 0.004
+
+[masses.bob]
+node = "bob"
+mass = 2.0
+inertia = 0.01
+
+[load_cases.weight]
+kind = "gravity"
+acceleration = [0, 0, -9.81]
+
+[interfaces.foot]
+kind = "nodes"
+nodes = "foot"
+
+[interfaces.tip]
+kind = "nodes"
+nodes = "tip"
+
+[reduction]
+set = "craig-bampton"
+n_modes = {n_modes}
+frame = "nodal"
+at = "foot"
+"""
+
+
+@pytest.fixture
+def beam(tmp_path):
+    def write(n_modes=12, bob=5):
+        names = {0: "foot", 12: "tip"} | {bob: "bob"}
+        rows = "".join(f"{i},{0.15 * i},0,{0.004 * i**2},{names.get(i, '')}\n" for i in range(13))
+        (tmp_path / "nodes.csv").write_text("node,x,y,z,sets\n" + rows)
+        (tmp_path / "lines.csv").write_text("node1,node2\n" + "".join(f"{i},{i + 1}\n" for i in range(12)))
+        (tmp_path / "mast.toml").write_text(BEAM.format(n_modes=n_modes))
+        return tmp_path / "mast.toml"
+
+    return write
+
+
+def reduced_parts(files):
+    for path in files[:-1]:
+        cms.write(reduce_job(read_job(path)), path.with_suffix(".h5"))
+    return read_system(files[-1])[0]
+
+
+def test_beam_in_parts_is_the_whole_beam(beam):
+    """All modes of the parts: the same discrete model, so the same frequencies."""
+    job = beam(n_modes=17)
+    files = split_job(SplitRequest(job, 3))
+    system = reduced_parts(files)
+    with Families(job_body(read_job(job))) as families:
+        exact = families.free_modes(n_modes=6).frequencies
+    free = linearize(system, static_equilibrium(system))
+    found = system_modes(free).natural_frequencies
+    assert_allclose(np.sort(found)[-len(found) + 6 :][:6], exact, rtol=1e-5)
+
+
+def test_parts_keep_what_is_theirs(beam):
+    job = beam()
+    files = split_job(SplitRequest(job, 3))
+    assert [path.name for path in files] == ["part_1.toml", "part_2.toml", "part_3.toml", "system.toml"]
+    parts = [read_job(path) for path in files[:-1]]
+    assert [set(part.interfaces) for part in parts] == [{"foot", "cut_1"}, {"cut_1", "cut_2"}, {"tip", "cut_2"}]
+    assert [part.reduction.at for part in parts] == ["foot", "cut_1", "tip"]
+    assert [set(part.masses) for part in parts] == [set(), {"bob"}, set()]
+    assert all(set(part.load_cases) == {"weight"} for part in parts)
+    assert "[materials.steel]   # of everything" in files[0].read_text()
+    masses = [reduce_job(part).moments.m for part in parts]
+    assert_allclose(sum(masses), reduce_job(read_job(job)).moments.m, rtol=1e-12)
+
+
+SOLID = """
+[body]
+mesh = "{mesh}"
+units = "m-kg-s"
+
+[materials.steel]
+young = 210e9
+poisson = 0.3
+density = 7850
+
+[interfaces.left]
+kind = "rigid"
+nodes = "left"
+{cut}
+[interfaces.right]
+kind = "rigid"
+nodes = "right"
+
+[reduction]
+set = "craig-bampton"
+n_modes = {n_modes}
+frame = "tisserand"
+"""
+
+
+def test_solid_in_parts_is_the_whole_with_rigid_sections(tmp_path):
+    deck = write_deck(tmp_path / "bar.inp", box_mesh(6, 1, 1, lx=1.2, ly=0.1, lz=0.1, kind="hexahedron20"))
+    plane = '[interfaces.middle]\nkind = "rigid"\nbox = {lo = [0.6, 0, 0], hi = [0.6, 0.1, 0.1]}\n'
+    (tmp_path / "whole.toml").write_text(SOLID.format(mesh=deck.name, cut=plane, n_modes=4))
+    (tmp_path / "bar.toml").write_text(SOLID.format(mesh=deck.name, cut="", n_modes=40))
+    with Families(job_body(read_job(tmp_path / "whole.toml"))) as families:
+        exact = families.free_modes(n_modes=5).frequencies
+    system = reduced_parts(split_job(SplitRequest(tmp_path / "bar.toml", 2)))
+    found = np.sort(system_modes(linearize(system, static_equilibrium(system))).natural_frequencies)
+    assert_allclose(found[6:11], exact, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "request_", "message"),
+    [
+        (lambda text: text, {"n": 2, "axis": (0, 1, 0)}, "no extent along"),
+        (lambda text: text, {"n": 2, "kind": "nodes"}, "--cut nodes: expected one of rigid, distributing"),
+        (lambda text: text.replace('node = "bob"', 'node = "foot"'), {"n": 40}, "has no cell"),
+        (
+            lambda text: text.replace('nodes = "tip"', 'box = {lo = [-1, -1, -1], hi = [9, 9, 9]}').replace(
+                '[interfaces.tip]\nkind = "nodes"', '[interfaces.tip]\nkind = "rigid"'
+            ),
+            {"n": 2},
+            "interfaces.tip: its 13 nodes do not lie on one part alone",
+        ),
+        (
+            lambda text: text.replace('units = "m-kg-s"', 'units = "m-kg-s"\npart = {number = 1, of = 2}'),
+            {"n": 2},
+            "this is a part already",
+        ),
+    ],
+)  # fmt: skip
+def test_a_body_that_cannot_be_split_is_refused_and_nothing_written(beam, change, request_, message):
+    job = beam()
+    job.write_text(change(job.read_text()))
+    with pytest.raises((JobError, ValueError), match=message):
+        split_job(SplitRequest(job, **request_))
+    assert not job.with_name("mast_parts").exists()
+
+
+def test_a_mass_on_a_cut_is_refused(beam):
+    job = beam(bob=6)
+    with pytest.raises(JobError, match=r"masses\.bob: it is on a node of a cut"):
+        split_job(SplitRequest(job, at=(0.9,), axis=(1, 0, 0)))
+
+
+@pytest.mark.parametrize(
+    ("part", "message"),
+    [
+        ("{number = 3, of = 2}", "there are 2 parts, got number 3"),
+        ("{number = 1}", "expected either of or at, got neither"),
+        ("{number = 1, of = 2, at = [0.5]}", "expected either of or at, got both"),
+        ("{number = 1, at = 0.5}", "expected a list of numbers"),
+    ],
+)
+def test_a_part_that_cannot_be_is_named(beam, part, message):
+    job = beam()
+    job.write_text(job.read_text().replace('units = "m-kg-s"', f'units = "m-kg-s"\npart = {part}'))
+    with pytest.raises(JobError, match=message):
+        read_job(job)
+
+
+def test_command_splits_reduces_and_says_where(beam):
+    job = beam(n_modes=2, bob=4)
+    result = CliRunner().invoke(
+        app, ["split", str(job), "--at", "0.75", "--axis", "x", "-o", str(job.with_name("two")), "--reduce"]
+    )
+    assert result.exit_code == 0, result.output
+    for name in ("part_1.toml", "part_2.toml", "system.toml", "part_1.h5", "part_2.h5"):
+        assert job.with_name("two").joinpath(name).is_file()
+        assert name in result.output
+    system, _ = read_system(job.with_name("two") / "system.toml")
+    assert [joint.name for joint in system.joints] == ["cut_1"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-n", "2", "--at", "0.5"], "either a number of parts or the places"),
+        (["--at", "a,b"], "--at a,b: expected numbers"),
+        (["-n", "2", "--axis", "w"], "--axis"),
+        (["-n", "2", "-o", "mast.toml"], "this is a file; expected a folder"),
+    ],
+)
+def test_command_names_the_option_that_is_wrong(beam, arguments, message, monkeypatch):
+    job = beam()
+    monkeypatch.chdir(job.parent)
+    result = CliRunner().invoke(app, ["split", str(job), *arguments])
+    assert result.exit_code == 2
+    assert message in " ".join(result.output.split())
