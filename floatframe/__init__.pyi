@@ -1,15 +1,22 @@
 from .analyses import Channel as Channel
 from .analyses import Equilibrium as Equilibrium
+from .analyses import InverseDynamics as InverseDynamics
 from .analyses import LinearSystem as LinearSystem
 from .analyses import Locus as Locus
 from .analyses import SystemModes as SystemModes
 from .analyses import campbell as campbell
+from .analyses import drive_forces as drive_forces
+from .analyses import frozen_bodies as frozen_bodies
+from .analyses import inverse_dynamics as inverse_dynamics
+from .analyses import kinematics as kinematics
 from .analyses import linearize as linearize
+from .analyses import quasi_static_bodies as quasi_static_bodies
 from .analyses import root_locus as root_locus
 from .analyses import static_equilibrium as static_equilibrium
 from .analyses import steady_rotation as steady_rotation
 from .analyses import sweep as sweep
 from .analyses import system_modes as system_modes
+from .analyses import with_motors as with_motors
 from .errors import (
     ConvergenceError as ConvergenceError,
 )

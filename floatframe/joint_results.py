@@ -26,6 +26,7 @@ class CoordinateMotion:
     value: Array  #: distance, or angle without jumps, (n_t,) [m, rad]
     rate: Array  #: (n_t,) [m/s, rad/s]
     force: Array  #: force or torque that acts to increase it: of the drive, or of joint forces, (n_t,) [N, N m]
+    is_angle: bool = False  #: an angle [rad], else a distance [m]
 
 
 def joint_coordinates(system: System, trajectory: Trajectory) -> dict[str, CoordinateMotion]:
@@ -75,7 +76,7 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     Z = a.axes @ row.z
     part = MOMENT_B if found.size == 9 else found.moment_b
     angle = np.unwrap(np.arctan2(dot(np.cross(E, Z), D), dot(Z, D)))
-    return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), -dot(w[:, part : part + 3], E))
+    return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), -dot(w[:, part : part + 3], E), is_angle=True)
 
 
 def dot(x: Array, y: Array) -> Array:

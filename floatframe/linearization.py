@@ -61,25 +61,34 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
         n = 6 + int(model.n_q[i])
         H.append(work.H[model.h0[i] : model.h0[i + 1]].reshape(n, n).copy())
     n_w, n_u = len(work.w), len(work.u)
-    J = sp.lil_array((n_w, n_u))
-    G = sp.lil_array((n_w, n_u))
+    J_parts: list[tuple[Array, int, int]] = []
+    G_parts: list[tuple[Array, int, int]] = []
     for m in model.ends:
         i, c, o = int(model.m_body[m]), int(model.m_connection[m]), int(model.m_x0[m])
         n, size = 6 + int(model.n_q[i]), int(model.c_size[c])
         R4 = np.kron(np.eye(4), work.R[i])
         column = work.J_column[6 * o : 6 * (o + n)].reshape(6, n)
         row = work.J_row[12 * o : 12 * (o + n)].reshape(12, n)
-        w = slice(int(model.c_w0[c]), int(model.c_w0[c + 1]))
-        u = slice(int(model.u0[i]), int(model.u0[i + 1]))
+        w0, u0 = int(model.c_w0[c]), int(model.u0[i])
         carried = model.m_sign[m] * (R4[:6, :6] @ column)
         for part, place in ((0, 0), (3, int(model.m_moment[m]))):
             if place >= 0:
-                k = slice(w.start + place, w.start + place + 3)
-                J[k, u] = J[k, u].toarray() + carried[part : part + 3]
-        G[w, u] = G[w, u].toarray() + work.P[m, :size] @ R4 @ row
+                J_parts.append((carried[part : part + 3], w0 + place, u0))
+        G_parts.append((work.P[m, :size] @ R4 @ row, w0, u0))
     blocks = [work.V[c, :size, :size].copy() for c, size in enumerate(model.c_size)]
     V = sp.csr_array(sp.block_diag(blocks)) if blocks else sp.csr_array((0, 0))
-    return Linearized(tuple(H), sp.csr_array(J), sp.csr_array(G), V)
+    return Linearized(tuple(H), summed(J_parts, (n_w, n_u)), summed(G_parts, (n_w, n_u)), V)
+
+
+def summed(parts: list[tuple[Array, int, int]], shape: tuple[int, int]) -> sp.csr_array:
+    """Return the sparse sum of dense blocks, each with its first row and column."""
+    rows = [np.repeat(np.arange(first, first + len(block)), block.shape[1]) for block, first, _ in parts]
+    columns = [np.tile(np.arange(first, first + block.shape[1]), len(block)) for block, _, first in parts]
+    values = [block.ravel() for block, _, _ in parts]
+    if not parts:
+        return sp.csr_array(shape)
+    place = (np.concatenate(rows), np.concatenate(columns))
+    return sp.csr_array(sp.coo_array((np.concatenate(values), place), shape=shape))
 
 
 def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ from cms.units import Units, unit_system
 from cms.words import nearest
 from floatframe.errors import ResultsError
 from floatframe.results import ArraySource, BodyEntry, Head, open_results
+from floatframe.state import State
 
 __all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_results"]
 
@@ -125,6 +126,11 @@ class Trajectory:
             omega_B_dot=u_dot[:, u0 + 3 : u0 + 6],
             q_ddot=u_dot[:, u0 + 6 : u0 + 6 + n],
         )
+
+    def state(self, i_time: int) -> State:
+        """Return the state at an output time, such as one to begin another motion from; -1: the last."""
+        arrays = [self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u")]
+        return State(*arrays)
 
     def reaction(self, name: str) -> Reaction:
         """Return what a joint or spring-damper exerts on its marker A."""

@@ -1,7 +1,10 @@
-"""Analyses of a system besides its motion: equilibrium, steady rotation, linearisation, system modes, responses."""
+"""Analyses of a system besides its motion: equilibrium, driven motion, linearisation, system modes, responses."""
 
 from floatframe.analyses.channels import Channel
+from floatframe.analyses.driven_motion import frozen_bodies, quasi_static_bodies
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium, steady_rotation
+from floatframe.analyses.inverse_dynamics import InverseDynamics, drive_forces, inverse_dynamics, with_motors
+from floatframe.analyses.kinematics import kinematics
 from floatframe.analyses.linear_system import LinearSystem, linearize
 from floatframe.analyses.parameter_study import Locus, campbell, root_locus
 from floatframe.analyses.sweep import sweep
@@ -10,14 +13,21 @@ from floatframe.analyses.system_modes import SystemModes, system_modes
 __all__ = [
     "Channel",
     "Equilibrium",
+    "InverseDynamics",
     "LinearSystem",
     "Locus",
     "SystemModes",
     "campbell",
+    "drive_forces",
+    "frozen_bodies",
+    "inverse_dynamics",
+    "kinematics",
     "linearize",
+    "quasi_static_bodies",
     "root_locus",
     "static_equilibrium",
     "steady_rotation",
     "sweep",
     "system_modes",
+    "with_motors",
 ]

@@ -1,0 +1,207 @@
+"""One instant of a fully driven system: place, velocities and accelerations from joints and drives alone.
+
+Unknowns are the motions of the body frames; modal coordinates stand still (q' = q'' = 0). With G the columns of the
+constraint rows for them, M the masses, P, V as in joints/rows.py:
+
+    (1) positions       G dx = -g                     Newton, until g = 0
+    (2) velocities      G u = -dg/dt
+    (3) accelerations   G u_dot = -d(G)/dt u - ...
+    (4) wrenches        M u_dot - Jᵀ w = f
+
+each as one system with M, which is unique where the drives leave nothing free. Elastic bodies are frozen as they were
+placed, or deform quasi-statically: the modes balance joints, loads and the inertia of the rigid motion,
+
+    (5) K* q + inertia(q, u, u_dot) = Psiᵀ w + loads
+
+by Newton's method with the whole tangent, the motion (1)-(4) made anew for every q.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.compiled import CompiledSystem
+from floatframe.constraint_words import open_joints
+from floatframe.errors import ConvergenceError
+from floatframe.initial import has_normal_friction
+from floatframe.joints.rows import HELD, HELD_DISTANCES
+from floatframe.kernels.model import Work
+from floatframe.linearization import displaced, in_ground_axes, linearized, set_iterate, solve
+from floatframe.state import State
+
+__all__ = ["ELASTICITY", "Elasticity", "Instant", "frozen_bodies", "quasi_static_bodies", "rigid_columns"]
+
+CLOSED = 1e-12  #: largest gap, relative to the size of the system
+ACCEPTED = 1e-9  #: the same where rounding allows no less
+MOST_ITERATIONS = 30
+SETTLED = 1e-11  #: last change of q relative to its size
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """Motion of all bodies at one time."""
+
+    t: float
+    state: State
+    u_dot: Array  #: (n_u,)
+    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+    G: Array  #: held rows by the motions of the body frames, (n_held, 6 n_b)
+    n_iterations: int = 0
+
+
+Elasticity = Callable[[CompiledSystem, Work, State, float], Instant]  #: (compiled, work, guess, t) -> Instant
+
+
+def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
+    """Return which unknowns are motions of body frames, (n_u,) bool; the others are modes."""
+    model = compiled.model
+    rigid = np.zeros(int(model.u0[-1]), dtype=bool)
+    for u0 in model.u0[:-1]:
+        rigid[u0 : u0 + 6] = True
+    return rigid
+
+
+def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
+    """(1)-(4): return the motion with all modes as they are in the state."""
+    from floatframe.kernels.entry import rates_of_constraints
+
+    model, rigid = compiled.model, rigid_columns(compiled)
+    work.time[0] = t
+    state, equations, n = closed(compiled, work, state, rigid, t)
+    # velocities: the rate at rest is that of the drives
+    state = State(state.r, state.p, state.q, np.zeros_like(state.u))
+    set_iterate(work, state)
+    rate, _ = rates_of_constraints(model, work)
+    holds = np.isin(model.row_kind, HELD)
+    y, _ = equations.solved(np.zeros(int(rigid.sum())), np.where(holds, -rate, 0.0))
+    u = np.zeros_like(state.u)
+    u[rigid] = y
+    state = State(state.r, state.p, state.q, in_ground_axes(model, state, u))
+    # accelerations and wrenches; friction by the normal force is not linear in them
+    w = np.zeros(len(work.w))
+    for _ in range(MOST_ITERATIONS):
+        set_iterate(work, state, w=w)
+        equations = rigid_equations(compiled, work)
+        residual = work.residual.copy()
+        _, bias = rates_of_constraints(model, work)
+        y, change = equations.solved(-residual[rigid], np.where(holds, -bias, -work.g))
+        w = w + change
+        if not has_normal_friction(model) or np.abs(change).max() <= 1e-11 * np.abs(w).max():
+            break
+    u_dot = np.zeros_like(state.u)
+    u_dot[rigid] = y
+    return Instant(t, state, in_ground_axes(model, state, u_dot), w, equations.G[holds], n)
+
+
+def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) -> Instant:
+    """(1)-(5): return the motion with modes that balance their loads at every instant."""
+    model, rigid = compiled.model, rigid_columns(compiled)
+    now = frozen_bodies(compiled, work, state, t)
+    if rigid.all():
+        return now
+    n, size = now.n_iterations, 0.0
+    for _ in range(MOST_ITERATIONS):
+        set_iterate(work, now.state, now.u_dot, now.w)
+        parts = linearized(model, work, 0.0, 0.0, 1.0)
+        y, _ = solve(parts.H, parts, -work.residual.copy(), -work.g.copy())
+        moved = displaced(model, now.state, in_ground_axes(model, now.state, y))
+        q = moved.q
+        now = frozen_bodies(compiled, work, State(moved.r, moved.p, q, now.state.u), t)
+        n += 1 + now.n_iterations
+        change, size = float(np.linalg.norm(y[~rigid])), float(np.linalg.norm(q))
+        if change <= SETTLED * size or size == 0.0:
+            return replace(now, n_iterations=n)
+    raise ConvergenceError(
+        f"the deformation at t = {t:g} did not settle in {MOST_ITERATIONS} iterations (last change {change:.2g} of "
+        f"{size:.2g}): the loads are beyond what these bodies carry, or buckle them; freeze them, or integrate",
+        t=t,
+        h=0.0,
+        residual=change,
+    )
+
+
+ELASTICITY: dict[str, Elasticity] = {"frozen": frozen_bodies, "quasi-static": quasi_static_bodies}
+
+
+@dataclass(frozen=True, eq=False)
+class RigidEquations:
+    """M y - Jᵀ w = forces, G y + V w = rows for the motions of the body frames, dense."""
+
+    M: Array  #: (6 n_b, 6 n_b)
+    J: Array  #: (n_w, 6 n_b)
+    G: Array  #: (n_w, 6 n_b)
+    V: Array  #: (n_w, n_w)
+
+    def solved(self, forces: Array, rows: Array) -> tuple[Array, Array]:
+        """Return y and w."""
+        matrix = np.block([[self.M, -self.J.T], [self.G, self.V]])
+        solution = np.linalg.solve(matrix, np.concatenate([forces, rows]))
+        return solution[: len(forces)], solution[len(forces) :]
+
+
+def rigid_equations(compiled: CompiledSystem, work: Work) -> RigidEquations:
+    """Evaluate at the iterate in `work` and return the equations of the body frames."""
+    from floatframe.kernels.entry import evaluate_and_linearize
+
+    model = compiled.model
+    evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
+    n_w, n_u = len(work.w), 6 * len(model.kind)
+    M, J, G, V = np.zeros((n_u, n_u)), np.zeros((n_w, n_u)), np.zeros((n_w, n_u)), np.zeros((n_w, n_w))
+    for i in range(len(model.kind)):
+        n = 6 + int(model.n_q[i])
+        M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = work.H[model.h0[i] : model.h0[i + 1]].reshape(n, n)[:6, :6]
+    for m in model.ends:
+        i, c, o = int(model.m_body[m]), int(model.m_connection[m]), int(model.m_x0[m])
+        n, size, w0 = 6 + int(model.n_q[i]), int(model.c_size[c]), int(model.c_w0[c])
+        R = work.R[i]
+        column = work.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)[:, :, :6]
+        row = work.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)[:, :, :6]
+        u = slice(6 * i, 6 * i + 6)
+        carried = model.m_sign[m] * (R @ column)
+        J[w0 : w0 + 3, u] += carried[0]
+        if model.m_moment[m] >= 0:
+            k = w0 + int(model.m_moment[m])
+            J[k : k + 3, u] += carried[1]
+        G[w0 : w0 + size, u] += work.P[m, :size] @ (R @ row).reshape(12, 6)
+    for c, size in enumerate(model.c_size):
+        w = slice(int(model.c_w0[c]), int(model.c_w0[c]) + int(size))
+        V[w, w] = work.V[c, :size, :size]
+    return RigidEquations(M, J, G, V)
+
+
+def closed(
+    compiled: CompiledSystem, work: Work, state: State, rigid: np.ndarray, t: float
+) -> tuple[State, RigidEquations, int]:
+    """(1): return the state with joints closed and drives followed, the equations at it, the iterations it took."""
+    model = compiled.model
+    holds = np.isin(model.row_kind, HELD)
+    scale = np.where(np.isin(model.row_kind, HELD_DISTANCES), compiled.length, 1.0)
+    error = np.zeros(len(work.w))
+    best = np.inf
+    for n in range(MOST_ITERATIONS):
+        set_iterate(work, state)
+        equations = rigid_equations(compiled, work)
+        error = np.where(holds, work.g, 0.0)
+        size = float(np.abs(error / scale).max(initial=0.0))
+        if size <= CLOSED or (size <= ACCEPTED and size > 0.3 * best):
+            return state, equations, n
+        best = min(best, size)
+        try:
+            y, _ = equations.solved(np.zeros(int(rigid.sum())), -error)
+        except np.linalg.LinAlgError:
+            break
+        if not np.isfinite(y).all() or np.abs(y).max() > 1e3 * max(compiled.length, 1.0):
+            break
+        x = np.zeros(len(rigid))
+        x[rigid] = y
+        state = displaced(model, state, in_ground_axes(model, state, x))
+    raise ConvergenceError(
+        f"the drives cannot be followed at t = {t:g}: {open_joints(compiled, error) or 'a joint opens'}; a drive goes "
+        "beyond the reach of the mechanism, or through a singular position: keep it within, or drive "
+        "another coordinate",
+        t=t,
+        h=0.0,
+        residual=float(np.abs(error / scale).max(initial=0.0)),
+    )

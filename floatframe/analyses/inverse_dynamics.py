@@ -1,0 +1,99 @@
+"""Inverse dynamics: what drives must give along a prescribed motion, and the reactions that go with it.
+
+    inverse = inverse_dynamics(system, np.linspace(0, 2, 401))       # a system whose drives decide its motion
+    inverse.drives["main.angle"].force                               # torque over time
+    integrate(with_motors(system, inverse.drives), GeneralizedAlpha(), 2.0, 1e-3, state=inverse.motion.state(0))
+
+The last line gives the motion back: motors with these forces in the place of the drives. Where bodies vibrate on the
+way, `drive_forces(system, integrate(system, ...))` has the drive forces with the vibrations.
+"""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from cms.arrays import Array
+from floatframe.analyses.driven_motion import Elasticity, quasi_static_bodies
+from floatframe.analyses.joint_rates import driven_coordinates
+from floatframe.analyses.kinematics import kinematics
+from floatframe.errors import ModelError
+from floatframe.forces import JointForce
+from floatframe.joint_results import CoordinateMotion, joint_coordinate
+from floatframe.state import State
+from floatframe.system import System
+from floatframe.time_functions import table
+from floatframe.trajectory import Trajectory
+
+__all__ = ["InverseDynamics", "drive_forces", "inverse_dynamics", "with_motors"]
+
+
+@dataclass(frozen=True, eq=False)
+class InverseDynamics:
+    """A prescribed motion with the forces it takes."""
+
+    motion: Trajectory  #: with the reactions of all joints
+    drives: Mapping[str, CoordinateMotion]  #: value, rate and force of the driven coordinates, by "joint.coordinate"
+
+
+def inverse_dynamics(
+    system: System,
+    times: Sequence[float] | Array,
+    *,
+    elasticity: Elasticity = quasi_static_bodies,
+    state: State | None = None,
+    output: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> InverseDynamics:
+    """Return the motion of a fully driven system, its reactions, and the forces and torques of its drives.
+
+    Parameters
+    ----------
+    system, times, state, output, progress
+        As for `kinematics`.
+    elasticity
+        `quasi_static_bodies`: flexible bodies deform under loads and inertia, without vibrations; `frozen_bodies`:
+        they keep their shape.
+
+    Raises
+    ------
+    ModelError, ConvergenceError
+        As `kinematics`.
+    """
+    motion = kinematics(system, times, elasticity=elasticity, state=state, output=output, progress=progress)
+    return InverseDynamics(motion, drive_forces(system, motion))
+
+
+def drive_forces(system: System, motion: Trajectory) -> dict[str, CoordinateMotion]:
+    """Return value, rate and force of all driven coordinates over any motion of the system, by "joint.coordinate"."""
+    found = {}
+    for name in driven_coordinates(system):
+        joint, _, coordinate = name.rpartition(".")
+        found[name] = joint_coordinate(system, motion, joint, coordinate)
+    return found
+
+
+def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> System:
+    """Return the system with motors that give the forces over time (cubic splines) in the place of these drives.
+
+    Raises
+    ------
+    ModelError
+        If a coordinate is not driven, or there are fewer than four times.
+    """
+    driven = driven_coordinates(system)
+    for name in drives:
+        if name not in driven:
+            raise ModelError(f"with_motors: {name!r} is not driven; driven are {', '.join(driven) or 'none'}")
+    joints = [
+        replace(joint, motions={c: f for c, f in joint.motions.items() if f"{joint.name}.{c}" not in drives})
+        if getattr(joint, "motions", None)
+        else joint
+        for joint in system.joints
+    ]
+    motors = [
+        JointForce(
+            f"motor of {name}", name.rpartition(".")[0], name.rpartition(".")[2], motor=table(drive.t, drive.force)
+        )
+        for name, drive in drives.items()
+    ]
+    return replace(system, joints=joints, forces=[*system.forces, *motors])

@@ -1,0 +1,56 @@
+"""Rates of joint coordinates by the velocities of the bodies, for the names of what is free and of what is driven."""
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.analyses.channels import marker_jacobian
+from floatframe.compiled import CompiledSystem
+from floatframe.joints.rows import DISTANCE, SLIDE, TURN
+from floatframe.kernels.model import Work
+from floatframe.marker_data import joint_markers, marker_pose, n_q_of
+from floatframe.rotations import tilde
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["coordinate_rows", "driven_coordinates"]
+
+
+def driven_coordinates(system: System) -> tuple[str, ...]:
+    """Return the joint coordinates with a prescribed motion, by the name "joint.coordinate"."""
+    return tuple(f"{joint.name}.{name}" for joint in system.joints for name in getattr(joint, "motions", {}))
+
+
+def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state: State) -> dict[str, Array]:
+    """Return d(rate)/d(velocities of small motions, body axes) of all joint coordinates, (n_u,), by "joint.coordinate".
+
+    Parameters
+    ----------
+    work
+        Evaluated at the state.
+    """
+    model, placed, n_q = compiled.model, compiled.placed, n_q_of(system)
+    rows: dict[str, Array] = {}
+    for joint in system.joints:
+        ends = joint_markers(system, joint, placed)
+        (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q) for end in ends)
+        described = [row for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate]
+        if not described:
+            continue
+        (r_a, A_a), (r_b, _) = (marker_pose(end, state, n_q) for end in ends)
+        d = r_b - r_a
+        J = np.zeros((2, 6, int(model.u0[-1])))  # of A and B: translation and rotation in ground axes
+        for k, end in enumerate(ends):
+            if end.body >= 0:
+                J[k][:, int(model.u0[end.body]) : int(model.u0[end.body + 1])] = marker_jacobian(compiled, work, end)
+        slip = J[1, :3] - J[0, :3] + tilde(d) @ J[0, 3:]  # v_B - v_A - omega_A × d
+        turn = J[1, 3:] - J[0, 3:]
+        for row in described:
+            is_angle = row.kind == TURN or (row.kind not in (SLIDE, DISTANCE) and bool(np.any(row.z)))
+            if row.kind == DISTANCE:
+                value = d / np.linalg.norm(d) @ slip
+            elif is_angle:
+                value = A_a @ (np.cross(row.x, row.z) if row.kind == TURN else row.x) @ turn
+            else:
+                value = A_a @ row.x @ slip
+            rows[f"{joint.name}.{row.coordinate}"] = np.asarray(value)
+    return rows

@@ -1,0 +1,200 @@
+"""Kinematic analysis of a fully driven system, and its inverse dynamics: motion, reactions and drive forces over time.
+
+Nothing is integrated: every instant follows from joints and drives alone (`driven_motion`), so that there is no step
+size to choose, and times may be as far apart as the next position can be found from the last one.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.analyses.driven_freedoms import SingularityGuard, free_coordinates
+from floatframe.analyses.driven_motion import ELASTICITY, Elasticity, Instant, frozen_bodies
+from floatframe.analyses.joint_rates import driven_coordinates
+from floatframe.compiled import CompiledSystem
+from floatframe.constraint_words import conflict_of_drives
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.freedoms import constraint_mobility
+from floatframe.initial import assembled, checked
+from floatframe.integration import head_of, joint_rows
+from floatframe.kernels.model import Memory, Rows, Work, new_work
+from floatframe.linearization import displaced
+from floatframe.results import MemorySource, ResultsWriter
+from floatframe.state import State
+from floatframe.system import System
+from floatframe.trajectory import Trajectory, read_results
+
+__all__ = ["Kinematics", "kinematics"]
+
+LARGEST_TURN = 0.25  #: rad that a body turns between two positions; longer ways are made in several
+MOST_PARTS = 2000  #: into which the way from one time to the next is cut
+ROWS_KEPT = 200  #: rows of results between writes
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """What stands in the place of the integrator in the record of a run."""
+
+    elasticity: str  #: name of the treatment of flexible bodies in `ELASTICITY`
+
+
+def kinematics(
+    system: System,
+    times: Sequence[float] | Array,
+    *,
+    elasticity: Elasticity = frozen_bodies,
+    state: State | None = None,
+    output: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Trajectory:
+    """Return the motion of a fully driven system at given times, with the reactions and drive forces that it takes.
+
+    Parameters
+    ----------
+    system
+        Its joints and prescribed motions must leave no body free to move.
+    times
+        Rising, two at least, (n_t,) [s].
+    elasticity
+        `frozen_bodies`: flexible bodies keep the shape they were placed in. `quasi_static_bodies`: they deform under
+        their loads and the inertia of the rigid motion, without vibrations (velocities and accelerations of the modes
+        are left out).
+    state
+        Where to look for the first position; the bodies as placed by default.
+    output
+        Results file; None keeps the motion in memory.
+    progress
+        Called with the numbers of times done and of all times.
+
+    Raises
+    ------
+    ModelError
+        If coordinates are free (they are named), drives conflict, or constraints repeat others.
+    ConvergenceError
+        At a singular position, between times on both sides of one, and where a drive goes out of reach. It carries the
+        motion so far.
+    """
+    t = np.asarray(times, dtype=float)
+    if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+        raise ModelError("kinematics: times: expected two or more rising numbers")
+    name = next((key for key, value in ELASTICITY.items() if value is elasticity), "user")
+    compiled = system.compiled
+    work = new_work(compiled.model)
+    work.time[0] = t[0]
+    state = compiled.placed if state is None else checked(compiled, state)
+    now = first_instant(system, work, state, float(t[0]), elasticity)
+    guard = SingularityGuard(compiled, now)
+    spacing = float(t[-1] - t[0]) / (len(t) - 1)
+    head = head_of(system, Kinematics(name), float(t[0]), float(t[-1]), spacing, 1)  # type: ignore[arg-type]
+    writer = None if output is None else ResultsWriter(output, head)
+    kept: list[Rows] = []
+    power, done = np.zeros((2, 2)), np.zeros(2)  # powers at the last two times, work up to now
+    try:
+        for k, time in enumerate(t):
+            if k:
+                now = moved_on(compiled, work, now, float(time), elasticity, guard)
+            rows, power[1] = observed(compiled, work, now)
+            if k:
+                done = done + (time - t[k - 1]) / 2 * (power[0] + power[1])
+            power[0] = power[1]
+            rows.diagnostics[0, 10:12] = done
+            if writer is None:
+                kept.append(rows)
+            else:
+                writer.append(rows)
+                if (k + 1) % ROWS_KEPT == 0:
+                    writer.close_segment()
+            if progress is not None:
+                progress(k + 1, len(t))
+    except ConvergenceError as error:
+        if writer is None:
+            error.trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False)
+        else:
+            writer.close_segment()
+            error.trajectory = read_results(writer.folder)
+            error.args = (f"{error}; the motion so far is in {str(writer.folder)!r}",)
+        raise
+    except BaseException:
+        if writer is not None:
+            writer.close_segment()
+        raise
+    if writer is None:
+        return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=True)
+    writer.finish()
+    return read_results(writer.path)
+
+
+def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:
+    """Return the motion at the first time; `ModelError` unless the drives decide all of it."""
+    compiled = system.compiled
+    state = assembled(compiled, work, state)
+    conflict = conflict_of_drives(compiled, work, state)
+    if conflict:
+        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+    free = free_coordinates(system, state, t=t)
+    if free:
+        driven = driven_coordinates(system)
+        raise ModelError(
+            f"kinematics: system {system.name!r} is not fully driven: {', '.join(free)} "
+            f"{'is' if len(free) == 1 else 'are'} free (driven: {', '.join(driven) or 'nothing'}); prescribe "
+            f"{'its motion' if len(free) == 1 else 'their motions'}, or integrate the motion instead"
+        )
+    counted = constraint_mobility(compiled, work, state)
+    if counted.n_redundant_rigid and not compiled.model.row_soft.any():
+        told = (
+            ", ".join(f"{count} of joint {name!r}" for name, count in counted.redundant.items()) or "with rigid bodies"
+        )
+        raise ModelError(
+            f"kinematics: {counted.n_redundant_rigid} constraints repeat others ({told}), so that reactions are not "
+            'unique; replace a joint by one that holds less, or share the load: redundant = "minimum-norm"'
+        )
+    return elasticity(compiled, work, state, t)
+
+
+def moved_on(
+    compiled: CompiledSystem, work: Work, now: Instant, t: float, elasticity: Elasticity, guard: SingularityGuard
+) -> Instant:
+    """Return the motion at time t, reached from the last one in parts in which no body turns far."""
+    model = compiled.model
+    begin, done, n = now.t, 0.0, now.n_iterations
+    parts = 0
+    while done < 1.0:
+        rest = t - now.t
+        x = rest * now.state.u + 0.5 * rest**2 * now.u_dot
+        turn = max(float(np.linalg.norm(x[u0 + 3 : u0 + 6])) for u0 in model.u0[:-1])
+        part = min(1.0, LARGEST_TURN / turn) if turn > 0 else 1.0
+        h = rest * part
+        after = t if part == 1.0 else now.t + h
+        guess = displaced(model, now.state, h * now.state.u + 0.5 * h**2 * now.u_dot)
+        last = now.t
+        now = elasticity(compiled, work, guess, after)
+        guard.check(now, last)
+        n += now.n_iterations
+        done = 1.0 if after == t else (after - begin) / (t - begin)
+        parts += 1
+        if parts > MOST_PARTS:
+            raise ConvergenceError(
+                f"kinematics: the way from t = {begin:g} to {t:g} has more than {MOST_PARTS} parts in which a body "
+                f"turns by {LARGEST_TURN} rad; give more times, or look for a singular position",
+                t=now.t,
+                h=h,
+                residual=0.0,
+            )
+    return replace(now, n_iterations=n)
+
+
+def observed(compiled: CompiledSystem, work: Work, now: Instant) -> tuple[Rows, Array]:
+    """Return the row of results of an instant and the power of loads and dampers at it, (2,)."""
+    from floatframe.kernels.entry import observe_state
+
+    state = now.state
+    work.time[0] = now.t
+    memory = Memory(
+        state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), now.u_dot.copy(), now.u_dot.copy(),
+        now.w.copy(), np.zeros(2), np.zeros(2),
+    )  # fmt: skip
+    rows = observe_state(compiled.model, work, memory, now.t)
+    return rows, memory.power.copy()

@@ -1,0 +1,196 @@
+"""The commands for driven systems: kinematics, inverse."""
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import guarded, output_path, print_table, say, stages
+
+if TYPE_CHECKING:
+    from cms.units import Units
+    from floatframe.joint_results import CoordinateMotion
+    from floatframe.system import System
+    from floatframe.trajectory import Trajectory
+
+__all__ = ["register"]
+
+SystemArgument = Annotated[Path, typer.Argument(help="System file (TOML) whose drives decide the motion.")]
+Json = Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an application."""
+    app.command("kinematics")(kinematics_command)
+    app.command("inverse")(inverse_command)
+
+
+@guarded
+def kinematics_command(
+    system: SystemArgument,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file to write.")] = None,
+    elastic: Annotated[
+        str, typer.Option(help="Flexible bodies: frozen (keep their shape) or quasi-static (no vibrations).")
+    ] = "frozen",
+    json: Json = False,
+) -> None:
+    """Positions, velocities and accelerations of a fully driven system, without integrating its motion.
+
+    The prescribed motions of the file must decide where everything is; what they leave free is named. Times are those
+    of the results of a run: t_end, h and output_every of [run]. The results, crank.kinematics.h5 for crank.toml, are
+    as those of a run, for plot, animate and export.
+
+    Example: floatframe kinematics crank.toml
+    """
+    model, motion, path = driven_motion(system, output, ".kinematics.h5", elastic)
+    record = coordinates_record(model, motion)
+    if json:
+        typer.echo(json_module.dumps(record | {"results": str(path)}, indent=2))
+        return
+    print_coordinates(record)
+    say(f"{record['n_times']} times from {record['t_first']:g} to {record['t_last']:g} {model.units.time_symbol}")
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+@guarded
+def inverse_command(
+    system: SystemArgument,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file to write.")] = None,
+    elastic: Annotated[
+        str, typer.Option(help="Flexible bodies: quasi-static (no vibrations), frozen, or dynamic (integrated).")
+    ] = "quasi-static",
+    json: Json = False,
+) -> None:
+    """Inverse dynamics: the forces and torques that drives must give along their motion, and the joint reactions.
+
+    Times are those of the results of a run: t_end, h and output_every of [run]. With --elastic dynamic the motion is
+    integrated as by floatframe run, vibrations included.
+
+    Example: floatframe inverse crank.toml
+
+    Example: floatframe inverse robot.toml --elastic dynamic --json
+    """
+    import numpy as np
+
+    model, motion, path = driven_motion(system, output, ".inverse.h5", elastic)
+    record = coordinates_record(model, motion)
+    record["reactions"] = {
+        name: {
+            "largest_force": float(np.linalg.norm(motion.reaction(name).force, axis=1).max()),
+            "largest_moment": float(np.linalg.norm(motion.reaction(name).moment, axis=1).max()),
+        }
+        for name in motion.connection_names
+    }
+    if json:
+        typer.echo(json_module.dumps(record | {"results": str(path)}, indent=2))
+        return
+    units = model.units
+    force, moment = units.force_symbol, f"{units.force_symbol} {units.length_symbol}"
+    ranges = ("force_least", "force_greatest", "force_rms")
+    print_table(
+        "Drives",
+        ("coordinate", "unit", "least>", "greatest>", "rms>", f"greatest power [{moment}/{units.time_symbol}]>"),
+        [
+            (name, drive["force_unit"], *(f"{drive[key]:.6g}" for key in ranges), f"{drive['power_greatest']:.6g}")
+            for name, drive in record["coordinates"].items()
+            if drive["is_driven"]
+        ],
+    )  # fmt: skip
+    print_table(
+        "Joints and springs: largest over time",
+        ("", f"force [{force}]>", f"moment [{moment}]>"),
+        [(name, f"{r['largest_force']:.6g}", f"{r['largest_moment']:.6g}") for name, r in record["reactions"].items()],
+    )
+    say(f"{record['n_times']} times from {record['t_first']:g} to {record['t_last']:g} {units.time_symbol}")
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) -> "tuple[System, Trajectory, Path]":
+    """Compute the motion that the drives of a system file decide; return system, motion and where it was written."""
+    import numpy as np
+
+    from cms.words import nearest
+    from floatframe.analyses.driven_motion import ELASTICITY
+    from floatframe.analyses.kinematics import kinematics
+    from floatframe.errors import ModelError, ResultsError
+    from floatframe.integration import integrate
+    from floatframe.system_file import read_system
+
+    choices = [*ELASTICITY, *(["dynamic"] if suffix == ".inverse.h5" else [])]
+    if elastic not in choices:
+        raise ModelError(f"--elastic {elastic}: expected one of {', '.join(choices)}{nearest(elastic, choices)}")
+    model, run = read_system(file)
+    path = output_path(output, file.with_suffix(suffix), ResultsError, overwrite_of=(file,))
+    with stages(remaining=True) as clock, clock(f"{model.name}: motion of the drives") as advance:
+        if elastic == "dynamic":
+            motion = integrate(
+                model, run.integrator, run.t_end, run.h, output=path, output_every=run.output_every,
+                progress=lambda p: advance(p.n_steps / p.n_total),
+            )  # fmt: skip
+        else:
+            n = max(1, round(run.t_end / (run.h * run.output_every)))
+            motion = kinematics(
+                model, np.linspace(0.0, run.t_end, n + 1), elasticity=ELASTICITY[elastic], output=path,
+                progress=lambda done, all_: advance(done / all_),
+            )  # fmt: skip
+    return model, motion, path
+
+
+def coordinates_record(system: "System", motion: "Trajectory") -> dict[str, Any]:
+    """Return ranges of all joint coordinates, and forces of the driven ones, in plain types."""
+    from floatframe.analyses.joint_rates import driven_coordinates
+    from floatframe.joint_results import joint_coordinates
+
+    driven = driven_coordinates(system)
+    return {
+        "system": system.name,
+        "units": system.units.name,
+        "n_times": len(motion.t),
+        "t_first": float(motion.t[0]),
+        "t_last": float(motion.t[-1]),
+        "coordinates": {
+            name: coordinate_record(coordinate, name in driven, system.units)
+            for name, coordinate in joint_coordinates(system, motion).items()
+        },
+    }
+
+
+def coordinate_record(coordinate: "CoordinateMotion", is_driven: bool, units: "Units") -> dict[str, Any]:
+    """Return the range of one coordinate and its rate; with its force if it is driven."""
+    import numpy as np
+
+    value, rate, force = coordinate.value, coordinate.rate, coordinate.force
+    record: dict[str, Any] = {
+        "is_driven": is_driven,
+        "unit": "rad" if coordinate.is_angle else units.length_symbol,
+        "least": float(value.min()),
+        "greatest": float(value.max()),
+        "rate_least": float(rate.min()),
+        "rate_greatest": float(rate.max()),
+    }
+    if is_driven:
+        record |= {
+            "force_unit": f"{units.force_symbol} {units.length_symbol}" if coordinate.is_angle else units.force_symbol,
+            "force_least": float(force.min()),
+            "force_greatest": float(force.max()),
+            "force_rms": float(np.sqrt((force**2).mean())),
+            "power_greatest": float((force * rate).max()),
+        }
+    return record
+
+
+def print_coordinates(record: dict[str, Any]) -> None:
+    """Print the ranges of the joint coordinates."""
+    from cms.units import unit_system
+
+    second = unit_system(record["units"]).time_symbol
+    print_table(
+        "Joint coordinates",
+        ("coordinate", "unit", "least>", "greatest>", f"least rate [1/{second}]>", f"greatest rate [1/{second}]>", ""),
+        [
+            (name, c["unit"], *(f"{c[key]:.6g}" for key in ("least", "greatest", "rate_least", "rate_greatest")),
+             "driven" if c["is_driven"] else "")
+            for name, c in record["coordinates"].items()
+        ],
+    )  # fmt: skip
