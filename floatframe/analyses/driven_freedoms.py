@@ -78,7 +78,7 @@ class SingularityGuard:
     def __init__(self, compiled: CompiledSystem, now: Instant) -> None:
         """Begin at an instant; `ConvergenceError` if it is singular."""
         self.compiled = compiled
-        self.kept = ~dependent_rows(scaled_rows(compiled, now.G))  #: rows that do not repeat others
+        self.kept = np.logical_not(dependent_rows(scaled_rows(compiled, now.G)))  #: rows that do not repeat others
         self.sign = 0.0
         self.check(now, now.t)
 

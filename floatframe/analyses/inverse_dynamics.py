@@ -11,6 +11,7 @@ way, `drive_forces(system, integrate(system, ...))` has the drive forces with th
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from cms.arrays import Array
 from floatframe.analyses.driven_motion import Elasticity, quasi_static_bodies
@@ -84,12 +85,7 @@ def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> Syste
     for name in drives:
         if name not in driven:
             raise ModelError(f"with_motors: {name!r} is not driven; driven are {', '.join(driven) or 'none'}")
-    joints = [
-        replace(joint, motions={c: f for c, f in joint.motions.items() if f"{joint.name}.{c}" not in drives})
-        if getattr(joint, "motions", None)
-        else joint
-        for joint in system.joints
-    ]
+    joints = [released(joint, drives) for joint in system.joints]
     motors = [
         JointForce(
             f"motor of {name}", name.rpartition(".")[0], name.rpartition(".")[2], motor=table(drive.t, drive.force)
@@ -97,3 +93,11 @@ def with_motors(system: System, drives: Mapping[str, CoordinateMotion]) -> Syste
         for name, drive in drives.items()
     ]
     return replace(system, joints=joints, forces=[*system.forces, *motors])
+
+
+def released(joint: Any, drives: Mapping[str, CoordinateMotion]) -> Any:
+    """Return a joint without its prescribed motions that are among the drives."""
+    motions = getattr(joint, "motions", None)
+    if not motions:
+        return joint
+    return replace(joint, motions={c: f for c, f in motions.items() if f"{joint.name}.{c}" not in drives})
