@@ -1,6 +1,7 @@
 """The type of the arrays in kernels: contiguous, owned by Python, indexed from zero up.
 
-It is numba's array type with its own code for single numbers: no test for negative indices, no counted references.
+It is numba's array type with its own code for numbers and parts: no test for negative indices or for the end of a
+slice that is given, no counted references, and as argument no more than the address and the shape.
 Kernels must not index from the end.
 """
 
@@ -12,14 +13,15 @@ from numba.core.datamodel import models
 from numba.extending import lower_builtin, register_model
 from numba.np.arrayobj import getitem_array_tuple, getitem_arraynd_intp, setitem_array
 
-__all__ = ["Block"]
+__all__ = ["Block", "make_block"]
 
-DATA, SHAPE = 4, 5  # places in numba's structure of an array
+N_ITEMS, ITEM_SIZE, DATA, SHAPE, STRIDES = 2, 3, 4, 5, 6  # places in numba's structure of an array
 WORD = ir.IntType(64)
+BYTES = 8  # of a number
 
 
 class Block(types.Array):
-    """A contiguous array of numbers in C order."""
+    """A contiguous array of numbers of eight bytes in C order."""
 
     def __init__(self, dtype, ndim):
         super().__init__(dtype, ndim, "C", name=f"block({dtype}, {ndim}d)")
@@ -31,24 +33,67 @@ class Block(types.Array):
         return super().copy(dtype, ndim, layout, readonly)
 
 
-register_model(Block)(models.ArrayModel)
+@register_model(Block)
+class BlockModel(models.ArrayModel):
+    """numba's structure of an array; as argument the address and the shape."""
+
+    def get_argument_type(self):
+        """Return the types of the parts of an argument."""
+        return self._models[DATA].get_argument_type(), (WORD,) * self._fe_type.ndim
+
+    def as_argument(self, builder, value):
+        """Return the parts of an argument."""
+        shape = tuple(builder.extract_value(value, (SHAPE, k)) for k in range(self._fe_type.ndim))
+        return builder.extract_value(value, DATA), shape
+
+    def from_argument(self, builder, value):
+        """Return the structure from the parts of an argument."""
+        return assemble(builder, self.get_value_type(), value[0], value[1])
 
 
-def pointer_to(context, builder, block, value, kinds, indices):
-    """Return the place of one number."""
+def assemble(builder, structure, data, shape):
+    """Return the structure of an array from its address and shape, with strides and number of items."""
+    n = len(shape)
+    known = [ir.Constant(part, ir.Undefined) for part in structure.elements]
+    known[0], known[1] = (ir.Constant(part, None) for part in structure.elements[:2])
+    known[ITEM_SIZE] = WORD(BYTES)
+    strides = [ir.Constant(WORD, ir.Undefined)] * (n - 1) + [WORD(BYTES)]
+    known[STRIDES] = ir.Constant(structure.elements[STRIDES], strides)
+    value = builder.insert_value(ir.Constant(structure, known), data, DATA)
+    n_items = None
+    for k in range(n - 1, -1, -1):
+        value = builder.insert_value(value, shape[k], (SHAPE, k))
+        n_items = shape[k] if n_items is None else builder.mul(n_items, shape[k])
+        if k > 0:
+            value = builder.insert_value(value, builder.mul(n_items, WORD(BYTES)), (STRIDES, k - 1))
+    return builder.insert_value(value, n_items, N_ITEMS)
+
+
+def make_block(context, builder, kind, data, shape):
+    """Return the value of type `kind` at an address, of a shape."""
+    return assemble(builder, context.get_value_type(kind), data, shape)
+
+
+def shape_of(builder, block, value):
+    """Return the numbers of the shape."""
+    return [builder.extract_value(value, (SHAPE, k)) for k in range(block.ndim)]
+
+
+def offset_of(context, builder, block, value, kinds, indices):
+    """Return how many numbers stand before that at the indices; missing indices are zero."""
     offset = None
-    for k, (kind, index) in enumerate(zip(kinds, indices, strict=True)):
-        index = context.cast(builder, index, kind, types.intp)
-        if offset is None:
-            offset = index
-        else:
-            offset = builder.add(builder.mul(offset, builder.extract_value(value, (SHAPE, k))), index)
+    for k in range(block.ndim):
+        if offset is not None:
+            offset = builder.mul(offset, builder.extract_value(value, (SHAPE, k)))
+        if k < len(kinds):
+            index = context.cast(builder, indices[k], kinds[k], types.intp)
+            offset = index if offset is None else builder.add(offset, index)
+    return offset
+
+
+def place(builder, value, offset):
+    """Return the address of the number at an offset."""
     return builder.gep(builder.extract_value(value, DATA), [offset], inbounds=True)
-
-
-def is_number(block, kinds):
-    """Whether an index of these types denotes one number."""
-    return len(kinds) == block.ndim and all(isinstance(kind, types.Integer) for kind in kinds)
 
 
 def parts_of(builder, kind, index):
@@ -58,14 +103,46 @@ def parts_of(builder, kind, index):
     return (kind,), [index]
 
 
+def is_number(block, kinds):
+    """Whether an index of these types denotes one number."""
+    return len(kinds) == block.ndim and all(isinstance(kind, types.Integer) for kind in kinds)
+
+
+def is_part(kinds):
+    """Whether an index of these types denotes a contiguous part: numbers, then at most one slice."""
+    last = kinds[-1]
+    is_slice = isinstance(last, types.SliceType) and not last.has_step
+    return all(isinstance(kind, types.Integer) for kind in kinds[:-1]) and (is_slice or isinstance(last, types.Integer))
+
+
+def get_part(context, builder, signature, value, kinds, indices):
+    """Return the part of a block that an index denotes."""
+    block, part = signature.args[0], signature.return_type
+    shape = shape_of(builder, block, value)
+    rest = shape[len(kinds) :]
+    kinds, indices = list(kinds), list(indices)
+    if isinstance(kinds[-1], types.SliceType):
+        first, end = (builder.extract_value(indices[-1], k) for k in range(2))
+        n = shape[len(kinds) - 1]
+        end = builder.select(builder.icmp_signed("<", end, n), end, n)  # a missing end is the largest integer
+        rest.insert(0, builder.sub(end, first))
+        kinds[-1], indices[-1] = types.intp, first
+    offset = offset_of(context, builder, block, value, kinds, indices)
+    return make_block(context, builder, part, place(builder, value, offset), rest)
+
+
 @lower_builtin(operator.getitem, Block, types.Integer)
+@lower_builtin(operator.getitem, Block, types.SliceType)
 @lower_builtin(operator.getitem, Block, types.BaseTuple)
 def get_item(context, builder, signature, arguments):
-    """Return one number, or a part as numba does it."""
+    """Return one number or a contiguous part; what else there is as numba does it."""
     block, kind = signature.args
     kinds, indices = parts_of(builder, kind, arguments[1])
     if is_number(block, kinds):
-        return builder.load(pointer_to(context, builder, block, arguments[0], kinds, indices))
+        offset = offset_of(context, builder, block, arguments[0], kinds, indices)
+        return builder.load(place(builder, arguments[0], offset))
+    if is_part(kinds):
+        return get_part(context, builder, signature, arguments[0], kinds, indices)
     plain = getitem_array_tuple if isinstance(kind, types.BaseTuple) else getitem_arraynd_intp
     return plain(context, builder, signature, arguments)
 
@@ -79,5 +156,23 @@ def set_item(context, builder, signature, arguments):
     if not is_number(block, kinds):
         return setitem_array(context, builder, signature, arguments)
     value = context.cast(builder, arguments[2], of_value, block.dtype)
-    builder.store(value, pointer_to(context, builder, block, arguments[0], kinds, indices))
+    offset = offset_of(context, builder, block, arguments[0], kinds, indices)
+    builder.store(value, place(builder, arguments[0], offset))
     return context.get_dummy_value()
+
+
+@lower_builtin("array.reshape", Block, types.BaseTuple)
+def reshape(context, builder, signature, arguments):
+    """Return the same numbers in another shape; that their number is the same is not tested."""
+    kinds, shape = parts_of(builder, signature.args[1], arguments[1])
+    shape = [context.cast(builder, n, kind, types.intp) for n, kind in zip(shape, kinds, strict=True)]
+    data = builder.extract_value(arguments[0], DATA)
+    return make_block(context, builder, signature.return_type, data, shape)
+
+
+@lower_builtin("array.reshape", Block, types.Integer)
+def flatten(context, builder, signature, arguments):
+    """Return the same numbers as a vector."""
+    shape = [context.cast(builder, arguments[1], signature.args[1], types.intp)]
+    data = builder.extract_value(arguments[0], DATA)
+    return make_block(context, builder, signature.return_type, data, shape)

@@ -1,21 +1,37 @@
 """How kernels are compiled: inner functions to intermediate code only, which an entry optimises once, all together.
 
 Left alone, numba optimises each function and makes machine code of it, and optimises everything below it once more
-with each caller; it also looks up what an operator means for numbers at every single place. Both are three quarters
-of the time of a compilation. Inner functions are never called from Python and own no memory, so that here
+with each caller; it also looks up what an operator means for numbers at every single place, and looks in each function
+for closures, generators, parallel loops and array expressions. All this is three quarters of the time of a
+compilation. Inner functions are never called from Python and own no memory, so that here
 
 (1) the library of an inner function stops before optimisation and machine code;
 (2) the library of an entry links all of them and is optimised once;
-(3) while an entry is compiled, the meaning of an operator or built-in function for given types is looked up once.
+(3) while an entry is compiled, the meaning of an operator or built-in function for given types is looked up once, and
+    Python does not look for garbage;
+(4) the passes of numba are those that kernels need: no closures, no lists, no array expressions, no `raise`;
+(5) variables and calls become lean code of LLVM, see kernels/lowering.py.
 """
 
+import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from numba import njit
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.typed_passes import (
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
 from numba.core.types.functions import BaseFunction
+from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
+
+from floatframe.kernels.lowering import KernelContext, KernelLower
 
 __all__ = ["entry", "inner", "view"]
 
@@ -96,31 +112,74 @@ def remembered_calls() -> Iterator[None]:
         BaseFunction.get_call_type = plain  # type: ignore[method-assign]
 
 
-class KernelCompiler(CompilerBase):
-    """The pipeline of numba."""
+@contextmanager
+def without_garbage_collection() -> Iterator[None]:
+    """(3): do not walk through the hundreds of thousands of objects of a compilation again and again."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):
+    """Lowering of an inner function (5)."""
+
+    _name = "kernel_lowering"
+
+    @property
+    def lowering_class(self):
+        """The lowering for kernels."""
+        return KernelLower
+
+
+def pipeline(state, lowering):
+    """Return the passes that kernels need (4)."""
+    manager = PassManager("kernel")
+    if state.func_ir is None:
+        manager.add_pass(TranslateByteCode, "read the byte code")
+        manager.add_pass(FixupArgs, "arguments")
+    manager.add_pass(IRProcessing, "intermediate code")
+    manager.add_pass(GenericRewrites, "constant indices and powers")
+    manager.add_pass(ReconstructSSA, "one assignment a variable")
+    manager.add_pass(NopythonTypeInference, "types")
+    manager.add_pass(PreLowerStripPhis, "no phi nodes")
+    manager.add_pass(IRLegalization, "legal code")
+    manager.add_pass(lowering, "code of LLVM")
+    manager.add_pass(NoPythonBackend, "result")
+    manager.finalize()
+    return manager
+
+
+class InnerCompiler(CompilerBase):
+    """The pipeline of an inner function."""
 
     def define_pipelines(self):
         """Return the one pipeline."""
-        return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
-
-
-class InnerCompiler(KernelCompiler):
-    """The pipeline of an inner function."""
+        return [pipeline(self.state, KernelLowering)]
 
     def compile_extra(self, func):
         """Compile into an `InnerLibrary`."""
+        self.state.targetctx = KernelContext.of(self.state.targetctx)
         self.state.library = InnerLibrary(self.state.targetctx.codegen(), func.__qualname__)
         return super().compile_extra(func)
 
 
-class EntryCompiler(KernelCompiler):
+class EntryCompiler(CompilerBase):
     """The pipeline of an entry."""
+
+    def define_pipelines(self):
+        """Return the one pipeline."""
+        return [pipeline(self.state, NativeLowering)]
 
     def compile_extra(self, func):
         """Compile into an `EntryLibrary`."""
         self.state.library = EntryLibrary(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
-        with remembered_calls():
+        with remembered_calls(), without_garbage_collection():
             return super().compile_extra(func)
 
 

@@ -12,10 +12,10 @@ from numba.core import cgutils
 from numba.core.datamodel import models
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
-from numba.np.arrayobj import make_array, populate_array
+from numba.np.arrayobj import make_array
 
 from cms.arrays import IntArray
-from floatframe.kernels.block import Block
+from floatframe.kernels.block import Block, make_block
 from floatframe.kernels.model import Memory, Model, Rows, Work
 
 __all__ = ["as_memory", "as_model", "as_rows", "as_work", "table_of"]
@@ -67,17 +67,11 @@ def get_field(context, builder, structure, pointer, name):
     table = builder.bitcast(pointer, WORD.as_pointer())
     words = []
     for k in range(1 + kind.ndim):
-        word = builder.load(cgutils.gep_inbounds(builder, table, place + k))
+        word = builder.load(builder.gep(table, [WORD(place + k)], inbounds=True))
         word.set_metadata("invariant.load", builder.module.add_metadata([]))
         words.append(word)
-    array = make_array(kind)(context, builder)
-    item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
-    shape, strides = words[1:], [WORD(item)]
-    for n in reversed(shape[1:]):
-        strides.insert(0, builder.mul(strides[0], n))
     data = builder.inttoptr(words[0], context.get_data_type(kind.dtype).as_pointer())
-    populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
-    return array._getvalue()
+    return make_block(context, builder, kind, data, words[1:])
 
 
 def converter(kind):
