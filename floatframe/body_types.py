@@ -1,6 +1,7 @@
 """Types of bodies as flat arrays: instances of one reduced body share one."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from cms.reduced_body import ReducedBody
 from floatframe.flexible_body import FlexibleBody
 from floatframe.kernels.model import N_BLOCKS
 from floatframe.rigid_body import RigidBody
+from floatframe.stiffening import stiffened_shape_moments
 from floatframe.system import Body
 
 __all__ = ["body_n_q", "body_types", "integers", "offsets", "stacked", "type_arrays"]
@@ -36,15 +38,21 @@ def body_n_q(body: Body) -> int:
 
 
 def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], IntArray]:
-    """Return the distinct bodies, instances of one reduced body counted once, and the type of each body."""
+    """Return the distinct bodies, instances of one reduced body counted once, and the type of each body.
+
+    A reduced body that is not stiffened comes without its geometric stiffness.
+    """
     types: list[RigidBody | ReducedBody] = []
-    kind = []
+    kind, keys = [], []
     for body in bodies:
         data = body.reduced if isinstance(body, FlexibleBody) else body
-        known = [k for k, other in enumerate(types) if other is data]
-        if not known:
+        key = id(data), isinstance(body, FlexibleBody) and body.is_stiffened
+        if key not in keys:
+            keys.append(key)
+            if isinstance(data, ReducedBody) and data.geometric is not None and not key[1]:
+                data = replace(data, geometric=None)
             types.append(data)
-        kind.append(known[0] if known else len(types) - 1)
+        kind.append(keys.index(key))
     return types, integers(kind)
 
 
@@ -53,6 +61,7 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> dict[str, Any]:
     blocks: list[Array] = []
     block0 = np.zeros((len(types), N_BLOCKS), np.int64)
     is_diagonal = np.ones((len(types), 3), np.int64)
+    is_stiffened = np.zeros(len(types), np.int64)
     mass, S, J0 = [], [], []
     n = 0
     for t, body in enumerate(types):
@@ -69,13 +78,22 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> dict[str, Any]:
         for k, matrix in enumerate((body.M, body.K, body.D)):
             is_diagonal[t, k] = int(not np.any(matrix - np.diag(np.diag(matrix))))
             square.append(np.diag(matrix) if is_diagonal[t, k] else matrix)
+        S_kl = moments.S_kl
+        unit_loads: list[Array] = []
+        if body.geometric is not None and body.n_q > 0:
+            is_stiffened[t] = 1
+            S_kl = stiffened_shape_moments(S_kl, body.geometric)
+            unit_loads = [
+                np.moveaxis(K, 2, 0) for K in (body.geometric.translation, body.geometric.rotation)
+            ]  # [l, a, k]
         parts = [
             moments.C1,
             moments.C2,
             np.moveaxis(moments.C3, 0, 2),
-            np.moveaxis(moments.S_kl, 3, 0),  # [l, a, b, k]
+            np.moveaxis(S_kl, 3, 0),  # [l, a, b, k]
             np.transpose(moments.C4, (1, 2, 0)),  # [l, a, k]
             *square,
+            *unit_loads,
         ]
         for k, part in enumerate(parts):
             block0[t, k] = n
@@ -88,4 +106,5 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> dict[str, Any]:
         "blocks": np.concatenate([*blocks, np.zeros(0)]),
         "block0": block0,
         "is_diagonal": is_diagonal,
+        "is_stiffened": is_stiffened,
     }

@@ -13,7 +13,15 @@ from floatframe.force_data import Functions, body_load_arrays, joint_force_array
 from floatframe.forces import Gravity, JointForce, PointForce, SpringDamper
 from floatframe.joints.rows import DOT, MOMENT, NO_MOMENT, POINT, SLIDE, SPRING, Row
 from floatframe.kernels.model import Model
-from floatframe.marker_data import MarkerData, find_marker, joint_markers, marker_pose, marker_shapes, n_q_of
+from floatframe.marker_data import (
+    MarkerData,
+    find_marker,
+    joint_markers,
+    marker_bending,
+    marker_pose,
+    marker_shapes,
+    n_q_of,
+)
 from floatframe.mass_checks import require_inertia
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
@@ -121,6 +129,7 @@ def compile_system(system: System) -> CompiledSystem:
     m_x0 = np.zeros(len(markers), np.int64)
     m_x0[ends] = np.cumsum([0] + [6 + int(n_q[markers[m].body]) for m in ends])[:-1]
     psi0, psi = marker_shapes(markers)
+    bend0, bend = marker_bending(markers)
     connection_of_marker = integers(connection_of)
     model = Model(
         kind=kind,
@@ -135,6 +144,8 @@ def compile_system(system: System) -> CompiledSystem:
         m_triad=stacked([m.triad for m in markers], (3, 3)),
         m_psi0=psi0,
         psi=psi,
+        m_bend0=bend0,
+        bend=bend,
         m_connection=connection_of_marker,
         m_sign=np.array(sign, dtype=float),
         m_moment=integers(moment),

@@ -1,6 +1,7 @@
 """A flexible body: a reduced body (modal file) with a place and a motion at the start."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -37,6 +38,8 @@ class FlexibleBody:
     q: Array = field(default_factory=lambda: np.zeros(0))  #: modal coordinates at the start, (n_q,); empty: undeformed
     q_dot: Array = field(default_factory=lambda: np.zeros(0))  #: their rates, (n_q,); empty: zero
     source: str = ""  #: path of the modal file, for the record and the animation
+    #: whether the geometric stiffness counts: loads stiffen or soften the body (THEORY §7); "auto": if it is there
+    stiffening: bool | Literal["auto"] = "auto"
 
     def __post_init__(self) -> None:
         where = f"flexible body {self.name!r}"
@@ -48,8 +51,21 @@ class FlexibleBody:
         for name in ("q", "q_dot"):
             value = getattr(self, name) if np.size(getattr(self, name)) else np.zeros(n)
             put(self, name, array_of_shape(f"{where}: {name}", value, (n,)))
+        if not (isinstance(self.stiffening, bool) or self.stiffening == "auto"):
+            raise ModelError(f"{where}: stiffening: expected true, false or 'auto', got {self.stiffening!r}")
+        if self.stiffening is True and self.reduced.geometric is None:
+            raise ModelError(
+                f"{where}: stiffening is asked for, but the reduced body {self.reduced.name!r} holds no geometric "
+                "stiffness; reduce it anew with geometric stiffness from a body with an element model, or leave "
+                "stiffening out"
+            )
         if self.reduced.moments.m <= 0:
             raise ModelError(f"{where}: expected a mass above zero, got {self.reduced.moments.m:g}")
+
+    @property
+    def is_stiffened(self) -> bool:
+        """Whether the geometric stiffness of the reduced body counts."""
+        return self.stiffening is not False and self.reduced.geometric is not None
 
     @property
     def frame_orientation(self) -> Array:

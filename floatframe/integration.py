@@ -262,6 +262,7 @@ def head_of(system: System, integrator: GeneralizedAlpha, t_start: float, t_end:
                 int(compiled.model.u0[i]),
                 source,
                 digest_of(source),
+                isinstance(body, FlexibleBody) and body.is_stiffened,
             )
         )
     try:

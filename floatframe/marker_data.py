@@ -14,9 +14,10 @@ from floatframe.joints import Joint
 from floatframe.markers import Marker, body_name
 from floatframe.rotations import rotation_exp, rotation_matrix
 from floatframe.state import State
+from floatframe.stiffening import bending_of
 from floatframe.system import System
 
-__all__ = ["MarkerData", "find_marker", "joint_markers", "marker_pose", "marker_shapes", "n_q_of"]
+__all__ = ["MarkerData", "find_marker", "joint_markers", "marker_bending", "marker_pose", "marker_shapes", "n_q_of"]
 
 GROUND_INDEX = -1
 
@@ -29,6 +30,7 @@ class MarkerData:
     position: Array  #: undeformed, body frame, (3,)
     triad: Array  #: undeformed axes as columns, body frame, (3, 3)
     psi: Array | None = None  #: (6, n_q)
+    bend: Array | None = None  #: K_P of a stiffened body, (6, n_q, n_q)
 
 
 def n_q_of(system: System) -> IntArray:
@@ -73,7 +75,8 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
             f"{nearest(marker.interface, choices)}"
         )
     interface = body.reduced.interface(marker.interface)
-    return MarkerData(index, interface.position, interface.triad @ triad, interface.Psi)
+    bend = bending_of(body.reduced, marker.interface) if body.is_stiffened else None
+    return MarkerData(index, interface.position, interface.triad @ triad, interface.Psi, bend)
 
 
 def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerData, MarkerData]:
@@ -121,7 +124,10 @@ def marker_pose(marker: MarkerData, state: State, n_q: IntArray) -> tuple[Array,
     position, triad = marker.position, marker.triad
     if marker.psi is not None:
         q0 = offsets(n_q)
-        d = marker.psi @ state.q[q0[marker.body] : q0[marker.body + 1]]
+        q = state.q[q0[marker.body] : q0[marker.body + 1]]
+        d = marker.psi @ q
+        if marker.bend is not None:
+            d = d - 0.5 * marker.bend @ q @ q
         position, triad = position + d[:3], rotation_exp(d[3:]) @ triad
     return state.r[marker.body] + R @ position, R @ triad
 
@@ -134,4 +140,20 @@ def marker_shapes(markers: list[MarkerData]) -> tuple[IntArray, Array]:
         if marker.psi is not None:
             parts.append(np.ascontiguousarray(marker.psi, dtype=float).ravel())
             n += marker.psi.size
+    return integers(start), np.concatenate([*parts, np.zeros(0)])
+
+
+def marker_bending(markers: list[MarkerData]) -> tuple[IntArray, Array]:
+    """Return where K_P [l, 6, k] of each marker begins (-1 for none), and all of them, flat; one interface has one."""
+    start, known, parts, n = [], {}, [], 0
+    for marker in markers:
+        if marker.bend is None or marker.bend.size == 0:
+            start.append(-1)
+            continue
+        key = marker.bend.__array_interface__["data"][0], marker.bend.shape
+        if key not in known:
+            known[key] = n
+            parts.append(np.ascontiguousarray(np.moveaxis(marker.bend, 2, 0)).ravel())
+            n += marker.bend.size
+        start.append(known[key])
     return integers(start), np.concatenate([*parts, np.zeros(0)])

@@ -6,6 +6,7 @@ from cms.arrays import Array
 from cms.reduced_body import ReducedBody
 from floatframe.errors import ResultsError
 from floatframe.rotations import rotation_matrix
+from floatframe.stiffening import interface_deformation
 from floatframe.trajectory import Trajectory
 
 __all__ = ["elastic_displacements", "interface_positions", "nodal_positions", "point_positions"]
@@ -40,15 +41,20 @@ def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody
 def interface_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
     """Return positions of the reference point of an interface over time, ground axes, (n_t, 3) [m]."""
     require_same_modes(trajectory, body_name, reduced)
-    place = reduced.interface(interface)
     motion = trajectory.body(body_name)
-    return at_points(motion.r, motion.p, place.position + motion.q @ place.Psi[:3].T)
+    d = elastic_displacements(trajectory, body_name, reduced, interface)
+    return at_points(motion.r, motion.p, reduced.interface(interface).position + d)
 
 
 def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
-    """Return the displacement of an interface in the body frame over time, Psi q, (n_t, 3) [m]."""
+    """Return the displacement of an interface in the body frame over time, (n_t, 3) [m].
+
+    Psi q, and of a stiffened body with the part of second order, such as the shortening of a bent rod.
+    """
     require_same_modes(trajectory, body_name, reduced)
-    return np.asarray(trajectory.body(body_name).q @ reduced.interface(interface).Psi[:3].T)
+    _, entry = trajectory.entry(body_name)
+    q = trajectory.body(body_name).q
+    return interface_deformation(reduced, interface, q, is_stiffened=entry.is_stiffened)[:, :3]
 
 
 def point_positions(trajectory: Trajectory, body_name: str, point: Array) -> Array:

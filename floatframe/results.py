@@ -64,6 +64,7 @@ class BodyEntry:
     u0: int  #: first column in u
     source: str = ""  #: path of the modal file; "" for rigid bodies and bodies made in memory
     digest: str = ""  #: of that file
+    is_stiffened: bool = False  #: whether its geometric stiffness counts
 
 
 @dataclass(frozen=True)

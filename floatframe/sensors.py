@@ -1,6 +1,6 @@
 """What is measured on a motion: place, velocity and acceleration of an interface or point, angles, stress.
 
-With rho = c + Psi_t q, all in body axes, and R = R_GB:
+With rho = c + Psi_t q (and the part of second order of a stiffened body), all in body axes, and R = R_GB:
 
     position      r + R rho                         acceleration  v_dot + R (alpha × rho + omega × (omega × rho)
     velocity      v + R (omega × rho + rho_dot)                          + 2 omega × rho_dot + rho_ddot)
@@ -16,6 +16,7 @@ from cms.stress_modes import von_mises
 from floatframe.errors import ResultsError
 from floatframe.recovery import require_same_modes
 from floatframe.rotations import right_jacobian, rotation_exp, rotation_matrix
+from floatframe.stiffening import interface_deformation, interface_deformation_rates
 from floatframe.trajectory import BodyMotion, Trajectory
 
 __all__ = ["PlaceMotion", "interface_motion", "largest_von_mises", "nodal_stress", "point_motion", "rotation_angle"]
@@ -46,18 +47,14 @@ def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, in
     require_same_modes(trajectory, body, reduced)
     place = reduced.interface(interface)
     motion = trajectory.body(body)
-    Psi_t, Psi_r = np.asarray(place.Psi[:3]), np.asarray(place.Psi[3:])
-    angle = motion.q @ Psi_r.T
-    turned = np.array([rotation_exp(theta) for theta in angle])
-    spin = np.einsum("tba,tb->ta", np.array([right_jacobian(theta) for theta in angle]), motion.q_dot @ Psi_r.T)
-    return _moved(
-        motion,
-        place.position + motion.q @ Psi_t.T,
-        motion.q_dot @ Psi_t.T,
-        motion.q_ddot @ Psi_t.T,
-        turned @ place.triad,
-        spin,
+    is_stiffened = trajectory.entry(body)[1].is_stiffened
+    d = interface_deformation(reduced, interface, motion.q, is_stiffened=is_stiffened)
+    d_dot, d_ddot = interface_deformation_rates(
+        reduced, interface, motion.q, motion.q_dot, motion.q_ddot, is_stiffened=is_stiffened
     )
+    turned = np.array([rotation_exp(theta) for theta in d[:, 3:]])
+    spin = np.einsum("tba,tb->ta", np.array([right_jacobian(theta) for theta in d[:, 3:]]), d_dot[:, 3:])
+    return _moved(motion, place.position + d[:, :3], d_dot[:, :3], d_ddot[:, :3], turned @ place.triad, spin)
 
 
 def point_motion(trajectory: Trajectory, body: str, point: Array | tuple[float, float, float]) -> PlaceMotion:

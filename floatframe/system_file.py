@@ -113,6 +113,7 @@ class BodySection(Table):
     euler_parameters: Parameters4 | None = Field(None, description="Euler parameters of length 1, [w, x, y, z]")
     velocity: Vector3 = Field((0.0, 0.0, 0.0), description="the velocity of the body (mesh) origin, [x, y, z]")
     omega_B: Vector3 = Field((0.0, 0.0, 0.0), description="the angular velocity in body (mesh) axes, [x, y, z]")  # noqa: N815
+    stiffening: bool | None = Field(None, description="true or false: whether geometric stiffness of the file counts")
 
     @field_validator("file", mode="before")
     @classmethod
@@ -134,6 +135,8 @@ class BodySection(Table):
             raise ValueError("inertia: missing; a rigid body needs mass and inertia")
         if self.file is not None and (self.inertia is not None or self.center_of_mass is not None):
             raise ValueError("a flexible body has its inertia in its file; remove inertia and center_of_mass")
+        if self.mass is not None and self.stiffening is not None:
+            raise ValueError("stiffening: a rigid body has none; remove it")
         if self.rotation_vector is not None and self.euler_parameters is not None:
             raise ValueError("expected either rotation_vector or euler_parameters, got both")
         return self
@@ -332,6 +335,7 @@ def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody], uni
         if reduced.units != units:
             log.warning("%s is in units %s: converted to those of the system, %s", section.file, reduced.units.name,
                         units.name)  # fmt: skip
+    motion["stiffening"] = "auto" if section.stiffening is None else section.stiffening
     return FlexibleBody(name, files[section.file], source=str(section.file.resolve()), **motion)
 
 

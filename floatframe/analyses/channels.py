@@ -61,11 +61,16 @@ def marker_jacobian(compiled: CompiledSystem, work: Work, data: MarkerData) -> A
     n = int(model.n_q[i])
     q = work.q[int(model.q0[i]) : int(model.q0[i + 1])]
     R = work.R[i]
-    rho = data.position if data.psi is None else data.position + data.psi[:3] @ q
+    if data.psi is None:
+        rho, psi, angle = data.position, None, np.zeros(3)
+    else:
+        psi = data.psi if data.bend is None else data.psi - data.bend @ q
+        d = 0.5 * (data.psi + psi) @ q
+        rho, angle = data.position + d[:3], d[3:]
     J = np.zeros((6, 6 + n))
     J[:3, :3] = J[3:, 3:6] = np.eye(3)
     J[:3, 3:6] = -tilde(rho)
-    if data.psi is not None:
-        J[:3, 6:] = data.psi[:3]
-        J[3:, 6:] = right_jacobian(data.psi[3:] @ q).T @ data.psi[3:]  # rotation of E in body axes before E
+    if psi is not None:
+        J[:3, 6:] = psi[:3]
+        J[3:, 6:] = right_jacobian(angle).T @ psi[3:]  # rotation of E in body axes before E
     return np.kron(np.eye(2), R) @ J

@@ -1,24 +1,27 @@
-"""Equations of motion of one body, complete in the deformation (THEORY §6), and their tangent.
+"""Equations of motion of one body, complete in the deformation (THEORY §6, §7), and their tangent.
 
 Components in body axes; a: acceleration of the frame origin minus gravity, alpha: angular acceleration. From
-W_ab = S_ab q and s = S + 1C q:
+W_ab = S_ab q, 1C(q) = 1C + K_t q, s = S + 1C q + 1/2 qᵀ K_t q (K_t, K_r: zero unless stiffened):
 
     D_k    = 3C_k + delta_ab Σ_c W_cc,k - W_ab,k               (= 3C_k + Σ_l 5C_lk q_l)
     B_k    = 2C_k + (W_zy - W_yz, W_xz - W_zx, W_yx - W_xy)_k  (= 2C_k + Σ_l 4C_kl q_l)
-    J      = J0 + C + Cᵀ + E,  C = Σ q_k 3C_k,  E_ab = delta_ab Σ_c q·W_cc - q·W_ab
+    J      = J0 + C + Cᵀ + (E + Eᵀ)/2,  C = Σ q_k 3C_k,  E_ab = delta_ab Σ_c q·W_cc - q·W_ab
     Y_k    = Σ_l 4C_kl q_dot_l
-    (1) m a + alpha × s + 1C q_ddot + 2 omega × (1C q_dot) + omega × (omega × s)                     = f
-    (2) s × a + J alpha + Σ B_k q_ddot_k + 2 (Σ q_dot_k D_k) omega + omega × (J omega)               = tau
-    (3) 1C_k·a + B_k·alpha + (M q_ddot)_k + 2 Y_k·omega - omegaᵀ D_k omega + (D q_dot + K q)_k       = h_k
+    (1) m a + alpha × s + 1C(q) q_ddot + q_dotᵀK_t q_dot + 2 omega × (1C(q) q_dot) + omega × (omega × s)  = f
+    (2) s × a + J alpha + Σ B_k q_ddot_k + q_dotᵀK_r q_dot + 2 (Σ q_dot_k D_k) omega + omega × (J omega)  = tau
+    (3) 1C_k(q)·a + B_k·alpha + (M q_ddot)_k + 2 Y_k·omega - omegaᵀ D_k omega + (D q_dot + K q)_k         = h_k
 
-One pass over S_ab (9 n² numbers) and one over 4C (3 n²) carry the cost.
+The matrices K_ab and K_r of a stiffened body are part of its S_ab (`floatframe.stiffening`), so that B, D and J hold
+them as they are written here. One pass over S_ab (9 n² numbers), one over 4C (3 n²), and over K_t, K_r (6 n²) carry
+the cost.
 """
 
 from floatframe.kernels.compilation import inner, view
-from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, MASS, S_AB, STIFFNESS
+from floatframe.kernels.dense import add_products
+from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.kernels.rotation import cross
 
-__all__ = ["body_forces", "body_mass_product", "body_tangent", "first_moment", "modal_term"]
+__all__ = ["body_forces", "body_mass_product", "body_tangent", "modal_term"]
 
 
 @view
@@ -46,36 +49,50 @@ def modal_term(model, i, which, x, out):
 
 
 @inner
-def first_moment(model, i, q):
-    """Return s = S + 1C q as three numbers."""
-    t, n = model.kind[i], model.n_q[i]
-    s0, s1, s2 = model.S[t, 0], model.S[t, 1], model.S[t, 2]
-    if n > 0:
-        c1 = block(model, i, C1, 3 * n)
+def first_moments(model, work, i):
+    """Write s(q) and 1C(q) = ds/dq into `work`, and K_t q_dot, K_r q_dot of a stiffened body."""
+    t, n, q0, u0 = model.kind[i], model.n_q[i], model.q0[i], model.u0[i]
+    s = work.first[i]
+    s[0], s[1], s[2] = model.S[t, 0], model.S[t, 1], model.S[t, 2]
+    if n == 0:
+        return
+    own = block(model, i, C1, 3 * n)
+    first = work.C1[3 * q0 : 3 * (q0 + n)]
+    for j in range(3 * n):
+        first[j] = own[j]
+    q = work.q[q0 : q0 + n]
+    if model.is_stiffened[t]:
+        qd = work.u[u0 + 6 : u0 + 6 + n]
+        K_t = block(model, i, K_TRANSLATION, 3 * n * n)
+        K_r = block(model, i, K_ROTATION, 3 * n * n)
+        first_dot, turn_dot = work.C1_dot[3 * q0 : 3 * (q0 + n)], work.R_dot[3 * q0 : 3 * (q0 + n)]
+        for j in range(3 * n):
+            first_dot[j] = 0.0
+            turn_dot[j] = 0.0
+        add_products(K_t, q, first)
+        add_products(K_t, qd, first_dot)
+        add_products(K_r, qd, turn_dot)
+    for a in range(3):
+        total = 0.0
         for k in range(n):
-            s0 += c1[k] * q[k]
-            s1 += c1[n + k] * q[k]
-            s2 += c1[2 * n + k] * q[k]
-    return s0, s1, s2
+            total += (own[a * n + k] + first[a * n + k]) * q[k]
+        s[a] += 0.5 * total
 
 
 @inner
-def shape_moment(model, i, x):
-    """Return 1C x as three numbers."""
-    n = model.n_q[i]
+def sum_over_modes(columns, n, x):
+    """Return Σ columns[a, k] x_k as three numbers."""
     s0, s1, s2 = 0.0, 0.0, 0.0
-    if n > 0:
-        c1 = block(model, i, C1, 3 * n)
-        for k in range(n):
-            s0 += c1[k] * x[k]
-            s1 += c1[n + k] * x[k]
-            s2 += c1[2 * n + k] * x[k]
+    for k in range(n):
+        s0 += columns[k] * x[k]
+        s1 += columns[n + k] * x[k]
+        s2 += columns[2 * n + k] * x[k]
     return s0, s1, s2
 
 
 @inner
 def body_forces(model, work, i):
-    """Write the left sides of (1) to (3) of body i into `work.residual`, and W, Y, J, D_q_dot into their places."""
+    """Write the left sides of (1) to (3) of body i into `work.residual`, and s, 1C, W, Y, J, D_q_dot into `work`."""
     t, n, u0, q0 = model.kind[i], model.n_q[i], model.u0[i], model.q0[i]
     R, g = work.R[i], model.gravity
     ud, u = work.u_dot, work.u
@@ -96,7 +113,8 @@ def body_forces(model, work, i):
         for b in range(3):
             J[a, b] = model.J0[t, a, b]
             Dd[a, b] = 0.0
-    s0, s1, s2 = first_moment(model, i, q)
+    first_moments(model, work, i)
+    s0, s1, s2 = work.first[i, 0], work.first[i, 1], work.first[i, 2]
     res = work.residual[u0 : u0 + 6 + n]
     t0, t1, t2 = 0.0, 0.0, 0.0
     f0, f1, f2 = 0.0, 0.0, 0.0
@@ -105,7 +123,7 @@ def body_forces(model, work, i):
         Y = work.Y[3 * q0 : 3 * (q0 + n)]
         products(model, i, q, qd, W, Y)
         c2 = block(model, i, C2, 3 * n)
-        c1 = block(model, i, C1, 3 * n)
+        c1 = work.C1[3 * q0 : 3 * (q0 + n)]
         c3 = block(model, i, C3, 9 * n)
         h = res[6:]
         for k in range(n):
@@ -138,8 +156,8 @@ def body_forces(model, work, i):
                     total_C += q[k] * c3[o + k]
                     total_E += q[k] * W[o + k]
                 Dd[a, b] += total
-                J[a, b] += total_C - total_E
-                J[b, a] += total_C
+                J[a, b] += total_C - 0.5 * total_E
+                J[b, a] += total_C - 0.5 * total_E
         square = o0 * o0 + o1 * o1 + o2 * o2
         trace, trace_dot = 0.0, 0.0
         for k in range(n):
@@ -153,12 +171,17 @@ def body_forces(model, work, i):
         modal_term(model, i, MASS, qdd, h)
         modal_term(model, i, DAMPING, qd, h)
         modal_term(model, i, STIFFNESS, q, h)
-        v0, v1, v2 = shape_moment(model, i, qd)
-        w0, w1, w2 = shape_moment(model, i, qdd)
+        v0, v1, v2 = sum_over_modes(c1, n, qd)
+        w0, w1, w2 = sum_over_modes(c1, n, qdd)
         f0, f1, f2 = cross(2 * o0, 2 * o1, 2 * o2, v0, v1, v2)
         f0 += w0
         f1 += w1
         f2 += w2
+        if model.is_stiffened[t]:
+            w0, w1, w2 = sum_over_modes(work.C1_dot[3 * q0 : 3 * (q0 + n)], n, qd)
+            f0, f1, f2 = f0 + w0, f1 + w1, f2 + w2
+            w0, w1, w2 = sum_over_modes(work.R_dot[3 * q0 : 3 * (q0 + n)], n, qd)
+            t0, t1, t2 = t0 + w0, t1 + w1, t2 + w2
         for b in range(3):
             ob = 2 * u[u0 + 3 + b]
             t0 += Dd[0, b] * ob
@@ -185,7 +208,7 @@ def body_forces(model, work, i):
 
 @inner
 def products(model, i, q, qd, W, Y):
-    """Write W_ab = S_ab q and Y = 4C q_dot; the inner loops run over contiguous numbers."""
+    """Write W_ab = S_ab q and Y = 4C q_dot."""
     n = model.n_q[i]
     S = block(model, i, S_AB, 9 * n * n)
     A = block(model, i, C4, 3 * n * n)
@@ -193,14 +216,8 @@ def products(model, i, q, qd, W, Y):
         W[j] = 0.0
     for j in range(3 * n):
         Y[j] = 0.0
-    for k in range(n):
-        x, y = q[k], qd[k]
-        row = S[9 * n * k : 9 * n * (k + 1)]
-        for j in range(9 * n):
-            W[j] += row[j] * x
-        row = A[3 * n * k : 3 * n * (k + 1)]
-        for j in range(3 * n):
-            Y[j] += row[j] * y
+    add_products(S, q, W)
+    add_products(A, qd, Y)
 
 
 @inner
@@ -211,11 +228,11 @@ def body_mass_product(model, work, i, v, out):
     """
     t, n, q0 = model.kind[i], model.n_q[i], model.q0[i]
     J, m = work.J[i], model.mass[t]
-    q = work.q[q0 : q0 + n]
-    s0, s1, s2 = first_moment(model, i, q)
+    s0, s1, s2 = work.first[i, 0], work.first[i, 1], work.first[i, 2]
+    first = work.C1[3 * q0 : 3 * (q0 + n)]
     x0, x1, x2 = cross(v[3], v[4], v[5], s0, s1, s2)
     y0, y1, y2 = cross(s0, s1, s2, v[0], v[1], v[2])
-    c0, c1, c2 = shape_moment(model, i, v[6:])
+    c0, c1, c2 = sum_over_modes(first, n, v[6:])
     out[0] = m * v[0] + x0 + c0
     out[1] = m * v[1] + x1 + c1
     out[2] = m * v[2] + x2 + c2
@@ -224,7 +241,6 @@ def body_mass_product(model, work, i, v, out):
     out[5] = y2 + J[2, 0] * v[3] + J[2, 1] * v[4] + J[2, 2] * v[5]
     if n > 0:
         W = work.W[9 * q0 : 9 * (q0 + n)]
-        first = block(model, i, C1, 3 * n)
         second = block(model, i, C2, 3 * n)
         for k in range(n):
             B0 = second[k] + W[7 * n + k] - W[5 * n + k]
@@ -274,12 +290,11 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     u, J, Dd = work.u, work.J[i], work.D_q_dot[i]
     a0, a1, a2 = work.a_B[i, 0], work.a_B[i, 1], work.a_B[i, 2]
     o0, o1, o2 = u[u0 + 3], u[u0 + 4], u[u0 + 5]
-    q = work.q[q0 : q0 + n]
     qd = u[u0 + 6 : u0 + 6 + n]
     H[:, :] = 0.0
     turn[:, :] = 0.0
-    s0, s1, s2 = first_moment(model, i, q)
-    v0, v1, v2 = shape_moment(model, i, qd)
+    s0, s1, s2 = work.first[i, 0], work.first[i, 1], work.first[i, 2]
+    v0, v1, v2 = sum_over_modes(work.C1[3 * q0 : 3 * (q0 + n)], n, qd)
     # by a
     for k in range(3):
         H[k, k] = c_m * m
@@ -350,7 +365,7 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     n, q0, u0 = model.n_q[i], model.q0[i], model.u0[i]
     W = work.W[9 * q0 : 9 * (q0 + n)]
     Y = work.Y[3 * q0 : 3 * (q0 + n)]
-    c1 = block(model, i, C1, 3 * n)
+    c1 = work.C1[3 * q0 : 3 * (q0 + n)]
     c2 = block(model, i, C2, 3 * n)
     c3 = block(model, i, C3, 9 * n)
     a0, a1, a2 = work.a_B[i, 0], work.a_B[i, 1], work.a_B[i, 2]
@@ -391,6 +406,8 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
         row[5] = c_m * b2 + c_d * (2 * Y[2 * n + k] - j2)
         turn[6 + k, 0], turn[6 + k, 1], turn[6 + k, 2] = v0, v1, v2
     modal_columns(model, work, i, c_d, c_k, H)
+    if model.is_stiffened[model.kind[i]]:
+        stiffened_columns(model, work, i, c_d, c_k, H)
     modal_block(model, i, MASS, c_m, H)
     modal_block(model, i, DAMPING, c_d, H)
     modal_block(model, i, STIFFNESS, c_k, H)
@@ -400,7 +417,8 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
 def modal_columns(model, work, i, c_d, c_k, H):
     """Add what needs products over 4C and S_ab: the modal block, and the rest of (2) by q.
 
-    2 4C_kj·omega, 4C_kj·alpha - omegaᵀ 5C_jk omega; Σ_k 4C_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega.
+    2 4C_kj·omega, B'_kj·alpha - omegaᵀ 5C_jk omega; Σ_k B'_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega, where B'_kj is the
+    derivative of B_k by q_j: 4C_kj, and K_r,kj of a stiffened body; both are in S_ab.
     """
     n, u0 = model.n_q[i], model.u0[i]
     S = block(model, i, S_AB, 9 * n * n)
@@ -409,11 +427,16 @@ def modal_columns(model, work, i, c_d, c_k, H):
     qdd = work.u_dot[u0 + 6 : u0 + 6 + n]
     o, weight = work.u[u0 + 3 : u0 + 6], work.scratch[:9]
     e = work.u_dot[u0 + 3 : u0 + 6]
-    f0, f1, f2 = 2 * c_d * o[0] + c_k * e[0], 2 * c_d * o[1] + c_k * e[1], 2 * c_d * o[2] + c_k * e[2]
+    # alpha·B'_jk = alpha·B'_kj - 2 alpha·4C_kj, the former by S_ab
+    f0, f1, f2 = 2 * (c_d * o[0] + c_k * e[0]), 2 * (c_d * o[1] + c_k * e[1]), 2 * (c_d * o[2] + c_k * e[2])
     square = o[0] * o[0] + o[1] * o[1] + o[2] * o[2]
     for a in range(3):  # omegaᵀ 5C omega = Σ weight_ab S_ab
         for b in range(3):
             weight[3 * a + b] = -c_k * ((square if a == b else 0.0) - o[a] * o[b])
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        weight[3 * c + b] += c_k * e[a]
+        weight[3 * b + c] -= c_k * e[a]
     for j in range(n):
         row4 = A[3 * n * j : 3 * n * (j + 1)]  # 4C_kj over [a, k]
         rows = S[9 * n * j : 9 * n * (j + 1)]  # ∫ phi_a,k phi_b,j over [ab, k]
@@ -430,14 +453,39 @@ def modal_columns(model, work, i, c_d, c_k, H):
                 trace += rows[4 * r * n + k] * qd[k]
         for r in range(3):
             total = 2 * trace * o[r]
+            plus, minus = 3 * ((r + 2) % 3) + (r + 1) % 3, 3 * ((r + 1) % 3) + (r + 2) % 3
             for k in range(n):
-                total += row4[r * n + k] * qdd[k]
+                total += (rows[plus * n + k] - rows[minus * n + k]) * qdd[k]
             for b in range(3):
                 product = 0.0
                 for k in range(n):
                     product += rows[(3 * r + b) * n + k] * qd[k]
                 total -= 2 * product * o[b]
             H[3 + r, 6 + j] += c_k * total
+
+
+@inner
+def stiffened_columns(model, work, i, c_d, c_k, H):
+    """Add what K_t gives beyond s(q) and 1C(q), and the derivatives of q_dotᵀK_t q_dot, q_dotᵀK_r q_dot."""
+    n, q0, u0 = model.n_q[i], model.q0[i], model.u0[i]
+    K_t = block(model, i, K_TRANSLATION, 3 * n * n)
+    first_dot, turn_dot = work.C1_dot[3 * q0 : 3 * (q0 + n)], work.R_dot[3 * q0 : 3 * (q0 + n)]
+    qdd = work.u_dot[u0 + 6 : u0 + 6 + n]
+    a0, a1, a2 = c_k * work.a_B[i, 0], c_k * work.a_B[i, 1], c_k * work.a_B[i, 2]
+    o0, o1, o2 = work.u[u0 + 3], work.u[u0 + 4], work.u[u0 + 5]
+    for j in range(n):
+        row = K_t[3 * n * j : 3 * n * (j + 1)]  # over [a, k]
+        out = H[6 + j, 6:]
+        for k in range(n):
+            out[k] += a0 * row[k] + a1 * row[n + k] + a2 * row[2 * n + k]
+        x0, x1, x2 = first_dot[j], first_dot[n + j], first_dot[2 * n + j]
+        y0, y1, y2 = sum_over_modes(row, n, qdd)
+        z0, z1, z2 = cross(o0, o1, o2, x0, x1, x2)
+        H[0, 6 + j] += 2 * c_d * x0 + c_k * (y0 + 2 * z0)
+        H[1, 6 + j] += 2 * c_d * x1 + c_k * (y1 + 2 * z1)
+        H[2, 6 + j] += 2 * c_d * x2 + c_k * (y2 + 2 * z2)
+        for a in range(3):
+            H[3 + a, 6 + j] += 2 * c_d * turn_dot[a * n + j]
 
 
 @inner

@@ -2,7 +2,24 @@
 
 from floatframe.kernels.compilation import inner
 
-__all__ = ["lu_factor", "lu_solve", "lu_solve_columns"]
+__all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns"]
+
+
+@inner
+def add_products(A, x, out):
+    """Add Σ_k A[k, j] x_k to out_j, A flat with rows as long as out; four rows at once."""
+    n, width = x.shape[0], out.shape[0]
+    for k in range(0, n - 3, 4):
+        o = k * width
+        r0, r1 = A[o : o + width], A[o + width : o + 2 * width]
+        r2, r3 = A[o + 2 * width : o + 3 * width], A[o + 3 * width : o + 4 * width]
+        x0, x1, x2, x3 = x[k], x[k + 1], x[k + 2], x[k + 3]
+        for j in range(width):
+            out[j] += (r0[j] * x0 + r1[j] * x1) + (r2[j] * x2 + r3[j] * x3)
+    for k in range(n - n % 4, n):
+        row, y = A[k * width : (k + 1) * width], x[k]
+        for j in range(width):
+            out[j] += row[j] * y
 
 
 @inner

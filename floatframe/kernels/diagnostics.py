@@ -3,7 +3,7 @@
 import math
 
 from floatframe.joints.rows import DISTANCE, DOT, POINT, PUSH, SCREW, SLIDE, TURN, TWIST
-from floatframe.kernels.body import body_mass_product, first_moment, modal_term
+from floatframe.kernels.body import body_mass_product, modal_term
 from floatframe.kernels.compilation import inner
 from floatframe.kernels.connection import loaded_axis, loaded_coordinate, normal_force, row_rate, spring_tension
 from floatframe.kernels.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
@@ -60,8 +60,7 @@ def diagnose(model, work, out, drift):
         out[8] += l1 + x1
         out[9] += l2 + x2
         q = work.q[q0 : q0 + n]
-        s0, s1, s2 = first_moment(model, i, q)
-        s0, s1, s2 = rotate(R, s0, s1, s2)
+        s0, s1, s2 = rotate(R, work.first[i, 0], work.first[i, 1], work.first[i, 2])
         out[2] -= g[0] * (m * r0 + s0) + g[1] * (m * r1 + s1) + g[2] * (m * r2 + s2)
         if n > 0:
             out[1] += 0.5 * quadratic(model, work, i, STIFFNESS, q)

@@ -1,14 +1,16 @@
 """Motion of a marker from that of its body, and the way of a wrench on the marker back to the body.
 
-With rho = c + Psi_t q, th = Psi_r q, E = exp(th), T' = left Jacobian at th, nu = T' th_dot, all in body axes:
+With [rho - c; th] = Psi q - 1/2 qᵀ K_P q (K_P, (6, n, n): zero unless the body is stiffened), Psi(q) = Psi - K_P q its
+derivative (t: rows of rho, r: rows of th), E = exp(th), T' = left Jacobian at th, nu = T' th_dot, all in body axes:
 
     position     r + R rho                        velocity          v + R (omega × rho + rho_dot)
     axes         R E triad                        angular velocity  R (omega + nu)
-    variation    dr_P = R (dx + dphi × rho + Psi_t dq),  dphi_P = R (dphi + T' Psi_r dq)
-    wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_tᵀ f + (T' Psi_r)ᵀ m
+    variation    dr_P = R (dx + dphi × rho + Psi_t(q) dq),  dphi_P = R (dphi + T' Psi_r(q) dq)
+    wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_t(q)ᵀ f + (T' Psi_r(q))ᵀ m
 """
 
 from floatframe.kernels.compilation import inner
+from floatframe.kernels.dense import add_products
 from floatframe.kernels.rotation import cross, exp_matrix, left_jacobian, left_jacobian_derivative
 
 __all__ = ["marker_acceleration_bias", "marker_columns", "marker_motion", "marker_stiffness", "wrench_to_body"]
@@ -81,15 +83,25 @@ def marker_motion(model, work, m):
 def elastic_motion(model, work, m, i):
     """Add the elastic displacement to rho and write elastic rotation, rates and the left Jacobian."""
     n, q0, u0, o = model.n_q[i], model.q0[i], model.u0[i], model.m_psi0[m]
+    is_bent = model.m_bend0[m] >= 0
+    if is_bent:
+        bent_shapes(model, work, m, i)
     for a in range(3):
         d, d_dot, th, th_dot = 0.0, 0.0, 0.0, 0.0
-        t = model.psi[o + a * n : o + (a + 1) * n]
-        r = model.psi[o + (a + 3) * n : o + (a + 4) * n]
-        for k in range(n):
-            d += t[k] * work.q[q0 + k]
-            th += r[k] * work.q[q0 + k]
-            d_dot += t[k] * work.u[u0 + 6 + k]
-            th_dot += r[k] * work.u[u0 + 6 + k]
+        t = work.psi[o + a * n : o + (a + 1) * n]
+        r = work.psi[o + (a + 3) * n : o + (a + 4) * n]
+        if is_bent:  # Psi q - 1/2 qᵀ K_P q
+            for k in range(n):
+                d += 0.5 * (model.psi[o + a * n + k] + t[k]) * work.q[q0 + k]
+                th += 0.5 * (model.psi[o + (a + 3) * n + k] + r[k]) * work.q[q0 + k]
+                d_dot += t[k] * work.u[u0 + 6 + k]
+                th_dot += r[k] * work.u[u0 + 6 + k]
+        else:
+            for k in range(n):
+                d += t[k] * work.q[q0 + k]
+                th += r[k] * work.q[q0 + k]
+                d_dot += t[k] * work.u[u0 + 6 + k]
+                th_dot += r[k] * work.u[u0 + 6 + k]
         work.rho[m, a] += d
         work.rho_dot[m, a] = d_dot
         work.angle[m, a] = th
@@ -101,10 +113,32 @@ def elastic_motion(model, work, m, i):
 
 
 @inner
+def bent_shapes(model, work, m, i):
+    """Write Psi(q) = Psi - K_P q."""
+    n, q0, o, first = model.n_q[i], model.q0[i], model.m_psi0[m], model.m_bend0[m]
+    psi, own = work.psi[o : o + 6 * n], model.psi[o : o + 6 * n]
+    for j in range(6 * n):
+        psi[j] = -own[j]
+    add_products(model.bend[first : first + 6 * n * n], work.q[q0 : q0 + n], psi)
+    for j in range(6 * n):
+        psi[j] = -psi[j]
+
+
+@inner
+def bent_rate(model, work, m, i, out):
+    """Write K_P q_dot [6, k], minus the rate of Psi(q), into out, (6 n_q,)."""
+    n, u0, first = model.n_q[i], model.u0[i], model.m_bend0[m]
+    for j in range(6 * n):
+        out[j] = 0.0
+    add_products(model.bend[first : first + 6 * n * n], work.u[u0 + 6 : u0 + 6 + n], out)
+
+
+@inner
 def marker_acceleration_bias(model, work, m, out):
     """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot, ground axes, into out.
 
-    R (omega × (omega × rho + 2 rho_dot)) and R (omega × nu + (dT'/dth [th_dot]) th_dot).
+    R (omega × (omega × rho + 2 rho_dot) + b_t) and R (omega × nu + (dT'/dth [th_dot]) th_dot + T' b_r), where
+    b = -q_dotᵀ K_P q_dot.
     """
     out[:] = 0.0
     i = model.m_body[m]
@@ -115,14 +149,25 @@ def marker_acceleration_bias(model, work, m, out):
     rho, rho_dot = work.rho[m], work.rho_dot[m]
     x0, x1, x2 = cross(o0, o1, o2, rho[0], rho[1], rho[2])
     x0, x1, x2 = cross(o0, o1, o2, x0 + 2 * rho_dot[0], x1 + 2 * rho_dot[1], x2 + 2 * rho_dot[2])
-    out[0], out[1], out[2] = rotate(R, x0, x1, x2)
+    n = model.n_q[i]
+    bias = work.scratch[9:15]
+    for a in range(6):
+        bias[a] = 0.0
+    if model.m_bend0[m] >= 0:
+        rate = work.scratch[15 : 15 + 6 * n]
+        bent_rate(model, work, m, i, rate)
+        for a in range(6):
+            for k in range(n):
+                bias[a] -= rate[a * n + k] * work.u[u0 + 6 + k]
+    out[0], out[1], out[2] = rotate(R, x0 + bias[0], x1 + bias[1], x2 + bias[2])
     if model.m_psi0[m] >= 0:
         d, nu = work.angle_dot[m], work.spin[m]
         slope = work.scratch[:9].reshape((3, 3))
         left_jacobian_derivative(work.angle[m], d[0], d[1], d[2], 1.0, slope)
         x0, x1, x2 = cross(o0, o1, o2, nu[0], nu[1], nu[2])
         y0, y1, y2 = rotate(slope, d[0], d[1], d[2])
-        out[3], out[4], out[5] = rotate(R, x0 + y0, x1 + y1, x2 + y2)
+        z0, z1, z2 = rotate(work.T_left[m], bias[3], bias[4], bias[5])
+        out[3], out[4], out[5] = rotate(R, x0 + y0 + z0, x1 + y1 + z1, x2 + y2 + z2)
 
 
 @inner
@@ -145,7 +190,7 @@ def wrench_to_body(model, work, m):
     res[u0 + 5] -= x2 + t2
     o = model.m_psi0[m]
     if o >= 0:
-        psi = model.psi[o : o + 6 * n]
+        psi = work.psi[o : o + 6 * n]
         t0, t1, t2 = rotate_back(work.T_left[m], t0, t1, t2)
         for k in range(n):
             res[u0 + 6 + k] -= (
@@ -206,7 +251,7 @@ def marker_columns(model, work, m, rate, turning, column, row):
     slope = work.scratch[:9].reshape((3, 3))
     d = work.angle_dot[m]
     left_jacobian_derivative(work.angle[m], d[0], d[1], d[2], 1.0, slope)
-    psi = model.psi[o : o + 6 * n]
+    psi = work.psi[o : o + 6 * n]
     for k in range(n):
         p0, p1, p2 = psi[k], psi[n + k], psi[2 * n + k]
         y0, y1, y2 = psi[3 * n + k], psi[4 * n + k], psi[5 * n + k]
@@ -219,6 +264,17 @@ def marker_columns(model, work, m, rate, turning, column, row):
         row[6, 6 + k], row[7, 6 + k], row[8, 6 + k] = x0 + rate * p0, x1 + rate * p1, x2 + rate * p2
         x0, x1, x2 = rotate(slope, y0, y1, y2)
         row[9, 6 + k], row[10, 6 + k], row[11, 6 + k] = x0 + rate * t0, x1 + rate * t1, x2 + rate * t2
+    if model.m_bend0[m] >= 0:  # d(Psi(q) q_dot)/dq = -K_P q_dot
+        bent = work.scratch[9 : 9 + 6 * n]
+        bent_rate(model, work, m, i, bent)
+        for k in range(n):
+            t0, t1, t2 = rotate(work.T_left[m], bent[3 * n + k], bent[4 * n + k], bent[5 * n + k])
+            row[6, 6 + k] -= bent[k]
+            row[7, 6 + k] -= bent[n + k]
+            row[8, 6 + k] -= bent[2 * n + k]
+            row[9, 6 + k] -= t0
+            row[10, 6 + k] -= t1
+            row[11, 6 + k] -= t2
 
 
 @inner
@@ -248,8 +304,23 @@ def marker_stiffness(model, work, m, c_k, H, turn):
     o = model.m_psi0[m]
     if o < 0:
         return
-    psi = model.psi[o : o + 6 * n]
+    psi = work.psi[o : o + 6 * n]
     T = work.T_left[m]
+    if model.m_bend0[m] >= 0:  # h = Psi(q)ᵀ [f; Tᵀ m], dPsi(q) = -K_P dq
+        s0, s1, s2 = rotate_back(T, t0, t1, t2)
+        first = model.m_bend0[m]
+        for j in range(n):
+            row = model.bend[first + 6 * n * j : first + 6 * n * (j + 1)]
+            out = H[6 + j, 6:]
+            for k in range(n):
+                out[k] += c_k * (
+                    f0 * row[k]
+                    + f1 * row[n + k]
+                    + f2 * row[2 * n + k]
+                    + s0 * row[3 * n + k]
+                    + s1 * row[4 * n + k]
+                    + s2 * row[5 * n + k]
+                )
     slope = work.scratch[:9].reshape((3, 3))
     left_jacobian_derivative(work.angle[m], t0, t1, t2, -1.0, slope)
     for j in range(n):

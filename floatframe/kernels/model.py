@@ -18,6 +18,8 @@ __all__ = [
     "C3",
     "C4",
     "DAMPING",
+    "K_ROTATION",
+    "K_TRANSLATION",
     "MASS",
     "N_BLOCKS",
     "N_DIAGNOSTICS",
@@ -33,8 +35,8 @@ __all__ = [
     "new_work",
 ]
 
-C1, C2, C3, S_AB, C4, MASS, STIFFNESS, DAMPING = range(8)  #: columns of `Model.block0`
-N_BLOCKS = 8
+C1, C2, C3, S_AB, C4, MASS, STIFFNESS, DAMPING, K_TRANSLATION, K_ROTATION = range(10)  #: columns of `Model.block0`
+N_BLOCKS = 10
 N_W = 9  #: most components of the wrench of a connection
 N_DIAGNOSTICS = 12  #: kinetic, strain, gravity, springs, linear momentum (3), angular about the origin (3), work (2)
 N_DRIFTS = 4  #: of a joint: distance, angle, their rates
@@ -53,9 +55,12 @@ class Model(NamedTuple):
     mass: Array  #: (n_t,)
     S: Array  #: first moment, (n_t, 3)
     J0: Array  #: inertia about the frame origin, undeformed, (n_t, 3, 3)
-    blocks: Array  #: C1 [a,k], C2 [a,k], C3 [ab,k], S_ab [l,ab,k], C4 [l,a,k], M, K, D of all types, flat
+    #: C1 [a,k], C2 [a,k], C3 [ab,k], S_ab [l,ab,k], C4 [l,a,k], M, K, D; of stiffened types (whose S_ab hold more, see
+    #: stiffening.py) K_t [l,a,k], K_r [l,a,k]; of all types, flat
+    blocks: Array
     block0: IntArray  #: where they begin, (n_t, N_BLOCKS)
     is_diagonal: IntArray  #: whether M, K, D are held as diagonals, (n_t, 3)
+    is_stiffened: IntArray  #: whether geometric stiffness counts, (n_t,)
     gravity: Array  #: (3,)
     # markers; those of connections first in the list of their body
     m_body: IntArray  #: body, -1 for the ground, (n_m,)
@@ -63,6 +68,8 @@ class Model(NamedTuple):
     m_triad: Array  #: undeformed axes, body frame, (n_m, 3, 3)
     m_psi0: IntArray  #: where Psi [6, n_q] begins in `psi`, -1 for none, (n_m,)
     psi: Array
+    m_bend0: IntArray  #: where K_P [l, 6, k] begins in `bend`, -1 for none, (n_m,)
+    bend: Array
     m_connection: IntArray  #: connection of which it is an end, -1 for none, (n_m,)
     m_sign: Array  #: +1 at end A, -1 at end B: sign of the wrench, (n_m,)
     m_moment: IntArray  #: where the moment on it begins in the wrench of its connection, -1 for none, (n_m,)
@@ -136,14 +143,19 @@ class Work(NamedTuple):
     J: Array  #: J(q), (n_b, 3, 3)
     turning: Array  #: right Jacobian at theta: rotation of the body by its unknown, (n_b, 3, 3)
     D_q_dot: Array  #: Σ q_dot_k D_k, (n_b, 3, 3)
+    first: Array  #: s(q), (n_b, 3)
+    C1: Array  #: 1C(q) = ds/dq [a, k] of each body, (3 n_q,)
+    C1_dot: Array  #: K_t q_dot [a, k] of stiffened bodies, (3 n_q,)
+    R_dot: Array  #: K_r q_dot [a, k] of stiffened bodies, (3 n_q,)
     W: Array  #: S_ab q [ab, k] of each body, (9 n_q,)
     Y: Array  #: Σ_l 4C_kl q_dot_l [a, k] of each body, (3 n_q,)
     residual: Array  #: inertia and elastic minus applied and reaction forces, body axes, (n_u,)
     # markers
+    psi: Array  #: derivative of displacement and rotation by q, laid out as `Model.psi`
     rho: Array  #: from the frame origin, body axes, (n_m, 3)
     rho_dot: Array  #: its rate in the body, (n_m, 3)
     T_left: Array  #: left Jacobian at the elastic rotation, body axes, (n_m, 3, 3)
-    angle: Array  #: elastic rotation vector Psi_r q, (n_m, 3)
+    angle: Array  #: elastic rotation vector, (n_m, 3)
     angle_dot: Array  #: (n_m, 3)
     spin: Array  #: T_left angle_dot, body axes, (n_m, 3)
     m_r: Array  #: position, ground axes, (n_m, 3)
@@ -198,9 +210,14 @@ def new_work(model: Model) -> Work:
         J=zeros(n_b, 3, 3),
         turning=zeros(n_b, 3, 3),
         D_q_dot=zeros(n_b, 3, 3),
+        first=zeros(n_b, 3),
+        C1=zeros(3 * n_q),
+        C1_dot=zeros(3 * n_q),
+        R_dot=zeros(3 * n_q),
         W=zeros(9 * n_q),
         Y=zeros(3 * n_q),
         residual=zeros(n_u),
+        psi=np.array(model.psi),
         rho=zeros(n_m, 3),
         rho_dot=zeros(n_m, 3),
         T_left=zeros(n_m, 3, 3),

@@ -1,10 +1,12 @@
 """Point-mass bodies: random masses with random shape vectors, whose every integral is a plain sum."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from cms.arrays import Array
+from cms.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
 from cms.invariants import Moments
 from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.units import unit_system
@@ -81,3 +83,46 @@ def stiffness(n_q: int, seed: int = 2, *, omega: float = 10.0) -> Array:
     """Return a random positive definite stiffness, frequencies of the order of omega for unit masses."""
     A = np.random.default_rng(seed).normal(size=(n_q, n_q))
     return omega**2 * (A @ A.T / n_q + 0.5 * np.eye(n_q))
+
+
+@dataclass(frozen=True, eq=False)
+class SecondOrder:
+    """Displacements of second order of point masses, 1/2 q_k q_l g_i,kl, and what follows from them by plain sums."""
+
+    points: PointMasses
+    g: Array  # (n_p, 3, n_q, n_q), symmetric in the modes
+
+    def geometric(self, interfaces: tuple[int, ...], seed: int = 5) -> GeometricStiffness:
+        """Return K_j = -Σ f_j·g of the unit loads; interfaces at these points, their moments random."""
+        m, c, g = self.points.m, self.points.c, self.g
+        e = np.eye(3)
+
+        def of_load(f: Array) -> Array:
+            return -np.einsum("pa,pakl->kl", f, g)
+
+        rng = np.random.default_rng(seed)
+        moments = rng.normal(size=(len(interfaces), 3, *g.shape[2:])) * np.abs(g).max()
+        spin = []
+        for a, b in SPIN_PAIRS:
+            f = np.cross(e[a], np.cross(e[b], c)) + np.cross(e[b], np.cross(e[a], c))
+            spin.append(of_load(-0.5 * m[:, None] * f))
+        return GeometricStiffness(
+            translation=np.array([of_load(-m[:, None] * e[a]) for a in range(3)]),
+            rotation=np.array([of_load(-m[:, None] * np.cross(e[a], c)) for a in range(3)]),
+            spin=np.array(spin),
+            interfaces=np.concatenate([-g[list(interfaces)], moments + np.swapaxes(moments, 2, 3)], axis=1),
+        )
+
+
+def random_second_order(points: PointMasses, seed: int = 0, *, size: float = 0.3) -> SecondOrder:
+    """Return random displacements of second order."""
+    n_q = points.phi.shape[2]
+    g = size * np.random.default_rng(seed).normal(size=(*points.c.shape, n_q, n_q))
+    return SecondOrder(points, g + np.swapaxes(g, 2, 3))
+
+
+def stiffened_body(points: PointMasses, K: Array, *, size: float = 0.3, seed: int = 0, **options: Any) -> ReducedBody:
+    """Return `reduced_body` with the geometric stiffness of random displacements of second order."""
+    body = reduced_body(points, K, **options)
+    places = tuple(int(interface.members[0]) for interface in body.interfaces)
+    return replace(body, geometric=random_second_order(points, seed, size=size).geometric(places))
