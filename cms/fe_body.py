@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from cms.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape, symmetric_csc
 from cms.errors import BodyError
 from cms.load_cases import LoadCase, check_load_cases
+from cms.mass_loads import MassLoads
 from cms.units import Units, unit_system
 from cms.words import nearest
 
@@ -21,7 +22,7 @@ INTERFACE_KINDS = ("rigid", "distributing", "nodes")
 
 
 class ElementModel(Protocol):
-    """What only the elements know: exact integrals over mass, and stress, of a displacement field."""
+    """What only the elements know of a displacement field: exact integrals over mass, stress, geometric stiffness."""
 
     @property
     def has_nodal_stress(self) -> bool:
@@ -56,6 +57,54 @@ class ElementModel(Protocol):
         -------
         Array
             (n_mesh_nodes, 6, k) [Pa], components xx, yy, zz, yz, xz, xy; zero at nodes without solid elements.
+        """
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """Whether the three functions below can be asked for; bare matrices do not know them."""
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Nodal forces of loads per mass, consistent: their work on any u is that of the loads on its field.
+
+        Returns
+        -------
+        Array
+            (n_mesh_dof, loads.k) [N, N m].
+        """
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Nodal forces that hold the displacements u: f_int = K u of the elements, without couplings.
+
+        Parameters
+        ----------
+        u
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
+        nodes
+            Whose forces are wanted; None: those of all. The others may show zero.
+
+        Returns
+        -------
+        Array
+            (n_mesh_dof, k) [N, N m].
+        """
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Return Phiᵀ K_geo(sigma_j) Phi of static states u_j, (k, n, n), symmetric, linear in the state (THEORY §7).
+
+        K_geo is the second derivative of the potential energy by the displacements at fixed stress: solids
+        ∫ sigma_ab u_c,a u_c,b. Elements with rotations take them as rotation vectors, and add the work of what acts off
+        their axis (section, offset) on the second order of the rotation, for which they need the loads. Together:
+        K_geo(sigma_j) of the rigid rotation theta, (theta × c, theta), is (theta × f, ½ theta × m) with f, m the nodal
+        forces `internal_forces` - `mass_forces`, plus ∫ (theta × load)·N over mass.
+
+        Parameters
+        ----------
+        u
+            Displacements of the static states, (n_mesh_dof, k): only their stress counts, not their rigid part.
+        loads
+            The loads per mass that act in these states.
+        Phi
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, n).
         """
 
 

@@ -72,6 +72,8 @@ class FrameCondition:
     rigid_part: Callable[[Array], Array]  #: columns (n_dof, k) -> C (6, k): what to take off as Psi_R C
     Psi_R: Array  #: rigid-body modes about the centre of mass, (n_dof, 6)
     M_Psi_R: Array  #: (n_dof, 6)
+    W: Array  #: W Psi_R, whose rows the condition is: Psi_Rᵀ W u = 0, (n_dof, 6)
+    center: Array  #: the centre of mass, which Psi_R is about, mesh axes, (3,) [m]
 
     def remove_rigid_part(self, columns: Array) -> Array:
         """Return columns - Psi_R C, which satisfy the condition of the frame, (n_dof, k)."""
@@ -102,6 +104,8 @@ def frame_condition(body: FEBody, frame: Frame) -> FrameCondition:
             lambda columns: la.cho_solve(factor, M_Psi_R.T @ columns),
             Psi_R,
             M_Psi_R,
+            M_Psi_R,
+            center,
         )
     if isinstance(frame, BuckensFrame):
         weights = node_weights(body)
@@ -109,13 +113,23 @@ def frame_condition(body: FEBody, frame: Frame) -> FrameCondition:
         W_Psi_R = weighted_rigid_modes(body, center)
         norm = la.lu_factor(W_Psi_R.T @ Psi_R)
         return FrameCondition(
-            placed("buckens", frame, middle), lambda columns: la.lu_solve(norm, W_Psi_R.T @ columns), Psi_R, M_Psi_R
+            placed("buckens", frame, middle),
+            lambda columns: la.lu_solve(norm, W_Psi_R.T @ columns),
+            Psi_R,
+            M_Psi_R,
+            W_Psi_R,
+            center,
         )
     held, rows = nodal_rows(body, frame)
     default = center if frame.at is None else body.interface(frame.at).reference
     lu = la.lu_factor(rows @ Psi_R)
     return FrameCondition(
-        placed("nodal", frame, default, held), lambda columns: la.lu_solve(lu, rows @ columns), Psi_R, M_Psi_R
+        placed("nodal", frame, default, held),
+        lambda columns: la.lu_solve(lu, rows @ columns),
+        Psi_R,
+        M_Psi_R,
+        rows.T.toarray(),
+        center,
     )
 
 

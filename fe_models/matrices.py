@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from cms.arrays import Array, IntArray
 from cms.errors import BodyError
 from cms.fe_body import FEBody, Interface, put_translations
+from cms.mass_loads import MassLoads
 from cms.units import Units, unit_system
 from cms.words import nearest
 from fe_models.errors import MeshError
@@ -50,6 +51,29 @@ class ScalarMassModel:
         raise BodyError(
             f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "
             f"(fe_models.solid.solid_body) for stresses"
+        )
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """False: matrices do not know the elements."""
+        return False
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Refuse: only an element model with geometric stiffness is asked."""
+        raise self._no_elements()
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Refuse: matrices do not know the elements."""
+        raise self._no_elements()
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Refuse: matrices do not know the elements."""
+        raise self._no_elements()
+
+    def _no_elements(self) -> BodyError:
+        return BodyError(
+            f"body {self.name!r}: it came as bare matrices, which know no geometric stiffness; build it from its mesh "
+            f"(fe_models.solid.solid_body), or reduce it without"
         )
 
 

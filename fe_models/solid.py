@@ -12,12 +12,14 @@ import scipy.sparse as sp
 from cms.arrays import Array, IntArray, frozen_int
 from cms.errors import BodyError
 from cms.fe_body import FEBody, Interface
+from cms.mass_loads import MassLoads
 from cms.threads import n_threads
 from cms.units import Units
 from fe_models.assembly import Progress, assemble, expand_scalar_mass
 from fe_models.boundary import boundary_triangles
 from fe_models.cell_shapes import cell_jacobians
 from fe_models.elements import reference_element
+from fe_models.geometric import internal_forces, projected_geometric_stiffness
 from fe_models.material import Material, assign_materials
 from fe_models.mesh import Mesh
 from fe_models.stress import nodal_stress, stiffest_at_nodes
@@ -30,7 +32,7 @@ GRAM_BYTES = 64e6  #: of one block of rows of [1, X, u] and of M_s times it
 
 @dataclass(frozen=True, eq=False)
 class SolidModel:
-    """The elements behind a solid body: exact integrals over mass, and stress (`cms.fe_body.ElementModel`)."""
+    """The elements behind a solid body (`cms.fe_body.ElementModel`): mass moments, stress, geometric stiffness."""
 
     mesh: Mesh
     materials: tuple[Material, ...]
@@ -58,6 +60,26 @@ class SolidModel:
         """
         require_rows("nodal_stress", u, 3 * len(self.mesh.nodes))
         return nodal_stress(self.mesh, self.materials, self.of_cell, self.of_node, u, nodes=nodes)
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """True: solid elements know it."""
+        return True
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Return the consistent nodal forces of loads per mass, (3 n_nodes, k): exact, the loads are linear in c."""
+        return np.asarray(self.M_s @ loads.at(self.mesh.nodes).reshape(len(self.mesh.nodes), -1)).reshape(-1, loads.k)
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return ∫ sigma grad N, (3 n_nodes, k) [N], of columns u; only at `nodes` where these are given."""
+        require_rows("internal_forces", u, 3 * len(self.mesh.nodes))
+        return internal_forces(self.mesh, self.materials, self.of_cell, u, nodes=nodes)
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); the stress alone makes it."""
+        require_rows("geometric_stiffness", u, 3 * len(self.mesh.nodes))
+        require_rows("geometric_stiffness", Phi, 3 * len(self.mesh.nodes))
+        return projected_geometric_stiffness(self.mesh, self.materials, self.of_cell, u, Phi)
 
 
 def solid_body(

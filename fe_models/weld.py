@@ -13,6 +13,7 @@ from cms.elimination import eliminate_dofs
 from cms.errors import BodyError
 from cms.fe_body import ElementModel, FEBody, Interface, Recovery, StressPointModel
 from cms.load_cases import LoadCase
+from cms.mass_loads import MassLoads
 from cms.rigid_modes import rigid_motion_of_points
 
 __all__ = ["WeldedModel", "weld"]
@@ -53,6 +54,36 @@ class WeldedModel:
                 stress[: len(own)] = own
             stresses.append(stress)
         return np.concatenate(stresses)
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """Whether all parts know it: without one of them the stiffness of the whole would be wrong."""
+        return all(part.has_geometric_stiffness for part in self.parts)
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Return the consistent nodal forces of loads per mass, (n_mesh_dof, k)."""
+        return np.concatenate([part.mass_forces(loads) for part in self.parts])
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return the nodal forces of columns u, (n_mesh_dof, k)."""
+        first = np.cumsum([0, *self.n_nodes])
+        inside = [
+            None if nodes is None else nodes[(nodes >= begin) & (nodes < begin + n)] - begin
+            for begin, n in zip(first[:-1], self.n_nodes, strict=True)
+        ]
+        return np.concatenate(
+            [
+                part.internal_forces(u[rows], nodes=own)
+                for part, rows, own in zip(self.parts, self._rows(), inside, strict=True)
+            ]
+        )
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Return the sum of Phiᵀ K_geo(sigma_j) Phi over the parts, (k, n, n)."""
+        K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
+        for part, rows in zip(self.parts, self._rows(), strict=True):
+            K += part.geometric_stiffness(u[rows], loads, Phi[rows])
+        return K
 
     def _rows(self) -> list[slice]:
         return mesh_rows(self.n_mesh_dof)

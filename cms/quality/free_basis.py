@@ -60,7 +60,12 @@ def free_basis(body: FEBody, modes: ModeSet, families: Families) -> FreeBasis:
     """
     N, M_N = families.free.N, families.free.M_N
     condition = FrameCondition(
-        BodyFrame("tisserand", np.zeros(3)), lambda columns: M_N.T @ columns, Psi_R=N, M_Psi_R=M_N
+        BodyFrame("tisserand", np.zeros(3)),
+        lambda columns: M_N.T @ columns,
+        Psi_R=N,
+        M_Psi_R=M_N,
+        W=M_N,
+        center=np.zeros(3),
     )
     finished = finish(body, modes, condition)
     is_massive = np.diag(finished.M) > 0.5

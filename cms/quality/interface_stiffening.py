@@ -8,10 +8,10 @@ from cms.arrays import Array, frozen
 from cms.couplings import couple
 from cms.families import Families
 from cms.fe_body import FEBody, Interface
+from cms.node_motion import are_spread
 from cms.quality.errors import QualityError
 from cms.quality.ports import Ports
 from cms.quality.record import QualityRecord, judge
-from cms.reduction import are_spread
 
 __all__ = ["InterfaceStiffening", "has_both_kinds", "interface_stiffening", "stiffening_record", "with_kind"]
 

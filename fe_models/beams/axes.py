@@ -20,12 +20,14 @@ class LineGeometry:
     length : (n_lines,) [m]
     R : (n_lines, 3, 3) local axes x, y, z as columns, in mesh axes
     T : (n_lines, 12, 12) local dofs of the axis ends from the dofs of the nodes
+    levers : (n_lines, 2, 3) from the nodes to the ends [m]
     """
 
     def __init__(self, ends: Array, levers: Array, R: Array) -> None:
         self.ends = ends
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         self.R = R
+        self.levers = levers
         T = np.zeros((len(R), 12, 12))
         for end in range(2):
             rows = 6 * end

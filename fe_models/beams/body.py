@@ -102,7 +102,7 @@ def beam_body(
         units=units,
         surface=n_nodes + skin.triangles,
         element_model=BeamModel(
-            n_nodes, tuple(pieces), geometry, elements.K_local, dofs_of_line, of_line, sections, skin
+            mesh.nodes, tuple(pieces), geometry, elements.K_local, dofs_of_line, of_line, sections, skin, springs
         ),
         recovery=Recovery(
             sp.vstack([sp.eye_array(6 * n_nodes), skin_rows(mesh.nodes, skin.points, skin.mover)], format="csr"),

@@ -14,9 +14,15 @@ from fe_models.beams.element import (
 from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.slices import Slices
 
-__all__ = ["Elements"]
+__all__ = ["Elements", "gauss_points"]
 
 N_GAUSS = 4  #: exact for the square of a cubic, degree 6
+
+
+def gauss_points() -> tuple[Array, Array]:
+    """Return the points of the slices, 0 to 1, and their weights, whose sum is 1."""
+    xi, weights = np.polynomial.legendre.leggauss(N_GAUSS)
+    return (xi + 1) / 2, weights / 2
 
 
 class Elements:
@@ -49,8 +55,7 @@ class Elements:
         self.moments_per_length = np.where(
             has_rotary[:, None], np.stack([zero, rho * Iz, rho * Iy], axis=1), np.stack([-polar, polar, polar], axis=1)
         )
-        xi, weights = np.polynomial.legendre.leggauss(N_GAUSS)
-        self.xi, self.weights = (xi + 1) / 2, weights / 2
+        self.xi, self.weights = gauss_points()
         self.N = interpolation(self.xi, Phi_y, Phi_z, L, shear_center)
 
     def stiffness(self) -> Array:

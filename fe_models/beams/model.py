@@ -1,13 +1,24 @@
-"""The elements behind a frame: exact integrals over mass, section forces, stress at the points of the skin."""
+"""The elements behind a frame: integrals over mass, section forces, stress at the skin, geometric stiffness."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from cms.arrays import Array, IntArray
 from cms.errors import BodyError
+from cms.mass_loads import MassLoads
+from fe_models.beams.attachments import Spring, spring_matrix
 from fe_models.beams.axes import LineGeometry
 from fe_models.beams.element import end_forces_at_centroid
+from fe_models.beams.elements import gauss_points
+from fe_models.beams.geometric import (
+    BeamLines,
+    line_geometric_stiffness,
+    point_geometric_stiffness,
+    slice_forces,
+    spring_geometric_stiffness,
+)
 from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.skin import Skin
 from fe_models.beams.slices import Slices
@@ -19,14 +30,20 @@ __all__ = ["BeamModel"]
 class BeamModel:
     """Element model of a frame (`cms.fe_body.ElementModel`); its dofs: six per node, then three per skin node."""
 
-    n_nodes: int
-    pieces: tuple[Slices, ...]
+    nodes: Array  #: of the mesh, (n_nodes, 3) [m]
+    pieces: tuple[Slices, ...]  #: of the lines if there are some, then of the point masses if there are some
     geometry: LineGeometry
     K_local: Array  #: (n_lines, 12, 12)
     dofs: IntArray  #: of the nodes of each line, (n_lines, 12)
     of_line: IntArray  #: section of each line, (n_lines,)
     sections: tuple[SectionProperties, ...]
     skin: Skin
+    springs: tuple[Spring, ...] = ()
+
+    @property
+    def n_nodes(self) -> int:
+        """Nodes of the mesh; those of the skin come after them."""
+        return len(self.nodes)
 
     @property
     def has_nodal_stress(self) -> bool:
@@ -100,6 +117,62 @@ class BeamModel:
         table = np.einsum("ncs,psf->npcf", _stress_directions(self.geometry.R[lines]), section.stress)
         n, n_points = table.shape[:2]
         return np.asarray((table.reshape(n, 6 * n_points, 6) @ about).reshape(n, n_points, 6, -1))
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """True: from section forces, masses and springs."""
+        return True
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Return the consistent forces and moments of loads per mass, (n_mesh_dof, k), couples of sections included."""
+        forces = np.zeros((self.n_mesh_dof, loads.k))
+        for piece in self.pieces:
+            np.add.at(forces, piece.dofs, slice_forces(piece, loads))
+        return forces
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return K u of lines and springs, (n_mesh_dof, k) [N, N m], at all nodes."""
+        self._require_rows("internal_forces", u)
+        forces = np.zeros(np.shape(u))
+        np.add.at(forces, self.dofs, self._node_forces(u))
+        for spring in self.springs:
+            matrix, dofs = spring_matrix(self.nodes, spring, np.asarray(spring.stiffness))
+            np.add.at(forces, dofs, matrix @ np.asarray(u)[dofs])
+        return forces
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of states u under these loads (`fe_models.beams.geometric`)."""
+        for columns in (u, Phi):
+            self._require_rows("geometric_stiffness", columns)
+        K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
+        if len(self.dofs):
+            by_nodes = self._node_forces(u) - slice_forces(self.pieces[0], loads)
+        for j in range(loads.k):
+            load = MassLoads(loads.A[j : j + 1], loads.b[j : j + 1])
+            parts = []
+            if len(self.dofs):
+                ends = by_nodes[:, :, j].reshape(-1, 2, 6)
+                parts.append((self.dofs, line_geometric_stiffness(self._lines, ends, load)))
+            parts += [(p.dofs, point_geometric_stiffness(p, load)) for p in self.pieces[1 if len(self.dofs) else 0 :]]
+            for spring in self.springs:
+                _, dofs = spring_matrix(self.nodes, spring, np.asarray(spring.stiffness))
+                parts.append((dofs[None], spring_geometric_stiffness(self.nodes, spring, np.asarray(u)[dofs, j])[None]))
+            for dofs, matrices in parts:
+                columns = np.asarray(Phi)[dofs]
+                K[j] += np.tensordot(columns, matrices @ columns, axes=([0, 1], [0, 1]))
+        return (K + K.transpose(0, 2, 1)) / 2
+
+    def _node_forces(self, u: Array) -> Array:
+        """Forces and moments on each line by its nodes, mesh axes, (n_lines, 12, k)."""
+        T = self.geometry.T
+        return np.asarray(T.transpose(0, 2, 1) @ (self.K_local @ (T @ np.asarray(u)[self.dofs])))
+
+    @cached_property
+    def _lines(self) -> BeamLines:
+        xi, weights = gauss_points()
+        radius2 = np.array([section.J_polar / section.A for section in self.sections])[self.of_line]
+        geometry = self.geometry
+        return BeamLines(self.pieces[0], xi, weights, geometry.length, geometry.R[:, :, 0], geometry.levers, radius2)
 
     def _require_rows(self, where: str, u: Array) -> None:
         if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:
