@@ -21,6 +21,7 @@ from cms.tall import combine
 __all__ = ["balanced_truncation"]
 
 FEWEST_RICH = 60  #: free modes of the rich basis, at least
+LOWER_PART = 0.6  #: of all modes of a small body, that the rich basis takes by default
 RICH_FACTOR = 3  #: free modes of the rich basis for each mode asked for
 NOTHING_LEFT = 1e-7  #: length of a residual attachment mode, of the whole one, below which it is rounding
 STIFF = 1e-12  #: compliance of a boundary dof, of the largest, below which it is rounding
@@ -62,7 +63,7 @@ def balanced_truncation(
     damping_ratio
         Modal damping that is added for the balancing alone, of critical; 1 % by default.
     n_rich
-        Free modes of the rich basis; by default 3 n_modes, but 60 at least.
+        Free modes of the rich basis; by default 3 n_modes, but 60 at least, and three fifths of all at most.
     families
         Mode families to share; made and freed here by default.
 
@@ -87,7 +88,7 @@ def balanced_truncation(
     body.require_coupled()
     require_interfaces("balanced_truncation", body)
     with families_of(body, families) as families:
-        rich = rich_basis(families, n_rich or max(FEWEST_RICH, RICH_FACTOR * (n_modes or 0)))
+        rich = rich_basis(families, n_rich, max(FEWEST_RICH, RICH_FACTOR * (n_modes or 0)))
         n = len(rich.omega2)
         if n_modes is not None and n_modes > n:
             raise ModeSetError(
@@ -133,11 +134,15 @@ class RichBasis:
     omega2: Array  #: (n,) [1/s²]
 
 
-def rich_basis(families: Families, n_free: int) -> RichBasis:
-    """Return free modes with residual attachment modes (the span of Rubin's set), without massless directions."""
+def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichBasis:
+    """Return free modes with residual attachment modes (the span of Rubin's set), without massless directions.
+
+    A small body has fewer modes than the default; its highest are no use, and cost the eigensolver its accuracy.
+    """
     body = families.body
     n_most = int((body.M.diagonal() > 0).sum()) - families.Psi_R.shape[1]
-    modes = families.free_modes(n_modes=max(1, min(n_free, n_most)))
+    n_free = min(n_asked, n_most) if n_asked is not None else min(n_default, int(LOWER_PART * n_most))
+    modes = families.free_modes(n_modes=max(1, n_free))
     residual = families.residual_attachment(modes)
     is_left = _stiffness(body, residual) > NOTHING_LEFT**2 * _stiffness(body, families.Psi_U)
     V = np.hstack([modes.Phi, residual[:, is_left]])

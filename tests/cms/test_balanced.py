@@ -6,11 +6,13 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
+import fe_models as fm
 from cms.balancing import balance
 from cms.couplings import couple
 from cms.errors import ModeSetError
 from cms.mode_sets.balanced import balanced_truncation
 from cms.receptance import largest_error, receptance_of_modes
+from cms.units import unit_system
 from tests.bodies import bar, chain
 
 ROUNDOFF = 1e-12
@@ -163,7 +165,7 @@ def test_a_rich_basis_of_all_modes_gives_the_singular_values_of_the_full_body():
     B = Phi[body.b].T
     B = B / np.sqrt(np.einsum("kb,kb->b", B, B / omega2[:, None]))  # every static response is 1
     exact, _ = square_root_balancing(*first_order(omega2, np.diag(0.04 * np.sqrt(omega2)), B), r=2)
-    modes = balanced_truncation(body, n_modes=3, damping_ratio=0.02)
+    modes = balanced_truncation(body, n_modes=3, damping_ratio=0.02, n_rich=7)
     assert_allclose(modes.data["hankel"], exact, rtol=1e-6, atol=1e-9 * exact[0])
     assert modes.options["Hankel singular values"].startswith(f"{exact[0]:.4g}, {exact[1]:.4g}")
 
@@ -205,3 +207,14 @@ def test_a_tolerance_keeps_as_many_directions_as_it_takes(body):
 def test_bad_options_are_refused(options, text):
     with pytest.raises(ModeSetError, match=text):
         balanced_truncation(couple(chain(6)), **options)
+
+
+def test_a_small_body_is_balanced_without_asking_for_its_highest_modes():
+    line = fm.straight_line((0, 0, 0), (1, 0, 0), 21)
+    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
+    section = fm.BeamProperty(fm.Circle(0.01), fm.Material("steel", E=2.1e11, nu=0.3, rho=7850.0))
+    body = couple(fm.beam_body(line, section, name="rod", units=unit_system("m-kg-s"), interfaces=ends))
+    modes = balanced_truncation(fm.planar(body, normal=2), n_modes=4)
+    sigma = modes.data["position-velocity"]
+    assert modes.columns.shape[1] == 6 + 4
+    assert sigma[4:].sum() < 0.02 * sigma.sum()
