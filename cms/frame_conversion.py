@@ -28,6 +28,7 @@ from cms.frames import (
     determinate_rows,
     placed,
 )
+from cms.geometric_conversion import converted_geometric_stiffness, require_convertible
 from cms.invariants import Moments, moments_from_gram
 from cms.load_cases import ReducedLoadCase
 from cms.nodal_sums import NodalSums
@@ -61,14 +62,10 @@ def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None
     BodyError
         If the body does not hold what the frame rests on: an unknown interface, one without rotation, no weighted sums
         (a file of version 1) for a Buckens frame; if a rigid-body motion is among its shapes; or if it has a geometric
-        stiffness, which is that of modes in their own frame.
+        stiffness and the reaction of the new frame is no combination of its unit loads (`geometric_conversion`).
     """
-    if reduced.geometric is not None:
-        raise BodyError(
-            f"reduced body {reduced.name!r}: its geometric stiffness is that of modes in their own frame; reduce it "
-            "anew in the other frame, or leave it out (replace(body, geometric=None))"
-        )
     C, target = condition_of(reduced, frame)  # (1)
+    require_convertible(reduced, target)
     Y, M_R = rigid_mass(reduced.moments)
     M = reduced.M - C.T @ Y - Y.T @ C + C.T @ M_R @ C  # (2)
     Z, is_massive = modes_of(reduced, (M + M.T) / 2)  # (3)
@@ -275,6 +272,9 @@ def changed_body(
         nodal_sums=None if reduced.nodal_sums is None else changed_sums(reduced.nodal_sums, change),
         load_cases=tuple(changed_load_case(case, change) for case in reduced.load_cases),
         stress=None if reduced.stress is None else turned_stress(np.asarray(reduced.stress) @ Z, change.R),
+        geometric=None
+        if reduced.geometric is None
+        else converted_geometric_stiffness(reduced, frame, C=change.C, Z=Z, p=change.p, R=change.R),
         point_stress=None if reduced.point_stress is None else changed_point_stress(reduced.point_stress, change),
     )
 

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from cms.arrays import require_shape
 from cms.errors import ModalFileError
+from cms.geometric_stiffness import GeometricStiffness
 from cms.invariants import Moments
 from cms.load_cases import ReducedLoadCase
 from cms.modal_entries import ENTRIES, entry_of, unit_of
@@ -22,6 +24,7 @@ __all__ = ["FORMAT", "Contents", "body_of", "content_of", "require_same_invarian
 FORMAT = "modal-file"
 SI = UNIT_SYSTEMS["m-kg-s"]
 INVARIANT_DEFECT = 1e-12  #: largest difference of a stored 1C-5C from that of the moments, over the largest entry
+UNIT_LOADS = ("translation", "rotation", "spin")  #: of the geometric stiffness, beside those of the interfaces
 INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
 
 
@@ -66,6 +69,8 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
         attributes[f"/load_cases/{k}"] = {"name": case.name, "kind": case.kind}
     if body.columns is not None:
         attributes["/columns"] = {}
+    if body.geometric is not None:
+        attributes["/geometric"] = {}
     if body.nodal_sums is not None:
         attributes["/nodal_sums"] = {"is_volume": int(body.nodal_sums.is_volume)}
     return attributes
@@ -97,6 +102,9 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
     for k, interface in enumerate(body.interfaces):
         names = ("position", "triad", "Psi", "members")
         values |= {f"/interfaces/{k}/{name}": getattr(interface, name) for name in names}
+    if body.geometric is not None:
+        values |= {f"/geometric/{name}": getattr(body.geometric, name) for name in UNIT_LOADS}
+        values |= {f"/interfaces/{k}/K_geometric": K for k, K in enumerate(body.geometric.interfaces)}
     if columns is not None:
         values |= {f"/columns/{name}": getattr(columns, name) for name in ("labels", "groups", "A", "F")}
     if sums is not None:
@@ -208,6 +216,7 @@ def body_of(content: Content) -> ReducedBody:
         )
         if contents.has("/stress", "has_points")
         else None,
+        geometric=geometric_of(contents) if contents.has("/geometric") else None,
     )  # fmt: skip
 
 
@@ -235,6 +244,17 @@ def nodal_sums_of(contents: Contents) -> NodalSums:
         **contents.arrays("/nodal_sums", "S", "R", "U1", "U2"),
         is_volume=bool(contents.attribute("/nodal_sums", "is_volume", int)),
     )
+
+
+def geometric_of(contents: Contents) -> GeometricStiffness:
+    """Return the geometric stiffness; that of the interfaces stands with them."""
+    of_loads = contents.arrays("/geometric", *UNIT_LOADS)
+    n = of_loads["spin"].shape[-1]
+    groups = contents.numbered("/interfaces")
+    of_interfaces = [contents.array(f"{group}/K_geometric") for group in groups]
+    for group, K in zip(groups, of_interfaces, strict=True):
+        require_shape(f"dataset {group}/K_geometric", K, (6, n, n))
+    return GeometricStiffness(**of_loads, interfaces=np.stack(of_interfaces) if groups else np.zeros((0, 6, n, n)))
 
 
 def units_of(contents: Contents) -> Units:

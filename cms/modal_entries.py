@@ -83,6 +83,9 @@ ENTRIES = {
     "/interfaces/<i>/triad": entry("columns: undeformed axes of the interface in B"),
     "/interfaces/<i>/Psi": entry("translation and rotation of the reference point in B for each mode", SHAPE, TURN),
     "/interfaces/<i>/members": entry("kept nodes of the interface, from 0"),
+    "/interfaces/<i>/K_geometric": entry("geometric stiffness of a unit force (0-2) and moment (3-5) at the reference "
+                                         "point, axes of B; index order load, k, l",
+                                         Dimensions(-1, -1), Dimensions(-1, -2)),
     "/columns/labels": entry("one per column of the mode set, in words"),
     "/columns/groups": entry("the source each column belongs to"),
     "/columns/A": entry("coordinates of the modes in the columns, scaled; index order column, mode", RATE),
@@ -92,6 +95,11 @@ ENTRIES = {
     "/nodal_sums/R": entry("sum of w c_a c_b", Dimensions(0, 5)),
     "/nodal_sums/U1": entry("sum of w phi_a,k; index order a, k", Dimensions(-0.5, 3)),
     "/nodal_sums/U2": entry("sum of w (c x phi_k)_a; index order a, k", Dimensions(-0.5, 4)),
+    "/geometric/translation": entry("geometric stiffness K_t,a of the loads -rho e_a of a frame acceleration minus "
+                                    "gravity; index order a, k, l", Dimensions(0, -1)),
+    "/geometric/rotation": entry("K_r,a of the loads -rho e_a x c of an angular acceleration; index order a, k, l"),
+    "/geometric/spin": entry("K_ab of -rho/2 [e_a x (e_b x c) + e_b x (e_a x c)], products of angular velocities; "
+                             "index order ab (xx yy zz xy yz zx), k, l"),
     "/load_cases/<i>/force": entry("resultant force in B", Dimensions(1, 1, -2)),
     "/load_cases/<i>/torque": entry("resultant torque about the origin of B", Dimensions(1, 2, -2)),
     "/load_cases/<i>/h": entry("modal forces Phi.T f", Dimensions(0.5, 1, -2)),

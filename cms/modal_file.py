@@ -1,7 +1,6 @@
 """The modal file: a reduced body as self-describing HDF5 (specified in docs/modal_file.md)."""
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 from cms.errors import CmsError, ModalFileError
@@ -72,10 +71,7 @@ def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
     content = in_units(content_of(reduced, VERSION), reduced.units, new)
     provenance = {"/provenance": dict(reduced.provenance) | record}
     attributes = dict(content.attributes) | provenance
-    body = body_of(type(content)(content.format, content.version, content.datasets, attributes))
-    if reduced.geometric is not None and body.geometric is None:
-        body = replace(body, geometric=reduced.geometric.in_units(reduced.units, new))
-    return body
+    return body_of(type(content)(content.format, content.version, content.datasets, attributes))
 
 
 def digest(path: str | os.PathLike[str]) -> str:

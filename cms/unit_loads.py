@@ -17,7 +17,7 @@ from cms.mass_loads import MassLoads
 from cms.node_motion import reference_motion
 from cms.reduced_body import BodyFrame
 
-__all__ = ["UnitLoads", "balanced", "unit_loads"]
+__all__ = ["UnitLoads", "balanced", "unit_loads", "unit_mass_loads"]
 
 BALANCED = 1e-10  #: of a load: what is left of it when its support carries all of it
 
@@ -34,20 +34,25 @@ class UnitLoads:
 
 def unit_loads(body: FEBody, frame: BodyFrame) -> UnitLoads:
     """Return the 12 loads per mass, then six loads for each interface."""
-    e, origin = frame.axes.T, frame.origin  # e[a]: axis a of B
+    mass = unit_mass_loads(frame)
+    none = MassLoads.none(6 * len(body.interfaces))
+    turn = np.kron(np.eye(2), frame.axes)
+    columns = [reference_motion(body, interface)[0].T @ turn for interface in body.interfaces]
+    on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns])
+    return together(body, MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), on_dofs)
+
+
+def unit_mass_loads(frame: BodyFrame) -> MassLoads:
+    """Return the 12 loads per mass of a frame: 3 translations, 3 rotations, 6 products in the order `SPIN_PAIRS`."""
+    e = frame.axes.T  # e[a]: axis a of B
     A, b = np.zeros((12, 3, 3)), np.zeros((12, 3))
     b[:3] = -e
     for a in range(3):
         A[3 + a] = -np.cross(e[a], np.eye(3)).T
     for j, (p, q) in enumerate(SPIN_PAIRS):
         A[6 + j] = float(p == q) * np.eye(3) - (np.outer(e[p], e[q]) + np.outer(e[q], e[p])) / 2
-    b[3:] = -A[3:] @ origin
-    none = MassLoads.none(6 * len(body.interfaces))
-    turn = np.kron(np.eye(2), frame.axes)
-    columns = [reference_motion(body, interface)[0].T @ turn for interface in body.interfaces]
-    on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns])
-    mass = MassLoads(np.concatenate([A, none.A]), np.concatenate([b, none.b]))
-    return together(body, mass, on_dofs)
+    b[3:] = -A[3:] @ frame.origin
+    return MassLoads(A, b)
 
 
 def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitLoads:

@@ -95,6 +95,9 @@ def frame_command(
         float | None, typer.Option(help="Ratio of the new modes; default: the damping of the file, carried over.")
     ] = None,
     units: Annotated[str | None, typer.Option(help="Write numbers in another unit system, such as m-kg-s.")] = None,
+    geometric: Annotated[
+        bool, typer.Option("--geometric-stiffness/--no-geometric-stiffness", help="Carry it over, or leave it out.")
+    ] = True,
     output: Output = None,
 ) -> None:
     """Convert a modal file to another body frame, from the file alone; its modes are diagonalised afresh.
@@ -107,7 +110,7 @@ def frame_command(
     """
     from cms.cli.frame import FrameRequest, run_frame
 
-    print_body(run_frame(FrameRequest(file, to, at, origin, axes, damping, units, output)))
+    print_body(run_frame(FrameRequest(file, to, at, origin, axes, damping, units, output, geometric)))
 
 
 def info_record(file: Path, units: str | None = None) -> str:
@@ -343,6 +346,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("mass moments", "exact" if record["moments_are_exact"] else "approximate (from bare matrices)"),
         ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
         ("stress of modes", stress_words(record["stress"])),
+        ("geometric stiffness", "spin, accelerations, interface loads" if record["geometric_stiffness"] else "none"),
     ]
     print_table("Body", ("", ""), rows)
     print_table(

@@ -1,6 +1,6 @@
 """`cms frame`: a modal file in another body frame, from the file alone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,7 @@ class FrameRequest:
     ratio: float | None = None
     units: str | None = None
     output: Path | None = None
+    keep_geometric: bool = True  #: False: leave the geometric stiffness out
 
 
 def run_frame(request: FrameRequest) -> "ReducedBody":
@@ -51,6 +52,8 @@ def run_frame(request: FrameRequest) -> "ReducedBody":
             body = read(request.file)
             if request.units is not None:
                 body = convert_units(body, request.units)
+            if not request.keep_geometric:
+                body = replace(body, geometric=None)
         with clock("convert"):
             converted = convert_frame(body, frame, damping=damping_of(request))
         with clock("write"):

@@ -44,15 +44,28 @@ def reduce_job(
         If the mesh, a material, an interface or the mode set does not do.
     """
     from cms.cli.job_mode_set import job_mode_set
+    from cms.families import Families
+    from cms.geometric_reduction import has_geometric_stiffness, require_geometric_stiffness
     from cms.reduction import reduce
 
     stages = stages or Stages()
     coupled = job_body(job, stages, on_report=on_report)
-    with stages(f"mode set {job.reduction.set}"):
-        modes = job_mode_set(coupled, job.reduction)
-    with stages("reduce"):
-        damping = None if job.damping is None else job.damping.damping
-        return reduce(coupled, modes, frame=frame_of(job), damping=damping, stress=job.reduction.stress is not False)
+    if job.reduction.geometric_stiffness:
+        require_geometric_stiffness(coupled)  # before the long work
+    wanted = job.reduction.geometric_stiffness
+    with Families(coupled) as families:
+        with stages(f"mode set {job.reduction.set}"):
+            modes = job_mode_set(coupled, job.reduction, families=families)
+        with stages("reduce"):
+            return reduce(
+                coupled,
+                modes,
+                frame=frame_of(job),
+                damping=None if job.damping is None else job.damping.damping,
+                stress=job.reduction.stress is not False,
+                geometric=has_geometric_stiffness(coupled) if wanted is None else wanted,
+                families=families,
+            )
 
 
 def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None) -> FEBody:

@@ -7,8 +7,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import BodyError
-from cms.frame_conversion import convert_frame
-from cms.frames import TisserandFrame
 from cms.geometric_stiffness import GeometricStiffness
 from cms.modal_file import convert_units
 from floatframe.mode_choice import with_modes
@@ -98,8 +96,3 @@ def test_the_energy_of_a_load_is_the_same_in_other_units():
         amplitude = np.array([number(1.0, **row) for row in of_rows])
         expected = number(1.0, mass=1, length=2, time=-2) * work
         assert_allclose(work_new * amplitude, expected, rtol=ROUNDOFF, atol=0)
-
-
-def test_another_frame_is_refused():
-    with pytest.raises(BodyError, match="reduce it anew in the other frame"):
-        convert_frame(body(), TisserandFrame())
