@@ -11,7 +11,7 @@ from cms.modal_file import digest, read
 from cms.reduced_body import ReducedBody, ReducedInterface
 from cms.rendering import Drawing, Lines, Scene, Surface, Triad, render_animation
 from cms.rendering.drawing import OnFrame
-from cms.units import Units
+from floatframe.body_colors import DISPLACEMENT, BodyColor
 from floatframe.errors import ResultsError
 from floatframe.film_times import FilmTimes, film_times, round_below, speed_words, time_words
 from floatframe.rigid_body import RigidBody
@@ -35,6 +35,7 @@ def animate(
     speed: float | None = None,
     magnification: float | None = None,
     up: Sequence[float] | None = None,
+    color: BodyColor = DISPLACEMENT,
     on_frame: OnFrame | None = None,
 ) -> Drawing:
     """Draw a motion into a film.
@@ -55,6 +56,8 @@ def animate(
     up
         What points up in the film, ground axes, (3,); None: against gravity if the trajectory knows it, else z, or y
         for a motion in the xy plane.
+    color
+        By what flexible bodies are coloured: `DISPLACEMENT` or `VON_MISES` of `floatframe.body_colors`.
     on_frame
         Called with the number of frames drawn and of all.
 
@@ -64,7 +67,7 @@ def animate(
         If the trajectory has no rows, or a body does not fit it.
     """
     times = film_times(trajectory.t * trajectory.units.time, fps=fps, speed=speed, n_nodes=count_nodes(bodies))
-    scene = motion_scene(trajectory, bodies, times, magnification=magnification, up=up)
+    scene = motion_scene(trajectory, bodies, times, magnification=magnification, up=up, color=color)
     return render_animation(scene, path, fps=times.fps, on_frame=on_frame)
 
 
@@ -94,6 +97,7 @@ def motion_scene(
     *,
     magnification: float | None = None,
     up: Sequence[float] | None = None,
+    color: BodyColor = DISPLACEMENT,
 ) -> Scene:
     """Return the scene of a motion: surfaces, interfaces and their trails, ground; else as `animate`."""
     unknown = set(bodies) - set(trajectory.body_names)
@@ -113,7 +117,8 @@ def motion_scene(
     if magnification is None:
         magnification = chosen_magnification(flexible, displacements)
     surfaces, triads, lines = [], [], []
-    name_unit, unit_factor = length_unit(trajectory.units, displacements)
+    scalars = {name: color.values(body, motions[name].q[rows]) for name, body in flexible.items()}
+    name_unit, unit_factor = color.unit(trajectory.units, largest_of(scalars))
     frames = {name: (motion.r[rows], rotations(motion.p[rows])) for name, motion in motions.items()}
     size = scene_size(flexible, frames)
     for name, (r, R) in frames.items():
@@ -121,8 +126,7 @@ def motion_scene(
         if body is not None and len(body.surface):
             moved = displacements[name].reshape(len(rows), -1, 3)
             nodes = r[:, None] + (body.nodes + magnification * moved) @ R.transpose(0, 2, 1)
-            scalars = unit_factor * np.linalg.norm(moved, axis=2)
-            surfaces.append(Surface(body.surface, nodes, scalars=scalars, name=name))
+            surfaces.append(Surface(body.surface, nodes, scalars=unit_factor * scalars[name], name=name))
             for interface in body.interfaces:
                 path = interface_path(motions[name], interface, magnification)
                 triads.append(Triad(path[rows], R @ interface.triad, 0.06 * size, interface.name))
@@ -149,7 +153,7 @@ def motion_scene(
             + f"ground grid {step:g} {trajectory.units.length_symbol}",
         ),
         frame_notes=time_words(trajectory.t[rows] * trajectory.units.time),
-        scalar_title="elastic displacement" if flexible else "",
+        scalar_title=color.title if flexible else "",
         scalar_unit=name_unit if flexible else "",
         direction=direction,
         up=up_axis,
@@ -193,15 +197,9 @@ def chosen_magnification(flexible: Mapping[str, ReducedBody], displacements: Map
     return 1.0 if share >= VISIBLE or share == 0 else round_below(DRAWN / share)
 
 
-def length_unit(units: Units, displacements: Mapping[str, Array]) -> tuple[str, float]:
-    """Return the unit in which the displacements read well, and the factor to it; metric lengths only."""
-    if units.length_symbol not in ("m", "mm", "cm"):
-        return units.length_symbol, 1.0
-    largest = max((float(np.abs(d).max()) for d in displacements.values()), default=0.0) * units.length
-    for symbol, metres in (("m", 1.0), ("mm", 1e-3), ("\N{GREEK SMALL LETTER MU}m", 1e-6)):
-        if largest >= 0.5 * metres:
-            return symbol, units.length / metres
-    return "nm", units.length / 1e-9
+def largest_of(scalars: Mapping[str, Array]) -> float:
+    """Return the largest size of the scalars of all bodies."""
+    return max((float(np.abs(values).max(initial=0.0)) for values in scalars.values()), default=0.0)
 
 
 def interface_path(motion: BodyMotion, interface: ReducedInterface, magnification: float) -> Array:

@@ -12,19 +12,24 @@ from cms.paths import replace_file
 from cms.reduced_body import ReducedBody
 from cms.stress_modes import von_mises
 from floatframe.errors import ResultsError
+from floatframe.measuring import measured, sensor_of
 from floatframe.recovery import elastic_displacements, require_same_modes
 from floatframe.rotations import rotation_matrix
 from floatframe.sensors import interface_motion
+from floatframe.system import System
 from floatframe.trajectory import Trajectory
 
 __all__ = ["export_csv", "export_vtk", "motion_table"]
 
 
-def motion_table(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None) -> dict[str, Array]:
+def motion_table(
+    trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None, system: System | None = None
+) -> dict[str, Array]:
     """Return the columns of a motion by name with unit, each (n_t,).
 
     Time; of every body the place and motion of its frame; of the interfaces of the bodies given, position, velocity
-    and elastic displacement in B; of joints and springs force and moment on marker A; energies.
+    and elastic displacement in B; of joints and springs force and moment on marker A; energies. With the system, also
+    its joint coordinates (value, rate, force along them) and all that its sensors measure.
     """
     units = trajectory.units
     m, s = units.length_symbol, units.time_symbol
@@ -55,14 +60,21 @@ def motion_table(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | Non
     energies = trajectory.energies
     for name in ("kinetic", "strain", "gravity", "springs", "work", "dissipated", "total", "balance"):
         table[f"energy {name} [{Nm}]"] = getattr(energies, name)
+    if system is not None:
+        coordinates = [sensor_of(system, f"{j.name}.{c}") for j in system.joints for c in j.coordinates]
+        for measurement in measured(system, trajectory, [*coordinates, *system.sensors]).values():
+            table |= dict(zip(measurement.headers, measurement.columns.values(), strict=True))
     return table
 
 
 def export_csv(
-    trajectory: Trajectory, path: str | os.PathLike[str], bodies: Mapping[str, ReducedBody] | None = None
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    bodies: Mapping[str, ReducedBody] | None = None,
+    system: System | None = None,
 ) -> None:
     """Write `motion_table` as comma-separated values, with 17 digits, so that every number reads back as it was."""
-    table = motion_table(trajectory, bodies)
+    table = motion_table(trajectory, bodies, system)
     names = [f'"{name}"' if "," in name else name for name in table]
     rows = np.column_stack(list(table.values()))
     lines = [",".join(names), *(",".join(repr(float(value)) for value in row) for row in rows)]

@@ -16,6 +16,7 @@ from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.flexible_body import FlexibleBody
 from floatframe.integrators.generalized_alpha import Carry, GeneralizedAlpha
 from floatframe.kernels.model import Rows, new_work
+from floatframe.recorded_system import file_digest
 from floatframe.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.results import SEGMENTS, BodyEntry, Head, MemorySource, ResultsWriter, arrays_of, last_restart
 from floatframe.state import State
@@ -277,6 +278,8 @@ def head_of(system: System, integrator: GeneralizedAlpha, t_start: float, t_end:
         "h": h,
         "output_every": every,
         "gravity": [float(x) for x in compiled.model.gravity],
+        "system_file": system.source,
+        "system_file_digest": file_digest(system.source),
         "digest": system_digest(system, integrator),
         "floatframe": release,
     }

@@ -1,6 +1,6 @@
 """Joint coordinates over a motion: value, rate, and the force along them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,4 +99,4 @@ def end_motion(system: System, trajectory: Trajectory, end: MarkerData) -> Place
         interface = next(i for i in body.reduced.interfaces if i.Psi is end.psi)
         place = interface_motion(trajectory, body.name, body.reduced, interface.name)
         triad = interface.triad.T @ end.triad
-    return PlaceMotion(place.t, place.position, place.velocity, place.acceleration, place.axes @ triad, place.omega)
+    return replace(place, axes=place.axes @ triad)

@@ -1,6 +1,7 @@
 """One figure that shows a computed motion: where the parts go, energies, elastic displacement, loads, errors."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,8 +9,10 @@ import numpy as np
 from cms.arrays import Array
 from cms.reduced_body import ReducedBody
 from floatframe.errors import ResultsError
+from floatframe.measuring.measurement import Measurement
 from floatframe.plots import axes_for, labelled, plot_drift, plot_energies, plot_energy_balance
 from floatframe.recovery import elastic_displacements, interface_positions
+from floatframe.sensor_plots import panels_of, plot_measurement
 from floatframe.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -21,7 +24,11 @@ __all__ = ["plot_deformation", "plot_loads", "plot_overview", "plot_places"]
 MOST_CURVES = 8  #: in one plot; of more, those with the largest values are drawn
 
 
-def plot_overview(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None) -> "Figure":
+def plot_overview(
+    trajectory: Trajectory,
+    bodies: Mapping[str, ReducedBody] | None = None,
+    measurements: Sequence[Measurement] = (),
+) -> "Figure":
     """Return a figure with a panel for each kind of result that the motion has.
 
     Parameters
@@ -30,6 +37,8 @@ def plot_overview(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | No
         The motion.
     bodies
         Reduced bodies by name: their interfaces are shown, instead of frame origins and modal coordinates.
+    measurements
+        What sensors measured: a panel for each, and for each unit of its columns.
 
     Raises
     ------
@@ -52,6 +61,9 @@ def plot_overview(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | No
         panels.append(lambda ax: plot_loads(trajectory, ax))
     if trajectory.head.joints:
         panels.append(lambda ax: plot_drift(trajectory, ax))
+    for measurement in measurements:
+        for unit, _ in panels_of(measurement):
+            panels.append(partial(sensor_panel, trajectory, measurement, unit))
     n_rows = (len(panels) + 1) // 2
     figure = Figure(figsize=(13, 3.4 * n_rows + 0.6), layout="constrained")
     figure.suptitle(trajectory.head.system)
@@ -61,6 +73,11 @@ def plot_overview(trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | No
     for ax in axes[len(panels) :]:
         ax.remove()
     return figure
+
+
+def sensor_panel(trajectory: Trajectory, measurement: Measurement, unit: str, ax: "Axes") -> "Axes":
+    """Plot the columns of one unit of a sensor."""
+    return plot_measurement(measurement, ax, unit=unit, time_symbol=trajectory.units.time_symbol)
 
 
 def plot_places(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], ax: "Axes | None" = None) -> "Axes":

@@ -19,7 +19,16 @@ from floatframe.rotations import right_jacobian, rotation_exp, rotation_matrix
 from floatframe.stiffening import interface_deformation, interface_deformation_rates
 from floatframe.trajectory import BodyMotion, Trajectory
 
-__all__ = ["PlaceMotion", "interface_motion", "largest_von_mises", "nodal_stress", "point_motion", "rotation_angle"]
+__all__ = [
+    "PlaceMotion",
+    "interface_motion",
+    "largest_von_mises",
+    "nodal_stress",
+    "node_motion",
+    "point_motion",
+    "rotation_angle",
+    "stress_modes",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +40,8 @@ class PlaceMotion:
     velocity: Array  #: (n_t, 3) [m/s]
     acceleration: Array  #: (n_t, 3) [m/s²]
     axes: Array  #: columns, (n_t, 3, 3)
-    omega: Array  #: angular velocity, (n_t, 3) [rad/s]
+    omega: Array  #: angular velocity of the axes, (n_t, 3) [rad/s]
+    alpha: Array | None = None  #: their angular acceleration, (n_t, 3) [rad/s²]; None: they do not turn
 
 
 def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, interface: str) -> PlaceMotion:
@@ -52,9 +62,45 @@ def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, in
     d_dot, d_ddot = interface_deformation_rates(
         reduced, interface, motion.q, motion.q_dot, motion.q_ddot, is_stiffened=is_stiffened
     )
-    turned = np.array([rotation_exp(theta) for theta in d[:, 3:]])
-    spin = np.einsum("tba,tb->ta", np.array([right_jacobian(theta) for theta in d[:, 3:]]), d_dot[:, 3:])
-    return _moved(motion, place.position + d[:, :3], d_dot[:, :3], d_ddot[:, :3], turned @ place.triad, spin)
+    triples = list(zip(d[:, 3:], d_dot[:, 3:], d_ddot[:, 3:], strict=True))
+    turned = np.array([rotation_exp(theta) for theta, _, _ in triples])
+    spin = np.array([spin_of(theta, rate) for theta, rate, _ in triples])
+    spin_dot = np.array([spin_rate_of(*three) for three in triples])
+    rho = place.position + d[:, :3]
+    return _moved(motion, rho, d_dot[:, :3], d_ddot[:, :3], turned @ place.triad, spin, spin_dot)
+
+
+def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: int) -> PlaceMotion:
+    """Return the motion of a kept node (its index in `ReducedBody.nodes`), with the axes of the body frame.
+
+    Raises
+    ------
+    ResultsError
+        If there is no such body or node, or the reduced body is another one.
+    """
+    require_same_modes(trajectory, body, reduced)
+    if not 0 <= node < len(reduced.nodes):
+        raise ResultsError(f"body {body!r}: node: expected 0 to {len(reduced.nodes) - 1}, got {node}")
+    motion, shape = trajectory.body(body), reduced.Phi[node]
+    n_t, zero = len(motion.t), np.zeros((len(motion.t), 3))
+    local = reduced.nodes[node] + motion.q @ shape.T
+    axes = np.broadcast_to(np.eye(3), (n_t, 3, 3))
+    return _moved(motion, local, motion.q_dot @ shape.T, motion.q_ddot @ shape.T, axes, zero, zero)
+
+
+def spin_of(theta: Array, rate: Array) -> Array:
+    """Return the angular velocity of exp(theta) as seen from the body, (3,)."""
+    return np.asarray(right_jacobian(theta).T @ rate)
+
+
+def spin_rate_of(theta: Array, rate: Array, rate2: Array) -> Array:
+    """Return the rate of `spin_of`, (3,): its change along the rate by a central difference, and by the second rate."""
+    size = float(np.linalg.norm(rate))
+    result = spin_of(theta, rate2)
+    if size > 0:
+        s = 1e-5 / size
+        result = result + (spin_of(theta + s * rate, rate) - spin_of(theta - s * rate, rate)) / (2 * s)
+    return np.asarray(result)
 
 
 def point_motion(trajectory: Trajectory, body: str, point: Array | tuple[float, float, float]) -> PlaceMotion:
@@ -63,10 +109,12 @@ def point_motion(trajectory: Trajectory, body: str, point: Array | tuple[float, 
     n_t = len(motion.t)
     rho = np.broadcast_to(np.asarray(point, dtype=float), (n_t, 3))
     zero = np.zeros((n_t, 3))
-    return _moved(motion, rho, zero, zero, np.broadcast_to(np.eye(3), (n_t, 3, 3)), zero)
+    return _moved(motion, rho, zero, zero, np.broadcast_to(np.eye(3), (n_t, 3, 3)), zero, zero)
 
 
-def _moved(motion: BodyMotion, rho: Array, rho_dot: Array, rho_ddot: Array, axes: Array, spin: Array) -> PlaceMotion:
+def _moved(
+    motion: BodyMotion, rho: Array, rho_dot: Array, rho_ddot: Array, axes: Array, spin: Array, spin_dot: Array
+) -> PlaceMotion:
     R = np.array([rotation_matrix(p) for p in motion.p]).reshape(-1, 3, 3)
     omega, alpha = motion.omega_B, motion.omega_B_dot
     arm = np.cross(omega, rho)
@@ -82,6 +130,7 @@ def _moved(motion: BodyMotion, rho: Array, rho_dot: Array, rho_ddot: Array, axes
         acceleration=motion.v_dot + in_ground(relative),
         axes=R @ axes,
         omega=in_ground(omega + spin),
+        alpha=in_ground(alpha + np.cross(omega, spin) + spin_dot),
     )
 
 
@@ -116,13 +165,13 @@ def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time
         If the modal file holds no stress modes, or the reduced body is another one.
     """
     require_same_modes(trajectory, body, reduced)
-    return np.asarray(_stress_modes(body, reduced) @ trajectory.body(body).q[i_time])
+    return np.asarray(stress_modes(body, reduced) @ trajectory.body(body).q[i_time])
 
 
 def largest_von_mises(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[Array, IntArray]:
     """Return the largest von Mises stress of the kept nodes over time, (n_t,) [Pa], and where it is, (n_t,) index."""
     require_same_modes(trajectory, body, reduced)
-    modes, q = _stress_modes(body, reduced), trajectory.body(body).q
+    modes, q = stress_modes(body, reduced), trajectory.body(body).q
     largest, where = np.zeros(len(q)), np.zeros(len(q), np.int64)
     for k, row in enumerate(q):
         stress = von_mises(modes @ row)
@@ -131,7 +180,8 @@ def largest_von_mises(trajectory: Trajectory, body: str, reduced: ReducedBody) -
     return largest, where
 
 
-def _stress_modes(body: str, reduced: ReducedBody) -> Array:
+def stress_modes(body: str, reduced: ReducedBody) -> Array:
+    """Return the stress modes of a body, (n_kept, 6, n_q); `ResultsError` if its file holds none."""
     if reduced.stress is None:
         raise ResultsError(
             f"body {body!r}: its modal file holds no stress modes; reduce it again with stress (and from a mesh, since "

@@ -16,6 +16,7 @@ from floatframe.rigid_body import RigidBody
 
 if TYPE_CHECKING:
     from floatframe.compiled import CompiledSystem
+    from floatframe.measuring import Sensor
 
 __all__ = ["Body", "System"]
 
@@ -41,9 +42,11 @@ class System:
     name: str = "system"
     #: constraints that repeat others: "refuse" them by name, or share their reactions ("minimum-norm")
     redundant: str = "refuse"
+    sensors: Sequence["Sensor"] = field(default=(), kw_only=True)  #: what is measured on its motions
+    source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
 
     def __post_init__(self) -> None:
-        for part in ("bodies", "joints", "forces"):
+        for part in ("bodies", "joints", "forces", "sensors"):
             object.__setattr__(self, part, tuple(getattr(self, part)))
         where = f"system {self.name!r}"
         if self.redundant not in REDUNDANT:
@@ -53,6 +56,7 @@ class System:
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
         named = [force.name for force in self.forces if not isinstance(force, Gravity)]
         require_names(f"{where}: joints and forces", [joint.name for joint in self.joints] + named)
+        require_names(f"{where}: sensors", [sensor.name for sensor in self.sensors])
         for body in self.bodies:
             if isinstance(body, FlexibleBody) and body.reduced.units != self.units:
                 raise ModelError(

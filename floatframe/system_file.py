@@ -32,8 +32,10 @@ from floatframe.integrators import GeneralizedAlpha
 from floatframe.joints import JOINTS, Joint
 from floatframe.markers import Marker, Place
 from floatframe.motion_section import MotionSection
+from floatframe.place_key import PlaceOnBody
 from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.sensor_section import SensorSection
 from floatframe.system import REDUNDANT, Body, System
 from floatframe.unit_hints import unit_hints
 
@@ -66,16 +68,6 @@ KEYS_OF_FORCES = {
 }
 
 
-def place_on_body(value: Any) -> Any:
-    """Return the name of an interface, or a position as three numbers."""
-    if isinstance(value, str) and value:
-        return value
-    try:
-        return numbers(value)
-    except ValueError:
-        raise ValueError('expected the name of an interface ("big_end") or a position [x, y, z] in the body') from None
-
-
 def four_numbers(value: Any) -> tuple[float, ...]:
     """Return Euler parameters."""
     try:
@@ -84,7 +76,6 @@ def four_numbers(value: Any) -> tuple[float, ...]:
         raise ValueError("expected four numbers, [w, x, y, z]") from None
 
 
-PlaceOnBody = Annotated[str | tuple[float, float, float], BeforeValidator(place_on_body)]
 Parameters4 = Annotated[tuple[float, float, float, float], BeforeValidator(four_numbers)]
 
 
@@ -251,14 +242,15 @@ class SystemFile(Table):
     bodies: dict[str, BodySection] = Field(description="tables [bodies.NAME]")
     joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")
     forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
+    sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
     run: RunSection = Field(description="a table [run] with t_end and h")
 
     @model_validator(mode="after")
     def _names_bodies(self) -> "SystemFile":
         choices = [GROUND.name, *self.bodies]
-        for kind, sections in (("joints", self.joints), ("forces", self.forces)):
+        for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors)):
             for name, section in sections.items():
-                for key in ("body", "body_a", "body_b"):
+                for key in ("body", "body_a", "body_b", "relative_to"):
                     body = getattr(section, key, None)
                     if body is not None and body not in choices:
                         hint = nearest(body, choices)
@@ -301,7 +293,10 @@ def read_system(path: str | os.PathLike[str]) -> tuple[System, RunOptions]:
         if any(data.system.gravity):
             forces.insert(0, Gravity(np.array(data.system.gravity)))
         name = data.system.name or path.stem
-        system = System(bodies, joints, forces, units, name, data.system.redundant)
+        sensors = [section.sensor(key) for key, section in data.sensors.items()]
+        system = System(
+            bodies, joints, forces, units, name, data.system.redundant, sensors=sensors, source=str(path.resolve())
+        )
         _ = system.compiled  # markers and interfaces are looked up here
         for hint in unit_hints(system):
             log.warning("%s: %s", path, hint)

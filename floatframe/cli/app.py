@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from cms.cli.console import Stages
     from floatframe.integration import Progress
+    from floatframe.system import System
     from floatframe.trajectory import Trajectory
 
 __all__ = ["app"]
@@ -114,7 +115,7 @@ def print_run(trajectory: "Trajectory", progress: Any, seconds: float | None) ->
     """Print what a motion is and how good; numbers of the computation where it was done just now."""
     from floatframe.cli.record import run_record
 
-    record = run_record(trajectory)
+    record = run_record(trajectory, known_system(trajectory))
     units = trajectory.units
     second, length = units.time_symbol, units.length_symbol
     energy = f"{units.force_symbol} {length}"
@@ -149,10 +150,44 @@ def print_run(trajectory: "Trajectory", progress: Any, seconds: float | None) ->
             [(name, *(f"{value:.1e}" for value in drift.values())) for name, drift in record["drift"].items()],
         )
 
+    if record["sensors"]:
+        print_table(
+            "Sensors",
+            ("", "unit", "least>", "greatest>", "last>"),
+            [
+                (name, column["unit"], *(f"{column[key]:.6g}" for key in ("least", "greatest", "last")))
+                for name, column in record["sensors"].items()
+            ],
+        )
+
+
+def known_system(trajectory: "Trajectory") -> "System | None":
+    """Return the system of a motion from the file its results name; None, with a note, where that cannot be read."""
+    from cms.errors import CmsError
+    from floatframe.errors import FloatframeError
+    from floatframe.recorded_system import recorded_system
+
+    try:
+        return recorded_system(trajectory)
+    except (FloatframeError, CmsError) as error:
+        typer.echo(f"note: sensors are left out: {error}", err=True)
+        return None
+
 
 def integrator_words(run: dict[str, Any]) -> str:
     """Return the integrator and its parameters."""
-    known = {"integrator", "t_start", "t_end", "h", "output_every", "floatframe"}
+    known = {
+        "integrator",
+        "t_start",
+        "t_end",
+        "h",
+        "output_every",
+        "floatframe",
+        "digest",
+        "gravity",
+        "system_file",
+        "system_file_digest",
+    }
     options = ", ".join(f"{key} = {value}" for key, value in run.items() if key not in known)
     return f"{run.get('integrator', '')} ({options})"
 
@@ -178,7 +213,8 @@ def info_command(
 
         from floatframe.cli.record import run_record
 
-        typer.echo(json_module.dumps(run_record(trajectory), indent=2, ensure_ascii=True))
+        record = run_record(trajectory, known_system(trajectory))
+        typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))
         return
     print_run(trajectory, None, None)
 
@@ -224,12 +260,17 @@ def print_mobility(path: Path, *, as_json: bool) -> None:
 def plot_command(
     file: ResultsFile,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to write (.png, .svg, .pdf).")] = None,
+    sensors: Annotated[
+        list[str], typer.Option("--sensor", "-s", help="Only this sensor or joint.coordinate; repeatable.")
+    ] = [],  # noqa: B006
 ) -> None:
-    """Plot the motion: positions, energies, elastic displacement, reactions, energy error, joint drift.
+    """Plot the motion: positions, energies, elastic displacement, reactions, energy error, joint drift, sensors.
 
     Without -o the picture stands beside the results: swing.h5 gives swing.png.
 
     Example: floatframe plot swing.h5 -o swing.png
+
+    Example: floatframe plot swing.h5 --sensor tip --sensor hinge.angle
     """
     import io
 
@@ -237,7 +278,9 @@ def plot_command(
     from cms.paths import replace_file
     from floatframe.animation import bodies_of
     from floatframe.errors import ResultsError
+    from floatframe.measuring import measured, sensor_of
     from floatframe.overview import plot_overview
+    from floatframe.sensor_plots import plot_sensors
     from floatframe.trajectory import read_results
 
     trajectory = read_results(file)
@@ -250,8 +293,19 @@ def plot_command(
     except CmsError as error:  # the motion can be plotted without its bodies
         typer.echo(f"note: elastic displacement is left out: {error}", err=True)
         bodies = {}
+    system = known_system(trajectory)
     picture = io.BytesIO()
-    plot_overview(trajectory, bodies).savefig(picture, format=kind, dpi=130)
+    if sensors:
+        if system is None:
+            raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
+        chosen = [sensor_of(system, name) for name in sensors]
+        figure = plot_sensors(
+            [*measured(system, trajectory, chosen).values()], title=system.name, time_symbol=system.units.time_symbol
+        )
+    else:
+        found = [] if system is None else [*measured(system, trajectory).values()]
+        figure = plot_overview(trajectory, bodies, found)
+    figure.savefig(picture, format=kind, dpi=130)
     replace_file(path, picture.getvalue())
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
@@ -268,23 +322,30 @@ def animate_command(
         float | None, typer.Option(help="How many times larger elastic displacement is drawn; default: to be seen.")
     ] = None,
     fps: Annotated[float, typer.Option(help="Frames a second.")] = 25.0,
+    color: Annotated[str, typer.Option(help="Colour of flexible bodies: displacement or von-mises.")] = "displacement",
 ) -> None:
-    """Draw the motion into a film: deformed bodies, coloured by elastic displacement; needs no display.
+    """Draw the motion into a film: deformed bodies, coloured by elastic displacement or stress; needs no display.
 
     Without -o the film stands beside the results: swing.h5 gives swing.gif.
 
     Example: floatframe animate swing.h5 -o swing.mp4
+
+    Example: floatframe animate swing.h5 --color von-mises
     """
+    from cms.words import nearest
     from floatframe.animation import animate, bodies_of
+    from floatframe.body_colors import BODY_COLORS
     from floatframe.errors import ResultsError
     from floatframe.trajectory import read_results
 
+    if color not in BODY_COLORS:
+        raise ResultsError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
     trajectory = read_results(file)
     path = output_path(output, file.with_suffix(".gif"), ResultsError, overwrite_of=(file,))
     bodies = bodies_of(trajectory)
     with stages(remaining=True) as clock, clock("film") as advance:
         animate(
-            trajectory, bodies, path, fps=fps, speed=speed, magnification=magnification,
+            trajectory, bodies, path, fps=fps, speed=speed, magnification=magnification, color=BODY_COLORS[color],
             on_frame=lambda done, all_: advance(done / all_),
         )  # fmt: skip
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
@@ -297,7 +358,7 @@ def export_command(
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A .csv table, or a .pvd series.")] = None,
     every: Annotated[int, typer.Option(min=1, help="Take every so many output times (.pvd).")] = 1,
 ) -> None:
-    """Write a motion for other programs: a table, or deformed surfaces with stress for ParaView.
+    """Write a motion for other programs: a table with all sensors, or deformed surfaces with stress for ParaView.
 
     Without -o a table stands beside the results: swing.h5 gives swing.csv.
 
@@ -314,7 +375,7 @@ def export_command(
     path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file,))
     bodies = bodies_of(trajectory)
     if path.suffix.lower() == ".csv":
-        export_csv(trajectory, path, bodies)
+        export_csv(trajectory, path, bodies, known_system(trajectory))
         say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     elif path.suffix.lower() == ".pvd":
         with stages(remaining=True) as clock, clock("surfaces") as advance:

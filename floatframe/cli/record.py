@@ -5,13 +5,15 @@ from typing import Any
 import numpy as np
 
 from floatframe.energy_balance import balance_defect, energy_scale
+from floatframe.measuring import measured
+from floatframe.system import System
 from floatframe.trajectory import Trajectory
 
 __all__ = ["run_record"]
 
 
-def run_record(trajectory: Trajectory) -> dict[str, Any]:
-    """Return times, bodies, energies, energy balance and joint drift of a motion, in plain types and its units.
+def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str, Any]:
+    """Return times, bodies, energies, energy balance, drift and ranges of the sensors, in plain types and its units.
 
     `energy_defect` is the largest |balance defect| over `energy_scale`; a drift is the largest over time.
     """
@@ -55,4 +57,19 @@ def run_record(trajectory: Trajectory) -> dict[str, Any]:
             }
             for name, drift in drifts.items()
         },
+        "sensors": {} if system is None or not n_t else sensors_record(system, trajectory),
+    }
+
+
+def sensors_record(system: System, trajectory: Trajectory) -> dict[str, Any]:
+    """Return unit, least, greatest and last value of every column of the sensors of a system."""
+    return {
+        f"{measurement.sensor} {name}": {
+            "unit": measurement.units[name],
+            "least": float(values.min()),
+            "greatest": float(values.max()),
+            "last": float(values[-1]),
+        }
+        for measurement in measured(system, trajectory).values()
+        for name, values in measurement.columns.items()
     }
