@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cms.arrays import Array
 from cms.words import nearest
 from floatframe.errors import ModelError
 from floatframe.joint_results import end_motion, joint_coordinate
@@ -48,7 +49,8 @@ class ReactionSensor:
                 end = find_marker(system, f"force {self.of!r}: marker_a", spring.marker_a)  # type: ignore[union-attr]
             A = end_motion(system, trajectory, end).axes
             vectors = {key: np.einsum("tba,tb->ta", A, values) for key, values in vectors.items()}
-        columns, units = {}, {}
+        columns: dict[str, Array] = {}
+        units: dict[str, str] = {}
         for key, values in vectors.items():
             more, unit = vector_columns(values, unit_words(system.units, key.strip()), prefix=key)
             columns |= more
