@@ -47,6 +47,7 @@ from .mode_sets import rubin as rubin
 from .mode_sets import unrestrained_attachment as unrestrained_attachment
 from .mode_sets import user_basis as user_basis
 from .quality.body_check import check_body as check_body
+from .quality.buckling import critical_loads as critical_loads
 from .quality.record import QualityRecord as QualityRecord
 from .quality.reduction_check import check_reduction as check_reduction
 from .reduced_body import BodyFrame as BodyFrame

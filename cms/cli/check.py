@@ -1,6 +1,7 @@
 """The command `cms check`: verdicts about a modal file, alone or against its full model."""
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,13 @@ def print_records(reduced: ReducedBody, records: Sequence[QualityRecord]) -> Non
         for record in records
     ]
     print_table(f"Quality of {reduced.name}", ("verdict", "check", "value>", "tolerance>", "found"), rows)
+    loads = [row for record in records if record.name == "buckling" for row in record.data.get("loads", [])]
+    if loads:
+        print_table(
+            "Loads that buckle the body, each alone, along the axes of B",
+            ("load", "along>", "against>", "unit"),
+            [(load, number(along), number(against), unit) for load, along, against, unit in loads],
+        )
     todo = [record for record in records if record.action]
     if todo:
         print_table("Next", ("check", "what to do"), [(record.name, record.action) for record in todo])
@@ -88,4 +96,4 @@ def print_records(reduced: ReducedBody, records: Sequence[QualityRecord]) -> Non
 
 def number(value: float | None) -> str:
     """Return a value with three digits; none where there is none."""
-    return "" if value is None or value != value else f"{value:.3g}"
+    return "" if value is None or not math.isfinite(value) else f"{value:.3g}"

@@ -1,5 +1,6 @@
 """Everything a reduced body can be asked without its full model."""
 
+from cms.quality.buckling import check_buckling
 from cms.quality.effective_mass import check_driven_mass
 from cms.quality.identities import (
     check_energy_shares,
@@ -28,6 +29,7 @@ BODY_CHECKS = (
     check_interface_motions,
     check_energy_shares,
     check_driven_mass,
+    check_buckling,
     check_step_size,
     check_damping,
     check_dropped_columns,

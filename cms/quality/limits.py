@@ -53,6 +53,10 @@ LIMITS: dict[str, Limit] = {
     ),
     "energy-shares": Limit("energy shares of the sources sum to one", 1e-9, 1e-3, REDUCE_AGAIN),
     "driven-mass": Limit("mass that does not vibrate when one interface is driven", None, None, ""),
+    "buckling": Limit(
+        "unit loads over the loads that buckle the body", 1.0, None,
+        "a unit load buckles the body: look for a wrong unit of modulus or density, or a part that is almost loose",
+    ),
     "dropped-columns": Limit(
         "redundant columns that were dropped", None, None,
         "",
