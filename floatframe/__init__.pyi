@@ -12,6 +12,8 @@ from .analyses import kinematics as kinematics
 from .analyses import linearize as linearize
 from .analyses import quasi_static_bodies as quasi_static_bodies
 from .analyses import root_locus as root_locus
+from .analyses import run_study as run_study
+from .analyses import snapshot as snapshot
 from .analyses import static_equilibrium as static_equilibrium
 from .analyses import steady_rotation as steady_rotation
 from .analyses import sweep as sweep
@@ -83,6 +85,7 @@ from .sensors import largest_von_mises as largest_von_mises
 from .sensors import nodal_stress as nodal_stress
 from .sensors import point_motion as point_motion
 from .state import State as State
+from .study_file import read_study as read_study
 from .system import System as System
 from .time_functions import TimeFunction as TimeFunction
 from .trajectory import Trajectory as Trajectory

@@ -10,6 +10,7 @@ All of them raise `FloatframeError`, whose text is one message for the user.
 
 import logging
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,6 +25,7 @@ from cms.reduced_body import ReducedBody
 from cms.toml_file import Matrix3, Table, Vector3, choice, numbers, read_toml, validated
 from cms.units import UNIT_SYSTEMS, Units, unit_system
 from cms.words import nearest
+from floatframe.changed_content import changed
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
 from floatframe.flexible_body import FlexibleBody
 from floatframe.forces import FORCES, BodyLoad, Force, Gravity, JointForce, PointForce, SpringDamper
@@ -274,8 +276,15 @@ class RunOptions:
         return GeneralizedAlpha(rho_inf=self.rho_inf, tolerance=self.tolerance)
 
 
-def read_system(path: str | os.PathLike[str]) -> tuple[System, RunOptions]:
+def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> tuple[System, RunOptions]:
     """Read and check a system file and the modal files it names.
+
+    Parameters
+    ----------
+    path
+        The file.
+    changes
+        Values that take the place of those in the file, by key path: {"bodies.rod.mass": 2.0}.
 
     Raises
     ------
@@ -283,7 +292,8 @@ def read_system(path: str | os.PathLike[str]) -> tuple[System, RunOptions]:
         With every problem: key path, value, what was expected, choices and the nearest name.
     """
     path = Path(path)
-    data = validated(SystemFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)
+    content = changed(read_toml(path, SystemFileError), changes or {}, str(path), SystemFileError)
+    data = validated(SystemFile, content, path, SystemFileError, context=path.parent)
     files: dict[Path, ReducedBody] = {}
     try:
         units = unit_system(data.system.units)

@@ -19,6 +19,7 @@ import typer
 
 __all__ = [
     "INTERRUPTED",
+    "USER_ERROR",
     "Stages",
     "bug",
     "commands",

@@ -7,6 +7,8 @@ from floatframe.analyses.inverse_dynamics import InverseDynamics, drive_forces, 
 from floatframe.analyses.kinematics import kinematics
 from floatframe.analyses.linear_system import LinearSystem, linearize
 from floatframe.analyses.parameter_study import Locus, campbell, root_locus
+from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.study import StudyTable, run_study
 from floatframe.analyses.sweep import sweep
 from floatframe.analyses.system_modes import SystemModes, system_modes
 
@@ -16,6 +18,7 @@ __all__ = [
     "InverseDynamics",
     "LinearSystem",
     "Locus",
+    "StudyTable",
     "SystemModes",
     "campbell",
     "drive_forces",
@@ -25,6 +28,8 @@ __all__ = [
     "linearize",
     "quasi_static_bodies",
     "root_locus",
+    "run_study",
+    "snapshot",
     "static_equilibrium",
     "steady_rotation",
     "sweep",

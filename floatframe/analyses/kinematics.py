@@ -14,13 +14,14 @@ from cms.arrays import Array
 from floatframe.analyses.driven_freedoms import SingularityGuard, free_coordinates
 from floatframe.analyses.driven_motion import ELASTICITY, Elasticity, Instant, frozen_bodies
 from floatframe.analyses.joint_rates import driven_coordinates
+from floatframe.analyses.snapshot import observed_state
 from floatframe.compiled import CompiledSystem
 from floatframe.constraint_words import conflict_of_drives
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.freedoms import constraint_mobility
 from floatframe.initial import assembled, checked
 from floatframe.integration import head_of, joint_rows
-from floatframe.kernels.model import Memory, Rows, Work, new_work
+from floatframe.kernels.model import Rows, Work, new_work
 from floatframe.linearization import displaced
 from floatframe.results import MemorySource, ResultsWriter
 from floatframe.state import State
@@ -96,7 +97,7 @@ def kinematics(
         for k, time in enumerate(t):
             if k:
                 now = moved_on(compiled, work, now, float(time), elasticity, guard)
-            rows, power[1] = observed(compiled, work, now)
+            rows, power[1] = observed_state(compiled, work, now.state, now.u_dot, now.w, now.t)
             if k:
                 done = done + (time - t[k - 1]) / 2 * (power[0] + power[1])
             power[0] = power[1]
@@ -184,17 +185,3 @@ def moved_on(
                 residual=0.0,
             )
     return replace(now, n_iterations=n)
-
-
-def observed(compiled: CompiledSystem, work: Work, now: Instant) -> tuple[Rows, Array]:
-    """Return the row of results of an instant and the power of loads and dampers at it, (2,)."""
-    from floatframe.kernels.entry import observe_state
-
-    state = now.state
-    work.time[0] = now.t
-    memory = Memory(
-        state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), now.u_dot.copy(), now.u_dot.copy(),
-        now.w.copy(), np.zeros(2), np.zeros(2),
-    )  # fmt: skip
-    rows = observe_state(compiled.model, work, memory, now.t)
-    return rows, memory.power.copy()

@@ -1,0 +1,48 @@
+"""One state as a motion of one time, so that sensors, tables and pictures of motions serve for it too."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.compiled import CompiledSystem
+from floatframe.integration import head_of, joint_rows
+from floatframe.kernels.model import Memory, Rows, Work, new_work
+from floatframe.results import MemorySource
+from floatframe.state import State
+from floatframe.system import System
+from floatframe.trajectory import Trajectory
+
+__all__ = ["observed_state", "snapshot"]
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What stands in the place of the integrator in the record of one state."""
+
+
+def snapshot(
+    system: System, state: State, u_dot: Array | None = None, w: Array | None = None, *, t: float = 0.0
+) -> Trajectory:
+    """Return a state, with accelerations and wrenches (zero by default), as a trajectory of one time."""
+    model = system.compiled.model
+    u_dot = np.zeros(int(model.u0[-1])) if u_dot is None else u_dot
+    w = np.zeros(int(model.c_w0[-1])) if w is None else w
+    rows, _ = observed_state(system.compiled, new_work(model), state, u_dot, w, t)
+    head = head_of(system, Snapshot(), t, t, 1.0, 1)  # type: ignore[arg-type]
+    return Trajectory(head, MemorySource(joint_rows(system, [rows])), is_complete=True)
+
+
+def observed_state(
+    compiled: CompiledSystem, work: Work, state: State, u_dot: Array, w: Array, t: float
+) -> tuple[Rows, Array]:
+    """Return the row of results of a state and the power of loads and dampers at it, (2,)."""
+    from floatframe.kernels.entry import observe_state
+
+    work.time[0] = t
+    memory = Memory(
+        state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), np.array(u_dot), np.array(u_dot), np.array(w),
+        np.zeros(2), np.zeros(2),
+    )  # fmt: skip
+    rows = observe_state(compiled.model, work, memory, t)
+    return rows, memory.power.copy()

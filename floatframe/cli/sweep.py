@@ -1,0 +1,156 @@
+"""The command sweep: parameter studies of a system."""
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
+
+if TYPE_CHECKING:
+    from floatframe.analyses.study import StudyTable
+
+__all__ = ["register"]
+
+KINDS = ("csv", "json", "png", "svg", "pdf")
+MOST_ROWS = 60  #: printed
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command("sweep")(sweep_command)
+
+
+@guarded
+def sweep_command(
+    study: Annotated[Path, typer.Argument(help="Study file (TOML), see docs/analyses.md.")],
+    outputs: Annotated[
+        list[Path],
+        typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable."),
+    ] = [],  # noqa: B006
+    processes: Annotated[
+        int | None, typer.Option("--processes", "-j", min=1, help="Points at once; default: one a processor.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
+) -> None:
+    """Vary parameters of a system: one run, equilibrium or set of modes for every point, in parallel processes.
+
+    A point that fails is a row with its reason; the others go on. Without -o a table stands beside the study:
+    study.toml gives study.csv.
+
+    Example: floatframe sweep study.toml -o study.csv -o study.png
+    """
+    import io
+
+    from cms.paths import replace_file
+    from floatframe.analyses.study import run_study
+    from floatframe.analyses.study_plots import plot_study
+    from floatframe.errors import ModelError
+    from floatframe.study_file import read_study
+
+    described = read_study(study)
+    inputs = (study, Path(described.system))
+    paths = [output_path(path, None, ModelError, overwrite_of=inputs) for path in outputs]
+    if not paths and not json:
+        paths = [output_path(None, study.with_suffix(".csv"), ModelError, overwrite_of=inputs)]
+    for path in paths:
+        if path.suffix.lower().removeprefix(".") not in KINDS:
+            raise ModelError(f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in KINDS)}")
+    n = sum(1 for _ in described.points())
+    with stages(remaining=True) as clock:
+        if described.analysis == "run":
+            from floatframe.kernels.entry import prepare
+
+            with clock("compiled code (made at first use)"):
+                prepare()  # once, before many processes want it
+        with clock(f"{n} points") as advance:
+            table = run_study(described, processes=processes, progress=lambda done, all_: advance(done / all_))
+    record = study_record(table)
+    if json:
+        typer.echo(json_module.dumps(record, indent=2))
+    else:
+        print_study(table)
+    for path in paths:
+        kind = path.suffix.lower().removeprefix(".")
+        if kind == "csv":
+            replace_file(path, csv_of(table).encode())
+        elif kind == "json":
+            replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
+        else:
+            picture = io.BytesIO()
+            plot_study(table).savefig(picture, format=kind, dpi=130)
+            replace_file(path, picture.getvalue())
+        if not json:
+            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    if table.n_failed == len(table.rows):
+        print_error(f"no point gave a result; the first one: {table.rows[0].error}")
+        raise typer.Exit(USER_ERROR)
+
+
+def headers(table: "StudyTable") -> list[str]:
+    """Return the names of the columns: parameters, outputs with their units."""
+    study = table.study
+    named = [f"{o.name} [{unit}]" if unit else o.name for o, unit in zip(study.outputs, table.units, strict=True)]
+    return [parameter.name for parameter in study.parameters] + named
+
+
+def print_study(table: "StudyTable") -> None:
+    """Print the table, and why points failed."""
+    from floatframe.analyses.study_plots import shown
+
+    rows = [
+        (
+            *(shown(value) for value in row.values),
+            *(("failed",) * len(row.outputs) if row.error else (f"{value:.6g}" for value in row.outputs)),
+        )
+        for row in table.rows
+    ]
+    n = len(table.study.parameters)
+    names = headers(table)
+    print_table("Study", tuple([*names[:n], *(f"{name}>" for name in names[n:])]), rows[:MOST_ROWS])
+    if len(rows) > MOST_ROWS:
+        say(f"... and {len(rows) - MOST_ROWS} more points, in the files written")
+    for row in [row for row in table.rows if row.error][:5]:
+        point = ", ".join(f"{p.name} = {shown(v)}" for p, v in zip(table.study.parameters, row.values, strict=True))
+        say(f"failed at {point}: {row.error}")
+    if table.n_failed:
+        say(f"{table.n_failed} of {len(table.rows)} points failed")
+
+
+def study_record(table: "StudyTable") -> dict[str, Any]:
+    """Return a study in plain types; numbers of points that failed are null."""
+    study = table.study
+    return {
+        "system": study.system,
+        "analysis": study.analysis,
+        "parameters": {parameter.name: parameter.path for parameter in study.parameters},
+        "outputs": {
+            output.name: {"of": output.of, "take": output.take, "unit": unit}
+            for output, unit in zip(study.outputs, table.units, strict=True)
+        },
+        "points": [
+            {
+                "parameters": {p.name: value for p, value in zip(study.parameters, row.values, strict=True)},
+                "outputs": {
+                    o.name: None if row.error else value for o, value in zip(study.outputs, row.outputs, strict=True)
+                },
+                "error": row.error or None,
+            }
+            for row in table.rows
+        ],
+    }
+
+
+def csv_of(table: "StudyTable") -> str:
+    """Return a study as comma-separated values, with 17 digits; empty cells and a reason where a point failed."""
+    import csv
+    import io
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*headers(table), "error"])
+    for row in table.rows:
+        numbers = ["" if row.error else repr(value) for value in row.outputs]
+        writer.writerow([*(repr(v) if isinstance(v, float) else v for v in row.values), *numbers, row.error])
+    return text.getvalue()
