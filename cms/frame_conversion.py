@@ -46,7 +46,7 @@ def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None
 
     Free-free frequencies, stiffness, damping and loads are those of the same body; the motion is the same but for
     second order in q (THEORY §4). The damping matrix is carried as it is, D'' = Zᵀ D Z, so that a deformation loses the
-    same energy in both frames; it is diagonal no more in general.
+    same energy in both frames; it is diagonal no more in general. Quadratic modes need the elements and are left out.
 
     Parameters
     ----------
@@ -275,6 +275,7 @@ def changed_body(
         geometric=None
         if reduced.geometric is None
         else converted_geometric_stiffness(reduced, frame, C=change.C, Z=Z, p=change.p, R=change.R),
+        quadratic=None,  # its reaction is that of the old frame
         point_stress=None if reduced.point_stress is None else changed_point_stress(reduced.point_stress, change),
     )
 

@@ -41,7 +41,7 @@ def require_convertible(reduced: ReducedBody, frame: BodyFrame) -> None:
         f"reduced body {reduced.name!r}: its geometric stiffness can go to a Tisserand frame or to a nodal frame at an "
         f"interface with one reference node, not to this {frame.kind} frame, whose reaction it does not know; reduce "
         "the body anew in that frame, or leave the geometric stiffness out (cms frame --no-geometric-stiffness, or "
-        "replace(body, geometric=None))"
+        "replace(body, geometric=None, quadratic=None))"
     )
 
 

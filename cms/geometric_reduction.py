@@ -103,21 +103,31 @@ def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array) -> Array:
     A distributing interface hands what acts on its reference node to its members. The other ones that are no node of
     the body are read off several members, or by a lever: that counts for their own unit loads, 12 + 6 i + c.
     """
-    n = Phi.shape[1]
-    work = np.zeros((on_dofs.shape[1], n, n))
+    work = distributing_part(body, on_dofs, Phi)
     turn = np.kron(np.eye(2), axes)
     for number, interface in enumerate(body.interfaces):
         own = slice(12 + 6 * number, 18 + 6 * number)
         motion, _, turns = reference_motion(body, interface)
         if interface.kind == "distributing":
-            gamma = members_second_order(body, interface, Phi, turns)
-            work += np.einsum("cj,ckl->jkl", on_dofs[np.asarray(interface.dofs)], gamma, optimize=True)
-        elif is_mean(body, interface):
+            continue
+        if is_mean(body, interface):
             gamma = members_second_order(body, interface, Phi, turns)
             work[own] += np.einsum("cj,ckl->jkl", turn, gamma, optimize=True)
         else:
             six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
             work[own] += link_work(motion, six, body.dofs, np.asarray(turn, np.float64), Phi)
+    return work
+
+
+def distributing_part(body: FEBody, on_dofs: Array, Phi: Array) -> Array:
+    """Return the work of loads on reference nodes that are the mean of their members, (k, n, n)."""
+    n = Phi.shape[1]
+    work = np.zeros((on_dofs.shape[1], n, n))
+    for interface in body.interfaces:
+        if interface.kind == "distributing":
+            _, _, turns = reference_motion(body, interface)
+            gamma = members_second_order(body, interface, Phi, turns)
+            work += np.einsum("cj,ckl->jkl", on_dofs[np.asarray(interface.dofs)], gamma, optimize=True)
     return work
 
 

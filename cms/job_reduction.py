@@ -229,6 +229,9 @@ class ReductionSection(Table):
     geometric_stiffness: bool | None = Field(
         None, description="true or false: whether to add the geometric stiffness; default: where the elements are known"
     )
+    quadratic_modes: bool | None = Field(
+        None, description="true or false: whether to add the displacement of second order of the kept nodes"
+    )
 
     @field_validator("columns", mode="before")
     @classmethod

@@ -71,6 +71,8 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
         attributes["/columns"] = {}
     if body.geometric is not None:
         attributes["/geometric"] = {}
+    if body.quadratic is not None:
+        attributes["/quadratic"] = {}
     if body.nodal_sums is not None:
         attributes["/nodal_sums"] = {"is_volume": int(body.nodal_sums.is_volume)}
     return attributes
@@ -105,6 +107,8 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
     if body.geometric is not None:
         values |= {f"/geometric/{name}": getattr(body.geometric, name) for name in UNIT_LOADS}
         values |= {f"/interfaces/{k}/K_geometric": K for k, K in enumerate(body.geometric.interfaces)}
+    if body.quadratic is not None:
+        values["/quadratic/g"] = body.quadratic
     if columns is not None:
         values |= {f"/columns/{name}": getattr(columns, name) for name in ("labels", "groups", "A", "F")}
     if sums is not None:
@@ -217,6 +221,7 @@ def body_of(content: Content) -> ReducedBody:
         if contents.has("/stress", "has_points")
         else None,
         geometric=geometric_of(contents) if contents.has("/geometric") else None,
+        quadratic=array("/quadratic/g") if contents.has("/quadratic") else None,
     )  # fmt: skip
 
 

@@ -100,6 +100,8 @@ ENTRIES = {
     "/geometric/rotation": entry("K_r,a of the loads -rho e_a x c of an angular acceleration; index order a, k, l"),
     "/geometric/spin": entry("K_ab of -rho/2 [e_a x (e_b x c) + e_b x (e_a x c)], products of angular velocities; "
                              "index order ab (xx yy zz xy yz zx), k, l"),
+    "/quadratic/g": entry("displacement of second order of the kept nodes in B, 1/2 sum q_k q_l g_kl; index order "
+                          "node, component, k, l", Dimensions(-1, -1)),
     "/load_cases/<i>/force": entry("resultant force in B", Dimensions(1, 1, -2)),
     "/load_cases/<i>/torque": entry("resultant torque about the origin of B", Dimensions(1, 2, -2)),
     "/load_cases/<i>/h": entry("modal forces Phi.T f", Dimensions(0.5, 1, -2)),

@@ -101,6 +101,8 @@ class ReducedBody:
     stress: Array | None = None
     point_stress: PointStress | None = None  #: stress of the modes at named points; None: left out, or there are none
     geometric: GeometricStiffness | None = None  #: for geometric stiffening; None: left out, or not known
+    #: g_kl of the kept nodes in B, displacement ½ Σ q_k q_l g_kl, (n_kept, 3, n_q, n_q) [1/(kg m)]; None: left out
+    quadratic: Array | None = None
 
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"
@@ -114,6 +116,12 @@ class ReducedBody:
             put(self, "stress", frozen(self.stress))
             require_shape(f"{where}: stress", self.stress, (len(self.nodes), 6, self.n_q))
             require_finite(f"{where}: stress", self.stress)
+        if self.quadratic is not None:
+            put(self, "quadratic", frozen(self.quadratic))
+            require_shape(f"{where}: quadratic", self.quadratic, (len(self.nodes), 3, self.n_q, self.n_q))
+            require_finite(f"{where}: quadratic", self.quadratic)
+            if self.geometric is None:
+                raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
         for name in ("labels", "sources", "interfaces", "load_cases"):
             put(self, name, tuple(getattr(self, name)))
         put(self, "provenance", MappingProxyType(dict(self.provenance)))

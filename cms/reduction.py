@@ -20,6 +20,7 @@ from cms.matrix_moments import gram_from_matrices
 from cms.mode_set import ModeSet
 from cms.nodal_sums import NodalSums, node_weights, weighted_rigid_modes
 from cms.node_motion import reference_motion
+from cms.quadratic_modes import quadratic_modes
 from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.rigid_modes import geometric_rigid_modes
 from cms.stress_modes import nodal_stress_modes, point_stress_modes
@@ -35,6 +36,7 @@ def reduce(
     damping: Damping | None = None,
     stress: bool = True,
     geometric: bool = False,
+    quadratic: bool = False,
     families: Families | None = None,
 ) -> ReducedBody:
     """Reduce a body to the span of a mode set.
@@ -55,6 +57,9 @@ def reduce(
         Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`), with which a multibody
         system stiffens the body by its spin, accelerations and interface loads. It costs the static solution of 12 +
         6 n_interfaces loads and one pass over the elements.
+    quadratic
+        Whether to add quadratic modes, the displacement of second order of every kept node (`cms.quadratic_modes`),
+        with the geometric stiffness that is their inertia. For slender bodies: three static solutions a kept node.
     families
         The families that made `modes`, so that the geometric stiffness takes their factorisation; it makes its own by
         default.
@@ -67,6 +72,7 @@ def reduce(
         If the body is a mechanism, the frame cannot be attached, or geometric stiffness is asked of a body without an
         element model.
     """
+    geometric = geometric or quadratic
     if geometric:
         require_geometric_stiffness(body)
     if modes.columns.shape[0] != body.n_dof:
@@ -109,6 +115,7 @@ def reduce(
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
         geometric=reduced_geometric_stiffness(body, finished.Phi, condition, families=families) if geometric else None,
+        quadratic=quadratic_modes(body, finished.Phi, condition, kept, families=families) if quadratic else None,
     )
 
 

@@ -14,6 +14,7 @@ from cms.rendering.drawing import OnFrame
 from floatframe.body_colors import DISPLACEMENT, BodyColor
 from floatframe.errors import ResultsError
 from floatframe.film_times import FilmTimes, film_times, round_below, speed_words, time_words
+from floatframe.recovery import nodal_displacements
 from floatframe.rigid_body import RigidBody
 from floatframe.stage import box_of, ground_grid, view_axes
 from floatframe.trajectory import BodyMotion, Trajectory
@@ -113,7 +114,7 @@ def motion_scene(
                 f"film: body {name!r} has {reduced.n_q} modes, but its motion {motions[name].q.shape[1]}"
             )
     rows = times.rows
-    displacements = {name: motions[name].q[rows] @ modes_as_rows(body) for name, body in flexible.items()}
+    displacements = {name: nodal_displacements(trajectory, name, body, rows) for name, body in flexible.items()}
     if magnification is None:
         magnification = chosen_magnification(flexible, displacements)
     surfaces, triads, lines = [], [], []
@@ -124,7 +125,7 @@ def motion_scene(
     for name, (r, R) in frames.items():
         body = flexible.get(name)
         if body is not None and len(body.surface):
-            moved = displacements[name].reshape(len(rows), -1, 3)
+            moved = displacements[name]
             nodes = r[:, None] + (body.nodes + magnification * moved) @ R.transpose(0, 2, 1)
             surfaces.append(Surface(body.surface, nodes, scalars=unit_factor * scalars[name], name=name))
             for interface in body.interfaces:
@@ -159,11 +160,6 @@ def motion_scene(
         up=up_axis,
         size=(960, 720),
     )
-
-
-def modes_as_rows(body: ReducedBody) -> Array:
-    """Return the modes at the kept nodes as (n_q, 3 n_nodes)."""
-    return body.Phi.reshape(-1, body.n_q).T
 
 
 def rotations(p: Array) -> Array:

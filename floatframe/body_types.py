@@ -50,7 +50,7 @@ def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], I
         if key not in keys:
             keys.append(key)
             if isinstance(data, ReducedBody) and data.geometric is not None and not key[1]:
-                data = replace(data, geometric=None)
+                data = replace(data, geometric=None, quadratic=None)
             types.append(data)
         kind.append(keys.index(key))
     return types, integers(kind)

@@ -13,7 +13,7 @@ from cms.reduced_body import ReducedBody
 from cms.stress_modes import von_mises
 from floatframe.errors import ResultsError
 from floatframe.measuring import measured, sensor_of
-from floatframe.recovery import elastic_displacements, require_same_modes
+from floatframe.recovery import elastic_displacements, nodal_displacements, require_same_modes
 from floatframe.rotations import rotation_matrix
 from floatframe.sensors import interface_motion
 from floatframe.system import System
@@ -136,7 +136,7 @@ def export_vtk(
         for name, body in drawn.items():
             motion = motions[name]
             R = rotation_matrix(motion.p[i])
-            elastic = body.Phi @ motion.q[i]
+            elastic = nodal_displacements(trajectory, name, body, i)
             points.append(motion.r[i] + (body.nodes + elastic) @ R.T)
             displacement.append(elastic @ R.T)
             if has_stress and body.stress is not None:

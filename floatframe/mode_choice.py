@@ -56,6 +56,7 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
         stress=None if body.stress is None else body.stress[:, :, k],
         point_stress=None,
         geometric=None if body.geometric is None else body.geometric.of_modes(k),
+        quadratic=None if body.quadratic is None else np.asarray(body.quadratic)[:, :, k[:, None], k],
     )
 
 

@@ -2,14 +2,20 @@
 
 import numpy as np
 
-from cms.arrays import Array
+from cms.arrays import Array, IntArray
 from cms.reduced_body import ReducedBody
 from floatframe.errors import ResultsError
 from floatframe.rotations import rotation_matrix
 from floatframe.stiffening import interface_deformation
 from floatframe.trajectory import Trajectory
 
-__all__ = ["elastic_displacements", "interface_positions", "nodal_positions", "point_positions"]
+__all__ = [
+    "elastic_displacements",
+    "interface_positions",
+    "nodal_displacements",
+    "nodal_positions",
+    "point_positions",
+]
 
 
 def require_same_modes(trajectory: Trajectory, body_name: str, reduced: ReducedBody) -> None:
@@ -25,7 +31,8 @@ def require_same_modes(trajectory: Trajectory, body_name: str, reduced: ReducedB
 def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int) -> Array:
     """Return positions of the kept nodes of a flexible body at an output time, ground axes, (n_kept, 3) [m].
 
-    r + R (c + Phi q), with all modes of the body, static ones included.
+    r + R (c + Phi q), with all modes of the body, static ones included; of a stiffened body with quadratic modes also
+    the part of second order.
 
     Raises
     ------
@@ -34,8 +41,22 @@ def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody
     """
     require_same_modes(trajectory, body_name, reduced)
     motion = trajectory.body(body_name)
-    local = reduced.nodes + reduced.Phi @ motion.q[i_time]
+    local = reduced.nodes + nodal_displacements(trajectory, body_name, reduced, i_time)
     return motion.r[i_time] + local @ rotation_matrix(motion.p[i_time]).T
+
+
+def nodal_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int | IntArray) -> Array:
+    """Return displacements of the kept nodes in the body frame at one or several output times, (..., n_kept, 3) [m].
+
+    Phi q, and of a stiffened body with quadratic modes ½ Σ q_k q_l g_kl besides.
+    """
+    require_same_modes(trajectory, body_name, reduced)
+    _, entry = trajectory.entry(body_name)
+    q = trajectory.body(body_name).q[i_time]
+    displacement = np.einsum("nak,...k->...na", reduced.Phi, q, optimize=True)
+    if reduced.quadratic is not None and entry.is_stiffened:
+        displacement = displacement + 0.5 * np.einsum("nakl,...k,...l->...na", reduced.quadratic, q, q, optimize=True)
+    return np.asarray(displacement)
 
 
 def interface_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:

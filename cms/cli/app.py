@@ -347,6 +347,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
         ("stress of modes", stress_words(record["stress"])),
         ("geometric stiffness", "spin, accelerations, interface loads" if record["geometric_stiffness"] else "none"),
+        *([("quadratic modes", "second order at the kept nodes")] if record["quadratic_modes"] else []),
     ]
     print_table("Body", ("", ""), rows)
     print_table(

@@ -53,7 +53,7 @@ def run_frame(request: FrameRequest) -> "ReducedBody":
             if request.units is not None:
                 body = convert_units(body, request.units)
             if not request.keep_geometric:
-                body = replace(body, geometric=None)
+                body = replace(body, geometric=None, quadratic=None)
         with clock("convert"):
             converted = convert_frame(body, frame, damping=damping_of(request))
         with clock("write"):

@@ -88,6 +88,7 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
             "points": 0 if body.point_stress is None else len(body.point_stress.names),
         },
         "geometric_stiffness": body.geometric is not None,
+        "quadratic_modes": body.quadratic is not None,
         "kept_nodes": len(body.nodes),
         "surface_triangles": len(body.surface),
         "provenance": dict(body.provenance),

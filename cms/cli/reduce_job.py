@@ -50,7 +50,7 @@ def reduce_job(
 
     stages = stages or Stages()
     coupled = job_body(job, stages, on_report=on_report)
-    if job.reduction.geometric_stiffness:
+    if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
         require_geometric_stiffness(coupled)  # before the long work
     wanted = job.reduction.geometric_stiffness
     with Families(coupled) as families:
@@ -64,6 +64,7 @@ def reduce_job(
                 damping=None if job.damping is None else job.damping.damping,
                 stress=job.reduction.stress is not False,
                 geometric=has_geometric_stiffness(coupled) if wanted is None else wanted,
+                quadratic=bool(job.reduction.quadratic_modes),
                 families=families,
             )
 
