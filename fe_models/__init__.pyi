@@ -35,8 +35,10 @@ from .errors import (
     MeshError as MeshError,
 )
 from .errors import SectionError as SectionError
+from .errors import ShellError as ShellError
 from .importers.read_mesh import read_line_mesh as read_line_mesh
 from .importers.read_mesh import read_mesh as read_mesh
+from .importers.read_mesh import read_shell_mesh as read_shell_mesh
 from .importers.tables import read_tables as read_tables
 from .interfaces import (
     check_overlap as check_overlap,
@@ -81,6 +83,14 @@ from .selections import (
 from .selections import (
     Plane as Plane,
 )
+from .shells.body import shell_body as shell_body
+from .shells.interfaces import shell_interface as shell_interface
+from .shells.shell_mesh import ShellMesh as ShellMesh
+from .shells.shell_mesh import flat_plate as flat_plate
+from .shells.shell_mesh import mapped_shell as mapped_shell
+from .shells.shell_property import ShellProperty as ShellProperty
+from .shells.shell_report import ShellReport as ShellReport
+from .shells.shell_report import report_shell as report_shell
 from .solid import solid_body as solid_body
 from .split import Cut as Cut
 from .split import Split as Split

@@ -1,6 +1,15 @@
 """Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
 
-__all__ = ["BeamError", "FeModelsError", "InterfaceError", "LoadError", "MaterialError", "MeshError", "SectionError"]
+__all__ = [
+    "BeamError",
+    "FeModelsError",
+    "InterfaceError",
+    "LoadError",
+    "MaterialError",
+    "MeshError",
+    "SectionError",
+    "ShellError",
+]
 
 
 class FeModelsError(Exception):
@@ -21,6 +30,10 @@ class SectionError(FeModelsError, ValueError):
 
 class BeamError(FeModelsError, ValueError):
     """A beam model is impossible: a line without length or direction, a follower of two nodes, an unknown node."""
+
+
+class ShellError(FeModelsError, ValueError):
+    """A shell model is impossible: cells without thickness or area, warped beyond the limit, an unknown node."""
 
 
 class InterfaceError(FeModelsError, ValueError):

@@ -19,14 +19,14 @@ from fe_models.boundary import boundary_facets, facet_weights, first_of_equal_ro
 from fe_models.cell_shapes import quadrature, shape_values
 from fe_models.errors import LoadError
 from fe_models.mesh import Mesh
-from fe_models.selections import Selection, selected_facets
+from fe_models.selections import AnyMesh, Selection, selected_facets
 
 __all__ = ["gravity_load", "interface_load", "nodal_load", "pressure_load", "selection_load"]
 
 UNREACHED = 1e-9  #: share of a force or torque that the nodes fail to carry, above which it is refused
 
 
-def pressure_load(body: FEBody, mesh: Mesh | LineMesh, name: str, selection: Selection, pressure: float) -> LoadCase:
+def pressure_load(body: FEBody, mesh: AnyMesh, name: str, selection: Selection, pressure: float) -> LoadCase:
     """Make the load case of a uniform pressure on facets of the surface.
 
     f_n = -p ∫ N_n n dA with n dA = ∂x/∂xi × ∂x/∂eta: polynomial for every face, so the quadrature is exact; the
@@ -37,13 +37,13 @@ def pressure_load(body: FEBody, mesh: Mesh | LineMesh, name: str, selection: Sel
     body
         The body of that mesh, its nodes first.
     mesh
-        Solid mesh; lines have no faces.
+        Of a solid or of a shell; lines have no faces.
     name
         Of the load case.
     selection
-        Facets of the surface.
+        Facets of the surface; cells of a shell.
     pressure
-        Positive pushes on the surface [Pa].
+        Positive pushes on the surface; on the top of a shell, against the normal of its cells [Pa].
 
     Raises
     ------
@@ -62,7 +62,8 @@ def pressure_load(body: FEBody, mesh: Mesh | LineMesh, name: str, selection: Sel
         raise LoadError(f"{where}: the selected nodes make up no complete facet of the surface; select faces")
     forces = np.zeros((len(body.nodes), 6))
     for kind, rows in facets.items():
-        _require_outward(mesh, where, kind, rows)
+        if isinstance(mesh, Mesh):
+            _require_outward(mesh, where, kind, rows)
         points, weights = quadrature(kind)
         N, dN = shape_values(kind, points)
         tangents = np.einsum("fnd,pna->fpad", mesh.nodes[rows], dN)
@@ -156,7 +157,7 @@ def interface_load(
 
 def selection_load(
     body: FEBody,
-    mesh: Mesh | LineMesh,
+    mesh: AnyMesh,
     name: str,
     selection: Selection,
     *,
@@ -267,7 +268,7 @@ def _require_outward(mesh: Mesh, where: str, kind: str, rows: IntArray) -> None:
         )
 
 
-def _require_mesh_of(body: FEBody, mesh: Mesh | LineMesh, where: str) -> None:
+def _require_mesh_of(body: FEBody, mesh: AnyMesh, where: str) -> None:
     n = len(mesh.nodes)
     if len(body.nodes) < n or not np.array_equal(body.nodes[:n], mesh.nodes):
         raise LoadError(f"{where}: the mesh is not that of body {body.name!r}; pass the mesh the body was made of")

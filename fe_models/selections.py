@@ -12,24 +12,26 @@ from fe_models.beams.line_mesh import LineMesh
 from fe_models.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
 from fe_models.errors import InterfaceError
 from fe_models.mesh import Mesh
+from fe_models.shells.shell_mesh import ShellMesh
 
 __all__ = ["Box", "Cylinder", "FaceGroup", "NearestNode", "NodeSet", "Plane", "Selection", "selected_facets"]
 
 _WHY_EMPTY = "nodes that belong to no solid cell, such as reference nodes, are dropped: select nodes of the solid"
 
 Vector = tuple[float, float, float]
+AnyMesh = Mesh | LineMesh | ShellMesh
 
 
 class Selection(Protocol):
     """Something that chooses nodes of a mesh."""
 
-    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+    def members(self, mesh: AnyMesh) -> IntArray:
         """Return the chosen nodes, ascending; `InterfaceError` if there are none."""
 
 
 @dataclass(frozen=True)
 class FaceGroup:
-    """The nodes of a named group of faces.
+    """The nodes of a named group of faces, or of cells of a shell.
 
     Where the faces are facets of the solid, the nodes are those of the complete facets, so that linear triangles
     written over quadratic tetrahedra select the middle nodes too.
@@ -37,14 +39,16 @@ class FaceGroup:
 
     name: str
 
-    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+    def members(self, mesh: AnyMesh) -> IntArray:
         """Return the nodes of the group, ascending."""
         return np.unique(np.concatenate([rows.ravel() for rows in self.facets(mesh).values()]))
 
-    def facets(self, mesh: Mesh | LineMesh) -> dict[str, IntArray]:
+    def facets(self, mesh: AnyMesh) -> dict[str, IntArray]:
         """Return face type -> faces of the group, as complete facets of the solid where they are such."""
         if isinstance(mesh, LineMesh):
             raise InterfaceError(f"face group {self.name!r}: a mesh of lines has no faces; select nodes")
+        if isinstance(mesh, ShellMesh):
+            return self._cells(mesh)
         if self.name not in mesh.face_sets:
             raise InterfaceError(
                 f"no face group {self.name!r}{_other_kind(mesh, self.name, 'face group')}"
@@ -56,6 +60,18 @@ class FaceGroup:
         _require_on_solid(mesh, f"face group {self.name!r}", np.concatenate([f.ravel() for f in faces.values()]))
         return _complete(mesh, faces)
 
+    def _cells(self, mesh: ShellMesh) -> dict[str, IntArray]:
+        """Return cell type -> cells of the group of a shell."""
+        if self.name not in mesh.cell_sets:
+            raise InterfaceError(
+                f"no group of cells {self.name!r}{_other_kind(mesh, self.name, 'cell group')}"
+                f"{nearest(self.name, mesh.cell_sets)}"
+            )
+        cells = {kind: mesh.cells[kind][rows] for kind, rows in mesh.cell_sets[self.name].items() if rows.size}
+        if not cells:
+            raise InterfaceError(f"group of cells {self.name!r} is empty")
+        return cells
+
 
 @dataclass(frozen=True)
 class NodeSet:
@@ -63,7 +79,7 @@ class NodeSet:
 
     name: str
 
-    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+    def members(self, mesh: AnyMesh) -> IntArray:
         """Return the nodes of the set, ascending."""
         if self.name not in mesh.node_sets:
             raise InterfaceError(
@@ -85,7 +101,7 @@ class Plane:
     normal: Vector  #: any length
     tolerance: float | None = None  #: distance [m]; None: 1e-6 of the diagonal of the bounding box
 
-    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+    def members(self, mesh: AnyMesh) -> IntArray:
         """Return the surface nodes within the tolerance, ascending."""
         surface = candidates(mesh)
         normal = _unit("plane", "normal", self.normal)
@@ -112,7 +128,7 @@ class Cylinder:
     span: tuple[float, float] | None = None  #: range along the axis from `point` [m]; None: no limit
     tolerance: float | None = None  #: difference to the radius [m]; None: 1e-3 of the radius
 
-    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+    def members(self, mesh: AnyMesh) -> IntArray:
         """Return the surface nodes within the tolerance, ascending.
 
         Middle nodes on straight edges lie inside a coarse hole by its sagitta: give a larger tolerance for those.
@@ -149,7 +165,7 @@ class Box:
     lo: Vector  #: [m]
     hi: Vector  #: [m]
 
-    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+    def members(self, mesh: AnyMesh) -> IntArray:
         """Return the surface nodes inside, ascending; the walls, widened by 1e-9 of the body, belong to the box."""
         lo, hi = _point("box", self.lo), _point("box", self.hi)
         if (lo > hi).any():
@@ -174,27 +190,31 @@ class NearestNode:
 
     point: Vector  #: [m]
 
-    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+    def members(self, mesh: AnyMesh) -> IntArray:
         """Return that node, (1,)."""
         surface = candidates(mesh)
         point = _point("nearest node", self.point)
         return surface[[int(np.linalg.norm(mesh.nodes[surface] - point, axis=1).argmin())]]
 
 
-def candidates(mesh: Mesh | LineMesh) -> IntArray:
-    """Return the nodes that geometry can select: those of the surface of a solid, all nodes of a frame; ascending."""
-    return np.arange(len(mesh.nodes)) if isinstance(mesh, LineMesh) else boundary_nodes(mesh)
+def candidates(mesh: AnyMesh) -> IntArray:
+    """Return the nodes that geometry can select: of the surface of a solid, all of a frame or shell; ascending."""
+    return boundary_nodes(mesh) if isinstance(mesh, Mesh) else np.arange(len(mesh.nodes))
 
 
-def selected_facets(mesh: Mesh | LineMesh, selection: Selection) -> dict[str, IntArray]:
-    """Return face type -> facets of a selection: those of a face group, else boundary facets with all nodes chosen."""
+def selected_facets(mesh: AnyMesh, selection: Selection) -> dict[str, IntArray]:
+    """Return face type -> facets of a selection: those of a face group, else boundary facets with all nodes chosen.
+
+    The facets of a shell are its cells.
+    """
     if isinstance(selection, FaceGroup):
         return selection.facets(mesh)
     if isinstance(mesh, LineMesh):
         return {}
     chosen = np.zeros(len(mesh.nodes), dtype=bool)
     chosen[selection.members(mesh)] = True
-    whole = {kind: facets[chosen[facets].all(axis=1)] for kind, facets in boundary_facets(mesh).items()}
+    surface = boundary_facets(mesh) if isinstance(mesh, Mesh) else mesh.cells
+    whole = {kind: facets[chosen[facets].all(axis=1)] for kind, facets in surface.items()}
     return {kind: facets for kind, facets in whole.items() if len(facets)}
 
 
@@ -218,8 +238,8 @@ def _complete(mesh: Mesh, faces: Mapping[str, IntArray]) -> dict[str, IntArray]:
     return {kind: rows for kind, rows in joined.items() if len(rows)}
 
 
-def _require_on_solid(mesh: Mesh | LineMesh, what: str, nodes: IntArray) -> None:
-    if isinstance(mesh, LineMesh):
+def _require_on_solid(mesh: AnyMesh, what: str, nodes: IntArray) -> None:
+    if not isinstance(mesh, Mesh):
         return
     used = np.zeros(len(mesh.nodes), dtype=bool)
     for cells in mesh.cells.values():
@@ -232,11 +252,12 @@ def _require_on_solid(mesh: Mesh | LineMesh, what: str, nodes: IntArray) -> None
         )
 
 
-def _other_kind(mesh: Mesh | LineMesh, name: str, wanted: str) -> str:
+def _other_kind(mesh: AnyMesh, name: str, wanted: str) -> str:
     """Say that the name is that of another kind of group."""
     if isinstance(mesh, LineMesh):
         return f" ({name!r} is a group of lines)" if name in mesh.line_sets else ""
-    kinds = {"face group": mesh.face_sets, "node set": mesh.node_sets, "cell group": mesh.cell_sets}
+    kinds = {"node set": mesh.node_sets, "cell group": mesh.cell_sets}
+    kinds |= {"line group": mesh.line_sets} if isinstance(mesh, ShellMesh) else {"face group": mesh.face_sets}
     others = [kind for kind, sets in kinds.items() if kind != wanted and name in sets]
     return f" ({name!r} is a {others[0]})" if others else ""
 
@@ -264,7 +285,7 @@ def _tolerance(where: str, tolerance: float | None, default: float) -> float:
     return tolerance
 
 
-def _diagonal(mesh: Mesh | LineMesh) -> float:
+def _diagonal(mesh: AnyMesh) -> float:
     return float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
 
 

@@ -134,5 +134,6 @@ def end_forces_at_centroid(f: Array) -> Array:
     The face at the second end has the normal +x, so its section forces are the nodal forces; at the first their
     opposite.
     """
-    f = np.asarray(f).reshape(f.shape[0], 2, 6, -1)
+    f = np.asarray(f)
+    f = f.reshape(len(f), 2, 6, f.shape[2] if f.ndim == 3 else 1)
     return f * np.array([-1.0, 1.0])[None, :, None, None]

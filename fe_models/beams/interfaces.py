@@ -10,10 +10,9 @@ from cms.errors import BodyError
 from cms.fe_body import Interface
 from fe_models.beams.line_mesh import LineMesh
 from fe_models.errors import InterfaceError
-from fe_models.mesh import Mesh
-from fe_models.selections import Selection
+from fe_models.selections import AnyMesh, Selection
 
-__all__ = ["NodeIndices", "line_interface"]
+__all__ = ["NodeIndices", "line_interface", "node_interface"]
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class NodeIndices:
 
     nodes: tuple[int, ...]
 
-    def members(self, mesh: Mesh | LineMesh) -> IntArray:
+    def members(self, mesh: AnyMesh) -> IntArray:
         """Return these nodes, ascending."""
         nodes = np.unique(np.asarray(self.nodes, dtype=np.int64))
         if nodes.size == 0 or nodes.min() < 0 or nodes.max() >= len(mesh.nodes):
@@ -63,15 +62,29 @@ def line_interface(
     InterfaceError
         If nothing is selected, or reference or triad do not do.
     """
+    return node_interface(mesh, name, selection, kind, reference, triad, line_weights(mesh))
+
+
+def node_interface(
+    mesh: AnyMesh,
+    name: str,
+    selection: Selection,
+    kind: str,
+    reference: ArrayLike | None,
+    triad: ArrayLike | None,
+    weights: Array,
+) -> Interface:
+    """Make an interface at nodes that have rotations; `weights`, (n_nodes,), count where it is distributing."""
     try:
         nodes = selection.members(mesh)
     except InterfaceError as error:
         raise InterfaceError(f"interface {name!r}: {error}") from None
     point = mesh.nodes[nodes].mean(axis=0) if reference is None else np.asarray(reference, dtype=float)
     axes = np.eye(3) if triad is None else np.asarray(triad, dtype=float)
-    weights = line_weights(mesh)[nodes] if kind == "distributing" else None
     try:
-        return Interface(name, kind, nodes, point, triad=axes, weights=weights)
+        return Interface(
+            name, kind, nodes, point, triad=axes, weights=weights[nodes] if kind == "distributing" else None
+        )
     except BodyError as error:
         raise InterfaceError(str(error)) from None
 

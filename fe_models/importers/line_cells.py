@@ -10,7 +10,7 @@ from fe_models.beams.line_mesh import LineMesh
 from fe_models.errors import MeshError
 from fe_models.importers.raw_mesh import RawBlock, RawMesh, collect_cells, require_nodes
 
-__all__ = ["line_mesh_from_raw"]
+__all__ = ["collect_lines", "line_mesh_from_raw"]
 
 
 def line_mesh_from_raw(raw: RawMesh, path: Path, digest: str, groups: tuple[str, ...] | None) -> LineMesh:
@@ -33,10 +33,7 @@ def line_mesh_from_raw(raw: RawMesh, path: Path, digest: str, groups: tuple[str,
     where = f"mesh {path}"
     nodes, blocks = require_nodes(where, raw)
     notes = list(raw.notes)
-    halves = [_two_nodes(block) for block in blocks if block.kind in ("line", "line3")]
-    cells, sets, _ = collect_cells(where, halves, ("line",), raw.repeats_are_memberships, notes)
-    lines = cells.get("line", np.zeros((0, 2), np.int64))
-    line_sets = {group: by_type["line"] for group, by_type in sets.items()}
+    lines, line_sets = collect_lines(where, blocks, raw, notes)
     if groups is not None:
         unknown = [group for group in groups if group not in line_sets]
         if unknown:
@@ -77,6 +74,15 @@ def line_mesh_from_raw(raw: RawMesh, path: Path, digest: str, groups: tuple[str,
         node_numbers=np.zeros(0, np.int64) if raw.node_numbers is None else raw.node_numbers[used],
         notes=tuple(notes),
     )
+
+
+def collect_lines(
+    where: str, blocks: list[RawBlock], raw: RawMesh, notes: list[str]
+) -> tuple[IntArray, dict[str, IntArray]]:
+    """Return the lines of two nodes, (n_lines, 2), those of three as two each, and group -> rows of them."""
+    halves = [_two_nodes(block) for block in blocks if block.kind in ("line", "line3")]
+    cells, sets, _ = collect_cells(where, halves, ("line",), raw.repeats_are_memberships, notes)
+    return cells.get("line", np.zeros((0, 2), np.int64)), {group: by_type["line"] for group, by_type in sets.items()}
 
 
 def _two_nodes(block: RawBlock) -> RawBlock:

@@ -14,10 +14,12 @@ from fe_models.importers.line_cells import line_mesh_from_raw
 from fe_models.importers.med import read_med
 from fe_models.importers.nastran import read_nastran
 from fe_models.importers.raw_mesh import RawMesh, mesh_from_raw
+from fe_models.importers.shell_cells import shell_mesh_from_raw
 from fe_models.importers.vtk import read_vtk
 from fe_models.mesh import Mesh
+from fe_models.shells.shell_mesh import ShellMesh
 
-__all__ = ["MESH_FORMATS", "read_line_mesh", "read_mesh"]
+__all__ = ["MESH_FORMATS", "read_line_mesh", "read_mesh", "read_shell_mesh"]
 
 M = TypeVar("M")
 
@@ -81,6 +83,34 @@ def read_line_mesh(path: str | Path, *, groups: Iterable[str] | None = None) -> 
     """
     wanted = None if groups is None else tuple(groups)
     return _read(path, lambda raw, path, digest: line_mesh_from_raw(raw, path, digest, wanted))
+
+
+def read_shell_mesh(
+    path: str | Path, *, groups: Iterable[str] | None = None, stiffeners: Iterable[str] = ()
+) -> ShellMesh:
+    """Read the triangles and quads of a shell from a mesh file, by the same readers as `read_mesh`.
+
+    Cells of three and four nodes are shells, those of six and nine four shells each: Gmsh surfaces, VTK, Abaqus S3 and
+    S4, Nastran CTRIA3 and CQUAD4, MED TR3 and QU4. Their groups name thicknesses (Gmsh physical surfaces, Abaqus
+    element sets, Nastran pid_7); groups of points and lines name interfaces. Solids and nodes of neither shells nor
+    stiffeners are left out; `notes` says so.
+
+    Parameters
+    ----------
+    path
+        The file.
+    groups
+        Only the cells of these groups; None: all triangles and quads.
+    stiffeners
+        Groups of lines that are beams on the shell; other lines only select nodes.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`, and if there are no triangles or quads or a group is unknown.
+    """
+    wanted, lines = None if groups is None else tuple(groups), tuple(stiffeners)
+    return _read(path, lambda raw, path, digest: shell_mesh_from_raw(raw, path, digest, wanted, lines))
 
 
 def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:

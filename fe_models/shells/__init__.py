@@ -1,0 +1,1 @@
+"""Flat Reissner-Mindlin shells of three and four nodes: elements, properties, bodies (docs/shells.md)."""

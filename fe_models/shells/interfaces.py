@@ -1,0 +1,66 @@
+"""Interfaces of a shell: nodes made rigid, distributing, or kept node by node."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cms.arrays import Array
+from cms.fe_body import Interface
+from fe_models.beams.interfaces import node_interface
+from fe_models.boundary import facet_weights
+from fe_models.selections import Selection, selected_facets
+from fe_models.shells.shell_mesh import ShellMesh
+from fe_models.shells.skin import cell_edges
+
+__all__ = ["shell_interface"]
+
+
+def shell_interface(
+    mesh: ShellMesh,
+    name: str,
+    selection: Selection,
+    *,
+    kind: str = "rigid",
+    reference: ArrayLike | None = None,
+    triad: ArrayLike | None = None,
+) -> Interface:
+    """Make an interface at nodes of a shell, which have rotations.
+
+    Parameters
+    ----------
+    mesh
+        Mesh of the shell.
+    name
+        Name of the interface.
+    selection
+        Which nodes: `NodeSet("v0")` for the nodes of an edge, `FaceGroup("lug")` for those of a group of cells, or by
+        geometry.
+    kind
+        "rigid": the nodes move rigidly with the reference node, one node is enough; "distributing": the reference node
+        follows their mean motion, weighted by the area of the cells whose nodes are all selected, or else by the length
+        of the edges, which needs three nodes beside one line; "nodes": every dof of every node.
+    reference
+        Reference point, (3,) [m]; None: the mean of the nodes.
+    triad
+        Axes of the interface as columns in mesh axes, (3, 3); None: the mesh axes.
+
+    Raises
+    ------
+    InterfaceError
+        If nothing is selected, or reference or triad do not do.
+    """
+    weights = _weights(mesh, selection) if kind == "distributing" else np.ones(len(mesh.nodes))
+    return node_interface(mesh, name, selection, kind, reference, triad, weights)
+
+
+def _weights(mesh: ShellMesh, selection: Selection) -> Array:
+    """Area of the selected cells at their nodes, or length of the selected edges, or one, (n_nodes,)."""
+    facets = selected_facets(mesh, selection)
+    if facets:
+        return facet_weights(mesh.nodes, facets)
+    chosen = np.zeros(len(mesh.nodes), dtype=bool)
+    chosen[selection.members(mesh)] = True
+    edges = np.unique(np.sort(cell_edges(tuple(mesh.cells.values())).nodes, axis=1), axis=0)
+    edges = edges[chosen[edges].all(axis=1)]
+    weights = np.zeros(len(mesh.nodes))
+    np.add.at(weights, edges, np.linalg.norm(mesh.nodes[edges[:, 1]] - mesh.nodes[edges[:, 0]], axis=1)[:, None] / 2)
+    return weights if weights[chosen].all() else np.ones(len(mesh.nodes))

@@ -1,0 +1,100 @@
+"""The elements behind a shell body: exact integrals over mass, stress resultants, stress at the faces."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.arrays import Array, IntArray
+from cms.errors import BodyError
+from fe_models.shells.elements import ShellCells
+from fe_models.shells.skin import ShellSkin
+
+__all__ = ["ShellModel"]
+
+TOP, MIDDLE, BOTTOM = 0.5, 0.0, -0.5  #: heights in the thickness, z/t
+
+
+@dataclass(frozen=True, eq=False)
+class ShellModel:
+    """Element model of a shell (`cms.fe_body.ElementModel`); its dofs: six per node, then three per skin point."""
+
+    n_nodes: int
+    groups: tuple[ShellCells, ...]
+    skin: ShellSkin
+
+    @property
+    def has_nodal_stress(self) -> bool:
+        """True: at the skin points, and in the middle surface at the nodes."""
+        return True
+
+    @property
+    def n_mesh_dof(self) -> int:
+        """Dofs of the mesh: of the nodes, then of the skin."""
+        return 6 * self.n_nodes + 3 * len(self.skin.points)
+
+    def mass_gram(self, u: Array) -> Array:
+        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], exact through the thickness (THEORY §5).
+
+        Parameters
+        ----------
+        u
+            Columns over the dofs of the mesh, (n_mesh_dof, k).
+        """
+        self._require_rows("mass_gram", u)
+        k = np.shape(u)[1]
+        gram = np.zeros((4 + 3 * k, 4 + 3 * k))
+        for group in self.groups:
+            for rows in group.chunks():
+                gram += group.slices(rows).gram(np.asarray(u))
+        return gram
+
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return the stress at the nodes: that of the middle surface at those of the mesh, of the faces at skin points.
+
+        The mean over the cells that meet there, weighted by area; a skin point belongs to one smooth patch of cells.
+        All nodes are computed, `nodes` or not.
+
+        Returns
+        -------
+        Array
+            (n_nodes + n_skin, 6, k) [Pa], components xx, yy, zz, yz, xz, xy.
+        """
+        self._require_rows("nodal_stress", u)
+        u = np.asarray(u)
+        n_skin, k = len(self.skin.points), u.shape[1]
+        stress = np.zeros((self.n_nodes + n_skin, 6 * k))
+        for group, patch, means in zip(self.groups, self.skin.patch, self._means, strict=True):
+            for rows in group.chunks():
+                resultants = group.corner_resultants(u, rows)
+                of_chunk = slice(rows.start * patch.shape[1], rows.stop * patch.shape[1])
+                for height, mean in zip((MIDDLE, TOP, BOTTOM), means, strict=True):
+                    corners = group.stress(resultants, rows, height).reshape(-1, 6 * k)
+                    stress += mean[:, of_chunk] @ corners
+        return stress.reshape(-1, 6, k)
+
+    @cached_property
+    def _means(self) -> tuple[tuple[sp.csc_array, ...], ...]:
+        """Weights of corners in the means at nodes (middle), tops and bottoms, (n_nodes + n_skin, n_corners) each."""
+        n_rows = self.n_nodes + len(self.skin.points)
+        places = [
+            (group.cells.ravel(), self.n_nodes + patch.ravel(), self.n_nodes + self.skin.n_patches + patch.ravel())
+            for group, patch in zip(self.groups, self.skin.patch, strict=True)
+        ]
+        weights = [np.repeat(group.areas(), group.cells.shape[1]) for group in self.groups]
+        total = np.zeros(n_rows)
+        for at, weight in zip(places, weights, strict=True):
+            for rows in at:
+                total += np.bincount(rows, weight, minlength=n_rows)
+        return tuple(
+            tuple(
+                sp.csc_array((weight / total[rows], (rows, np.arange(len(rows)))), shape=(n_rows, len(rows)))
+                for rows in at
+            )
+            for at, weight in zip(places, weights, strict=True)
+        )
+
+    def _require_rows(self, where: str, u: Array) -> None:
+        if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:
+            raise BodyError(f"{where}: u: expected columns over {self.n_mesh_dof} dofs, got {np.shape(u)}")
