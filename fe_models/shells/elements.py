@@ -17,7 +17,7 @@ from fe_models.shells.triangle import triangle_strains
 
 __all__ = ["ShellCells", "shell_cells"]
 
-CHUNK = 1000  #: cells whose operators are held at once
+CHUNK = 500  #: cells whose operators are held at once
 SHEAR_FACTOR = 5 / 6  #: of the transverse shear stiffness of a homogeneous plate
 DRILLING = 0.1  #: gamma of quads, over the shear modulus; see docs/shells.md for what larger and smaller ones cost
 DRILLING_SHARE = {"triangle": 1.0, "quad": 0.3}  #: of the drilling rotations in the displacement of the sides
@@ -129,6 +129,15 @@ class ShellCells:
         n, p, _, d = strains.B.shape
         values = (strains.B.reshape(n, p * N_STRAINS, d) @ u[self.dofs[rows]]).reshape(n, p, N_STRAINS, -1)
         return np.asarray((self.elasticity(rows)[:, None] @ values)[:, :, :8])
+
+    def internal_forces(self, u: Array, rows: slice) -> Array:
+        """Return K u of cells by the dofs of their nodes, (n, 6 c, k) [N, N m]."""
+        strains = self.strains(rows)
+        n, p, _, d = strains.B.shape
+        flat = strains.B.reshape(n, p * N_STRAINS, d)
+        values = (flat @ u[self.dofs[rows]]).reshape(n, p, N_STRAINS, -1)
+        resultants = (self.elasticity(rows)[:, None] @ values) * strains.weights[..., None, None]
+        return np.asarray(flat.transpose(0, 2, 1) @ resultants.reshape(n, p * N_STRAINS, -1))
 
     def corner_resultants(self, u: Array, rows: slice) -> Array:
         """Return the resultants carried linearly to the corners, (n, c, 8, k)."""

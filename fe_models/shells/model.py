@@ -1,4 +1,4 @@
-"""The elements behind a shell body: exact integrals over mass, stress resultants, stress at the faces."""
+"""The elements behind a shell body: integrals over mass, stress at the faces, geometric stiffness."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,7 +8,10 @@ import scipy.sparse as sp
 
 from cms.arrays import Array, IntArray
 from cms.errors import BodyError
+from cms.mass_loads import MassLoads
+from fe_models.beams.geometric import slice_forces
 from fe_models.shells.elements import ShellCells
+from fe_models.shells.geometric import cell_geometric_stiffness
 from fe_models.shells.skin import ShellSkin
 
 __all__ = ["ShellModel"]
@@ -73,6 +76,38 @@ class ShellModel:
                     corners = group.stress(resultants, rows, height).reshape(-1, 6 * k)
                     stress += mean[:, of_chunk] @ corners
         return stress.reshape(-1, 6, k)
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """True: from stress resultants and masses."""
+        return True
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Return the consistent forces and moments of loads per mass, (n_mesh_dof, k), couples of normals included."""
+        forces = np.zeros((self.n_mesh_dof, loads.k))
+        for group in self.groups:
+            for rows in group.chunks():
+                np.add.at(forces, group.dofs[rows], slice_forces(group.slices(rows), loads))
+        return forces
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return K u of all cells, (n_mesh_dof, k) [N, N m], at all nodes."""
+        self._require_rows("internal_forces", u)
+        forces = np.zeros(np.shape(u))
+        for group in self.groups:
+            for rows in group.chunks():
+                np.add.at(forces, group.dofs[rows], group.internal_forces(np.asarray(u), rows))
+        return forces
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of states u under these loads (`fe_models.shells.geometric`)."""
+        for columns in (u, Phi):
+            self._require_rows("geometric_stiffness", columns)
+        K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
+        for group in self.groups:
+            for rows in group.chunks():
+                K += cell_geometric_stiffness(group, rows, np.asarray(u), loads, np.asarray(Phi))
+        return K
 
     @cached_property
     def _means(self) -> tuple[tuple[sp.csc_array, ...], ...]:

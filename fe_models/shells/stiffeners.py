@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from cms.arrays import Array, IntArray, frozen_int
 from cms.errors import BodyError
 from cms.fe_body import ElementModel, FEBody, Recovery
+from cms.mass_loads import MassLoads
 from fe_models.beams.model import BeamModel
 from fe_models.shells.model import ShellModel
 
@@ -54,6 +55,35 @@ class StiffenedModel:
         self._require_rows("nodal_stress", u)
         of_frame = self.frame.nodal_stress(u[self.frame_rows])[len(self.nodes) :]
         return np.concatenate([self.shell.nodal_stress(u[: self.shell.n_mesh_dof], nodes=nodes), of_frame])
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """True: both know it."""
+        return True
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Return the consistent forces of loads per mass on both, (n_mesh_dof, k)."""
+        return self._joined(self.shell.mass_forces(loads), self.frame.mass_forces(loads))
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return K u of both, (n_mesh_dof, k) [N, N m], at all nodes."""
+        self._require_rows("internal_forces", u)
+        of_shell = self.shell.internal_forces(u[: self.shell.n_mesh_dof])
+        return self._joined(of_shell, self.frame.internal_forces(u[self.frame_rows]))
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Return the sum of both, (k, n, n)."""
+        self._require_rows("geometric_stiffness", u)
+        n, rows = self.shell.n_mesh_dof, self.frame_rows
+        return self.shell.geometric_stiffness(u[:n], loads, Phi[:n]) + self.frame.geometric_stiffness(
+            u[rows], loads, Phi[rows]
+        )
+
+    def _joined(self, of_shell: Array, of_frame: Array) -> Array:
+        forces = np.zeros((self.n_mesh_dof, of_shell.shape[1]))
+        forces[: self.shell.n_mesh_dof] = of_shell
+        forces[self.frame_rows] += of_frame
+        return forces
 
     def _require_rows(self, where: str, u: Array) -> None:
         if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:

@@ -1,0 +1,134 @@
+"""Geometric stiffness of flat shells (THEORY §7).
+
+A point at the distance z from the middle surface moves by u + z psi + ½ z theta × (theta × n), psi = theta × n, theta a
+rotation vector. The second order of its Green strain is worked on by the stress, whose resultants are N = ∫ sigma,
+M = ∫ z sigma, Q; ∫ z² sigma = N t²/12. Over the middle surface, a and b along its axes e_a:
+
+    N_ab [½ u,a·u,b + t²/24 psi,a·psi,b]  +  M_ab [u,a·psi,b + ½ e_b·(theta × (theta × n)),a]
+    +  Q_a [u,a·psi + ½ e_a·(theta × (theta × n))]
+
+and the loads work on the second order of the rotation, on the normal and on the levers between nodes and middle surface
+(`cms.mass_loads.rotation_work`), to which the nodal forces of the cell itself belong as well. The drilling stress of
+quads, which vanishes with the mesh, is left out. The mean of Q is that of the nodal forces, Σ f_z x / area: so that the
+cell turns as a whole under the forces it has (triangles carry most of Q by the change of M along their sides).
+"""
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.mass_loads import MassLoads, rotation_work
+from fe_models.beams.geometric import slice_couples, slice_forces
+from fe_models.beams.slices import Slices
+from fe_models.shells.elements import DRILLING_SHARE, STRAIN_DEGREE, ShellCells, translations
+from fe_models.shells.shapes import flat_quadrature, flat_shape
+from fe_models.shells.strains import inverse_2x2, jacobians
+
+__all__ = ["cell_geometric_stiffness"]
+
+N_FIELDS = 15  #: u,1 u,2 theta,1 theta,2 theta, three components each
+
+
+def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: MassLoads, Phi: Array) -> Array:
+    """Return Phiᵀ K_geo Phi of some cells, (k, n, n).
+
+    Parameters
+    ----------
+    cells, rows
+        Cells of one type, and which of them.
+    u
+        Static states over the dofs of the nodes, (6 n_nodes, k).
+    loads
+        The k loads per mass that act in them.
+    Phi
+        Columns over the dofs of the nodes, (6 n_nodes, n).
+    """
+    dofs = cells.dofs[rows]
+    columns = Phi[dofs]
+    strains, elasticity = cells.strains(rows), cells.elasticity(rows)
+    values = strains.B @ u[dofs][:, None]
+    resultants = (elasticity[:, None] @ values) * strains.weights[..., None, None]
+    forces = np.einsum("npsd,npsj->ndj", strains.B, resultants)
+    resultants[:, :, 6:8] += _missing_shear(cells, rows, forces, resultants[:, :, 6:8], strains.weights)
+    slices = cells.slices(rows)
+    forces -= slice_forces(slices, loads)
+    fields = _fields(cells, rows) @ columns[:, None]  # (m, p, 15, n)
+    theta = slices.motion[:, :, 3:] @ columns[:, None]
+    turns = columns.reshape(len(dofs), -1, 6, Phi.shape[1])[:, :, 3:]
+    K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
+    for j in range(loads.k):
+        W = _work(resultants[..., :8, j], cells.t[rows])
+        K[j] += _contracted(fields, W)
+        K[j] += _contracted(theta, -rotation_work(_couples(slices, loads, j)))
+        at_corners = forces[:, :, j].reshape(len(dofs), -1, 6)[:, :, :3, None]
+        K[j] += _contracted(turns, rotation_work(at_corners * cells.planes.levers[rows][:, :, None]))
+    return (K + K.transpose(0, 2, 1)) / 2
+
+
+def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weights: Array) -> Array:
+    """What the mean of weighted Q, (m, p, 2, k), lacks of Σ f_z x / area, spread over the points."""
+    planes = cells.planes[rows]
+    n, c, k = len(planes.R), planes.xy.shape[1], forces.shape[2]
+    across = np.einsum("na,ncaj->ncj", planes.R[:, :, 2], forces.reshape(n, c, 6, k)[:, :, :3])
+    missing = np.einsum("nca,ncj->naj", planes.xy, across) - Q.sum(axis=1)
+    return np.asarray((weights / weights.sum(axis=1, keepdims=True))[:, :, None, None] * missing[:, None])
+
+
+def _contracted(fields: Array, W: Array) -> Array:
+    """Sum of fieldsᵀ W fields over all points, (n, n)."""
+    n = fields.shape[-1]
+    return np.asarray(fields.reshape(-1, n).T @ (W @ fields).reshape(-1, n))
+
+
+def _couples(slices: Slices, loads: MassLoads, j: int) -> Array:
+    """V = Σ f oᵀ of load j about the middle of each slice, (m, p, 3, 3)."""
+    return slice_couples(slices, MassLoads(loads.A[j : j + 1], loads.b[j : j + 1]))[1][0]
+
+
+def _fields(cells: ShellCells, rows: slice) -> Array:
+    """Gradients of u and theta, and theta, in local axes, for unit dofs of the nodes, (m, p, 15, 6 c)."""
+    planes = cells.planes[rows]
+    points, _ = flat_quadrature(cells.kind, STRAIN_DEGREE[cells.kind])
+    shape = flat_shape(cells.kind, points)
+    J, det = jacobians(shape.gradients, planes.xy)
+    inverse = inverse_2x2(J, det)
+    by_x = np.einsum("npak,pck->npac", inverse, shape.gradients)
+    sides_by_x = np.einsum("npak,pck->npac", inverse, shape.side_gradients)
+    n, p, c = len(planes.R), len(points), planes.xy.shape[1]
+    out = np.zeros((n, p, 5, 3, c, 6))
+    for a in range(2):
+        out[:, :, a] = translations(planes, by_x[:, :, a], sides_by_x[:, :, a], shape, DRILLING_SHARE[cells.kind])
+        for axis in range(3):
+            out[:, :, 2 + a, axis, :, 3 + axis] = by_x[:, :, a]
+    for axis in range(3):
+        out[:, :, 4, axis, :, 3 + axis] = shape.values
+    local = planes.R.transpose(0, 2, 1)[:, None, None] @ out.reshape(n, p, 5, 3, 6 * c)
+    return np.asarray(local.reshape(n, p, N_FIELDS, 6 * c))
+
+
+def _work(resultants: Array, t: Array) -> Array:
+    """Second derivative of the work by the fields, (m, p, 15, 15), of weighted N M Q, (m, p, 8)."""
+    W = np.zeros((*resultants.shape[:2], 5, 3, 5, 3))
+    N, M, Q = _plane(resultants, 0), _plane(resultants, 3), resultants[..., 6:]
+    across = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # psi = across @ theta = theta × e_z
+    plane = across.T @ across
+    for a in range(2):
+        for b in range(2):
+            W[:, :, a, :, b] += N[..., a, b, None, None] * np.eye(3)
+            W[:, :, 2 + a, :, 2 + b] += (t**2 / 12)[:, None, None, None] * N[..., a, b, None, None] * plane
+            W[:, :, a, :, 2 + b] += M[..., a, b, None, None] * across
+            # e_b·(theta × (theta × n)) = theta_b theta_z
+            for i, k in ((b, 2), (2, b)):
+                W[:, :, 2 + a, i, 4, k] += M[..., a, b] / 2
+        W[:, :, a, :, 4] += Q[..., a, None, None] * across
+        for i, k in ((a, 2), (2, a)):
+            W[:, :, 4, i, 4, k] += Q[..., a] / 4
+    whole = W.reshape(*resultants.shape[:2], N_FIELDS, N_FIELDS)
+    is_half = np.zeros((N_FIELDS, N_FIELDS), dtype=bool)  # the terms of which the other half is the transpose
+    is_half[:6, 6:] = is_half[6:12, 12:] = is_half[12:, 12:] = True
+    half = np.where(is_half, whole, 0.0)
+    return np.asarray(whole + half.swapaxes(2, 3))
+
+
+def _plane(resultants: Array, first: int) -> Array:
+    """Symmetric tensor of three components xx yy xy, (m, p, 2, 2)."""
+    return resultants[..., [[first, first + 2], [first + 2, first + 1]]]
