@@ -110,14 +110,14 @@ def make_shell_skin(nodes: Array, groups: tuple[ShellCells, ...]) -> ShellSkin:
     center = mean @ middle / count
     mover = np.zeros(n_patches, np.int64)
     mover[patch] = node_of
-    by_type = [
+    by_type: list[IntArray] = [
         rows.reshape(g.cells.shape) for rows, g in zip(np.split(patch, np.cumsum(sizes)[:-1]), groups, strict=True)
     ]
     is_end = np.ones(len(edges.nodes), dtype=bool)  # (3)
     is_end[a[is_smooth]] = is_end[b[is_smooth]] = False
     rim = patch[edges.corners[is_end]]
     low = rim + n_patches
-    triangles = [
+    triangles: list[IntArray] = [
         np.stack([low[:, 0], low[:, 1], rim[:, 1]], axis=1),
         np.stack([low[:, 0], rim[:, 1], rim[:, 0]], axis=1),
     ]
