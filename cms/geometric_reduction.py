@@ -1,15 +1,16 @@
 """Geometric stiffness of a reduced body from its elements: a static solution and a matrix per unit load (THEORY §7).
 
 (1) unit loads f_j, balanced by the support of the frame: P f_j (`cms.unit_loads`)
-(2) static states u_j = Pᵀ G_R P f_j, by the factorisation that gave the modes
+(2) static states u_j = G_R P f_j, by the factorisation that gave the modes; only their stress counts
 (3) Phiᵀ K_geo(sigma_j) Phi of the elements
 (4) rigid links: the forces on followers, internal less applied, on the second order of the rotation they follow
 (5) interfaces that are a mean of their members: the applied loads on the second order of the mean
 """
 
 import numpy as np
+import scipy.linalg as la
 
-from cms.arrays import Array
+from cms.arrays import Array, IntArray
 from cms.errors import BodyError
 from cms.families import Families
 from cms.fe_body import FEBody, Interface
@@ -19,6 +20,7 @@ from cms.link_work import followers, link_work
 from cms.mass_loads import MassLoads
 from cms.mean_work import mean_second_order
 from cms.node_motion import is_mean, reference_motion, translation_rows
+from cms.tall import combine
 from cms.unit_loads import balanced, unit_loads
 
 __all__ = ["has_geometric_stiffness", "reduced_geometric_stiffness"]
@@ -58,7 +60,7 @@ def reduced_geometric_stiffness(
     wanted = np.flatnonzero(~loads.is_zero)
     K = np.zeros((loads.mass.k, Phi.shape[1], Phi.shape[1]))
     mass = MassLoads(loads.mass.A[wanted], loads.mass.b[wanted])
-    u = families.flexibility(loads.F[:, wanted]) if len(wanted) else np.zeros((body.n_dof, 0))  # (2)
+    u = static_states(families, loads.F[:, wanted])  # (2)
     K[wanted] = elastic_part(body, u, mass, Phi)
     K -= mean_part(body, loads.on_dofs, Phi, condition.frame.axes)
     return GeometricStiffness(
@@ -77,6 +79,42 @@ def require_geometric_stiffness(body: FEBody) -> None:
             "build it from its mesh (fe_models.solid_body, beam_body), or reduce it without (geometric=False, in a job "
             "geometric_stiffness = false)"
         )
+
+
+def static_states(families: Families, F: Array) -> Array:
+    """Return the response to balanced loads with R held, (n_dof, k); it needs no inertia, as P would.
+
+    v = K_II⁻¹ f_I;  S_ee z_e = (f_h - K_hI v)_e with z = 0 at R;  u = v + Psi_C z.
+    """
+    body = families.body
+    if not F.shape[1]:
+        return np.zeros(F.shape)
+    i, h = families.fixed.i, families.h
+    v = families.fixed.factorization.solve(F[i])
+    z = np.zeros((len(h), F.shape[1]))
+    e = np.flatnonzero(~np.isin(h, families.r))
+    if len(e):
+        g = F[h] - (body.K[:, h].T @ embedded(v, i, body.n_dof))
+        S_ee = families.S[np.ix_(e, e)]
+        size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))
+        try:
+            factor = la.cho_factor(S_ee * np.outer(size, size))
+        except la.LinAlgError as error:
+            raise BodyError(
+                f"body {body.name!r}: motions besides the rigid ones cost no energy: a mechanism; join the parts or "
+                "add what holds them"
+            ) from error
+        z[e] = size[:, None] * la.cho_solve(factor, size[:, None] * g[e])
+    u = combine(families.Psi_C, z)
+    u[i] += v
+    return u
+
+
+def embedded(v: Array, rows: IntArray, n: int) -> Array:
+    """Return v in some rows of n, zero in the others."""
+    whole = np.zeros((n, v.shape[1]))
+    whole[rows] = v
+    return whole
 
 
 def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:

@@ -154,6 +154,16 @@ def test_matrices_reduce_without_a_mesh(folder):
     result = run("reduce", folder / "bar.toml")
     assert result.exit_code == 0, result.output
     assert_allclose(read(folder / "bar.h5").moments.m, 7850 * 0.05 * 0.04, rtol=1e-12)
+    assert read(folder / "bar.h5").geometric is None
+    (folder / "bar.toml").write_text((folder / "bar.toml").read_text() + "geometric_stiffness = true\n")
+    result = run("reduce", folder / "bar.toml", "-o", folder / "other.h5")
+    assert_refused(result, "geometric stiffness needs the elements", "geometric_stiffness = false")
+
+
+@pytest.mark.parametrize("wanted", ["", "geometric_stiffness = true", "geometric_stiffness = false"])
+def test_a_job_of_a_mesh_has_geometric_stiffness_unless_it_is_left_out(folder, wanted):
+    (folder / "bar.toml").write_text(JOB.replace("[reduction]", f"[reduction]\n{wanted}"))
+    assert (reduce_job(read_job(folder / "bar.toml")).geometric is None) == wanted.endswith("false")
 
 
 LOADS = """

@@ -180,6 +180,24 @@ def test_a_spinning_cantilever_has_the_flap_frequencies_of_the_rotating_beam(spe
         assert_allclose(flap[0], {2.0: 4.1373, 12.0: 13.1702}[speed], rtol=1e-4)
 
 
+@pytest.mark.parametrize("kind", ["tetra10", "hexahedron20"])
+def test_a_spinning_cantilever_of_solids_has_the_flap_frequency_of_the_rotating_beam(kind):
+    """Speed 6: 7.3604 in flap (Wright et al., 1982), lag² = flap² - speed²; the solid is a little softer at rest."""
+    material, h = replace(STEEL, nu=0.0), 0.02
+    body = cms.couple(bar(20, 1, 1, width=h, height=h, kind=kind, material=material))
+    unit = np.sqrt(STEEL.E * h**2 / 12 / STEEL.rho)
+    with cms.Families(body) as families:
+        modes = cms.craig_bampton(body, n_modes=10, families=families)
+        reduced = cms.reduce(body, modes, frame=NodalFrame(at="left"), geometric=True, families=families)
+    Omega = 6.0 * unit
+    found = []
+    for K_geo in (0.0, Omega**2 * (reduced.geometric.spin[2] - reduced.moments.C5[:, :, 2, 2])):
+        found.append(1 / np.sqrt(la.eigh(reduced.M, reduced.K + K_geo, eigvals_only=True)[-1:]) / unit)
+    at_rest, lag = np.concatenate(found)
+    assert_allclose(at_rest, 3.5160, rtol=3e-3)
+    assert_allclose(lag**2 - at_rest**2, 7.3604**2 - 6.0**2 - 3.5160**2, rtol=5e-3)
+
+
 def test_solids_and_beams_agree():
     """A slender bar of solids and of beams: K_spin and K of end loads over the first bending modes."""
     values = []
@@ -238,6 +256,20 @@ def test_a_planar_frame_stiffens_in_its_plane():
     lag = critical(reduced.K, reduced.geometric.interfaces[1, 0])
     both = 1 / la.eigh(whole.geometric.interfaces[1, 0], whole.K, eigvals_only=True)[-4:]
     assert np.abs(both / lag - 1).min() < 2e-3
+
+
+def test_a_body_without_inertia_about_its_axis_is_stiffened_too():
+    """Point masses in a row on massless beams: no mean axes, but a nodal frame."""
+    massless = replace(STEEL, rho=1e-30)
+    mesh = straight_line((0, 0, 0), (1, 0, 0), 4)
+    ends = [line_interface(mesh, name, NodeIndices((node,))) for name, node in (("left", 0), ("right", 4))]
+    masses = [PointMass(node, 1.0, (0.0, 0.1, 0.1)) for node in range(5)]
+    body = cms.couple(
+        beam_body(mesh, BeamProperty(SECTION, massless), name="row", units=SI, interfaces=ends, point_masses=masses)
+    )
+    reduced = cms.reduce(body, cms.guyan(body), frame=NodalFrame("left"), geometric=True)
+    EI = STEEL.E * 0.05 * 0.04**3 / 12
+    assert critical(reduced.K, reduced.geometric.interfaces[1, 0]) > 0.99 * np.pi**2 * EI / 4
 
 
 def test_bare_matrices_are_refused():
