@@ -19,6 +19,11 @@ from .analyses import steady_rotation as steady_rotation
 from .analyses import sweep as sweep
 from .analyses import system_modes as system_modes
 from .analyses import with_motors as with_motors
+from .coordinates import AxialAngle as AxialAngle
+from .coordinates import AxialDistance as AxialDistance
+from .coordinates import JointCoordinate as JointCoordinate
+from .coordinates import PointDistance as PointDistance
+from .couplers import CoordinateCoupler as CoordinateCoupler
 from .errors import (
     ConvergenceError as ConvergenceError,
 )
@@ -37,10 +42,13 @@ from .errors import (
 from .export import export_csv as export_csv
 from .export import export_vtk as export_vtk
 from .flexible_body import FlexibleBody as FlexibleBody
+from .force_results import coupler_motion as coupler_motion
 from .forces import BodyLoad as BodyLoad
+from .forces import Bushing as Bushing
 from .forces import Gravity as Gravity
 from .forces import JointForce as JointForce
 from .forces import PointForce as PointForce
+from .forces import SphereContact as SphereContact
 from .forces import SpringDamper as SpringDamper
 from .ground import GROUND as GROUND
 from .ground import Ground as Ground
@@ -62,6 +70,7 @@ from .joints import PointOnLine as PointOnLine
 from .joints import PointOnPlane as PointOnPlane
 from .joints import PrismaticJoint as PrismaticJoint
 from .joints import RevoluteJoint as RevoluteJoint
+from .joints import RollingDisc as RollingDisc
 from .joints import ScrewJoint as ScrewJoint
 from .joints import SphericalJoint as SphericalJoint
 from .joints import UniversalJoint as UniversalJoint

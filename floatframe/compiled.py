@@ -6,23 +6,24 @@ import numpy as np
 
 from cms.arrays import Array, IntArray
 from floatframe.body_types import body_types, integers, offsets, stacked, type_arrays
+from floatframe.connection_data import Connections, add_joint, add_spring
 from floatframe.elimination import plan_elimination
-from floatframe.errors import ModelError
 from floatframe.flexible_body import FlexibleBody
-from floatframe.force_data import Functions, body_load_arrays, joint_force_arrays, with_forces
-from floatframe.forces import Gravity, JointForce, PointForce, SpringDamper
-from floatframe.joints.rows import DOT, MOMENT, NO_MOMENT, POINT, SLIDE, SPRING, Row
+from floatframe.force_data import Functions, body_load_arrays, joint_force_arrays
+from floatframe.forces import Gravity, PointForce, SpringDamper
+from floatframe.joints.rows import DOT, POINT, SLIDE, Row
 from floatframe.kernels.model import Model
 from floatframe.marker_data import (
     MarkerData,
     find_marker,
-    joint_markers,
     marker_bending,
     marker_pose,
     marker_shapes,
     n_q_of,
 )
 from floatframe.mass_checks import require_inertia
+from floatframe.network_data import add_networks
+from floatframe.pair_data import add_pair_laws
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
 from floatframe.system import System
@@ -39,15 +40,17 @@ class CompiledSystem:
     model: Model
     body_names: tuple[str, ...]
     joint_names: tuple[str, ...]
-    spring_names: tuple[str, ...]
+    spring_names: tuple[str, ...]  #: of spring-dampers, then bushings and contacts
+    network_names: tuple[str, ...]  #: of couplers, then user forces
+    owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
     placed: State  #: the state as given, before it is made consistent
     coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
     length: float  #: size of the system as placed [m]; scales rotations against translations
 
     @property
     def connection_names(self) -> tuple[str, ...]:
-        """Names of joints, then spring-dampers: the order of connections in the model."""
-        return self.joint_names + self.spring_names
+        """Names of joints, springs, couplers and user forces: the order of connections in the model."""
+        return self.joint_names + self.spring_names + self.network_names
 
 
 def compile_system(system: System) -> CompiledSystem:
@@ -68,69 +71,32 @@ def compile_system(system: System) -> CompiledSystem:
         if isinstance(force, Gravity):
             gravity = gravity + force.acceleration
 
-    markers: list[MarkerData] = []
-    sizes: list[int] = []
-    rows: list[Row] = []
-    springs: list[list[float]] = []
-    a_of, b_of, spring_of, connection_of, sign = [], [], [], [], []
-    moment: list[int] = []
-    rates: list[int] = []  # of connections: whether their rows depend on velocities
-    owner: list[str] = []
-    spring_table: list[int] = []
+    made = Connections(placed, n_q)
     functions = Functions()
     for joint in system.joints:
-        a, b = joint_markers(system, joint, placed)
-        r_a, A_a = marker_pose(a, placed, n_q)
-        r_b, A_b = marker_pose(b, placed, n_q)
-        sizes.append(joint.size)
-        forces = [f for f in system.forces if isinstance(f, JointForce) and f.joint == joint.name]
-        rows.extend(with_forces(joint, joint.rows(A_a, A_b, r_b - r_a), forces))
-        rates.append(int(bool(forces)))
-        owner += [joint.name] * joint.size
-        moment += [MOMENT if joint.size >= MOMENT + 3 else NO_MOMENT, joint.moment_b]
-        spring_of.append(-1)
-        a_of.append(len(markers))
-        b_of.append(len(markers) + 1)
-        markers += [a, b]
-        connection_of += [len(sizes) - 1] * 2
-        sign += [1.0, -1.0]
+        add_joint(system, made, joint)
+    springs, spring_table = [], []
     dampers = [force for force in system.forces if isinstance(force, SpringDamper)]
     for spring in dampers:
-        where = f"force {spring.name!r}"
-        a = find_marker(system, f"{where}: marker_a", spring.marker_a)
-        b = find_marker(system, f"{where}: marker_b", spring.marker_b)
-        free_length = spring_length(where, spring, a, b, placed, n_q)
-        sizes.append(3)
-        rows.extend(Row(SPRING, axis) for axis in np.eye(3))
-        rates.append(1)
-        owner += [spring.name] * 3
+        springs.append(add_spring(system, made, spring))
         spring_table.append(functions.index(spring.characteristic))
-        moment += [NO_MOMENT] * 2
-        spring_of.append(len(springs))
-        springs.append([spring.stiffness, spring.damping, free_length, spring.preload])
-        a_of.append(len(markers))
-        b_of.append(len(markers) + 1)
-        markers += [a, b]
-        connection_of += [len(sizes) - 1] * 2
-        sign += [1.0, -1.0]
+    pairs = add_pair_laws(system, made, functions)
+    networks = add_networks(system, made, functions)
+    markers, rows = made.markers, made.rows
     loads = [force for force in system.forces if isinstance(force, PointForce)]
     load_marker = []
     for load in loads:
-        load_marker.append(len(markers))
-        markers.append(find_marker(system, f"force {load.name!r}: marker", load.marker))
-        connection_of.append(-1)
-        moment.append(NO_MOMENT)
-        sign.append(0.0)
+        load_marker.append(made.add_marker(find_marker(system, f"force {load.name!r}: marker", load.marker)))
 
     ends_of = [
-        [m for m, data in enumerate(markers) if data.body == i and connection_of[m] >= 0] for i in range(len(n_q))
+        [m for m, data in enumerate(markers) if data.body == i and made.connection_of[m] >= 0] for i in range(len(n_q))
     ]
     ends = [m for group in ends_of for m in group]
     m_x0 = np.zeros(len(markers), np.int64)
     m_x0[ends] = np.cumsum([0] + [6 + int(n_q[markers[m].body]) for m in ends])[:-1]
     psi0, psi = marker_shapes(markers)
     bend0, bend = marker_bending(markers)
-    connection_of_marker = integers(connection_of)
+    connection_of_marker = integers(made.connection_of)
     model = Model(
         kind=kind,
         n_q=n_q,
@@ -147,17 +113,19 @@ def compile_system(system: System) -> CompiledSystem:
         m_bend0=bend0,
         bend=bend,
         m_connection=connection_of_marker,
-        m_sign=np.array(sign, dtype=float),
-        m_moment=integers(moment),
+        m_sign=np.array(made.sign, dtype=float),
+        m_force=integers(made.force),
+        m_moment=integers(made.moment),
         m_follower=integers([0] * (len(markers) - len(loads)) + [int(load.is_follower) for load in loads]),
         m_x0=m_x0,
         end0=offsets(np.array([len(group) for group in ends_of])),
         ends=integers(ends),
-        c_size=integers(sizes),
-        c_w0=offsets(integers(sizes)),
-        c_a=integers(a_of),
-        c_b=integers(b_of),
-        c_spring=integers(spring_of),
+        c_size=integers(made.sizes),
+        c_w0=offsets(integers(made.sizes)),
+        c_a=integers(made.a_of),
+        c_b=integers(made.b_of),
+        c_law=integers(made.law),
+        c_item=integers(made.item),
         row_kind=integers([row.kind for row in rows]),
         row_x=stacked([row.x for row in rows], (3,)),
         row_y=stacked([row.y for row in rows], (3,)),
@@ -166,8 +134,10 @@ def compile_system(system: System) -> CompiledSystem:
         row_part=integers([row.part for row in rows]),
         row_soft=np.zeros(len(rows)),
         row_motion=integers([functions.index(row.motion) for row in rows]),
-        **joint_force_arrays(system, rows, owner, functions),
-        c_rates=integers(rates),
+        **joint_force_arrays(system, rows, made.owner, functions),
+        c_rates=integers(made.rates),
+        **pairs.arrays(),
+        **networks.arrays(),
         spring_table=integers(spring_table),
         l_factor=integers([functions.index(load.amplitude) for load in loads]),
         **body_load_arrays(system, functions),
@@ -176,7 +146,7 @@ def compile_system(system: System) -> CompiledSystem:
         l_marker=integers(load_marker),
         l_force=stacked([load.force for load in loads], (3,)),
         l_torque=stacked([load.torque for load in loads], (3,)),
-        **plan_elimination(sizes, ends_of, connection_of_marker)._asdict(),
+        **plan_elimination(made.sizes, ends_of, connection_of_marker)._asdict(),
     )
     length = system_length(markers, placed, n_q, model)
     model = model._replace(row_soft=row_softness(system, rows, model.mass[kind], length))
@@ -184,7 +154,9 @@ def compile_system(system: System) -> CompiledSystem:
         model=model,
         body_names=tuple(body.name for body in system.bodies),
         joint_names=tuple(joint.name for joint in system.joints),
-        spring_names=tuple(spring.name for spring in dampers),
+        spring_names=tuple(spring.name for spring in dampers) + pairs.names,
+        network_names=networks.names,
+        owners=tuple(made.owner),
         placed=placed,
         coordinates=tuple(row.coordinate for row in rows),
         length=length,
@@ -224,20 +196,6 @@ def place(system: System) -> State:
             p.append(body.orientation)
             u += [body.velocity, body.omega_B]
     return State(r=np.array(r), p=np.array(p), q=np.concatenate([*q, np.zeros(0)]), u=np.concatenate(u))
-
-
-def spring_length(
-    where: str, spring: SpringDamper, a: MarkerData, b: MarkerData, placed: State, n_q: IntArray
-) -> float:
-    """Return the free length of a spring; `ModelError` if it has no direction as placed."""
-    distance = float(np.linalg.norm(marker_pose(b, placed, n_q)[0] - marker_pose(a, placed, n_q)[0]))
-    free_length = distance if spring.free_length is None else spring.free_length
-    if distance == 0 and (free_length > 0 or spring.preload != 0 or spring.damping != 0 or spring.characteristic):
-        raise ModelError(
-            f"{where}: its markers coincide as placed, so that its tension has no direction; move one, or "
-            "give free_length = 0 without damping and preload"
-        )
-    return free_length
 
 
 def system_length(markers: list[MarkerData], placed: State, n_q: IntArray, model: Model) -> float:

@@ -19,7 +19,7 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
     """Return the joints that are open most, in words; `error`: the residuals of the rows, (n_w,)."""
     model = compiled.model
     words = []
-    for c, name in enumerate(compiled.joint_names):
+    for c, name in enumerate(compiled.connection_names):
         rows = slice(int(model.c_w0[c]), int(model.c_w0[c + 1]))
         kind = model.row_kind[rows]
         g = np.where(np.isin(kind, HELD), error[rows], 0.0)

@@ -14,7 +14,7 @@ from floatframe.errors import ModelError
 from floatframe.flexible_body import FlexibleBody
 from floatframe.forces import BodyLoad, JointForce
 from floatframe.joints import Joint
-from floatframe.joints.rows import GAUGE, HELD, Row, loaded_row
+from floatframe.joints.rows import GAUGE, GAUGE_B, HELD, Row, loaded_row
 from floatframe.marker_data import find_body
 from floatframe.markers import body_name
 from floatframe.system import System
@@ -50,7 +50,7 @@ def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce])
     result = list(rows)
     for force in forces:
         where = f"force {force.name!r}"
-        choices = [row.coordinate for row in rows if row.coordinate and row.kind == GAUGE]
+        choices = [row.coordinate for row in rows if row.coordinate and row.kind in (GAUGE, GAUGE_B)]
         prescribed = [row.coordinate for row in rows if row.coordinate and row.kind in HELD]
         if force.coordinate in prescribed:
             raise ModelError(f"{where}: the coordinate {force.coordinate!r} of joint {joint.name!r} is prescribed")

@@ -58,7 +58,7 @@ def constraint_mobility(compiled: CompiledSystem, work: Work, state: State) -> M
     repeated, repeated_rigid = dependent_rows(with_modes), dependent_rows(rigid)
     counts = {
         name: int(repeated[owner == c].sum())
-        for c, name in enumerate(compiled.joint_names)
+        for c, name in enumerate(compiled.connection_names)
         if repeated[owner == c].any()
     }
     return Mobility(

@@ -20,7 +20,7 @@ from floatframe.compiled import CompiledSystem
 from floatframe.constraint_words import conflict_of_drives, open_joints
 from floatframe.errors import ModelError
 from floatframe.freedoms import Mobility, constraint_mobility, scaled_constraints
-from floatframe.joints.rows import HELD, HELD_DISTANCES
+from floatframe.joints.rows import HELD, HELD_DISTANCES, HELD_VELOCITIES
 from floatframe.kernels.model import STIFFNESS, Model, Work, new_work
 from floatframe.linearization import (
     displaced,
@@ -107,7 +107,7 @@ def checked(compiled: CompiledSystem, state: State) -> State:
 def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
     """(1): return the state with all joints closed."""
     model = compiled.model
-    holds = np.isin(model.row_kind, HELD)
+    holds = np.isin(model.row_kind, HELD) & ~np.isin(model.row_kind, HELD_VELOCITIES)
     if not holds.any():
         return state
     scale = np.where(np.isin(model.row_kind, HELD_DISTANCES), compiled.length, 1.0)
@@ -154,7 +154,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, state:
         raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
     share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
     owner = np.repeat(np.arange(len(model.c_size)), model.c_size)[holds]
-    involved = [name for c, name in enumerate(compiled.joint_names) if share[owner == c].sum() > 1e-6]
+    involved = [name for c, name in enumerate(compiled.connection_names) if share[owner == c].sum() > 1e-6]
     if is_singular_position(compiled, work, state, n_redundant):
         raise ModelError(
             f"a singular position: {n_redundant} of {int(holds.sum())} constraints repeat others here, but not a "
@@ -281,11 +281,16 @@ def velocity_correction(
     """
     model = compiled.model
     work = new_work(model)
-    holds = np.isin(model.row_kind, HELD)
+    holds = np.isin(model.row_kind, HELD) & ~np.isin(model.row_kind, HELD_VELOCITIES)
     if not holds.any():
         return np.zeros(len(work.u))
+    work.time[0] = t
+    set_iterate(work, state)
+    linearized(model, work, 1.0, 0.0, 0.0)
+    x, rates = -work.g[model.p_row], -work.g[model.p_row + 1]
     work.time[0] = t + h
     set_iterate(work, after)
+    work.w[model.p_row] = x + h * rates  # angles of couplers are those next to these
     linearized(model, work, 1.0, 0.0, 0.0)
     gap = np.where(holds, work.g, 0.0)
     work.time[0] = t

@@ -71,7 +71,7 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
         row = work.J_row[12 * o : 12 * (o + n)].reshape(12, n)
         w0, u0 = int(model.c_w0[c]), int(model.u0[i])
         carried = model.m_sign[m] * (R4[:6, :6] @ column)
-        for part, place in ((0, 0), (3, int(model.m_moment[m]))):
+        for part, place in ((0, int(model.m_force[m])), (3, int(model.m_moment[m]))):
             if place >= 0:
                 J_parts.append((carried[part : part + 3], w0 + place, u0))
         G_parts.append((work.P[m, :size] @ R4 @ row, w0, u0))

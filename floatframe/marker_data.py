@@ -1,6 +1,6 @@
 """Markers found in their bodies, and where they are at the start."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,16 @@ from floatframe.state import State
 from floatframe.stiffening import bending_of
 from floatframe.system import System
 
-__all__ = ["MarkerData", "find_marker", "joint_markers", "marker_bending", "marker_pose", "marker_shapes", "n_q_of"]
+__all__ = [
+    "MarkerData",
+    "find_marker",
+    "joint_markers",
+    "marker_bending",
+    "marker_pose",
+    "marker_shapes",
+    "marker_with_pose",
+    "n_q_of",
+]
 
 GROUND_INDEX = -1
 
@@ -102,10 +111,17 @@ def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerDa
 
 def marker_as_placed(system: System, where: str, name: str, other: MarkerData, placed: State) -> MarkerData:
     """Return the marker of a body at the place of another marker, with the axes of the body."""
-    index = find_body(system, where, name)
     r_P, _ = marker_pose(other, placed, n_q_of(system))
+    marker = marker_with_pose(system, where, name, (r_P, np.eye(3)), placed)
+    return replace(marker, triad=np.eye(3))
+
+
+def marker_with_pose(system: System, where: str, name: str, pose: tuple[Array, Array], placed: State) -> MarkerData:
+    """Return the marker of a body at a position with axes, both in ground axes, as placed."""
+    index = find_body(system, where, name)
+    r_P, A_P = pose
     if index < 0:
-        return MarkerData(index, r_P, np.eye(3))
+        return MarkerData(index, r_P, A_P)
     body = system.bodies[index]
     if isinstance(body, FlexibleBody):
         choices = ", ".join(interface.name for interface in body.reduced.interfaces)
@@ -113,7 +129,7 @@ def marker_as_placed(system: System, where: str, name: str, other: MarkerData, p
             f"{where}: a flexible body can be held at an interface only; give a Marker on {name!r}, one of: {choices}"
         )
     R = rotation_matrix(placed.p[index])
-    return MarkerData(index, R.T @ (r_P - placed.r[index]), np.eye(3))
+    return MarkerData(index, R.T @ (r_P - placed.r[index]), R.T @ A_P)
 
 
 def marker_pose(marker: MarkerData, state: State, n_q: IntArray) -> tuple[Array, Array]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cms.units import Units, unit_system
 from cms.words import nearest
+from floatframe.couplers import CoordinateCoupler
 from floatframe.errors import ModelError
 from floatframe.flexible_body import FlexibleBody
 from floatframe.forces import Force, Gravity
@@ -36,18 +37,22 @@ class System:
     """
 
     bodies: Sequence[Body]
-    joints: Sequence[Joint] = ()
+    joints: Sequence[Joint | CoordinateCoupler] = ()  #: couplers among them are moved to `couplers`
     forces: Sequence[Force] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     name: str = "system"
     #: constraints that repeat others: "refuse" them by name, or share their reactions ("minimum-norm")
     redundant: str = "refuse"
+    couplers: Sequence[CoordinateCoupler] = ()  #: between coordinates of joints
     sensors: Sequence["Sensor"] = field(default=(), kw_only=True)  #: what is measured on its motions
     source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
 
     def __post_init__(self) -> None:
-        for part in ("bodies", "joints", "forces", "sensors"):
+        for part in ("bodies", "joints", "forces", "couplers", "sensors"):
             object.__setattr__(self, part, tuple(getattr(self, part)))
+        among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
+        object.__setattr__(self, "couplers", self.couplers + among)
+        object.__setattr__(self, "joints", tuple(joint for joint in self.joints if joint not in among))
         where = f"system {self.name!r}"
         if self.redundant not in REDUNDANT:
             raise ModelError(f"{where}: redundant: expected one of {', '.join(REDUNDANT)}, got {self.redundant!r}")
@@ -55,7 +60,7 @@ class System:
             raise ModelError(f"{where}: expected at least one body, got none")
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
         named = [force.name for force in self.forces if not isinstance(force, Gravity)]
-        require_names(f"{where}: joints and forces", [joint.name for joint in self.joints] + named)
+        require_names(f"{where}: joints and forces", [joint.name for joint in (*self.joints, *self.couplers)] + named)
         require_names(f"{where}: sensors", [sensor.name for sensor in self.sensors])
         for body in self.bodies:
             if isinstance(body, FlexibleBody) and body.reduced.units != self.units:

@@ -26,14 +26,28 @@ from cms.toml_file import Matrix3, Table, Vector3, choice, numbers, read_toml, v
 from cms.units import UNIT_SYSTEMS, Units, unit_system
 from cms.words import nearest
 from floatframe.changed_content import changed
+from floatframe.couplers import CoordinateCoupler
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
 from floatframe.flexible_body import FlexibleBody
-from floatframe.forces import FORCES, BodyLoad, Force, Gravity, JointForce, PointForce, SpringDamper
+from floatframe.forces import (
+    FORCES,
+    BodyLoad,
+    Bushing,
+    Force,
+    Gravity,
+    JointForce,
+    PointForce,
+    SphereContact,
+    SpringDamper,
+)
+from floatframe.forces.bushing import DEFORMATIONS
+from floatframe.forces.sphere_contact import DISSIPATIONS
 from floatframe.ground import GROUND
 from floatframe.integrators import GeneralizedAlpha
 from floatframe.joints import JOINTS, Joint
-from floatframe.markers import Marker, Place
+from floatframe.markers import Place
 from floatframe.motion_section import MotionSection
+from floatframe.coordinate_section import CoordinateSection, marker_of
 from floatframe.place_key import PlaceOnBody
 from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters_of_rotation_vector
@@ -67,7 +81,15 @@ KEYS_OF_FORCES = {
         "preload",
         "characteristic",
     ),
-}
+    "bushing": (
+        "body_a", "marker_a", "triad_a", "body_b", "marker_b", "triad_b",
+        "stiffness", "damping", "preload", "characteristics",
+    ),
+    "sphere-contact": (
+        "body_a", "marker_a", "triad_a", "body_b", "marker_b",
+        *(field.name for field in fields(SphereContact) if field.name not in ("name", "marker_a", "marker_b")),
+    ),
+}  # fmt: skip
 
 
 def four_numbers(value: Any) -> tuple[float, ...]:
@@ -78,6 +100,20 @@ def four_numbers(value: Any) -> tuple[float, ...]:
         raise ValueError("expected four numbers, [w, x, y, z]") from None
 
 
+def number_or_six(value: Any) -> Any:
+    """Return a number, or for a bushing six numbers or six rows of them."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    try:
+        rows = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        rows = np.zeros(0)
+    if rows.shape not in ((6,), (6, 6)) or not np.isfinite(rows).all():
+        raise ValueError("expected a number; for a bushing six numbers, or six rows of six numbers")
+    return rows.tolist()
+
+
+NumberOrSix = Annotated[float | list, BeforeValidator(number_or_six)]
 Parameters4 = Annotated[tuple[float, float, float, float], BeforeValidator(four_numbers)]
 
 
@@ -152,19 +188,23 @@ class JointSection(Table):
     rotation: Matrix3 | None = Field(None, description="the held rotation, three rows; default: as placed")
     lead: float | None = Field(None, description="a number other than 0, the advance of a screw for one turn")
     distance: Positive | None = Field(None, description="a number above 0, the length of a rod; default: as placed")
+    radius: Positive | None = Field(None, description="a number above 0, the radius of a rolling disc")
     motions: dict[str, MotionSection] | None = Field(
         None, description="tables [joints.NAME.motions.COORDINATE], functions of time"
     )
 
     @model_validator(mode="after")
     def _fits_the_type(self) -> "JointSection":
-        for key in ("axis", "axis_b", "rotation", "lead", "distance", "motions"):
+        for key in ("axis", "axis_b", "rotation", "lead", "distance", "radius", "motions"):
             if getattr(self, key) is not None and key not in KEYS_OF_JOINTS[self.type]:
                 raise ValueError(f"a {self.type} joint has no key {key}{nearest(key, KEYS_OF_JOINTS[self.type])}")
         if "axis" in KEYS_OF_JOINTS[self.type] and self.axis is None:
             raise ValueError(f"axis: missing; a {self.type} joint needs its axis in the axes of marker_a, [x, y, z]")
         if self.type == "universal" and self.axis_b is None:
             raise ValueError("axis_b: missing; a universal joint needs its axis in the axes of marker_b, [x, y, z]")
+        if self.type == "rolling-disc" and (self.axis_b is None or self.radius is None):
+            key = "axis_b" if self.axis_b is None else "radius"
+            raise ValueError(f"{key}: missing; a rolling disc needs its radius and its axis in the axes of marker_b")
         if self.type == "screw" and self.lead is None:
             raise ValueError("lead: missing; a screw joint needs its advance for one turn")
         if self.marker_a is None and self.marker_b is None:
@@ -188,10 +228,10 @@ class ForceSection(Table):
     body_b: Name | None = Field(None, description='the name of a body, or "ground"')
     marker_a: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_a")
     marker_b: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_b")
-    stiffness: NotNegative | None = Field(None, description="a number, 0 or more, the stiffness of the spring")
-    damping: NotNegative | None = Field(None, description="a number, 0 or more, the constant of the damper")
+    stiffness: NumberOrSix | None = Field(None, description="a number, 0 or more, the stiffness of the spring")
+    damping: NumberOrSix | None = Field(None, description="a number, 0 or more, the constant of the damper")
     free_length: NotNegative | None = Field(None, description="a number, 0 or more, the free length")
-    preload: float | None = Field(None, description="a number, the constant part of the tension or force")
+    preload: NumberOrSix | None = Field(None, description="a number, the constant part of the tension or force")
     load_case: Name | None = Field(None, description="the name of a load case of the modal file")
     amplitude: MotionSection | None = Field(None, description="a table, the factor as a function of time")
     joint: Name | None = Field(None, description="the name of a joint")
@@ -202,6 +242,21 @@ class ForceSection(Table):
     friction: NotNegative | None = Field(None, description="a number, 0 or more, Coulomb friction")
     friction_coefficient: NotNegative | None = Field(None, description="a number, 0 or more, friction by normal force")
     friction_speed: Positive | None = Field(None, description="a number above 0, the speed of full friction")
+    triad_a: Matrix3 | None = Field(None, description="the axes of marker_a, [x axis, y axis, z axis]")
+    triad_b: Matrix3 | None = Field(None, description="the axes of marker_b, [x axis, y axis, z axis]")
+    characteristics: dict[str, MotionSection] | None = Field(
+        None, description=f"tables of the force over one deformation, of {', '.join(DEFORMATIONS)}"
+    )
+    radius_a: Positive | None = Field(None, description="a number above 0, the radius of the sphere at marker_a")
+    radius_b: Positive | None = Field(None, description="a number above 0, the radius of the sphere at marker_b")
+    axis: Vector3 | None = Field(None, description="the normal of the plane in the axes of marker_a, [x, y, z]")
+    modulus: Positive | None = Field(None, description="a number above 0, the contact modulus of Hertz")
+    exponent: Positive | None = Field(None, description="a number, 1 or more, the exponent of the depth")
+    restitution: Positive | None = Field(None, description="a number above 0 and up to 1, the restitution")
+    dissipation: choice("law of restitution", lambda: tuple(DISSIPATIONS)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(DISSIPATIONS)}"
+    )
+    slow: Positive | None = Field(None, description="a number above 0, the least speed of approach")
 
     @model_validator(mode="after")
     def _fits_the_type(self) -> "ForceSection":
@@ -212,13 +267,37 @@ class ForceSection(Table):
         for key in ("body", "body_a", "body_b"):
             if key in allowed and getattr(self, key) is None:
                 raise ValueError(f'{key}: missing; expected the name of a body, or "ground"')
-        needed = {"body-load": ("load_case",), "joint-force": ("joint", "coordinate")}
+        needed = {
+            "body-load": ("load_case",), "joint-force": ("joint", "coordinate"), "sphere-contact": ("radius_b",)
+        }  # fmt: skip
         for key in needed.get(self.type, ()):
             if getattr(self, key) is None:
                 raise ValueError(f"{key}: missing; expected {type(self).model_fields[key].description}")
+        for key in ("stiffness", "damping", "preload"):
+            value = getattr(self, key)
+            if isinstance(value, list) != (self.type == "bushing") and value is not None:
+                expected = "six numbers, or six rows of six" if self.type == "bushing" else "a number"
+                raise ValueError(f"{key}: expected {expected} for a {self.type}, got {value}")
+            if isinstance(value, float) and value < 0 and key != "preload":
+                raise ValueError(f"{key}: expected a number, 0 or more, got {value:g}")
         if self.type == "point-force" and self.force is None and self.torque is None:
             raise ValueError("expected force or torque or both, got neither")
         return self
+
+
+class TermSection(CoordinateSection):
+    """[[couplers.NAME.terms]]: a coordinate and its coefficient."""
+
+    factor: float = Field(description="a number other than 0, the coefficient of the coordinate")
+
+
+class CouplerSection(Table):
+    """[couplers.NAME]: a linear relation between coordinates."""
+
+    terms: list[TermSection] = Field(description="tables [[couplers.NAME.terms]], coordinates with factors")
+    constant: float | MotionSection | None = Field(
+        None, description="a number, or a function of time; default: as placed"
+    )
 
 
 class RunSection(Table):
@@ -243,6 +322,7 @@ class SystemFile(Table):
     system: SystemSection = Field(description="a table [system] with units and gravity")
     bodies: dict[str, BodySection] = Field(description="tables [bodies.NAME]")
     joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")
+    couplers: dict[str, CouplerSection] = Field({}, description="tables [couplers.NAME]")
     forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
     sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
     run: RunSection = Field(description="a table [run] with t_end and h")
@@ -250,8 +330,10 @@ class SystemFile(Table):
     @model_validator(mode="after")
     def _names_bodies(self) -> "SystemFile":
         choices = [GROUND.name, *self.bodies]
-        for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors)):
-            for name, section in sections.items():
+        terms = {f"{name}.terms": term for name, coupler in self.couplers.items() for term in coupler.terms}
+        for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors),
+                               ("couplers", terms)):  # fmt: skip
+            for name, section in sections.items():  # type: ignore[attr-defined]
                 for key in ("body", "body_a", "body_b", "relative_to"):
                     body = getattr(section, key, None)
                     if body is not None and body not in choices:
@@ -299,14 +381,16 @@ def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None 
         units = unit_system(data.system.units)
         bodies = [body_of(name, section, files, units) for name, section in data.bodies.items()]
         joints = [joint_of(name, section) for name, section in data.joints.items()]
+        couplers = [coupler_of(name, section) for name, section in data.couplers.items()]
         forces: list[Force] = [force_of(name, section) for name, section in data.forces.items()]
         if any(data.system.gravity):
             forces.insert(0, Gravity(np.array(data.system.gravity)))
         name = data.system.name or path.stem
         sensors = [section.sensor(key) for key, section in data.sensors.items()]
         system = System(
-            bodies, joints, forces, units, name, data.system.redundant, sensors=sensors, source=str(path.resolve())
-        )
+            bodies, joints, forces, units, name, data.system.redundant, couplers, sensors=sensors,
+            source=str(path.resolve()),
+        )  # fmt: skip
         _ = system.compiled  # markers and interfaces are looked up here
         for hint in unit_hints(system):
             log.warning("%s: %s", path, hint)
@@ -344,14 +428,6 @@ def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody], uni
     return FlexibleBody(name, files[section.file], source=str(section.file.resolve()), **motion)
 
 
-def marker_of(body: str, place: str | tuple[float, float, float] | None, triad: Any = None) -> Marker:
-    """Return a marker by interface or position; rows of the triad in the file are its axes."""
-    axes = None if triad is None else np.array(triad).T
-    if isinstance(place, str):
-        return Marker(body, place, triad=axes)
-    return Marker(body, position=None if place is None else np.array(place), triad=axes)
-
-
 def joint_of(name: str, section: JointSection) -> Joint:
     """Return the joint of a table; an end without marker lies where the other end is placed."""
     ends: list[Place] = []
@@ -370,6 +446,36 @@ def joint_of(name: str, section: JointSection) -> Joint:
     return JOINTS[section.type](name, ends[0], ends[1], **options)
 
 
+def coupler_of(name: str, section: CouplerSection) -> CoordinateCoupler:
+    """Return the coupler of a table."""
+    constant = section.constant
+    terms = [(term.found(), term.factor) for term in section.terms]
+    return CoordinateCoupler(name, terms, constant.function() if isinstance(constant, MotionSection) else constant)
+
+
+def bushing_of(name: str, section: ForceSection) -> Bushing:
+    """Return the bushing of a table; a body without a marker is met where the other marker is placed."""
+    ends: list[Place] = []
+    for body, place, triad in ((section.body_a, section.marker_a, section.triad_a),
+                               (section.body_b, section.marker_b, section.triad_b)):  # fmt: skip
+        assert body is not None  # checked by the table
+        ends.append(body if place is None and triad is None else marker_of(body, place, triad))
+    given = {"stiffness": section.stiffness, "damping": section.damping, "preload": section.preload}
+    options = {key: np.array(value) for key, value in given.items() if value is not None}
+    tables = {key: table.function() for key, table in (section.characteristics or {}).items()}
+    return Bushing(name, ends[0], ends[1], characteristics=tables, **options)
+
+
+def contact_of(name: str, section: ForceSection) -> SphereContact:
+    """Return the contact of a table."""
+    assert section.body_a is not None  # checked by the table
+    assert section.body_b is not None
+    a = marker_of(section.body_a, section.marker_a, section.triad_a)
+    b = marker_of(section.body_b, section.marker_b)
+    keys = [key for key in KEYS_OF_FORCES["sphere-contact"] if not key.startswith(("body", "marker", "triad"))]
+    return SphereContact(name, a, b, **{k: getattr(section, k) for k in keys if getattr(section, k) is not None})
+
+
 def force_of(name: str, section: ForceSection) -> Force:
     """Return the force of a table."""
     functions = {
@@ -377,6 +483,10 @@ def force_of(name: str, section: ForceSection) -> Force:
         for key, table in (("amplitude", section.amplitude), ("characteristic", section.characteristic),
                            ("motor", section.motor))
     }  # fmt: skip
+    if section.type == "bushing":
+        return bushing_of(name, section)
+    if section.type == "sphere-contact":
+        return contact_of(name, section)
     if section.type == "body-load":
         assert section.body is not None  # checked by the table
         assert section.load_case is not None

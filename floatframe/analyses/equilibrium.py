@@ -20,6 +20,7 @@ from floatframe.arrays import array_of_shape
 from floatframe.compiled import CompiledSystem
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.initial import assembled, checked, require_independent_constraints
+from floatframe.joints.rows import HELD_VELOCITIES
 from floatframe.kernels.model import Work, new_work
 from floatframe.linearization import (
     Linearized,
@@ -106,6 +107,12 @@ def steady_rotation(
     center = array_of_shape("steady_rotation: center", center, (3,))
     compiled = system.compiled
     model = compiled.model
+    rolling = [name for name, row in zip(compiled.owners, model.row_kind, strict=True) if row in HELD_VELOCITIES]
+    if rolling:
+        raise ModelError(
+            f"joint {rolling[0]!r} rolls without slip: equilibria and linearisations do not know held velocities; "
+            "hold the body by other joints, or integrate the motion"
+        )
     work = new_work(model)
     state = assembled(compiled, work, compiled.placed if state is None else checked(compiled, state))
     require_independent_constraints(compiled, work, state)

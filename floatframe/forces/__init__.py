@@ -1,18 +1,32 @@
 """Forces: one file each; `FORCES` is the registry for the system file."""
 
 from floatframe.forces.body_load import BodyLoad
+from floatframe.forces.bushing import Bushing
 from floatframe.forces.gravity import Gravity
 from floatframe.forces.joint_force import JointForce
 from floatframe.forces.point_force import PointForce
+from floatframe.forces.sphere_contact import SphereContact
 from floatframe.forces.spring_damper import SpringDamper
 
-__all__ = ["FORCES", "BodyLoad", "Force", "Gravity", "JointForce", "PointForce", "SpringDamper"]
+__all__ = [
+    "FORCES",
+    "BodyLoad",
+    "Bushing",
+    "Force",
+    "Gravity",
+    "JointForce",
+    "PointForce",
+    "SphereContact",
+    "SpringDamper",
+]
 
-Force = BodyLoad | Gravity | JointForce | PointForce | SpringDamper
+Force = BodyLoad | Bushing | Gravity | JointForce | PointForce | SphereContact | SpringDamper
 
 FORCES = {
     "body-load": BodyLoad,
+    "bushing": Bushing,
     "joint-force": JointForce,
     "point-force": PointForce,
+    "sphere-contact": SphereContact,
     "spring-damper": SpringDamper,
 }

@@ -9,6 +9,7 @@ from floatframe.joints.point_on_line import PointOnLine
 from floatframe.joints.point_on_plane import PointOnPlane
 from floatframe.joints.prismatic import PrismaticJoint
 from floatframe.joints.revolute import RevoluteJoint
+from floatframe.joints.rolling_disc import RollingDisc
 from floatframe.joints.screw import ScrewJoint
 from floatframe.joints.spherical import SphericalJoint
 from floatframe.joints.universal import UniversalJoint
@@ -25,6 +26,7 @@ __all__ = [
     "PointOnPlane",
     "PrismaticJoint",
     "RevoluteJoint",
+    "RollingDisc",
     "ScrewJoint",
     "SphericalJoint",
     "UniversalJoint",
@@ -40,6 +42,7 @@ Joint = (
     | PointOnPlane
     | PrismaticJoint
     | RevoluteJoint
+    | RollingDisc
     | ScrewJoint
     | SphericalJoint
     | UniversalJoint
@@ -55,6 +58,7 @@ JOINTS = {
     "point-on-plane": PointOnPlane,
     "prismatic": PrismaticJoint,
     "revolute": RevoluteJoint,
+    "rolling-disc": RollingDisc,
     "screw": ScrewJoint,
     "spherical": SphericalJoint,
     "universal": UniversalJoint,

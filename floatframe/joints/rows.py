@@ -11,6 +11,9 @@ d = r_B - r_A and f(t) the prescribed motion of a row (constant c without):
               SLIDE x      E · d = f                                   distance along an axis of A
               DISTANCE     |d| = f                                     distance of the points
               SCREW x z y  E · d = c th                                th the angle of D from Z, about the axis E
+              TURN_B       TURN with A and B exchanged and -f          turns about an axis of B
+              RIM_HEIGHT   Z · (d + rho) = 0                           a disc touches the plane normal to Z of A
+              ROLL x       E · (velocity of the rim at the contact) = 0   held as a velocity: it rolls
     wrench    GAUGE x      E · part = 0                                none along what is free, part one of F, M, N
               PUSH x       E · F + Q = 0                               force Q(s, s_dot, F, t) along a free distance
               TWIST x z y  axis · part + Q = 0                         torque Q(th, th_dot, F, t) about a free angle
@@ -18,6 +21,11 @@ d = r_B - r_A and f(t) the prescribed motion of a row (constant c without):
               THREAD x     E · (N + c F) = 0                           of a screw
               ARM x        M - N - d × F = 0, along x in ground axes   forces on A and B balance about one point
               ROD x        F - mu d = 0, along x in ground axes        force along the line of the points
+              TWIST_B      TWIST about an axis of B
+              RIM x        N - rho × F = 0, along x in ground axes     the force acts at the rim of a disc on B
+
+rho leads from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
+kernels/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is COUPLE.
 
 Joints whose points coincide need one moment (N = M), the others take the force at the point of B and have ARM rows.
 """
@@ -32,6 +40,7 @@ from floatframe.time_functions import TimeFunction
 
 __all__ = [
     "ARM",
+    "COUPLE",
     "DISTANCE",
     "DOT",
     "FORCE",
@@ -39,18 +48,26 @@ __all__ = [
     "GAUGE_B",
     "HELD",
     "HELD_DISTANCES",
+    "HELD_VELOCITIES",
     "MOMENT",
     "MOMENT_B",
     "NO_MOMENT",
+    "PART",
     "POINT",
     "PUSH",
+    "RIM",
+    "RIM_HEIGHT",
     "ROD",
+    "ROLL",
     "SCREW",
     "SLIDE",
+    "SPAN",
     "SPRING",
     "THREAD",
     "TURN",
+    "TURN_B",
     "TWIST",
+    "TWIST_B",
     "Row",
     "arm_rows",
     "loaded_row",
@@ -58,12 +75,16 @@ __all__ = [
     "point_rows",
     "slide_row",
     "turn_row",
+    "turn_row_b",
 ]
 
 #: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
 POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
-HELD = (POINT, DOT, TURN, SLIDE, DISTANCE, SCREW)  #: rows that hold something; the others say what the wrench is
-HELD_DISTANCES = (POINT, SLIDE, DISTANCE, SCREW)  #: those in the unit of length
+RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B = range(14, 22)
+#: rows that hold something; the others say what the wrench is
+HELD = (POINT, DOT, TURN, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, ROLL, COUPLE, TURN_B)
+HELD_DISTANCES = (POINT, SLIDE, DISTANCE, SCREW, RIM_HEIGHT)  #: those in the unit of length
+HELD_VELOCITIES = (ROLL,)  #: those that hold a velocity and no position
 FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
 NO_MOMENT = -1  #: in place of a part: nothing acts there
 
@@ -123,8 +144,20 @@ def turn_row(axis: Array, frame: tuple[Array, Array, Array], part: int, motions:
     return Row(GAUGE, axis, y, z=z, part=part, coordinate=name)
 
 
+def turn_row_b(axis: Array, axis_b: Array, z: Array, motions: Mapping, name: str) -> Row:
+    """Return the row of a free angle about an axis of B: prescribed, or without moment.
+
+    z: direction of B, normal to its axis, that is along the axis of A at angle zero.
+    """
+    if name in motions:
+        return Row(TURN_B, np.cross(z, axis_b), axis, z=z, part=MOMENT, motion=motions[name], coordinate=name)
+    return Row(GAUGE_B, axis, axis_b, z=z, part=MOMENT, coordinate=name)
+
+
 def loaded_row(row: Row) -> Row:
     """Return the row of a free coordinate with forces along it, in place of the one without."""
+    if row.kind == GAUGE_B:
+        return replace(row, kind=TWIST_B, x=np.cross(row.z, row.y), y=row.x)
     if row.part == FORCE:
         return replace(row, kind=PUSH)
     return replace(row, kind=TWIST, x=np.cross(row.z, row.x))

@@ -34,7 +34,7 @@ class ScrewJoint:
 
     size = 9  #: components of the unknown wrench
     moment_b = MOMENT_B  #: where the moment on B begins in it
-    coordinates = ("angle",)
+    coordinates = ("angle", "distance")
 
     def __post_init__(self) -> None:
         checked_axes(self)
@@ -49,11 +49,14 @@ class ScrewJoint:
         axis_b = axis_in_b(self.axis, self.axis_b, A_a, A_b)
         x, z, y = turning_frame(self.axis, axis_b, A_a, A_b)
         slope = self.lead / (2 * np.pi)
-        motion = self.motions.get("angle")
-        if motion is None:
-            drive = Row(THREAD, self.axis, y, c=slope, z=z, coordinate="angle")
+        if len(self.motions) > 1:
+            raise ModelError(f"joint {self.name!r}: motions: expected angle or distance, which follows it, got both")
+        if "distance" in self.motions:
+            drive = Row(SLIDE, self.axis, motion=self.motions["distance"], coordinate="distance")
+        elif "angle" in self.motions:
+            drive = Row(TURN, x, y, z=z, motion=self.motions["angle"], coordinate="angle")
         else:
-            drive = Row(TURN, x, y, z=z, motion=motion, coordinate="angle")
+            drive = Row(THREAD, self.axis, y, c=slope, z=z, coordinate="angle")
         return (
             *arm_rows(),
             *(Row(SLIDE, n) for n in normals_of(self.axis)),

@@ -8,7 +8,7 @@ import numpy as np
 from cms.arrays import Array
 from floatframe.errors import ModelError
 from floatframe.joints.axis_frame import checked_axes, checked_motions
-from floatframe.joints.rows import DOT, GAUGE_B, MOMENT, Row, point_rows, turn_row
+from floatframe.joints.rows import DOT, MOMENT, Row, point_rows, turn_row, turn_row_b
 from floatframe.markers import Place
 from floatframe.time_functions import TimeFunction
 
@@ -19,7 +19,8 @@ __all__ = ["UniversalJoint"]
 class UniversalJoint:
     """Holds two points together and an axis of marker A at a right angle to one of marker B; four constraints.
 
-    Coordinate `angle`: of the cross about the axis of A, zero as placed.
+    Coordinates, zero as placed: `angle` of the cross about the axis of A, `angle_b` of B against the cross about the
+    axis of B.
     """
 
     name: str
@@ -31,7 +32,7 @@ class UniversalJoint:
 
     size = 6  #: components of the unknown wrench
     moment_b = MOMENT  #: where the moment on B begins in it
-    coordinates = ("angle",)
+    coordinates = ("angle", "angle_b")
 
     def __post_init__(self) -> None:
         checked_axes(self)
@@ -46,9 +47,12 @@ class UniversalJoint:
             raise ModelError(f"joint {self.name!r}: expected axes at about a right angle as placed, got parallel ones")
         z = z / np.linalg.norm(z)
         frame = (np.cross(z, self.axis), z, self.axis_b)
+        z_b = A_b.T @ A_a @ self.axis
+        z_b = z_b - (z_b @ self.axis_b) * self.axis_b
+        z_b = z_b / np.linalg.norm(z_b)
         return (
             *point_rows(),
             Row(DOT, self.axis, self.axis_b, part=MOMENT),
             turn_row(self.axis, frame, MOMENT, self.motions, "angle"),
-            Row(GAUGE_B, y=self.axis_b, part=MOMENT),
+            turn_row_b(self.axis, self.axis_b, z_b, self.motions, "angle_b"),
         )

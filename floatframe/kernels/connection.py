@@ -20,16 +20,37 @@ from floatframe.joints.rows import (
     MOMENT_B,
     POINT,
     PUSH,
+    RIM,
+    RIM_HEIGHT,
     ROD,
+    ROLL,
     SCREW,
     SLIDE,
     THREAD,
     TURN,
+    TURN_B,
     TWIST,
+    TWIST_B,
 )
 from floatframe.kernels.compilation import inner
 from floatframe.kernels.coordinate_force import coordinate_force
+from floatframe.kernels.coupler import coupler_derivatives, coupler_rates, coupler_rows
 from floatframe.kernels.marker import marker_acceleration_bias, rotate
+from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, JOINT, SPRING
+from floatframe.kernels.pair_law import pair_derivatives, pair_rows
+from floatframe.kernels.relative_motion import (
+    direction_of_a,
+    distance,
+    loaded_axis,
+    loaded_coordinate,
+    prescribed,
+    put_pair,
+    screw_angle,
+    screw_axis,
+    slip,
+    turned_angle,
+)
+from floatframe.kernels.rolling import rolling_acceleration, rolling_derivatives, rolling_rate, rolling_row
 from floatframe.kernels.rotation import cross
 from floatframe.kernels.time_function import time_function
 
@@ -37,8 +58,6 @@ __all__ = [
     "connection_derivatives",
     "connection_rows",
     "constraint_rates",
-    "loaded_axis",
-    "loaded_coordinate",
     "normal_force",
     "row_rate",
     "spring_tension",
@@ -60,100 +79,16 @@ def spring_tension(model, work, c):
 
     At length zero the tension has a direction only if the free length is zero: then k remains.
     """
-    k, damping, free, preload = model.springs[model.c_spring[c]]
+    k, damping, free, preload = model.springs[model.c_item[c]]
     x0, x1, x2, y0, y1, y2, length = spring_line(model, work, c)
     if length == 0.0:
         return k, length, 0.0
     rate = (x0 * y0 + x1 * y1 + x2 * y2) / length
     tension = k * (length - free) + damping * rate + preload
-    if model.spring_table[model.c_spring[c]] >= 0:
-        value, _, _ = time_function(model, model.spring_table[model.c_spring[c]], length - free)
+    if model.spring_table[model.c_item[c]] >= 0:
+        value, _, _ = time_function(model, model.spring_table[model.c_item[c]], length - free)
         tension += value
     return tension / length, length, rate
-
-
-@inner
-def prescribed(model, work, k):
-    """Return the motion of row k at the time of the iterate, its rate and its second rate; its constant without."""
-    if model.row_motion[k] < 0:
-        return model.row_c[k], 0.0, 0.0
-    return time_function(model, model.row_motion[k], work.time[0])
-
-
-@inner
-def direction_of_a(model, work, k, a):
-    """Return the direction of marker A in row k, ground axes; that of a prescribed angle turns with time."""
-    x = model.row_x[k]
-    if model.row_kind[k] == TURN:
-        angle, _, _ = prescribed(model, work, k)
-        z, c, s = model.row_z[k], math.cos(angle), math.sin(angle)
-        return rotate(work.m_A[a], c * x[0] + s * z[0], c * x[1] + s * z[1], c * x[2] + s * z[2])
-    return rotate(work.m_A[a], x[0], x[1], x[2])
-
-
-@inner
-def distance(work, a, b):
-    """Return r_B - r_A."""
-    return (work.m_r[b, 0] - work.m_r[a, 0], work.m_r[b, 1] - work.m_r[a, 1], work.m_r[b, 2] - work.m_r[a, 2])
-
-
-@inner
-def screw_angle(model, work, k, a, b):
-    """Return the angle of D about Z × (-E), and its derivative by a rotation of A (of B: the opposite).
-
-    th = atan2(S, C), S = -E·D, C = Z·D.
-    """
-    x, y, z = model.row_x[k], model.row_y[k], model.row_z[k]
-    e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
-    z0, z1, z2 = rotate(work.m_A[a], z[0], z[1], z[2])
-    d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
-    S, C = -(e0 * d0 + e1 * d1 + e2 * d2), z0 * d0 + z1 * d1 + z2 * d2
-    p0, p1, p2 = cross(e0, e1, e2, d0, d1, d2)
-    q0, q1, q2 = cross(z0, z1, z2, d0, d1, d2)
-    f = -1.0 / (S * S + C * C)
-    return math.atan2(S, C), f * (C * p0 + S * q0), f * (C * p1 + S * q1), f * (C * p2 + S * q2)
-
-
-@inner
-def screw_axis(model, work, k, a):
-    """Return the axis x × z of a screw, ground axes."""
-    x, z = model.row_x[k], model.row_z[k]
-    n0, n1, n2 = cross(x[0], x[1], x[2], z[0], z[1], z[2])
-    return rotate(work.m_A[a], n0, n1, n2)
-
-
-@inner
-def loaded_axis(model, work, k, a):
-    """Return the axis of a coordinate with forces, ground axes."""
-    if model.row_kind[k] == PUSH:
-        x = model.row_x[k]
-        return rotate(work.m_A[a], x[0], x[1], x[2])
-    return screw_axis(model, work, k, a)
-
-
-@inner
-def loaded_coordinate(model, work, k, a, b):
-    """Return value and rate of a coordinate with forces: distance along the axis of A, or angle about it."""
-    e0, e1, e2 = loaded_axis(model, work, k, a)
-    o, p = work.m_omega[a], work.m_omega[b]
-    if model.row_kind[k] == TWIST:
-        angle, _, _, _ = screw_angle(model, work, k, a, b)
-        return angle, e0 * (p[0] - o[0]) + e1 * (p[1] - o[1]) + e2 * (p[2] - o[2])
-    r0, r1, r2 = distance(work, a, b)
-    v0, v1, v2 = slip(work, a, b, r0, r1, r2)
-    return e0 * r0 + e1 * r1 + e2 * r2, e0 * v0 + e1 * v1 + e2 * v2
-
-
-@inner
-def slip(work, a, b, r0, r1, r2):
-    """Return the velocity of the point of B as seen from A: v_B - v_A - omega_A × d."""
-    o = work.m_omega[a]
-    n0, n1, n2 = cross(o[0], o[1], o[2], r0, r1, r2)
-    return (
-        work.m_v[b, 0] - work.m_v[a, 0] - n0,
-        work.m_v[b, 1] - work.m_v[a, 1] - n1,
-        work.m_v[b, 2] - work.m_v[a, 2] - n2,
-    )
 
 
 @inner
@@ -166,18 +101,18 @@ def normal_force(w, e0, e1, e2):
 
 @inner
 def loaded_row(model, work, k, a, b, w, c_k):
-    """Return the residual of a PUSH or TWIST row."""
-    e0, e1, e2 = loaded_axis(model, work, k, a)
+    """Return the residual of a PUSH, TWIST or TWIST_B row."""
+    e0, e1, e2 = loaded_axis(model, work, k, a, b)
     x, v = loaded_coordinate(model, work, k, a, b)
     normal, _ = normal_force(w, e0, e1, e2)
-    Q, _, _, _ = coordinate_force(model, work, k, model.row_kind[k] == TWIST, x, v, normal)
+    Q, _, _, _ = coordinate_force(model, work, k, model.row_kind[k] != PUSH, x, v, normal)
     part = model.row_part[k]
     return c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2] + Q)
 
 
 @inner
 def loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
-    """Write row r of P and V of a PUSH or TWIST row.
+    """Write row r of P and V of a PUSH, TWIST or TWIST_B row.
 
     With e the axis, s the slip of B seen from A and n the size of the force normal to e:
     PUSH   dx = e·(dr_B - dr_A) + (e × d)·dphi_A,   dv = e·(dv_B - dv_A) + (e × d)·domega_A
@@ -185,8 +120,8 @@ def loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     TWIST  dx by `screw_angle`,   dv = e·(domega_B - domega_A) + (e × (omega_B - omega_A))·dphi_A
     """
     o, p = work.m_omega[a], work.m_omega[b]
-    part, is_angle = model.row_part[k], model.row_kind[k] == TWIST
-    e0, e1, e2 = loaded_axis(model, work, k, a)
+    part, is_angle = model.row_part[k], model.row_kind[k] != PUSH
+    e0, e1, e2 = loaded_axis(model, work, k, a, b)
     x, v = loaded_coordinate(model, work, k, a, b)
     normal, along = normal_force(w, e0, e1, e2)
     _, Q_x, Q_v, Q_n = coordinate_force(model, work, k, is_angle, x, v, normal)
@@ -200,7 +135,7 @@ def loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
         m0, m1, m2 = cross(e0, e1, e2, w[0], w[1], w[2])
         n0, n1, n2 = n0 - f * along * m0, n1 - f * along * m1, n2 - f * along * m2
     if is_angle:
-        _, t0, t1, t2 = screw_angle(model, work, k, a, b)
+        _, t0, t1, t2 = turned_angle(model, work, k, a, b)
         put_pair(P_a, P_b, r, 3, c_k * Q_x, t0, t1, t2)
         put_pair(P_a, P_b, r, 9, -c_k * Q_v, e0, e1, e2)
         m0, m1, m2 = cross(e0, e1, e2, p[0] - o[0], p[1] - o[1], p[2] - o[2])
@@ -216,21 +151,18 @@ def loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
         n0, n1, n2 = n0 + Q_x * m0, n1 + Q_x * m1, n2 + Q_x * m2
         m0, m1, m2 = cross(e0, e1, e2, s0, s1, s2)
         n0, n1, n2 = n0 + Q_v * m0, n1 + Q_v * m1, n2 + Q_v * m2
-    P_a[r, 3] += c_k * n0
-    P_a[r, 4] += c_k * n1
-    P_a[r, 5] += c_k * n2
-
-
-@inner
-def put_pair(P_a, P_b, r, column, factor, x0, x1, x2):
-    """Write factor * x into a row of P at A, and its opposite at B."""
-    P_a[r, column], P_a[r, column + 1], P_a[r, column + 2] = factor * x0, factor * x1, factor * x2
-    P_b[r, column], P_b[r, column + 1], P_b[r, column + 2] = -factor * x0, -factor * x1, -factor * x2
+    P = P_b if model.row_kind[k] == TWIST_B else P_a  # of the marker that holds the axis
+    P[r, 3] += c_k * n0
+    P[r, 4] += c_k * n1
+    P[r, 5] += c_k * n2
 
 
 @inner
 def connection_rows(model, work, c, c_k):
-    """Write the residual of connection c, and its wrench on both markers."""
+    """Write the residual of connection c, and its wrench on its markers."""
+    if model.c_law[c] == COUPLER:
+        coupler_rows(model, work, c, c_k)
+        return
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
     w = work.w[w0 : w0 + size]
     for k in range(3):
@@ -240,7 +172,10 @@ def connection_rows(model, work, c, c_k):
             work.m_wrench[a, 3 + k] += w[model.m_moment[a] + k]
         if model.m_moment[b] >= 0:
             work.m_wrench[b, 3 + k] -= w[model.m_moment[b] + k]
-    if model.c_spring[c] >= 0:
+    if model.c_law[c] == BUSHING or model.c_law[c] == CONTACT:
+        pair_rows(model, work, c, c_k)
+        return
+    if model.c_law[c] == SPRING:
         tension, _, _ = spring_tension(model, work, c)
         for k in range(3):
             work.g[w0 + k] = c_k * (work.w[w0 + k] - tension * (work.m_r[b, k] - work.m_r[a, k]))
@@ -269,12 +204,19 @@ def connection_rows(model, work, c, c_k):
             along = e0 * r0 + e1 * r1 + e2 * r2
             turns = math.floor((along / slope - angle) / (2 * math.pi) + 0.5)
             work.g[k] = along - slope * (angle + 2 * math.pi * turns)
-        elif kind == PUSH or kind == TWIST:
+        elif kind == PUSH or kind == TWIST or kind == TWIST_B:
             work.g[k] = loaded_row(model, work, k, a, b, w, c_k)
         elif kind == GAUGE_B:
             y = model.row_y[k]
             e0, e1, e2 = rotate(work.m_A[b], y[0], y[1], y[2])
             work.g[k] = c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2])
+        elif kind == RIM_HEIGHT or kind == ROLL or kind == RIM:
+            work.g[k] = rolling_row(model, work, k, a, b, w, c_k)
+        elif kind == TURN_B:
+            y = model.row_y[k]
+            e0, e1, e2 = direction_of_a(model, work, k, b)
+            d0, d1, d2 = rotate(work.m_A[a], y[0], y[1], y[2])
+            work.g[k] = e0 * d0 + e1 * d1 + e2 * d2
         else:
             e0, e1, e2 = direction_of_a(model, work, k, a)
             if kind == GAUGE:
@@ -302,7 +244,10 @@ def connection_rows(model, work, c, c_k):
 
 @inner
 def connection_derivatives(model, work, c, c_k):
-    """Write P at both markers and V of connection c."""
+    """Write P at the markers and V of connection c."""
+    if model.c_law[c] == COUPLER:
+        coupler_derivatives(model, work, c, c_k)
+        return
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
     P_a, P_b, V, w = work.P[a], work.P[b], work.V[c], work.w[w0 : w0 + size]
     for r in range(size):
@@ -311,7 +256,10 @@ def connection_derivatives(model, work, c, c_k):
             P_b[r, j] = 0.0
         for j in range(size):
             V[r, j] = 0.0
-    if model.c_spring[c] >= 0:
+    if model.c_law[c] == BUSHING or model.c_law[c] == CONTACT:
+        pair_derivatives(model, work, c, c_k)
+        return
+    if model.c_law[c] == SPRING:
         spring_derivatives(model, work, c, c_k)
         return
     r0, r1, r2 = distance(work, a, b)
@@ -348,7 +296,7 @@ def connection_derivatives(model, work, c, c_k):
             P_a[r, 3] += n0
             P_a[r, 4] += n1
             P_a[r, 5] += n2
-        elif kind == PUSH or kind == TWIST:
+        elif kind == PUSH or kind == TWIST or kind == TWIST_B:
             loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V)
         elif kind == GAUGE_B:
             y = model.row_y[k]
@@ -356,6 +304,14 @@ def connection_derivatives(model, work, c, c_k):
             n0, n1, n2 = cross(e0, e1, e2, w[part], w[part + 1], w[part + 2])
             P_b[r, 3], P_b[r, 4], P_b[r, 5] = c_k * n0, c_k * n1, c_k * n2
             V[r, part], V[r, part + 1], V[r, part + 2] = e0, e1, e2
+        elif kind == RIM_HEIGHT or kind == ROLL or kind == RIM:
+            rolling_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V)
+        elif kind == TURN_B:
+            y = model.row_y[k]
+            e0, e1, e2 = direction_of_a(model, work, k, b)
+            d0, d1, d2 = rotate(work.m_A[a], y[0], y[1], y[2])
+            n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
+            put_pair(P_b, P_a, r, 3, 1.0, n0, n1, n2)
         else:
             e0, e1, e2 = direction_of_a(model, work, k, a)
             if kind == GAUGE:
@@ -392,10 +348,10 @@ def spring_derivatives(model, work, c, c_k):
     d(s d)/dr_B = (k - s/l) d dᵀ + (s/l) 1 + (c/l) d (v - l_dot d)ᵀ,  d(s d)/dv_B = c d dᵀ.
     """
     P_a, P_b, V = work.P[model.c_a[c]], work.P[model.c_b[c]], work.V[c]
-    k, damping, free, _ = model.springs[model.c_spring[c]]
+    k, damping, free, _ = model.springs[model.c_item[c]]
     x0, x1, x2, y0, y1, y2, own_length = spring_line(model, work, c)
-    if model.spring_table[model.c_spring[c]] >= 0:
-        _, slope, _ = time_function(model, model.spring_table[model.c_spring[c]], own_length - free)
+    if model.spring_table[model.c_item[c]] >= 0:
+        _, slope, _ = time_function(model, model.spring_table[model.c_item[c]], own_length - free)
         k += slope
     tension, length, rate = spring_tension(model, work, c)
     x, y = (x0, x1, x2), (y0, y1, y2)
@@ -418,7 +374,7 @@ def spring_derivatives(model, work, c, c_k):
 def moving_direction(model, work, k, a):
     """Return E, E_dot less omega_A × E, and E_ddot less alpha and omega terms, of row k: nine numbers, ground axes."""
     e0, e1, e2 = direction_of_a(model, work, k, a)
-    if model.row_kind[k] != TURN:
+    if model.row_kind[k] != TURN and model.row_kind[k] != TURN_B:
         return e0, e1, e2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     angle, rate, second = prescribed(model, work, k)
     x, z, c, s = model.row_x[k], model.row_z[k], math.cos(angle), math.sin(angle)
@@ -449,7 +405,11 @@ def row_rate(model, work, k, a, b):
         f0, f1, f2 = cross(o[0], o[1], o[2], e0, e1, e2)
         turning = t0 * (o[0] - p[0]) + t1 * (o[1] - p[1]) + t2 * (o[2] - p[2])
         return f0 * r0 + f1 * r1 + f2 * r2 + e0 * v0 + e1 * v1 + e2 * v2 - model.row_c[k] * turning
-    if kind == DOT or kind == TURN or kind == SLIDE:
+    if kind == RIM_HEIGHT or kind == ROLL:
+        return rolling_rate(model, work, k, a, b)
+    if kind == TURN_B:
+        a, b, o, p = b, a, p, o
+    if kind == DOT or kind == TURN or kind == TURN_B or kind == SLIDE:
         e0, e1, e2, f0, f1, f2, _, _, _ = moving_direction(model, work, k, a)
         n0, n1, n2 = cross(o[0], o[1], o[2], e0, e1, e2)
         f0, f1, f2 = f0 + n0, f1 + n1, f2 + n2
@@ -481,7 +441,11 @@ def row_acceleration(model, work, k, a, b, bias_a, bias_b):
         square, slope = r0 * r0 + r1 * r1 + r2 * r2, r0 * v0 + r1 * v1 + r2 * v2
         own = (v0 * v0 + v1 * v1 + v2 * v2 + r0 * c0 + r1 * c1 + r2 * c2) / L - 2 * slope * rate / (L * L)
         return own + square * rate * rate / (L * L * L) - 0.5 * second * (square / (L * L) + 1.0)
-    if kind == DOT or kind == TURN or kind == SLIDE or kind == SCREW:
+    if kind == RIM_HEIGHT or kind == ROLL:
+        return rolling_acceleration(model, work, k, a, b, bias_a, bias_b)
+    if kind == TURN_B:
+        a, b, o, p, bias_a, bias_b = b, a, p, o, bias_b, bias_a
+    if kind == DOT or kind == TURN or kind == TURN_B or kind == SLIDE or kind == SCREW:
         e0, e1, e2, t0, t1, t2, s0, s1, s2 = moving_direction(model, work, k, a)
         if kind == SCREW:
             e0, e1, e2 = screw_axis(model, work, k, a)
@@ -521,6 +485,13 @@ def constraint_rates(model, work, rate, bias):
         marker_acceleration_bias(model, work, m, motion[m])
     for c in range(model.c_size.shape[0]):
         a, b = model.c_a[c], model.c_b[c]
+        if model.c_law[c] != JOINT:
+            for k in range(model.c_w0[c], model.c_w0[c + 1]):
+                rate[k], bias[k] = 0.0, 0.0
+        if model.c_law[c] == COUPLER:
+            coupler_rates(model, work, c, rate, bias)
+        if model.c_law[c] != JOINT:
+            continue
         for k in range(model.c_w0[c], model.c_w0[c + 1]):
             rate[k] = row_rate(model, work, k, a, b)
             bias[k] = row_acceleration(model, work, k, a, b, motion[a], motion[b])

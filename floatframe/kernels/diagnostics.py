@@ -2,13 +2,29 @@
 
 import math
 
-from floatframe.joints.rows import DISTANCE, DOT, POINT, PUSH, SCREW, SLIDE, TURN, TWIST
+from floatframe.joints.rows import (
+    DISTANCE,
+    DOT,
+    POINT,
+    PUSH,
+    RIM_HEIGHT,
+    ROLL,
+    SCREW,
+    SLIDE,
+    TURN,
+    TURN_B,
+    TWIST,
+    TWIST_B,
+)
 from floatframe.kernels.body import body_mass_product, modal_term
 from floatframe.kernels.compilation import inner
-from floatframe.kernels.connection import loaded_axis, loaded_coordinate, normal_force, row_rate, spring_tension
+from floatframe.kernels.connection import normal_force, row_rate, spring_tension
 from floatframe.kernels.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
+from floatframe.kernels.coupler import coupler_power
 from floatframe.kernels.marker import rotate, rotate_back
-from floatframe.kernels.model import DAMPING, N_DRIFTS, STIFFNESS
+from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, N_DRIFTS, SPRING, STIFFNESS
+from floatframe.kernels.pair_law import pair_energy, pair_power
+from floatframe.kernels.relative_motion import loaded_axis, loaded_coordinate
 from floatframe.kernels.rotation import cross
 from floatframe.kernels.time_function import time_function
 
@@ -67,21 +83,26 @@ def diagnose(model, work, out, drift):
     for c in range(model.c_size.shape[0]):
         for k in range(N_DRIFTS):
             drift[c, k] = 0.0
-        if model.c_spring[c] >= 0:
-            k, _, free, preload = model.springs[model.c_spring[c]]
+        if model.c_law[c] == SPRING:
+            k, _, free, preload = model.springs[model.c_item[c]]
             _, length, _ = spring_tension(model, work, c)
             out[3] += 0.5 * k * (length - free) ** 2 + preload * length
+        elif model.c_law[c] == BUSHING or model.c_law[c] == CONTACT:
+            out[3] += pair_energy(model, work, c)
+        if model.c_law[c] != JOINT:
             continue
         a, b = model.c_a[c], model.c_b[c]
         for k in range(model.c_w0[c], model.c_w0[c + 1]):
             kind = model.row_kind[k]
-            if kind in (POINT, SLIDE, DISTANCE, SCREW):
+            if kind in (POINT, SLIDE, DISTANCE, SCREW, RIM_HEIGHT):
                 drift[c, 0] += work.g[k] ** 2
                 drift[c, 2] += row_rate(model, work, k, a, b) ** 2
-            elif kind == PUSH or kind == TWIST:
+            elif kind in (PUSH, TWIST, TWIST_B):
                 x, _ = loaded_coordinate(model, work, k, a, b)
-                out[3] += coordinate_strain(model, k, kind == TWIST, x)
-            elif kind in (DOT, TURN):
+                out[3] += coordinate_strain(model, k, kind != PUSH, x)
+            elif kind == ROLL:
+                drift[c, 2] += work.g[k] ** 2
+            elif kind in (DOT, TURN, TURN_B):
                 drift[c, 1] += work.g[k] ** 2
                 drift[c, 3] += row_rate(model, work, k, a, b) ** 2
         for k in range(N_DRIFTS):
@@ -113,10 +134,10 @@ def loaded_power(model, work, c):
     w0, a, b = model.c_w0[c], model.c_a[c], model.c_b[c]
     w = work.w[w0 : model.c_w0[c + 1]]
     for k in range(w0, model.c_w0[c + 1]):
-        if model.row_kind[k] == PUSH or model.row_kind[k] == TWIST:
-            is_angle = model.row_kind[k] == TWIST
+        if model.row_kind[k] in (PUSH, TWIST, TWIST_B):
+            is_angle = model.row_kind[k] != PUSH
             x, v = loaded_coordinate(model, work, k, a, b)
-            e0, e1, e2 = loaded_axis(model, work, k, a)
+            e0, e1, e2 = loaded_axis(model, work, k, a, b)
             normal, _ = normal_force(w, e0, e1, e2)
             Q, _, _, _ = coordinate_force(model, work, k, is_angle, x, v, normal)
             given, taken = coordinate_power(model, work, k, is_angle, x, v, Q)
@@ -148,20 +169,27 @@ def power(model, work):
         for a in range(3):
             loads += work.m_wrench[m, a] * work.m_v[m, a] + work.m_wrench[m, 3 + a] * work.m_omega[m, a]
     for c in range(model.c_size.shape[0]):
-        if model.c_spring[c] < 0:
+        law = model.c_law[c]
+        if law == JOINT:
             driven = drive_power(model, work, c)
             loads += driven
             if model.c_rates[c]:
                 given, taken, total = loaded_power(model, work, c)
                 loads += given - (total if driven != 0.0 else 0.0)
                 dissipated += taken
-        else:
-            _, damping, _, _ = model.springs[model.c_spring[c]]
+        elif law == BUSHING or law == CONTACT:
+            given, taken = pair_power(model, work, c)
+            loads += given
+            dissipated += taken
+        elif law == COUPLER:
+            loads += coupler_power(model, work, c)
+        elif law == SPRING:
+            _, damping, _, _ = model.springs[model.c_item[c]]
             _, length, rate = spring_tension(model, work, c)
             dissipated += damping * rate * rate
-            if model.spring_table[model.c_spring[c]] >= 0:
+            if model.spring_table[model.c_item[c]] >= 0:
                 value, _, _ = time_function(
-                    model, model.spring_table[model.c_spring[c]], length - model.springs[model.c_spring[c], 2]
+                    model, model.spring_table[model.c_item[c]], length - model.springs[model.c_item[c], 2]
                 )
                 loads -= value * rate
     for d in range(model.d_body.shape[0]):

@@ -8,6 +8,7 @@ from floatframe.kernels.evaluation import evaluate
 from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
 from floatframe.kernels.schur import correction, factorize_bodies
+from floatframe.kernels.step_start import begin_step
 
 __all__ = ["DIVERGED", "DONE", "SINGULAR_BODY", "SINGULAR_CONNECTION", "advance", "write_row"]
 
@@ -72,6 +73,7 @@ def turn_body(work, memory, i, step):
 @inner
 def predict(model, work, memory, h, alpha_f):
     """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
+    begin_step(model, work, memory, h)
     size, size_x = 0.0, 0.0
     step = work.scratch[:9].reshape((3, 3))
     for i in range(model.kind.shape[0]):

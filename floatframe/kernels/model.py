@@ -13,20 +13,25 @@ import numpy as np
 from cms.arrays import Array, IntArray
 
 __all__ = [
+    "BUSHING",
     "C1",
     "C2",
     "C3",
     "C4",
+    "CONTACT",
+    "COUPLER",
     "DAMPING",
+    "JOINT",
     "K_ROTATION",
     "K_TRANSLATION",
     "MASS",
     "N_BLOCKS",
     "N_DIAGNOSTICS",
     "N_DRIFTS",
-    "N_W",
+    "SPRING",
     "STIFFNESS",
     "S_AB",
+    "USER_FORCE",
     "Memory",
     "Model",
     "Rows",
@@ -35,9 +40,9 @@ __all__ = [
     "new_work",
 ]
 
+JOINT, SPRING, BUSHING, CONTACT, COUPLER, USER_FORCE = range(6)  #: values of `Model.c_law`
 C1, C2, C3, S_AB, C4, MASS, STIFFNESS, DAMPING, K_TRANSLATION, K_ROTATION = range(10)  #: columns of `Model.block0`
 N_BLOCKS = 10
-N_W = 9  #: most components of the wrench of a connection
 N_DIAGNOSTICS = 12  #: kinetic, strain, gravity, springs, linear momentum (3), angular about the origin (3), work (2)
 N_DRIFTS = 4  #: of a joint: distance, angle, their rates
 
@@ -72,17 +77,19 @@ class Model(NamedTuple):
     bend: Array
     m_connection: IntArray  #: connection of which it is an end, -1 for none, (n_m,)
     m_sign: Array  #: +1 at end A, -1 at end B: sign of the wrench, (n_m,)
+    m_force: IntArray  #: where the force on it begins in the wrench of its connection, -1 for none, (n_m,)
     m_moment: IntArray  #: where the moment on it begins in the wrench of its connection, -1 for none, (n_m,)
     m_follower: IntArray  #: whether its wrench turns with it, (n_m,)
     m_x0: IntArray  #: Σ (6 + n_q) over the ends before it, (n_m,)
     end0: IntArray  #: ends of body i are ends[end0[i]:end0[i + 1]], (n_b + 1,)
     ends: IntArray
     # connections
-    c_size: IntArray  #: number of wrench components = rows, up to N_W, (n_c,)
+    c_size: IntArray  #: number of wrench components = rows, (n_c,)
     c_w0: IntArray  #: first of them, (n_c + 1,)
     c_a: IntArray  #: marker A, (n_c,)
     c_b: IntArray  #: marker B, (n_c,)
-    c_spring: IntArray  #: row of `springs`, -1 for a joint, (n_c,)
+    c_law: IntArray  #: JOINT, SPRING, BUSHING, CONTACT, COUPLER or USER_FORCE, (n_c,)
+    c_item: IntArray  #: number among the connections of its law, (n_c,)
     row_kind: IntArray  #: see joints/rows.py, (n_w,)
     row_x: Array  #: (n_w, 3)
     row_y: Array  #: (n_w, 3)
@@ -102,6 +109,18 @@ class Model(NamedTuple):
     c_rates: IntArray  #: whether its rows depend on velocities, (n_c,)
     spring_table: IntArray  #: tension as a function of the elongation, -1 for none, (n_springs,)
     springs: Array  #: stiffness, damping, free length, preload, (n_springs, 4)
+    bushings: Array  #: stiffness, damping (36 each), preload (6), (n_bushings, 78)
+    bushing_table: IntArray  #: force as a function of each deformation, -1 for none, (n_bushings, 6)
+    contacts: Array  #: columns as in kernels/contact.py, (n_contacts, 9)
+    # coordinates of couplers and user forces, and the forces along them, see kernels/port.py
+    port0: IntArray  #: first port of each coupler, then of each user force, and the end, (n_networks + 1,)
+    p_a: IntArray  #: marker A, (n_p,)
+    p_b: IntArray  #: marker B, (n_p,)
+    p_row: IntArray  #: row of its value, of the kind PUSH, TWIST or SPAN; that of its rate follows, (n_p,)
+    p_force: IntArray  #: first of its three rows of force or torque, -1 for none, (n_p,)
+    p_arm: IntArray  #: first of its three rows of moment on A, -1 for none, (n_p,)
+    p_factor: Array  #: coefficient in a coupler, (n_p,)
+    core: IntArray  #: row of the multiplier of each coupler, of the first force of each user force, (n_networks,)
     # loads
     l_marker: IntArray  #: (n_l,)
     l_factor: IntArray  #: function of time by which it is multiplied, -1 for one, (n_l,)
@@ -137,6 +156,7 @@ class Work(NamedTuple):
     u_dot: Array  #: accelerations, (n_u,)
     theta: Array  #: rotation since the beginning of the step, (n_b, 3)
     w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+    w_start: Array  #: the same at the beginning of the step, (n_w,)
     time: Array  #: of the iterate, (1,)
     # bodies
     a_B: Array  # noqa: N815  #: acceleration of the frame origin minus gravity, body axes, (n_b, 3)
@@ -166,8 +186,9 @@ class Work(NamedTuple):
     m_bias: Array  #: acceleration and angular acceleration at zero u_dot, ground axes, (n_m, 6)
     # connections
     g: Array  #: residual of the rows, scaled, (n_w,)
-    P: Array  #: derivative of the rows by marker motion (r, phi, v, omega), ground axes, (n_m, N_W, 12)
-    V: Array  #: derivative of the rows by their own wrench, (n_c, N_W, N_W)
+    P: Array  #: derivative of the rows by marker motion (r, phi, v, omega), ground axes, (n_m, most rows, 12)
+    V: Array  #: derivative of the rows by their own wrench, (n_c, most rows, most rows)
+    pair: Array  #: what a bushing or contact makes of the motion of its markers, see kernels/pair_law.py, (128,)
     # linear algebra
     H: Array  #: tangent of each body, then its LU factors, flat
     pivot: IntArray  #: (n_u,)
@@ -193,6 +214,7 @@ def new_work(model: Model) -> Work:
     on_body = is_end & (model.m_body >= 0)
     n_x = int(sum(6 + model.n_q[model.m_body[m]] for m in np.flatnonzero(on_body)))
     n_largest = int(max(model.n_q, default=0))
+    most = int(max(model.c_size, default=0))
 
     def zeros(*shape: int) -> Array:
         return np.zeros(shape)
@@ -205,6 +227,7 @@ def new_work(model: Model) -> Work:
         u_dot=zeros(n_u),
         theta=zeros(n_b, 3),
         w=zeros(n_w),
+        w_start=zeros(n_w),
         time=zeros(1),
         a_B=zeros(n_b, 3),
         J=zeros(n_b, 3, 3),
@@ -231,8 +254,9 @@ def new_work(model: Model) -> Work:
         m_wrench=zeros(n_m, 6),
         m_bias=zeros(n_m, 6),
         g=zeros(n_w),
-        P=zeros(n_m, N_W, 12),
-        V=zeros(n_c, N_W, N_W),
+        P=zeros(n_m, most, 12),
+        V=zeros(n_c, most, most),
+        pair=zeros(128),
         H=zeros(int(model.h0[-1])),
         pivot=np.zeros(n_u, np.int64),
         J_row=zeros(12 * n_x),

@@ -74,7 +74,7 @@ def assemble(model, work, c_k):
                 for k in range(3):
                     turned[part + k] = P[r, part] * R[0, k] + P[r, part + 1] * R[1, k] + P[r, part + 2] * R[2, k]
             for part in range(0, 6, 3):
-                w_part = 0 if part == 0 else model.m_moment[b]
+                w_part = model.m_force[b] if part == 0 else model.m_moment[b]
                 if w_part < 0:
                     continue
                 x0, x1, x2 = 0.0, 0.0, 0.0
@@ -195,14 +195,13 @@ def correction(model, work, c_k, is_new):
             m = model.ends[e]
             c = model.m_connection[m]
             o, w0, sign = model.m_x0[m], model.c_w0[c], model.m_sign[m]
-            size = 6
-            for part in range(0, 6, 3):
-                w_part = w0
-                if part == 3:
-                    if model.m_moment[m] < 0:
-                        size = 3
-                        break
-                    w_part = w0 + model.m_moment[m]
+            size = 3 if model.m_moment[m] < 0 else 6
+            for part in range(0, size, 3):
+                w_part = model.m_force[m] if part == 0 else model.m_moment[m]
+                if w_part < 0:
+                    motion[0], motion[1], motion[2] = 0.0, 0.0, 0.0
+                    continue
+                w_part += w0
                 x0, x1, x2 = mu[w_part], mu[w_part + 1], mu[w_part + 2]
                 for k in range(3):
                     motion[part + k] = sign * (R[0, k] * x0 + R[1, k] * x1 + R[2, k] * x2)

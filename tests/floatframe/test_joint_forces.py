@@ -22,6 +22,7 @@ from floatframe import (
     RigidBody,
     SpringDamper,
     System,
+    UniversalJoint,
     integrate,
 )
 from floatframe.time_functions import harmonic, smooth_step, table
@@ -38,6 +39,7 @@ LOADED = {
     "prismatic": (PrismaticJoint, ["distance"]),
     "cylindrical": (CylindricalJoint, ["distance", "angle"]),
     "planar": (PlanarJoint, ["first", "angle"]),
+    "universal": (UniversalJoint, ["angle", "angle_b"]),
 }
 
 

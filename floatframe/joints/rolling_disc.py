@@ -1,0 +1,57 @@
+"""The rolling disc: a thin wheel on a plane, without slip."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.arrays import number
+from floatframe.errors import ModelError
+from floatframe.joints.axis_frame import checked_axes, normals_of
+from floatframe.joints.rows import MOMENT_B, RIM, RIM_HEIGHT, ROLL, Row, arm_rows
+from floatframe.markers import Place
+
+__all__ = ["RollingDisc"]
+
+
+@dataclass(frozen=True, eq=False)
+class RollingDisc:
+    """A thin disc about the point of marker B rolls without slip on a plane through the point of marker A.
+
+    One constraint of position, the contact, and two of velocity: the rim does not slide where it touches. It does
+    not lift off; watch the sign of the reaction. Held velocities do not drift, the path they lead along is found by
+    the integrator alone.
+    """
+
+    name: str
+    marker_a: Place
+    marker_b: Place
+    radius: float = 1.0  #: of the disc [m]
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal of the plane, axes of marker A
+    axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: of the disc, in the axes of marker B
+
+    size = 9  #: components of the unknown wrench
+    moment_b = MOMENT_B  #: where the moment on B begins in it
+    coordinates = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", number(f"joint {self.name!r}: radius", self.radius, above=0.0))
+        checked_axes(self)
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for marker axes A_a, A_b, (3, 3), and r_B - r_A = d, (3,), in ground axes, as placed."""
+        if abs(float((A_a @ self.axis) @ (A_b @ self.axis_b))) > 1 - 1e-6:
+            raise ModelError(
+                f"joint {self.name!r}: the disc lies flat on the plane as placed, so that no point of its rim is the "
+                "lowest; tilt it, or check axis and axis_b"
+            )
+
+        def row(kind: int, x: Array) -> Row:
+            return Row(kind, x, self.axis_b, c=self.radius, z=self.axis)
+
+        return (
+            *arm_rows(),
+            *(row(RIM, x) for x in np.eye(3)),
+            row(RIM_HEIGHT, self.axis),
+            *(row(ROLL, t) for t in normals_of(self.axis)),
+        )

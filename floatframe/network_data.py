@@ -1,0 +1,204 @@
+"""Couplers as flat arrays: ports on the markers of joints or of their own, and the rows of their multipliers."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cms.arrays import Array
+from cms.words import nearest
+from floatframe.body_types import integers
+from floatframe.connection_data import Connections, End
+from floatframe.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate
+from floatframe.couplers import CoordinateCoupler
+from floatframe.errors import ModelError
+from floatframe.force_data import Functions
+from floatframe.joints.axis_frame import axis_in_b, turning_frame
+from floatframe.joints.rows import (
+    COUPLE,
+    DISTANCE,
+    FORCE,
+    GAUGE_B,
+    NO_MOMENT,
+    PART,
+    PUSH,
+    SLIDE,
+    SPAN,
+    TURN,
+    TURN_B,
+    TWIST,
+    TWIST_B,
+    Row,
+)
+from floatframe.kernels.model import COUPLER
+from floatframe.marker_data import MarkerData, find_marker, joint_markers, marker_pose
+from floatframe.system import System
+
+__all__ = ["Networks", "Port", "add_networks", "find_port", "port_value"]
+
+
+@dataclass(frozen=True, eq=False)
+class Port:
+    """A coordinate found in the system: its markers and the directions it is made of."""
+
+    a: MarkerData
+    b: MarkerData
+    row: Row  #: of the kind PUSH, TWIST, TWIST_B or SPAN
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is an angle."""
+        return self.row.kind in (TWIST, TWIST_B)
+
+    @property
+    def has_arm(self) -> bool:
+        """Whether a force along it has a moment about the point of A that anything feels."""
+        return self.row.kind == PUSH and self.a.body >= 0
+
+
+@dataclass
+class Networks:
+    """Lists over ports and connections."""
+
+    names: tuple[str, ...] = ()
+    port0: list[int] = field(default_factory=lambda: [0])
+    p_a: list[int] = field(default_factory=list)
+    p_b: list[int] = field(default_factory=list)
+    p_row: list[int] = field(default_factory=list)
+    p_force: list[int] = field(default_factory=list)
+    p_arm: list[int] = field(default_factory=list)
+    p_factor: list[float] = field(default_factory=list)
+    core: list[int] = field(default_factory=list)
+
+    def arrays(self) -> dict[str, Any]:
+        """Return the arrays of the model."""
+        return {
+            "port0": integers(self.port0),
+            **{name: integers(getattr(self, name)) for name in ("p_a", "p_b", "p_row", "p_force", "p_arm", "core")},
+            "p_factor": np.array(self.p_factor, dtype=float),
+        }
+
+
+def add_networks(system: System, made: Connections, functions: Functions) -> Networks:
+    """Add the couplers of a system."""
+    networks = Networks(tuple(coupler.name for coupler in system.couplers))
+    for coupler in system.couplers:
+        add_coupler(system, made, networks, coupler)
+    return networks
+
+
+def add_coupler(system: System, made: Connections, networks: Networks, coupler: CoordinateCoupler) -> None:
+    """Add a coupler: the rows of its ports, then that of its multiplier."""
+    where = f"coupler {coupler.name!r}"
+    ports = [find_port(system, f"{where}: term {k + 1}", c, made) for k, (c, _) in enumerate(coupler.terms)]
+    factors = [factor for _, factor in coupler.terms]
+    as_placed = sum(f * port_value(port, made) for f, port in zip(factors, ports, strict=True))
+    scale = 1 / max(abs(factor) for factor in factors)
+    held = Row(COUPLE, np.array([scale, 0.0, 0.0]), c=as_placed, motion=coupler.constant)  # type: ignore[arg-type]
+    add_ports(made, networks, coupler.name, COUPLER, ports, factors, [True] * len(ports), [held])
+
+
+def add_ports(
+    made: Connections,
+    networks: Networks,
+    name: str,
+    law: int,
+    ports: list[Port],
+    factors: list[float],
+    has_force: list[bool],
+    core: list[Row],
+) -> int:
+    """Add a connection with the rows of its ports, then those of its core; return the number of the first of these."""
+    rows: list[Row] = []
+    ends: list[End] = []
+    starts: list[tuple[int, int, int]] = []  # of each port, in the connection: value, force, arm
+    for port, acts in zip(ports, has_force, strict=True):
+        value = len(rows)
+        rows += [port.row, Row(PART)]
+        force = arm = NO_MOMENT
+        if acts:
+            force = len(rows)
+            rows += [Row(PART)] * 3
+            if port.has_arm:
+                arm = len(rows)
+                rows += [Row(PART)] * 3
+        starts.append((value, force, arm))
+        if port.is_angle:
+            ends += [End(port.a, 1.0, NO_MOMENT, force), End(port.b, -1.0, NO_MOMENT, force)]
+        else:
+            ends += [End(port.a, 1.0, force, arm), End(port.b, -1.0, force)]
+    marker, w0 = made.add(name, law, ends, [*rows, *core], has_rates=True)
+    for k, (value, force, arm) in enumerate(starts):
+        networks.p_a.append(marker + 2 * k)
+        networks.p_b.append(marker + 2 * k + 1)
+        networks.p_row.append(w0 + value)
+        networks.p_force.append(w0 + force if force >= 0 else -1)
+        networks.p_arm.append(w0 + arm if arm >= 0 else -1)
+        networks.p_factor.append(factors[k])
+    networks.port0.append(len(networks.p_a))
+    networks.core.append(w0 + len(rows))
+    return w0 + len(rows)
+
+
+def find_port(system: System, where: str, coordinate: Coordinate, made: Connections) -> Port:
+    """Return the port of a coordinate; `ModelError` with the nearest name if it is not there."""
+    if isinstance(coordinate, JointCoordinate):
+        return joint_port(system, where, coordinate, made)
+    a = find_marker(system, f"{where}: marker_a", coordinate.marker_a)
+    b = find_marker(system, f"{where}: marker_b", coordinate.marker_b)
+    if a.body == b.body:
+        raise ModelError(f"{where}: expected markers on two bodies, got both on one")
+    (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
+    if isinstance(coordinate, AxialDistance):
+        return Port(a, b, Row(PUSH, coordinate.axis))
+    if isinstance(coordinate, AxialAngle):
+        axis_b = axis_in_b(coordinate.axis, None, A_a, A_b)
+        x, z, y = turning_frame(coordinate.axis, axis_b, A_a, A_b)
+        return Port(a, b, Row(TWIST, x, y, z=z))
+    if np.linalg.norm(r_b - r_a) == 0:
+        raise ModelError(f"{where}: its markers coincide as placed, so that their line has no direction; move one")
+    return Port(a, b, Row(SPAN))
+
+
+def joint_port(system: System, where: str, wanted: JointCoordinate, made: Connections) -> Port:
+    """Return the port of a coordinate of a joint."""
+    names = [joint.name for joint in system.joints]
+    if wanted.joint not in names:
+        raise ModelError(f"{where}: no joint {wanted.joint!r}{nearest(wanted.joint, names)}")
+    joint = system.joints[names.index(wanted.joint)]
+    if wanted.coordinate not in joint.coordinates:
+        raise ModelError(
+            f"{where}: joint {joint.name!r} has no coordinate {wanted.coordinate!r}"
+            f"{nearest(wanted.coordinate, list(joint.coordinates))}"
+        )
+    a, b = joint_markers(system, joint, made.placed)
+    (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
+    row = next(row for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate == wanted.coordinate)
+    if row.kind == DISTANCE:
+        return Port(a, b, Row(SPAN))
+    if row.kind == GAUGE_B:
+        return Port(a, b, Row(TWIST_B, np.cross(row.z, row.y), row.x, z=row.z))
+    if row.kind == TURN_B:
+        return Port(a, b, Row(TWIST_B, row.x, row.y, z=row.z))
+    if row.kind == SLIDE or (row.kind != TURN and row.part == FORCE and not np.any(row.z)):
+        return Port(a, b, Row(PUSH, row.x))
+    x = row.x if row.kind == TURN else np.cross(row.z, row.x)
+    return Port(a, b, Row(TWIST, x, row.y, z=row.z))
+
+
+def port_value(port: Port, made: Connections) -> float:
+    """Return the value of a port as placed; angles between -pi and pi."""
+    (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (port.a, port.b))
+    row = port.row
+    if row.kind == SPAN:
+        return float(np.linalg.norm(r_b - r_a))
+    if row.kind == PUSH:
+        return float(A_a @ row.x @ (r_b - r_a))
+    if row.kind == TWIST_B:
+        return -turned(A_b, A_a, row.x, row.z, row.y)
+    return turned(A_a, A_b, row.x, row.z, row.y)
+
+
+def turned(A: Array, B: Array, x: Array, z: Array, y: Array) -> float:
+    """Return the angle of the direction y of B from z of A towards -x of A."""
+    return float(np.arctan2(-(A @ x) @ (B @ y), (A @ z) @ (B @ y)))
