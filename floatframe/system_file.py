@@ -113,7 +113,16 @@ def number_or_six(value: Any) -> Any:
     return rows.tolist()
 
 
+def not_negative_or_six(value: Any) -> Any:
+    """Return the same, a single number not below zero."""
+    result = number_or_six(value)
+    if isinstance(result, float) and result < 0:
+        raise ValueError("expected a number, 0 or more; for a bushing six numbers, or six rows of six numbers")
+    return result
+
+
 NumberOrSix = Annotated[float | list, BeforeValidator(number_or_six)]
+NotNegativeOrSix = Annotated[float | list, BeforeValidator(not_negative_or_six)]
 Parameters4 = Annotated[tuple[float, float, float, float], BeforeValidator(four_numbers)]
 
 
@@ -228,8 +237,8 @@ class ForceSection(Table):
     body_b: Name | None = Field(None, description='the name of a body, or "ground"')
     marker_a: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_a")
     marker_b: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_b")
-    stiffness: NumberOrSix | None = Field(None, description="a number, 0 or more, the stiffness of the spring")
-    damping: NumberOrSix | None = Field(None, description="a number, 0 or more, the constant of the damper")
+    stiffness: NotNegativeOrSix | None = Field(None, description="a number, 0 or more, the stiffness of the spring")
+    damping: NotNegativeOrSix | None = Field(None, description="a number, 0 or more, the constant of the damper")
     free_length: NotNegative | None = Field(None, description="a number, 0 or more, the free length")
     preload: NumberOrSix | None = Field(None, description="a number, the constant part of the tension or force")
     load_case: Name | None = Field(None, description="the name of a load case of the modal file")
@@ -278,8 +287,6 @@ class ForceSection(Table):
             if isinstance(value, list) != (self.type == "bushing") and value is not None:
                 expected = "six numbers, or six rows of six" if self.type == "bushing" else "a number"
                 raise ValueError(f"{key}: expected {expected} for a {self.type}, got {value}")
-            if isinstance(value, float) and value < 0 and key != "preload":
-                raise ValueError(f"{key}: expected a number, 0 or more, got {value:g}")
         if self.type == "point-force" and self.force is None and self.torque is None:
             raise ValueError("expected force or torque or both, got neither")
         return self

@@ -1,0 +1,182 @@
+"""Couplers, bushings, contacts and rolling discs from system files: the same as from Python, and refusals."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from floatframe import (
+    GROUND,
+    Bushing,
+    CoordinateCoupler,
+    FloatframeError,
+    Gravity,
+    JointCoordinate,
+    Marker,
+    PointDistance,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    RollingDisc,
+    SphereContact,
+    System,
+)
+from floatframe.system_file import read_system
+from floatframe.time_functions import harmonic, table
+
+MACHINE = """
+[system]
+units = "m-kg-s"
+gravity = [0, 0, -9.81]
+
+[bodies.wheel]
+mass = 2.0
+inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.2]]
+position = [0, 0, 1]
+
+[bodies.rack]
+mass = 1.0
+inertia = [[0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.2]]
+position = [1, 0, 1]
+
+[joints.hub]
+type = "revolute"
+body_a = "ground"
+body_b = "wheel"
+marker_b = [0, 0, 0]
+axis = [0, 0, 1]
+
+[joints.guide]
+type = "prismatic"
+body_a = "ground"
+body_b = "rack"
+marker_b = [0, 0, 0]
+axis = [1, 0, 0]
+
+[joints.tyre]
+type = "rolling-disc"
+body_a = "ground"
+body_b = "wheel"
+marker_a = [0, 0, 0]
+marker_b = [0, 0, 0]
+axis = [0, 0, 1]
+axis_b = [0, 1, 0]
+radius = 0.7
+
+[couplers.mesh]
+constant = {type = "harmonic", amplitude = 0.1, omega = 3.0}
+
+[[couplers.mesh.terms]]
+joint = "hub"
+coordinate = "angle"
+factor = -0.3
+
+[[couplers.mesh.terms]]
+joint = "guide"
+coordinate = "distance"
+factor = 1
+
+[[couplers.mesh.terms]]
+type = "point-distance"
+body_a = "wheel"
+marker_a = [0, 0.1, 0]
+body_b = "rack"
+factor = 0.2
+
+[forces.mount]
+type = "bushing"
+body_a = "ground"
+body_b = "rack"
+marker_b = [0, 0, 0.1]
+stiffness = [1, 2, 3, 4, 5, 6]
+damping = [[1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0], [0, 0, 0, 0, 1, 0],
+    [0, 0, 0, 0, 0, 1]]
+preload = [0, 0, 5, 0, 0, 0]
+
+[forces.mount.characteristics.x]
+type = "table"
+t = [-1, 0, 1, 2]
+values = [-3, 0, 1, 5]
+
+[forces.stop]
+type = "sphere-contact"
+body_a = "ground"
+marker_a = [5, 0, 0]
+axis = [-1, 0, 0]
+body_b = "rack"
+radius_b = 0.2
+modulus = 1e6
+restitution = 0.5
+dissipation = "flores"
+friction = 0.1
+
+[run]
+t_end = 0.05
+h = 1e-3
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(*changes):
+        text = MACHINE
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new, 1)
+        path = tmp_path / "machine.toml"
+        path.write_text(text)
+        return path
+
+    return written
+
+
+def test_file_becomes_the_system_it_describes(write):
+    system, _ = read_system(write())
+    wheel = RigidBody("wheel", 2.0, np.diag([0.1, 0.1, 0.2]), position=(0, 0, 1))
+    rack = RigidBody("rack", 1.0, np.diag([0.1, 0.1, 0.2]), position=(1, 0, 1))
+    x = np.array([-1.0, 0, 1, 2])
+    expected = System(
+        [wheel, rack],
+        [
+            RevoluteJoint("hub", GROUND, Marker("wheel", position=np.zeros(3)), axis=(0, 0, 1)),
+            PrismaticJoint("guide", GROUND, Marker("rack", position=np.zeros(3)), axis=(1, 0, 0)),
+            RollingDisc("tyre", Marker(GROUND, position=np.zeros(3)), Marker("wheel", position=np.zeros(3)), 0.7),
+            CoordinateCoupler(
+                "mesh",
+                [(JointCoordinate("hub", "angle"), -0.3), (JointCoordinate("guide", "distance"), 1.0),
+                 (PointDistance(Marker("wheel", position=(0, 0.1, 0)), Marker("rack")), 0.2)],
+                harmonic(0.1, 3.0),
+            ),
+        ],
+        [
+            Gravity((0, 0, -9.81)),
+            Bushing("mount", GROUND, Marker("rack", position=(0, 0, 0.1)), np.arange(1.0, 7.0), np.ones(6),
+                    (0, 0, 5, 0, 0, 0), {"x": table(x, np.array([-3.0, 0, 1, 5]))}),
+            SphereContact("stop", Marker(GROUND, position=(5, 0, 0)), Marker("rack"), 0.2, axis=(-1, 0, 0),
+                          modulus=1e6, restitution=0.5, dissipation="flores", friction=0.1),
+        ],
+    )  # fmt: skip
+    for name, found in system.compiled.model._asdict().items():
+        assert_array_equal(found, getattr(expected.compiled.model, name), err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('coordinate = "angle"', 'coordinate = "angel"'), "joint 'hub' has no coordinate 'angel'"),
+        (('joint = "hub"', 'joint = "hbu"'), "no joint 'hbu'; did you mean 'hub'"),
+        (('body_a = "wheel"\nmarker_a = [0, 0.1, 0]', 'body_a = "weel"'), 'body_a = "weel": there is no such body'),
+        (("factor = 1\n", "factor = 0\n"), "coefficient 2: expected a number other than zero"),
+        (('type = "point-distance"', 'type = "axial-angle"'), "axis: expected .x, y, z. in the axes of marker_a"),
+        (('type = "point-distance"', 'joint = "hub"'), "coordinate: missing; expected a coordinate of the joint"),
+        (("radius = 0.7\n", ""), "radius: missing; a rolling disc needs"),
+        (("stiffness = [1, 2, 3, 4, 5, 6]", "stiffness = 3.0"), "stiffness: expected six numbers, or six rows"),
+        (("stiffness = [1, 2, 3, 4, 5, 6]", "stiffness = [1, 2]"), "for a bushing six numbers, or six rows"),
+        (("radius_b = 0.2\n", ""), "radius_b: missing; expected a number above 0"),
+        (('"flores"', '"flroes"'), "dissipation.*did you mean 'flores'"),
+        (("restitution = 0.5", "restitution = 2"), "restitution: expected 0 < e <= 1, got 2"),
+        (("axis_b = [0, 1, 0]", "axis_b = [0, 0, 1]"), "the disc lies flat on the plane"),
+    ],
+)
+def test_mistakes_are_named(write, change, words):
+    with pytest.raises(FloatframeError, match=words):
+        read_system(write(change))
