@@ -76,4 +76,4 @@ class CoordinateSection(Table):
         b = marker_of(self.body_b, self.marker_b, self.triad_b)
         if self.type == "point-distance":
             return PointDistance(a, b)
-        return COORDINATES[self.type](a, b, np.array(self.axis))
+        return COORDINATES[str(self.type)](a, b, np.array(self.axis))

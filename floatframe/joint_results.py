@@ -8,8 +8,8 @@ from cms.arrays import Array
 from cms.words import nearest
 from floatframe.errors import ResultsError
 from floatframe.flexible_body import FlexibleBody
-from floatframe.joints import Joint
-from floatframe.joints.rows import DISTANCE, MOMENT_B, SLIDE, TURN
+from floatframe.joints import Joint, ScrewJoint
+from floatframe.joints.rows import DISTANCE, GAUGE_B, MOMENT, MOMENT_B, SLIDE, TURN, TURN_B, Row
 from floatframe.marker_data import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.sensors import PlaceMotion, interface_motion, point_motion
 from floatframe.system import System
@@ -67,6 +67,14 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
         length = np.linalg.norm(d, axis=1)
         along = d / length[:, None]
         return CoordinateMotion(a.t, length, (along * slip).sum(axis=1), -(w[:, :3] * along).sum(axis=1))
+    if isinstance(found, ScrewJoint):
+        return screw_motion(found, row, coordinate, a, b, w)
+    if row.kind in (GAUGE_B, TURN_B):  # about an axis of B: the angle of A about it, with the other sign
+        axis = row.y if row.kind == GAUGE_B else np.cross(row.x, row.z)
+        E, Z = b.axes @ axis, b.axes @ row.z
+        D = a.axes @ (row.x if row.kind == GAUGE_B else row.y)
+        angle = -np.unwrap(np.arctan2(dot(np.cross(E, Z), D), dot(Z, D)))
+        return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), -dot(w[:, MOMENT : MOMENT + 3], E))
     is_angle = row.kind == TURN or (row.kind != SLIDE and bool(np.any(row.z)))
     if not is_angle:
         E = a.axes @ row.x
@@ -77,6 +85,22 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     part = MOMENT_B if found.size == 9 else found.moment_b
     angle = np.unwrap(np.arctan2(dot(np.cross(E, Z), D), dot(Z, D)))
     return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), -dot(w[:, part : part + 3], E), is_angle=True)
+
+
+def screw_motion(
+    joint: ScrewJoint, row: Row, coordinate: str, a: PlaceMotion, b: PlaceMotion, w: Array
+) -> CoordinateMotion:
+    """Return angle or distance of a screw; torque T = -E · (N + slope F) of its drive, or the force T/slope."""
+    slope = joint.lead / (2 * np.pi)
+    E = a.axes @ joint.axis
+    torque = -dot(w[:, MOMENT_B : MOMENT_B + 3] + slope * w[:, :3], E)
+    if coordinate == "distance":
+        d = b.position - a.position
+        slip = b.velocity - a.velocity - np.cross(a.omega, d)
+        return CoordinateMotion(a.t, dot(E, d), dot(E, slip), torque / slope)
+    Z, D = a.axes @ row.z, b.axes @ row.y
+    angle = np.unwrap(np.arctan2(dot(np.cross(E, Z), D), dot(Z, D)))
+    return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), torque)
 
 
 def dot(x: Array, y: Array) -> Array:

@@ -22,6 +22,7 @@ from floatframe.joints.rows import (
     NO_MOMENT,
     PART,
     PUSH,
+    SCREW,
     SLIDE,
     SPAN,
     TURN,
@@ -176,6 +177,10 @@ def joint_port(system: System, where: str, wanted: JointCoordinate, made: Connec
     row = next(row for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate == wanted.coordinate)
     if row.kind == DISTANCE:
         return Port(a, b, Row(SPAN))
+    if row.kind == SCREW:
+        if wanted.coordinate == "distance":
+            return Port(a, b, Row(PUSH, np.cross(row.x, row.z)))
+        return Port(a, b, Row(TWIST, row.x, row.y, z=row.z))
     if row.kind == GAUGE_B:
         return Port(a, b, Row(TWIST_B, np.cross(row.z, row.y), row.x, z=row.z))
     if row.kind == TURN_B:

@@ -13,11 +13,12 @@ from floatframe.forces import Bushing, SphereContact
 from floatframe.forces.bushing import DEFORMATIONS
 from floatframe.joints.rows import MOMENT, MOMENT_B, PART, Row
 from floatframe.kernels.model import BUSHING, CONTACT
-from floatframe.marker_data import MarkerData, find_marker, marker_pose, marker_with_pose
+from floatframe.marker_data import MarkerData, find_marker, marker_pose, marker_with_pose, n_q_of
 from floatframe.markers import Marker, body_name
+from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["Pairs", "add_pair_laws"]
+__all__ = ["Pairs", "add_pair_laws", "bushing_markers"]
 
 
 @dataclass
@@ -44,7 +45,7 @@ def add_pair_laws(system: System, made: Connections, functions: Functions) -> Pa
     bushings = [force for force in system.forces if isinstance(force, Bushing)]
     contacts = [force for force in system.forces if isinstance(force, SphereContact)]
     for bushing in bushings:
-        a, b = bushing_markers(system, bushing, made)
+        a, b = bushing_markers(system, bushing, made.placed)
         made.add(bushing.name, BUSHING, ends_of(a, b), [Row(PART)] * 9, has_rates=True)
         pairs.bushings.append(np.concatenate([bushing.stiffness.ravel(), bushing.damping.ravel(), bushing.preload]))
         pairs.tables.append([functions.index(bushing.characteristics.get(name)) for name in DEFORMATIONS])
@@ -55,7 +56,7 @@ def add_pair_laws(system: System, made: Connections, functions: Functions) -> Pa
         require_two_bodies(where, a, b)
         made.add(contact.name, CONTACT, ends_of(a, b), [Row(PART, contact.axis)] * 10, has_rates=True)
         pairs.contacts.append(contact.coefficients)
-    pairs.names = tuple(force.name for force in (*bushings, *contacts))
+    pairs.names = (*(bushing.name for bushing in bushings), *(contact.name for contact in contacts))
     return pairs
 
 
@@ -70,7 +71,7 @@ def require_two_bodies(where: str, a: MarkerData, b: MarkerData) -> None:
         raise ModelError(f"{where}: expected markers on two bodies, got both on one")
 
 
-def bushing_markers(system: System, bushing: Bushing, made: Connections) -> tuple[MarkerData, MarkerData]:
+def bushing_markers(system: System, bushing: Bushing, placed: State) -> tuple[MarkerData, MarkerData]:
     """Return both markers; a body in place of one is met where, and as, the other is placed."""
     where = f"force {bushing.name!r}"
     given = (bushing.marker_a, bushing.marker_b)
@@ -84,8 +85,8 @@ def bushing_markers(system: System, bushing: Bushing, made: Connections) -> tupl
             if other is None:
                 raise ModelError(f"{where}: expected a Marker at one end at least, got two bodies; say where it is")
             name = body_name(given[k])  # type: ignore[arg-type]
-            pose = marker_pose(other, made.placed, made.n_q)
-            found[k] = marker_with_pose(system, f"{where}: marker_{'ab'[k]}", name, pose, made.placed)
+            pose = marker_pose(other, placed, n_q_of(system))
+            found[k] = marker_with_pose(system, f"{where}: marker_{'ab'[k]}", name, pose, placed)
     a, b = found
     assert a is not None  # filled above
     assert b is not None

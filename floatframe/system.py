@@ -37,7 +37,7 @@ class System:
     """
 
     bodies: Sequence[Body]
-    joints: Sequence[Joint | CoordinateCoupler] = ()  #: couplers among them are moved to `couplers`
+    joints: Sequence[Joint] = ()  #: couplers given among them are moved to `couplers`
     forces: Sequence[Force] = ()
     units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
     name: str = "system"
@@ -51,7 +51,7 @@ class System:
         for part in ("bodies", "joints", "forces", "couplers", "sensors"):
             object.__setattr__(self, part, tuple(getattr(self, part)))
         among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
-        object.__setattr__(self, "couplers", self.couplers + among)
+        object.__setattr__(self, "couplers", (*self.couplers, *among))
         object.__setattr__(self, "joints", tuple(joint for joint in self.joints if joint not in among))
         where = f"system {self.name!r}"
         if self.redundant not in REDUNDANT:

@@ -26,6 +26,7 @@ from cms.toml_file import Matrix3, Table, Vector3, choice, numbers, read_toml, v
 from cms.units import UNIT_SYSTEMS, Units, unit_system
 from cms.words import nearest
 from floatframe.changed_content import changed
+from floatframe.coordinate_section import CoordinateSection, marker_of
 from floatframe.couplers import CoordinateCoupler
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
 from floatframe.flexible_body import FlexibleBody
@@ -47,7 +48,6 @@ from floatframe.integrators import GeneralizedAlpha
 from floatframe.joints import JOINTS, Joint
 from floatframe.markers import Place
 from floatframe.motion_section import MotionSection
-from floatframe.coordinate_section import CoordinateSection, marker_of
 from floatframe.place_key import PlaceOnBody
 from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters_of_rotation_vector
@@ -340,7 +340,7 @@ class SystemFile(Table):
         terms = {f"{name}.terms": term for name, coupler in self.couplers.items() for term in coupler.terms}
         for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors),
                                ("couplers", terms)):  # fmt: skip
-            for name, section in sections.items():  # type: ignore[attr-defined]
+            for name, section in sections.items():
                 for key in ("body", "body_a", "body_b", "relative_to"):
                     body = getattr(section, key, None)
                     if body is not None and body not in choices:
@@ -519,13 +519,15 @@ def force_of(name: str, section: ForceSection) -> Force:
         )
     assert section.body_a is not None  # checked by the table
     assert section.body_b is not None
+    given = [each or 0.0 for each in (section.stiffness, section.damping, section.preload)]
+    stiffness, damping, preload = (each for each in given if isinstance(each, float))  # no lists: the table checks
     return SpringDamper(
         name,
         marker_of(section.body_a, section.marker_a),
         marker_of(section.body_b, section.marker_b),
-        section.stiffness or 0.0,
-        section.damping or 0.0,
+        stiffness,
+        damping,
         section.free_length,
-        section.preload or 0.0,
+        preload,
         functions["characteristic"],
     )

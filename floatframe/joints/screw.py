@@ -51,6 +51,7 @@ class ScrewJoint:
         slope = self.lead / (2 * np.pi)
         if len(self.motions) > 1:
             raise ModelError(f"joint {self.name!r}: motions: expected angle or distance, which follows it, got both")
+        other = "angle" if "distance" in self.motions else "distance"  # it follows the one of the last row
         if "distance" in self.motions:
             drive = Row(SLIDE, self.axis, motion=self.motions["distance"], coordinate="distance")
         elif "angle" in self.motions:
@@ -61,6 +62,6 @@ class ScrewJoint:
             *arm_rows(),
             *(Row(SLIDE, n) for n in normals_of(self.axis)),
             *(Row(DOT, self.axis, n, part=MOMENT_B) for n in normals_of(axis_b)),
-            Row(SCREW, x, y, c=slope, z=z),
+            Row(SCREW, x, y, c=slope, z=z, coordinate=other),
             drive,
         )

@@ -7,10 +7,12 @@ import numpy as np
 from cms.arrays import Array
 from cms.words import nearest
 from floatframe.errors import ModelError
+from floatframe.forces import Bushing
 from floatframe.joint_results import end_motion, joint_coordinate
 from floatframe.marker_data import find_marker, joint_markers
 from floatframe.measuring.measurement import Measurement, unit_words, vector_columns
 from floatframe.measuring.stresses import flexible_body
+from floatframe.pair_data import bushing_markers
 from floatframe.recovery import require_same_modes
 from floatframe.system import System
 from floatframe.trajectory import Energies, Trajectory
@@ -46,7 +48,10 @@ class ReactionSensor:
                 end = joint_markers(system, joint, system.compiled.placed)[0]
             else:
                 spring = next(each for each in system.forces if getattr(each, "name", "") == self.of)
-                end = find_marker(system, f"force {self.of!r}: marker_a", spring.marker_a)  # type: ignore[union-attr]
+                if isinstance(spring, Bushing):
+                    end = bushing_markers(system, spring, system.compiled.placed)[0]
+                else:
+                    end = find_marker(system, f"force {self.of!r}: marker_a", spring.marker_a)  # type: ignore[union-attr]
             A = end_motion(system, trajectory, end).axes
             vectors = {key: np.einsum("tba,tb->ta", A, values) for key, values in vectors.items()}
         columns: dict[str, Array] = {}

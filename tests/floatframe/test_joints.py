@@ -269,6 +269,36 @@ def test_a_rod_without_direction_is_refused():
         _ = System([body], [DistanceJoint("j", Marker(GROUND), Marker("b"))]).compiled
 
 
+def test_both_angles_of_a_universal_joint_are_what_its_drives_say():
+    system = pair(DRIVEN["universal twice"])
+    motion = integrate(system, GeneralizedAlpha(0.8, 1e-11), 0.3, 1e-3)
+    found = joint_coordinates(system, motion)
+    assert set(found) == {"j.angle", "j.angle_b"}
+    for coordinate in found.values():
+        assert_allclose(coordinate.value, [DRIVE(t) for t in motion.t], rtol=0, atol=1e-9)
+    energy = motion.energies
+    power = sum(each.force * each.rate for each in found.values())
+    work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(motion.t))])
+    assert_allclose(energy.work, work, rtol=0, atol=1e-3 * np.abs(work).max())
+
+
+def test_screw_driven_by_its_distance_takes_the_force_of_its_turning_inertia():
+    """m x'' + J (2 pi/lead)² x'' along the drive; angle and distance in their fixed ratio."""
+    lead, J, m = 0.7, 0.05, 2.0
+    nut = RigidBody("nut", m, np.diag([0.1, 0.1, J]))
+    x = polynomial_of_time([0.0, 0.0, 0.2, 0.3])
+    slope = lead / (2 * np.pi)
+    for name, motion in (("distance", x), ("angle", polynomial_of_time([0.0, 0.0, 0.2 / slope, 0.3 / slope]))):
+        screw = ScrewJoint("j", GROUND, Marker("nut"), axis=(0, 0, 1), lead=lead, motions={name: motion})
+        system = System([nut], [screw])
+        found = joint_coordinates(system, integrate(system, GeneralizedAlpha(0.9, 1e-12), 1.0, 1e-3))
+        along, about = found["j.distance"], found["j.angle"]
+        assert_allclose(along.value, [x(t) for t in along.t], rtol=0, atol=1e-9)
+        assert_allclose(about.value, along.value / slope, rtol=0, atol=1e-9)
+        assert_allclose(along.force, [(m + J / slope**2) * x(t, 2) for t in along.t], rtol=0, atol=1e-3)
+        assert_allclose(about.force, along.force * slope, rtol=1e-12, atol=0)
+
+
 def test_coordinates_of_driven_joints_are_their_motions_and_forces_those_of_newton():
     """Rate and value as prescribed; torque I f'', force m f''; flexible bodies too."""
     system = pair(DRIVEN["cylindrical"])
