@@ -18,11 +18,22 @@ from floatframe.integrators.generalized_alpha import Carry, GeneralizedAlpha
 from floatframe.kernels.model import Rows, new_work
 from floatframe.recorded_system import file_digest
 from floatframe.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
-from floatframe.results import SEGMENTS, BodyEntry, Head, MemorySource, ResultsWriter, arrays_of, last_restart
+from floatframe.results import (
+    SEGMENTS,
+    BodyEntry,
+    Head,
+    MemorySource,
+    ResultsWriter,
+    arrays_of,
+    last_restart,
+    validity_text,
+)
 from floatframe.state import State
 from floatframe.step_advice import step_advice
 from floatframe.system import System
 from floatframe.trajectory import Trajectory, read_results
+from floatframe.validity import ValidityNote, notes_from_json, notes_to_json
+from floatframe.validity_watch import ValidityWatch
 
 __all__ = ["Progress", "integrate", "resume"]
 
@@ -41,6 +52,7 @@ class Progress:
     n_steps: int  #: done
     n_total: int
     n_iterations: int  #: of Newton's method, so far
+    notes: tuple[ValidityNote, ...] = ()  #: bodies that left the range of their linear frame, so far
 
 
 def integrate(
@@ -161,7 +173,8 @@ def resume(
     writer = ResultsWriter(path.with_name(path.name.removesuffix(SEGMENTS)), head, goes_on=True)
     n_total = round((run["t_end"] - run["t_start"]) / run["h"])
     again = Run(
-        system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer
+        system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer,
+        notes_from_json(validity_text(writer.path)),
     )  # fmt: skip
     return again.advance(carry, n_done, BATCH_STEPS, progress)
 
@@ -179,13 +192,20 @@ class Run:
     n_total: int
     output_every: int
     writer: ResultsWriter | None
+    notes: tuple[ValidityNote, ...] = ()  #: of the part that is done
     kept: list[Rows] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        self.watch = ValidityWatch(self.system, self.notes)
+
     def keep(self, rows: Rows) -> None:
-        """Take rows of results."""
+        """Take rows of results; tell when a body leaves the range of its linear frame."""
+        for note in self.watch.observe(rows):
+            log.warning("%s", note.words)
         if self.writer is None:
             self.kept.append(rows)
         else:
+            self.writer.validity = notes_to_json(self.watch.notes)
             self.writer.append(rows)
 
     def advance(
@@ -212,29 +232,38 @@ class Run:
                 self.keep(rows)
                 if progress is not None:
                     t = self.t_start + n_done * self.h
-                    progress(Progress(t, self.t_end, n_done, self.n_total, carry.n_iterations))
+                    progress(Progress(t, self.t_end, n_done, self.n_total, carry.n_iterations, self.watch.notes))
         except BaseException:
             if self.writer is not None:
                 self.writer.close_segment(restart_record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
             raise
         if failure is not None:
             raise stopped(
-                self.system, self.head, self.kept, self.writer, failure, self.t_start + n_done * self.h, self.h
+                self.system,
+                self.head,
+                self.kept,
+                self.writer,
+                failure,
+                self.t_start + n_done * self.h,
+                self.h,
+                self.watch.notes,
             )
         if self.writer is None:
-            return Trajectory(self.head, MemorySource(joint_rows(self.system, self.kept)), is_complete=True)
+            arrays = MemorySource(joint_rows(self.system, self.kept))
+            return Trajectory(self.head, arrays, is_complete=True, validity=self.watch.notes)
         self.writer.finish()
         return read_results(self.writer.path)
 
 
-def stopped(system, head, kept, writer, failure, t: float, h: float) -> ConvergenceError:
+def stopped(system, head, kept, writer, failure, t: float, h: float, notes) -> ConvergenceError:
     """Return the error of a failed step, with the motion so far."""
     words = f"system {system.name!r}: the step of {h:g} from t = {t:.9g} failed: {failure.words}"
     advice = step_advice(system, h)
     if advice is not None:
         words += f"; {advice.words}"
+    words += "".join(f"; {note.words}" for note in notes)
     if writer is None:
-        trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False)
+        trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False, validity=notes)
     else:
         writer.close_segment()
         trajectory = read_results(writer.folder)

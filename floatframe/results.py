@@ -29,12 +29,14 @@ __all__ = [
     "ResultsWriter",
     "last_restart",
     "open_results",
+    "validity_text",
 ]
 
 FORMAT = "floatframe-results"
 VERSION = 1  #: of the format; a reader refuses greater ones
 SEGMENTS = ".segments"  #: added to the name of the results file
 UNFINISHED = ".unfinished"  #: added to the name of a file being written
+VALIDITY = "validity"  #: attribute with the notes on the range of the linear frames
 RESTART = "restart"  #: group in a segment with the memory of the integrator at its end
 
 DATASETS = {  # name in the file -> field of Rows, what it is
@@ -130,6 +132,7 @@ class ResultsWriter:
         self.folder = self.path.with_name(self.path.name + SEGMENTS)
         self.n_segments = 0
         self.open_rows: list[Rows] = []
+        self.validity = "[]"  #: notes on the range of the linear frames, see floatframe/validity.py
         if self.path.is_dir():
             raise ResultsError(f"results file {str(self.path)!r}: expected a file name, got a folder")
         if not self.path.parent.is_dir():
@@ -187,6 +190,7 @@ class ResultsWriter:
 
         def fill(file: h5py.File) -> None:
             file.attrs["format"], file.attrs["version"] = FORMAT, VERSION
+            file.attrs[VALIDITY] = self.validity
             for name, array in arrays.items():
                 file.create_dataset(name, data=array)
             for name, array in (restart or {}).items():
@@ -203,6 +207,7 @@ class ResultsWriter:
 
         def fill(file: h5py.File) -> None:
             write_head(file, self.head, is_complete=True)
+            file.attrs[VALIDITY] = self.validity
             copy_segments(file, source)
 
         self.guarded(lambda: self.write_file(self.path, fill))
@@ -341,3 +346,12 @@ def open_results(path: str | os.PathLike[str]) -> tuple[Head, FileSource, bool]:
         words = f"{path}: expected a results file of floatframe; it is damaged or of another kind: {error}"
         raise ResultsError(words) from error
     return head, FileSource((path,), shapes), is_complete
+
+
+def validity_text(path: Path) -> str:
+    """Return the notes on the range of the linear frames in a results file, or in its last segment, as text."""
+    paths = [path] if path.is_file() else segment_paths(path if path.is_dir() else path.with_name(path.name + SEGMENTS))
+    if not paths:
+        return "[]"
+    with h5py.File(paths[-1], "r") as file:
+        return str(file.attrs.get(VALIDITY, "[]"))

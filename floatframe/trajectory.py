@@ -11,8 +11,9 @@ from cms.arrays import Array
 from cms.units import Units, unit_system
 from cms.words import nearest
 from floatframe.errors import ResultsError
-from floatframe.results import ArraySource, BodyEntry, Head, open_results
+from floatframe.results import ArraySource, BodyEntry, Head, open_results, validity_text
 from floatframe.state import State
+from floatframe.validity import ValidityNote, notes_from_json
 
 __all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_results"]
 
@@ -81,6 +82,7 @@ class Trajectory:
     source: ArraySource
     is_complete: bool  #: False for a run that was interrupted
     path: Path | None = None  #: results file, or None for a motion in memory
+    validity: tuple[ValidityNote, ...] = ()  #: bodies that left the range of their linear frame
 
     @cached_property
     def t(self) -> Array:
@@ -173,4 +175,4 @@ def read_results(path: str | os.PathLike[str]) -> Trajectory:
         If there is nothing, or the file is of another kind, a newer version or damaged.
     """
     head, source, is_complete = open_results(path)
-    return Trajectory(head, source, is_complete, Path(path))
+    return Trajectory(head, source, is_complete, Path(path), notes_from_json(validity_text(Path(path))))

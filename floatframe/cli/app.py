@@ -123,7 +123,7 @@ def print_run(trajectory: "Trajectory", progress: Any, seconds: float | None) ->
     rows = [
         ("system", record["system"]),
         ("units", units.name),
-        ("bodies", ", ".join(f"{b['name']} ({b['n_modes']} modes)" for b in record["bodies"])),
+        ("bodies", ", ".join(body_words(body) for body in record["bodies"])),
         ("integrator", integrator_words(run)),
         ("step", f"{run['h']:.6g} {second}"),
         ("time", f"{record['t_first']:.6g} to {record['t_last']:.6g} {second}, {record['n_outputs']} outputs"),
@@ -143,6 +143,15 @@ def print_run(trajectory: "Trajectory", progress: Any, seconds: float | None) ->
         ("", "start>", "end>"),
         [(name, *(f"{v:.6g}" for v in pair)) for name, pair in record["energy"].items() if pair and any(pair)],
     )
+    if trajectory.validity:
+        print_table(
+            "Bodies that left the range of their linear frame",
+            ("body", "what", "limit>", "largest>", f"from [{second}]>", "what to do"),
+            [
+                (note.body, note.kind, f"{note.limit:g}", f"{note.largest:.3g}", f"{note.t_first:.6g}", note.action)
+                for note in trajectory.validity
+            ],
+        )
     if record["drift"]:
         print_table(
             "Joints: largest drift",
@@ -172,6 +181,12 @@ def known_system(trajectory: "Trajectory") -> "System | None":
     except (FloatframeError, CmsError) as error:
         typer.echo(f"note: sensors are left out: {error}", err=True)
         return None
+
+
+def body_words(body: dict[str, Any]) -> str:
+    """Return name, number of modes and whether it is stiffened."""
+    stiffened = ", stiffened" if body["is_stiffened"] else ""
+    return f"{body['name']} ({body['n_modes']} modes{stiffened})"
 
 
 def integrator_words(run: dict[str, Any]) -> str:
@@ -221,6 +236,7 @@ def info_command(
 
 def print_mobility(path: Path, *, as_json: bool) -> None:
     """Print the mobility of a system file: counted, true, and constraints that repeat others."""
+    from floatframe.flexible_body import FlexibleBody
     from floatframe.initial import mobility
     from floatframe.system_file import read_system
 
@@ -235,6 +251,11 @@ def print_mobility(path: Path, *, as_json: bool) -> None:
         "mobility": found.mobility,
         "redundant": found.n_redundant,
         "redundant_by_joint": dict(found.redundant),
+        "stiffening": {
+            body.name: "yes" if body.is_stiffened else "switched off" if body.reduced.geometric else "not in the file"
+            for body in system.bodies
+            if isinstance(body, FlexibleBody)
+        },
     }
     if as_json:
         import json as json_module
@@ -242,6 +263,7 @@ def print_mobility(path: Path, *, as_json: bool) -> None:
         typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))
         return
     told = ", ".join(f"{count} of {name}" for name, count in found.redundant.items()) or "none"
+    stiffened = ", ".join(f"{name}: {words}" for name, words in record["stiffening"].items()) or "no flexible body"
     print_table(
         "System",
         ("", ""),
@@ -251,6 +273,7 @@ def print_mobility(path: Path, *, as_json: bool) -> None:
             ("constraints", str(found.n_constraints)),
             ("mobility", f"{found.mobility} (count of Gruebler {found.gruebler}), bodies taken as rigid"),
             ("constraints that repeat others", told),
+            ("geometric stiffening", stiffened),
         ],
     )
 

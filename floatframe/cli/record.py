@@ -1,5 +1,6 @@
 """How good a computed motion is, as one record: `floatframe run` and `floatframe info` print it."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -32,9 +33,16 @@ def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str
         "t_last": float(trajectory.t[-1]) if n_t else None,
         "n_steps": round((float(trajectory.t[-1]) - run["t_start"]) / run["h"]) if n_t else 0,
         "bodies": [
-            {"name": body.name, "n_modes": body.n_q, "source": body.source, "digest": body.digest}
+            {
+                "name": body.name,
+                "n_modes": body.n_q,
+                "source": body.source,
+                "digest": body.digest,
+                "is_stiffened": body.is_stiffened,
+            }
             for body in trajectory.head.bodies
         ],
+        "validity": [asdict(note) | {"words": note.words} for note in trajectory.validity],
         "energy": {
             name: [float(values[0]), float(values[-1])] if n_t else None
             for name, values in {

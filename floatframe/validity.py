@@ -1,0 +1,77 @@
+"""The range of a linear body frame: what is compared with which limit, and what to do beyond it."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+__all__ = ["LINEAR", "STIFFENED", "Limits", "ValidityNote", "notes_from_json", "notes_to_json"]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Largest values for which the motion of a body can be trusted within about one per cent of its deformation."""
+
+    rotation: float  #: elastic rotation of an interface in the body frame [rad]
+    load: float  #: relative change of the stiffness by the loads; of a stiffened body: loads by the first buckling load
+    speed: float  #: angular speed by the lowest angular frequency of the body
+
+
+#: a linear frame: its strain is wrong by the square of the rotation, its stiffness by what the loads change of it
+LINEAR = Limits(rotation=0.1, load=0.1, speed=0.2)
+#: with the terms of second order what is left goes with the third power of the rotation; near buckling a body bends far
+STIFFENED = Limits(rotation=0.3, load=0.7, speed=12.0)
+
+KINDS = ("rotation", "load", "speed")
+
+
+@dataclass(frozen=True)
+class ValidityNote:
+    """A body has left the range of its linear frame; one per body and kind."""
+
+    body: str
+    kind: str  #: "rotation", "load" or "speed", the field of `Limits`
+    limit: float
+    largest: float  #: so far; rotation in rad, else a ratio
+    t_first: float  #: when the limit was passed [s]
+    t_largest: float  #: [s]
+    is_stiffened: bool
+    has_matrices: bool  #: whether the reduced body holds geometric stiffness
+
+    @property
+    def what(self) -> str:
+        """Say what is too large."""
+        if self.kind == "rotation":
+            return f"an interface turns by {self.largest:.3g} rad against the body frame (limit {self.limit:g})"
+        if self.kind == "speed":
+            return f"it turns with {self.largest:.3g} of its lowest frequency (limit {self.limit:g})"
+        if self.is_stiffened:
+            return f"its loads reach {self.largest:.3g} of those that buckle it (limit {self.limit:g})"
+        return f"its loads change its stiffness by {100 * self.largest:.3g} % (limit {100 * self.limit:g} %)"
+
+    @property
+    def action(self) -> str:
+        """Say what to do."""
+        if self.is_stiffened:
+            more = "reduce it with more modes, or " if self.kind == "speed" else ""
+            return f"{more}split it into parts (cms split, [body] part)"
+        if self.has_matrices:
+            return "switch its stiffening on"
+        return "reduce it with geometric stiffness, or split it into parts (cms split)"
+
+    @property
+    def words(self) -> str:
+        """Say it in one sentence, in the units of the system."""
+        return (
+            f"body {self.body!r} left the range of its {'stiffened' if self.is_stiffened else 'linear'} frame at t = "
+            f"{self.t_first:.6g}: {self.what}; {self.action}"
+        )
+
+
+def notes_to_json(notes: Iterable[ValidityNote]) -> str:
+    """Return notes as text."""
+    return json.dumps([asdict(note) for note in notes])
+
+
+def notes_from_json(text: str) -> tuple[ValidityNote, ...]:
+    """Return the notes of a text."""
+    return tuple(ValidityNote(**note) for note in json.loads(text))
