@@ -25,6 +25,8 @@ from cms.unit_loads import balanced, unit_loads
 
 __all__ = ["has_geometric_stiffness", "reduced_geometric_stiffness"]
 
+LOADS_AT_ONCE = 60  #: of many interfaces; their static states are as tall as the body
+
 
 def has_geometric_stiffness(body: FEBody) -> bool:
     """Return whether the elements behind the body know their geometric stiffness."""
@@ -57,11 +59,11 @@ def reduced_geometric_stiffness(
         with Families(body) as own:
             return reduced_geometric_stiffness(body, Phi, condition, families=own)
     loads = balanced(body, unit_loads(body, condition.frame), condition)  # (1)
-    wanted = np.flatnonzero(~loads.is_zero)
     K = np.zeros((loads.mass.k, Phi.shape[1], Phi.shape[1]))
-    mass = MassLoads(loads.mass.A[wanted], loads.mass.b[wanted])
-    u = static_states(families, loads.F[:, wanted])  # (2)
-    K[wanted] = elastic_part(body, u, mass, Phi)
+    for wanted in blocks(np.flatnonzero(~loads.is_zero)):
+        u = static_states(families, loads.F[:, wanted])  # (2)
+        mass = MassLoads(loads.mass.A[wanted], loads.mass.b[wanted])
+        K[wanted] = elastic_part(body, u, mass, Phi)
     K -= mean_part(body, loads.on_dofs, Phi, condition.frame.axes)
     return GeometricStiffness(
         translation=K[:3],
@@ -115,6 +117,11 @@ def embedded(v: Array, rows: IntArray, n: int) -> Array:
     whole = np.zeros((n, v.shape[1]))
     whole[rows] = v
     return whole
+
+
+def blocks(loads: IntArray) -> list[IntArray]:
+    """Return the loads in blocks, whose states are held at once."""
+    return [loads[first : first + LOADS_AT_ONCE] for first in range(0, len(loads), LOADS_AT_ONCE)]
 
 
 def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:

@@ -141,6 +141,30 @@ def test_a_right_angled_cantilever_tips_over_at_the_load_of_prandtl():
     assert_allclose(critical(reduced.K, K_geo), 4.0126 * np.sqrt(EI * GJ) / L**2, rtol=5e-3)
 
 
+@pytest.mark.parametrize("make", [bar_without_lateral_strain, bar_of_beams], ids=["solid", "beams"])
+def test_a_bent_cantilever_becomes_shorter(make):
+    """A tip load bends it by w; its tip comes nearer by ∫ ½ w'² = 3/5 w²/L, which is ½ qᵀ K q of the unit force x."""
+    body = cms.couple(make())
+    with cms.Families(body) as families:
+        modes = cms.craig_bampton(body, n_modes=8, families=families)
+        reduced = cms.reduce(body, modes, frame=NodalFrame(at="left"), geometric=True, families=families)
+    Psi = reduced.interface("right").Psi
+    q = Psi[2] / np.diag(reduced.K)  # of a unit force along z
+    shortening = q @ reduced.geometric.interfaces[1, 0] @ q / 2
+    assert_allclose(shortening, 0.6 * (Psi[2] @ q) ** 2, rtol=5e-3)
+
+
+def test_many_loads_in_blocks_are_the_same(monkeypatch):
+    body = cms.couple(bar(2, 1, 1))
+    Phi = np.random.default_rng(0).standard_normal((body.n_dof, 2))
+    condition = frame_condition(body, TisserandFrame())
+    whole = reduced_geometric_stiffness(body, Phi, condition)
+    monkeypatch.setattr("cms.geometric_reduction.LOADS_AT_ONCE", 7)
+    parts = reduced_geometric_stiffness(body, Phi, condition)
+    assert_allclose(parts.spin, whole.spin, rtol=0, atol=1e-12 * np.abs(whole.spin).max())
+    assert_allclose(parts.interfaces, whole.interfaces, rtol=0, atol=1e-12 * np.abs(whole.interfaces).max())
+
+
 def spinning_cantilever_reference(speed, radius, n=12):
     """Flap frequencies of w: ∫ EI w''² + N w'² = omega² ∫ w², N = speed² ∫_x (radius + s), EI = rho A = L = 1.
 
