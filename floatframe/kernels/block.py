@@ -10,7 +10,7 @@ import operator
 from llvmlite import ir
 from numba import types
 from numba.core.datamodel import models
-from numba.extending import lower_builtin, register_model
+from numba.extending import lower_builtin, lower_getattr, register_model
 from numba.np.arrayobj import getitem_array_tuple, getitem_arraynd_intp, setitem_array
 
 __all__ = ["Block", "make_block"]
@@ -176,3 +176,15 @@ def flatten(context, builder, signature, arguments):
     shape = [context.cast(builder, arguments[1], signature.args[1], types.intp)]
     data = builder.extract_value(arguments[0], DATA)
     return make_block(context, builder, signature.return_type, data, shape)
+
+
+@lower_getattr(Block, "shape")
+def get_shape(context, builder, kind, value):
+    """Return the shape."""
+    return builder.extract_value(value, SHAPE)
+
+
+@lower_getattr(Block, "size")
+def get_size(context, builder, kind, value):
+    """Return how many numbers there are."""
+    return builder.extract_value(value, N_ITEMS)

@@ -9,8 +9,8 @@ compilation. Inner functions are never called from Python and own no memory, so 
 (2) the library of an entry links all of them and is optimised once;
 (3) while an entry is compiled, the meaning of an operator or built-in function for given types is looked up once, and
     Python does not look for garbage;
-(4) the passes of numba are those that kernels need: no closures, no lists, no array expressions, no `raise`;
-(5) variables and calls become lean code of LLVM, see kernels/lowering.py.
+(4) the passes of numba are those that kernels need (no closures, lists, array expressions, `raise`): passes.py;
+(5) variables, operations and calls become lean code of LLVM, see kernels/lowering.py.
 """
 
 import gc
@@ -20,18 +20,10 @@ from contextlib import contextmanager
 from numba import njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
-from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.typed_passes import (
-    IRLegalization,
-    NativeLowering,
-    NoPythonBackend,
-    NopythonTypeInference,
-    PreLowerStripPhis,
-)
 from numba.core.types.functions import BaseFunction
-from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
 
-from floatframe.kernels.lowering import KernelContext, KernelLower
+from floatframe.kernels.lowering import KernelContext
+from floatframe.kernels.passes import ENTRY, INNER, pipeline
 
 __all__ = ["entry", "inner", "view"]
 
@@ -124,42 +116,12 @@ def without_garbage_collection() -> Iterator[None]:
             gc.enable()
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class KernelLowering(NativeLowering):
-    """Lowering of an inner function (5)."""
-
-    _name = "kernel_lowering"
-
-    @property
-    def lowering_class(self):
-        """The lowering for kernels."""
-        return KernelLower
-
-
-def pipeline(state, lowering):
-    """Return the passes that kernels need (4)."""
-    manager = PassManager("kernel")
-    if state.func_ir is None:
-        manager.add_pass(TranslateByteCode, "read the byte code")
-        manager.add_pass(FixupArgs, "arguments")
-    manager.add_pass(IRProcessing, "intermediate code")
-    manager.add_pass(GenericRewrites, "constant indices and powers")
-    manager.add_pass(ReconstructSSA, "one assignment a variable")
-    manager.add_pass(NopythonTypeInference, "types")
-    manager.add_pass(PreLowerStripPhis, "no phi nodes")
-    manager.add_pass(IRLegalization, "legal code")
-    manager.add_pass(lowering, "code of LLVM")
-    manager.add_pass(NoPythonBackend, "result")
-    manager.finalize()
-    return manager
-
-
 class InnerCompiler(CompilerBase):
     """The pipeline of an inner function."""
 
     def define_pipelines(self):
         """Return the one pipeline."""
-        return [pipeline(self.state, KernelLowering)]
+        return [pipeline(self.state, INNER)]
 
     def compile_extra(self, func):
         """Compile into an `InnerLibrary`."""
@@ -173,7 +135,7 @@ class EntryCompiler(CompilerBase):
 
     def define_pipelines(self):
         """Return the one pipeline."""
-        return [pipeline(self.state, NativeLowering)]
+        return [pipeline(self.state, ENTRY)]
 
     def compile_extra(self, func):
         """Compile into an `EntryLibrary`."""

@@ -4,18 +4,34 @@ Kernels own no memory and raise no errors, so that here
 
 (1) variables are not counted, not deleted and not set to zero before their first value;
 (2) a variable with one assignment is a value wherever that assignment comes first, not a place on the stack;
-(3) a call of another kernel is a call, without tests of its status.
+(3) a call of another kernel is a call, without tests of its status;
+(4) operations on two integers or two reals, and indices of arrays, are written without a search for their meaning.
 """
 
+import operator
 from collections import defaultdict
 
 from numba import types
 from numba.core import ir
 from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
 from numba.core.cpu import CPUContext
+from numba.core.errors import LoweringError
 from numba.core.lowering import Lower
 
+from floatframe.kernels.block import Block, get_item
+
 __all__ = ["KernelContext", "KernelLower"]
+
+NO_WRAP = ("nsw",)  # integers of kernels do not overflow
+OPERATIONS = {
+    (operator.add, types.float64, types.float64): lambda builder, x, y: builder.fadd(x, y),
+    (operator.sub, types.float64, types.float64): lambda builder, x, y: builder.fsub(x, y),
+    (operator.mul, types.float64, types.float64): lambda builder, x, y: builder.fmul(x, y),
+    (operator.truediv, types.float64, types.float64): lambda builder, x, y: builder.fdiv(x, y),
+    (operator.add, types.int64, types.int64): lambda builder, x, y: builder.add(x, y, flags=NO_WRAP),
+    (operator.sub, types.int64, types.int64): lambda builder, x, y: builder.sub(x, y, flags=NO_WRAP),
+    (operator.mul, types.int64, types.int64): lambda builder, x, y: builder.mul(x, y, flags=NO_WRAP),
+}
 
 
 def single_assignments(blocks):
@@ -70,6 +86,52 @@ class KernelLower(Lower):
         if isinstance(ty, types.Dispatcher):
             return self.context.get_dummy_value()
         return super().lower_assign(ty, inst)
+
+    def lower_block(self, block):
+        """Write a block of statements; an error names the line."""
+        self.pre_block(block)
+        for statement in block.body:
+            self.loc = statement.loc
+            try:
+                self.lower_inst(statement)
+            except Exception as error:
+                raise LoweringError(f"{error}, in: {statement}", loc=statement.loc) from error
+        self.post_block(block)
+
+    def lower_inst(self, inst):
+        """Write a statement (4)."""
+        if isinstance(inst, ir.Assign):
+            self.storevar(self.lower_assign(self.typeof(inst.target.name), inst), inst.target.name)
+        elif isinstance(inst, ir.StaticSetItem) and isinstance(self.typeof(inst.target.name), Block):
+            self.lower_setitem(inst.target, inst.index_var, inst.value, self.fndesc.calltypes[inst])
+        else:
+            super().lower_inst(inst)
+
+    def lower_expr(self, resty, expr):
+        """Return the value of an expression (4)."""
+        if expr.op in ("binop", "inplace_binop"):
+            signature = self.fndesc.calltypes[expr]
+            function = expr.fn if expr.op == "binop" else expr.immutable_fn
+            write = OPERATIONS.get((function, *signature.args))
+            if write is not None:
+                x, y = (self.value_as(*each) for each in zip((expr.lhs, expr.rhs), signature.args, strict=True))
+                return self.context.cast(self.builder, write(self.builder, x, y), signature.return_type, resty)
+        elif expr.op == "static_getitem" and expr.index_var is not None:
+            if isinstance(self.typeof(expr.value.name), Block):
+                return self.lower_getitem(resty, expr, expr.value, expr.index_var, self.fndesc.calltypes[expr])
+        return super().lower_expr(resty, expr)
+
+    def lower_getitem(self, resty, expr, value, index, signature):
+        """Return a part of an array (4)."""
+        if not isinstance(signature.args[0], Block):
+            return super().lower_getitem(resty, expr, value, index, signature)
+        arguments = [self.loadvar(value.name), self.value_as(index, signature.args[1])]
+        part = get_item(self.context, self.builder, signature, arguments)
+        return self.context.cast(self.builder, part, signature.return_type, resty)
+
+    def value_as(self, variable, kind):
+        """Return the value of a variable as one of another type."""
+        return self.context.cast(self.builder, self.loadvar(variable.name), self.typeof(variable.name), kind)
 
 
 def call_of_kernel(fndesc, libraries):
