@@ -242,7 +242,7 @@ def print_mobility(path: Path, *, as_json: bool) -> None:
 
     system, _ = read_system(path)
     found = mobility(system)
-    record = {
+    record: dict[str, Any] = {
         "system": system.name,
         "bodies": found.n_bodies,
         "modes": found.n_modes,
