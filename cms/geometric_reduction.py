@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.arrays import Array, IntArray
-from cms.errors import BodyError
+from cms.errors import BodyError, ModeSetError
 from cms.families import Families
 from cms.fe_body import FEBody, Interface
 from cms.frames import FrameCondition
@@ -53,11 +53,18 @@ def reduced_geometric_stiffness(
     ------
     BodyError
         If the body has no element model that knows its geometric stiffness.
+    ModeSetError
+        If the families are those of another body.
     """
     require_geometric_stiffness(body)
     if families is None:
         with Families(body) as own:
             return reduced_geometric_stiffness(body, Phi, condition, families=own)
+    if families.body is not body:
+        raise ModeSetError(
+            f"families: made for body {families.body.name!r}, but the geometric stiffness is asked of another one, "
+            f"{body.name!r}; make Families of the very body"
+        )
     loads = balanced(body, unit_loads(body, condition.frame), condition)  # (1)
     K = np.zeros((loads.mass.k, Phi.shape[1], Phi.shape[1]))
     for wanted in blocks(np.flatnonzero(~loads.is_zero)):

@@ -8,7 +8,7 @@ import scipy.linalg as la
 from numpy.testing import assert_allclose
 
 import cms
-from cms.errors import BodyError
+from cms.errors import BodyError, ModeSetError
 from cms.frames import BuckensFrame, NodalFrame, TisserandFrame, frame_condition
 from cms.geometric_reduction import reduced_geometric_stiffness
 from cms.mass_loads import MassLoads
@@ -20,8 +20,9 @@ from fe_models.beams.attachments import PointMass, RigidLink
 from fe_models.beams.beam_property import BeamProperty
 from fe_models.beams.body import beam_body
 from fe_models.beams.interfaces import NodeIndices, line_interface
-from fe_models.beams.line_mesh import straight_line
+from fe_models.beams.line_mesh import LineMesh, straight_line
 from fe_models.beams.sections import Rectangle
+from fe_models.material import Material
 from fe_models.planar import planar
 from fe_models.weld import weld
 from tests.bodies import STEEL, bar, with_interfaces
@@ -126,7 +127,32 @@ def test_a_column_buckles_at_the_load_of_euler(make):
     assert_allclose(push, np.pi**2 * EI / 4 / shear, rtol=4e-3)
 
 
-def test_a_right_angled_cantilever_tips_over_at_the_load_of_prandtl():
+@pytest.mark.parametrize("angle", [0.0, 45.0])
+def test_a_frame_bent_by_end_moments_tips_over_at_the_same_moment_either_way(angle):
+    """Two legs at an angle, hinged about the normal of their plane: M = ± pi sqrt(EI GJ) / L, whatever the angle.
+
+    Moments that do not turn by half with a node at the corner give a frame that is stiffer one way (Argyris 1979).
+    """
+    L, n, section = 240.0, 12, Rectangle(30.0, 0.6)
+    leg = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle)), 0.0])
+    s = np.linspace(0, L, n + 1)[:, None]
+    nodes = np.vstack([s * leg, L * leg + s[1:] * leg * [1, -1, 1]])
+    mesh = LineMesh(nodes, np.stack([np.arange(2 * n), np.arange(1, 2 * n + 1)], axis=1))
+    ends = [line_interface(mesh, name, NodeIndices((node,))) for name, node in (("a", 0), ("b", 2 * n))]
+    material = Material("metal", E=71240.0, nu=0.31, rho=2.7e-9)
+    body = beam_body(mesh, BeamProperty(section, material), name="frame", units=SI, interfaces=ends)
+    body = cms.couple(body)
+    a, b = (np.asarray(interface.dofs) for interface in body.interfaces)
+    free = np.setdiff1d(np.arange(body.n_dof), [*a[:5], *b[1:5]])
+    found = reduced_geometric_stiffness(body, np.eye(body.n_dof)[:, free], frame_condition(body, NodalFrame("a")))
+    K = body.K.toarray()[np.ix_(free, free)]
+    values = la.eigh(found.interfaces[1, 5] - found.interfaces[0, 5], K, eigvals_only=True)
+    properties = section.properties(material.nu)
+    expected = np.pi * np.sqrt(material.E * properties.Iy * material.mu * properties.J) / L
+    assert_allclose(1 / values[[0, -1]], [-expected, expected], rtol=5e-3)
+
+
+def test_a_narrow_cantilever_tips_over_at_the_load_of_prandtl():
     """A narrow cantilever under a lateral tip force: P = 4.0126 sqrt(EI GJ) / L² (Timoshenko & Gere)."""
     L, height, width = 2.0, 0.06, 0.003
     section = Rectangle(width, height)
@@ -294,6 +320,15 @@ def test_a_body_without_inertia_about_its_axis_is_stiffened_too():
     reduced = cms.reduce(body, cms.guyan(body), frame=NodalFrame("left"), geometric=True)
     EI = STEEL.E * 0.05 * 0.04**3 / 12
     assert critical(reduced.K, reduced.geometric.interfaces[1, 0]) > 0.99 * np.pi**2 * EI / 4
+
+
+def test_families_of_another_body_are_refused():
+    body = cms.couple(bar(2, 1, 1))
+    with (
+        cms.Families(cms.couple(bar(2, 1, 1))) as other,
+        pytest.raises(ModeSetError, match="make Families of the"),
+    ):
+        cms.reduce(body, cms.guyan(body), geometric=True, families=other)
 
 
 def test_bare_matrices_are_refused():
