@@ -16,6 +16,7 @@ from floatframe.joints import Joint
 from floatframe.rigid_body import RigidBody
 
 if TYPE_CHECKING:
+    from floatframe.analyses.channels import AnyChannel
     from floatframe.compiled import CompiledSystem
     from floatframe.measuring import Sensor
 
@@ -45,10 +46,12 @@ class System:
     redundant: str = "refuse"
     couplers: Sequence[CoordinateCoupler] = ()  #: between coordinates of joints
     sensors: Sequence["Sensor"] = field(default=(), kw_only=True)  #: what is measured on its motions
+    inputs: Sequence["AnyChannel"] = field(default=(), kw_only=True)  #: forces that act on it when it is linearised
+    outputs: Sequence["AnyChannel"] = field(default=(), kw_only=True)  #: what is then observed
     source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
 
     def __post_init__(self) -> None:
-        for part in ("bodies", "joints", "forces", "couplers", "sensors"):
+        for part in ("bodies", "joints", "forces", "couplers", "sensors", "inputs", "outputs"):
             object.__setattr__(self, part, tuple(getattr(self, part)))
         among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
         object.__setattr__(self, "couplers", (*self.couplers, *among))
@@ -61,7 +64,8 @@ class System:
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
         named = [force.name for force in self.forces if not isinstance(force, Gravity)]
         require_names(f"{where}: joints and forces", [joint.name for joint in (*self.joints, *self.couplers)] + named)
-        require_names(f"{where}: sensors", [sensor.name for sensor in self.sensors])
+        for kind in ("sensors", "inputs", "outputs"):
+            require_names(f"{where}: {kind}", [each.name for each in getattr(self, kind)])
         for body in self.bodies:
             if isinstance(body, FlexibleBody) and body.reduced.units != self.units:
                 raise ModelError(

@@ -26,6 +26,7 @@ from cms.toml_file import Matrix3, Table, Vector3, choice, numbers, read_toml, v
 from cms.units import UNIT_SYSTEMS, Units, unit_system
 from cms.words import nearest
 from floatframe.changed_content import changed
+from floatframe.channel_section import InputSection, OutputSection
 from floatframe.coordinate_section import CoordinateSection, marker_of
 from floatframe.couplers import CoordinateCoupler
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
@@ -332,6 +333,8 @@ class SystemFile(Table):
     couplers: dict[str, CouplerSection] = Field({}, description="tables [couplers.NAME]")
     forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
     sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
+    inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
+    outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
     run: RunSection = Field(description="a table [run] with t_end and h")
 
     @model_validator(mode="after")
@@ -339,7 +342,7 @@ class SystemFile(Table):
         choices = [GROUND.name, *self.bodies]
         terms = {f"{name}.terms": term for name, coupler in self.couplers.items() for term in coupler.terms}
         for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors),
-                               ("couplers", terms)):  # fmt: skip
+                               ("couplers", terms), ("inputs", self.inputs), ("outputs", self.outputs)):  # fmt: skip
             for name, section in sections.items():
                 for key in ("body", "body_a", "body_b", "relative_to"):
                     body = getattr(section, key, None)
@@ -396,6 +399,8 @@ def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None 
         sensors = [section.sensor(key) for key, section in data.sensors.items()]
         system = System(
             bodies, joints, forces, units, name, data.system.redundant, couplers, sensors=sensors,
+            inputs=[section.channel(key) for key, section in data.inputs.items()],
+            outputs=[section.output(key) for key, section in data.outputs.items()],
             source=str(path.resolve()),
         )  # fmt: skip
         _ = system.compiled  # markers and interfaces are looked up here

@@ -1,8 +1,9 @@
 """Analyses of a system besides its motion: equilibrium, driven motion, linearisation, system modes, responses."""
 
-from floatframe.analyses.channels import Channel
+from floatframe.analyses.channels import Channel, CoordinateChannel, StressChannel
 from floatframe.analyses.driven_motion import frozen_bodies, quasi_static_bodies
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium, steady_rotation
+from floatframe.analyses.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies
 from floatframe.analyses.inverse_dynamics import InverseDynamics, drive_forces, inverse_dynamics, with_motors
 from floatframe.analyses.kinematics import kinematics
 from floatframe.analyses.linear_system import LinearSystem, linearize
@@ -14,19 +15,24 @@ from floatframe.analyses.system_modes import SystemModes, system_modes
 
 __all__ = [
     "Channel",
+    "CoordinateChannel",
     "Equilibrium",
+    "FrequencyResponse",
     "InverseDynamics",
     "LinearSystem",
     "Locus",
+    "StressChannel",
     "StudyTable",
     "SystemModes",
     "campbell",
     "drive_forces",
+    "frequency_response",
     "frozen_bodies",
     "inverse_dynamics",
     "kinematics",
     "linearize",
     "quasi_static_bodies",
+    "resolved_frequencies",
     "root_locus",
     "run_study",
     "snapshot",

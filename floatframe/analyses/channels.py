@@ -1,22 +1,28 @@
-"""Channels: named scalar motions of markers, as inputs (a force along it) and outputs (the motion along it)."""
+"""Channels: named scalars as inputs (a force, a torque) and outputs (a motion, a stress) of a linearised system."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from cms.arrays import Array
-from floatframe.arrays import unit_vector
+from cms.words import nearest
+from floatframe.analyses.joint_rates import coordinate_rows
+from floatframe.analyses.marker_jacobian import marker_jacobian
+from floatframe.arrays import array_of_shape, unit_vector
 from floatframe.compiled import CompiledSystem
 from floatframe.errors import ModelError
 from floatframe.kernels.model import Work
-from floatframe.marker_data import MarkerData, find_marker
+from floatframe.marker_data import find_marker
 from floatframe.markers import Marker
-from floatframe.rotations import right_jacobian, tilde
+from floatframe.rotations import euler_parameters
+from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["Channel", "channel_rows"]
+__all__ = ["AnyChannel", "Channel", "CoordinateChannel", "StressChannel", "channel_rows", "channel_units"]
 
 QUANTITIES = ("translation", "rotation")
+RATES = ("displacement", "velocity", "acceleration")
+COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,45 +38,117 @@ class Channel:
     direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: ground axes, (3,)
     quantity: str = "translation"  #: or "rotation"
     relative_to: Marker | None = None
+    rate: int = 0  #: as an output: 0 displacement, 1 velocity, 2 acceleration, seen from the turning system
 
     def __post_init__(self) -> None:
         where = f"channel {self.name!r}"
         object.__setattr__(self, "direction", unit_vector(f"{where}: direction", self.direction))
         if self.quantity not in QUANTITIES:
             raise ModelError(f"{where}: quantity: expected one of {', '.join(QUANTITIES)}, got {self.quantity!r}")
+        require_rate(where, self.rate)
 
 
-def channel_rows(system: System, compiled: CompiledSystem, work: Work, channels: tuple[Channel, ...]) -> Array:
-    """Return the derivative of the channels by the unknowns of small motions (body axes), (n_channels, n_u)."""
+@dataclass(frozen=True, eq=False)
+class CoordinateChannel:
+    """A joint coordinate; as an input the force or torque along it."""
+
+    name: str
+    joint: str
+    coordinate: str
+    rate: int = 0  #: as an output: 0 value, 1 its rate, 2 its second rate
+
+    def __post_init__(self) -> None:
+        require_rate(f"channel {self.name!r}", self.rate)
+
+
+@dataclass(frozen=True, eq=False)
+class StressChannel:
+    """A stress component at a node of a flexible body, in axes of its frame; an output only."""
+
+    name: str
+    body: str
+    component: str  #: xx, yy, zz, yz, xz or xy
+    position: Array  #: mesh axes; the kept node nearest to it is taken, (3,) [m]
+
+    def __post_init__(self) -> None:
+        where = f"channel {self.name!r}"
+        object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
+        if self.component not in COMPONENTS:
+            raise ModelError(f"{where}: component: expected one of {', '.join(COMPONENTS)}, got {self.component!r}")
+
+
+AnyChannel = Channel | CoordinateChannel | StressChannel
+
+
+def require_rate(where: str, rate: int) -> None:
+    """Raise `ModelError` unless a rate is 0, 1 or 2."""
+    if rate not in (0, 1, 2):
+        raise ModelError(f"{where}: rate: expected 0, 1 or 2 ({', '.join(RATES)}), got {rate!r}")
+
+
+def channel_rows(system: System, compiled: CompiledSystem, work: Work, channels: tuple[AnyChannel, ...]) -> Array:
+    """Return the derivative of the channels by the unknowns of small motions (body axes), (n_channels, n_u).
+
+    Raises
+    ------
+    ModelError
+        With the nearest name, if a channel is at a place or joint that does not exist.
+    """
     rows = np.zeros((len(channels), int(compiled.model.u0[-1])))
     for row, channel in zip(rows, channels, strict=True):
-        for sign, marker in ((1.0, channel.marker), (-1.0, channel.relative_to)):
-            if marker is None:
-                continue
-            data = find_marker(system, f"channel {channel.name!r}: marker", marker)
-            if data.body >= 0:
-                u = slice(int(compiled.model.u0[data.body]), int(compiled.model.u0[data.body + 1]))
-                first = 0 if channel.quantity == "translation" else 3
-                row[u] += sign * channel.direction @ marker_jacobian(compiled, work, data)[first : first + 3]
+        if isinstance(channel, Channel):
+            for sign, marker in ((1.0, channel.marker), (-1.0, channel.relative_to)):
+                if marker is not None:
+                    row += sign * marker_row(system, compiled, work, channel, marker)
+        elif isinstance(channel, CoordinateChannel):
+            row += coordinate_row(system, compiled, work, channel)
+        else:
+            row += stress_row(system, compiled, channel)
     return rows
 
 
-def marker_jacobian(compiled: CompiledSystem, work: Work, data: MarkerData) -> Array:
-    """Return translation and rotation (ground axes) of a marker by the motion of its body (body axes), (6, 6 + n)."""
-    model, i = compiled.model, data.body
-    n = int(model.n_q[i])
-    q = work.q[int(model.q0[i]) : int(model.q0[i + 1])]
-    R = work.R[i]
-    if data.psi is None:
-        rho, psi, angle = data.position, None, np.zeros(3)
+def marker_row(system: System, compiled: CompiledSystem, work: Work, channel: Channel, marker: Marker) -> Array:
+    """Return the row of one marker of a channel, (n_u,)."""
+    row = np.zeros(int(compiled.model.u0[-1]))
+    data = find_marker(system, f"channel {channel.name!r}: marker", marker)
+    if data.body >= 0:
+        u = slice(int(compiled.model.u0[data.body]), int(compiled.model.u0[data.body + 1]))
+        first = 0 if channel.quantity == "translation" else 3
+        row[u] = channel.direction @ marker_jacobian(compiled, work, data)[first : first + 3]
+    return row
+
+
+def coordinate_row(system: System, compiled: CompiledSystem, work: Work, channel: CoordinateChannel) -> Array:
+    """Return the row of a joint coordinate, (n_u,)."""
+    state = State(work.r, np.array([euler_parameters(R) for R in work.R]), work.q, work.u)
+    rows = coordinate_rows(system, compiled, work, state)
+    name = f"{channel.joint}.{channel.coordinate}"
+    if name not in rows:
+        raise ModelError(f"channel {channel.name!r}: no joint coordinate {name!r}{nearest(name, list(rows))}")
+    return rows[name]
+
+
+def stress_row(system: System, compiled: CompiledSystem, channel: StressChannel) -> Array:
+    """Return the row of a stress component, (n_u,)."""
+    from floatframe.measuring.stresses import flexible_body, modes_at
+
+    body = flexible_body(system, f"channel {channel.name}", channel.body)
+    row = np.zeros(int(compiled.model.u0[-1]))
+    i = compiled.body_names.index(channel.body)
+    modes = modes_at(body, channel.name, channel.position, None)
+    row[int(compiled.model.u0[i]) + 6 : int(compiled.model.u0[i + 1])] = modes[COMPONENTS.index(channel.component)]
+    return row
+
+
+def channel_units(system: System, channel: AnyChannel) -> tuple[str, str]:
+    """Return the units of a channel as an output and as an input."""
+    units = system.units
+    if isinstance(channel, StressChannel):
+        return units.stress_symbol, "-"
+    if isinstance(channel, Channel):
+        is_angle = channel.quantity == "rotation"
     else:
-        psi = data.psi if data.bend is None else data.psi - data.bend @ q
-        d = 0.5 * (data.psi + psi) @ q
-        rho, angle = data.position + d[:3], d[3:]
-    J = np.zeros((6, 6 + n))
-    J[:3, :3] = J[3:, 3:6] = np.eye(3)
-    J[:3, 3:6] = -tilde(rho)
-    if psi is not None:
-        J[:3, 6:] = psi[:3]
-        J[3:, 6:] = right_jacobian(angle).T @ psi[3:]  # rotation of E in body axes before E
-    return np.kron(np.eye(2), R) @ J
+        is_angle = channel.coordinate == "angle"
+    per_time = ("", f"/{units.time_symbol}", f"/{units.time_symbol}²")[channel.rate]
+    force = f"{units.force_symbol} {units.length_symbol}" if is_angle else units.force_symbol
+    return ("rad" if is_angle else units.length_symbol) + per_time, force

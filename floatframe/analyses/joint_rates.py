@@ -3,7 +3,7 @@
 import numpy as np
 
 from cms.arrays import Array
-from floatframe.analyses.channels import marker_jacobian
+from floatframe.analyses.marker_jacobian import marker_jacobian
 from floatframe.compiled import CompiledSystem
 from floatframe.joints.rows import DISTANCE, SLIDE, TURN
 from floatframe.kernels.model import Work

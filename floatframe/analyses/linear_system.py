@@ -8,7 +8,7 @@ With N a basis of the motions the joints allow (G N = 0) and the matrices of `ta
 N does not change in time, because in body axes nothing does.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.arrays import Array, frozen
-from floatframe.analyses.channels import Channel, channel_rows
+from floatframe.analyses.channels import AnyChannel, StressChannel, channel_rows, channel_units
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.tangents import tangents, turning_matrices
 from floatframe.errors import ModelError
@@ -35,7 +35,7 @@ MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion h
 
 @dataclass(frozen=True, eq=False)
 class LinearSystem:
-    """M z_ddot + C z_dot + K z = B s,  y = L z: small motions z about a steady one, inputs s, outputs y."""
+    """M z_ddot + C z_dot + K z = B s,  y = L d^r z/dt^r: small motions z about a steady one, inputs s, outputs y."""
 
     equilibrium: Equilibrium
     M: Array  #: (n_z, n_z)
@@ -48,10 +48,15 @@ class LinearSystem:
     outputs: tuple[str, ...]
     body_names: tuple[str, ...]
     body_masses: tuple[Array, ...]  #: mass matrix of each body, (6 + n_q, 6 + n_q)
+    rates: tuple[int, ...] = ()  #: r of each output: 0 displacement, 1 velocity, 2 acceleration; (): all 0
+    input_units: tuple[str, ...] = ()
+    output_units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("M", "C", "K", "B", "L", "N"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+        if not self.rates:
+            object.__setattr__(self, "rates", (0,) * len(self.outputs))
 
     @property
     def n_z(self) -> int:
@@ -67,17 +72,33 @@ class LinearSystem:
 
     def with_mass(self) -> tuple["LinearSystem", Array]:
         """Return the system without its massless motions, which follow the others statically, and z by its motions."""
-        scale = 1 / np.sqrt(np.maximum(np.diag(self.M), np.finfo(float).tiny))
-        values, vectors = la.eigh(scale[:, None] * self.M * scale)
-        is_massive = values > MASSLESS
-        if is_massive.all():
+        dynamic, static = self.motions_with_and_without_mass()
+        if not static.shape[1]:
             return self, np.eye(self.n_z)
-        dynamic, static = scale[:, None] * vectors[:, is_massive], scale[:, None] * vectors[:, ~is_massive]
-        # scaled so that a massless motion of tiny diagonal mass does not spoil the others
-        static /= np.linalg.norm(static, axis=0)
         T = dynamic - static @ la.solve(static.T @ self.K @ static, static.T @ self.K @ dynamic)
         parts = {name: T.T @ getattr(self, name) @ T for name in ("M", "C", "K")}
         return replace(self, **parts, B=T.T @ self.B, L=self.L @ T, N=self.N @ T), T
+
+    def motions_with_and_without_mass(self) -> tuple[Array, Array]:
+        """Return bases of z: motions with mass (orthonormal by it), and those without, (n_z, n) each."""
+        scale = 1 / np.sqrt(np.maximum(np.diag(self.M), np.finfo(float).tiny))
+        values, vectors = la.eigh(scale[:, None] * self.M * scale)
+        is_massive = values > MASSLESS
+        static = scale[:, None] * vectors[:, ~is_massive]
+        # scaled so that a massless motion of tiny diagonal mass does not spoil the others
+        static /= np.linalg.norm(static, axis=0)
+        return scale[:, None] * vectors[:, is_massive], static
+
+    def feedthrough(self) -> Array:
+        """Return the displacement outputs that follow inputs at once, over motions without mass, (n_outputs, n_inputs).
+
+        Their velocities would be derivatives of the inputs, which a state space cannot hold: they are left out.
+        """
+        _, S = self.motions_with_and_without_mass()
+        if not S.shape[1] or not self.B.shape[1]:
+            return np.zeros((len(self.outputs), len(self.inputs)))
+        D = self.L @ S @ la.solve(S.T @ self.K @ S, S.T @ self.B)
+        return np.asarray(D * (np.array(self.rates) == 0)[:, None])
 
     def state_space(self) -> "StateSpace":
         """Return A, B, C, D over the state (z, z_dot) of the motions with mass, as `scipy.signal.StateSpace`."""
@@ -92,13 +113,23 @@ class LinearSystem:
         A[n:, n:] = -la.cho_solve(factor, system.C)
         B = np.vstack([np.zeros((n, system.B.shape[1])), la.cho_solve(factor, system.B)])
         C = np.hstack([system.L, np.zeros_like(system.L)])
-        return StateSpace(A, B, C, np.zeros((len(C), B.shape[1])))
+        D = self.feedthrough()
+        for k, rate in enumerate(self.rates):
+            if rate == 2:
+                D[k] = C[k] @ A @ B
+            for _ in range(rate):
+                C[k] = C[k] @ A
+        return StateSpace(A, B, C, D)
 
     def response(self, frequencies: Array) -> Array:
         """Return the frequency response y/s at frequencies [Hz], (n_frequencies, n_outputs, n_inputs), complex."""
         H = np.empty((len(frequencies), len(self.outputs), len(self.inputs)), complex)
         for k, omega in enumerate(2 * np.pi * np.asarray(frequencies, dtype=float)):
-            H[k] = self.L @ np.linalg.solve(self.K + 1j * omega * self.C - omega**2 * self.M, self.B)
+            try:
+                H[k] = self.L @ np.linalg.solve(self.K + 1j * omega * self.C - omega**2 * self.M, self.B)
+            except np.linalg.LinAlgError:  # an undamped resonance, met exactly
+                H[k] = np.inf
+            H[k] *= ((1j * omega) ** np.array(self.rates, dtype=int))[:, None]
         return H
 
 
@@ -106,8 +137,8 @@ def linearize(
     system: System,
     about: Equilibrium | None = None,
     *,
-    inputs: tuple[Channel, ...] = (),
-    outputs: tuple[Channel, ...] = (),
+    inputs: Sequence[AnyChannel] | None = None,
+    outputs: Sequence[AnyChannel] | None = None,
 ) -> LinearSystem:
     """Linearise a system about an equilibrium or a steady rotation.
 
@@ -118,13 +149,18 @@ def linearize(
     about
         As `static_equilibrium` or `steady_rotation` returns it; the equilibrium at rest by default.
     inputs, outputs
-        Channels; a channel can be both. Their directions turn with a steady rotation.
+        Channels; a channel can be both. Their directions turn with a steady rotation. None: those of the system.
 
     Raises
     ------
     ModelError
-        If nothing can move.
+        If nothing can move, or a channel is at a place that does not exist.
     """
+    inputs = tuple(system.inputs if inputs is None else inputs)
+    outputs = tuple(system.outputs if outputs is None else outputs)
+    for channel in inputs:
+        if isinstance(channel, StressChannel):
+            raise ModelError(f"linearize: channel {channel.name!r} is a stress: expected a force or torque as an input")
     about = static_equilibrium(system) if about is None else about
     compiled = system.compiled
     model, work = compiled.model, new_work(compiled.model)
@@ -139,13 +175,16 @@ def linearize(
         M=N.T @ parts.M @ N,
         C=N.T @ (parts.C + parts.M @ (Omega + Omega_t)) @ N,
         K=N.T @ (parts.K + parts.C @ Omega + parts.M @ Omega_t @ Omega) @ N,
-        B=(channel_rows(system, compiled, work, tuple(inputs)) @ N).T,
-        L=channel_rows(system, compiled, work, tuple(outputs)) @ N,
+        B=(channel_rows(system, compiled, work, inputs) @ N).T,
+        L=channel_rows(system, compiled, work, outputs) @ N,
         N=N,
         inputs=tuple(channel.name for channel in inputs),
         outputs=tuple(channel.name for channel in outputs),
         body_names=compiled.body_names,
         body_masses=linearized(model, work, 1.0, 0.0, 0.0).H,
+        rates=tuple(getattr(channel, "rate", 0) for channel in outputs),
+        input_units=tuple(channel_units(system, channel)[1] for channel in inputs),
+        output_units=tuple(channel_units(system, channel)[0] for channel in outputs),
     )
 
 

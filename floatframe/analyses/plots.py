@@ -4,12 +4,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from floatframe.analyses.frequency_response import FrequencyResponse
 from floatframe.analyses.parameter_study import Locus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-__all__ = ["plot_campbell", "plot_root_locus"]
+__all__ = ["plot_campbell", "plot_frequency_response", "plot_root_locus"]
 
 
 def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 1.0) -> "Axes":
@@ -54,6 +56,48 @@ def plot_root_locus(locus: Locus, ax: "Axes | None" = None) -> "Axes":
     ax.set_ylabel("imaginary part [1/s]")
     ax.grid(alpha=0.3)
     return ax
+
+
+def plot_frequency_response(response: FrequencyResponse, *, time_unit: float = 1.0) -> "Figure":
+    """Return a Bode plot: amplitudes, a panel for each unit, and phases below; a curve for each output and input.
+
+    Parameters
+    ----------
+    response
+        As `frequency_response` returns it.
+    time_unit
+        Seconds in the unit of time of the system.
+    """
+    from matplotlib.figure import Figure
+
+    pairs = [(o, i) for o in range(len(response.outputs)) for i in range(len(response.inputs))]
+    units = list(dict.fromkeys(response.units[o][i] for o, i in pairs))
+    figure = Figure(figsize=(8, 2.8 * len(units) + 2.6), layout="constrained")
+    axes = figure.subplots(len(units) + 1, 1, sharex=True, squeeze=False).ravel()
+    hertz = response.frequencies / time_unit
+    amplitudes, phases = response.amplitudes, response.phases
+    for k, (o, i) in enumerate(pairs):
+        color = f"C{k % 10}"
+        label = f"{response.outputs[o]} / {response.inputs[i]}"
+        size = amplitudes[:, o, i]
+        if not size.any():
+            label += " (none)"
+        axes[units.index(response.units[o][i])].loglog(
+            hertz, np.where(size > 0, size, np.nan), color=color, linewidth=1.4, label=label
+        )
+        axes[-1].semilogx(hertz, (phases[:, o, i] + 180) % 360 - 180, color=color, linewidth=1.1)
+    for unit, ax in zip(units, axes, strict=False):
+        ax.set_ylabel(f"amplitude [{unit}]")
+        ax.legend(fontsize="small")
+        ax.grid(which="major", alpha=0.4)
+        ax.grid(which="minor", alpha=0.15)
+    axes[-1].set_ylabel("phase [degrees]")
+    axes[-1].set_ylim(-190, 190)
+    axes[-1].set_yticks([-180, -90, 0, 90, 180])
+    axes[-1].grid(which="major", alpha=0.4)
+    axes[-1].set_xlabel("frequency [Hz]")
+    axes[-1].set_xlim(hertz[0], hertz[-1])
+    return figure
 
 
 def _axes() -> "Axes":

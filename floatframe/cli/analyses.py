@@ -1,4 +1,4 @@
-"""The commands that analyse a system without its motion: static, eig, linearize, campbell."""
+"""The commands that analyse a system without its motion: static, eig, campbell."""
 
 import json as json_module
 from pathlib import Path
@@ -9,12 +9,11 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
 
 if TYPE_CHECKING:
-    from floatframe.analyses import Channel, Equilibrium, LinearSystem
+    from floatframe.analyses import Equilibrium, LinearSystem
+    from floatframe.analyses.channels import AnyChannel
     from floatframe.system import System
 
 __all__ = ["register"]
-
-COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 
 SystemArgument = Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")]
 Json = Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")]
@@ -28,7 +27,6 @@ def register(app: typer.Typer) -> None:
     """Add the commands to an application."""
     app.command("static")(static_command)
     app.command("eig")(eig_command)
-    app.command("linearize")(linearize_command)
     app.command("campbell")(campbell_command)
 
 
@@ -129,54 +127,6 @@ def eig_command(
 
 
 @guarded
-def linearize_command(
-    system: SystemArgument,
-    inputs: Annotated[
-        list[str], typer.Option("--input", "-i", help="A force: body/interface:x (also y, z, rx, ry, rz); repeatable.")
-    ] = [],  # noqa: B006
-    outputs: Annotated[
-        list[str], typer.Option("--out", "-m", help="A measured motion, in the words of --input; repeatable.")
-    ] = [],  # noqa: B006
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write (.npz).")] = None,
-    speed: Speed = 0.0,
-    axis: Axis = "z",
-    center: Center = "0,0,0",
-) -> None:
-    """Linearise a system: M, C, K of its independent motions, and the state space A, B, C, D, into an .npz file.
-
-    Example: floatframe linearize crane.toml --input jib/tip:z --out jib/tip:z -o crane.npz
-    """
-    import io
-
-    import numpy as np
-
-    from cms.paths import replace_file
-    from floatframe.errors import ModelError
-
-    model = read(system)
-    path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system,))
-    if path.suffix.lower() != ".npz":
-        raise ModelError(f"--output {path}: expected a file name that ends in .npz")
-    linear = linearized(
-        model,
-        speed,
-        axis,
-        center,
-        inputs=tuple(channel(text) for text in inputs),
-        outputs=tuple(channel(text) for text in outputs),
-    )
-    space = linear.state_space()
-    data = io.BytesIO()
-    np.savez(
-        data, A=space.A, B=space.B, C=space.C, D=space.D, M_z=linear.M, C_z=linear.C, K_z=linear.K, B_z=linear.B,
-        L=linear.L, N=linear.N, inputs=linear.inputs, outputs=linear.outputs,
-    )  # fmt: skip
-    replace_file(path, data.getvalue())
-    say(f"{linear.n_z} independent motions, {len(space.A)} states, {len(inputs)} inputs, {len(outputs)} outputs")
-    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
-
-
-@guarded
 def campbell_command(
     system: SystemArgument,
     speeds: Annotated[str, typer.Option(help='Speeds "from:to:number" [rad/time unit].')],
@@ -237,8 +187,8 @@ def linearized(
     axis: str,
     center: str,
     *,
-    inputs: "tuple[Channel, ...]" = (),
-    outputs: "tuple[Channel, ...]" = (),
+    inputs: "tuple[AnyChannel, ...]" = (),
+    outputs: "tuple[AnyChannel, ...]" = (),
 ) -> "LinearSystem":
     """Return the system linearised about rest, or about a steady rotation."""
     import numpy as np
@@ -279,26 +229,6 @@ def speed_range(text: str) -> Any:
     if not len(values) or not np.isfinite(values).all():
         raise ModelError(f'--speeds {text}: expected "from:to:number", such as 0:200:21')
     return values
-
-
-def channel(text: str) -> "Channel":
-    """Return a channel from "body/interface:component"."""
-    import numpy as np
-
-    from floatframe.analyses import Channel
-    from floatframe.errors import ModelError
-    from floatframe.markers import Marker
-
-    place, _, component = text.rpartition(":")
-    body, _, interface = place.partition("/")
-    if not body or component not in COMPONENTS:
-        raise ModelError(
-            f"channel {text!r}: expected body/interface:component (an interface only for flexible bodies), with a "
-            f"component of {', '.join(COMPONENTS)}"
-        )
-    index = COMPONENTS.index(component)
-    kind = "translation" if index < 3 else "rotation"
-    return Channel(text, Marker(body, interface or None), np.eye(3)[index % 3], kind)
 
 
 def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:

@@ -84,7 +84,7 @@ def test_campbell_draws_a_picture_and_writes_a_table(pendulum, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["linearize", "--input", "rod/tip"], "expected body/interface:component"),
+        (["linearize", "--input", "rod/tip"], "or body/interface:component"),
         (["linearize", "--input", "rode:x"], "no body 'rode'; did you mean 'rod'"),
         (["eig", "--axis", "up"], "expected x, y, z or three numbers"),
         (["campbell", "--speeds", "0:5"], 'expected "from:to:number"'),

@@ -1,0 +1,89 @@
+"""Frequency responses of a linearised system: amplitude and phase of every output over every input."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.analyses.linear_system import LinearSystem
+from floatframe.analyses.system_modes import system_modes
+from floatframe.errors import ModelError
+
+__all__ = ["FrequencyResponse", "frequency_response", "resolved_frequencies"]
+
+AROUND = 12.0  #: half-widths of a resonance that get points of their own
+POINTS_AROUND = 40  #: even: none at its middle, where an undamped response is infinite
+LEAST_DAMPING = 1e-4  #: of a resonance, for its width: an undamped one is infinitely thin
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """Responses y/s at frequencies."""
+
+    frequencies: Array  #: ascending, (n_f,) [1/unit of time]
+    values: Array  #: (n_f, n_outputs, n_inputs), complex
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    units: tuple[tuple[str, ...], ...]  #: of each output over each input
+
+    @property
+    def amplitudes(self) -> Array:
+        """|y/s|, (n_f, n_outputs, n_inputs)."""
+        return np.abs(self.values)
+
+    @property
+    def phases(self) -> Array:
+        """Phase of y over s, followed over the frequency from -180 to 180 at its start, same shape [degrees]."""
+        return np.degrees(np.unwrap(np.angle(self.values), axis=0))
+
+
+def frequency_response(linear: LinearSystem, frequencies: Array) -> FrequencyResponse:
+    """Return the responses of a linearised system.
+
+    Parameters
+    ----------
+    linear
+        With inputs and outputs.
+    frequencies
+        Ascending, (n_f,) [1/unit of time of the system]; `resolved_frequencies` makes ones that show the resonances.
+
+    Raises
+    ------
+    ModelError
+        If there is no input or output, or frequencies are negative or not in order.
+    """
+    f = np.asarray(frequencies, dtype=float)
+    if f.ndim != 1 or not len(f) or not np.isfinite(f).all() or f[0] < 0 or (np.diff(f) <= 0).any():
+        raise ModelError("frequency_response: frequencies: expected rising numbers of 0 or more")
+    for kind in ("inputs", "outputs"):
+        if not getattr(linear, kind):
+            raise ModelError(
+                f"frequency_response: the linearised system has no {kind}; name some: linearize(system, {kind}=[...]), "
+                f"tables [{kind}.NAME] in the system file"
+            )
+    units = tuple(
+        tuple(f"{o}/{i}" if " " not in i else f"{o}/({i})" for i in linear.input_units) for o in linear.output_units
+    )
+    return FrequencyResponse(f, linear.response(f), linear.inputs, linear.outputs, units)
+
+
+def resolved_frequencies(linear: LinearSystem, first: float, last: float, *, n: int = 400) -> Array:
+    """Return frequencies evenly spaced in their logarithm, with more around each resonance between them, (n_f,).
+
+    Raises
+    ------
+    ModelError
+        If the band is empty or does not begin above zero.
+    """
+    if not 0 < first < last:
+        raise ModelError(f"frequency response: expected a rising band above 0, got {first:g} to {last:g}")
+    modes = system_modes(linear)
+    f = modes.natural_frequencies * np.sqrt(np.maximum(1 - 2 * modes.damping_ratios**2, 0.0))  # of the peaks
+    width = np.maximum(modes.damping_ratios, LEAST_DAMPING)
+    inside = (f > first) & (f < last) & (modes.damping_ratios < 0.5)
+    spread = AROUND * np.linspace(-1.0, 1.0, POINTS_AROUND) ** 3
+    is_damped = inside & (modes.damping_ratios >= LEAST_DAMPING)
+    around = (f[is_damped, None] * (1 + width[is_damped, None] * spread)).ravel()
+    aside = (f[inside & ~is_damped, None] * (1 + LEAST_DAMPING * spread[np.abs(spread) > 0.5])).ravel()
+    points = np.concatenate([np.geomspace(first, last, n), around, aside])
+    return np.unique(points[(points >= first) & (points <= last)])

@@ -1,0 +1,271 @@
+"""The commands of the linearised system with inputs and outputs: linearize, response."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import guarded, output_path, print_table, say
+from floatframe.cli.analyses import Axis, Center, Speed, SystemArgument, linearized, read
+
+if TYPE_CHECKING:
+    from floatframe.analyses import LinearSystem
+    from floatframe.analyses.channels import AnyChannel
+    from floatframe.analyses.frequency_response import FrequencyResponse
+    from floatframe.system import System
+
+__all__ = ["register"]
+
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+
+Inputs = Annotated[
+    list[str],
+    typer.Option("--input", "-i", help="A force: a name of [inputs], joint.coordinate, body/interface:x."),
+]
+Outputs = Annotated[
+    list[str],
+    typer.Option("--out", "-m", help="What is observed: a name of [outputs], or as --input; repeatable."),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an application."""
+    app.command("linearize")(linearize_command)
+    app.command("response")(response_command)
+
+
+@guarded
+def linearize_command(
+    system: SystemArgument,
+    inputs: Inputs = [],  # noqa: B006
+    outputs: Outputs = [],  # noqa: B006
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write: .npz, .mat or .h5.")] = None,
+    speed: Speed = 0.0,
+    axis: Axis = "z",
+    center: Center = "0,0,0",
+) -> None:
+    """Linearise a system: M, C, K of its independent motions, and the state space A, B, C, D, into a file.
+
+    Inputs and outputs are those of the tables [inputs] and [outputs] of the system, unless named here; a place is
+    written body/interface:component, with x, y, z, rx, ry, rz. Without -o crane.toml gives crane.npz.
+
+    Example: floatframe linearize crane.toml -o crane.mat
+
+    Example: floatframe linearize crane.toml --input jib/tip:z --out jib/tip:z
+    """
+    from cms.paths import replace_file
+    from floatframe.errors import ModelError
+
+    model = read(system)
+    path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system,))
+    kind = path.suffix.lower()
+    if kind not in WRITERS:
+        raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(WRITERS)}")
+    linear = linearized(
+        model,
+        speed,
+        axis,
+        center,
+        inputs=chosen(model, inputs, model.inputs),
+        outputs=chosen(model, outputs, model.outputs),
+    )
+    space = linear.state_space()
+    arrays = {
+        "A": space.A, "B": space.B, "C": space.C, "D": space.D, "M_z": linear.M, "C_z": linear.C, "K_z": linear.K,
+        "B_z": linear.B, "L": linear.L, "N": linear.N,
+    }  # fmt: skip
+    words = {
+        "inputs": linear.inputs, "input_units": linear.input_units, "outputs": linear.outputs,
+        "output_units": linear.output_units,
+    }  # fmt: skip
+    replace_file(path, WRITERS[kind](arrays, words))
+    say(f"{linear.n_z} independent motions, {len(space.A)} states, {len(linear.inputs)} inputs, "
+        f"{len(linear.outputs)} outputs")  # fmt: skip
+    if not linear.inputs or not linear.outputs:
+        say("name inputs and outputs in tables [inputs.NAME] and [outputs.NAME], or with --input and --out")
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+@guarded
+def response_command(
+    system: SystemArgument,
+    band: Annotated[str, typer.Option(help='Frequencies "from:to" in Hz; default: around all modes.')] = "",
+    inputs: Inputs = [],  # noqa: B006
+    outputs: Outputs = [],  # noqa: B006
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture (.png, .svg, .pdf) or .csv.")] = None,
+    points: Annotated[int, typer.Option(min=2, help="Frequencies, besides those around resonances.")] = 400,
+    speed: Speed = 0.0,
+    axis: Axis = "z",
+    center: Center = "0,0,0",
+) -> None:
+    """Frequency responses (Bode plot) of a system about its equilibrium, or about a steady rotation.
+
+    Inputs and outputs as for linearize. Without -o crane.toml gives crane.response.png.
+
+    Example: floatframe response crane.toml --band 0.1:100
+
+    Example: floatframe response crane.toml --input jib/tip:z --out jib/tip:z -o frf.csv
+    """
+    import io
+
+    from cms.paths import replace_file
+    from floatframe.analyses.frequency_response import frequency_response, resolved_frequencies
+    from floatframe.analyses.plots import plot_frequency_response
+    from floatframe.errors import ModelError
+
+    model = read(system)
+    path = output_path(output, system.with_suffix(".response.png"), ModelError, overwrite_of=(system,))
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg", "pdf", "csv"):
+        raise ModelError(f"--output {path}: expected a file name that ends in .png, .svg, .pdf or .csv")
+    linear = linearized(
+        model,
+        speed,
+        axis,
+        center,
+        inputs=chosen(model, inputs, model.inputs),
+        outputs=chosen(model, outputs, model.outputs),
+    )
+    seconds = model.units.time
+    first, last = band_of(band, linear, seconds)
+    response = frequency_response(linear, resolved_frequencies(linear, first * seconds, last * seconds, n=points))
+    if kind == "csv":
+        replace_file(path, csv_of(response, seconds).encode())
+    else:
+        picture = io.BytesIO()
+        plot_frequency_response(response, time_unit=seconds).savefig(picture, format=kind, dpi=130)
+        replace_file(path, picture.getvalue())
+    print_peaks(response, seconds)
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def chosen(system: "System", texts: list[str], default: "tuple[AnyChannel, ...] | Any") -> "tuple[AnyChannel, ...]":
+    """Return the channels named on the command line, or those of the system."""
+    return tuple(channel_of(system, text) for text in texts) if texts else tuple(default)
+
+
+def channel_of(system: "System", text: str) -> "AnyChannel":
+    """Return a channel by the name of an input or output, "joint.coordinate" or "body/interface:component"."""
+    import numpy as np
+
+    from cms.words import nearest
+    from floatframe.analyses.channels import Channel, CoordinateChannel
+    from floatframe.errors import ModelError
+    from floatframe.markers import Marker
+
+    named = {channel.name: channel for channel in (*system.outputs, *system.inputs)}
+    if text in named:
+        return named[text]
+    joint, _, coordinate = text.rpartition(".")
+    coordinates = [f"{each.name}.{name}" for each in system.joints for name in each.coordinates]
+    if text in coordinates:
+        return CoordinateChannel(text, joint, coordinate)
+    place, _, component = text.rpartition(":")
+    body, _, interface = place.partition("/")
+    if not body or component not in COMPONENTS:
+        hint = nearest(text, [*named, *coordinates]) if "/" not in text and ":" not in text else ""
+        raise ModelError(
+            f"channel {text!r}: expected a name of [inputs] or [outputs], joint.coordinate, or "
+            f"body/interface:component (interfaces only of flexible bodies) with one of {', '.join(COMPONENTS)}{hint}"
+        )
+    index = COMPONENTS.index(component)
+    kind = "translation" if index < 3 else "rotation"
+    return Channel(text, Marker(body, interface or None), np.eye(3)[index % 3], kind)
+
+
+def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, float]:
+    """Return a band "from:to" in Hz; without, from a third of the lowest mode to three times the highest one."""
+    from floatframe.analyses import system_modes
+    from floatframe.errors import ModelError
+
+    if not text:
+        f = system_modes(linear).natural_frequencies / seconds
+        f = f[f > 0]
+        return (float(f.min()) / 3, float(f.max()) * 3) if len(f) else (0.1, 10.0)
+    try:
+        first, last = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise ModelError(f'--band {text}: expected "from:to" in Hz, such as 1:500') from None
+    return first, last
+
+
+def print_peaks(response: "FrequencyResponse", seconds: float) -> None:
+    """Print the greatest amplitude of each response and where it is."""
+    rows = []
+    for o, out in enumerate(response.outputs):
+        for i, name in enumerate(response.inputs):
+            size = response.amplitudes[:, o, i]
+            k = int(size.argmax())
+            rows.append((f"{out} / {name}", response.units[o][i], f"{size[0]:.4g}", f"{size[k]:.4g}",
+                         f"{response.frequencies[k] / seconds:.6g}"))  # fmt: skip
+    low = response.frequencies[0] / seconds
+    print_table("Responses", ("output / input", "unit", f"at {low:.3g} Hz>", "greatest>", "at Hz>"), rows)
+
+
+def csv_of(response: "FrequencyResponse", seconds: float) -> str:
+    """Return frequencies in Hz, amplitudes and phases in degrees as comma-separated values."""
+    import csv
+    import io
+
+    pairs = [(o, i) for o in range(len(response.outputs)) for i in range(len(response.inputs))]
+    names = [f"{response.outputs[o]} / {response.inputs[i]}" for o, i in pairs]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    heads = [
+        head
+        for name, (o, i) in zip(names, pairs, strict=True)
+        for head in (f"{name} amplitude [{response.units[o][i]}]", f"{name} phase [degrees]")
+    ]
+    writer.writerow(["frequency [Hz]", *heads])
+    amplitudes, phases = response.amplitudes, response.phases
+    for k, f in enumerate(response.frequencies / seconds):
+        row = [value for o, i in pairs for value in (amplitudes[k, o, i], phases[k, o, i])]
+        writer.writerow([repr(float(f)), *(repr(float(value)) for value in row)])
+    return text.getvalue()
+
+
+def npz_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
+    """Return an .npz file."""
+    import io
+
+    import numpy as np
+
+    data = io.BytesIO()
+    np.savez(data, **arrays, **{name: np.array(texts, dtype=str) for name, texts in words.items()})
+    return data.getvalue()
+
+
+def mat_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
+    """Return a .mat file (MATLAB 5): matrices, and cell arrays of texts."""
+    import io
+
+    import numpy as np
+    from scipy.io import savemat
+
+    cells = {name: np.array([*texts, ""], dtype=object)[:-1] for name, texts in words.items()}
+    data = io.BytesIO()
+    savemat(data, {**{name: np.array(array) for name, array in arrays.items()}, **cells})
+    return data.getvalue()
+
+
+def h5_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
+    """Return an HDF5 file: matrices as datasets, names and units as attributes of the root."""
+    import io
+
+    import h5py
+
+    data = io.BytesIO()
+    with h5py.File(data, "w") as file:
+        for name, array in arrays.items():
+            file.create_dataset(name, data=array)
+        for name, texts in words.items():
+            file.attrs[name] = list(texts) if texts else h5py.Empty("S1")
+    return data.getvalue()
+
+
+WRITERS: dict[str, Callable[[dict[str, Any], dict[str, Any]], bytes]] = {
+    ".npz": npz_bytes,
+    ".mat": mat_bytes,
+    ".h5": h5_bytes,
+}
