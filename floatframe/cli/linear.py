@@ -232,7 +232,8 @@ def npz_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
     import numpy as np
 
     data = io.BytesIO()
-    np.savez(data, **arrays, **{name: np.array(texts, dtype=str) for name, texts in words.items()})
+    named: dict[str, Any] = {name: np.array(texts, dtype=str) for name, texts in words.items()}
+    np.savez(data, **arrays, **named)
     return data.getvalue()
 
 
