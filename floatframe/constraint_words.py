@@ -25,15 +25,17 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
         g = np.where(np.isin(kind, HELD), error[rows], 0.0)
         is_distance = np.isin(kind, HELD_DISTANCES)
         gap, angle = np.linalg.norm(g[is_distance]), np.linalg.norm(g[~is_distance])
-        words.append((gap / compiled.length + angle, f"joint {name!r} is open by {gap:.4g} and {angle:.4g} rad"))
+        kind_of_it = "joint" if name in compiled.joint_names else "coupler"
+        words.append((gap / compiled.length + angle, f"{kind_of_it} {name!r} is open by {gap:.4g} and {angle:.4g} rad"))
     words.sort(reverse=True)
     return ", ".join(text for size, text in words[:3] if size > 1e-9)
 
 
 def drive_name(compiled: CompiledSystem, row: int) -> str:
     """Return the drive of a row, in words."""
-    joint = int(np.searchsorted(compiled.model.c_w0, row, side="right")) - 1
-    return f"the drive of {compiled.coordinates[row]!r} of joint {compiled.joint_names[joint]!r}"
+    if not compiled.coordinates[row]:
+        return f"the motion of coupler {compiled.owners[row]!r}"
+    return f"the drive of {compiled.coordinates[row]!r} of joint {compiled.owners[row]!r}"
 
 
 def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> str:

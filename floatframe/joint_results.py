@@ -74,7 +74,9 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
         E, Z = b.axes @ axis, b.axes @ row.z
         D = a.axes @ (row.x if row.kind == GAUGE_B else row.y)
         angle = -np.unwrap(np.arctan2(dot(np.cross(E, Z), D), dot(Z, D)))
-        return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), -dot(w[:, MOMENT : MOMENT + 3], E))
+        return CoordinateMotion(
+            a.t, angle, dot(E, b.omega - a.omega), -dot(w[:, MOMENT : MOMENT + 3], E), is_angle=True
+        )
     is_angle = row.kind == TURN or (row.kind != SLIDE and bool(np.any(row.z)))
     if not is_angle:
         E = a.axes @ row.x
@@ -100,7 +102,7 @@ def screw_motion(
         return CoordinateMotion(a.t, dot(E, d), dot(E, slip), torque / slope)
     Z, D = a.axes @ row.z, b.axes @ row.y
     angle = np.unwrap(np.arctan2(dot(np.cross(E, Z), D), dot(Z, D)))
-    return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), torque)
+    return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), torque, is_angle=True)
 
 
 def dot(x: Array, y: Array) -> Array:

@@ -148,7 +148,7 @@ def channel_units(system: System, channel: AnyChannel) -> tuple[str, str]:
     if isinstance(channel, Channel):
         is_angle = channel.quantity == "rotation"
     else:
-        is_angle = channel.coordinate == "angle"
+        is_angle = channel.coordinate.startswith("angle")
     per_time = ("", f"/{units.time_symbol}", f"/{units.time_symbol}²")[channel.rate]
     force = f"{units.force_symbol} {units.length_symbol}" if is_angle else units.force_symbol
     return ("rad" if is_angle else units.length_symbol) + per_time, force

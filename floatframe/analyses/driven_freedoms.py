@@ -95,9 +95,10 @@ class SingularityGuard:
         is_met = not is_square or values[-1] <= SINGULAR
         where = f"at t = {now.t:g}" if is_met else f"between t = {last_t:g} and {now.t:g}"
         holds = np.flatnonzero(np.isin(self.compiled.model.row_kind, HELD))[self.kept]
-        owner = np.searchsorted(self.compiled.model.c_w0, holds, side="right") - 1
+        owner = [self.compiled.owners[k] for k in holds]
         share = left[:, -1] ** 2
-        involved = [name for c, name in enumerate(self.compiled.joint_names) if share[owner == c].sum() > 0.02]
+        names = dict.fromkeys(owner)
+        involved = [name for name in names if sum(s for s, o in zip(share, owner, strict=True) if o == name) > 0.02]
         raise ConvergenceError(
             f"a singular position {where}: the constraints of joints {', '.join(repr(name) for name in involved)} "
             f"depend on each other there (smallest singular value {values[-1]:.2g}), so that the drives do not decide "

@@ -160,10 +160,9 @@ def rigid_equations(compiled: CompiledSystem, work: Work) -> RigidEquations:
         row = work.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)[:, :, :6]
         u = slice(6 * i, 6 * i + 6)
         carried = model.m_sign[m] * (R @ column)
-        J[w0 : w0 + 3, u] += carried[0]
-        if model.m_moment[m] >= 0:
-            k = w0 + int(model.m_moment[m])
-            J[k : k + 3, u] += carried[1]
+        for part, place in ((0, int(model.m_force[m])), (1, int(model.m_moment[m]))):
+            if place >= 0:
+                J[w0 + place : w0 + place + 3, u] += carried[part]
         G[w0 : w0 + size, u] += work.P[m, :size] @ (R @ row).reshape(12, 6)
     for c, size in enumerate(model.c_size):
         w = slice(int(model.c_w0[c]), int(model.c_w0[c]) + int(size))

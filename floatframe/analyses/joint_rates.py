@@ -5,7 +5,8 @@ import numpy as np
 from cms.arrays import Array
 from floatframe.analyses.marker_jacobian import marker_jacobian
 from floatframe.compiled import CompiledSystem
-from floatframe.joints.rows import DISTANCE, SLIDE, TURN
+from floatframe.joints import ScrewJoint
+from floatframe.joints.rows import DISTANCE, GAUGE_B, SLIDE, TURN, TURN_B
 from floatframe.kernels.model import Work
 from floatframe.marker_data import joint_markers, marker_pose, n_q_of
 from floatframe.rotations import tilde
@@ -36,7 +37,7 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
         described = [row for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate]
         if not described:
             continue
-        (r_a, A_a), (r_b, _) = (marker_pose(end, state, n_q) for end in ends)
+        (r_a, A_a), (r_b, A_b) = (marker_pose(end, state, n_q) for end in ends)
         d = r_b - r_a
         J = np.zeros((2, 6, int(model.u0[-1])))  # of A and B: translation and rotation in ground axes
         for k, end in enumerate(ends):
@@ -48,6 +49,10 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
             is_angle = row.kind == TURN or (row.kind not in (SLIDE, DISTANCE) and bool(np.any(row.z)))
             if row.kind == DISTANCE:
                 value = d / np.linalg.norm(d) @ slip
+            elif isinstance(joint, ScrewJoint):
+                value = A_a @ joint.axis @ (slip if row.coordinate == "distance" else turn)
+            elif row.kind in (GAUGE_B, TURN_B):
+                value = A_b @ (row.y if row.kind == GAUGE_B else np.cross(row.x, row.z)) @ turn
             elif is_angle:
                 value = A_a @ (np.cross(row.x, row.z) if row.kind == TURN else row.x) @ turn
             else:

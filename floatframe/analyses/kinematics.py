@@ -21,6 +21,7 @@ from floatframe.errors import ConvergenceError, ModelError
 from floatframe.freedoms import constraint_mobility
 from floatframe.initial import assembled, checked
 from floatframe.integration import head_of, joint_rows
+from floatframe.joints.rows import HELD_VELOCITIES
 from floatframe.kernels.model import Rows, Work, new_work
 from floatframe.linearization import displaced
 from floatframe.results import MemorySource, ResultsWriter
@@ -131,6 +132,12 @@ def kinematics(
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:
     """Return the motion at the first time; `ModelError` unless the drives decide all of it."""
     compiled = system.compiled
+    rolling = np.flatnonzero(np.isin(compiled.model.row_kind, HELD_VELOCITIES))
+    if len(rolling):
+        raise ModelError(
+            f"kinematics: joint {compiled.owners[rolling[0]]!r} rolls: it holds velocities, and where that leads "
+            "follows by integration only; integrate the motion"
+        )
     state = assembled(compiled, work, state)
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:

@@ -9,14 +9,23 @@ from numpy.testing import assert_allclose
 from floatframe import (
     GROUND,
     ConvergenceError,
+    CoordinateCoupler,
+    CylindricalJoint,
+    DistanceJoint,
     FlexibleBody,
     GeneralizedAlpha,
     Gravity,
+    JointCoordinate,
     Marker,
     ModelError,
+    PointOnPlane,
     RevoluteJoint,
     RigidBody,
+    RollingDisc,
+    ScrewJoint,
     System,
+    UniversalJoint,
+    consistent_state,
     frozen_bodies,
     integrate,
     joint_coordinate,
@@ -26,8 +35,13 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
+from floatframe.analyses.joint_rates import coordinate_rows
+from floatframe.analyses.snapshot import snapshot
 from floatframe.joint_results import joint_coordinates
+from floatframe.kernels.model import new_work
+from floatframe.linearization import set_iterate
 from floatframe.mechanisms import double_pendulum, four_bar, slider_crank
+from floatframe.rotations import rotation_matrix
 from floatframe.time_functions import constant, harmonic, polynomial_of_time
 from tests.floatframe.bodies import random_point_masses, reduced_body, stiffness
 from tests.floatframe.test_bad_input import parallelogram
@@ -205,3 +219,48 @@ def test_results_in_a_file_are_those_in_memory(tmp_path):
 def test_impossible_times_are_refused(times):
     with pytest.raises(ModelError, match="two or more rising numbers"):
         kinematics(CRANK, times)
+
+
+@pytest.mark.parametrize(
+    "joint",
+    [
+        UniversalJoint("j", GROUND, Marker("body"), axis=(1, 0, 0), axis_b=(0, 1, 0)),
+        ScrewJoint("j", GROUND, Marker("body"), axis=(0, 0, 1), lead=0.3),
+        CylindricalJoint("j", GROUND, Marker("body"), axis=(0.6, 0, 0.8)),
+        DistanceJoint("j", Marker(GROUND), Marker("body", position=(1, 2, 0.5)), 2.0),
+        PointOnPlane("j", GROUND, Marker("body"), axis=(0, 0, 1)),
+    ],
+)
+def test_rates_of_joint_coordinates_are_those_of_the_motion(joint):
+    body = RigidBody("body", 1.0, np.eye(3), omega_B=(0.3, 0.4, 0.5), velocity=(0.1, -0.2, 0.3))
+    system = System([body], [joint])
+    found = consistent_state(system)
+    motion = snapshot(system, found.state, found.u_dot, found.w)
+    work = new_work(system.compiled.model)
+    set_iterate(work, found.state)
+    rows = coordinate_rows(system, system.compiled, work, found.state)
+    R = rotation_matrix(found.state.p[0])
+    u = np.concatenate([R.T @ found.state.u[:3], found.state.u[3:]])
+    assert set(rows) == {f"j.{name}" for name in joint.coordinates}
+    for name, row in rows.items():
+        assert_allclose(row @ u, joint_coordinates(system, motion)[name].rate[0], rtol=0, atol=1e-12)
+
+
+def test_gears_pass_the_motion_of_a_drive_on():
+    wheels = [RigidBody(f"wheel {k}", 1.0, np.eye(3), position=(k, 0, 0)) for k in (1, 2)]
+    hinges = [RevoluteJoint("one", GROUND, Marker("wheel 1"), motions={"angle": harmonic(1.0, 2.0)}),
+              RevoluteJoint("two", Marker(GROUND, position=(2, 0, 0)), Marker("wheel 2"))]  # fmt: skip
+    gear = CoordinateCoupler("gear", [(JointCoordinate("one", "angle"), 20.0), (JointCoordinate("two", "angle"), 50.0)])
+    with pytest.raises(ModelError, match=r"'two.angle' is free"):
+        kinematics(System(wheels, hinges), [0.0, 1.0])
+    system = System(wheels, hinges, couplers=[gear])
+    motion = kinematics(system, np.linspace(0, 2, 9))
+    one, two = (joint_coordinate(system, motion, name, "angle") for name in ("one", "two"))
+    assert_allclose(two.value, -0.4 * one.value, rtol=0, atol=1e-11)
+    assert_allclose(one.force, -(1 + 0.4**2) * 4.0 * np.sin(2 * motion.t), rtol=0, atol=1e-11)
+
+
+def test_rolling_is_refused():
+    disc = RigidBody("disc", 1.0, np.eye(3), position=(0, 0, 1.0))
+    with pytest.raises(ModelError, match="joint 'roll' rolls: it holds velocities"):
+        kinematics(System([disc], [RollingDisc("roll", GROUND, Marker("disc"), radius=1.0)]), [0.0, 1.0])
