@@ -63,7 +63,13 @@ from .initial import mobility as mobility
 from .integration import Progress as Progress
 from .integration import integrate as integrate
 from .integration import resume as resume
+from .integrators import EnergyDecaying as EnergyDecaying
+from .integrators import EnergyMomentum as EnergyMomentum
 from .integrators import GeneralizedAlpha as GeneralizedAlpha
+from .integrators import Variational as Variational
+from .integrators import hht as hht
+from .integrators import newmark as newmark
+from .integrators import trapezoidal as trapezoidal
 from .joint_results import joint_coordinate as joint_coordinate
 from .joint_results import joint_coordinates as joint_coordinates
 from .joints import ConstantOrientation as ConstantOrientation

@@ -4,7 +4,7 @@ import logging
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.metadata import PackageNotFoundError, version
 from math import ceil
 from pathlib import Path
@@ -14,7 +14,8 @@ import numpy as np
 from floatframe.arrays import number
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.flexible_body import FlexibleBody
-from floatframe.integrators.generalized_alpha import Carry, GeneralizedAlpha
+from floatframe.integrators import CLASSES
+from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.model import Rows, new_work
 from floatframe.recorded_system import file_digest
 from floatframe.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
@@ -53,11 +54,12 @@ class Progress:
     n_total: int
     n_iterations: int  #: of Newton's method, so far
     notes: tuple[ValidityNote, ...] = ()  #: bodies that left the range of their linear frame, so far
+    n_rejected: int = 0  #: steps that were tried in vain, so far
 
 
 def integrate(
     system: System,
-    integrator: GeneralizedAlpha,
+    integrator: Integrator,
     t_end: float,
     h: float,
     *,
@@ -79,7 +81,8 @@ def integrate(
     t_end
         End time [s].
     h
-        Step size [s]; made smaller by less than one step in the whole run where it does not divide it.
+        Step size [s], or distance of outputs and largest step where the integrator controls its step; made smaller by
+        less than one step in the whole run where it does not divide it.
     t_start
         Time at the beginning [s].
     state
@@ -130,7 +133,7 @@ def integrate(
     run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer)
     run.keep(rows)
     if writer is not None:
-        writer.close_segment(restart_record(carry, 0))
+        writer.close_segment(run.record(carry, 0))
     return run.advance(carry, 0, batch_steps, progress)
 
 
@@ -160,7 +163,10 @@ def resume(
     """
     head, record = last_restart(output)
     run = dict(head.run)
-    integrator = GeneralizedAlpha(**{part.name: run[part.name] for part in fields(GeneralizedAlpha)})
+    kind = CLASSES.get(str(run["integrator"]))
+    if kind is None or any(part.name not in run for part in fields(kind)):
+        raise ResultsError(f"{output}: the interrupted run is of another version of this program; run it anew")
+    integrator = kind(**{part.name: run[part.name] for part in fields(kind)})
     if run.get("digest") != system_digest(system, integrator):
         raise ResultsError(
             f"{output}: the interrupted run was of another system than {system.name!r}, or it has changed since; "
@@ -174,7 +180,8 @@ def resume(
     n_total = round((run["t_end"] - run["t_start"]) / run["h"])
     again = Run(
         system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer,
-        notes_from_json(validity_text(writer.path)),
+        notes=notes_from_json(validity_text(writer.path)),
+        seconds_before=float(record.get("seconds", 0.0)),
     )  # fmt: skip
     return again.advance(carry, n_done, BATCH_STEPS, progress)
 
@@ -184,7 +191,7 @@ class Run:
     """One motion being computed, and where its results go."""
 
     system: System
-    integrator: GeneralizedAlpha
+    integrator: Integrator
     head: Head
     t_start: float
     t_end: float
@@ -194,6 +201,26 @@ class Run:
     writer: ResultsWriter | None
     notes: tuple[ValidityNote, ...] = ()  #: of the part that is done
     kept: list[Rows] = field(default_factory=list)
+    seconds_before: float = 0.0  #: that the run has taken before it was interrupted
+    began: float = field(default_factory=time.perf_counter)
+
+    @property
+    def seconds(self) -> float:
+        """Time the run has taken so far [s]."""
+        return self.seconds_before + time.perf_counter() - self.began
+
+    def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
+        """Return what is needed to go on from here."""
+        return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)}
+
+    def summary(self, carry: Carry) -> dict[str, float]:
+        """Return what the run took."""
+        return {
+            "n_steps": carry.n_steps,
+            "n_rejected": carry.n_rejected,
+            "n_iterations": carry.n_iterations,
+            "wall_time": self.seconds,
+        }
 
     def __post_init__(self) -> None:
         self.watch = ValidityWatch(self.system, self.notes)
@@ -221,7 +248,7 @@ class Run:
                 if n_done % RESTART_STEPS == 0:
                     work.factors[:] = 0.0  # made anew, as after a resumption
                     if self.writer is not None and n_done and time.monotonic() - closed > SEGMENT_SECONDS:
-                        self.writer.close_segment(restart_record(carry, n_done))
+                        self.writer.close_segment(self.record(carry, n_done))
                         closed = time.monotonic()
                 n_batch = min(batch_steps, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
                 carry, rows, n_good, failure = self.integrator.advance(
@@ -232,10 +259,11 @@ class Run:
                 self.keep(rows)
                 if progress is not None:
                     t = self.t_start + n_done * self.h
-                    progress(Progress(t, self.t_end, n_done, self.n_total, carry.n_iterations, self.watch.notes))
+                    counts = carry.n_iterations, self.watch.notes, carry.n_rejected
+                    progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
         except BaseException:
             if self.writer is not None:
-                self.writer.close_segment(restart_record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
+                self.writer.close_segment(self.record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
             raise
         if failure is not None:
             raise stopped(
@@ -249,9 +277,10 @@ class Run:
                 self.watch.notes,
             )
         if self.writer is None:
+            head = replace(self.head, summary=self.summary(carry))
             arrays = MemorySource(joint_rows(self.system, self.kept))
-            return Trajectory(self.head, arrays, is_complete=True, validity=self.watch.notes)
-        self.writer.finish()
+            return Trajectory(head, arrays, is_complete=True, validity=self.watch.notes)
+        self.writer.finish(self.summary(carry))
         return read_results(self.writer.path)
 
 
@@ -278,7 +307,7 @@ def joint_rows(system: System, kept: list[Rows]) -> dict[str, np.ndarray]:
     return arrays
 
 
-def head_of(system: System, integrator: GeneralizedAlpha, t_start: float, t_end: float, h: float, every: int) -> Head:
+def head_of(system: System, integrator: Integrator, t_start: float, t_end: float, h: float, every: int) -> Head:
     """Return the head of the results of a run."""
     compiled = system.compiled
     entries = []
@@ -301,7 +330,7 @@ def head_of(system: System, integrator: GeneralizedAlpha, t_start: float, t_end:
         release = "unknown"
     run = {
         "integrator": type(integrator).__name__,
-        **asdict(integrator),
+        **asdict(integrator),  # type: ignore[call-overload]
         "t_start": t_start,
         "t_end": t_end,
         "h": h,

@@ -7,12 +7,13 @@ anew, so that a resumed run takes the same steps as one that was never interrupt
 import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
 from cms.arrays import Array
 from floatframe.errors import ResultsError
-from floatframe.integrators.generalized_alpha import Carry, GeneralizedAlpha
+from floatframe.integrators.carry import Carry, Integrator
 from floatframe.state import State
 from floatframe.system import System
 
@@ -21,6 +22,8 @@ __all__ = ["RESTART_STEPS", "carry_of_record", "restart_record", "system_digest"
 RESTART_STEPS = 200
 STATE = ("r", "p", "q", "u")
 ARRAYS = ("u_dot", "a", "w", "work", "power")
+STEPS = ("h", "h_next")
+COUNTS = ("n_iterations", "n_steps", "n_rejected")
 
 
 def restart_record(carry: Carry, n_done: int) -> dict[str, Array]:
@@ -28,8 +31,7 @@ def restart_record(carry: Carry, n_done: int) -> dict[str, Array]:
     record = {name: np.asarray(getattr(carry.state, name)) for name in STATE}
     record |= {name: np.asarray(getattr(carry, name)) for name in ARRAYS}
     return record | {
-        "h": np.array(carry.h),
-        "n_iterations": np.array(carry.n_iterations),
+        **{name: np.array(getattr(carry, name)) for name in STEPS + COUNTS},
         "n_done": np.array(n_done),
     }
 
@@ -40,18 +42,15 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
     for name in STATE:
         if name not in record or record[name].shape != getattr(placed, name).shape:
             raise ResultsError("restart: the record is of a system with other bodies; resume the system that was run")
-    carry = Carry(
-        State(*(np.asarray(record[name], dtype=float) for name in STATE)),
-        h=float(record["h"]),
-        n_iterations=int(record["n_iterations"]),
-        **{name: np.asarray(record[name], dtype=float) for name in ARRAYS},
-    )
+    values: dict[str, Any] = {name: np.asarray(record[name], dtype=float) for name in ARRAYS}
+    values |= {name: float(record[name]) for name in STEPS} | {name: int(record[name]) for name in COUNTS}
+    carry = Carry(State(*(np.asarray(record[name], dtype=float) for name in STATE)), **values)
     return carry, int(record["n_done"])
 
 
-def system_digest(system: System, integrator: GeneralizedAlpha) -> str:
+def system_digest(system: System, integrator: Integrator) -> str:
     """Return the sha256 of everything the motion follows from: compiled system, its start, method and parameters."""
-    digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())
+    digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())  # type: ignore[call-overload]
     compiled = system.compiled
     parts = [*compiled.model, *(getattr(compiled.placed, name) for name in STATE)]
     for part in parts:

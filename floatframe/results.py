@@ -9,7 +9,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -80,6 +80,8 @@ class Head:
     springs: tuple[str, ...]
     w0: tuple[int, ...]  #: first column in w of each connection (joints, then springs), and the end
     run: Mapping[str, Any]  #: integrator and its parameters, h, t_end, version
+    #: of a run that has ended: n_steps, n_rejected, n_iterations (of Newton's method), wall_time [s]
+    summary: Mapping[str, Any] = field(default_factory=dict)
 
 
 class ArraySource(Protocol):
@@ -200,10 +202,11 @@ class ResultsWriter:
         self.n_segments += 1
         self.open_rows = []
 
-    def finish(self) -> None:
-        """Join the segments into the results file and remove them."""
+    def finish(self, summary: Mapping[str, Any] | None = None) -> None:
+        """Join the segments into the results file, with the summary of the run, and remove them."""
         self.close_segment()
         _, source = open_segments(self.folder)
+        self.head = replace(self.head, summary=summary or {})
 
         def fill(file: h5py.File) -> None:
             write_head(file, self.head, is_complete=True)

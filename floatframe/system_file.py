@@ -11,7 +11,7 @@ All of them raise `FloatframeError`, whose text is one message for the user.
 import logging
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -45,13 +45,13 @@ from floatframe.forces import (
 from floatframe.forces.bushing import DEFORMATIONS
 from floatframe.forces.sphere_contact import DISSIPATIONS
 from floatframe.ground import GROUND
-from floatframe.integrators import GeneralizedAlpha
 from floatframe.joints import JOINTS, Joint
 from floatframe.markers import Place
 from floatframe.motion_section import MotionSection
 from floatframe.place_key import PlaceOnBody
 from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.run_section import RunOptions, RunSection
 from floatframe.sensor_section import SensorSection
 from floatframe.system import REDUNDANT, Body, System
 from floatframe.unit_hints import unit_hints
@@ -308,22 +308,6 @@ class CouplerSection(Table):
     )
 
 
-class RunSection(Table):
-    """[run]: how the motion is computed."""
-
-    t_end: Positive = Field(description="a number above 0, the end time")
-    h: Positive = Field(description="a number above 0, the step size")
-    rho_inf: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.8, description="a number between 0 and 1, the spectral radius at infinite frequency"
-    )
-    output_every: Annotated[int, Field(ge=1)] = Field(
-        1, description="a whole number above 0: results are written after every so many steps"
-    )
-    tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
-        GeneralizedAlpha.tolerance, description="a number between 0 and 1, the tolerance of Newton's method"
-    )
-
-
 class SystemFile(Table):
     """A system and its run."""
 
@@ -350,22 +334,6 @@ class SystemFile(Table):
                         hint = nearest(body, choices)
                         raise ValueError(f'{kind}.{name}.{key} = "{body}": there is no such body{hint}')
         return self
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """What the table [run] asks for."""
-
-    t_end: float
-    h: float
-    rho_inf: float
-    output_every: int
-    tolerance: float
-
-    @property
-    def integrator(self) -> GeneralizedAlpha:
-        """The integrator with these parameters."""
-        return GeneralizedAlpha(rho_inf=self.rho_inf, tolerance=self.tolerance)
 
 
 def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> tuple[System, RunOptions]:
@@ -408,7 +376,7 @@ def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None 
             log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:
         raise SystemFileError(f"{path}: {error}") from error
-    return system, RunOptions(**data.run.model_dump())
+    return system, data.run.options()
 
 
 def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody], units: Units) -> Body:

@@ -42,7 +42,7 @@ def observed_state(
     work.time[0] = t
     memory = Memory(
         state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), np.array(u_dot), np.array(u_dot), np.array(w),
-        np.zeros(2), np.zeros(2),
+        np.zeros(2), np.zeros(2), np.zeros(4),
     )  # fmt: skip
     rows = observe_state(compiled.model, work, memory, t)
     return rows, memory.power.copy()

@@ -78,15 +78,12 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
     """Run a motion with a progress bar; print what it is, or where the part of it is that an interruption left."""
     from floatframe.results import SEGMENTS
 
-    last: list[Any] = []
-    began = time.perf_counter()
     try:
         with stages(remaining=True) as clock:
             load_kernels(clock)
             with clock(f"{name}: motion") as advance:
 
                 def on_progress(progress: "Progress") -> None:
-                    last[:] = [progress]
                     advance(progress.n_steps / progress.n_total)
 
                 trajectory = run(on_progress)
@@ -95,7 +92,7 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
         kept = f"the motion so far is in {segments}, which plot, animate and info can read; floatframe resume goes on"
         print_error(f"interrupted; {kept if segments.is_dir() else 'nothing was written'}")
         raise typer.Exit(INTERRUPTED) from None
-    print_run(trajectory, last[0] if last else None, time.perf_counter() - began)
+    print_run(trajectory)
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
@@ -111,8 +108,8 @@ def load_kernels(clock: "Stages") -> None:
         typer.echo(f"note: compiled the code of the motion in {seconds:.0f} s; later runs find it ready", err=True)
 
 
-def print_run(trajectory: "Trajectory", progress: Any, seconds: float | None) -> None:
-    """Print what a motion is and how good; numbers of the computation where it was done just now."""
+def print_run(trajectory: "Trajectory") -> None:
+    """Print what a motion is, what it took, and how good it is."""
     from floatframe.cli.record import run_record
 
     record = run_record(trajectory, known_system(trajectory))
@@ -131,11 +128,14 @@ def print_run(trajectory: "Trajectory", progress: Any, seconds: float | None) ->
     ]
     if not record["is_complete"]:
         rows.append(("note", f"this run did not reach its end, {run.get('t_end', 0):.6g} {second}"))
-    if progress is not None:
-        each = progress.n_iterations / max(progress.n_steps, 1)
-        rows.append(("Newton iterations", f"{progress.n_iterations} ({each:.2f} a step)"))
-    if seconds is not None:
-        rows.append(("wall time", f"{seconds:.2f} s"))
+    summary = record["summary"]
+    if summary.get("n_rejected"):
+        rows.append(("rejected steps", f"{summary['n_rejected']}, made again, shorter"))
+    if "n_iterations" in summary:
+        each = summary["n_iterations"] / max(summary["n_steps"], 1)
+        rows.append(("Newton iterations", f"{summary['n_iterations']} ({each:.2f} a step)"))
+    if "wall_time" in summary:
+        rows.append(("wall time", f"{summary['wall_time']:.2f} s"))
     rows.append(("energy defect", f"{record['energy_defect']:.2e} of {record['energy_scale']:.6g} {energy}"))
     print_table("Run", ("", ""), rows)
     print_table(
@@ -203,7 +203,7 @@ def integrator_words(run: dict[str, Any]) -> str:
         "system_file",
         "system_file_digest",
     }
-    options = ", ".join(f"{key} = {value}" for key, value in run.items() if key not in known)
+    options = ", ".join(f"{key} = {value}" for key, value in run.items() if key not in known and value is not None)
     return f"{run.get('integrator', '')} ({options})"
 
 
@@ -231,7 +231,7 @@ def info_command(
         record = run_record(trajectory, known_system(trajectory))
         typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))
         return
-    print_run(trajectory, None, None)
+    print_run(trajectory)
 
 
 def print_mobility(path: Path, *, as_json: bool) -> None:

@@ -1,7 +1,34 @@
 """Integrators: one file each; frozen, with `start` and `step` and all memory in a carry; `integrate` owns the loop."""
 
-from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from collections.abc import Callable
 
-__all__ = ["INTEGRATORS", "GeneralizedAlpha"]
+from floatframe.integrators.carry import Integrator
+from floatframe.integrators.energy_momentum import EnergyDecaying, EnergyMomentum
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
+from floatframe.integrators.variational import Variational
 
-INTEGRATORS = {"generalized-alpha": GeneralizedAlpha}
+__all__ = [
+    "CLASSES",
+    "INTEGRATORS",
+    "EnergyDecaying",
+    "EnergyMomentum",
+    "GeneralizedAlpha",
+    "Variational",
+    "hht",
+    "newmark",
+    "trapezoidal",
+]
+
+#: schemes by the name they have in a system file
+INTEGRATORS: dict[str, Callable[..., Integrator]] = {
+    "generalized-alpha": GeneralizedAlpha,
+    "hht": hht,
+    "newmark": newmark,
+    "trapezoidal": trapezoidal,
+    "energy-momentum": EnergyMomentum,
+    "energy-decaying": EnergyDecaying,
+    "variational": Variational,
+}
+
+#: their classes, by the name in a results file
+CLASSES = {cls.__name__: cls for cls in (GeneralizedAlpha, EnergyMomentum, EnergyDecaying, Variational)}

@@ -1,41 +1,24 @@
 """The generalized-alpha method for constrained motion on R³ × SO(3) × Rⁿ."""
 
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
 from cms.arrays import Array
+from floatframe.compiled import CompiledSystem
 from floatframe.constraint_words import open_joints
 from floatframe.errors import ModelError
 from floatframe.initial import acceleration_rates, consistent_state, velocity_correction
-from floatframe.kernels.model import MASS, STIFFNESS, Memory, Model, Rows, Work, new_rows, new_work
+from floatframe.integrators.carry import Carry, Failure, memory_of, observed
+from floatframe.kernels.model import MASS, STIFFNESS, Model, Rows, Work, new_rows, new_work
 from floatframe.linearization import displaced, modal_diagonals
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["Carry", "Failure", "GeneralizedAlpha"]
+__all__ = ["GeneralizedAlpha", "hht", "newmark", "trapezoidal"]
 
-
-@dataclass(frozen=True, eq=False)
-class Carry:
-    """All that generalized-alpha remembers between steps."""
-
-    state: State
-    u_dot: Array  #: accelerations, (n_u,)
-    a: Array  #: algorithmic accelerations, (n_u,); for h = 0 (at the start) the rates of u_dot
-    h: float  #: step size to which `a` belongs; 0 at the start
-    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
-    work: Array  #: of point forces; taken by dampers and modal damping, (2,)
-    power: Array  #: their rates, (2,)
-    n_iterations: int = 0  #: of Newton's method so far
-
-
-@dataclass(frozen=True)
-class Failure:
-    """Why a step could not be made."""
-
-    words: str
-    residual: float  #: last correction over the allowed one
+LEAST_STEP = 1e-6  #: of the largest, where the step is controlled and no least one is given
 
 
 @dataclass(frozen=True)
@@ -53,10 +36,24 @@ class GeneralizedAlpha:
     velocities by O(h²) such that the first step closes the joints without a kick; without both, reactions begin with
     an error of first order.
 
+    Energy: in linear systems no mode gains any, and modes that h does not resolve lose all but rho_inf of their
+    amplitude in a step; in nonlinear ones its error is of second order.
+
+    With `error_tolerance` the step follows the motion. The position x of (2) and the exact one differ by [3]_
+
+        e = (gamma/2 - beta - 1/12) h² (a_new - a) + O(h⁴),
+
+    because a = u_dot + (1/2 - gamma) h u_ddot to first order, so that x has h³ u_ddot ((1/2 - gamma)/2 + beta) in the
+    place of h³ u_ddot / 6. A step whose e, as root mean square over the mass, divided by the size of the system, is
+    above the tolerance, or in which Newton's method fails, is tried again, shorter. The `h` of `integrate` is then the
+    distance of output times and the longest step; output times are met exactly, by equal steps from one to the next.
+
     References
     ----------
     .. [1] Arnold & Bruels (2007), Multibody System Dynamics 18, 185-202.
     .. [2] Bruels & Cardona (2010), Journal of Computational and Nonlinear Dynamics 5, 031002.
+    .. [3] The estimate of Zienkiewicz & Xie (1991), Earthquake Engineering & Structural Dynamics 20, 871-887, which
+       Negrut et al. carry to the index-3 equations of HHT, for all parameters; derived above.
     """
 
     #: spectral radius at infinite frequency, 0 <= rho_inf <= 1; 1: no numerical damping, reactions of joints then
@@ -64,6 +61,11 @@ class GeneralizedAlpha:
     rho_inf: float = 0.8
     tolerance: float = 1e-8  #: largest last correction over the one that the accelerations of the step amount to
     max_iterations: int = 25
+    error_tolerance: float | None = None  #: largest local error of a step over the size of the system; None: fixed step
+    #: least step, to which one that fails is divided [s]; None: a millionth of h, and no division of fixed steps
+    h_min: float | None = None
+    #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf (see `newmark`, `hht`)
+    parameters: tuple[float, float, float, float] | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.rho_inf <= 1.0:
@@ -72,10 +74,23 @@ class GeneralizedAlpha:
             raise ModelError(f"GeneralizedAlpha: tolerance: expected 0 < tolerance < 1, got {self.tolerance}")
         if self.max_iterations < 1:
             raise ModelError(f"GeneralizedAlpha: max_iterations: expected at least 1, got {self.max_iterations}")
+        for name in ("error_tolerance", "h_min"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < np.inf:
+                raise ModelError(f"GeneralizedAlpha: {name}: expected a number above 0, or None, got {value}")
+        if self.parameters is not None:
+            object.__setattr__(self, "parameters", tuple(float(x) for x in self.parameters))
+            if len(self.parameters) != 4 or not self.parameters[2] > 0 or max(self.parameters[:2]) >= 1:
+                raise ModelError(
+                    "GeneralizedAlpha: parameters: expected (alpha_m, alpha_f, beta, gamma) with alpha_m and alpha_f "
+                    f"below 1 and beta above 0, got {self.parameters}"
+                )
 
     @property
     def coefficients(self) -> tuple[float, float, float, float]:
         """alpha_m, alpha_f, beta, gamma."""
+        if self.parameters is not None:
+            return self.parameters
         rho = self.rho_inf
         alpha_m, alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
         gamma = 0.5 + alpha_f - alpha_m
@@ -106,24 +121,15 @@ class GeneralizedAlpha:
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the results at the carried state; the carry learns the power at it."""
-        from floatframe.kernels.entry import observe_state
-
-        memory = memory_of(carry)
-        rows = observe_state(system.compiled.model, work, memory, t)
-        return replace(carry, power=memory.power), rows
+        power, rows = observed(system, t, carry, work)
+        return replace(carry, power=power), rows
 
     def advance(
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0.
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`.
 
         `work` holds the factors of the last Newton matrix, which serve until they are too old.
-
-        Returns
-        -------
-        tuple
-            The memory after the last good step; the rows of results after every `every`-th step; how many steps were
-            good; why the next was not, or None.
         """
         from floatframe.kernels.entry import advance_steps
 
@@ -147,20 +153,43 @@ class GeneralizedAlpha:
             tolerance=self.tolerance,
             max_iterations=self.max_iterations,
             length=compiled.length,
+            most_error=self.error_tolerance or 0.0,
+            h_min=self.least_step(h),
         )
         after = Carry(
             State(memory.r, memory.p, memory.q, memory.u),
             memory.u_dot,
             memory.a,
-            h,
+            float(memory.step[0]),
             memory.w,
             memory.work,
             memory.power,
             carry.n_iterations + int(work.counts[2]) - iterations,
+            float(memory.step[1]),
+            int(memory.step[2]),
+            int(memory.step[3]),
         )
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
-        failure = None if outcome.status == 0 else self.explain(system, work, outcome)
+        failure = None if outcome.status == 0 else self.explain(system, work, outcome, self.least_step(h))
         return after, rows, outcome.n_steps, failure
+
+    def least_step(self, h: float) -> float:
+        """Return the least part into which a step of size h may be divided; 0 if it may not."""
+        if self.h_min is not None:
+            return min(self.h_min, h)
+        return 0.0 if self.error_tolerance is None else LEAST_STEP * h
+
+    def first_step(self, compiled: CompiledSystem, h: float, rates: Array) -> float:
+        """Return the size of the first step: what its estimated error allows, an equal part of h."""
+        if self.error_tolerance is None:
+            return h
+        model = compiled.model
+        _, _, beta, gamma = self.coefficients
+        weight, mass = mass_weights(model), model.mass[model.kind].sum()
+        resolved = rates / (1 + h**2 * squared_frequencies(model))
+        error = abs(gamma / 2 - beta - 1 / 12) * np.sqrt(weight @ resolved**2 / mass) / compiled.length
+        fitting = (self.error_tolerance / error) ** (1 / 3) if error > 0 else h
+        return h / ceil(h / max(0.5 * fitting, self.least_step(h), 1e-3 * h) * (1 - 1e-9))
 
     def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
         """Return the memory with its algorithmic accelerations for steps of size h.
@@ -168,22 +197,24 @@ class GeneralizedAlpha:
         At the start: a = u_dot + (alpha_m - alpha_f) h d(u_dot)/dt, where rates of modes that h does not resolve are
         left out smoothly, and the velocities are shifted. After a change of the step size: scaled likewise.
         """
-        if carry.h == h:
-            return carry
+        is_divided = self.least_step(h) > 0.0
+        if carry.h == h or (carry.h != 0.0 and is_divided):
+            return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
         if carry.h != 0.0:
-            return replace(carry, a=carry.u_dot + h / carry.h * (carry.a - carry.u_dot), h=h)
+            return replace(carry, a=carry.u_dot + h / carry.h * (carry.a - carry.u_dot), h=h, h_next=h)
         compiled = system.compiled
+        h = self.first_step(compiled, h, carry.a)
         alpha_m, alpha_f, beta, _ = self.coefficients
         rates = carry.a / (1 + h**2 * squared_frequencies(compiled.model))
         a = carry.u_dot + (alpha_m - alpha_f) * h * rates
         x = h * carry.state.u + h**2 * (0.5 * a + beta * h * rates)
         after = displaced(compiled.model, carry.state, x)
         shift = velocity_correction(compiled, carry.state, after, h, beta, t)
-        return replace(carry, state=replace(carry.state, u=carry.state.u + shift), a=a, h=h)
+        return replace(carry, state=replace(carry.state, u=carry.state.u + shift), a=a, h=h, h_next=h)
 
-    def explain(self, system: System, work: Work, outcome: tuple) -> Failure:
+    def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:
         """Say why a step failed."""
-        from floatframe.kernels.generalized_alpha import SINGULAR_BODY, SINGULAR_CONNECTION
+        from floatframe.kernels.generalized_alpha import INACCURATE, SINGULAR_BODY, SINGULAR_CONNECTION
 
         compiled = system.compiled
         status, _, _, index, excess = outcome
@@ -194,30 +225,79 @@ class GeneralizedAlpha:
         if status == SINGULAR_CONNECTION:
             name = compiled.connection_names[index]
             return Failure(f"the constraints of joint {name!r} depend on others here (a singular position)", excess)
+        if status == INACCURATE:
+            words = (
+                f"its error stays above error_tolerance = {self.error_tolerance} down to the least step, "
+                f"h_min = {least:.3g}; allow a larger error or a shorter step, or look for a jump in the motion"
+            )
+            return Failure(words, excess)
         words = f"Newton's method did not converge in {self.max_iterations} iterations"
         if np.isfinite(excess):
             words += f" (last correction {excess:.2g} times the allowed one)"
         gaps = open_joints(compiled, work.g)
         if gaps and np.isfinite(work.g).all():
             words += f"; {gaps}"
+        if least > 0:
+            words += f"; this was the least step, h_min = {least:.3g}"
         words += "; choose a smaller h, or look for a singular position, a drive out of reach or an error in the system"
         return Failure(words, excess)
 
 
-def memory_of(carry: Carry) -> Memory:
-    """Return a copy of the memory that the kernels may overwrite."""
-    state = carry.state
-    return Memory(
-        state.r.copy(),
-        state.p.copy(),
-        state.q.copy(),
-        state.u.copy(),
-        np.array(carry.u_dot),
-        np.array(carry.a),
-        np.array(carry.w),
-        np.array(carry.work),
-        np.array(carry.power),
-    )
+def newmark(beta: float = 0.25, gamma: float = 0.5, **options: float) -> GeneralizedAlpha:
+    """Return the method of Newmark [1]_: alpha_m = alpha_f = 0; second order for gamma = 1/2 alone.
+
+    Parameters
+    ----------
+    beta, gamma
+        Of positions and velocities: x = h u + h² ((1/2 - beta) a + beta a_new). beta >= gamma/2 >= 1/4 is stable for
+        every h in linear systems.
+    options
+        As of `GeneralizedAlpha`.
+
+    References
+    ----------
+    .. [1] Newmark (1959), Journal of the Engineering Mechanics Division 85, 67-94.
+    """
+    if not (np.isfinite(gamma) and np.isfinite(beta) and 2 * beta >= gamma >= 0.5):
+        raise ModelError(f"newmark: expected 2 beta >= gamma >= 1/2 (stable), got beta = {beta}, gamma = {gamma}")
+    return GeneralizedAlpha(parameters=(0.0, 0.0, beta, gamma), **options)  # type: ignore[arg-type]
+
+
+def trapezoidal(**options: float) -> GeneralizedAlpha:
+    """Return the trapezoidal rule, `newmark(1/4, 1/2)`: no numerical damping at all.
+
+    In linear systems without joints it keeps the energy; reactions of joints oscillate by O(h) for good.
+    """
+    return newmark(0.25, 0.5, **options)
+
+
+def hht(alpha: float = -0.1, **options: float) -> GeneralizedAlpha:
+    """Return the method of Hilber, Hughes and Taylor [1]_: alpha_m = 0, alpha_f = -alpha, second order.
+
+    Parameters
+    ----------
+    alpha
+        Numerical damping, -1/3 (most) to 0 (none: the trapezoidal rule).
+    options
+        As of `GeneralizedAlpha`.
+
+    References
+    ----------
+    .. [1] Hilber, Hughes & Taylor (1977), Earthquake Engineering & Structural Dynamics 5, 283-292.
+    """
+    if not -1 / 3 <= alpha <= 0:
+        raise ModelError(f"hht: alpha: expected -1/3 <= alpha <= 0, got {alpha}")
+    parameters = (0.0, -alpha, 0.25 * (1 - alpha) ** 2, 0.5 - alpha)
+    return GeneralizedAlpha(parameters=parameters, **options)  # type: ignore[arg-type]
+
+
+def mass_weights(model: Model) -> Array:
+    """Return mass, inertia and modal masses of all velocities, (n_u,)."""
+    result = np.zeros(int(model.u0[-1]))
+    for i, t in enumerate(model.kind):
+        parts = [np.full(3, model.mass[t]), np.diag(model.J0[t]), modal_diagonals(model, i, MASS)]
+        result[model.u0[i] : model.u0[i + 1]] = np.concatenate(parts)
+    return result
 
 
 def squared_frequencies(model: Model) -> Array:

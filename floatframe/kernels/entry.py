@@ -35,7 +35,7 @@ LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE = range(5)
 class Outcome(NamedTuple):
     """What an entry reports."""
 
-    status: int  #: DONE, DIVERGED, SINGULAR_BODY or SINGULAR_CONNECTION
+    status: int  #: DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION or INACCURATE
     n_steps: int  #: done
     n_rows: int  #: written
     singular: int  #: number of the body or connection that is
@@ -60,10 +60,12 @@ def make_entry(digest):
                 integers[0],
                 integers[1],
                 integers[2],
-                numbers[4:8],
+                numbers[6:10],
                 numbers[2],
                 integers[3],
                 numbers[3],
+                numbers[4],
+                numbers[5],
                 rows,
             )
         if what == OBSERVE:
@@ -128,7 +130,7 @@ def call(
 
 def no_memory() -> Memory:
     """Return an empty memory, for what needs none."""
-    return Memory(np.zeros((0, 3)), np.zeros((0, 4)), *(np.zeros(0) for _ in range(7)))
+    return Memory(np.zeros((0, 3)), np.zeros((0, 4)), *(np.zeros(0) for _ in range(8)))
 
 
 def evaluate_and_linearize(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> None:
@@ -172,8 +174,10 @@ def advance_steps(
     tolerance: float,
     max_iterations: int,
     length: float,
+    most_error: float,
+    h_min: float,
 ) -> Outcome:
     """Advance the memory by n_steps of the generalized-alpha method; see `kernels.generalized_alpha.advance`."""
-    numbers = np.array([t0, h, tolerance, length, *coefficients])
+    numbers = np.array([t0, h, tolerance, length, most_error, h_min, *coefficients])
     integers = np.array([first, n_steps, every, max_iterations], np.int64)
     return call(ADVANCE, model, work, memory, rows, numbers, integers, NO_OUT)

@@ -10,12 +10,16 @@ from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, 
 from floatframe.kernels.schur import correction, factorize_bodies
 from floatframe.kernels.step_start import begin_step
 
-__all__ = ["DIVERGED", "DONE", "SINGULAR_BODY", "SINGULAR_CONNECTION", "advance", "write_row"]
+__all__ = ["DIVERGED", "DONE", "INACCURATE", "SINGULAR_BODY", "SINGULAR_CONNECTION", "advance", "write_row"]
 
-DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION = 0, 1, 2, 3
+DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE = 0, 1, 2, 3, 4
 SLOW = 0.2  # ratio of corrections above which the factors are made anew
 MANY = 4  # iterations of a step after which the next one starts with new factors
 ROUNDOFF = 2e-15  # of a position
+H_OF_A, H_WANTED, N_ACCEPTED, N_REJECTED = range(4)  # places in `Memory.step`
+SAFETY = 0.9  # of the step that would just meet the error that is allowed
+LEAST, MOST, WORTH = 0.2, 2.0, 1.2  # a step becomes this much shorter, longer at most; longer only if by this much
+SAME = 1e-12  # relative difference of step sizes that are one
 
 
 @inner
@@ -137,10 +141,33 @@ def roundoff_floor(model, work, length):
 
 
 @inner
-def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length):
-    """Advance the memory by one step.
+def local_error(model, work, memory, h, coefficients, length):
+    """Return the estimated error of the increment of a step that has converged: rms over the mass, by the length."""
+    alpha_m, alpha_f, beta, gamma = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    total, mass = 0.0, 0.0
+    for i in range(model.kind.shape[0]):
+        t, u0, n = model.kind[i], model.u0[i], model.n_q[i]
+        mass += model.mass[t]
+        for k in range(6 + n):
+            mean = (1 - alpha_f) * work.u_dot[u0 + k] + alpha_f * memory.u_dot[u0 + k]
+            jump = (mean - alpha_m * memory.a[u0 + k]) / (1 - alpha_m) - memory.a[u0 + k]
+            if k < 3:
+                weight = model.mass[t]
+            elif k < 6:
+                weight = model.J0[t, k - 3, k - 3]
+            else:
+                step = 1 if model.is_diagonal[t, 0] else n + 1
+                weight = model.blocks[model.block0[t, MASS] + (k - 6) * step]
+            total += weight * jump * jump
+    factor = abs(0.5 * gamma - beta - 1.0 / 12.0) * h * h  # 1/6 - (1/2 - gamma)/2 - beta
+    return factor * math.sqrt(total / mass) / length
 
-    Return (status, index of what is singular, last correction by the allowed one).
+
+@inner
+def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length, most_error):
+    """Advance the memory by one step, unless its error by the allowed one is above `most_error`.
+
+    Return (status, index of what is singular, last correction by the allowed one, error; -1 if not estimated).
     """
     alpha_m, alpha_f, beta, gamma = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
     c_k = beta * h * h
@@ -164,30 +191,35 @@ def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, le
         if work.counts[3] == 1:
             body = factorize_bodies(model, work, c_m, c_d, c_k)
             if body >= 0:
-                return SINGULAR_BODY, body, excess
+                return SINGULAR_BODY, body, excess, -1.0
             work.factors[0], work.factors[1], work.factors[2] = c_m, c_d, c_k
             work.counts[3] = 0
             is_new = True
         connection = correction(model, work, c_k, is_new)
         if connection >= 0:
             work.counts[3] = 1
-            return SINGULAR_CONNECTION, connection, excess
+            return SINGULAR_CONNECTION, connection, excess, -1.0
         norm = math.sqrt(update(model, work, memory, c_d / c_k, c_m / c_k, c_k))
         work.counts[2] += 1
         if not math.isfinite(norm):
             work.counts[3] = 1
-            return DIVERGED, -1, math.inf
+            return DIVERGED, -1, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
         if norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2):
             if iteration >= MANY:
                 work.counts[3] = 1
+            error = -1.0
+            if most_error > 0.0:
+                error = local_error(model, work, memory, h, coefficients, length)
+                if not error <= most_error:
+                    return INACCURATE, -1, excess, error
             accept(model, work, memory, h, alpha_m, alpha_f)
-            return DONE, -1, excess
+            return DONE, -1, excess, error
         if norm > SLOW * last or iteration >= MANY:
             work.counts[3] = 1
         last = norm
     work.counts[3] = 1
-    return DIVERGED, -1, excess
+    return DIVERGED, -1, excess, -1.0
 
 
 @inner
@@ -234,19 +266,71 @@ def write_row(model, work, memory, t, rows):
 
 
 @inner
-def advance(model, work, memory, t0, h, first, n_steps, every, coefficients, tolerance, max_iterations, length, rows):
-    """Advance by n_steps, the first of them number `first` from t0; write a row after every `every`-th.
+def resize(memory, h):
+    """Turn the algorithmic accelerations into those of steps of size h: their distance from u_dot is of first order."""
+    ratio = h / memory.step[H_OF_A]
+    for k in range(memory.a.shape[0]):
+        memory.a[k] = memory.u_dot[k] + ratio * (memory.a[k] - memory.u_dot[k])
+    memory.step[H_OF_A] = h
+
+
+@inner
+def step_after(h, error, most_error, has_failed):
+    """Return the step to take after a good one of size h: local errors grow with its cube."""
+    if most_error <= 0.0:
+        return h if has_failed else MOST * h
+    fitting = MOST * h if error <= 0.0 else SAFETY * h * (most_error / error) ** (1.0 / 3.0)
+    if fitting >= h and (has_failed or fitting < WORTH * h):
+        return h
+    return min(max(fitting, LEAST * h), MOST * h)
+
+
+@inner
+def advance(
+    model, work, memory, t0, h, first, n_steps, every, coefficients, tolerance, max_iterations, length, most_error,
+    h_min, rows,
+):  # fmt: skip
+    """Advance by n_steps of size h, the first of them number `first` from t0; write a row after every `every`-th.
+
+    With h_min above 0 each of these is divided into equal parts of at most the size that is wanted: one that fails, or
+    whose error is above `most_error` (if above 0), is tried again, shorter, down to h_min; then parts grow again.
 
     Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
     """
-    put_weights(model, work, coefficients[2] * h * h)
+    put_weights(model, work, coefficients[2] * memory.step[H_OF_A] ** 2)
     work.counts[4] = 0
     excess = 0.0
     for k in range(n_steps):
-        work.time[0] = t0 + (first + k + 1) * h
-        status, index, excess = one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length)
-        if status != DONE:
-            return status, k, work.counts[4], index, excess
+        end = t0 + (first + k + 1) * h
+        left = h
+        has_failed = False
+        while left > 0.0:
+            n_parts = 1.0
+            if h_min > 0.0:
+                n_parts = max(1.0, math.ceil(left / memory.step[H_WANTED] * (1.0 - 1e-9)))
+            part = left / n_parts
+            if abs(part - memory.step[H_OF_A]) > SAME * part:
+                resize(memory, part)
+                put_weights(model, work, coefficients[2] * part * part)
+            work.time[0] = end - (left - part)
+            status, index, excess, error = one_step(
+                model, work, memory, memory.step[H_OF_A], coefficients, tolerance, max_iterations, length, most_error
+            )
+            if status == DONE:
+                memory.step[N_ACCEPTED] += 1.0
+                left = left - part if n_parts > 1.0 else 0.0
+                if h_min > 0.0:
+                    memory.step[H_WANTED] = min(step_after(part, error, most_error, has_failed), h)
+                has_failed = False
+                continue
+            if h_min <= 0.0 or part <= h_min:
+                return status, k, work.counts[4], index, excess
+            memory.step[N_REJECTED] += 1.0
+            shorter = 0.5 * part
+            if status == INACCURATE:
+                shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
+            memory.step[H_WANTED] = max(shorter, h_min)
+            has_failed = True
         if (first + k + 1) % every == 0:
-            write_row(model, work, memory, t0 + (first + k + 1) * h, rows)
+            write_row(model, work, memory, end, rows)
     return DONE, n_steps, work.counts[4], -1, excess

@@ -286,6 +286,7 @@ class Memory(NamedTuple):
     w: Array  #: (n_w,)
     work: Array  #: of point forces; taken by dampers and modal damping, (2,)
     power: Array  #: their rates, (2,)
+    step: Array  #: size to which `a` belongs, size wanted next, numbers of steps accepted and rejected, (4,)
 
 
 class Rows(NamedTuple):

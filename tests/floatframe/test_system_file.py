@@ -5,7 +5,18 @@ import pytest
 from numpy.testing import assert_allclose
 
 import cms
-from floatframe import FixedJoint, Gravity, PointForce, RevoluteJoint, SystemFileError, integrate
+from floatframe import (
+    FixedJoint,
+    GeneralizedAlpha,
+    Gravity,
+    PointForce,
+    RevoluteJoint,
+    SystemFileError,
+    hht,
+    integrate,
+    newmark,
+    trapezoidal,
+)
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.system_file import read_system
 from tests.floatframe.bodies import random_point_masses, reduced_body, stiffness
@@ -116,6 +127,8 @@ def test_file_becomes_the_system_it_describes(write):
         ("t_end = 0.05", "", "run.t_end: missing; expected a number above 0, the end time"),
         ("h = 1e-3", "h = 0", "run.h = 0: expected a number above 0"),
         ("rho_inf = 0.7", "rho_inf = 1.7", "run.rho_inf = 1.7"),
+        ("rho_inf = 0.7", 'scheme = "hth"', "run.scheme"),
+        ("rho_inf = 0.7", 'scheme = "hht"\nrho_inf = 0.7', "the scheme hht has no key rho_inf"),
         ("[system]", "[system", "not valid TOML"),
     ],
 )  # fmt: skip
@@ -289,3 +302,17 @@ def test_mistakes_in_joint_forces_are_answered(write, old, new, words):
     assert old in FORCES
     with pytest.raises(SystemFileError, match=words):
         read_system(write(("[run]", FORCES.replace(old, new))))
+
+
+@pytest.mark.parametrize(
+    ("keys", "integrator"),
+    [
+        ('scheme = "hht"\nalpha = -0.2\nerror_tolerance = 1e-6', hht(-0.2, error_tolerance=1e-6)),
+        ('scheme = "newmark"\nbeta = 0.3\ngamma = 0.6', newmark(0.3, 0.6)),
+        ('scheme = "trapezoidal"\ntolerance = 1e-9', trapezoidal(tolerance=1e-9)),
+        ("rho_inf = 0.6\nh_min = 1e-5\nmax_iterations = 9", GeneralizedAlpha(0.6, h_min=1e-5, max_iterations=9)),
+    ],
+)
+def test_run_names_its_scheme(write, keys, integrator):
+    _, run = read_system(write(("rho_inf = 0.7", keys)))
+    assert run.integrator == integrator

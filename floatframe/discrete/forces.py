@@ -1,0 +1,140 @@
+"""Forces over a step: loads whose work is the change of their potential, and what they give and take.
+
+Springs act by the discrete derivative of their potential (Gonzalez 1996), here in closed form: with the lengths l_0,
+l_1 at both ends, |d_1|² - |d_0|² = 2 d_mean·(d_1 - d_0), so that the tension k ((l_0 + l_1)/2 - l_free) along
+2 d_mean/(l_0 + l_1) does the work of the change of k (l - l_free)²/2 exactly. Rates are changes over the step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.discrete.bodies import BodyStep, CentralBody
+from floatframe.discrete.constraints import Loads, Pair, Span, angle_change, angle_loads, end_angle, slip_change
+from floatframe.discrete.functions import along_imaginary, value_of
+from floatframe.discrete.markers import Load, MarkerStep
+from floatframe.discrete.rotation import cross, dot, turned
+from floatframe.joints.rows import PUSH, TWIST
+from floatframe.kernels.model import Model
+
+__all__ = ["Given", "body_load", "coordinate_load", "point_load", "spring_load"]
+
+SPRING, FREE, DAMPER, PRELOAD, FRICTION, COEFFICIENT, SPEED = range(7)  #: columns of `Model.joint_forces`
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Work of a force over a step."""
+
+    given: Array | float = 0.0  #: that enters the system
+    taken: Array | float = 0.0  #: that a damper or friction takes
+
+
+def spring_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> Given:
+    """Add the loads of spring-damper c."""
+    a, b = pair
+    s = int(model.c_spring[c])
+    k, damping, free, preload = model.springs[s]
+    d_0, d_1, dd = b.x_0 - a.x_0, b.x_1 - a.x_1, b.dx - a.dx
+    d = 0.5 * (d_0 + d_1)
+    if k != 0 and free == 0 and damping == 0 and preload == 0 and model.spring_table[s] < 0:
+        add_pair(pair, loads, -k * d)  # through length zero
+        return Given()
+    both = np.sqrt(dot(d_0, d_0)) + np.sqrt(dot(d_1, d_1))
+    change = 2 * dot(d, dd) / both
+    tension = k * (0.5 * both - free) + preload + damping * change / span.h
+    given = np.zeros(np.shape(change), change.dtype)
+    if model.spring_table[s] >= 0:
+        by_table = along_imaginary(model, int(model.spring_table[s]), 0.5 * both - free)
+        tension = tension + by_table
+        given = -by_table * change
+    add_pair(pair, loads, -(2 * tension / both)[..., None] * d)
+    return Given(given, damping * change**2 / span.h)
+
+
+def add_pair(pair: Pair, loads: Loads, F: Array) -> None:
+    """Add a force on B and its opposite on A."""
+    pair[1].add_force(loads[1], F)
+    pair[0].add_force(loads[0], -F)
+
+
+def point_load(model: Model, k: int, marker: MarkerStep, load: Load | None, span: Span) -> Given:
+    """Add load k, fixed in space or in its marker."""
+    factor = value_of(model, int(model.l_factor[k]), span.t_force)[0] if model.l_factor[k] >= 0 else 1.0
+    work: Array | float = 0.0
+    for part, is_force in ((model.l_force[k], True), (model.l_torque[k], False)):
+        if not np.any(part):
+            continue
+        if model.m_follower[model.l_marker[k]]:
+            V_0, V_1 = marker.ends(part)
+            V = factor * 0.5 * (V_0 + V_1)
+        else:
+            V = factor * part
+        if is_force:
+            marker.add_force(load, V)
+            work = work + dot(V, marker.dx)
+        else:
+            marker.add_moment(load, V)
+            work = work + dot(V, marker.turning())
+    return Given(work)
+
+
+def body_load(model: Model, k: int, body: CentralBody, step: BodyStep, load: Load, span: Span) -> Given:
+    """Add load case k of a body: force and torque about its frame origin in its axes, and modal forces."""
+    factor = value_of(model, int(model.d_factor[k]), span.t_force)[0]
+    first = int(model.d_first[k])
+    f, tau, modal = np.split(factor * model.d_values[first : first + 6 + body.n], [3, 6])
+    q = 0.5 * (step.q_0 + step.q_1)
+    s = body.center(q)
+    R = 0.5 * (step.R_0 + step.R_1)
+    F, T = turned(R, f), turned(R, tau - cross(s, np.broadcast_to(f, s.shape)))
+    h = modal - turned(np.swapaxes(body.shapes(q), -1, -2), f)
+    load.force += F
+    load.torque += T
+    load.modal += h
+    return Given(dot(F, step.d) + dot(T, step.theta_G) + dot(h, step.dq))
+
+
+def coordinate_load(model: Model, k: int, pair: Pair, loads: Loads, span: Span, normal: Array) -> Given:
+    """Add the forces along the coordinate of row k (PUSH or TWIST); normal: force in the joint across its axis."""
+    is_angle = int(model.row_kind[k]) == TWIST
+    if is_angle:
+        change = angle_change(model, k, pair)
+        end = end_angle(model, k, pair)
+        begin = end - change if has_two_ends(pair) else end
+    else:
+        assert int(model.row_kind[k]) == PUSH
+        change, E, d = slip_change(model, k, pair)
+        x = model.row_x[k]
+        begin = dot(pair[0].ends(x)[0], pair[1].x_0 - pair[0].x_0)
+        end = dot(pair[0].ends(x)[1], pair[1].x_1 - pair[0].x_1)
+    rate = change / span.h
+    Q, given, taken = 0.0 * rate, 0.0 * rate, 0.0 * rate
+    for i in range(int(model.row_force0[k]), int(model.row_force1[k])):
+        f = model.joint_forces[i]
+        mean = 0.5 * (begin + end) - f[FREE]
+        if is_angle:
+            mean = mean - 2 * np.pi * np.floor(np.real(mean) / (2 * np.pi) + 0.5)
+        entering = f[PRELOAD] + 0.0 * rate
+        if model.joint_force_motor[i] >= 0:
+            entering = entering + value_of(model, int(model.joint_force_motor[i]), span.t_force)[0]
+        if model.joint_force_table[i] >= 0:
+            entering = entering + along_imaginary(model, int(model.joint_force_table[i]), mean)
+        resisting = f[DAMPER] * rate
+        if f[FRICTION] > 0 or f[COEFFICIENT] > 0:
+            resisting = resisting + (f[FRICTION] + f[COEFFICIENT] * normal) * np.tanh(rate / f[SPEED])
+        Q = Q + entering - f[SPRING] * mean - resisting
+        given = given + entering * change
+        taken = taken + resisting * change
+    if is_angle:
+        angle_loads(model, k, pair, loads, Q)
+    else:
+        add_pair(pair, loads, Q[..., None] * E)
+        pair[0].add_direction(loads[0], model.row_x[k], Q[..., None] * d)
+    return Given(given, taken)
+
+
+def has_two_ends(pair: Pair) -> bool:
+    """Whether the two ends of the step are two configurations."""
+    return any(m.step is not None and m.step.R_0 is not m.step.R_1 for m in pair)

@@ -1,0 +1,89 @@
+"""What an integrator remembers between steps, and what it reports: one type for all of them."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.kernels.model import Memory, Rows, Work
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["Carry", "Failure", "Integrator", "memory_of", "observed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Carry:
+    """All that an integrator remembers between steps."""
+
+    state: State
+    u_dot: Array  #: accelerations, (n_u,)
+    a: Array  #: algorithmic accelerations, (n_u,); for h = 0 (at the start) the rates of u_dot
+    h: float  #: step size to which `a` belongs; 0 at the start
+    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+    work: Array  #: of point forces; taken by dampers and modal damping, (2,)
+    power: Array  #: their rates, (2,)
+    n_iterations: int = 0  #: of Newton's method so far
+    h_next: float = 0.0  #: step size that is wanted next
+    n_steps: int = 0  #: accepted so far
+    n_rejected: int = 0  #: tried in vain so far
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a step could not be made."""
+
+    words: str
+    residual: float  #: last correction over the allowed one
+
+
+class Integrator(Protocol):
+    """A method with its parameters: a frozen dataclass of plain numbers, all memory in the carry."""
+
+    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+        """Return the memory at the beginning, from a state made consistent."""
+
+    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
+
+    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the results at the carried state; the carry learns the power at it."""
+
+    def advance(
+        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Carry, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0, with a row after every `every`-th.
+
+        Returns
+        -------
+        tuple
+            The memory after the last good step; the rows of results; how many steps were good; why the next was not,
+            or None.
+        """
+
+
+def memory_of(carry: Carry) -> Memory:
+    """Return a copy of the memory that the kernels may overwrite."""
+    state = carry.state
+    return Memory(
+        state.r.copy(),
+        state.p.copy(),
+        state.q.copy(),
+        state.u.copy(),
+        np.array(carry.u_dot),
+        np.array(carry.a),
+        np.array(carry.w),
+        np.array(carry.work),
+        np.array(carry.power),
+        np.array([carry.h, carry.h_next, carry.n_steps, carry.n_rejected], dtype=float),
+    )
+
+
+def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows]:
+    """Return the power, (2,), and the results at the carried state."""
+    from floatframe.kernels.entry import observe_state
+
+    memory = memory_of(carry)
+    rows = observe_state(system.compiled.model, work, memory, t)
+    return memory.power, rows

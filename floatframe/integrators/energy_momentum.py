@@ -1,0 +1,235 @@
+"""Schemes that keep energy and momentum in steps of any size, or let energy fall alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.arrays import Array
+from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, step_of
+from floatframe.discrete.constraints import Span
+from floatframe.discrete.newton import solve_step, work_of
+from floatframe.discrete.rotation import cross, turned
+from floatframe.discrete.system import DiscreteSystem
+from floatframe.errors import ModelError
+from floatframe.integrators.carry import Carry, Failure
+from floatframe.integrators.discrete_run import StepResult, advance_discrete, observe_discrete, start_discrete
+from floatframe.integrators.discrete_run import step as step_discrete
+from floatframe.kernels.model import Rows, Work
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["EnergyDecaying", "EnergyMomentum"]
+
+
+@dataclass(frozen=True)
+class EnergyMomentum:
+    """Energy, linear and angular momentum to the tolerance of Newton's method, second order [1]_ [2]_ [3]_.
+
+    In coordinates of the centre of mass (discrete/bodies.py), ' at the end of a step, mean values overlined in words:
+
+    (1) c' - c = h mean(v),  R' = R cay(h mean(omega)),  q' - q = h mean(q_dot)
+    (2) m (v' - v) = h F
+    (3) R' Pi' - R Pi = h tau                                            about the centre of mass, ground axes
+    (4) Y' - Y = h (1/2 wᵀ M,k(mean q) w' - K mean(q) - D mean(q_dot) + Q)
+    (5) g(t') = 0
+
+    F, tau, Q act at the mean lever with the discrete derivatives of discrete/markers.py, so that their work is that of
+    the true displacements. T' - T is mean(v)·(2) + mean(omega)·(3) + mean(q_dot)·(4), because M is of degree two in q:
+    energy changes by the work of forces alone, closed joints do none. Torques of internal forces cancel, since levers
+    are those to the mean of the true positions. Derivation in docs/integrators.md.
+
+    Velocities fulfil joints in the mean over a step, at its ends to second order; accelerations and reactions in the
+    results are those of the equations of motion at the output times, for velocities that fulfil the joints.
+
+    References
+    ----------
+    .. [1] Simo & Wong (1991), International Journal for Numerical Methods in Engineering 31, 19-52: the rigid body.
+    .. [2] Gonzalez (1996), Journal of Nonlinear Science 6, 449-467: discrete derivatives.
+    .. [3] Betsch & Steinmann (2001), International Journal for Numerical Methods in Engineering 50, 1931-1955:
+       constraints.
+    """
+
+    tolerance: float = 1e-11  #: largest last correction over the increments of the step
+    max_iterations: int = 25
+
+    def __post_init__(self) -> None:
+        check_options(self)
+
+    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+        """Return the memory at the beginning, from a state made consistent."""
+        return start_discrete(system, t, state, type(self).__name__)
+
+    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
+        return step_discrete(self, system, t, h, carry)
+
+    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the results at the carried state."""
+        return observe_discrete(system, t, carry, work)
+
+    def advance(
+        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Carry, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
+        return advance_discrete(
+            self, system, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
+        )  # fmt: skip
+
+    def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
+        """Return the bodies, multipliers and work after a step."""
+        return conserving_step(ds, placed, span, f, 1.0, self.tolerance, self.max_iterations)
+
+
+@dataclass(frozen=True)
+class EnergyDecaying:
+    """The scheme of `EnergyMomentum` with dissipation in the modes that h does not resolve: energy never rises.
+
+    In place of (1) and (4), with the modes Phi of the pencil (K, M - Bᵀ J⁻¹ B at q = 0) and their frequencies omega,
+
+        q' - q = h (mean(q_dot) + Phi chi Phiᵀ (Y' - Y)),    K mean(q) becomes K (mean(q) + X (q' - q)),
+        X = Phi chi Phiᵀ (M - Bᵀ J⁻¹ B),   chi = chi_inf x²/(1 + x²),  x = omega h,  chi_inf = (1 - rho)/(1 + rho)/2
+
+    Energy falls in a step by (q' - q)ᵀ K X (q' - q) + (Y' - Y)ᵀ Phi chi Phiᵀ (Y' - Y), both matrices positive
+    semidefinite, whatever h; momenta stay exact. A mode alone has the spectral radius of the method with
+    theta = 1/2 + chi, rho_inf where h is long; for short h dissipation is of third order, the scheme of second. The
+    idea of dissipating stress and velocity together is that of Armero & Romero (2001) [1]_; the filter by
+    frequency, which makes it of second order, is possible because K is constant here.
+
+    References
+    ----------
+    .. [1] Computer Methods in Applied Mechanics and Engineering 190, 2603-2649.
+    """
+
+    rho_inf: float = 0.5  #: spectral radius of modes far above 1/h, 0 <= rho_inf <= 1; 1: `EnergyMomentum`
+    tolerance: float = 1e-11  #: largest last correction over the increments of the step
+    max_iterations: int = 25
+
+    def __post_init__(self) -> None:
+        check_options(self)
+        if not 0.0 <= self.rho_inf <= 1.0:
+            raise ModelError(f"EnergyDecaying: rho_inf: expected 0 <= rho_inf <= 1, got {self.rho_inf}")
+
+    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+        """Return the memory at the beginning, from a state made consistent."""
+        return start_discrete(system, t, state, type(self).__name__)
+
+    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
+        return step_discrete(self, system, t, h, carry)
+
+    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the results at the carried state."""
+        return observe_discrete(system, t, carry, work)
+
+    def advance(
+        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Carry, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
+        return advance_discrete(
+            self, system, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
+        )  # fmt: skip
+
+    def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
+        """Return the bodies, multipliers and work after a step."""
+        return conserving_step(ds, placed, span, f, self.rho_inf, self.tolerance, self.max_iterations)
+
+
+def check_options(method: EnergyMomentum | EnergyDecaying) -> None:
+    """Raise `ModelError` if tolerance or number of iterations is impossible."""
+    name = type(method).__name__
+    if not 0.0 < method.tolerance < 1.0:
+        raise ModelError(f"{name}: tolerance: expected 0 < tolerance < 1, got {method.tolerance}")
+    if method.max_iterations < 1:
+        raise ModelError(f"{name}: max_iterations: expected at least 1, got {method.max_iterations}")
+
+
+@dataclass(frozen=True, eq=False)
+class Filter:
+    """Dissipation of the modes of one body."""
+
+    G: Array  #: Phi chi Phiᵀ, (n, n)
+    X: Array  #: (n, n)
+
+
+def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:
+    """Return the dissipation of the modes of a body for steps of size h."""
+    M = body.mass_matrix(np.zeros(body.n))
+    effective = M[3:, 3:] - M[3:, :3] @ np.linalg.solve(M[:3, :3], M[:3, 3:])
+    squares, Phi = la.eigh(body.K, 0.5 * (effective + effective.T))
+    x = h**2 * np.maximum(squares, 0.0)
+    chi = 0.5 * (1 - rho_inf) / (1 + rho_inf) * x / (1 + x)
+    G = (Phi * chi) @ Phi.T
+    return Filter(G, G @ effective)
+
+
+@dataclass(frozen=True, eq=False)
+class ConservingScheme:
+    """Equations (1) to (4) of one body, as `discrete.newton.Scheme`; `filters` for bodies with dissipation."""
+
+    filters: dict[int, Filter]
+    acts_along: bool = True
+
+    def rates(self, body: CentralBody, place: Placed, x: Array, h: float) -> tuple[Array, Array]:
+        """(1): return omega and q_dot at the end of a step, for stacks of increments."""
+        theta, dq = x[..., 3:6], x[..., 6:]
+        omega = 2 * theta / h - place.omega
+        q_dot: Array = 2 * dq / h - place.q_dot
+        made = self.filters.get(id(body))
+        if made is not None:
+            q = place.q + dq
+            _, Y_0 = body.momenta(place.q, place.omega, place.q_dot)
+            _, by_spin = body.momenta(q, omega, np.zeros_like(dq))
+            C = body.shapes(q)
+            matrix = 0.5 * np.eye(body.n) + made.G @ (body.M - body.m * np.swapaxes(C, -1, -2) @ C)
+            right = dq / h - 0.5 * place.q_dot - (by_spin - Y_0) @ made.G
+            q_dot = np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
+        return omega, q_dot
+
+    def inertia(self, body: CentralBody, place: Placed, x: Array, h: float) -> Array:
+        """h/2 times the left sides of (2) to (4) without loads."""
+        d, theta, dq = x[..., :3], x[..., 3:6], x[..., 6:]
+        omega, q_dot = self.rates(body, place, x, h)
+        Pi_0, Y_0 = body.momenta(place.q, place.omega, place.q_dot)
+        Pi_1, Y_1 = body.momenta(place.q + dq, omega, q_dot)
+        turning = Pi_1 + 0.5 * cross(theta, Pi_1) - Pi_0 + 0.5 * cross(theta, np.broadcast_to(Pi_0, theta.shape))
+        parts = [body.m * (d - h * place.v), 0.5 * h * turning]
+        q_mean = place.q + 0.5 * dq
+        w_0 = (np.broadcast_to(place.omega, theta.shape), np.broadcast_to(place.q_dot, dq.shape))
+        force = body.inertia_force(place.q, place.q + dq, w_0, (omega, q_dot)) - dq @ body.D.T / h
+        made = self.filters.get(id(body))
+        force = force - (q_mean if made is None else q_mean + dq @ made.X.T) @ body.K.T
+        parts.append(0.5 * h * (Y_1 - Y_0) - 0.5 * h**2 * force)
+        return np.concatenate(parts, axis=-1)
+
+    def force_step(self, place: Placed, x: Array) -> BodyStep:
+        """Forces act along the step."""
+        return step_of(place, x)
+
+    def torque(self, place: Placed, x: Array, tau: Array) -> Array:
+        """(1 - tilde(theta)/2) R_0ᵀ tau: (3) times (1 - tilde(theta)/2) R_0ᵀ, which makes it polynomial."""
+        tau = turned(place.R.T, tau)
+        return tau - 0.5 * cross(x[..., 3:6], tau)
+
+
+def conserving_step(
+    ds: DiscreteSystem,
+    placed: list[Placed],
+    span: Span,
+    f: Array,
+    rho_inf: float,
+    tolerance: float,
+    max_iterations: int,
+) -> StepResult:
+    """Return the bodies, multipliers and work after a step of the conserving or decaying scheme."""
+    h = span.h
+    filters = {}
+    if rho_inf < 1.0:
+        filters = {id(body): filter_of(body, h, rho_inf) for body in set(ds.bodies) if body.n}
+    scheme = ConservingScheme(filters)
+    solution = solve_step(ds, scheme, placed, span, f, tolerance, max_iterations)
+    after = []
+    for body, place, x in zip(ds.bodies, placed, solution.x, strict=True):
+        omega, q_dot = scheme.rates(body, place, x, h)
+        after.append(moved(place, x, 2 * x[:3] / h - place.v, omega, q_dot))
+    return StepResult(after, solution.f, work_of(ds, scheme, placed, span, solution), solution.n_iterations)

@@ -1,0 +1,199 @@
+"""A variational integrator: the motion that makes the sum of discrete Lagrangians stationary."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, still
+from floatframe.discrete.constraints import Span, add_reaction, rate_in_time
+from floatframe.discrete.markers import Load
+from floatframe.discrete.newton import Solution, StepError, pair_of, solve_step, work_of
+from floatframe.discrete.rotation import cross, dot, turned
+from floatframe.discrete.system import DiscreteSystem
+from floatframe.errors import ModelError
+from floatframe.integrators.carry import Carry, Failure
+from floatframe.integrators.discrete_run import StepResult, advance_discrete, observe_discrete, start_discrete
+from floatframe.integrators.discrete_run import step as step_discrete
+from floatframe.kernels.model import Rows, Work
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["Variational"]
+
+
+@dataclass(frozen=True)
+class Variational:
+    """Symplectic, momentum exact, energy bounded without drift, joints closed in positions and velocities, order two.
+
+    Coordinates of the centre of mass c, R_GB, q (discrete/bodies.py). Between two configurations with
+    R' = R cay(theta), by the midpoint rule in q and the trapezoidal rule in the potential V of gravity and springs,
+
+        L_d = h (m |d/h|²/2 + T(theta/h, dq/h; mean q) - mean(q)ᵀ K mean(q)/2) - h (V + V')/2
+        d = c' - c,  dq = q' - q,  Pi = J omega + B q_dot and Y = Bᵀ omega + M q_dot at theta/h, dq/h, mean q
+
+    (1) m v + h/2 F = m d/h,   Pi_0 + h/2 Rᵀ tau = (1 + tilde(theta)/2 + theta thetaᵀ/4) Pi
+        Y_0 + h/2 Q = Y - h/2 (1/2 wᵀ M,k w - K mean(q) - D dq/h),   g(t') = 0
+    (2) the same at the end, Pi_0' = (1 - tilde(theta)/2 + theta thetaᵀ/4) Pi + h/2 R'ᵀ tau', ... with G u' = -g_t
+
+    Momenta with index 0 are those of the results, velocities follow from them. The joints act like forces at both ends,
+    with one multiplier that closes positions and one that closes velocities (RATTLE). Discrete Euler-Poincare
+    equations and the Cayley map: [1]_; constraints: [2]_; dampers enter by the discrete Lagrange-d'Alembert principle.
+    The modal stiffness stands in the implicit midpoint, so that stiff modes do not bound h; stiff spring-dampers do.
+
+    Friction by the normal force of a joint is refused.
+
+    References
+    ----------
+    .. [1] Bou-Rabee & Marsden (2009), Foundations of Computational Mathematics 9, 197-219.
+    .. [2] Leyendecker, Marsden & Ortiz (2008), Journal of Applied Mathematics and Mechanics (ZAMM) 88, 677-708.
+    """
+
+    tolerance: float = 1e-11  #: largest last correction over the increments of the step
+    max_iterations: int = 25
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < 1.0:
+            raise ModelError(f"Variational: tolerance: expected 0 < tolerance < 1, got {self.tolerance}")
+        if self.max_iterations < 1:
+            raise ModelError(f"Variational: max_iterations: expected at least 1, got {self.max_iterations}")
+
+    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+        """Return the memory at the beginning, from a state made consistent."""
+        for force in system.forces:
+            if getattr(force, "friction_coefficient", 0.0) > 0:
+                raise ModelError(
+                    f"Variational: force {getattr(force, 'name', '')!r} has friction by the normal force, which this "
+                    "scheme does not know; use energy-momentum or generalized-alpha"
+                )
+        return start_discrete(system, t, state, type(self).__name__)
+
+    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
+        return step_discrete(self, system, t, h, carry)
+
+    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the results at the carried state."""
+        return observe_discrete(system, t, carry, work)
+
+    def advance(
+        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Carry, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
+        return advance_discrete(
+            self, system, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
+        )  # fmt: skip
+
+    def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
+        """(1), (2): return the bodies, multipliers and work after a step."""
+        scheme = VariationalScheme()
+        begin = Span(span.t_0, span.t_1, span.t_0)
+        solution = solve_step(ds, scheme, placed, begin, f, self.tolerance, self.max_iterations)
+        given, taken = work_of(ds, scheme, placed, begin, solution)
+        after, f_after = closed_velocities(ds, placed, span, solution)
+        end = Solution(solution.x, f_after, solution.n_iterations)
+        given_after, taken_after = work_of(ds, scheme, after, Span(span.t_0, span.t_1, span.t_1), end)
+        work = 0.5 * (given + given_after), 0.5 * (taken + taken_after)
+        return StepResult(after, solution.f, work, solution.n_iterations)
+
+
+@dataclass(frozen=True, eq=False)
+class VariationalScheme:
+    """(1) of one body, as `discrete.newton.Scheme`."""
+
+    acts_along: bool = False
+
+    def inertia(self, body: CentralBody, place: Placed, x: Array, h: float) -> Array:
+        """H times the right sides of (1) without loads, less the momenta at the beginning."""
+        d, theta = x[..., :3], x[..., 3:6]
+        Pi_0, Y_0 = body.momenta(place.q, place.omega, place.q_dot)
+        Pi, Y, force = interval(body, place, x, h)
+        turning = Pi + 0.5 * cross(theta, Pi) + 0.25 * dot(theta, Pi)[..., None] * theta - Pi_0
+        return np.concatenate(
+            [body.m * (d - h * place.v), h * turning, h * (Y - Y_0) - 0.5 * h**2 * force], axis=-1
+        )  # fmt: skip
+
+    def force_step(self, place: Placed, x: Array) -> BodyStep:
+        """Forces act where the step begins."""
+        return still(place, x)
+
+    def torque(self, place: Placed, x: Array, tau: Array) -> Array:
+        """Rᵀ tau."""
+        return turned(place.R.T, tau)
+
+
+def interval(body: CentralBody, place: Placed, x: Array, h: float) -> tuple[Array, Array, Array]:
+    """Return Pi and Y between two configurations, and the modal force there."""
+    omega, q_dot = x[..., 3:6] / h, x[..., 6:] / h
+    q = place.q + 0.5 * x[..., 6:]
+    Pi, Y = body.momenta(q, omega, q_dot)
+    return Pi, Y, body.inertia_force(q, q, (omega, q_dot), (omega, q_dot)) - q @ body.K.T - q_dot @ body.D.T
+
+
+def closed_velocities(
+    ds: DiscreteSystem, placed: list[Placed], span: Span, solution: Solution
+) -> tuple[list[Placed], Array]:
+    """(2): return the bodies at the end of a step with the momenta that close the joints, and the multipliers."""
+    h, model = span.h, ds.model
+    end = Span(span.t_0, span.t_1, span.t_1)
+    zeros = [np.zeros_like(x) for x in solution.x]
+    moved_to = [moved(place, x, zero[:3], zero[3:6], zero[6:])
+                for place, x, zero in zip(placed, solution.x, zeros, strict=True)]  # fmt: skip
+    steps = [still(place, x) for place, x in zip(moved_to, solution.x, strict=True)]
+    loads = [Load(body.n, (), float) for body in ds.bodies]
+    nothing = np.zeros(ds.n_held)
+    for i, load in enumerate(loads):
+        ds.own_loads(i, steps[i], load, end)
+    for c in ds.connections:
+        pair = pair_of(c, (at(steps, c.a.body), at(steps, c.b.body)))
+        f = nothing[c.first : c.first + len(c.held)]
+        ds.connection_loads(c, pair, (at(loads, c.a.body), at(loads, c.b.body)), end, f)
+    momenta, masses = [], []
+    for body, place, after, x, load in zip(ds.bodies, placed, moved_to, solution.x, loads, strict=True):
+        Pi, Y, force = interval(body, place, x, h)
+        theta = x[3:6]
+        turning = Pi - 0.5 * np.cross(theta, Pi) + 0.25 * (theta @ Pi) * theta + 0.5 * h * after.R.T @ load.torque
+        modal = Y + 0.5 * h * (force + load.modal)
+        momenta.append(np.concatenate([body.m * x[:3] / h + 0.5 * h * load.force, turning, modal]))
+        masses.append(mass_matrix(body, after.q))
+    n_u = int(model.u0[-1])
+    G, rate = np.zeros((ds.n_held, n_u)), np.zeros(ds.n_held)
+    for c in ds.connections:
+        pair = pair_of(c, (at(steps, c.a.body), at(steps, c.b.body)))
+        for j, k in enumerate(c.held, start=c.first):
+            parts = [Load(body.n, (), float) for body in ds.bodies]
+            add_reaction(model, k, pair, (at(parts, c.a.body), at(parts, c.b.body)), end, np.array(1.0))
+            for i in {c.a.body, c.b.body} - {-1}:
+                own = np.concatenate([parts[i].force, moved_to[i].R.T @ parts[i].torque, parts[i].modal])
+                G[j, model.u0[i] : model.u0[i + 1]] = own
+            rate[j] = rate_in_time(model, k, pair, span.t_1)
+    u, X = np.zeros(n_u), np.zeros((n_u, ds.n_held))
+    for i, (M, p) in enumerate(zip(masses, momenta, strict=True)):
+        rows = slice(int(model.u0[i]), int(model.u0[i + 1]))
+        u[rows] = np.linalg.solve(M, p)
+        X[rows] = np.linalg.solve(M, G[:, rows].T)
+    held = [k for c in ds.connections for k in c.held]
+    soft = np.diag(model.row_soft[held])
+    try:
+        impulse = np.linalg.solve(G @ X + soft, -(rate + G @ u)) if ds.n_held else nothing
+    except np.linalg.LinAlgError:
+        raise StepError("the constraints on velocities depend on each other", np.inf) from None
+    u = u + X @ impulse
+    result = []
+    for i, (place, x) in enumerate(zip(placed, solution.x, strict=True)):
+        own = u[model.u0[i] : model.u0[i + 1]]
+        result.append(moved(place, x, own[:3], own[3:6], own[6:]))
+    return result, np.asarray(2 * impulse / h, dtype=float)
+
+
+def at(items: list, i: int):
+    """Return the item of body i, None for the ground."""
+    return items[i] if i >= 0 else None
+
+
+def mass_matrix(body: CentralBody, q: Array) -> Array:
+    """Return the matrix of (v, omega, q_dot) about the centre of mass, (6 + n, 6 + n)."""
+    M = np.zeros((6 + body.n, 6 + body.n))
+    M[:3, :3] = body.m * np.eye(3)
+    M[3:, 3:] = body.mass_matrix(q)
+    return M
