@@ -34,7 +34,7 @@ class Given:
 def spring_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> Given:
     """Add the loads of spring-damper c."""
     a, b = pair
-    s = int(model.c_spring[c])
+    s = int(model.c_item[c])
     k, damping, free, preload = model.springs[s]
     d_0, d_1, dd = b.x_0 - a.x_0, b.x_1 - a.x_1, b.dx - a.dx
     d = 0.5 * (d_0 + d_1)

@@ -30,13 +30,14 @@ from floatframe.joints.rows import (
     TURN,
     TWIST,
 )
-from floatframe.kernels.model import Model
+from floatframe.kernels.model import JOINT, Model
+from floatframe.kernels.model import SPRING as SPRING_LAW
 from floatframe.system import System
 
 __all__ = ["Connection", "DiscreteSystem", "discrete_system"]
 
+KNOWN_FORCES = (BodyLoad, Gravity, JointForce, PointForce, SpringDamper)
 ROWS = (ARM, DISTANCE, DOT, GAUGE, GAUGE_B, POINT, PUSH, ROD, SCREW, SLIDE, SPRING, THREAD, TURN, TWIST)
-FORCES = (BodyLoad, Gravity, JointForce, PointForce, SpringDamper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ class DiscreteSystem:
     def connection_loads(self, connection: Connection, pair: Pair, loads: Loads, span: Span, f: Array) -> Given:
         """Add reactions with multipliers f, (..., n_held of it), and the forces of a connection."""
         model = self.model
-        if model.c_spring[connection.number] >= 0:
+        if model.c_law[connection.number] == SPRING_LAW:
             return spring_load(model, connection.number, pair, loads, span)
         for j, k in enumerate(connection.held):
             add_reaction(model, k, pair, loads, span, f[..., j])
@@ -120,10 +121,12 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
     compiled = system.compiled
     model = compiled.model
     for force in system.forces:
-        if not isinstance(force, FORCES):
+        if not isinstance(force, KNOWN_FORCES):
             raise ModelError(f"{scheme}: forces of the kind {type(force).__name__} are not known to it; "
                              "use generalized-alpha")  # fmt: skip
-    for c, name in enumerate(compiled.joint_names):
+    for c, name in enumerate(compiled.connection_names):
+        if model.c_law[c] not in (JOINT, SPRING_LAW):
+            raise ModelError(f"{scheme}: {name!r} is of a kind that is not known to it; use generalized-alpha")
         if not np.isin(model.row_kind[model.c_w0[c] : model.c_w0[c + 1]], ROWS).all():
             raise ModelError(f"{scheme}: joint {name!r} is of a kind that is not known to it; use generalized-alpha")
     bodies = central_bodies(model, compiled.body_names, scheme)

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 import floatframe.integration as integration
 from floatframe import (
     GROUND,
+    Bushing,
     EnergyDecaying,
     EnergyMomentum,
     FlexibleBody,
@@ -260,6 +261,12 @@ def test_massless_modes_are_refused():
     body = FlexibleBody("body", reduced_body(type(points)(points.m, points.c, phi), stiffness(2)))
     with pytest.raises(ModelError, match="body 'body' has a mode without mass"):
         integrate(System([body]), EnergyMomentum(), 1.0, 0.1)
+
+
+def test_forces_and_joints_that_a_scheme_does_not_know_are_refused_by_name():
+    bushing = Bushing("mount", Marker("soft", "end_b"), Marker("block", position=(0.3, 0, 0.1)), np.ones(6))
+    with pytest.raises(ModelError, match=r"EnergyMomentum: .*(Bushing|'mount').* use generalized-alpha"):
+        integrate(floating_pair("revolute", [bushing]), EnergyMomentum(), 1.0, 0.1)
 
 
 def test_friction_by_the_normal_force_is_refused_by_the_variational_scheme():
