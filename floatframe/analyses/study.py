@@ -24,8 +24,8 @@ from floatframe.errors import FloatframeError, ModelError
 from floatframe.integration import integrate
 from floatframe.measuring import measured, sensor_of
 from floatframe.study_file import TAKES, Output, Study
+from floatframe.run_section import RunOptions
 from floatframe.system import System
-from floatframe.system_file import RunOptions, read_system
 from floatframe.trajectory import Trajectory
 
 __all__ = ["StudyRow", "StudyTable", "run_study"]
@@ -98,6 +98,8 @@ def run_study(
 
 def check(study: Study, point: tuple[Any, ...]) -> None:
     """Raise if the system, a key path or an output is not there; before the long work, in this process."""
+    from floatframe.system_file import read_system  # it imports the analyses for its channels
+
     plain, _ = read_system(study.system)
     try:
         system, _ = read_system(study.system, study.changes(point))
@@ -136,6 +138,8 @@ class StudyPoint:
 
     def __call__(self, point: tuple[Any, ...]) -> StudyRow:
         """Return the row of a point; what goes wrong with it is its error."""
+        from floatframe.system_file import read_system  # it imports the analyses for its channels
+
         try:
             system, run = read_system(self.study.system, self.study.changes(point))
             if self.study.analysis == "eig":
