@@ -23,8 +23,8 @@ from floatframe.analyses.system_modes import SystemModes, system_modes
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.integration import integrate
 from floatframe.measuring import measured, sensor_of
-from floatframe.study_file import TAKES, Output, Study
 from floatframe.run_section import RunOptions
+from floatframe.study_file import TAKES, Output, Study
 from floatframe.system import System
 from floatframe.trajectory import Trajectory
 
