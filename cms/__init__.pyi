@@ -54,6 +54,7 @@ from .reduced_body import BodyFrame as BodyFrame
 from .reduced_body import ReducedBody as ReducedBody
 from .reduced_body import ReducedInterface as ReducedInterface
 from .reduction import reduce as reduce
+from .unit_states import unit_states as unit_states
 from .units import UNIT_SYSTEMS as UNIT_SYSTEMS
 from .units import Units as Units
 from .units import unit_system as unit_system

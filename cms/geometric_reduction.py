@@ -8,10 +8,8 @@
 """
 
 import numpy as np
-import scipy.linalg as la
 
-from cms.arrays import Array, IntArray
-from cms.errors import BodyError, ModeSetError
+from cms.arrays import Array
 from cms.families import Families
 from cms.fe_body import FEBody, Interface
 from cms.frames import FrameCondition
@@ -20,17 +18,11 @@ from cms.link_work import followers, link_work
 from cms.mass_loads import MassLoads
 from cms.mean_work import mean_second_order
 from cms.node_motion import is_mean, reference_motion, translation_rows
-from cms.tall import combine
-from cms.unit_loads import balanced, unit_loads
+from cms.unit_states import UnitStates, states_of
 
-__all__ = ["has_geometric_stiffness", "reduced_geometric_stiffness"]
+__all__ = ["elastic_part", "reduced_geometric_stiffness", "stiffness_of_states"]
 
-LOADS_AT_ONCE = 60  #: of many interfaces; their static states are as tall as the body
-
-
-def has_geometric_stiffness(body: FEBody) -> bool:
-    """Return whether the elements behind the body know their geometric stiffness."""
-    return body.element_model is not None and body.element_model.has_geometric_stiffness
+LOADS_AT_ONCE = 60  #: whose displacements over the mesh are held at once
 
 
 def reduced_geometric_stiffness(
@@ -56,79 +48,24 @@ def reduced_geometric_stiffness(
     ModeSetError
         If the families are those of another body.
     """
-    require_geometric_stiffness(body)
-    if families is None:
-        with Families(body) as own:
-            return reduced_geometric_stiffness(body, Phi, condition, families=own)
-    if families.body is not body:
-        raise ModeSetError(
-            f"families: made for body {families.body.name!r}, but the geometric stiffness is asked of another one, "
-            f"{body.name!r}; make Families of the very body"
-        )
-    loads = balanced(body, unit_loads(body, condition.frame), condition)  # (1)
-    K = np.zeros((loads.mass.k, Phi.shape[1], Phi.shape[1]))
-    for wanted in blocks(np.flatnonzero(~loads.is_zero)):
-        u = static_states(families, loads.F[:, wanted])  # (2)
-        mass = MassLoads(loads.mass.A[wanted], loads.mass.b[wanted])
-        K[wanted] = elastic_part(body, u, mass, Phi)
-    K -= mean_part(body, loads.on_dofs, Phi, condition.frame.axes)
+    return stiffness_of_states(body, Phi, states_of(body, condition, families))
+
+
+def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> GeometricStiffness:
+    """Return steps (3) to (5) of the static states of the unit loads; the factorisation is needed no more."""
+    K = np.zeros((states.mass.k, Phi.shape[1], Phi.shape[1]))
+    for first in range(0, len(states.loaded), LOADS_AT_ONCE):
+        some = slice(first, first + LOADS_AT_ONCE)
+        loads = states.loaded[some]
+        mass = MassLoads(states.mass.A[loads], states.mass.b[loads])
+        K[loads] = elastic_part(body, states.u[:, some], mass, Phi)
+    K -= mean_part(body, states.on_dofs, Phi, states.condition.frame.axes)
     return GeometricStiffness(
         translation=K[:3],
         rotation=K[3:6],
         spin=K[6:12],
         interfaces=K[12:].reshape(len(body.interfaces), 6, *K.shape[1:]),
     )
-
-
-def require_geometric_stiffness(body: FEBody) -> None:
-    """Raise `BodyError` unless the elements know their geometric stiffness."""
-    if not has_geometric_stiffness(body):
-        raise BodyError(
-            f"body {body.name!r}: geometric stiffness needs the elements, and it came without them (bare matrices); "
-            "build it from its mesh (fe_models.solid_body, beam_body), or reduce it without (geometric=False, in a job "
-            "geometric_stiffness = false)"
-        )
-
-
-def static_states(families: Families, F: Array) -> Array:
-    """Return the response to balanced loads with R held, (n_dof, k); it needs no inertia, as P would.
-
-    v = K_II⁻¹ f_I;  S_ee z_e = (f_h - K_hI v)_e with z = 0 at R;  u = v + Psi_C z.
-    """
-    body = families.body
-    if not F.shape[1]:
-        return np.zeros(F.shape)
-    i, h = families.fixed.i, families.h
-    v = families.fixed.factorization.solve(F[i])
-    z = np.zeros((len(h), F.shape[1]))
-    e = np.flatnonzero(~np.isin(h, families.r))
-    if len(e):
-        g = F[h] - (body.K[:, h].T @ embedded(v, i, body.n_dof))
-        S_ee = families.S[np.ix_(e, e)]
-        size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))
-        try:
-            factor = la.cho_factor(S_ee * np.outer(size, size))
-        except la.LinAlgError as error:
-            raise BodyError(
-                f"body {body.name!r}: motions besides the rigid ones cost no energy: a mechanism; join the parts or "
-                "add what holds them"
-            ) from error
-        z[e] = size[:, None] * la.cho_solve(factor, size[:, None] * g[e])
-    u = combine(families.Psi_C, z)
-    u[i] += v
-    return u
-
-
-def embedded(v: Array, rows: IntArray, n: int) -> Array:
-    """Return v in some rows of n, zero in the others."""
-    whole = np.zeros((n, v.shape[1]))
-    whole[rows] = v
-    return whole
-
-
-def blocks(loads: IntArray) -> list[IntArray]:
-    """Return the loads in blocks, whose states are held at once."""
-    return [loads[first : first + LOADS_AT_ONCE] for first in range(0, len(loads), LOADS_AT_ONCE)]
 
 
 def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:

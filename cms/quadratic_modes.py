@@ -14,11 +14,12 @@ from cms.errors import BodyError
 from cms.families import Families
 from cms.fe_body import FEBody
 from cms.frames import FrameCondition
-from cms.geometric_reduction import distributing_part, elastic_part, require_geometric_stiffness
+from cms.geometric_reduction import distributing_part, elastic_part
 from cms.link_work import link_work
 from cms.mass_loads import MassLoads
 from cms.node_motion import translation_rows
 from cms.unit_loads import balanced, together
+from cms.unit_states import require_geometric_stiffness
 
 __all__ = ["MOST_NUMBERS", "quadratic_modes"]
 

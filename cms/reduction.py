@@ -13,7 +13,7 @@ from cms.families import Families
 from cms.fe_body import FEBody, Interface
 from cms.finishing import FinishedBasis, finish
 from cms.frames import Frame, TisserandFrame, frame_condition
-from cms.geometric_reduction import reduced_geometric_stiffness, require_geometric_stiffness
+from cms.geometric_reduction import stiffness_of_states
 from cms.invariants import Moments, moments_from_gram
 from cms.load_cases import LoadCase, ReducedLoadCase
 from cms.matrix_moments import gram_from_matrices
@@ -24,6 +24,7 @@ from cms.quadratic_modes import quadratic_modes
 from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.rigid_modes import geometric_rigid_modes
 from cms.stress_modes import nodal_stress_modes, point_stress_modes
+from cms.unit_states import UnitStates, require_geometric_stiffness, states_of
 
 __all__ = ["reduce"]
 
@@ -38,6 +39,7 @@ def reduce(
     geometric: bool = False,
     quadratic: bool = False,
     families: Families | None = None,
+    states: UnitStates | None = None,
 ) -> ReducedBody:
     """Reduce a body to the span of a mode set.
 
@@ -63,6 +65,9 @@ def reduce(
     families
         The families that made `modes`, so that the geometric stiffness takes their factorisation; it makes its own by
         default.
+    states
+        The static states of the unit loads in this frame (`cms.unit_states`), so that the geometric stiffness needs no
+        factorisation any more.
 
     Raises
     ------
@@ -82,6 +87,10 @@ def reduce(
         )
     frame = frame or TisserandFrame()
     condition = frame_condition(body, frame)
+    if geometric and states is None:
+        states = states_of(body, condition, families)
+    if states is not None:
+        require_states_of(body, condition.frame, states)
     finished = finish(body, modes, condition)
     kept = kept_nodes(body)
     axes, origin = condition.frame.axes, condition.frame.origin
@@ -114,9 +123,21 @@ def reduce(
         load_cases=tuple(reduced_load_case(body, case, finished.Phi, condition.frame) for case in body.load_cases),
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
-        geometric=reduced_geometric_stiffness(body, finished.Phi, condition, families=families) if geometric else None,
+        geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
         quadratic=quadratic_modes(body, finished.Phi, condition, kept, families=families) if quadratic else None,
     )
+
+
+def require_states_of(body: FEBody, frame: BodyFrame, states: UnitStates) -> None:
+    """Raise `ModeSetError` unless the static states are those of this body in this frame."""
+    other = states.condition.frame
+    is_same = frame.kind == other.kind and np.array_equal(frame.dofs, other.dofs)
+    is_same = is_same and np.array_equal(frame.origin, other.origin) and np.array_equal(frame.axes, other.axes)
+    if states.body is not body or not is_same:
+        raise ModeSetError(
+            f"reduce: the unit states are those of body {states.body.name!r} in a {other.kind} frame, expected "
+            f"{body.name!r} in a {frame.kind} frame with the same origin and axes; make them for this very frame"
+        )
 
 
 def kept_nodes(body: FEBody) -> IntArray:

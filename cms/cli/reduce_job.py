@@ -16,6 +16,8 @@ from cms.units import unit_system
 
 if TYPE_CHECKING:
     from cms.frames import Frame
+    from cms.mode_set import ModeSet
+    from cms.unit_states import UnitStates
     from fe_models.beams.line_mesh import LineMesh
     from fe_models.material import Material
     from fe_models.mesh import Mesh
@@ -43,30 +45,45 @@ def reduce_job(
     CmsError, FeModelsError
         If the mesh, a material, an interface or the mode set does not do.
     """
-    from cms.cli.job_mode_set import job_mode_set
-    from cms.families import Families
-    from cms.geometric_reduction import has_geometric_stiffness, require_geometric_stiffness
     from cms.reduction import reduce
+    from cms.unit_states import require_geometric_stiffness
 
     stages = stages or Stages()
     coupled = job_body(job, stages, on_report=on_report)
     if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
         require_geometric_stiffness(coupled)  # before the long work
+    modes, states = modes_and_states(job, coupled, stages)
+    with stages("reduce"):
+        return reduce(
+            coupled,
+            modes,
+            frame=frame_of(job),
+            damping=None if job.damping is None else job.damping.damping,
+            stress=job.reduction.stress is not False,
+            quadratic=bool(job.reduction.quadratic_modes),
+            states=states,
+        )
+
+
+def modes_and_states(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSet, UnitStates | None]":
+    """Make what needs the factorisation, which is freed before the reduction: that needs the memory.
+
+    The static states of unit loads are for the geometric stiffness; None where it is left out or not known.
+    """
+    from cms.cli.job_mode_set import job_mode_set
+    from cms.families import Families
+    from cms.unit_states import has_geometric_stiffness, unit_states
+
     wanted = job.reduction.geometric_stiffness
+    if wanted is None:
+        wanted = has_geometric_stiffness(coupled)
     with Families(coupled) as families:
         with stages(f"mode set {job.reduction.set}"):
             modes = job_mode_set(coupled, job.reduction, families=families)
-        with stages("reduce"):
-            return reduce(
-                coupled,
-                modes,
-                frame=frame_of(job),
-                damping=None if job.damping is None else job.damping.damping,
-                stress=job.reduction.stress is not False,
-                geometric=has_geometric_stiffness(coupled) if wanted is None else wanted,
-                quadratic=bool(job.reduction.quadratic_modes),
-                families=families,
-            )
+        if not wanted and not job.reduction.quadratic_modes:
+            return modes, None
+        with stages("static states"):
+            return modes, unit_states(coupled, frame=frame_of(job), families=families)
 
 
 def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None) -> FEBody:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg as la
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 from cms.errors import BodyError, ModeSetError
@@ -320,6 +320,20 @@ def test_a_body_without_inertia_about_its_axis_is_stiffened_too():
     reduced = cms.reduce(body, cms.guyan(body), frame=NodalFrame("left"), geometric=True)
     EI = STEEL.E * 0.05 * 0.04**3 / 12
     assert critical(reduced.K, reduced.geometric.interfaces[1, 0]) > 0.99 * np.pi**2 * EI / 4
+
+
+def test_states_made_before_serve_when_the_factorisation_is_gone():
+    body = cms.couple(bar(3, 1, 1))
+    frame = NodalFrame("left")
+    with cms.Families(body) as families:
+        modes = cms.craig_bampton(body, n_modes=2, families=families)
+        expected = cms.reduce(body, modes, frame=frame, geometric=True, families=families).geometric
+        states = cms.unit_states(body, frame=frame, families=families)
+    found = cms.reduce(body, modes, frame=frame, states=states).geometric
+    for name in ("translation", "rotation", "spin", "interfaces"):
+        assert_array_equal(getattr(found, name), getattr(expected, name))
+    with pytest.raises(ModeSetError, match="'bar' in a nodal frame, expected 'bar' in a tisserand frame"):
+        cms.reduce(body, modes, states=states)
 
 
 def test_families_of_another_body_are_refused():
