@@ -4,11 +4,12 @@ import numpy as np
 
 from cms.reduced_body import ReducedBody
 from cms.units import Units, unit_system
+from floatframe.descriptions.flexible_part import PartMaker
 from floatframe.errors import ModelError
 from floatframe.ground import GROUND
 from floatframe.joints import Joint, PointOnLine, PrismaticJoint, RevoluteJoint, SphericalJoint, UniversalJoint
 from floatframe.markers import Marker
-from floatframe.mechanisms.rods import Rod
+from floatframe.mechanisms.rods import Rod, turning
 from floatframe.rigid_body import RigidBody
 from floatframe.system import System
 from floatframe.time_functions import TimeFunction
@@ -28,7 +29,7 @@ def slider_crank(
     angle: float = 0.0,
     speed: float = 0.0,
     drive: TimeFunction | None = None,
-    flexible_rod: ReducedBody | None = None,
+    flexible_rod: ReducedBody | PartMaker | None = None,
     ends: tuple[str, str] = ("start", "end"),
     units: Units | None = None,
 ) -> System:
@@ -46,15 +47,16 @@ def slider_crank(
     angle
         Of the crank to the x axis at the start [rad].
     speed
-        Of the crank at the start [rad/s].
+        Of the crank at the start, where no drive says it [rad/s].
     drive
         Angle of the crank over time, from `angle` on; None: it turns freely.
     flexible_rod
-        A reduced body in place of the rigid rod, its interfaces `ends` at the pin and at the slider.
+        A reduced body in place of the rigid rod, its interfaces `ends` at the pin and at the slider; or another
+        description that is placed here, such as `partial(finite_segments, line=line, n=10)`.
     ends
-        Interfaces of it.
+        Interfaces of it, or places of the part.
     units
-        Default: those of `flexible_rod`, or m-kg-s.
+        Default: those of a reduced `flexible_rod`, or m-kg-s.
     """
     if not 0 < crank < rod:
         raise ModelError(f"slider_crank: expected 0 < crank < rod, got crank = {crank:g}, rod = {rod:g}")
@@ -62,25 +64,23 @@ def slider_crank(
     end = np.array([knee[0] + np.sqrt(rod**2 - knee[1] ** 2), 0.0, 0.0])
     arm = Rod("crank", np.zeros(3), knee, crank_mass)
     link = Rod("rod", knee, end, rod_mass, flexible_rod, ends)
-    block = RigidBody("slider", slider_mass, slider_mass * (0.1 * crank) ** 2 * np.eye(3), position=end)
-    assert isinstance(arm.body, RigidBody)
-    turning = RigidBody(
-        "crank",
-        arm.body.mass,
-        arm.body.inertia,
-        center_of_mass=arm.body.center_of_mass,
-        position=arm.body.position,
-        orientation=arm.body.orientation,
-        omega_B=speed * Z,
-    )
+    # velocities of the undeformed mechanism: the rod turns so that its end stays on the x axis
+    omega = (speed if drive is None else drive(0.0, 1)) * Z
+    v_knee = np.cross(omega, knee)
+    omega_rod = -v_knee[1] / (end[0] - knee[0]) * Z
+    v_end = v_knee + np.cross(omega_rod, end - knee)
+    inertia = slider_mass * (0.1 * crank) ** 2 * np.eye(3)
+    block = RigidBody("slider", slider_mass, inertia, position=end, velocity=v_end)
     joints: list[Joint] = [
         RevoluteJoint("main", GROUND, arm.start, axis=Z, motions={} if drive is None else {"angle": drive}),
         RevoluteJoint("pin", arm.end, link.start, axis=Z),
         PointOnLine("gudgeon", Marker("slider"), link.end, axis=Z),
         PrismaticJoint("guide", Marker(GROUND), Marker("slider"), axis=np.array([1.0, 0.0, 0.0])),
     ]
-    units = units or (flexible_rod.units if flexible_rod is not None else unit_system("m-kg-s"))
-    return System([turning, link.body, block], joints, [], units, "slider-crank")
+    units = units or (flexible_rod.units if isinstance(flexible_rod, ReducedBody) else unit_system("m-kg-s"))
+    moving = (turning(body, omega_rod, point=knee, velocity=v_knee) for body in link.bodies)
+    bodies = [turning(arm.body, omega), *moving, block]
+    return System(bodies, [*joints, *link.joints], link.forces, units, "slider-crank")
 
 
 def four_bar(

@@ -6,8 +6,11 @@ import numpy as np
 
 from cms.arrays import Array
 from cms.reduced_body import ReducedBody
+from floatframe.descriptions.flexible_part import PartMaker
 from floatframe.errors import ModelError
 from floatframe.flexible_body import FlexibleBody
+from floatframe.forces import Force
+from floatframe.joints import Joint
 from floatframe.markers import Marker
 from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters, rotation_matrix, tilde
@@ -34,24 +37,33 @@ class Rod:
         start: Array,
         end: Array,
         mass: float,
-        reduced: ReducedBody | None = None,
+        reduced: ReducedBody | PartMaker | None = None,
         ends: tuple[str, str] = ("start", "end"),
     ) -> None:
-        """Place the rod; a reduced body is laid with its interfaces `ends` on the two points."""
+        """Place the rod; a reduced body is laid with its interfaces `ends` on the two points, a part with its x axis."""
         start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         self.length = float(np.linalg.norm(end - start))
-        self.body: Body
+        self.joints: tuple[Joint, ...] = ()
+        self.forces: tuple[Force, ...] = ()
+        self.bodies: tuple[Body, ...]
         if reduced is None:
             orientation = turned(end - start, np.array([1.0, 0.0, 0.0]))
-            self.body = RigidBody(
-                name,
-                mass,
-                slender_inertia(mass, self.length),
-                center_of_mass=np.array([self.length / 2, 0, 0]),
-                position=start,
-                orientation=orientation,
+            self.bodies = (
+                RigidBody(
+                    name,
+                    mass,
+                    slender_inertia(mass, self.length),
+                    center_of_mass=np.array([self.length / 2, 0, 0]),
+                    position=start,
+                    orientation=orientation,
+                ),
             )
             self.start, self.end = Marker(name), Marker(name, position=np.array([self.length, 0, 0]))
+            return
+        if not isinstance(reduced, ReducedBody):
+            part = reduced(name, position=start, orientation=turned(end - start, np.array([1.0, 0.0, 0.0])))
+            self.bodies, self.joints, self.forces = part.bodies, part.joints, part.forces
+            self.start, self.end = (part.marker(place) for place in ends)
             return
         a, b = (between(reduced, interface) for interface in ends)
         size = float(np.linalg.norm(b - a))
@@ -61,8 +73,13 @@ class Rod:
             )
         orientation = turned(end - start, b - a)
         position = start - rotation_matrix(orientation) @ a
-        self.body = FlexibleBody(name, reduced, position=position, orientation=orientation)
+        self.bodies = (FlexibleBody(name, reduced, position=position, orientation=orientation),)
         self.start, self.end = Marker(name, ends[0]), Marker(name, ends[1])
+
+    @property
+    def body(self) -> Body:
+        """The one body of a rod that is rigid or reduced."""
+        return self.bodies[0]
 
 
 def between(reduced: ReducedBody, interface: str) -> Array:
@@ -82,8 +99,14 @@ def turned(to: Array, direction: Array) -> Array:
     return euler_parameters(np.eye(3) + turn + turn @ turn / (1 + cosine))
 
 
-def turning(body: Body, omega: Array) -> Body:
-    """Return the body with the velocities of a rigid rotation about the origin of ground, omega in ground axes."""
+def turning(body: Body, omega: Array, *, point: Array | None = None, velocity: Array | None = None) -> Body:
+    """Return the body with the velocities of a rigid rotation omega, (3,), ground axes.
+
+    It turns about the origin of ground, or about a point, (3,), that moves with a velocity, (3,).
+    """
+    omega = np.asarray(omega, dtype=float)
+    arm = body.position if point is None else body.position - point
+    base = np.zeros(3) if velocity is None else velocity
     return replace(
-        body, velocity=np.cross(omega, body.position), omega_B=rotation_matrix(body.orientation).T @ np.asarray(omega)
+        body, velocity=base + np.cross(omega, arm), omega_B=rotation_matrix(body.orientation).T @ omega
     )
