@@ -10,11 +10,13 @@ import scipy.linalg as la
 from cms.arrays import Array, IntArray
 from cms.axis_functions import AXIS_FUNCTIONS, CUBIC
 from cms.beam_fields import BeamFields, beam_fields, inertia_rows, rigid_fields, strain_rows
+from cms.beam_geometric import beam_geometric_stiffness
 from cms.beam_line import BeamLine
 from cms.beam_tube import tube
 from cms.damping import Damping, modal_damping
 from cms.errors import BodyError, ModeSetError
 from cms.frames import BuckensFrame, Frame, NodalFrame, TisserandFrame, checked_dofs, determinate_rows, placed
+from cms.geometric_stiffness import GeometricStiffness
 from cms.independent import RANK_TOLERANCE
 from cms.invariants import Moments, moments_from_gram
 from cms.orientation import orientation
@@ -39,6 +41,7 @@ def beam_from_assumed_modes(
     stations: Mapping[str, float] | None = None,
     frame: Frame | None = None,
     damping: Damping | None = None,
+    geometric: bool = True,
 ) -> ReducedBody:
     """Return a beam whose displacement is a sum of functions along its axis (Ritz), reduced and ready for a system.
 
@@ -69,6 +72,8 @@ def beam_from_assumed_modes(
         `NodalFrame(dofs=...)` of six (station, component).
     damping
         None by default.
+    geometric
+        Whether to add the geometric stiffness of the unit loads, with which a system stiffens the body.
 
     Returns
     -------
@@ -160,7 +165,18 @@ def beam_from_assumed_modes(
         interfaces=interfaces,
         provenance=provenance(line, functions, counts, dropped),
         columns=columns,
+        geometric=stiffening(line, functions, counts, C, T, x_station, condition) if geometric else None,
     )
+
+
+def stiffening(
+    line: BeamLine, functions: str, counts: Mapping[str, int], C: Array, T: Array, x_station: Array, frame: BodyFrame
+) -> GeometricStiffness:
+    """Return the geometric stiffness of the modes T; section forces jump at the stations."""
+    x, weight = gauss_points(line, functions, counts, breaks=x_station, more=CUBIC + 1)
+    fields = beam_fields(functions, counts, line, x)
+    motion = (fields.motion - rigid_fields(x, np.zeros(3)) @ C) @ T
+    return beam_geometric_stiffness(line, (x, weight), motion, fields.strain @ T, x_station, frame)
 
 
 def station_places(where: str, line: BeamLine, places: Mapping[str, float]) -> Array:
@@ -176,13 +192,16 @@ def station_places(where: str, line: BeamLine, places: Mapping[str, float]) -> A
     return x
 
 
-def gauss_points(line: BeamLine, functions: str, counts: Mapping[str, int]) -> tuple[Array, Array]:
-    """Return points and weights that integrate products of two functions exactly."""
+def gauss_points(
+    line: BeamLine, functions: str, counts: Mapping[str, int], *, breaks: Array | None = None, more: int = 0
+) -> tuple[Array, Array]:
+    """Return points and weights that integrate products of two functions and a polynomial of degree `more` exactly."""
+    inner = np.zeros(0) if breaks is None else breaks
     if functions != "splines":
-        return line.points(2 * max(counts[name] + (name == "bending") for name in counts))
+        return line.points(2 * max(counts[name] + (name == "bending") for name in counts) + more, breaks=inner)
     sets = [count + first for count, first in zip(counts.values(), (1, 2, 1, 0), strict=True) if count]
     knots = [np.linspace(0.0, line.length, n - CUBIC + 1) for n in sets if n > CUBIC]
-    return line.points(2 * CUBIC, breaks=np.concatenate([*knots, np.zeros(0)]))
+    return line.points(2 * CUBIC + more, breaks=np.concatenate([*knots, inner]))
 
 
 def frame_of_beam(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -69,13 +70,18 @@ def beam_line(
         laws: dict[str, Law] = {**values(section_of(item))}
         return BeamLine(length, breaks=breaks, **laws)
 
+    @cache
+    def at(place: float) -> dict[str, float]:
+        assert taper is not None
+        return values(section_of(replace(item, section=taper(place))))
+
     def law(name: str) -> Callable[[Array], Array]:
         def of_place(x: Array) -> Array:
-            sections = (section_of(replace(item, section=taper(float(place)))) for place in np.asarray(x).ravel())
-            return np.array([values(section)[name] for section in sections]).reshape(np.shape(x))
+            return np.array([at(float(place))[name] for place in np.asarray(x).ravel()]).reshape(np.shape(x))
 
         return of_place
 
-    first = values(section_of(replace(item, section=taper(0.0))))
-    names = [name for name, value in first.items() if np.isfinite(value)]  # an infinite shear stiffness is the default
+    names = [
+        name for name, value in at(0.0).items() if np.isfinite(value)
+    ]  # infinite: the default
     return BeamLine(length, breaks=breaks, **{name: law(name) for name in names})

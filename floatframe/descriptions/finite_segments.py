@@ -27,14 +27,15 @@ def finite_segments(
     position: Array | None = None,
     orientation: Array | None = None,
     velocity: Array | None = None,
-    omega_B: Array | None = None,  # noqa: N803
+    omega_B: Array | None = None,
     stations: Mapping[str, float] | None = None,
     damping: float = 0.0,
 ) -> FlexiblePart:
     """Return a straight, uniform or tapered beam as n rigid segments with springs between them.
 
-    (1) nodes at equal distances h = length / (n - 1), the first and the last at the ends; segment k is what lies nearer to
-        node k than to the others: its mass, centre and inertia are integrals of the laws over it, the end ones half as long
+    (1) nodes at equal distances h = length / (n - 1), the first and the last at the ends; segment k is what lies
+        nearer to node k than to the others: its mass, centre and inertia are integrals of the laws over it, the end
+        ones half as long
     (2) between two nodes a `Bushing` in their middle has the stiffness of the piece of beam between the nodes: relative
         motion (d, theta) of its two halves at the middle under the section force f and moment m there,
         F = ∫ Bᵀ diag(1/EA, 1/GAy, 1/GAz, 1/GJ, 1/EIy, 1/EIz) B dx, B (f, m) = (f, m + (x_m - x) e_x × f);  K = F⁻¹
@@ -54,8 +55,8 @@ def finite_segments(
     position, orientation
         Of the start of the beam in ground axes, (3,) [m], and Euler parameters of its axes, (4,).
     velocity, omega_B
-        Velocity of the start in ground axes, (3,) [m/s], and angular velocity in the axes of the beam, (3,) [rad/s]; the
-        part moves as one rigid body at the start.
+        Velocity of the start in ground axes, (3,) [m/s], and angular velocity in the axes of the beam, (3,) [rad/s]:
+        the part begins to move as one rigid body.
     stations
         Places with a marker: name -> x; default: "start" and "end". Between nodes they are fixed to their segment.
     damping

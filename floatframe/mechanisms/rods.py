@@ -40,7 +40,7 @@ class Rod:
         reduced: ReducedBody | PartMaker | None = None,
         ends: tuple[str, str] = ("start", "end"),
     ) -> None:
-        """Place the rod; a reduced body is laid with its interfaces `ends` on the two points, a part with its x axis."""
+        """Place the rod; a reduced body is laid with its interfaces `ends` on the points, a part with its x axis."""
         start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         self.length = float(np.linalg.norm(end - start))
         self.joints: tuple[Joint, ...] = ()
@@ -107,6 +107,4 @@ def turning(body: Body, omega: Array, *, point: Array | None = None, velocity: A
     omega = np.asarray(omega, dtype=float)
     arm = body.position if point is None else body.position - point
     base = np.zeros(3) if velocity is None else velocity
-    return replace(
-        body, velocity=base + np.cross(omega, arm), omega_B=rotation_matrix(body.orientation).T @ omega
-    )
+    return replace(body, velocity=base + np.cross(omega, arm), omega_B=rotation_matrix(body.orientation).T @ omega)
