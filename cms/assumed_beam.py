@@ -9,7 +9,7 @@ import scipy.linalg as la
 
 from cms.arrays import Array, IntArray
 from cms.axis_functions import AXIS_FUNCTIONS, CUBIC
-from cms.beam_fields import BeamFields, beam_fields, inertia_rows, rigid_fields, strain_rows
+from cms.beam_fields import BeamFields, beam_fields, beam_moments, inertia_rows, rigid_fields, strain_rows
 from cms.beam_geometric import beam_geometric_stiffness
 from cms.beam_line import BeamLine
 from cms.beam_tube import tube
@@ -18,7 +18,6 @@ from cms.errors import BodyError, ModeSetError
 from cms.frames import BuckensFrame, Frame, NodalFrame, TisserandFrame, checked_dofs, determinate_rows, placed
 from cms.geometric_stiffness import GeometricStiffness
 from cms.independent import RANK_TOLERANCE
-from cms.invariants import Moments, moments_from_gram
 from cms.orientation import orientation
 from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.source_columns import source_columns
@@ -283,26 +282,6 @@ def free_frequencies(line: BeamLine, integral: tuple[Array, Array, Array], field
     rest = A_M - rows @ np.linalg.lstsq(rows, A_M, rcond=None)[0]
     _, omega2, _ = elastic_modes(fields, A_K, rest)
     return np.asarray(np.sqrt(omega2) / (2 * np.pi))
-
-
-def beam_moments(line: BeamLine, points: tuple[Array, Array], U: Array, frame: BodyFrame) -> Moments:
-    """Return the canonical moments of rigid sections at the Gauss points about the frame (docs/theory.md, beams)."""
-    x, weight = points
-    n = U.shape[2]
-    parts = [np.zeros((len(x), 4 + 3 * n)) for _ in range(3)]
-    center = np.column_stack([x, np.zeros((len(x), 2))]) - frame.origin
-    turned = np.einsum("ba,nbk->nak", frame.axes, U[:, :3])
-    parts[0][:, 0] = 1.0
-    parts[0][:, 1:4] = center @ frame.axes
-    parts[0][:, 4:] = turned.reshape(len(x), -1)
-    for part, axis in ((parts[1], 1), (parts[2], 2)):
-        e = np.eye(3)[axis]
-        part[:, 1:4] = frame.axes.T @ e
-        moved = np.cross(U[:, 3:], e[None, :, None], axisa=1, axisb=1, axisc=1)
-        part[:, 4:] = np.einsum("ba,nbk->nak", frame.axes, moved).reshape(len(x), -1)
-    densities = (line.at("rho_A", x), line.at("rho_Iz", x), line.at("rho_Iy", x))
-    gram = sum(a.T @ ((density * weight)[:, None] * a) for a, density in zip(parts, densities, strict=True))
-    return moments_from_gram(np.asarray(gram))
 
 
 def provenance(line: BeamLine, functions: str, counts: Mapping[str, int], dropped: tuple[str, ...]) -> dict[str, str]:

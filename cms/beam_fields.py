@@ -17,9 +17,11 @@ import numpy as np
 from cms.arrays import Array
 from cms.axis_functions import axis_functions
 from cms.beam_line import BeamLine
+from cms.invariants import Moments, moments_from_gram
+from cms.reduced_body import BodyFrame
 from cms.rigid_modes import rigid_motion_of_points
 
-__all__ = ["BeamFields", "beam_fields", "inertia_rows", "rigid_fields", "strain_rows"]
+__all__ = ["BeamFields", "beam_fields", "beam_moments", "inertia_rows", "rigid_fields", "strain_rows"]
 
 PLANES = (("y", 1, 5, 1.0), ("z", 2, 4, -1.0))  #: name, translation, rotation and its sign by the slope
 
@@ -115,3 +117,23 @@ def strain_rows(line: BeamLine, x: Array, weight: Array, strain: Array) -> Array
     laws = [line.at(name, x) for name in ("EA", "GAy", "GAz", "GJ", "EIy", "EIz")]
     stiffness = np.where(np.isfinite(laws), laws, 0.0).T
     return np.asarray((np.sqrt(stiffness * weight[:, None])[:, :, None] * strain).reshape(6 * len(x), -1))
+
+
+def beam_moments(line: BeamLine, points: tuple[Array, Array], U: Array, frame: BodyFrame) -> Moments:
+    """Return the canonical moments of rigid sections at the Gauss points about the frame (docs/theory.md, beams)."""
+    x, weight = points
+    n = U.shape[2]
+    parts = [np.zeros((len(x), 4 + 3 * n)) for _ in range(3)]
+    center = np.column_stack([x, np.zeros((len(x), 2))]) - frame.origin
+    turned = np.einsum("ba,nbk->nak", frame.axes, U[:, :3])
+    parts[0][:, 0] = 1.0
+    parts[0][:, 1:4] = center @ frame.axes
+    parts[0][:, 4:] = turned.reshape(len(x), -1)
+    for part, axis in ((parts[1], 1), (parts[2], 2)):
+        e = np.eye(3)[axis]
+        part[:, 1:4] = frame.axes.T @ e
+        moved = np.cross(U[:, 3:], e[None, :, None], axisa=1, axisb=1, axisc=1)
+        part[:, 4:] = np.einsum("ba,nbk->nak", frame.axes, moved).reshape(len(x), -1)
+    densities = (line.at("rho_A", x), line.at("rho_Iz", x), line.at("rho_Iy", x))
+    gram = sum(a.T @ ((density * weight)[:, None] * a) for a, density in zip(parts, densities, strict=True))
+    return moments_from_gram(np.asarray(gram))
