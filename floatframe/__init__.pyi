@@ -29,6 +29,8 @@ from .coordinates import AxialDistance as AxialDistance
 from .coordinates import JointCoordinate as JointCoordinate
 from .coordinates import PointDistance as PointDistance
 from .couplers import CoordinateCoupler as CoordinateCoupler
+from .descriptions import FlexiblePart as FlexiblePart
+from .descriptions import finite_segments as finite_segments
 from .errors import (
     ConvergenceError as ConvergenceError,
 )
@@ -83,6 +85,7 @@ from .joints import PrismaticJoint as PrismaticJoint
 from .joints import RevoluteJoint as RevoluteJoint
 from .joints import RollingDisc as RollingDisc
 from .joints import ScrewJoint as ScrewJoint
+from .joints import SlidingJoint as SlidingJoint
 from .joints import SphericalJoint as SphericalJoint
 from .joints import UniversalJoint as UniversalJoint
 from .markers import Marker as Marker

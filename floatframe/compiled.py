@@ -12,7 +12,9 @@ from floatframe.flexible_body import FlexibleBody
 from floatframe.force_data import Functions, body_load_arrays, joint_force_arrays
 from floatframe.forces import Gravity, PointForce, SpringDamper
 from floatframe.joints.rows import DOT, POINT, SLIDE, Row
+from floatframe.joints.sliding import SlidingJoint
 from floatframe.kernels.model import Model
+from floatframe.line_data import Lines, add_sliding
 from floatframe.marker_data import (
     MarkerData,
     find_marker,
@@ -73,8 +75,12 @@ def compile_system(system: System) -> CompiledSystem:
 
     made = Connections(placed, n_q)
     functions = Functions()
+    lines = Lines()
     for joint in system.joints:
-        add_joint(system, made, joint)
+        if isinstance(joint, SlidingJoint):
+            add_sliding(system, made, lines, joint)
+        else:
+            add_joint(system, made, joint)
     springs, spring_table = [], []
     dampers = [force for force in system.forces if isinstance(force, SpringDamper)]
     for spring in dampers:
@@ -138,6 +144,7 @@ def compile_system(system: System) -> CompiledSystem:
         c_rates=integers(made.rates),
         **pairs.arrays(),
         **networks.arrays(),
+        **lines.arrays(len(markers)),
         spring_table=integers(spring_table),
         l_factor=integers([functions.index(load.amplitude) for load in loads]),
         **body_load_arrays(system, functions),

@@ -40,6 +40,7 @@ __all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
 LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
 FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: of tau in one step, while the residual falls or stands
 STANDING = 0.9  #: last residual by this one, below which it rises: tau shrinks with it
+ROUNDING = 4 * np.finfo(float).eps  #: of a position
 CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
 
 
@@ -128,7 +129,8 @@ def steady_rotation(
         scale_of_forces = _forces_at_work(compiled, work, parts, W)
         error = size / scale_of_forces if scale_of_forces > 0 else 0.0
         is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
-        is_told = np.abs(gaps[~holds]).max(initial=0.0) <= tolerance * np.abs(w).max(initial=0.0)
+        told = tolerance * np.abs(w).max(initial=0.0) + _rounding(compiled, parts, state)
+        is_told = bool((np.abs(gaps) <= told)[~holds].all())
         if error <= tolerance and is_closed and is_told:
             _require_rotation(compiled, work, omega)
             return Equilibrium(state, u_dot, w, omega, error, iteration)
@@ -198,6 +200,16 @@ def _forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: 
     """Return the length of the forces of joints, springs and weight, in the norm of the residual."""
     reactions = _size(W, parts.J.T @ work.w) if len(work.w) else 0.0
     return max(reactions, _size(W, work.residual + (parts.J.T @ work.w if len(work.w) else 0.0)))
+
+
+def _rounding(compiled: CompiledSystem, parts: Linearized, state: State) -> Array:
+    """Return what the rounding of positions alone leaves of the rows, (n_w,): much where a spring is stiff."""
+    reach = np.ones(len(state.u))
+    for i, u0 in enumerate(compiled.model.u0[:-1]):
+        reach[u0 : u0 + 3] = compiled.length + np.abs(state.r[i]).max()
+        q = slice(int(compiled.model.q0[i]), int(compiled.model.q0[i + 1]))
+        reach[u0 + 6 : compiled.model.u0[i + 1]] = np.abs(state.q[q])
+    return np.asarray(ROUNDING * (abs(parts.G) @ reach))
 
 
 def _total_mass(W: tuple[Array, ...]) -> float:

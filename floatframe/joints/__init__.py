@@ -11,6 +11,7 @@ from floatframe.joints.prismatic import PrismaticJoint
 from floatframe.joints.revolute import RevoluteJoint
 from floatframe.joints.rolling_disc import RollingDisc
 from floatframe.joints.screw import ScrewJoint
+from floatframe.joints.sliding import SlidingJoint
 from floatframe.joints.spherical import SphericalJoint
 from floatframe.joints.universal import UniversalJoint
 
@@ -28,6 +29,7 @@ __all__ = [
     "RevoluteJoint",
     "RollingDisc",
     "ScrewJoint",
+    "SlidingJoint",
     "SphericalJoint",
     "UniversalJoint",
 ]
@@ -44,6 +46,7 @@ Joint = (
     | RevoluteJoint
     | RollingDisc
     | ScrewJoint
+    | SlidingJoint
     | SphericalJoint
     | UniversalJoint
 )
@@ -60,6 +63,7 @@ JOINTS = {
     "revolute": RevoluteJoint,
     "rolling-disc": RollingDisc,
     "screw": ScrewJoint,
+    "sliding": SlidingJoint,
     "spherical": SphericalJoint,
     "universal": UniversalJoint,
 }

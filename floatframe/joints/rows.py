@@ -24,6 +24,8 @@ d = r_B - r_A and f(t) the prescribed motion of a row (constant c without):
               TWIST_B      TWIST about an axis of B
               RIM x        N - rho × F = 0, along x in ground axes     the force acts at the rim of a disc on B
 
+Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/deformed_line.py.
+
 rho leads from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
 kernels/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is COUPLE.
 
@@ -49,6 +51,9 @@ __all__ = [
     "HELD",
     "HELD_DISTANCES",
     "HELD_VELOCITIES",
+    "LINE",
+    "LINE_FREE",
+    "LINE_TURN",
     "MOMENT",
     "MOMENT_B",
     "NO_MOMENT",
@@ -80,10 +85,10 @@ __all__ = [
 
 #: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
 POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
-RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B = range(14, 22)
+RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B, LINE, LINE_TURN, LINE_FREE = range(14, 25)
 #: rows that hold something; the others say what the wrench is
-HELD = (POINT, DOT, TURN, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, ROLL, COUPLE, TURN_B)
-HELD_DISTANCES = (POINT, SLIDE, DISTANCE, SCREW, RIM_HEIGHT)  #: those in the unit of length
+HELD = (POINT, DOT, TURN, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, ROLL, COUPLE, TURN_B, LINE, LINE_TURN)
+HELD_DISTANCES = (POINT, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, LINE)  #: those in the unit of length
 HELD_VELOCITIES = (ROLL,)  #: those that hold a velocity and no position
 FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
 NO_MOMENT = -1  #: in place of a part: nothing acts there

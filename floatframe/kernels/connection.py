@@ -16,6 +16,9 @@ from floatframe.joints.rows import (
     DOT,
     GAUGE,
     GAUGE_B,
+    LINE,
+    LINE_FREE,
+    LINE_TURN,
     MOMENT,
     MOMENT_B,
     POINT,
@@ -35,6 +38,13 @@ from floatframe.joints.rows import (
 from floatframe.kernels.compilation import inner
 from floatframe.kernels.coordinate_force import coordinate_force
 from floatframe.kernels.coupler import coupler_derivatives, coupler_rates, coupler_rows
+from floatframe.kernels.deformed_line import (
+    line_acceleration,
+    line_derivatives,
+    line_rate,
+    line_row,
+    line_turn_by_place,
+)
 from floatframe.kernels.marker import marker_acceleration_bias, rotate
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, JOINT, SPRING
 from floatframe.kernels.pair_law import pair_derivatives, pair_rows
@@ -212,6 +222,8 @@ def connection_rows(model, work, c, c_k):
             work.g[k] = c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2])
         elif kind == RIM_HEIGHT or kind == ROLL or kind == RIM:
             work.g[k] = rolling_row(model, work, k, a, b, w, c_k)
+        elif kind == LINE or kind == LINE_FREE:
+            work.g[k] = line_row(model, work, k, a, b, w, c_k)
         elif kind == TURN_B:
             y = model.row_y[k]
             e0, e1, e2 = direction_of_a(model, work, k, b)
@@ -232,7 +244,7 @@ def connection_rows(model, work, c, c_k):
                 value, _, _ = prescribed(model, work, k)
                 force = e0 * w[0] + e1 * w[1] + e2 * w[2]
                 work.g[k] = e0 * r0 + e1 * r1 + e2 * r2 - value - model.row_soft[k] * c_k * force
-            else:  # DOT, TURN
+            else:  # DOT, TURN, LINE_TURN
                 y = model.row_y[k]
                 d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
                 held = model.row_c[k] if kind == DOT else 0.0
@@ -306,6 +318,8 @@ def connection_derivatives(model, work, c, c_k):
             V[r, part], V[r, part + 1], V[r, part + 2] = e0, e1, e2
         elif kind == RIM_HEIGHT or kind == ROLL or kind == RIM:
             rolling_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V)
+        elif kind == LINE or kind == LINE_FREE:
+            line_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V)
         elif kind == TURN_B:
             y = model.row_y[k]
             e0, e1, e2 = direction_of_a(model, work, k, b)
@@ -331,11 +345,13 @@ def connection_derivatives(model, work, c, c_k):
                 put_pair(P_a, P_b, r, 0, -1.0, e0, e1, e2)
                 P_a[r, 3], P_a[r, 4], P_a[r, 5] = cross(e0, e1, e2, r0, r1, r2)
                 V[r, 0], V[r, 1], V[r, 2] = -model.row_soft[k] * e0, -model.row_soft[k] * e1, -model.row_soft[k] * e2
-            else:  # DOT, TURN
+            else:  # DOT, TURN, LINE_TURN
                 y = model.row_y[k]
                 d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
                 n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
                 put_pair(P_a, P_b, r, 3, 1.0, n0, n1, n2)
+                if kind == LINE_TURN:
+                    line_turn_by_place(model, work, r, a, n0, n1, n2, P_a, P_b)
                 if model.row_soft[k] > 0.0:  # its change with the direction is left out: of second order
                     f = model.row_soft[k]
                     V[r, part], V[r, part + 1], V[r, part + 2] = f * n0, f * n1, f * n2
@@ -407,6 +423,8 @@ def row_rate(model, work, k, a, b):
         return f0 * r0 + f1 * r1 + f2 * r2 + e0 * v0 + e1 * v1 + e2 * v2 - model.row_c[k] * turning
     if kind == RIM_HEIGHT or kind == ROLL:
         return rolling_rate(model, work, k, a, b)
+    if kind == LINE or kind == LINE_TURN:
+        return line_rate(model, work, k, a, b)
     if kind == TURN_B:
         a, b, o, p = b, a, p, o
     if kind == DOT or kind == TURN or kind == TURN_B or kind == SLIDE:
@@ -443,6 +461,8 @@ def row_acceleration(model, work, k, a, b, bias_a, bias_b):
         return own + square * rate * rate / (L * L * L) - 0.5 * second * (square / (L * L) + 1.0)
     if kind == RIM_HEIGHT or kind == ROLL:
         return rolling_acceleration(model, work, k, a, b, bias_a, bias_b)
+    if kind == LINE or kind == LINE_TURN:
+        return line_acceleration(model, work, k, a, b, bias_a, bias_b)
     if kind == TURN_B:
         a, b, o, p, bias_a, bias_b = b, a, p, o, bias_b, bias_a
     if kind == DOT or kind == TURN or kind == TURN_B or kind == SLIDE or kind == SCREW:

@@ -5,6 +5,8 @@ import math
 from floatframe.joints.rows import (
     DISTANCE,
     DOT,
+    LINE,
+    LINE_TURN,
     POINT,
     PUSH,
     RIM_HEIGHT,
@@ -94,7 +96,7 @@ def diagnose(model, work, out, drift):
         a, b = model.c_a[c], model.c_b[c]
         for k in range(model.c_w0[c], model.c_w0[c + 1]):
             kind = model.row_kind[k]
-            if kind in (POINT, SLIDE, DISTANCE, SCREW, RIM_HEIGHT):
+            if kind in (POINT, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, LINE):
                 drift[c, 0] += work.g[k] ** 2
                 drift[c, 2] += row_rate(model, work, k, a, b) ** 2
             elif kind in (PUSH, TWIST, TWIST_B):
@@ -102,7 +104,7 @@ def diagnose(model, work, out, drift):
                 out[3] += coordinate_strain(model, k, kind != PUSH, x)
             elif kind == ROLL:
                 drift[c, 2] += work.g[k] ** 2
-            elif kind in (DOT, TURN, TURN_B):
+            elif kind in (DOT, TURN, TURN_B, LINE_TURN):
                 drift[c, 1] += work.g[k] ** 2
                 drift[c, 3] += row_rate(model, work, k, a, b) ** 2
         for k in range(N_DRIFTS):

@@ -3,6 +3,7 @@
 from floatframe.kernels.body import body_forces, body_tangent
 from floatframe.kernels.compilation import inner
 from floatframe.kernels.connection import connection_derivatives, connection_rows
+from floatframe.kernels.deformed_line import slide_marker
 from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, rotate, wrench_to_body
 from floatframe.kernels.rotation import right_jacobian
 from floatframe.kernels.time_function import time_function
@@ -17,6 +18,8 @@ def evaluate(model, work, c_k):
         marker_motion(model, work, m)
         for k in range(6):
             work.m_wrench[m, k] = 0.0
+    for k in range(model.line_marker.shape[0]):
+        slide_marker(model, work, k)
     for c in range(model.c_size.shape[0]):
         connection_rows(model, work, c, c_k)
     for k in range(model.l_marker.shape[0]):

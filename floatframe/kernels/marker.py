@@ -13,7 +13,9 @@ from floatframe.kernels.compilation import inner
 from floatframe.kernels.dense import add_products
 from floatframe.kernels.rotation import cross, exp_matrix, left_jacobian, left_jacobian_derivative
 
-__all__ = ["marker_acceleration_bias", "marker_columns", "marker_motion", "marker_stiffness", "wrench_to_body"]
+__all__ = [
+    "marker_acceleration_bias", "marker_columns", "marker_motion", "marker_stiffness", "pose_on_body", "wrench_to_body",
+]  # fmt: skip
 
 
 @inner
@@ -49,13 +51,22 @@ def marker_motion(model, work, m):
             for b in range(3):
                 A[a, b] = triad[a, b]
         return
+    for a in range(3):
+        work.rho[m, a] = model.m_position[m, a]
+    if model.m_psi0[m] >= 0:
+        elastic_motion(model, work, m, i)
+    pose_on_body(model, work, m)
+
+
+@inner
+def pose_on_body(model, work, m):
+    """Write place, axes and velocities of marker m in ground axes from its motion in its body."""
+    i = model.m_body[m]
+    A, triad = work.m_A[m], model.m_triad[m]
     R, u0 = work.R[i], model.u0[i]
     u = work.u
     rho, rho_dot, spin = work.rho[m], work.rho_dot[m], work.spin[m]
-    for a in range(3):
-        rho[a] = model.m_position[m, a]
     if model.m_psi0[m] >= 0:
-        elastic_motion(model, work, m, i)
         exp_matrix(work.angle[m], A)
         for b in range(3):
             x0, x1, x2 = rotate(A, triad[0, b], triad[1, b], triad[2, b])

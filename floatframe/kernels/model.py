@@ -121,6 +121,15 @@ class Model(NamedTuple):
     p_arm: IntArray  #: first of its three rows of moment on A, -1 for none, (n_p,)
     p_factor: Array  #: coefficient in a coupler, (n_p,)
     core: IntArray  #: row of the multiplier of each coupler, of the first force of each user force, (n_networks,)
+    # markers that slide along the deformed line through stations, see kernels/deformed_line.py
+    m_line: IntArray  #: line of a sliding marker, -1 for none, (n_m,)
+    line_marker: IntArray  #: the marker that slides, its position that of s = 0, (n_lines,)
+    line_other: IntArray  #: marker B, (n_lines,)
+    line_row: IntArray  #: row with the prescribed s, -1 for none, (n_lines,)
+    line_axis: Array  #: unit vector along the line, body axes, (n_lines, 3)
+    line0: IntArray  #: first station of each line, and the end, (n_lines + 1,)
+    line_s: Array  #: places of the stations, (n_stations,)
+    line_m: IntArray  #: their markers, (n_stations,)
     # loads
     l_marker: IntArray  #: (n_l,)
     l_factor: IntArray  #: function of time by which it is multiplied, -1 for one, (n_l,)
@@ -184,6 +193,7 @@ class Work(NamedTuple):
     m_omega: Array  #: angular velocity, ground axes, (n_m, 3)
     m_wrench: Array  #: force and moment on the marker, ground axes, (n_m, 6)
     m_bias: Array  #: acceleration and angular acceleration at zero u_dot, ground axes, (n_m, 6)
+    line: Array  #: place and shape at the sliding markers, see kernels/deformed_line.py, (n_lines, 16)
     # connections
     g: Array  #: residual of the rows, scaled, (n_w,)
     P: Array  #: derivative of the rows by marker motion (r, phi, v, omega), ground axes, (n_m, most rows, 12)
@@ -253,6 +263,7 @@ def new_work(model: Model) -> Work:
         m_omega=zeros(n_m, 3),
         m_wrench=zeros(n_m, 6),
         m_bias=zeros(n_m, 6),
+        line=zeros(len(model.line_marker), 16),
         g=zeros(n_w),
         P=zeros(n_m, most, 12),
         V=zeros(n_c, most, most),

@@ -1,0 +1,112 @@
+"""A point, or a body, that slides along the deformed centre line of a flexible body."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.arrays import unit_vector
+from floatframe.errors import ModelError
+from floatframe.joints.axis_frame import checked_motions
+from floatframe.joints.rows import LINE, LINE_FREE, LINE_TURN, MOMENT, NO_MOMENT, Row, orientation_rows
+from floatframe.markers import Marker, Place
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["SlidingJoint"]
+
+ALONG, ACROSS, UPWARD = range(3)  #: parts of LINE rows
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingJoint:
+    """Keeps the point of marker B on the deformed line through interfaces of a flexible body; two constraints.
+
+    The line leads from marker A through the interfaces `line`, in their order; undeformed it is straight. Between the
+    interfaces it is a cubic by their displacements and rotations, so that three or more of them are wanted for a beam
+    that bends within its length. Beyond its ends it goes on straight. With `is_aligned` marker B keeps its orientation,
+    as placed, to the line, which turns as it bends and twists: five constraints, a prismatic joint on the deformed
+    line.
+    There is no friction: the reaction does no work as B slides.
+
+    Coordinate `distance`: place of B along the line from marker A, in the length of the undeformed line.
+    """
+
+    name: str
+    marker_a: Marker  #: at an interface of a flexible body, where the line begins
+    marker_b: Place
+    line: Sequence[str] = ()  #: names of the further interfaces of that body along the line
+    is_aligned: bool = False  #: True: the orientation of marker B follows the line
+    normal: Array | None = None  #: direction across the line in the axes of its body, (3,); None: chosen
+    motions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: prescribed, by coordinate; a number: held
+
+    coordinates = ("distance",)
+
+    def __post_init__(self) -> None:
+        where = f"joint {self.name!r}"
+        if not isinstance(self.marker_a, Marker) or self.marker_a.interface is None:
+            raise ModelError(f"{where}: marker_a: expected a Marker at an interface of a flexible body")
+        line = (self.line,) if isinstance(self.line, str) else tuple(self.line)
+        names = (self.marker_a.interface, *line)
+        if not line or len(set(names)) != len(names):
+            raise ModelError(
+                f"{where}: line: expected the names of one or more further interfaces of the body, each once, got "
+                f"{list(line)} after {self.marker_a.interface!r}"
+            )
+        object.__setattr__(self, "line", line)
+        if self.normal is not None:
+            object.__setattr__(self, "normal", unit_vector(f"{where}: normal", self.normal))
+        checked_motions(self)
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """Names of the interfaces along the line."""
+        assert self.marker_a.interface is not None
+        return (self.marker_a.interface, *self.line)
+
+    @property
+    def size(self) -> int:
+        """Components of the unknown wrench: force, and moment where it is aligned."""
+        return 6 if self.is_aligned else 3
+
+    @property
+    def moment_b(self) -> int:
+        """Where the moment on B begins in it."""
+        return MOMENT if self.is_aligned else NO_MOMENT
+
+    def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
+        """Return the rows for axes of the line A_a, x along it, and marker axes A_b, (3, 3), ground axes, as placed."""
+        if "distance" in self.motions:
+            own = Row(LINE, part=ALONG, motion=self.motions["distance"], coordinate="distance")
+        else:
+            own = Row(LINE_FREE, part=ALONG)
+        turned = (Row(LINE_TURN, row.x, row.y, part=MOMENT) for row in orientation_rows(A_a.T @ A_b) if self.is_aligned)
+        return (Row(LINE, part=ACROSS), Row(LINE, part=UPWARD), own, *turned)
+
+
+def line_triad(where: str, points: Array, normal: Array | None) -> tuple[Array, Array]:
+    """Return places along a straight line of points, (n,), and its axes as columns, x along it, (3, 3).
+
+    Raises
+    ------
+    ModelError
+        If the points are not in a row along a straight line, or the normal lies along it.
+    """
+    chord = points[-1] - points[0]
+    length = float(np.linalg.norm(chord))
+    if not length > 0:
+        raise ModelError(f"{where}: the first and the last interface of the line are in one place")
+    x = chord / length
+    s = (points - points[0]) @ x
+    beside = float(np.abs(points - points[0] - np.outer(s, x)).max())
+    if beside > 1e-6 * length or not (np.diff(s) > 1e-6 * length).all():
+        raise ModelError(
+            f"{where}: its interfaces: expected them one after another on a straight line, got places {s.round(9)} up "
+            f"to {beside:.3g} beside it"
+        )
+    y = np.eye(3)[int(np.argmin(np.abs(x)))] if normal is None else normal
+    y = y - (y @ x) * x
+    if np.linalg.norm(y) < 1e-6:
+        raise ModelError(f"{where}: normal: expected a direction across the line {x.round(6)}, got one along it")
+    y = y / np.linalg.norm(y)
+    return s, np.column_stack([x, y, np.cross(x, y)])
