@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+SMALL = 150  # unknowns up to which dense matrices are faster
 Motion = Callable[[float], tuple[float, float, float]]  # t -> value, rate, second rate
 
 
@@ -51,6 +52,13 @@ def rotation(phase: Callable[[float], tuple[float, float, float]], radius: float
     return along(0.0), along(-np.pi / 2)
 
 
+def of_dofs(free: np.ndarray):
+    """Return how to take the part of a matrix over these dofs, and how to solve with it: dense where that is faster."""
+    if len(free) <= SMALL:
+        return lambda A: A.toarray()[np.ix_(free, free)], np.linalg.solve
+    return lambda A: sp.csc_array(A[free][:, free]), lambda S, r: splu(sp.csc_array(S)).solve(r)
+
+
 def integrate(problem: Problem, t_end: float, h: float, *, rho_inf: float = 0.9, tolerance: float = 1e-10) -> Solution:
     """Integrate from rest (or v0) at x0."""
     n = len(problem.x0)
@@ -72,12 +80,13 @@ def integrate(problem: Problem, t_end: float, h: float, *, rho_inf: float = 0.9,
     impose(0.0, x, v, a)
     f, _ = problem.force(x)
     rest = load(0.0) - f - M @ a - (C @ v if C is not None else 0.0)
-    a[free] = splu(sp.csc_array(M[free][:, free])).solve(rest[free])
+    part, solve = of_dofs(free)
+    a[free] = solve(part(M), rest[free])
     n_steps = round(t_end / h)
     out = Solution(np.arange(n_steps + 1) * h, *(np.zeros((n_steps + 1, n)) for _ in range(3)))
     out.x[0], out.v[0], out.a[0] = x, v, a
-    M_ff = sp.csc_array(M[free][:, free])
-    C_ff = None if C is None else sp.csc_array(C[free][:, free])
+    M_ff = part(M)
+    C_ff = None if C is None else part(C)
     f_last = f
     for k in range(n_steps):
         t = (k + 1) * h
@@ -91,10 +100,10 @@ def integrate(problem: Problem, t_end: float, h: float, *, rho_inf: float = 0.9,
             r = M @ ((1 - alpha_m) * a_new + alpha_m * a) + (1 - alpha_f) * f + alpha_f * f_last - p
             if C is not None:
                 r = r + C @ ((1 - alpha_f) * v_new + alpha_f * v)
-            S = (1 - alpha_m) / (beta * h**2) * M_ff + (1 - alpha_f) * sp.csc_array(K[free][:, free])
+            S = (1 - alpha_m) / (beta * h**2) * M_ff + (1 - alpha_f) * part(K)
             if C_ff is not None:
                 S = S + (1 - alpha_f) * gamma / (beta * h) * C_ff
-            dx = -splu(sp.csc_array(S)).solve(r[free])
+            dx = -solve(S, r[free])
             x_new[free] += dx
             v_new[free] += gamma / (beta * h) * dx
             a_new[free] += dx / (beta * h**2)
