@@ -30,6 +30,7 @@ from .coordinates import JointCoordinate as JointCoordinate
 from .coordinates import PointDistance as PointDistance
 from .couplers import CoordinateCoupler as CoordinateCoupler
 from .descriptions import FlexiblePart as FlexiblePart
+from .descriptions import corotational as corotational
 from .descriptions import finite_segments as finite_segments
 from .errors import (
     ConvergenceError as ConvergenceError,

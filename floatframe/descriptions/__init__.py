@@ -2,5 +2,6 @@
 
 from floatframe.descriptions.finite_segments import finite_segments
 from floatframe.descriptions.flexible_part import FlexiblePart, PartMaker
+from floatframe.descriptions.superelement import corotational
 
-__all__ = ["FlexiblePart", "PartMaker", "finite_segments"]
+__all__ = ["FlexiblePart", "PartMaker", "corotational", "finite_segments"]
