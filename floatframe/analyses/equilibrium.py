@@ -40,7 +40,7 @@ __all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
 LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
 FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: of tau in one step, while the residual falls or stands
 STANDING = 0.9  #: last residual by this one, below which it rises: tau shrinks with it
-ROUNDING = 4 * np.finfo(float).eps  #: of a position
+ROUNDING = 32 * np.finfo(float).eps  #: of a position or rotation, as springs see it
 CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
 
 

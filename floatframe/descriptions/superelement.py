@@ -100,19 +100,14 @@ def corotational(
         inertias.append(own[1])
         middle = (a.position + b.position) / 2
         K = relative_stiffness(where, body, a, b)
-        markers = []
-        for interface, node in ((a, number + 1), (b, number + 2)):
-            markers.append(
-                Marker(
-                    f"{name} {node}",
-                    position=interface.triad.T @ (middle - interface.position),
-                    triad=interface.triad.T,
-                )
-            )
-        elements.append(Bushing(f"{name} element {number + 1}", *markers, stiffness=K, damping=damping * K))
+        first, second = (
+            Marker(f"{name} {node}", position=i.triad.T @ (middle - i.position), triad=i.triad.T)
+            for i, node in ((a, number + 1), (b, number + 2))
+        )
+        elements.append(Bushing(f"{name} element {number + 1}", first, second, stiffness=K, damping=damping * K))
     bodies = []
-    for k, ((point, axes), (mass, first, inertia)) in enumerate(zip(places, inertias, strict=True)):
-        center = first / mass
+    for k, ((point, axes), (mass, moment, inertia)) in enumerate(zip(places, inertias, strict=True)):
+        center = moment / mass
         about_center = inertia - mass * (center @ center * np.eye(3) - np.outer(center, center))
         bodies.append(
             RigidBody(

@@ -38,10 +38,13 @@ ITEM = fm.BeamProperty(fm.Rectangle(0.01, 0.02), STEEL, orientation=(0, 1, 0))
 CHORD = cms.NodalFrame(dofs=((0, 0), (0, 1), (0, 2), (0, 3), (6, 1), (6, 2)))
 
 
-def beam(length=LENGTH, *, n_modes=0, frame=None):
+THIN = replace(ITEM, section=fm.Circle(0.001))
+
+
+def beam(length=LENGTH, *, n_modes=0, frame=None, item=ITEM):
     mesh = fm.straight_line((0, 0, 0), (length, 0, 0), 6)
     ends = [fm.line_interface(mesh, end, fm.NodeIndices((k,))) for end, k in (("start", 0), ("end", 6))]
-    body = cms.couple(fm.beam_body(mesh, ITEM, name="beam", units=UNITS, interfaces=ends))
+    body = cms.couple(fm.beam_body(mesh, item, name="beam", units=UNITS, interfaces=ends))
     return cms.reduce(body, cms.craig_bampton(body, n_modes=n_modes), frame=frame)
 
 
@@ -116,13 +119,13 @@ def test_static_deflection_under_an_end_load_is_exact():
 
 
 def test_an_end_moment_bends_a_row_to_a_quarter_of_a_circle():
-    moment = np.pi * law().EIy / (2 * LENGTH)
+    moment = np.pi * STEEL.E * np.pi / 4 * 0.001**4 / (2 * LENGTH)
     exact = np.array([2 * LENGTH / np.pi, 0.0, 2 * LENGTH / np.pi])
     errors = []
     for n in (4, 8):
-        part = corotational("part", [beam(LENGTH / n)] * n)
+        part = corotational("part", [beam(LENGTH / n, item=THIN)] * n)
         load = PointForce("load", part.marker("end"), torque=(0, -moment, 0))
-        found = static_equilibrium(cantilever(part, load), max_iterations=1000).state.r[-1]
+        found = static_equilibrium(cantilever(part, load)).state.r[-1]
         errors.append(np.linalg.norm(found - exact) / LENGTH)
     assert errors[1] < 5e-3
     assert 3.6 < errors[0] / errors[1] < 4.4
@@ -147,13 +150,13 @@ def test_free_motion_keeps_momenta_and_energy_while_it_bends_and_turns():
     ]
     drift = []
     for h in (2e-5, 1e-5):
-        motion = integrate(System(thrown, [], part.forces, UNITS), GeneralizedAlpha(1.0), 0.01, h)
+        motion = integrate(System(thrown, [], part.forces, UNITS), GeneralizedAlpha(1.0, 1e-12), 0.01, h)
         e = motion.energies
         total = e.kinetic + e.springs
         momentum = motion.linear_momentum
         drift.append(np.ptp(total))
         assert np.ptp(e.springs) > 0.1 * e.springs.max()
-        assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), rtol=0, atol=1e-8)
+        assert np.abs(momentum - momentum[0]).max() < 1e-7 * np.linalg.norm(momentum[0])  # rounding of stiff springs
     assert drift[1] < 0.35 * drift[0]
 
 
