@@ -10,8 +10,10 @@ from floatframe.errors import ResultsError
 from floatframe.flexible_body import FlexibleBody
 from floatframe.joints import Joint, ScrewJoint
 from floatframe.joints.rows import DISTANCE, GAUGE_B, MOMENT, MOMENT_B, SLIDE, TURN, TURN_B, Row
+from floatframe.joints.sliding import SlidingJoint
 from floatframe.marker_data import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.sensors import PlaceMotion, interface_motion, point_motion
+from floatframe.sliding_results import sliding_place
 from floatframe.system import System
 from floatframe.trajectory import Trajectory
 
@@ -57,6 +59,8 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
         )
     placed = system.compiled.placed
     ends = joint_markers(system, found, placed)
+    if isinstance(found, SlidingJoint):
+        return sliding_motion(system, trajectory, found, ends[1])
     (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q_of(system)) for end in ends)
     row = next(row for row in found.rows(A_a, A_b, r_b - r_a) if row.coordinate == coordinate)
     a, b = (end_motion(system, trajectory, end) for end in ends)
@@ -87,6 +91,22 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     part = MOMENT_B if found.size == 9 else found.moment_b
     angle = np.unwrap(np.arctan2(dot(np.cross(E, Z), D), dot(Z, D)))
     return CoordinateMotion(a.t, angle, dot(E, b.omega - a.omega), -dot(w[:, part : part + 3], E), is_angle=True)
+
+
+def sliding_motion(
+    system: System, trajectory: Trajectory, joint: SlidingJoint, marker_b: MarkerData
+) -> CoordinateMotion:
+    """Return the place along a deformed line; the force is that of its drive, zero where it slides freely."""
+    b = end_motion(system, trajectory, marker_b)
+    place = sliding_place(system, trajectory, joint, b)
+    first = trajectory.head.w0[[each.name for each in system.joints].index(joint.name)]
+    w = trajectory.source.read("w")[:, first : first + joint.size]
+    force = np.zeros(len(b.t))
+    if joint.motions:
+        force = -dot(w[:, :3], place.tangent)
+        if joint.is_aligned:
+            force = force - dot(w[:, MOMENT : MOMENT + 3], place.turning)
+    return CoordinateMotion(b.t, place.s, place.rate, force)
 
 
 def screw_motion(

@@ -199,13 +199,27 @@ class JointSection(Table):
     lead: float | None = Field(None, description="a number other than 0, the advance of a screw for one turn")
     distance: Positive | None = Field(None, description="a number above 0, the length of a rod; default: as placed")
     radius: Positive | None = Field(None, description="a number above 0, the radius of a rolling disc")
+    line: list[Name] | None = Field(None, description="the names of further interfaces along the line of marker_a")
+    is_aligned: bool | None = Field(None, description="true or false: marker_b turns with the line")
+    normal: Vector3 | None = Field(None, description="a direction across the line, axes of body_a, [x, y, z]")
     motions: dict[str, MotionSection] | None = Field(
         None, description="tables [joints.NAME.motions.COORDINATE], functions of time"
     )
 
     @model_validator(mode="after")
     def _fits_the_type(self) -> "JointSection":
-        for key in ("axis", "axis_b", "rotation", "lead", "distance", "radius", "motions"):
+        for key in (
+            "axis",
+            "axis_b",
+            "rotation",
+            "lead",
+            "distance",
+            "radius",
+            "line",
+            "is_aligned",
+            "normal",
+            "motions",
+        ):
             if getattr(self, key) is not None and key not in KEYS_OF_JOINTS[self.type]:
                 raise ValueError(f"a {self.type} joint has no key {key}{nearest(key, KEYS_OF_JOINTS[self.type])}")
         if "axis" in KEYS_OF_JOINTS[self.type] and self.axis is None:
@@ -215,6 +229,9 @@ class JointSection(Table):
         if self.type == "rolling-disc" and (self.axis_b is None or self.radius is None):
             key = "axis_b" if self.axis_b is None else "radius"
             raise ValueError(f"{key}: missing; a rolling disc needs its radius and its axis in the axes of marker_b")
+        if self.type == "sliding" and (self.line is None or self.marker_a is None):
+            key = "line" if self.line is None else "marker_a"
+            raise ValueError(f"{key}: missing; a sliding joint needs the interface marker_a and the others of its line")
         if self.type == "screw" and self.lead is None:
             raise ValueError("lead: missing; a screw joint needs its advance for one turn")
         if self.marker_a is None and self.marker_b is None:
@@ -422,7 +439,7 @@ def joint_of(name: str, section: JointSection) -> Joint:
         if key == "motions":
             options[key] = {coordinate: table.function() for coordinate, table in (value or {}).items()}
         elif value is not None:
-            options[key] = value if isinstance(value, float) else np.array(value)
+            options[key] = value if isinstance(value, float | bool | list) else np.array(value)
     return JOINTS[section.type](name, ends[0], ends[1], **options)
 
 

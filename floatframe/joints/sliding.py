@@ -77,7 +77,7 @@ class SlidingJoint:
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:
         """Return the rows for axes of the line A_a, x along it, and marker axes A_b, (3, 3), ground axes, as placed."""
         if "distance" in self.motions:
-            own = Row(LINE, part=ALONG, motion=self.motions["distance"], coordinate="distance")
+            own = Row(LINE, part=ALONG, motion=self.motions["distance"])
         else:
             own = Row(LINE_FREE, part=ALONG)
         turned = (Row(LINE_TURN, row.x, row.y, part=MOMENT) for row in orientation_rows(A_a.T @ A_b) if self.is_aligned)

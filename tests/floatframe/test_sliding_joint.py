@@ -11,6 +11,7 @@ import cms
 from floatframe import (
     GROUND,
     FlexibleBody,
+    FloatframeError,
     GeneralizedAlpha,
     Gravity,
     Marker,
@@ -24,9 +25,12 @@ from floatframe import (
     SphericalJoint,
     System,
     integrate,
+    mobility,
 )
+from floatframe.joint_results import joint_coordinate
 from floatframe.mode_choice import frozen_to_rigid
 from floatframe.sensors import interface_motion, point_motion
+from floatframe.system_file import read_system
 from floatframe.time_functions import polynomial_of_time
 
 UNITS = cms.unit_system("m-kg-s")
@@ -222,3 +226,61 @@ def test_impossible_lines_are_refused(options, text):
 def test_a_line_needs_a_flexible_body():
     with pytest.raises(ModelError, match="expected a Marker at an interface"):
         SlidingJoint("slide", Marker("beam"), Marker("slider"), line=("a",))
+
+
+@pytest.mark.parametrize("is_aligned", [False, True])
+def test_coordinate_of_the_joint_is_found_again_in_the_results(is_aligned):
+    """Value and rate of a drive; its force times the rate is the power that enters."""
+    drive = polynomial_of_time([0.2, 0.5, 3.0])
+    slide = SlidingJoint(
+        "slide",
+        Marker("beam", FIRST),
+        Marker("slider"),
+        line=FURTHER,
+        is_aligned=is_aligned,
+        motions={"distance": drive},
+    )
+    system = simply_supported(beam(), slide, slider(0.5, 0.2, (0.5, 0, 0)), 9.81)
+    motion = integrate(system, GeneralizedAlpha(0.9), 0.25, 2e-4)
+    found = joint_coordinate(system, motion, "slide", "distance")
+    assert_allclose(found.value, [drive(t) for t in found.t], rtol=0, atol=1e-9)
+    assert_allclose(found.rate, [drive(t, 1) for t in found.t], rtol=0, atol=1e-5)
+    power = found.force * found.rate
+    work = np.concatenate([[0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(found.t))])
+    assert_allclose(work, motion.energies.work - motion.energies.work[0], rtol=0, atol=1e-3 * np.abs(work).max())
+
+
+def test_system_file_knows_the_joint(tmp_path):
+    cms.write(beam(), tmp_path / "beam.h5")
+    text = """
+        [system]
+        units = "m-kg-s"
+        [bodies.beam]
+        file = "beam.h5"
+        [bodies.slider]
+        mass = 1.0
+        inertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        position = [0.25, 0, 0]
+        [joints.slide]
+        type = "sliding"
+        body_a = "beam"
+        marker_a = "s0"
+        body_b = "slider"
+        marker_b = [0, 0, 0]
+        line = ["s4", "s8"]
+        is_aligned = true
+        normal = [0, 1, 0]
+        [run]
+        t_end = 0.1
+        h = 1e-3
+    """
+    (tmp_path / "system.toml").write_text(text)
+    system, _ = read_system(tmp_path / "system.toml")
+    joint = system.joints[0]
+    assert isinstance(joint, SlidingJoint)
+    assert joint.stations == ("s0", "s4", "s8")
+    assert joint.is_aligned
+    assert mobility(system).mobility == 7  # both free but for five constraints
+    (tmp_path / "bad.toml").write_text(text.replace('line = ["s4", "s8"]', ""))
+    with pytest.raises(FloatframeError, match="line: missing"):
+        read_system(tmp_path / "bad.toml")
