@@ -17,13 +17,13 @@ from .analyses import linearize as linearize
 from .analyses import quasi_static_bodies as quasi_static_bodies
 from .analyses import resolved_frequencies as resolved_frequencies
 from .analyses import root_locus as root_locus
-from .analyses import run_study as run_study
 from .analyses import snapshot as snapshot
 from .analyses import static_equilibrium as static_equilibrium
 from .analyses import steady_rotation as steady_rotation
 from .analyses import sweep as sweep
 from .analyses import system_modes as system_modes
 from .analyses import with_motors as with_motors
+from .analyses.study import run_study as run_study
 from .coordinates import AxialAngle as AxialAngle
 from .coordinates import AxialDistance as AxialDistance
 from .coordinates import JointCoordinate as JointCoordinate

@@ -59,3 +59,39 @@ def test_output_of_the_core_goes_through_the_command_line():
             if "cli" not in parts and any(isinstance(c.func, ast.Name) and c.func.id == "print" for c in calls):
                 talkers.append(str(path.relative_to(ROOT)))
     assert [name for name in talkers if "rendering" not in name] == []
+
+
+ENTRIES = ("system_file", "study_file", "analyses", "measuring", "integration", "trajectory", "mechanisms")
+
+
+@pytest.mark.parametrize("module", ENTRIES)
+def test_modules_where_users_begin_can_be_imported_first(module):
+    code = f"import floatframe.{module}"
+    result = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+
+
+@pytest.mark.long
+def test_every_module_can_be_imported_first():
+    """Each in an interpreter whose modules of ours are forgotten before: no circle of imports."""
+    code = """
+import importlib, pathlib, sys
+failed = []
+for package in {packages!r}:
+    for path in sorted(pathlib.Path(package).rglob("*.py")):
+        name = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+        if "kernels" in name or "rendering" in name or name.endswith("__main__"):
+            continue  # compiled on import, or the entry of a process
+        for known in [m for m in sys.modules if m.split(".")[0] in {packages!r} and "kernels" not in m]:
+            del sys.modules[known]
+        try:
+            importlib.import_module(name)
+        except ImportError as error:
+            failed.append(f"{{name}}: {{error}}")
+print("\\n".join(failed))
+sys.exit(bool(failed))
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", code.format(packages=tuple(OURS))], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stdout + result.stderr

@@ -9,7 +9,6 @@ from floatframe.analyses.kinematics import kinematics
 from floatframe.analyses.linear_system import LinearSystem, linearize
 from floatframe.analyses.parameter_study import Locus, campbell, root_locus
 from floatframe.analyses.snapshot import snapshot
-from floatframe.analyses.study import StudyTable, run_study
 from floatframe.analyses.sweep import sweep
 from floatframe.analyses.system_modes import SystemModes, system_modes
 
@@ -22,7 +21,6 @@ __all__ = [
     "LinearSystem",
     "Locus",
     "StressChannel",
-    "StudyTable",
     "SystemModes",
     "campbell",
     "drive_forces",
@@ -34,7 +32,6 @@ __all__ = [
     "quasi_static_bodies",
     "resolved_frequencies",
     "root_locus",
-    "run_study",
     "snapshot",
     "static_equilibrium",
     "steady_rotation",

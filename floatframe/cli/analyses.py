@@ -9,8 +9,9 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
 
 if TYPE_CHECKING:
-    from floatframe.analyses import Equilibrium, LinearSystem
+    from floatframe.analyses import Equilibrium, LinearSystem, SystemModes
     from floatframe.analyses.channels import AnyChannel
+    from floatframe.body_colors import BodyColor
     from floatframe.system import System
 
 __all__ = ["register"]
@@ -84,16 +85,36 @@ def eig_command(
     axis: Axis = "z",
     center: Center = "0,0,0",
     n_modes: Modes = 20,
+    animate: Annotated[
+        list[int], typer.Option("--animate", "-a", min=1, help="Draw this mode into a film; repeatable.")
+    ] = [],  # noqa: B006
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Film (.gif, .mp4) or picture (.png) of the mode.")
+    ] = None,
+    color: Annotated[str, typer.Option(help="Colour of the film: displacement or von-mises.")] = "displacement",
     json: Json = False,
 ) -> None:
     """Vibration modes of a system about its equilibrium, or about a steady rotation: frequency, damping, what moves.
 
+    With --animate 3 and without -o the film of mode 3 of crane.toml is crane.mode3.gif.
+
     Example: floatframe eig crane.toml
+
+    Example: floatframe eig crane.toml --animate 1 --animate 2
 
     Example: floatframe eig rotor.toml --speed 100 --axis z
     """
+    from cms.words import nearest
     from floatframe.analyses import system_modes
+    from floatframe.body_colors import BODY_COLORS
+    from floatframe.errors import ModelError
 
+    if color not in BODY_COLORS:
+        raise ModelError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
+    if output is not None and len(animate) != 1:
+        raise ModelError(f"--output {output}: expected --animate with the number of one mode, got {len(animate)}")
+    films = {k: output_path(output, system.with_suffix(f".mode{k}.gif"), ModelError, overwrite_of=(system,))
+             for k in animate}  # fmt: skip
     model = read(system)
     linear = linearized(model, speed, axis, center)
     modes = system_modes(linear)
@@ -124,6 +145,8 @@ def eig_command(
     left = len(modes.eigenvalues) - len(record["modes"])
     say(f"{'stable' if modes.is_stable else 'unstable'}; {linear.n_z} independent motions"
         + (f", {left} more modes (--modes)" if left > 0 else ""))  # fmt: skip
+    for k, path in films.items():
+        draw_mode_film(model, linear.equilibrium, modes, k, path, BODY_COLORS[color])
 
 
 @guarded
@@ -171,6 +194,20 @@ def campbell_command(
         assert figure is not None
         figure.savefig(picture, format=kind, dpi=130)
         replace_file(path, picture.getvalue())
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def draw_mode_film(
+    model: "System", about: "Equilibrium", modes: "SystemModes", k: int, path: Path, color: "BodyColor"
+) -> None:
+    """Draw a mode into a film, or a picture where the name of the file ends like one."""
+    from floatframe.mode_film import animate_mode, draw_mode
+
+    with stages(remaining=True) as clock, clock(f"film of mode {k}") as advance:
+        if path.suffix.lower() == ".png":
+            draw_mode(model, about, modes, k, path, color=color)
+        else:
+            animate_mode(model, about, modes, k, path, color=color, on_frame=lambda done, all_: advance(done / all_))
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
