@@ -20,6 +20,7 @@ from cms.job_beams import (
 )
 from cms.job_damping import DampingSection
 from cms.job_reduction import ReductionSection, mode_set_options, named_interfaces
+from cms.job_shells import ShellSection, check_shells
 from cms.load_cases import LOAD_CASE_KINDS
 from cms.paths import near_file
 from cms.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, read_toml, validated
@@ -29,7 +30,7 @@ from cms.words import nearest
 __all__ = ["SELECTIONS", "DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
 
 SELECTIONS = ("faces", "nodes", "plane", "cylinder", "box", "nearest")  #: keys that select the nodes of an interface
-ACCEPTABLE = ("overlap", "parts", "transition", "units")  #: errors of the mesh report that may be meant
+ACCEPTABLE = ("overlap", "parts", "transition", "units", "warped")  #: errors of the mesh report that may be meant
 KEYS_OF_LOADS = {
     "pressure": ("pressure",),
     "gravity": ("acceleration",),
@@ -241,6 +242,7 @@ class Job(Table):
 
     body: BodySection = Field(description="a table [body] with mesh and units")
     materials: dict[str, MaterialSection] = Field({}, description="tables [materials.NAME]")
+    shells: dict[str, ShellSection] = Field({}, description="tables [shells.NAME]")
     sections: dict[str, BeamSection] = Field({}, description="tables [sections.NAME] of beams")
     masses: dict[str, MassSection] = Field({}, description="tables [masses.NAME]")
     springs: dict[str, SpringSection] = Field({}, description="tables [springs.NAME]")
@@ -255,8 +257,8 @@ class Job(Table):
 
     @property
     def materials_of_cells(self) -> dict[str, MaterialSection]:
-        """The materials of solid cells: all, but for those that only sections of beams name."""
-        if self.sections and not self.ties:
+        """The materials of solid cells: all, but for those that only sections of beams name; none of shells."""
+        if self.shells or (self.sections and not self.ties):
             return {}
         named = {section.material for section in self.sections.values()}
         return {
@@ -270,6 +272,11 @@ class Job(Table):
         if not self.body.matrices and not self.materials:
             raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
         attached = {"masses": self.masses, "springs": self.springs, "links": self.links, "ties": self.ties}
+        if self.shells:
+            check_shells(self.shells, self.sections, self.body, self.materials)
+            if self.ties:
+                raise ValueError("ties: belong to a mesh of solid and lines; stiffeners share the nodes of the shell")
+            attached = {}
         check_beams(self.sections, attached, self.materials)
         if self.body.lines and not self.sections:
             raise ValueError("sections: missing; lines need at least one table [sections.NAME]")

@@ -17,6 +17,7 @@ from cms.words import nearest
 if TYPE_CHECKING:
     from fe_models.beams.beam_property import BeamProperty
     from fe_models.beams.line_mesh import LineMesh
+    from fe_models.shells.shell_mesh import ShellMesh
 
 __all__ = ["body_of_frame", "frame_interface", "frame_mesh"]
 
@@ -121,7 +122,7 @@ def shape_of(section: BeamSection) -> Any:
     return SECTIONS[section.shape](**given)
 
 
-def attachments_of(job: Job, mesh: "LineMesh") -> tuple[list[Any], list[Any], list[Any]]:
+def attachments_of(job: Job, mesh: "LineMesh | ShellMesh") -> tuple[list[Any], list[Any], list[Any]]:
     """Return point masses, springs and rigid links of the job on this mesh."""
     from fe_models.beams.attachments import PointMass, RigidLink, Spring
 
@@ -159,7 +160,7 @@ def attachments_of(job: Job, mesh: "LineMesh") -> tuple[list[Any], list[Any], li
     return masses, springs, links
 
 
-def one_node(mesh: "LineMesh", where: str, group: str) -> int:
+def one_node(mesh: "LineMesh | ShellMesh", where: str, group: str) -> int:
     """Return the node of a group that holds just one; `JobError` with the key otherwise."""
     nodes = nodes_named(mesh, where, group)
     if len(nodes) != 1:
@@ -167,7 +168,7 @@ def one_node(mesh: "LineMesh", where: str, group: str) -> int:
     return int(nodes[0])
 
 
-def nodes_named(mesh: "LineMesh", where: str, group: str) -> np.ndarray:
+def nodes_named(mesh: "LineMesh | ShellMesh", where: str, group: str) -> np.ndarray:
     """Return the nodes of a group of the lines."""
     if group not in mesh.node_sets:
         raise JobError(f'{where} = "{group}": the lines have no such group of nodes{nearest(group, mesh.node_sets)}')

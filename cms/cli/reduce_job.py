@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from fe_models.beams.line_mesh import LineMesh
     from fe_models.material import Material
     from fe_models.mesh import Mesh
+    from fe_models.shells.shell_mesh import ShellMesh
     from fe_models.split import AnyMesh
 
 __all__ = ["coupled_body", "job_body", "reduce_job", "uncoupled_body"]
@@ -111,6 +112,10 @@ def coupled_body(job: Job, body: FEBody) -> FEBody:
 
 def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
     """Run a job up to the body whose interfaces are still to be coupled."""
+    if job.shells:
+        from cms.cli.job_shells import body_of_shell
+
+        return body_of_shell(job, stages, on_report)
     if job.sections and not job.ties:
         from cms.cli.job_beams import body_of_frame
 
@@ -219,12 +224,14 @@ def selection_of(key: str, given: Any) -> Any:
     return selection(given) if isinstance(given, str) else selection(**given.model_dump())
 
 
-def load_cases_of(job: Job, body: FEBody, mesh: "Mesh | LineMesh | None" = None) -> tuple[LoadCase, ...]:
+def load_cases_of(job: Job, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | None" = None) -> tuple[LoadCase, ...]:
     """Return the load cases of the job on this body, not yet coupled."""
     return tuple(load_case_of(name, section, body, mesh) for name, section in job.load_cases.items())
 
 
-def load_case_of(name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | None") -> LoadCase:
+def load_case_of(
+    name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | None"
+) -> LoadCase:
     """Return one load case; the job has checked that its keys fit its kind."""
     from fe_models import loads
 

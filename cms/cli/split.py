@@ -108,6 +108,8 @@ def mesh_of(job: Job) -> Any:
         raise JobError("body.matrices: bare matrices cannot be cut; give the mesh they were made of")
     if job.ties:
         raise JobError("ties: beams tied to a solid cannot be cut; cut one without the other")
+    if job.shells:
+        raise JobError("shells: a shell cannot be cut; remove the tables to cut a solid or lines")
     if job.sections:
         return frame_mesh(job)
     if job.body.mesh is None:

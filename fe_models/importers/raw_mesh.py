@@ -65,7 +65,7 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
         found = ", ".join(f"{len(b.nodes)} {b.kind}" for b in blocks) or "no cells"
         raise MeshError(
             f"{where}: expected solid cells ({', '.join(SOLID_TYPES)}), got {found}; export the volume "
-            f"mesh, not only its surface"
+            f"mesh, not only its surface; a shell needs its thickness (tables [shells.NAME] in a job, or shell_body)"
         )
     for kind, rows in cells.items():
         require_node_order(where, kind, nodes, rows)
