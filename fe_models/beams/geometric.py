@@ -47,15 +47,17 @@ def slice_couples(slices: Slices, loads: MassLoads) -> tuple[Array, Array]:
     f = A (c + o) + b per mass; over a slice the first moment of o vanishes, so that V = A E with E = ∫ o oᵀ.
     """
     force = np.einsum("np,npaj->jnpa", slices.mass, loads.at(slices.position))
-    E = np.einsum("npaf,npf,npbf->npab", slices.axes, slices.moments, slices.axes)
-    return force, np.einsum("jab,npbc->jnpac", loads.A, E)
+    E = (slices.axes * slices.moments[..., None, :]) @ slices.axes.swapaxes(-1, -2)
+    return force, np.tensordot(loads.A, E, axes=(2, 2)).transpose(0, 2, 3, 1, 4)
 
 
 def slice_forces(slices: Slices, loads: MassLoads) -> Array:
     """Return the consistent forces on the dofs of the elements, (n, d, k): Σ motionᵀ (force, moment) over slices."""
     force, V = slice_couples(slices, loads)
     wrench = np.concatenate([force, axial(V)], axis=-1)
-    return np.asarray(np.einsum("npcd,jnpc->ndj", slices.motion, wrench))
+    k, n, p, _ = wrench.shape
+    motion = slices.motion.reshape(n, 6 * p, -1).transpose(0, 2, 1)
+    return np.asarray(motion @ wrench.transpose(1, 2, 3, 0).reshape(n, 6 * p, k))
 
 
 def axial(V: Array) -> Array:

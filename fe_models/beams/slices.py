@@ -43,8 +43,9 @@ class Slices:
         inertia = np.zeros((*self.mass.shape, 6, 6))
         inertia[..., :3, :3] = self.mass[..., None, None] * np.eye(3)
         inertia[..., 3:, 3:] = J
-        weighted = np.einsum("npij,npjd->npid", inertia, self.motion)
-        M = np.einsum("npic,npid->ncd", self.motion, weighted)
+        n, p, _, d = self.motion.shape
+        weighted = (inertia @ self.motion).reshape(n, 6 * p, d)
+        M = self.motion.reshape(n, 6 * p, d).transpose(0, 2, 1) @ weighted
         return np.asarray((M + M.transpose(0, 2, 1)) / 2)
 
     def gram(self, u: Array) -> Array:

@@ -13,12 +13,13 @@ quads, which vanishes with the mesh, is left out. The mean of Q is that of the n
 cell turns as a whole under the forces it has (triangles carry most of Q by the change of M along their sides).
 """
 
+from functools import cache
+
 import numpy as np
 
-from cms.arrays import Array
+from cms.arrays import Array, frozen
 from cms.mass_loads import MassLoads, rotation_work
 from fe_models.beams.geometric import slice_couples, slice_forces
-from fe_models.beams.slices import Slices
 from fe_models.shells.elements import DRILLING_SHARE, STRAIN_DEGREE, ShellCells, translations
 from fe_models.shells.shapes import flat_quadrature, flat_shape
 from fe_models.shells.strains import inverse_2x2, jacobians
@@ -47,10 +48,12 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
     strains, elasticity = cells.strains(rows), cells.elasticity(rows)
     values = strains.B @ u[dofs][:, None]
     resultants = (elasticity[:, None] @ values) * strains.weights[..., None, None]
-    forces = np.einsum("npsd,npsj->ndj", strains.B, resultants)
+    m, p, s, d = strains.B.shape
+    forces = strains.B.reshape(m, p * s, d).transpose(0, 2, 1) @ resultants.reshape(m, p * s, -1)
     resultants[:, :, 6:8] += _missing_shear(cells, rows, forces, resultants[:, :, 6:8], strains.weights)
     slices = cells.slices(rows)
     forces -= slice_forces(slices, loads)
+    couples = slice_couples(slices, loads)[1]
     fields = _fields(cells, rows) @ columns[:, None]  # (m, p, 15, n)
     theta = slices.motion[:, :, 3:] @ columns[:, None]
     turns = columns.reshape(len(dofs), -1, 6, Phi.shape[1])[:, :, 3:]
@@ -58,7 +61,7 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
     for j in range(loads.k):
         W = _work(resultants[..., :8, j], cells.t[rows])
         K[j] += _contracted(fields, W)
-        K[j] += _contracted(theta, -rotation_work(_couples(slices, loads, j)))
+        K[j] += _contracted(theta, -rotation_work(couples[j]))
         at_corners = forces[:, :, j].reshape(len(dofs), -1, 6)[:, :, :3, None]
         K[j] += _contracted(turns, rotation_work(at_corners * cells.planes.levers[rows][:, :, None]))
     return (K + K.transpose(0, 2, 1)) / 2
@@ -77,11 +80,6 @@ def _contracted(fields: Array, W: Array) -> Array:
     """Sum of fieldsᵀ W fields over all points, (n, n)."""
     n = fields.shape[-1]
     return np.asarray(fields.reshape(-1, n).T @ (W @ fields).reshape(-1, n))
-
-
-def _couples(slices: Slices, loads: MassLoads, j: int) -> Array:
-    """V = Σ f oᵀ of load j about the middle of each slice, (m, p, 3, 3)."""
-    return slice_couples(slices, MassLoads(loads.A[j : j + 1], loads.b[j : j + 1]))[1][0]
 
 
 def _fields(cells: ShellCells, rows: slice) -> Array:
@@ -107,28 +105,26 @@ def _fields(cells: ShellCells, rows: slice) -> Array:
 
 def _work(resultants: Array, t: Array) -> Array:
     """Second derivative of the work by the fields, (m, p, 15, 15), of weighted N M Q, (m, p, 8)."""
-    W = np.zeros((*resultants.shape[:2], 5, 3, 5, 3))
-    N, M, Q = _plane(resultants, 0), _plane(resultants, 3), resultants[..., 6:]
+    of_fibres = (t**2 / 12)[:, None, None] * resultants[..., :3]
+    W = np.concatenate([resultants, of_fibres], axis=-1) @ _unit_work().reshape(-1, N_FIELDS**2)
+    return np.asarray(W.reshape(*resultants.shape[:2], N_FIELDS, N_FIELDS))
+
+
+@cache
+def _unit_work() -> Array:
+    """Second derivatives of the work of unit N_x N_y N_xy, M_x M_y M_xy, Q_x Q_y, N t²/12 (three), (11, 15, 15)."""
+    W = np.zeros((11, 5, 3, 5, 3))
     across = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # psi = across @ theta = theta × e_z
-    plane = across.T @ across
+    for number, pairs in enumerate((((0, 0),), ((1, 1),), ((0, 1), (1, 0)))):
+        N, M, of_fibres = W[number], W[3 + number], W[8 + number]
+        for a, b in pairs:
+            N[a, :, b, :] += np.eye(3) / 2
+            of_fibres[2 + a, :, 2 + b, :] += across.T @ across / 2
+            M[a, :, 2 + b, :] += across
+            M[2 + a, b, 4, 2] += 1 / 2  # ½ (theta_b theta_z),a
+            M[2 + a, 2, 4, b] += 1 / 2
     for a in range(2):
-        for b in range(2):
-            W[:, :, a, :, b] += N[..., a, b, None, None] * np.eye(3)
-            W[:, :, 2 + a, :, 2 + b] += (t**2 / 12)[:, None, None, None] * N[..., a, b, None, None] * plane
-            W[:, :, a, :, 2 + b] += M[..., a, b, None, None] * across
-            # e_b·(theta × (theta × n)) = theta_b theta_z
-            for i, k in ((b, 2), (2, b)):
-                W[:, :, 2 + a, i, 4, k] += M[..., a, b] / 2
-        W[:, :, a, :, 4] += Q[..., a, None, None] * across
-        for i, k in ((a, 2), (2, a)):
-            W[:, :, 4, i, 4, k] += Q[..., a] / 4
-    whole = W.reshape(*resultants.shape[:2], N_FIELDS, N_FIELDS)
-    is_half = np.zeros((N_FIELDS, N_FIELDS), dtype=bool)  # the terms of which the other half is the transpose
-    is_half[:6, 6:] = is_half[6:12, 12:] = is_half[12:, 12:] = True
-    half = np.where(is_half, whole, 0.0)
-    return np.asarray(whole + half.swapaxes(2, 3))
-
-
-def _plane(resultants: Array, first: int) -> Array:
-    """Symmetric tensor of three components xx yy xy, (m, p, 2, 2)."""
-    return resultants[..., [[first, first + 2], [first + 2, first + 1]]]
+        W[6 + a, a, :, 4, :] += across
+        W[6 + a, 4, a, 4, 2] += 1 / 2
+    half = W.reshape(11, N_FIELDS, N_FIELDS)
+    return frozen(half + half.transpose(0, 2, 1))
