@@ -127,6 +127,32 @@ def test_in_plane_bending_of_rectangles_of_any_aspect_ratio(kind, limit):
         assert_allclose(u[of_nodes(end, 1)].mean(), exact, rtol=limit)
 
 
+def test_shear_strain_of_a_quad_is_that_of_its_sides_in_their_middles():
+    """(w_j - w_i)/L plus the mean rotation of the normal along the side, for any motion (Bathe & Dvorkin 1985)."""
+    a, b = 1.3, 0.7
+    mesh = fm.flat_plate(a, b, 1, 1)
+    body = fm.shell_body(mesh, fm.ShellProperty(0.1, STEEL), name="cell", units=SI)
+    (group,) = body.element_model.groups
+    u = np.random.default_rng(0).normal(size=(4, 6))  # nodes 0 (0, 0), 1 (0, b), 2 (a, 0), 3 (a, b)
+    strains = group.strains(slice(0, 1)).B[0] @ u[group.cells[0]].ravel()
+    g = 1 / np.sqrt(3)
+    xi, eta = np.array([-g, g, -g, g]), np.array([-g, -g, g, g])
+    monomials = np.stack([xi * 0 + 1, xi, eta, xi * eta], axis=1)
+    gamma = np.linalg.solve(monomials, strains[:, 6:8])
+    beta_x, beta_y, w = u[:, 4], -u[:, 3], u[:, 2]
+    turn = group.planes.R[0][:2, :2]  # local to mesh axes
+    for (xi_0, eta_0), (i, j), along, length in (
+        ((0, -1), (0, 2), 0, a),
+        ((0, 1), (1, 3), 0, a),
+        ((-1, 0), (0, 1), 1, b),
+        ((1, 0), (2, 3), 1, b),
+    ):
+        beta = beta_x if along == 0 else beta_y
+        expected = (w[j] - w[i]) / length + (beta[i] + beta[j]) / 2
+        there = turn @ (np.array([1, xi_0, eta_0, xi_0 * eta_0]) @ gamma)
+        assert_allclose(there[along], expected, rtol=1e-12)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_thin_plates_do_not_lock(kind):
     """The centre of a clamped square under pressure, thin to the limit: w = 0.00126532 q a⁴/D (Taylor & Govindjee)."""
