@@ -47,6 +47,7 @@ from .errors import (
 from .errors import (
     SystemFileError as SystemFileError,
 )
+from .events import Event as Event
 from .export import export_csv as export_csv
 from .export import export_vtk as export_vtk
 from .flexible_body import FlexibleBody as FlexibleBody

@@ -8,11 +8,13 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.metadata import PackageNotFoundError, version
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from floatframe.arrays import number
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
+from floatframe.event_steps import EventWatch
 from floatframe.flexible_body import FlexibleBody
 from floatframe.integrators import CLASSES
 from floatframe.integrators.carry import Carry, Integrator
@@ -126,11 +128,15 @@ def integrate(
     if advice is not None and advice.n_followed == 0:
         log.warning("system %r: %s", system.name, advice.words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
-    carry = integrator.start(system, t_start, state)
-    work = new_work(system.compiled.model)
-    carry, rows = integrator.observe(system, t_start, carry, work)
+    watch = EventWatch(system, head) if system.events else None
+    begun = system if watch is None else watch.system
+    carry = integrator.start(begun, t_start, state)
+    work = new_work(begun.compiled.model)
+    carry, rows = integrator.observe(begun, t_start, carry, work)
+    if watch is not None:
+        watch.begin(rows)
     writer = None if output is None else ResultsWriter(output, head)
-    run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer)
+    run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=watch)
     run.keep(rows)
     if writer is not None:
         writer.close_segment(run.record(carry, 0))
@@ -175,6 +181,9 @@ def resume(
     if record is None:
         raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
     carry, n_done = carry_of_record(record, system)
+    watch = EventWatch(system, head) if system.events else None
+    if watch is not None:
+        watch.restore(record)
     path = Path(output)
     writer = ResultsWriter(path.with_name(path.name.removesuffix(SEGMENTS)), head, goes_on=True)
     n_total = round((run["t_end"] - run["t_start"]) / run["h"])
@@ -182,6 +191,7 @@ def resume(
         system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer,
         notes=notes_from_json(validity_text(writer.path)),
         seconds_before=float(record.get("seconds", 0.0)),
+        events=watch,
     )  # fmt: skip
     return again.advance(carry, n_done, BATCH_STEPS, progress)
 
@@ -203,6 +213,7 @@ class Run:
     kept: list[Rows] = field(default_factory=list)
     seconds_before: float = 0.0  #: that the run has taken before it was interrupted
     began: float = field(default_factory=time.perf_counter)
+    events: EventWatch | None = None
 
     @property
     def seconds(self) -> float:
@@ -211,11 +222,13 @@ class Run:
 
     def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
         """Return what is needed to go on from here."""
-        return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)}
+        events = {} if self.events is None else self.events.record()
+        return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events
 
-    def summary(self, carry: Carry) -> dict[str, float]:
-        """Return what the run took."""
-        return {
+    def summary(self, carry: Carry) -> dict[str, Any]:
+        """Return what the run took, and its events."""
+        events = {} if self.events is None else {"events": self.events.happened}
+        return events | {
             "n_steps": carry.n_steps,
             "n_rejected": carry.n_rejected,
             "n_iterations": carry.n_iterations,
@@ -239,24 +252,37 @@ class Run:
         self, carry: Carry, n_done: int, batch_steps: int, progress: Callable[[Progress], None] | None
     ) -> Trajectory:
         """Take the steps that are left, in batches that end where a run can go on; return the motion."""
-        work = new_work(self.system.compiled.model)
-        self.integrator.observe(self.system, self.t_start + n_done * self.h, carry, work)  # the iterate to begin from
+        begun = self.system if self.events is None else self.events.system
+        work = new_work(begun.compiled.model)
+        t_begun = self.t_start + n_done * self.h
+        _, row = self.integrator.observe(begun, t_begun, carry, work)  # the iterate to begin from
+        if self.events is not None:
+            self.events.begin(row)
         closed = time.monotonic()
-        failure = None
+        failure, has_stopped = None, False
         try:
-            while n_done < self.n_total and failure is None:
+            while n_done < self.n_total and failure is None and not has_stopped:
                 if n_done % RESTART_STEPS == 0:
                     work.factors[:] = 0.0  # made anew, as after a resumption
                     if self.writer is not None and n_done and time.monotonic() - closed > SEGMENT_SECONDS:
                         self.writer.close_segment(self.record(carry, n_done))
                         closed = time.monotonic()
                 n_batch = min(batch_steps, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
-                carry, rows, n_good, failure = self.integrator.advance(
-                    self.system, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
-                    every=self.output_every,
-                )  # fmt: skip
+                if self.events is None:
+                    carry, rows, n_good, failure = self.integrator.advance(
+                        self.system, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
+                        every=self.output_every,
+                    )  # fmt: skip
+                    self.keep(rows)
+                else:
+                    carry, rows, work, failure = self.events.step(
+                        self.integrator, carry, work, t0=self.t_start, h=self.h, k=n_done
+                    )
+                    n_good = int(failure is None)
+                    has_stopped = self.events.has_stopped
+                    if failure is None and (has_stopped or (n_done + 1) % self.output_every == 0):
+                        self.keep(rows)
                 n_done += n_good
-                self.keep(rows)
                 if progress is not None:
                     t = self.t_start + n_done * self.h
                     counts = carry.n_iterations, self.watch.notes, carry.n_rejected

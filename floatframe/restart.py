@@ -51,6 +51,8 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
 def system_digest(system: System, integrator: Integrator) -> str:
     """Return the sha256 of everything the motion follows from: compiled system, its start, method and parameters."""
     digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())  # type: ignore[call-overload]
+    if system.events:
+        digest.update(repr(system.events).encode())
     compiled = system.compiled
     parts = [*compiled.model, *(getattr(compiled.placed, name) for name in STATE)]
     for part in parts:

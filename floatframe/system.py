@@ -18,6 +18,7 @@ from floatframe.rigid_body import RigidBody
 if TYPE_CHECKING:
     from floatframe.analyses.channels import AnyChannel
     from floatframe.compiled import CompiledSystem
+    from floatframe.events import Event
     from floatframe.measuring import Sensor
 
 __all__ = ["Body", "System"]
@@ -48,10 +49,11 @@ class System:
     sensors: Sequence["Sensor"] = field(default=(), kw_only=True)  #: what is measured on its motions
     inputs: Sequence["AnyChannel"] = field(default=(), kw_only=True)  #: forces that act on it when it is linearised
     outputs: Sequence["AnyChannel"] = field(default=(), kw_only=True)  #: what is then observed
+    events: Sequence["Event"] = field(default=(), kw_only=True)  #: what a run does when a value passes a level
     source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
 
     def __post_init__(self) -> None:
-        for part in ("bodies", "joints", "forces", "couplers", "sensors", "inputs", "outputs"):
+        for part in ("bodies", "joints", "forces", "couplers", "sensors", "inputs", "outputs", "events"):
             object.__setattr__(self, part, tuple(getattr(self, part)))
         among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
         object.__setattr__(self, "couplers", (*self.couplers, *among))
@@ -64,7 +66,7 @@ class System:
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
         named = [force.name for force in self.forces if not isinstance(force, Gravity)]
         require_names(f"{where}: joints and forces", [joint.name for joint in (*self.joints, *self.couplers)] + named)
-        for kind in ("sensors", "inputs", "outputs"):
+        for kind in ("sensors", "inputs", "outputs", "events"):
             require_names(f"{where}: {kind}", [each.name for each in getattr(self, kind)])
         for body in self.bodies:
             if isinstance(body, FlexibleBody) and body.reduced.units != self.units:

@@ -30,6 +30,8 @@ from floatframe.channel_section import InputSection, OutputSection
 from floatframe.coordinate_section import CoordinateSection, marker_of
 from floatframe.couplers import CoordinateCoupler
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
+from floatframe.event_section import EventSection
+from floatframe.events import require_events
 from floatframe.flexible_body import FlexibleBody
 from floatframe.forces import (
     FORCES,
@@ -336,6 +338,7 @@ class SystemFile(Table):
     sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
     inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
     outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
+    events: dict[str, EventSection] = Field({}, description="tables [events.NAME]")
     run: RunSection = Field(description="a table [run] with t_end and h")
 
     @model_validator(mode="after")
@@ -386,9 +389,11 @@ def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None 
             bodies, joints, forces, units, name, data.system.redundant, couplers, sensors=sensors,
             inputs=[section.channel(key) for key, section in data.inputs.items()],
             outputs=[section.output(key) for key, section in data.outputs.items()],
+            events=[section.event(key) for key, section in data.events.items()],
             source=str(path.resolve()),
         )  # fmt: skip
         _ = system.compiled  # markers and interfaces are looked up here
+        require_events(system)
         for hint in unit_hints(system):
             log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:

@@ -134,6 +134,10 @@ def print_run(trajectory: "Trajectory") -> None:
     if "n_iterations" in summary:
         each = summary["n_iterations"] / max(summary["n_steps"], 1)
         rows.append(("Newton iterations", f"{summary['n_iterations']} ({each:.2f} a step)"))
+    for event in summary.get("events", ()):
+        done = ["run stopped"] * event["stop"] + [f"{name} on" for name in event["switch_on"]]
+        done += [f"{name} off" for name in event["switch_off"]]
+        rows.append(("event", f"{event['name']} at {event['t']:.9g} {second}: {', '.join(done)}"))
     if "wall_time" in summary:
         rows.append(("wall time", f"{summary['wall_time']:.2f} s"))
     rows.append(("energy defect", f"{record['energy_defect']:.2e} of {record['energy_scale']:.6g} {energy}"))

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import cms
 from floatframe import (
+    Event,
     FixedJoint,
     GeneralizedAlpha,
     Gravity,
@@ -316,3 +317,14 @@ def test_mistakes_in_joint_forces_are_answered(write, old, new, words):
 def test_run_names_its_scheme(write, keys, integrator):
     _, run = read_system(write(("rho_inf = 0.7", keys)))
     assert run.integrator == integrator
+
+
+def test_file_holds_events(write):
+    text = '[events.low]\nwatch = "pin.angle"\nlevel = -0.5\ndirection = "falling"\nswitch_off = ["spring"]\n\n[run]'
+    system, _ = read_system(write(("[run]", text)))
+    assert system.events == (Event("low", "pin.angle", -0.5, "falling", switch_off=("spring",)),)
+    for old, new, words in (("pin.angle", "pin.angel", "no sensor or joint coordinate 'pin.angel'"),
+                            ('"spring"]', '"sprnig"]', "no force 'sprnig'; did you mean 'spring'"),
+                            ("falling", "fallling", "events.low.direction")):  # fmt: skip
+        with pytest.raises(SystemFileError, match=words):
+            read_system(write(("[run]", text.replace(old, new))))
