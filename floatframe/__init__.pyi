@@ -52,6 +52,7 @@ from .export import export_csv as export_csv
 from .export import export_vtk as export_vtk
 from .flexible_body import FlexibleBody as FlexibleBody
 from .force_results import coupler_motion as coupler_motion
+from .force_results import user_force_motion as user_force_motion
 from .forces import BodyLoad as BodyLoad
 from .forces import Bushing as Bushing
 from .forces import Gravity as Gravity
@@ -59,6 +60,7 @@ from .forces import JointForce as JointForce
 from .forces import PointForce as PointForce
 from .forces import SphereContact as SphereContact
 from .forces import SpringDamper as SpringDamper
+from .forces import UserForce as UserForce
 from .ground import GROUND as GROUND
 from .ground import Ground as Ground
 from .initial import ConsistentState as ConsistentState

@@ -29,6 +29,7 @@ from floatframe.pair_data import add_pair_laws
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
 from floatframe.system import System
+from floatframe.user_functions import Callback
 
 __all__ = ["CompiledSystem", "compile_system"]
 
@@ -44,6 +45,7 @@ class CompiledSystem:
     joint_names: tuple[str, ...]
     spring_names: tuple[str, ...]  #: of spring-dampers, then bushings and contacts
     network_names: tuple[str, ...]  #: of couplers, then user forces
+    callbacks: tuple[Callback, ...]  #: users' functions that the kernels call
     owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
     placed: State  #: the state as given, before it is made consistent
     coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
@@ -163,6 +165,7 @@ def compile_system(system: System) -> CompiledSystem:
         joint_names=tuple(joint.name for joint in system.joints),
         spring_names=tuple(spring.name for spring in dampers) + pairs.names,
         network_names=networks.names,
+        callbacks=tuple(networks.callbacks),
         owners=tuple(made.owner),
         placed=placed,
         coordinates=tuple(row.coordinate for row in rows),

@@ -36,6 +36,7 @@ from floatframe.linearization import (
 from floatframe.rigid_body import euler_parameters_from_user
 from floatframe.state import State
 from floatframe.system import System
+from floatframe.user_functions import raise_errors_of
 
 __all__ = [
     "ConsistentState",
@@ -112,8 +113,9 @@ def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
         return state
     scale = np.where(np.isin(model.row_kind, HELD_DISTANCES), compiled.length, 1.0)
     for _ in range(MOST_ITERATIONS):
-        set_iterate(work, state)
+        set_iterate(work, state, w=start_unknowns(model))
         parts = linearized(model, work, 1.0, 0.0, 0.0)
+        raise_errors_of(compiled.callbacks)
         error = np.where(holds, work.g, 0.0)
         if np.abs(error / scale).max() <= ASSEMBLED:
             return state
@@ -204,7 +206,7 @@ def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: Stat
     model = compiled.model
     if len(work.w) == 0:
         return state
-    set_iterate(work, state)
+    set_iterate(work, state, w=start_unknowns(model))
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     rate, _ = rates_of_constraints(model, work)
     if not np.any(rate):
@@ -218,18 +220,28 @@ def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> t
     from floatframe.kernels.entry import rates_of_constraints
 
     model = compiled.model
-    w = np.zeros(len(work.w))
+    w = start_unknowns(model)
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, state, w=w)
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         _, bias = rates_of_constraints(model, work)
+        raise_errors_of(compiled.callbacks)
         rows = -np.where(np.isin(model.row_kind, HELD), bias, work.g)
         y, change = solve(with_mass_for_all(model, parts.H), parts, -work.residual, rows)
         w = w + change
-        # friction by the normal force is not linear in the reactions
-        if not has_normal_friction(model) or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
+        raise_errors_of(compiled.callbacks)
+        # friction by the normal force is not linear in the reactions, nor are users' forces in their states
+        is_linear = not has_normal_friction(model) and not len(model.state_row)
+        if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
             break
     return in_ground_axes(model, state, y), w
+
+
+def start_unknowns(model: Model) -> Array:
+    """Return the unknowns of connections before anything is known: the states of user forces at their start, (n_w,)."""
+    w = np.zeros(int(model.c_w0[-1]))
+    w[model.state_row] = model.state_start
+    return w
 
 
 def has_normal_friction(model: Model) -> bool:
@@ -284,17 +296,18 @@ def velocity_correction(
     holds = np.isin(model.row_kind, HELD) & ~np.isin(model.row_kind, HELD_VELOCITIES)
     if not holds.any():
         return np.zeros(len(work.u))
-    work.time[0] = t
-    set_iterate(work, state)
-    linearized(model, work, 1.0, 0.0, 0.0)
-    x, rates = -work.g[model.p_row], -work.g[model.p_row + 1]
+    w = start_unknowns(model)
+    if len(model.p_row):  # angles of couplers and user forces are those next to where their rates lead
+        work.time[0] = t
+        set_iterate(work, state, w=w)
+        linearized(model, work, 1.0, 0.0, 0.0)
+        w[model.p_row] = -work.g[model.p_row] - h * work.g[model.p_row + 1]
     work.time[0] = t + h
-    set_iterate(work, after)
-    work.w[model.p_row] = x + h * rates  # angles of couplers are those next to these
+    set_iterate(work, after, w=w)
     linearized(model, work, 1.0, 0.0, 0.0)
     gap = np.where(holds, work.g, 0.0)
     work.time[0] = t
-    set_iterate(work, state)
+    set_iterate(work, state, w=start_unknowns(model))
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     H = []
     for i, block in enumerate(parts.H):

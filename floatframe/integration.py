@@ -35,6 +35,7 @@ from floatframe.state import State
 from floatframe.step_advice import step_advice
 from floatframe.system import System
 from floatframe.trajectory import Trajectory, read_results
+from floatframe.user_functions import raise_errors_of
 from floatframe.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.validity_watch import ValidityWatch
 
@@ -291,6 +292,7 @@ class Run:
             if self.writer is not None:
                 self.writer.close_segment(self.record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
             raise
+        raise_errors_of(self.system.compiled.callbacks)
         if failure is not None:
             raise stopped(
                 self.system,

@@ -1,5 +1,6 @@
-"""Couplers as flat arrays: ports on the markers of joints or of their own, and the rows of their multipliers."""
+"""Couplers and user forces as flat arrays: ports on the markers of joints or of their own, and what couples them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -7,12 +8,14 @@ import numpy as np
 
 from cms.arrays import Array
 from cms.words import nearest
-from floatframe.body_types import integers
+from floatframe.body_types import integers, offsets
 from floatframe.connection_data import Connections, End
 from floatframe.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate
 from floatframe.couplers import CoordinateCoupler
 from floatframe.errors import ModelError
+from floatframe.expressions import Tape, compile_expression
 from floatframe.force_data import Functions
+from floatframe.forces import UserForce
 from floatframe.joints.axis_frame import axis_in_b, turning_frame
 from floatframe.joints.rows import (
     COUPLE,
@@ -31,11 +34,17 @@ from floatframe.joints.rows import (
     TWIST_B,
     Row,
 )
-from floatframe.kernels.model import COUPLER
+from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.marker_data import MarkerData, find_marker, joint_markers, marker_pose
 from floatframe.system import System
+from floatframe.user_functions import Callback, callback_of
 
 __all__ = ["Networks", "Port", "add_networks", "find_port", "port_value"]
+
+INTEGERS = (
+    "p_a", "p_b", "p_row", "p_force", "p_arm", "p_core", "core",
+    "user_forces", "user_states", "user_address", "user_tape0", "state0", "state_row",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,22 +78,41 @@ class Networks:
     p_force: list[int] = field(default_factory=list)
     p_arm: list[int] = field(default_factory=list)
     p_factor: list[float] = field(default_factory=list)
+    p_core: list[int] = field(default_factory=list)
     core: list[int] = field(default_factory=list)
+    user_forces: list[int] = field(default_factory=list)
+    user_states: list[int] = field(default_factory=list)
+    user_address: list[int] = field(default_factory=list)
+    user_tape0: list[int] = field(default_factory=list)
+    state0: list[int] = field(default_factory=lambda: [0])
+    state_row: list[int] = field(default_factory=list)
+    state_start: list[float] = field(default_factory=list)
+    tapes: list[Tape] = field(default_factory=list)
+    callbacks: list[Callback] = field(default_factory=list)
 
     def arrays(self) -> dict[str, Any]:
         """Return the arrays of the model."""
         return {
             "port0": integers(self.port0),
-            **{name: integers(getattr(self, name)) for name in ("p_a", "p_b", "p_row", "p_force", "p_arm", "core")},
+            **{name: integers(getattr(self, name)) for name in INTEGERS},
             "p_factor": np.array(self.p_factor, dtype=float),
+            "state_start": np.array(self.state_start, dtype=float),
+            "tape0": offsets(integers([len(tape.op) for tape in self.tapes])),
+            "tape_op": integers([op for tape in self.tapes for op in tape.op]),
+            "tape_a": integers([a for tape in self.tapes for a in tape.a]),
+            "tape_b": integers([b for tape in self.tapes for b in tape.b]),
+            "tape_c": np.array([c for tape in self.tapes for c in tape.c], dtype=float),
         }
 
 
 def add_networks(system: System, made: Connections, functions: Functions) -> Networks:
-    """Add the couplers of a system."""
-    networks = Networks(tuple(coupler.name for coupler in system.couplers))
+    """Add the couplers of a system, then its user forces."""
+    forces = [force for force in system.forces if isinstance(force, UserForce)]
+    networks = Networks((*(coupler.name for coupler in system.couplers), *(force.name for force in forces)))
     for coupler in system.couplers:
         add_coupler(system, made, networks, coupler)
+    for force in forces:
+        add_user_force(system, made, networks, functions, force)
     return networks
 
 
@@ -97,6 +125,38 @@ def add_coupler(system: System, made: Connections, networks: Networks, coupler: 
     scale = 1 / max(abs(factor) for factor in factors)
     held = Row(COUPLE, np.array([scale, 0.0, 0.0]), c=as_placed, motion=coupler.constant)  # type: ignore[arg-type]
     add_ports(made, networks, coupler.name, COUPLER, ports, factors, [True] * len(ports), [held])
+
+
+def add_user_force(
+    system: System, made: Connections, networks: Networks, functions: Functions, force: UserForce
+) -> None:
+    """Add a user force: the rows of its ports, then of its forces, then of its states."""
+    where = f"force {force.name!r}"
+    names, acting = list(force.coordinates), list(force.forces)
+    ports = [find_port(system, f"{where}: coordinates: {k}", c, made) for k, c in force.coordinates.items()]
+    rows = [Row(PART)] * (len(acting) + 3 * len(force.states))
+    has_force = [name in acting for name in names]
+    first = add_ports(made, networks, force.name, USER_FORCE, ports, [1.0] * len(ports), has_force, rows)
+    networks.p_core[-len(ports) :] = [first + acting.index(name) if name in acting else first for name in names]
+    networks.user_forces.append(len(acting))
+    networks.user_states.append(len(force.states))
+    networks.user_tape0.append(len(networks.tapes))
+    networks.state_row += [first + len(acting) + 3 * k for k in range(len(force.states))]
+    networks.state0.append(len(networks.state_row))
+    networks.state_start += list(force.states.values())
+    if force.function is not None:
+        networks.callbacks.append(callback_of(force, len(ports)))
+        networks.user_address.append(networks.callbacks[-1].address)
+        return
+    networks.user_address.append(0)
+    assert isinstance(force.forces, Mapping)  # checked by the force
+    numbers = {name: functions.index(function) for name, function in force.functions.items()}
+    texts = [(f"forces: {name}", text) for name, text in force.forces.items()]
+    texts += [(f"rates: {name}", force.rates[name]) for name in force.states]
+    for place, text in texts:
+        networks.tapes.append(
+            compile_expression(f"{where}: {place}", text, force.inputs, parameters=force.parameters, functions=numbers)
+        )
 
 
 def add_ports(
@@ -136,6 +196,7 @@ def add_ports(
         networks.p_force.append(w0 + force if force >= 0 else -1)
         networks.p_arm.append(w0 + arm if arm >= 0 else -1)
         networks.p_factor.append(factors[k])
+        networks.p_core.append(w0 + len(rows))
     networks.port0.append(len(networks.p_a))
     networks.core.append(w0 + len(rows))
     return w0 + len(rows)

@@ -43,6 +43,7 @@ from floatframe.forces import (
     PointForce,
     SphereContact,
     SpringDamper,
+    UserForce,
 )
 from floatframe.forces.bushing import DEFORMATIONS
 from floatframe.forces.sphere_contact import DISSIPATIONS
@@ -92,6 +93,7 @@ KEYS_OF_FORCES = {
         "body_a", "marker_a", "triad_a", "body_b", "marker_b",
         *(field.name for field in fields(SphereContact) if field.name not in ("name", "marker_a", "marker_b")),
     ),
+    "user-force": ("coordinates", "forces", "rates", "states", "parameters", "functions"),
 }  # fmt: skip
 
 
@@ -286,6 +288,12 @@ class ForceSection(Table):
         None, description=f"one of {', '.join(DISSIPATIONS)}"
     )
     slow: Positive | None = Field(None, description="a number above 0, the least speed of approach")
+    coordinates: dict[str, CoordinateSection] | None = Field(None, description="tables of coordinates by name")
+    forces: dict[str, str] | None = Field(None, description="expressions of forces, text, by coordinate")
+    rates: dict[str, str] | None = Field(None, description="expressions of the rates of states, text, by state")
+    states: dict[str, float] | None = Field(None, description="values of states at the start, numbers by state")
+    parameters: dict[str, float] | None = Field(None, description="numbers of the expressions, by name")
+    functions: dict[str, MotionSection] | None = Field(None, description="tables of functions of one number, by name")
 
     @model_validator(mode="after")
     def _fits_the_type(self) -> "ForceSection":
@@ -297,7 +305,8 @@ class ForceSection(Table):
             if key in allowed and getattr(self, key) is None:
                 raise ValueError(f'{key}: missing; expected the name of a body, or "ground"')
         needed = {
-            "body-load": ("load_case",), "joint-force": ("joint", "coordinate"), "sphere-contact": ("radius_b",)
+            "body-load": ("load_case",), "joint-force": ("joint", "coordinate"), "sphere-contact": ("radius_b",),
+            "user-force": ("coordinates",),
         }  # fmt: skip
         for key in needed.get(self.type, ()):
             if getattr(self, key) is None:
@@ -345,8 +354,14 @@ class SystemFile(Table):
     def _names_bodies(self) -> "SystemFile":
         choices = [GROUND.name, *self.bodies]
         terms = {f"{name}.terms": term for name, coupler in self.couplers.items() for term in coupler.terms}
+        coordinates = {
+            f"{name}.coordinates.{key}": section
+            for name, force in self.forces.items()
+            for key, section in (force.coordinates or {}).items()
+        }
         for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors),
-                               ("couplers", terms), ("inputs", self.inputs), ("outputs", self.outputs)):  # fmt: skip
+                               ("couplers", terms), ("forces", coordinates),
+                               ("inputs", self.inputs), ("outputs", self.outputs)):  # fmt: skip
             for name, section in sections.items():
                 for key in ("body", "body_a", "body_b", "relative_to"):
                     body = getattr(section, key, None)
@@ -478,6 +493,19 @@ def contact_of(name: str, section: ForceSection) -> SphereContact:
     return SphereContact(name, a, b, **{k: getattr(section, k) for k in keys if getattr(section, k) is not None})
 
 
+def user_force_of(name: str, section: ForceSection) -> UserForce:
+    """Return the user force of a table."""
+    return UserForce(
+        name,
+        {key: coordinate.found() for key, coordinate in (section.coordinates or {}).items()},
+        section.forces or {},
+        section.rates or {},
+        section.states or {},
+        section.parameters or {},
+        {key: table.function() for key, table in (section.functions or {}).items()},
+    )
+
+
 def force_of(name: str, section: ForceSection) -> Force:
     """Return the force of a table."""
     functions = {
@@ -489,6 +517,8 @@ def force_of(name: str, section: ForceSection) -> Force:
         return bushing_of(name, section)
     if section.type == "sphere-contact":
         return contact_of(name, section)
+    if section.type == "user-force":
+        return user_force_of(name, section)
     if section.type == "body-load":
         assert section.body is not None  # checked by the table
         assert section.load_case is not None

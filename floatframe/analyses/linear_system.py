@@ -20,6 +20,7 @@ from floatframe.analyses.channels import AnyChannel, StressChannel, channel_rows
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.tangents import tangents, turning_matrices
 from floatframe.errors import ModelError
+from floatframe.forces import UserForce
 from floatframe.kernels.model import new_work
 from floatframe.linearization import linearized, set_iterate
 from floatframe.system import System
@@ -161,6 +162,12 @@ def linearize(
     for channel in inputs:
         if isinstance(channel, StressChannel):
             raise ModelError(f"linearize: channel {channel.name!r} is a stress: expected a force or torque as an input")
+    with_states = [force.name for force in system.forces if isinstance(force, UserForce) and force.states]
+    if with_states:
+        raise ModelError(
+            f"system {system.name!r}: force {with_states[0]!r} has states of its own, which a linearisation to M, C, K "
+            "does not hold; take it out, or give its forces without states"
+        )
     about = static_equilibrium(system) if about is None else about
     compiled = system.compiled
     model, work = compiled.model, new_work(compiled.model)

@@ -7,6 +7,7 @@ from floatframe.forces.joint_force import JointForce
 from floatframe.forces.point_force import PointForce
 from floatframe.forces.sphere_contact import SphereContact
 from floatframe.forces.spring_damper import SpringDamper
+from floatframe.forces.user_force import UserForce
 
 __all__ = [
     "FORCES",
@@ -18,9 +19,10 @@ __all__ = [
     "PointForce",
     "SphereContact",
     "SpringDamper",
+    "UserForce",
 ]
 
-Force = BodyLoad | Bushing | Gravity | JointForce | PointForce | SphereContact | SpringDamper
+Force = BodyLoad | Bushing | Gravity | JointForce | PointForce | SphereContact | SpringDamper | UserForce
 
 FORCES = {
     "body-load": BodyLoad,
@@ -29,4 +31,5 @@ FORCES = {
     "point-force": PointForce,
     "sphere-contact": SphereContact,
     "spring-damper": SpringDamper,
+    "user-force": UserForce,
 }

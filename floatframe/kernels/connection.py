@@ -46,7 +46,7 @@ from floatframe.kernels.deformed_line import (
     line_turn_by_place,
 )
 from floatframe.kernels.marker import marker_acceleration_bias, rotate
-from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, JOINT, SPRING
+from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, JOINT, SPRING, USER_FORCE
 from floatframe.kernels.pair_law import pair_derivatives, pair_rows
 from floatframe.kernels.relative_motion import (
     direction_of_a,
@@ -63,6 +63,7 @@ from floatframe.kernels.relative_motion import (
 from floatframe.kernels.rolling import rolling_acceleration, rolling_derivatives, rolling_rate, rolling_row
 from floatframe.kernels.rotation import cross
 from floatframe.kernels.time_function import time_function
+from floatframe.kernels.user_force import user_force_derivatives, user_force_rows
 
 __all__ = [
     "connection_derivatives",
@@ -173,6 +174,9 @@ def connection_rows(model, work, c, c_k):
     if model.c_law[c] == COUPLER:
         coupler_rows(model, work, c, c_k)
         return
+    if model.c_law[c] == USER_FORCE:
+        user_force_rows(model, work, c, c_k)
+        return
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
     w = work.w[w0 : w0 + size]
     for k in range(3):
@@ -259,6 +263,9 @@ def connection_derivatives(model, work, c, c_k):
     """Write P at the markers and V of connection c."""
     if model.c_law[c] == COUPLER:
         coupler_derivatives(model, work, c, c_k)
+        return
+    if model.c_law[c] == USER_FORCE:
+        user_force_derivatives(model, work, c, c_k)
         return
     a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
     P_a, P_b, V, w = work.P[a], work.P[b], work.V[c], work.w[w0 : w0 + size]

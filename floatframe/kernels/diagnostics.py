@@ -24,11 +24,12 @@ from floatframe.kernels.connection import normal_force, row_rate, spring_tension
 from floatframe.kernels.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
 from floatframe.kernels.coupler import coupler_power
 from floatframe.kernels.marker import rotate, rotate_back
-from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, N_DRIFTS, SPRING, STIFFNESS
+from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, N_DRIFTS, SPRING, STIFFNESS, USER_FORCE
 from floatframe.kernels.pair_law import pair_energy, pair_power
 from floatframe.kernels.relative_motion import loaded_axis, loaded_coordinate
 from floatframe.kernels.rotation import cross
 from floatframe.kernels.time_function import time_function
+from floatframe.kernels.user_force import user_force_power
 
 __all__ = ["diagnose", "power"]
 
@@ -185,6 +186,8 @@ def power(model, work):
             dissipated += taken
         elif law == COUPLER:
             loads += coupler_power(model, work, c)
+        elif law == USER_FORCE:
+            loads += user_force_power(model, work, c)
         elif law == SPRING:
             _, damping, _, _ = model.springs[model.c_item[c]]
             _, length, rate = spring_tension(model, work, c)

@@ -9,6 +9,7 @@ from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
 from floatframe.kernels.schur import correction, factorize_bodies
 from floatframe.kernels.step_start import begin_step
+from floatframe.kernels.user_force import resize_states
 
 __all__ = ["DIVERGED", "DONE", "INACCURATE", "SINGULAR_BODY", "SINGULAR_CONNECTION", "advance", "write_row"]
 
@@ -77,7 +78,7 @@ def turn_body(work, memory, i, step):
 @inner
 def predict(model, work, memory, h, alpha_f):
     """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
-    begin_step(model, work, memory, h)
+    begin_step(model, work, memory, h, alpha_f)
     size, size_x = 0.0, 0.0
     step = work.scratch[:9].reshape((3, 3))
     for i in range(model.kind.shape[0]):
@@ -205,6 +206,10 @@ def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, le
             work.counts[3] = 1
             return DIVERGED, -1, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
+        has_states = model.state_row.shape[0] > 0  # they follow the bodies by one iteration
+        if iteration == 0 and has_states:
+            last = norm
+            continue
         if norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2):
             if iteration >= MANY:
                 work.counts[3] = 1
@@ -266,11 +271,12 @@ def write_row(model, work, memory, t, rows):
 
 
 @inner
-def resize(memory, h):
+def resize(model, memory, h):
     """Turn the algorithmic accelerations into those of steps of size h: their distance from u_dot is of first order."""
     ratio = h / memory.step[H_OF_A]
     for k in range(memory.a.shape[0]):
         memory.a[k] = memory.u_dot[k] + ratio * (memory.a[k] - memory.u_dot[k])
+    resize_states(model, memory, ratio)
     memory.step[H_OF_A] = h
 
 
@@ -310,7 +316,7 @@ def advance(
                 n_parts = max(1.0, math.ceil(left / memory.step[H_WANTED] * (1.0 - 1e-9)))
             part = left / n_parts
             if abs(part - memory.step[H_OF_A]) > SAME * part:
-                resize(memory, part)
+                resize(model, memory, part)
                 put_weights(model, work, coefficients[2] * part * part)
             work.time[0] = end - (left - part)
             status, index, excess, error = one_step(

@@ -120,6 +120,7 @@ class Model(NamedTuple):
     p_force: IntArray  #: first of its three rows of force or torque, -1 for none, (n_p,)
     p_arm: IntArray  #: first of its three rows of moment on A, -1 for none, (n_p,)
     p_factor: Array  #: coefficient in a coupler, (n_p,)
+    p_core: IntArray  #: row of the unknown that is its force, or of the multiplier, (n_p,)
     core: IntArray  #: row of the multiplier of each coupler, of the first force of each user force, (n_networks,)
     # markers that slide along the deformed line through stations, see kernels/deformed_line.py
     m_line: IntArray  #: line of a sliding marker, -1 for none, (n_m,)
@@ -130,6 +131,19 @@ class Model(NamedTuple):
     line0: IntArray  #: first station of each line, and the end, (n_lines + 1,)
     line_s: Array  #: places of the stations, (n_stations,)
     line_m: IntArray  #: their markers, (n_stations,)
+    # user forces
+    user_forces: IntArray  #: number of forces, (n_user,)
+    user_states: IntArray  #: number of states, (n_user,)
+    user_address: IntArray  #: of a C function of the user, 0 for expressions, (n_user,)
+    user_tape0: IntArray  #: first of its tapes, those of the forces, then of the rates of the states, (n_user,)
+    state0: IntArray  #: first of its states, and the end, (n_user + 1,)
+    state_row: IntArray  #: row of each state; those of its rate and algorithmic rate follow, (n_states,)
+    state_start: Array  #: values at the start, (n_states,)
+    tape0: IntArray  #: first operation of each expression, and the end, (n_tapes + 1,)
+    tape_op: IntArray  #: codes of floatframe.expressions, (n_operations,)
+    tape_a: IntArray  #: operands, (n_operations,)
+    tape_b: IntArray  #: (n_operations,)
+    tape_c: Array  #: constants, (n_operations,)
     # loads
     l_marker: IntArray  #: (n_l,)
     l_factor: IntArray  #: function of time by which it is multiplied, -1 for one, (n_l,)
@@ -199,6 +213,15 @@ class Work(NamedTuple):
     P: Array  #: derivative of the rows by marker motion (r, phi, v, omega), ground axes, (n_m, most rows, 12)
     V: Array  #: derivative of the rows by their own wrench, (n_c, most rows, most rows)
     pair: Array  #: what a bushing or contact makes of the motion of its markers, see kernels/pair_law.py, (128,)
+    # user forces
+    inputs: Array  #: t, values and rates of the coordinates, states
+    outputs: Array  #: forces, rates of states
+    trial: Array  #: the same, for differences
+    gradients: Array  #: of the outputs by the inputs, row by row
+    tape: Array  #: results of the operations of an expression
+    tape_bar: Array  #: derivatives of its value by them
+    state_base: Array  #: known parts of states and of their algorithmic rates after the step, (n_states, 2)
+    state_scheme: Array  #: kappa, rho, see kernels/user_force.py, (2,)
     # linear algebra
     H: Array  #: tangent of each body, then its LU factors, flat
     pivot: IntArray  #: (n_u,)
@@ -225,6 +248,10 @@ def new_work(model: Model) -> Work:
     n_x = int(sum(6 + model.n_q[model.m_body[m]] for m in np.flatnonzero(on_body)))
     n_largest = int(max(model.n_q, default=0))
     most = int(max(model.c_size, default=0))
+    n_ports = np.diff(model.port0)[len(model.port0) - 1 - len(model.user_states) :]
+    n_in = int(max(1 + 2 * n_ports + model.user_states, default=0))
+    n_out = int(max(model.user_forces + model.user_states, default=0))
+    n_tape = int(max(np.diff(model.tape0), default=0))
 
     def zeros(*shape: int) -> Array:
         return np.zeros(shape)
@@ -268,6 +295,14 @@ def new_work(model: Model) -> Work:
         P=zeros(n_m, most, 12),
         V=zeros(n_c, most, most),
         pair=zeros(128),
+        inputs=zeros(n_in),
+        outputs=zeros(n_out),
+        trial=zeros(n_out),
+        gradients=zeros(n_in * n_out),
+        tape=zeros(n_tape),
+        tape_bar=zeros(n_tape),
+        state_base=np.column_stack([model.state_start, zeros(len(model.state_start))]),
+        state_scheme=np.array([0.0, 1.0]),
         H=zeros(int(model.h0[-1])),
         pivot=np.zeros(n_u, np.int64),
         J_row=zeros(12 * n_x),

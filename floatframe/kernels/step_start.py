@@ -2,15 +2,17 @@
 
 from floatframe.kernels.compilation import inner
 from floatframe.kernels.port import predict_port
+from floatframe.kernels.user_force import begin_states
 
 __all__ = ["begin_step"]
 
 
 @inner
-def begin_step(model, work, memory, h):
-    """Take the unknowns of the last step as known, and move the coordinates of couplers by their rates."""
+def begin_step(model, work, memory, h, alpha_f):
+    """Take the unknowns of the last step as known, move coordinates of ports by their rates, and prepare states."""
     for k in range(memory.w.shape[0]):
         work.w_start[k] = memory.w[k]
         work.w[k] = memory.w[k]
     for p in range(model.p_a.shape[0]):
         predict_port(model, work, p, h)
+    begin_states(model, work, memory, h, alpha_f)

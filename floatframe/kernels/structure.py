@@ -23,7 +23,7 @@ __all__ = ["as_memory", "as_model", "as_rows", "as_work", "table_of"]
 N_DIMENSIONS = {  # of the fields that are not vectors
     "S": 2, "J0": 3, "block0": 2, "is_diagonal": 2, "m_position": 2, "m_triad": 3, "row_x": 2, "row_y": 2, "row_z": 2,
     "piece": 2, "springs": 2, "bushings": 2, "bushing_table": 2, "contacts": 2, "joint_forces": 2, "l_force": 2,
-    "l_torque": 2, "line_axis": 2, "line": 2,
+    "l_torque": 2, "line_axis": 2, "line": 2, "state_base": 2,
     "r": 2, "R": 3, "theta": 2, "a_B": 2, "J": 3, "turning": 3, "D_q_dot": 3, "first": 2, "rho": 2, "rho_dot": 2,
     "T_left": 3,
     "angle": 2, "angle_dot": 2, "spin": 2, "m_r": 2, "m_A": 3, "m_v": 2, "m_omega": 2, "m_wrench": 2, "m_bias": 2,

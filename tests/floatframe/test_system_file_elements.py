@@ -6,6 +6,7 @@ from numpy.testing import assert_array_equal
 
 from floatframe import (
     GROUND,
+    AxialDistance,
     Bushing,
     CoordinateCoupler,
     FloatframeError,
@@ -19,6 +20,7 @@ from floatframe import (
     RollingDisc,
     SphereContact,
     System,
+    UserForce,
 )
 from floatframe.system_file import read_system
 from floatframe.time_functions import harmonic, table
@@ -109,6 +111,28 @@ restitution = 0.5
 dissipation = "flores"
 friction = 0.1
 
+[forces.pid]
+type = "user-force"
+forces = {phi = "-kp*(phi - aim(t)) - ki*e"}
+rates = {e = "phi - aim(t) + 0*x"}
+states = {e = 0.1}
+parameters = {kp = 40, ki = 30.0}
+
+[forces.pid.functions.aim]
+type = "harmonic"
+amplitude = 0.2
+omega = 2.0
+
+[forces.pid.coordinates.phi]
+joint = "hub"
+coordinate = "angle"
+
+[forces.pid.coordinates.x]
+type = "axial-distance"
+body_a = "wheel"
+body_b = "rack"
+axis = [1, 0, 0]
+
 [run]
 t_end = 0.05
 h = 1e-3
@@ -153,6 +177,10 @@ def test_file_becomes_the_system_it_describes(write):
                     (0, 0, 5, 0, 0, 0), {"x": table(x, np.array([-3.0, 0, 1, 5]))}),
             SphereContact("stop", Marker(GROUND, position=(5, 0, 0)), Marker("rack"), 0.2, axis=(-1, 0, 0),
                           modulus=1e6, restitution=0.5, dissipation="flores", friction=0.1),
+            UserForce("pid", {"phi": JointCoordinate("hub", "angle"),
+                              "x": AxialDistance(Marker("wheel"), Marker("rack"), (1, 0, 0))},
+                      {"phi": "-kp*(phi - aim(t)) - ki*e"}, {"e": "phi - aim(t) + 0*x"}, {"e": 0.1},
+                      {"kp": 40.0, "ki": 30.0}, {"aim": harmonic(0.2, 2.0)}),
         ],
     )  # fmt: skip
     for name, found in system.compiled.model._asdict().items():
@@ -174,6 +202,13 @@ def test_file_becomes_the_system_it_describes(write):
         (("radius_b = 0.2\n", ""), "radius_b: missing; expected a number above 0"),
         (('"flores"', '"flroes"'), "dissipation.*did you mean 'flores'"),
         (("restitution = 0.5", "restitution = 2"), "restitution: expected 0 < e <= 1, got 2"),
+        (("- ki*e", "- ki*ee"), "force 'pid': forces: phi: unknown name 'ee' at column 25.*did you mean 'e'"),
+        (("states = {e = 0.1}\n", ""), "a rate and a value at the start for each state"),
+        (('rates = {e = "phi', 'rates = {e = "sni(phi) + phi'), "rates: e: unknown function 'sni' at column 1"),
+        (
+            ('body_a = "wheel"\nbody_b', 'body_a = "weel"\nbody_b'),
+            "forces.pid.coordinates.x.body_a = .weel.: there is no such body",
+        ),
         (("axis_b = [0, 1, 0]", "axis_b = [0, 0, 1]"), "the disc lies flat on the plane"),
     ],
 )

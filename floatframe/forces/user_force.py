@@ -1,0 +1,98 @@
+"""User forces: expressions or functions of coordinates, time and states of their own (control)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from floatframe.arrays import number
+from floatframe.coordinates import Coordinate, coordinate_words
+from floatframe.errors import ModelError
+from floatframe.expressions import CONSTANTS, FUNCTIONS
+from floatframe.time_functions import TimeFunction
+
+__all__ = ["UserForce"]
+
+
+@dataclass(frozen=True, eq=False)
+class UserForce:
+    """Forces Q along coordinates x, and states z with z_dot = g, as functions of t, x, x_dot and z.
+
+    With expressions (see `floatframe.expressions`), in which `phi` is the value of the coordinate of that name,
+    `phi_dot` its rate, `t` the time, and states, parameters and tables go by their names:
+
+        UserForce("pid", {"phi": JointCoordinate("hub", "angle")},
+                  forces={"phi": "-kp*(phi - aim(t)) - kd*phi_dot - ki*e"},
+                  rates={"e": "phi - aim(t)"}, states={"e": 0.0},
+                  parameters={"kp": 40.0, "kd": 4.0, "ki": 10.0}, functions={"aim": smooth_step(0, 1, 0, 0.5)})
+
+    With a function: `forces` then names the coordinates that get one. It is called as function(t, x, v, z, Q, z_dot)
+    with arrays in the order in which coordinates and states are given, and writes Q, (n_forces,), and z_dot,
+    (n_states,). One made by `numba.njit` runs at full speed, a plain Python function slowly. Its derivatives are taken
+    by differences, and it must depend on its arguments alone: it is called more often than once a step.
+    """
+
+    name: str
+    coordinates: Mapping[str, Coordinate]  #: what is seen and acted on, by name
+    forces: Mapping[str, str] | Sequence[str] = field(default_factory=dict)  #: expressions by coordinate, or names
+    rates: Mapping[str, str] = field(default_factory=dict)  #: expressions of the rates of the states
+    states: Mapping[str, float] = field(default_factory=dict)  #: values of the states at the start
+    parameters: Mapping[str, float] = field(default_factory=dict)  #: numbers of expressions
+    functions: Mapping[str, TimeFunction] = field(default_factory=dict)  #: functions of one number of expressions
+    function: Callable[..., None] | None = None  #: instead of expressions
+
+    def __post_init__(self) -> None:
+        where = f"force {self.name!r}"
+        if not isinstance(self.coordinates, Mapping) or not self.coordinates:
+            raise ModelError(f"{where}: coordinates: expected a dict with one coordinate at least, by name")
+        for key, coordinate in self.coordinates.items():
+            coordinate_words(f"{where}: coordinates: {key}", coordinate)
+        require_words(where, self.inputs)
+        require_words(where, [*self.inputs, *self.parameters])
+        require_words(where, [*self.inputs, *self.parameters, *self.functions])
+        for part in ("states", "parameters"):
+            values = {k: number(f"{where}: {part}: {k}", v) for k, v in getattr(self, part).items()}
+            object.__setattr__(self, part, values)
+        for key, function in self.functions.items():
+            if not isinstance(function, TimeFunction):
+                raise ModelError(
+                    f"{where}: functions: {key}: expected a function of floatframe.time_functions, got {function!r}"
+                )
+        for key in self.forces:
+            if key not in self.coordinates:
+                raise ModelError(f"{where}: forces: no coordinate {key!r}; choices: {', '.join(self.coordinates)}")
+        self._either(where)
+
+    def _either(self, where: str) -> None:
+        """Raise `ModelError` unless there are expressions for everything, or one function."""
+        if self.function is not None:
+            if not callable(self.function):
+                raise ModelError(f"{where}: function: expected a callable, got {self.function!r}")
+            if isinstance(self.forces, Mapping) or self.rates or self.parameters or self.functions:
+                raise ModelError(
+                    f"{where}: with a function, forces names coordinates, as in forces=('phi',), and there are no "
+                    "rates, parameters and functions"
+                )
+            return
+        if not isinstance(self.forces, Mapping):
+            raise ModelError(f"{where}: forces: expected expressions by coordinate, or a function, got {self.forces!r}")
+        if set(self.rates) != set(self.states):
+            raise ModelError(
+                f"{where}: expected a rate and a value at the start for each state, got rates of "
+                f"{sorted(self.rates)} and states {sorted(self.states)}"
+            )
+        if not self.forces and not self.rates:
+            raise ModelError(f"{where}: expected forces or states, got none")
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the inputs of expressions in their order: t, coordinates, their rates, states."""
+        names = list(self.coordinates)
+        return ["t", *names, *(f"{name}_dot" for name in names), *self.states]
+
+
+def require_words(where: str, names: Sequence[str]) -> None:
+    """Raise `ModelError` unless all names can stand in an expression and differ."""
+    for k, name in enumerate(names):
+        if not isinstance(name, str) or not name.isidentifier():
+            raise ModelError(f"{where}: expected a name of letters, digits and _, got {name!r}")
+        if name in names[:k] or name in CONSTANTS or name in FUNCTIONS:
+            raise ModelError(f"{where}: the name {name!r} is used twice, or that of a function; choose another")
