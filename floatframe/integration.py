@@ -19,6 +19,7 @@ from floatframe.flexible_body import FlexibleBody
 from floatframe.integrators import CLASSES
 from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.model import Rows, new_work
+from floatframe.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.recorded_system import file_digest
 from floatframe.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.results import (
@@ -303,6 +304,7 @@ class Run:
                 self.t_start + n_done * self.h,
                 self.h,
                 self.watch.notes,
+                carry.state,
             )
         if self.writer is None:
             head = replace(self.head, summary=self.summary(carry))
@@ -312,13 +314,15 @@ class Run:
         return read_results(self.writer.path)
 
 
-def stopped(system, head, kept, writer, failure, t: float, h: float, notes) -> ConvergenceError:
+def stopped(system, head, kept, writer, failure, t: float, h: float, notes, state: State) -> ConvergenceError:
     """Return the error of a failed step, with the motion so far."""
     words = f"system {system.name!r}: the step of {h:g} from t = {t:.9g} failed: {failure.words}"
     advice = step_advice(system, h)
     if advice is not None:
         words += f"; {advice.words}"
     words += "".join(f"; {note.words}" for note in notes)
+    lost = indefinite_mass_words(indefinite_masses(system, state))
+    words += f"; {lost}" if lost else ""
     if writer is None:
         trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False, validity=notes)
     else:
