@@ -41,7 +41,7 @@ def rows_of(system, q, u, u_dot, p=None):
     placed = system.compiled.placed
     p = placed.p if p is None else p
     memory = Memory(placed.r.copy(), p.copy(), q, u, u_dot, np.zeros(len(u)), np.zeros(int(model.c_w0[-1])),
-                    np.zeros(2), np.zeros(2))  # fmt: skip
+                    np.zeros(2), np.zeros(2), np.zeros(4))  # fmt: skip
     return observe_state(model, new_work(model), memory, 0.5)
 
 
