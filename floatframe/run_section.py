@@ -44,6 +44,12 @@ class RunSection(Table):
     )
     beta: Annotated[float, Field(gt=0)] | None = Field(None, description="a number above 0, of the scheme newmark")
     gamma: Annotated[float, Field(ge=0.5)] | None = Field(None, description="a number, 1/2 or more, of newmark")
+    rtol: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="a number between 0 and 1, the relative tolerance of the scheme ida"
+    )
+    atol: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="a number between 0 and 1, the absolute tolerance of the scheme ida"
+    )
     tolerance: Annotated[float, Field(gt=0, lt=1)] | None = Field(
         None, description="a number between 0 and 1, the tolerance of Newton's method"
     )

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from floatframe.integrators.carry import Integrator
 from floatframe.integrators.energy_momentum import EnergyDecaying, EnergyMomentum
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
+from floatframe.integrators.ida import Ida
 from floatframe.integrators.variational import Variational
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "EnergyDecaying",
     "EnergyMomentum",
     "GeneralizedAlpha",
+    "Ida",
     "Variational",
     "hht",
     "newmark",
@@ -28,7 +30,8 @@ INTEGRATORS: dict[str, Callable[..., Integrator]] = {
     "energy-momentum": EnergyMomentum,
     "energy-decaying": EnergyDecaying,
     "variational": Variational,
+    "ida": Ida,
 }
 
 #: their classes, by the name in a results file
-CLASSES = {cls.__name__: cls for cls in (GeneralizedAlpha, EnergyMomentum, EnergyDecaying, Variational)}
+CLASSES = {cls.__name__: cls for cls in (GeneralizedAlpha, EnergyMomentum, EnergyDecaying, Variational, Ida)}

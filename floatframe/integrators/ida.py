@@ -1,0 +1,153 @@
+"""SUNDIALS IDA on the index-reduced equations: another method of another kind, for cross-checks."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.arrays import Array
+from floatframe.compiled import CompiledSystem
+from floatframe.errors import FloatframeError, ModelError
+from floatframe.initial import assembled, consistent_state, solve_accelerations, with_compatible_velocities
+from floatframe.integrators.carry import Carry, Failure, observed
+from floatframe.integrators.discrete_run import step as one_step
+from floatframe.kernels.model import COUPLER, USER_FORCE, Rows, Work, new_rows, new_work
+from floatframe.rotations import euler_parameter_rates
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["Ida"]
+
+MOST_STEPS = 100_000  #: between two outputs
+
+
+@dataclass(frozen=True)
+class Ida:
+    """Backward differentiation of orders one to five with variable steps: SUNDIALS IDA [1]_, through scikit-sundae.
+
+    Joints enter by their second derivatives: accelerations and reactions follow from the state by one linear system
+    (index one), y' = (v, p * omega / 2, q_dot, u_dot(t, y)). At the end of each batch of steps, and in every output,
+    the state is put back on the joints with the least motion, positions first, then velocities. It is for checks of
+    the other methods: slow, and its energy falls or rises with the tolerances. Work and dissipation in the results
+    are summed by the trapezoidal rule over the outputs.
+
+    Needs the extra `ida`: pip install "floatframe[ida]".
+
+    References
+    ----------
+    .. [1] Hindmarsh et al. (2005), ACM Transactions on Mathematical Software 31, 363-396.
+    """
+
+    rtol: float = 1e-8  #: relative tolerance of a step
+    atol: float = 1e-10  #: absolute tolerance of a step, in the units of the system
+
+    def __post_init__(self) -> None:
+        for name in ("rtol", "atol"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ModelError(f"Ida: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
+
+    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+        """Return the memory at the beginning, from a state made consistent."""
+        solver_class()
+        compiled = system.compiled
+        for c, name in enumerate(compiled.connection_names):
+            if compiled.model.c_law[c] in (COUPLER, USER_FORCE):
+                raise ModelError(f"Ida: {name!r} has a memory of its own, which this scheme does not know; use another")
+        made = consistent_state(system, state, t=t)
+        return Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
+
+    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+        """Return the memory a time h later; `ConvergenceError` if it fails."""
+        return one_step(self, system, t, h, carry)
+
+    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the results at the carried state; the carry learns the power at it."""
+        work.time[0] = t
+        power, rows = observed(system, t, carry, work)
+        return replace(carry, power=power), rows
+
+    def advance(
+        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Carry, Rows, int, Failure | None]:
+        """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
+        compiled = system.compiled
+        own = new_work(compiled.model)
+        t = t0 + h * np.arange(first, first + n_steps + 1)
+        made = Motion(compiled, own)
+        y_0 = flattened(carry.state)
+        solver = solver_class()(
+            made.residual, rtol=self.rtol, atol=self.atol, max_num_steps=MOST_STEPS, linsolver="dense"
+        )
+        solution = solver.solve(t, y_0, made.rates(float(t[0]), y_0))
+        rows, n_good, failure = [new_rows(compiled.model, 0)], 0, None
+        for k, y in enumerate(np.atleast_2d(solution.y)[1:], start=first + 1):
+            if not np.isfinite(y).all() or made.problem:
+                break
+            own.time[0] = t[k - first]
+            state = assembled(compiled, own, state_of(compiled, y))
+            state = with_compatible_velocities(compiled, own, state)
+            u_dot, w = solve_accelerations(compiled, own, state)
+            carry = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
+            power, row = observed(system, float(t[k - first]), carry, work)
+            carry = replace(carry, power=power, work=carry.work + 0.5 * h * (carry.power + power))
+            row.diagnostics[0, 10:12] = carry.work
+            if k % every == 0:
+                rows.append(row)
+            n_good += 1
+        if n_good < n_steps:
+            failure = Failure(f"IDA: {made.problem or solution.message}", np.inf)
+        carry = replace(carry, n_iterations=carry.n_iterations + made.n_evaluations)
+        joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
+        return carry, joined, n_good, failure
+
+
+def solver_class():
+    """Return the class of the solver; `ModelError` naming the extra if it is not installed."""
+    try:
+        from sksundae.ida import IDA
+    except ImportError as error:
+        raise ModelError(
+            'Ida: needs SUNDIALS through scikit-sundae, which is not installed; pip install "floatframe[ida]"'
+        ) from error
+    return IDA
+
+
+def flattened(state: State) -> Array:
+    """Return (r, p, q, u) as one vector."""
+    return np.concatenate([state.r.ravel(), state.p.ravel(), state.q, state.u])
+
+
+def state_of(compiled: CompiledSystem, y: Array) -> State:
+    """Return the state of a vector, its Euler parameters made of length one."""
+    n_b, n_q = len(compiled.model.kind), int(compiled.model.q0[-1])
+    r, p, q, u = np.split(np.array(y), [3 * n_b, 7 * n_b, 7 * n_b + n_q])
+    p = p.reshape(n_b, 4)
+    return State(r.reshape(n_b, 3), p / np.linalg.norm(p, axis=1, keepdims=True), q, u)
+
+
+class Motion:
+    """The rates of a system, counted; what goes wrong is kept, since it cannot leave the solver."""
+
+    def __init__(self, compiled: CompiledSystem, work: Work) -> None:
+        self.compiled, self.work = compiled, work
+        self.n_evaluations, self.problem = 0, ""
+
+    def rates(self, t: float, y: Array) -> Array:
+        """Return y'."""
+        model = self.compiled.model
+        state = state_of(self.compiled, y)
+        self.work.time[0] = t
+        u_dot, _ = solve_accelerations(self.compiled, self.work, state)
+        self.n_evaluations += 1
+        starts = model.u0[:-1]
+        r_dot = [state.u[k : k + 3] for k in starts]
+        p_dot = [euler_parameter_rates(p, state.u[k + 3 : k + 6]) for p, k in zip(state.p, starts, strict=True)]
+        q_dot = [state.u[model.u0[i] + 6 : model.u0[i + 1]] for i in range(len(starts))]
+        return np.concatenate([*r_dot, *p_dot, *q_dot, u_dot])
+
+    def residual(self, t: float, y: Array, y_dot: Array, result: Array) -> None:
+        """Write y' less the rates at y."""
+        try:
+            result[:] = y_dot - self.rates(t, y)
+        except (FloatframeError, RuntimeError, ValueError) as error:
+            self.problem = self.problem or str(error)
+            result[:] = np.nan
