@@ -64,7 +64,7 @@ def observed(system, state):
     """Return the row of results at a state."""
     n = len(state.u)
     memory = Memory(state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), np.zeros(n), np.zeros(n),
-                    np.zeros(0), np.zeros(2), np.zeros(2))  # fmt: skip
+                    np.zeros(0), np.zeros(2), np.zeros(2), np.zeros(4))  # fmt: skip
     return observe_state(system.compiled.model, new_work(system.compiled.model), memory, 0.0).diagnostics[0]
 
 

@@ -136,7 +136,7 @@ def test_equations_of_motion_are_lagranges_of_the_kinetic_energy_to_second_order
 def observed(system, state):
     n = len(state.u)
     memory = Memory(state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), np.zeros(n), np.zeros(n),
-                    np.zeros(0), np.zeros(2), np.zeros(2))  # fmt: skip
+                    np.zeros(0), np.zeros(2), np.zeros(2), np.zeros(4))  # fmt: skip
     return observe_state(system.compiled.model, new_work(system.compiled.model), memory, 0.0).diagnostics[0]
 
 
