@@ -107,6 +107,8 @@ from .measuring import StrainGauge as StrainGauge
 from .measuring import StressSensor as StressSensor
 from .measuring import VonMisesSensor as VonMisesSensor
 from .measuring import measured as measured
+from .mode_film import animate_mode as animate_mode
+from .mode_film import draw_mode as draw_mode
 from .rigid_body import RigidBody as RigidBody
 from .sensors import interface_motion as interface_motion
 from .sensors import largest_von_mises as largest_von_mises

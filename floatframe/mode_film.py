@@ -25,6 +25,7 @@ N_FRAMES = 40  #: of one period
 FPS = 20.0
 SWING = 0.12  #: largest displacement by the size of the system
 LARGEST_TURN = 0.5  #: rad that a body turns in the film, at most
+INSIDE = 0.99  #: size of the still body by the moving one, so that it does not shine through where nothing moves
 GHOST_COLOR, RIGID_COLOR = "#c3cbd2", "#9fb0bf"
 
 
@@ -115,7 +116,9 @@ def mode_scene(
                 triangles, moved, scalars=None if values is None else np.abs(values) / top, color=RIGID_COLOR, name=name
             )
         )
-        surfaces.append(Surface(triangles, places[name], color=GHOST_COLOR, opacity=0.25, has_edges=False))
+        center = places[name].mean(axis=0)
+        ghost = center + INSIDE * (places[name] - center)
+        surfaces.append(Surface(triangles, ghost, color=GHOST_COLOR, opacity=0.25, has_edges=False))
     for i, body in enumerate(system.bodies):
         if isinstance(body, FlexibleBody):
             for interface in body.reduced.interfaces:

@@ -21,6 +21,7 @@ __all__ = [
     "plot_reaction",
 ]
 
+SHOWN = 1e-18  #: least drift on the axis: what is below is rounding of rounding
 FLOOR = 1e-300  #: below which a logarithmic axis shows nothing
 
 
@@ -94,6 +95,9 @@ def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
             size = np.abs(values)
             if np.any(size > FLOOR):
                 ax.semilogy(trajectory.t, np.where(size > FLOOR, size, np.nan), label=f"{name} {kind}")
+    drawn = [np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()]
+    largest = max((float(np.nanmax(values)) for values in drawn if np.isfinite(values).any()), default=0.0)
+    ax.set_ylim(SHOWN, max(10 * largest, 1e4 * SHOWN))
     return labelled(ax, f"drift of joints [{length}, rad]")
 
 

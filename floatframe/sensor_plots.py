@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from floatframe.errors import ResultsError
 from floatframe.measuring.measurement import Measurement
 from floatframe.plots import labelled
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["panels_of", "plot_measurement", "plot_sensors"]
 
+NOTHING = 1e-9  #: of the largest column of a unit, below which a curve would lie on zero
 LEFT_OUT = ("number in the mesh",)  #: units of columns that are no curves
 
 
@@ -36,18 +39,21 @@ def plot_measurement(
         ax = Figure(figsize=(7, 4), layout="constrained").add_subplot()
     panels = dict(panels_of(measurement))
     unit = next(iter(panels)) if unit is None else unit
+    largest = max(float(np.abs(measurement.columns[name]).max(initial=0.0)) for name in panels[unit])
     for name in panels[unit]:
         values = measurement.columns[name]
         # components that stay zero would only crowd the legend
-        if len(panels[unit]) == 1 or values.any():
+        if len(panels[unit]) == 1 or np.abs(values).max(initial=0.0) > NOTHING * largest:
             is_sum = name.split()[-1] in ("size", "total", "von")
             ax.plot(measurement.t, values, label=name, linewidth=1.0 if is_sum else 1.5, color="k" if is_sum else None)
     ax.set_xlabel(f"time [{time_symbol}]")
     ax.set_title(measurement.sensor, fontsize="medium")
     ax.grid(alpha=0.3)
     columns = panels[unit]
-    what = columns[0] if len(columns) == 1 else ""
-    return labelled(ax, f"{what} [{unit}]".strip())
+    if len(columns) == 1:
+        ax.set_ylabel(f"{columns[0]} [{unit}]")
+        return ax
+    return labelled(ax, f"{measurement.sensor} [{unit}]")
 
 
 def plot_sensors(measurements: Sequence[Measurement], *, title: str = "", time_symbol: str = "s") -> "Figure":

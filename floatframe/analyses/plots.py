@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 __all__ = ["plot_campbell", "plot_frequency_response", "plot_root_locus"]
 
 
+NOTHING = 1e-12  #: of the largest amplitude of a unit, below which a response is rounding
+
+
 def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 1.0) -> "Axes":
     """Plot frequencies over the speed, with the lines of once, twice and three times per revolution.
 
@@ -35,7 +38,10 @@ def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 
         inside = np.flatnonzero(line <= 1.04 * largest)
         if len(inside):
             k = inside[-1]
-            ax.annotate(f"{order}P", (locus.values[k], line[k]), color="0.45", fontsize=9, va="bottom", ha="right")
+            ax.annotate(
+                f"{order}P", (locus.values[k], line[k]), xytext=(-14, -3), textcoords="offset points", color="0.4",
+                fontsize=9, va="top", ha="center", bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
+            )  # fmt: skip
     ax.set_ylim(0, 1.05 * largest if largest > 0 else 1)
     ax.set_xlim(locus.values.min(), max(locus.values.max(), locus.values.min() + 1e-12))
     ax.set_xlabel(locus.parameter)
@@ -50,6 +56,9 @@ def plot_root_locus(locus: Locus, ax: "Axes | None" = None) -> "Axes":
     for column in locus.eigenvalues.T:
         ax.plot(column.real, column.imag, color="0.75", linewidth=1, zorder=1)
         points = ax.scatter(column.real, column.imag, c=locus.values, s=18, cmap="viridis", zorder=2)
+    start = locus.eigenvalues[0]
+    ax.scatter(start.real, start.imag, s=46, facecolors="none", edgecolors="k", linewidths=0.9, label="first value")
+    ax.legend(fontsize="small")
     ax.figure.colorbar(points, ax=ax, label=locus.parameter)
     ax.axvline(0, color="0.3", linewidth=0.8)
     ax.set_xlabel("real part [1/s]")
@@ -71,32 +80,42 @@ def plot_frequency_response(response: FrequencyResponse, *, time_unit: float = 1
     from matplotlib.figure import Figure
 
     pairs = [(o, i) for o in range(len(response.outputs)) for i in range(len(response.inputs))]
-    units = list(dict.fromkeys(response.units[o][i] for o, i in pairs))
+    amplitudes, phases = response.amplitudes, response.phases
+    sizes = {pair: float(amplitudes[:, pair[0], pair[1]].max()) for pair in pairs}
+    largest = {response.units[o][i]: 0.0 for o, i in pairs}
+    for (o, i), size in sizes.items():
+        largest[response.units[o][i]] = max(largest[response.units[o][i]], size)
+    units = [unit for unit, size in largest.items() if size > 0] or [response.units[0][0]]
     figure = Figure(figsize=(8, 2.8 * len(units) + 2.6), layout="constrained")
     axes = figure.subplots(len(units) + 1, 1, sharex=True, squeeze=False).ravel()
     hertz = response.frequencies / time_unit
-    amplitudes, phases = response.amplitudes, response.phases
+    still = []
     for k, (o, i) in enumerate(pairs):
-        color = f"C{k % 10}"
-        label = f"{response.outputs[o]} / {response.inputs[i]}"
+        unit, label = response.units[o][i], f"{response.outputs[o]} / {response.inputs[i]}"
+        if sizes[o, i] <= NOTHING * largest[unit]:
+            still.append(label)
+            continue
         size = amplitudes[:, o, i]
-        if not size.any():
-            label += " (none)"
-        axes[units.index(response.units[o][i])].loglog(
-            hertz, np.where(size > 0, size, np.nan), color=color, linewidth=1.4, label=label
+        axes[units.index(unit)].loglog(
+            hertz, np.where(size > 0, size, np.nan), color=f"C{k % 10}", linewidth=1.4, label=label
         )
-        axes[-1].semilogx(hertz, (phases[:, o, i] + 180) % 360 - 180, color=color, linewidth=1.1)
+        axes[-1].semilogx(hertz, phases[:, o, i], color=f"C{k % 10}", linewidth=1.1)
     for unit, ax in zip(units, axes, strict=False):
         ax.set_ylabel(f"amplitude [{unit}]")
-        ax.legend(fontsize="small")
+        if ax.get_legend_handles_labels()[0]:
+            ax.legend(fontsize="small")
         ax.grid(which="major", alpha=0.4)
         ax.grid(which="minor", alpha=0.15)
-    axes[-1].set_ylabel("phase [degrees]")
-    axes[-1].set_ylim(-190, 190)
-    axes[-1].set_yticks([-180, -90, 0, 90, 180])
-    axes[-1].grid(which="major", alpha=0.4)
-    axes[-1].set_xlabel("frequency [Hz]")
-    axes[-1].set_xlim(hertz[0], hertz[-1])
+    ax = axes[-1]
+    ax.set_ylabel("phase [degrees]")
+    low, high = ax.get_ylim()
+    first, last = np.floor(low / 90 - 0.05), np.ceil(high / 90 + 0.05)
+    ax.set_yticks(90 * np.arange(first, last + 1, max(1, (last - first) // 6)))
+    ax.grid(which="major", alpha=0.4)
+    ax.set_xlabel("frequency [Hz]")
+    ax.set_xlim(hertz[0], hertz[-1])
+    if still:
+        figure.suptitle(f"no response: {', '.join(still)}", fontsize="small", color="0.4")
     return figure
 
 

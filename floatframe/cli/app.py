@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cms.cli.console import Stages
+    from cms.reduced_body import ReducedBody
     from floatframe.integration import Progress
     from floatframe.system import System
     from floatframe.trajectory import Trajectory
@@ -363,13 +364,17 @@ def animate_command(
     from floatframe.animation import animate, bodies_of
     from floatframe.body_colors import BODY_COLORS
     from floatframe.errors import ResultsError
+    from floatframe.rigid_body import RigidBody
     from floatframe.trajectory import read_results
 
     if color not in BODY_COLORS:
         raise ResultsError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
     trajectory = read_results(file)
     path = output_path(output, file.with_suffix(".gif"), ResultsError, overwrite_of=(file,))
-    bodies = bodies_of(trajectory)
+    bodies: dict[str, ReducedBody | RigidBody] = {**bodies_of(trajectory)}
+    system = known_system(trajectory)
+    if system is not None:  # boxes of the inertia of rigid bodies, instead of cubes
+        bodies |= {body.name: body for body in system.bodies if isinstance(body, RigidBody)}
     with stages(remaining=True) as clock, clock("film") as advance:
         animate(
             trajectory, bodies, path, fps=fps, speed=speed, magnification=magnification, color=BODY_COLORS[color],
