@@ -12,8 +12,10 @@ import numpy as np
 
 import cms
 import fe_models as fm
+from fe_models.beams.torsion import rectangle_torsion_constant
+from fe_models.shells import elements
 from tests.fe_models import test_shell_benchmarks as cases
-from tests.fe_models.shells import KINDS, SI, STEEL, frequencies, of_nodes, plate
+from tests.fe_models.shells import KINDS, SI, STEEL, frequencies, of_nodes, plate, solved
 
 
 def errors(kind, n):
@@ -61,11 +63,93 @@ def cost(n):
     print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.2f} GB")
 
 
+def hemisphere(kind, n):
+    """Deflection of a pinched hemisphere with a hole of 18 degrees, R/t = 250, over 0.093 (MacNeal & Harder)."""
+
+    def surface(u, v):
+        phi, theta = np.pi / 2 * u, np.deg2rad(72) * v
+        return 10 * np.stack([np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)], axis=1)
+
+    mesh = fm.mapped_shell(surface, n, n, kind=kind)
+    material = fm.Material("m", E=6.825e7, nu=0.3, rho=1.0)
+    body = fm.shell_body(mesh, fm.ShellProperty(0.04, material), name="hemisphere", units=SI)
+    sets = mesh.node_sets
+    a, b = (int(np.intersect1d(sets[s], sets["v0"])[0]) for s in ("u0", "u1"))
+    fixed = np.unique(np.concatenate([of_nodes(sets["u0"], 1, 3, 5), of_nodes(sets["u1"], 0, 4, 5), [6 * a + 2]]))
+    f = np.zeros(body.n_dof)
+    f[6 * a], f[6 * b + 1] = 1.0, -1.0
+    return solved(body, f, fixed)[6 * a] / 0.093
+
+
+def twisted_beam(kind):
+    """Deflection of the twisted beam under a force across, over 0.005424 (MacNeal & Harder), 24 x 4 cells."""
+
+    def surface(u, v):
+        angle, y = np.pi / 2 * u, 1.1 * (v - 0.5)
+        return np.stack([12 * u, y * np.cos(angle), y * np.sin(angle)], axis=1)
+
+    mesh = fm.mapped_shell(surface, 24, 4, kind=kind)
+    material = fm.Material("m", E=29e6, nu=0.22, rho=1.0)
+    body = fm.shell_body(mesh, fm.ShellProperty(0.32, material), name="beam", units=SI)
+    tip = np.flatnonzero(np.abs(mesh.nodes - [12.0, 0.0, 0.0]).max(axis=1) < 1e-9)[0]
+    f = np.zeros(body.n_dof)
+    f[6 * tip + 2] = 1.0
+    return solved(body, f, of_nodes(mesh.node_sets["u0"], *range(6)))[6 * tip + 2] / 0.005424
+
+
+def torsion(kind, n):
+    """Torsional stiffness of a strip five times as wide as thick, n square cells across, over St Venant's."""
+    b, t = 0.1, 0.02
+    material = fm.Material("m", E=2e11, nu=0.0, rho=1.0)
+    mesh = fm.flat_plate(5 * b, b, 5 * n, n, kind=kind)
+    body = fm.shell_body(mesh, fm.ShellProperty(t, material), name="strip", units=SI)
+    start, end = mesh.node_sets["u0"], mesh.node_sets["u1"]
+    fixed = np.concatenate([of_nodes(start, 0, 1, 2, 3, 5), of_nodes(end, 2, 3)])
+    turned = np.stack([mesh.nodes[end, 1] - b / 2, np.ones(len(end))], axis=1).ravel()
+    values = np.concatenate([np.zeros(5 * len(start)), turned])
+    order = np.argsort(fixed)
+    u = solved(body, np.zeros(body.n_dof), fixed[order], values[order])
+    return u @ (body.K @ u) * 5 * b / (material.mu * rectangle_torsion_constant(b, t))
+
+
+def choices():
+    """Print what the drilling stiffness, the parabolic sides and the size of cells bring."""
+    chosen = elements.DRILLING, elements.translations
+    print("drilling of quads over G t: hemisphere 8 x 8, 16 x 16, twisted beam (1 is exact)")
+    for gamma in (1.0, 0.1, 0.001):
+        elements.DRILLING = gamma
+        print(f"{gamma:8g} {hemisphere('quad', 8):8.3f} {hemisphere('quad', 16):8.3f} {twisted_beam('quad'):8.3f}")
+    elements.DRILLING = chosen[0]
+    print(
+        f"triangles {hemisphere('triangle', 8):7.3f} {hemisphere('triangle', 16):8.3f} {twisted_beam('triangle'):8.3f}"
+    )
+    mesh = fm.flat_plate(10.0, 10.0, 16, 16)
+    exact = np.array([13.468, 19.596, 24.270, 34.801, 34.801, 61.093]) * cases.THIN_PLATE
+    print("worst of FV12 in %, 16 x 16: sides of the mass straight, parabolic")
+    for kind in KINDS:
+        worst = []
+        for factor in (0.0, 1.0):
+            elements.translations = lambda planes, N, E, shape, share, factor=factor: chosen[1](
+                planes, N, factor * E, shape, share
+            )
+            error = frequencies(plate(kind, 16), cases.across(mesh), 9)[3:] / exact - 1
+            worst.append(100 * np.abs(error).max())
+        elements.translations = chosen[1]
+        print(f"{kind:9s} {worst[0]:8.2f} {worst[1]:8.2f}")
+    print("torsional stiffness of a strip of width 5 t, cells of t 5/n: n = 4, 8, 16 (1 is exact)")
+    for kind in KINDS:
+        print(f"{kind:9s}" + "".join(f"{torsion(kind, n):8.3f}" for n in (4, 8, 16)))
+
+
 def main():
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cost", type=int, metavar="N")
+    parser.add_argument("--choices", action="store_true")
     options = parser.parse_args()
+    if options.choices:
+        choices()
+        return
     if options.cost:
         cost(options.cost)
         return

@@ -85,9 +85,11 @@ from .selections import (
 )
 from .shells.body import shell_body as shell_body
 from .shells.interfaces import shell_interface as shell_interface
+from .shells.normals import orient_normals as orient_normals
 from .shells.shell_mesh import ShellMesh as ShellMesh
 from .shells.shell_mesh import flat_plate as flat_plate
 from .shells.shell_mesh import mapped_shell as mapped_shell
+from .shells.shell_points import shell_points as shell_points
 from .shells.shell_property import ShellProperty as ShellProperty
 from .shells.shell_report import ShellReport as ShellReport
 from .shells.shell_report import report_shell as report_shell

@@ -81,7 +81,5 @@ def beam_line(
 
         return of_place
 
-    names = [
-        name for name, value in at(0.0).items() if np.isfinite(value)
-    ]  # infinite: the default
+    names = [name for name, value in at(0.0).items() if np.isfinite(value)]  # infinite: the default
     return BeamLine(length, breaks=breaks, **{name: law(name) for name in names})

@@ -121,7 +121,8 @@ def report_shell(
                 "normals",
                 False,
                 f"the normal changes sides at {int(flips.sum())} edges, first between nodes {' and '.join(nodes)}: "
-                "top, bottom, offset and pressure change sides there; order the nodes of all cells in one sense",
+                "top, bottom, offset and pressure change sides there; give the cells one sense (orient_normals), or "
+                "leave it where walls are meant so",
             )
         )
     findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, materials)]

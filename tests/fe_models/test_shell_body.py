@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models as fm
-from tests.fe_models.shells import KINDS, SI, STEEL, distorted, of_nodes, plate, solved
+from tests.bodies import box_mesh
+from tests.fe_models.shells import KINDS, SI, STEEL, distorted, frequencies, of_nodes, plate, solved
 
 
 def folded(kind="quad", n=2):
@@ -204,3 +205,70 @@ def test_the_report_finds_warp_flipped_normals_parts_and_coincident_nodes():
         warped = replace(mesh, nodes=mesh.nodes + np.array([0, 0, height]) * ((np.arange(9) % 2)[:, None]))
         found = fm.report_shell(warped, [STEEL], units=SI).findings
         assert [(f.kind, f.is_error) for f in found] == [("warped", is_error)]
+
+
+def test_named_points_show_top_middle_and_bottom_of_a_cell():
+    mesh = fm.flat_plate(1.0, 0.5, 2, 1)
+    t, material = 0.02, replace(STEEL, nu=0.0)
+    body = fm.shell_body(mesh, fm.ShellProperty(t, material, offset=0.1), name="plate", units=SI)
+    points = fm.shell_points(body, {"quad": [1]}).stress_points
+    assert points.names == ("quad 1 top", "quad 1 middle", "quad 1 bottom")
+    assert_allclose(points.positions, [[0.75, 0.25, 0.1 + z] for z in (0.01, 0, -0.01)], rtol=0, atol=1e-15)
+    x = mesh.nodes[:, 0]
+    stretch, curvature = 1e-4, 2e-3
+    u = np.zeros((len(x), 6))
+    u[:, 0], u[:, 2], u[:, 4] = stretch * x, curvature * x**2 / 2, -curvature * x
+    stress = points.stress(body.mesh_displacement(u.reshape(-1, 1)))[:, 0, 0]
+    expected = [material.E * (stretch - (0.1 + z) * curvature) for z in (t / 2, 0, -t / 2)]
+    assert_allclose(stress, expected, rtol=1e-10)
+    with pytest.raises(fm.ShellError, match=r"quad: expected some of 2 cells, 0..1, got \[5\]"):
+        fm.shell_points(body, {"quad": [5]})
+    reduced_from = cms.couple(fm.shell_points(body, {"quad": [0, 1]}))
+    reduced = cms.reduce(reduced_from, cms.normal_modes(reduced_from, n_modes=2))
+    assert reduced.point_stress.modes.shape == (6, 6, 2)
+
+
+def test_normals_are_turned_to_one_side():
+    rng = np.random.default_rng(0)
+    for kind in KINDS:
+        mesh = folded(kind, 3)
+        cells = np.array(mesh.cells[kind])
+        some = rng.choice(len(cells), len(cells) // 3, replace=False)
+        some = some[some > 0]
+        cells[some] = cells[some][:, ::-1]
+        mixed = replace(mesh, cells={kind: cells})
+        assert [f.kind for f in fm.report_shell(mixed, [STEEL], units=SI).findings] == ["normals"]
+        oriented = fm.orient_normals(mixed)
+        assert fm.report_shell(oriented, [STEEL], units=SI).findings == ()
+        assert oriented.notes == (f"the nodes of {len(some)} cells were turned round",)
+        body = fm.shell_body(oriented, fm.ShellProperty(0.02, STEEL), name="L", units=SI)
+        assert is_closed(body.surface)
+    assert fm.orient_normals(mesh) is mesh
+
+
+def test_a_shell_is_welded_to_a_solid_with_the_mass_of_both_and_no_loose_motion():
+    block_mesh = box_mesh(2, 2, 2, 0.2, 0.4, 0.2, "hexahedron20")
+    x = block_mesh.nodes[:, 0].max()
+    block_mesh = replace(block_mesh, node_sets={"face": np.flatnonzero(block_mesh.nodes[:, 0] > x - 1e-9)})
+    face = fm.rigid_interface(block_mesh, "face", fm.NodeSet("face"))
+    block = cms.couple(fm.solid_body(block_mesh, STEEL, name="block", units=SI, interfaces=[face]))
+    mesh = fm.flat_plate(1.0, 0.4, 8, 4)
+    mesh = replace(mesh, nodes=mesh.nodes + np.array([0.2, 0.0, 0.1]))
+    root = fm.shell_interface(mesh, "root", fm.NodeSet("u0"))
+    flap = cms.couple(fm.shell_body(mesh, fm.ShellProperty(0.01, STEEL), name="flap", units=SI, interfaces=[root]))
+    whole = fm.weld([block, flap], [(("block", "face"), ("flap", "root"))], name="whole")
+    reduced = cms.reduce(whole, cms.normal_modes(whole, n_modes=4), geometric=True)
+    assert_allclose(reduced.moments.m, STEEL.rho * (0.2 * 0.4 * 0.2 + 0.4 * 0.01), rtol=1e-12)
+    assert reduced.provenance["mode set rigid-body motions removed"] == "6"
+    assert reduced.geometric is not None
+    m, width, thick = STEEL.rho * 0.2 * 0.4 * 0.2, 0.4, 0.01
+    inertia = m / 12 * np.array([0.4**2 + 0.2**2, 0.2**2 + 0.2**2, 0.2**2 + 0.4**2])
+    beam = fm.beam_body(
+        fm.straight_line((0, 0, 0), (1, 0, 0), 20),
+        fm.BeamProperty(fm.Rectangle(width, thick), STEEL),
+        name="beam",
+        units=SI,
+        point_masses=[fm.PointMass(0, m, inertia, offset=(-0.1, 0.0, 0.0))],
+    )
+    as_beam = frequencies(beam, np.zeros(0, np.int64), 7)[6]
+    assert as_beam < reduced.free_frequencies[0] < 1.06 * as_beam  # a plate is stiffer by what nu holds back

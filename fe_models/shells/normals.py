@@ -1,0 +1,49 @@
+"""One sense of the normal for all cells of a wall."""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.arrays import IntArray
+from fe_models.shells.shell_mesh import ShellMesh
+from fe_models.shells.skin import cell_edges
+
+__all__ = ["orient_normals"]
+
+
+def orient_normals(mesh: ShellMesh) -> ShellMesh:
+    """Return the mesh with the normals of neighbouring cells on one side, by turning round the nodes of some.
+
+    Cells are neighbours where they are the only two on an edge. In each part so joined the first cell keeps its
+    normal and the others follow; a part that cannot be oriented, such as a Möbius strip, keeps one seam. A joint of
+    three walls joins nothing: each wall keeps the normal of its own first cell.
+
+    Parameters
+    ----------
+    mesh
+        Any shell mesh.
+    """
+    kinds = list(mesh.cells)
+    edges = cell_edges(tuple(mesh.cells[kind] for kind in kinds))
+    n = mesh.n_cells
+    first, second = edges.cell[edges.first], edges.cell[edges.second]
+    is_flip = (edges.nodes[edges.first] == edges.nodes[edges.second]).all(axis=1)
+    flips = sp.csr_array((np.where(is_flip, 2.0, 1.0), (first, second)), shape=(n, n))
+    graph = sp.csr_array(flips.maximum(flips.T))
+    _, part = sp.csgraph.connected_components(graph, directed=False)
+    turned = np.zeros(n, dtype=bool)
+    for start in np.unique(part, return_index=True)[1]:
+        order, before = sp.csgraph.breadth_first_order(graph, start, directed=False)
+        for cell in order[1:]:
+            turned[cell] = turned[before[cell]] ^ (graph[before[cell], cell] == 2.0)
+    if not turned.any():
+        return mesh
+    starts = np.cumsum([0, *(len(mesh.cells[kind]) for kind in kinds)])
+    cells: dict[str, IntArray] = {}
+    for kind, begin, end in zip(kinds, starts[:-1], starts[1:], strict=True):
+        rows = np.array(mesh.cells[kind])
+        mine = turned[begin:end]
+        rows[mine] = rows[mine][:, [0, *range(rows.shape[1] - 1, 0, -1)]]
+        cells[kind] = rows
+    return replace(mesh, cells=cells, notes=(*mesh.notes, f"the nodes of {int(turned.sum())} cells were turned round"))

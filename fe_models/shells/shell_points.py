@@ -1,0 +1,83 @@
+"""Named stress points at top, middle and bottom of the centres of chosen cells (`cms.fe_body.StressPointModel`)."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.arrays import Array, IntArray, frozen
+from cms.fe_body import FEBody
+from fe_models.errors import ShellError
+from fe_models.shells.elements import ShellCells
+from fe_models.shells.model import BOTTOM, MIDDLE, TOP, ShellModel
+from fe_models.shells.stiffeners import StiffenedModel
+
+__all__ = ["ShellPoints", "shell_points"]
+
+HEIGHTS = {"top": TOP, "middle": MIDDLE, "bottom": BOTTOM}
+
+
+@dataclass(frozen=True, eq=False)
+class ShellPoints:
+    """Points through the thickness at the centres of cells; each shows its own cell, no mean."""
+
+    parts: tuple[tuple[ShellCells, IntArray], ...]  #: cells of one type and the chosen rows
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One per point: "quad 3 top", (n_points,)."""
+        return tuple(f"{group.kind} {row} {name}" for group, rows in self.parts for row in rows for name in HEIGHTS)
+
+    @property
+    def positions(self) -> Array:
+        """Undeformed, mesh axes, (n_points, 3) [m]."""
+        places = []
+        for group, rows in self.parts:
+            center = group.planes.corners[rows].mean(axis=1)
+            arm = group.t[rows, None] * group.planes.R[rows][:, :, 2]
+            places.append(np.stack([center + height * arm for height in HEIGHTS.values()], axis=1).reshape(-1, 3))
+        return frozen(np.concatenate(places))
+
+    def stress(self, u: Array) -> Array:
+        """Return the stress, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes, of columns over the mesh dofs."""
+        values = []
+        for group, rows in self.parts:
+            for row in rows.tolist():
+                at = slice(row, row + 1)
+                mean = group.resultants(np.asarray(u), at).mean(axis=1, keepdims=True)
+                values += [group.stress(mean, at, height)[0] for height in HEIGHTS.values()]
+        return np.concatenate(values)
+
+
+def shell_points(body: FEBody, cells: Mapping[str, Iterable[int]]) -> FEBody:
+    """Return the body with named stress points at top, middle and bottom of some cells.
+
+    Parameters
+    ----------
+    body
+        Made by `shell_body`, coupled or not.
+    cells
+        Cell type -> rows of `ShellMesh.cells`, such as a group `mesh.cell_sets["lug"]`.
+
+    Raises
+    ------
+    ShellError
+        If the body is no shell, or a cell does not exist.
+    """
+    model = body.element_model
+    if isinstance(model, StiffenedModel):
+        model = model.shell
+    where = f"shell_points: body {body.name!r}"
+    if not isinstance(model, ShellModel):
+        raise ShellError(f"{where} is no shell; choose points before welding")
+    parts = []
+    for kind, chosen in cells.items():
+        group = next((group for group in model.groups if group.kind == kind), None)
+        rows = np.array(list(chosen), dtype=np.int64)
+        n = 0 if group is None else len(group.cells)
+        if group is None or not len(rows) or rows.min() < 0 or rows.max() >= n:
+            raise ShellError(f"{where}: {kind}: expected some of {n} cells, 0..{n - 1}, got {rows.tolist()[:5]}")
+        parts.append((group, rows))
+    if not parts:
+        raise ShellError(f"{where}: expected cells, got none")
+    return replace(body, stress_points=ShellPoints(tuple(parts)))
