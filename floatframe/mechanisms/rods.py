@@ -76,6 +76,16 @@ class Rod:
         self.bodies = (FlexibleBody(name, reduced, position=position, orientation=orientation),)
         self.start, self.end = Marker(name, ends[0]), Marker(name, ends[1])
 
+    def across(self, direction: Array) -> Array:
+        """Return a direction in ground axes, (3,), in the axes of the marker at the start."""
+        body = self.body
+        if isinstance(body, FlexibleBody):
+            assert self.start.interface is not None
+            axes = body.frame_orientation @ body.reduced.interface(self.start.interface).triad
+        else:
+            axes = rotation_matrix(body.orientation)
+        return np.asarray(axes.T @ direction)
+
     @property
     def body(self) -> Body:
         """The one body of a rod that is rigid or reduced."""
