@@ -1,3 +1,5 @@
+from .added_mass import AddedMass as AddedMass
+from .added_mass import with_masses as with_masses
 from .analyses import Channel as Channel
 from .analyses import CoordinateChannel as CoordinateChannel
 from .analyses import Equilibrium as Equilibrium

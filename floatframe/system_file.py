@@ -25,6 +25,7 @@ from cms.reduced_body import ReducedBody
 from cms.toml_file import Matrix3, Table, Vector3, choice, numbers, read_toml, validated
 from cms.units import UNIT_SYSTEMS, Units, unit_system
 from cms.words import nearest
+from floatframe.added_mass import AddedMass, with_masses
 from floatframe.changed_content import changed
 from floatframe.channel_section import InputSection, OutputSection
 from floatframe.coordinate_section import CoordinateSection, marker_of
@@ -50,6 +51,8 @@ from floatframe.forces.sphere_contact import DISSIPATIONS
 from floatframe.ground import GROUND
 from floatframe.joints import JOINTS, Joint
 from floatframe.markers import Place
+from floatframe.mass_properties import MassProperties, combined, mass_properties, point_mass
+from floatframe.mode_choice import frozen_to_rigid, with_modes, without_modes
 from floatframe.motion_section import MotionSection
 from floatframe.place_key import PlaceOnBody
 from floatframe.rigid_body import RigidBody
@@ -66,6 +69,9 @@ log = logging.getLogger(__name__)
 Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=0)]
+RIGID_KEYS = ("inertia_axes", "inertia_about", "positive_products")
+FLEXIBLE_KEYS = ("modes", "without_modes", "is_rigid")
 KEYS_OF_JOINTS = {
     kind: tuple(field.name for field in fields(joint) if field.name not in ("name", "marker_a", "marker_b"))
     for kind, joint in JOINTS.items()
@@ -144,6 +150,16 @@ class SystemSection(Table):
     )
 
 
+class MassSection(Table):
+    """[[bodies.NAME.masses]]: a small part fixed to a body."""
+
+    mass: Positive = Field(description="a number above 0, the mass of the part")
+    interface: Name | None = Field(None, description="the name of an interface of a flexible body")
+    position: Vector3 | None = Field(None, description="its centre of mass in a rigid body, [x, y, z]")
+    offset: Vector3 | None = Field(None, description="its centre of mass from the interface, in its axes, [x, y, z]")
+    inertia: Matrix3 | None = Field(None, description="its inertia tensor about its centre of mass, three rows")
+
+
 class BodySection(Table):
     """[bodies.NAME]: a flexible body from a modal file, or a rigid one from its mass properties."""
 
@@ -151,6 +167,15 @@ class BodySection(Table):
     mass: Positive | None = Field(None, description="a number above 0, the mass of a rigid body")
     inertia: Matrix3 | None = Field(None, description="the inertia tensor about the centre of mass, three rows")
     center_of_mass: Vector3 | None = Field(None, description="the centre of mass in the body frame, [x, y, z]")
+    inertia_axes: Matrix3 | None = Field(None, description="the axes of the inertia tensor, [x axis, y axis, z axis]")
+    inertia_about: Vector3 | None = Field(None, description="the point of the inertia tensor in the body, [x, y, z]")
+    positive_products: bool | None = Field(None, description="true: products of inertia without their minus sign")
+    masses: list[MassSection] = Field([], description="tables [[bodies.NAME.masses]], parts fixed to the body")
+    modes: list[Count] | None = Field(None, description="a list of whole numbers from 0, the modes to keep")
+    without_modes: list[Count] | None = Field(
+        None, description="a list of whole numbers from 0, the modes to leave out"
+    )
+    is_rigid: bool | None = Field(None, description="true: a flexible body without its modes")
     position: Vector3 = Field((0.0, 0.0, 0.0), description="the position of the body (mesh) origin, [x, y, z]")
     rotation_vector: Vector3 | None = Field(None, description="axis times angle in rad from ground to body, [x, y, z]")
     euler_parameters: Parameters4 | None = Field(None, description="Euler parameters of length 1, [w, x, y, z]")
@@ -180,6 +205,21 @@ class BodySection(Table):
             raise ValueError("a flexible body has its inertia in its file; remove inertia and center_of_mass")
         if self.mass is not None and self.stiffening is not None:
             raise ValueError("stiffening: a rigid body has none; remove it")
+        others = RIGID_KEYS if self.file is not None else FLEXIBLE_KEYS
+        for key in others:
+            if getattr(self, key) is not None:
+                raise ValueError(f"{key}: a {'flexible' if self.file else 'rigid'} body has no such key; remove it")
+        if sum(getattr(self, key) is not None for key in FLEXIBLE_KEYS) > 1:
+            raise ValueError(f"expected one of {', '.join(FLEXIBLE_KEYS)}, got several")
+        for part in self.masses:
+            wrong = ("interface", "offset") if self.file is None else ("position",)
+            for key in wrong:
+                if getattr(part, key) is not None:
+                    kind = "flexible body; give position" if self.file is None else "rigid body; give interface"
+                    raise ValueError(f"masses: {key} is for a {kind}")
+            needed = "position" if self.file is None else "interface"
+            if getattr(part, needed) is None:
+                raise ValueError(f"masses: {needed}: missing; expected where the part is")
         if self.rotation_vector is not None and self.euler_parameters is not None:
             raise ValueError("expected either rotation_vector or euler_parameters, got both")
         return self
@@ -389,7 +429,7 @@ def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None 
     path = Path(path)
     content = changed(read_toml(path, SystemFileError), changes or {}, str(path), SystemFileError)
     data = validated(SystemFile, content, path, SystemFileError, context=path.parent)
-    files: dict[Path, ReducedBody] = {}
+    files: dict[Any, ReducedBody] = {}
     try:
         units = unit_system(data.system.units)
         bodies = [body_of(name, section, files, units) for name, section in data.bodies.items()]
@@ -416,7 +456,7 @@ def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None 
     return system, data.run.options()
 
 
-def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody], units: Units) -> Body:
+def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], units: Units) -> Body:
     """Return the body of a table; a modal file is read once for all its instances, and converted to the units."""
     if section.euler_parameters is not None:
         orientation = np.array(section.euler_parameters)
@@ -430,8 +470,7 @@ def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody], uni
     }
     if section.file is None:
         assert section.mass is not None  # checked by the table
-        center = section.center_of_mass or (0.0, 0.0, 0.0)
-        return RigidBody(name, section.mass, np.array(section.inertia), center_of_mass=np.array(center), **motion)
+        return RigidBody(name, **rigid_mass(section).arguments, **motion)
     if section.file not in files:
         try:
             reduced = read(section.file)
@@ -442,7 +481,52 @@ def body_of(name: str, section: BodySection, files: dict[Path, ReducedBody], uni
             log.warning("%s is in units %s: converted to those of the system, %s", section.file, reduced.units.name,
                         units.name)  # fmt: skip
     motion["stiffening"] = "auto" if section.stiffening is None else section.stiffening
-    return FlexibleBody(name, files[section.file], source=str(section.file.resolve()), **motion)
+    return FlexibleBody(name, changed_body(section, files), source=str(section.file.resolve()), **motion)
+
+
+def rigid_mass(section: BodySection) -> MassProperties:
+    """Return the mass properties of a rigid body with the parts fixed to it."""
+    assert section.mass is not None  # checked by the table
+    own = mass_properties(
+        section.mass,
+        section.center_of_mass or (0.0, 0.0, 0.0),
+        np.array(section.inertia),
+        axes=None if section.inertia_axes is None else np.array(section.inertia_axes).T,
+        reference=section.inertia_about,
+        positive_products=bool(section.positive_products),
+    )
+    parts = [
+        point_mass(
+            part.mass, part.position or (0.0, 0.0, 0.0), None if part.inertia is None else np.array(part.inertia)
+        )
+        for part in section.masses
+    ]
+    return combined(own, *parts)
+
+
+def changed_body(section: BodySection, files: dict[Any, ReducedBody]) -> ReducedBody:
+    """Return the reduced body with the modes and parts asked for; instances with the same ones share it."""
+    chosen = [getattr(section, name) for name in FLEXIBLE_KEYS]
+    key = (section.file, repr(chosen), repr(section.masses))
+    if key not in files:
+        body = files[section.file]
+        if section.modes is not None:
+            body = with_modes(body, section.modes)
+        if section.without_modes is not None:
+            body = without_modes(body, section.without_modes)
+        if section.is_rigid:
+            body = frozen_to_rigid(body)
+        parts = [
+            AddedMass(
+                part.interface or "",
+                part.mass,
+                np.array(part.offset or (0.0, 0.0, 0.0)),
+                np.zeros((3, 3)) if part.inertia is None else np.array(part.inertia),
+            )
+            for part in section.masses
+        ]
+        files[key] = with_masses(body, parts) if parts else body
+    return files[key]
 
 
 def joint_of(name: str, section: JointSection) -> Joint:
