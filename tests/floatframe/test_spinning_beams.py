@@ -13,6 +13,7 @@ from floatframe.analyses.equilibrium import Equilibrium, turning
 from floatframe.mechanisms import rotating_blade, spin_up_beam, spinning_shaft
 from floatframe.sensors import interface_motion
 from floatframe.time_functions import cycloidal_spin_up
+from tests.bodies import bar
 from tests.references.exact_beam import ExactBeam
 from tests.references.planar_dynamics import Problem
 from tests.references.planar_dynamics import integrate as integrate_exact
@@ -105,6 +106,21 @@ def test_spin_up_without_stiffening_fails(first_seconds):
     assert errors(found, first_seconds)[0] > 0.2
     found = spun_up(SIMO_VU_QUOC, planar_beam(SIMO_VU_QUOC, cms.NodalFrame("root")), 8.0, 0.02, stiffening=False)
     assert errors(found, first_seconds)[0] > 2.0
+
+
+def test_spin_up_of_a_body_of_solids(first_seconds):
+    """The same beam of 32 bricks, square of the height that has its rotary inertia, without lateral contraction."""
+    data = SIMO_VU_QUOC
+    height = np.sqrt(12 * data["rho_I"] / data["rho_A"])
+    material = fm.Material("solid", E=data["EA"] / height**2, nu=0.0, rho=data["rho_A"] / height**2)
+    body = cms.couple(bar(32, 1, 1, length=data["L"], width=height, height=height, material=material))
+    beam = reduced(body, 12, cms.TisserandFrame())
+    system = spin_up_beam(beam, speed=data["speed"], duration=data["T"], root="left")
+    motion = integrate(system, GeneralizedAlpha(0.9, 1e-9), 8.0, 0.02)
+    tip = interface_motion(motion, "beam", beam, "right").position
+    of_deflection, of_shortening = errors(tip_in_turning_axes(tip, data, motion.t), first_seconds)
+    assert of_deflection < 0.005
+    assert of_shortening < 0.01
 
 
 @pytest.mark.long
@@ -229,3 +245,23 @@ def test_pinned_shaft_whirls_as_rayleighs(frame):
             found[stiffening] = nearest(2 * np.pi * modes.natural_frequencies, expected)
         assert_allclose(found[True], expected, rtol=2e-4)
         assert np.abs(found[False] / expected - 1).max() > 1e-3
+
+
+def test_shaft_of_solids_whirls_as_one_of_beams():
+    """A square shaft, shear included, at twice its critical speed; in axes that turn with it."""
+    steel, side = fm.Material("steel", E=2.1e11, nu=0.0, rho=7850.0), 0.08
+    bodies = {
+        "solids": cms.couple(bar(16, 2, 2, width=side, height=side, material=steel)),
+        "beams": coupled_beam(1.0, fm.Rectangle(side, side), steel, 24, ("left", "right")),
+    }
+    found = {}
+    for name, body in bodies.items():
+        shaft = reduced(body, 14, cms.TisserandFrame())
+        for stiffening in (True, False):
+            speed = 4 * np.pi * 186.0
+            system = spinning_shaft(shaft, speed=speed, stiffening=stiffening)
+            f = np.sort(system_modes(linearize(system, steady_rotation(system, (speed, 0, 0)))).natural_frequencies)
+            found[name, stiffening] = f[f > 1.0][:4]
+    assert_allclose(found["solids", True], found["beams", True], rtol=2e-3)
+    assert_allclose(found["solids", True][0], found["beams", True][0], rtol=5e-4)
+    assert abs(found["solids", False][0] / found["solids", True][0] - 1) > 5e-3
