@@ -29,14 +29,18 @@ def orient_normals(mesh: ShellMesh) -> ShellMesh:
     n = mesh.n_cells
     first, second = edges.cell[edges.first], edges.cell[edges.second]
     is_flip = (edges.nodes[edges.first] == edges.nodes[edges.second]).all(axis=1)
-    flips = sp.csr_array((np.where(is_flip, 2.0, 1.0), (first, second)), shape=(n, n))
-    graph = sp.csr_array(flips.maximum(flips.T))
+    keys = np.concatenate([first * n + second, second * n + first])
+    order = np.argsort(keys, kind="stable")
+    keys, flips = keys[order], np.tile(is_flip, 2)[order]
+    graph = sp.csr_array((np.ones(len(keys)), (keys // n, keys % n)), shape=(n, n))
     _, part = sp.csgraph.connected_components(graph, directed=False)
     turned = np.zeros(n, dtype=bool)
     for start in np.unique(part, return_index=True)[1]:
-        order, before = sp.csgraph.breadth_first_order(graph, start, directed=False)
-        for cell in order[1:]:
-            turned[cell] = turned[before[cell]] ^ (graph[before[cell], cell] == 2.0)
+        visited, before = sp.csgraph.breadth_first_order(graph, start, directed=False)
+        parents = before[visited[1:]].astype(np.int64)
+        turns = flips[np.searchsorted(keys, parents * n + visited[1:])]
+        for cell, parent, turn in zip(visited[1:].tolist(), parents.tolist(), turns.tolist(), strict=True):
+            turned[cell] = turned[parent] ^ turn
     if not turned.any():
         return mesh
     starts = np.cumsum([0, *(len(mesh.cells[kind]) for kind in kinds)])
