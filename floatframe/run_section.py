@@ -1,5 +1,6 @@
 """The table [run] of a system file: which integrator computes the motion, and how."""
 
+import os
 from dataclasses import dataclass
 from inspect import signature
 from typing import Annotated, Any
@@ -8,11 +9,12 @@ from pydantic import Field, model_validator
 
 from cms.toml_file import Table, choice
 from cms.words import nearest
+from floatframe.errors import SystemFileError
 from floatframe.integrators import INTEGRATORS
 from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 
-__all__ = ["RunOptions", "RunSection"]
+__all__ = ["RunOptions", "RunSection", "required_run"]
 
 NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme")
 
@@ -87,3 +89,10 @@ class RunOptions:
     h: float
     output_every: int
     integrator: Integrator
+
+
+def required_run(run: RunOptions | None, path: str | os.PathLike[str]) -> RunOptions:
+    """Return the run of a system file; `SystemFileError` if it has none."""
+    if run is None:
+        raise SystemFileError(f"{path}: run: missing; expected a table [run] with t_end and h, for a motion over time")
+    return run

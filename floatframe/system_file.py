@@ -388,7 +388,7 @@ class SystemFile(Table):
     inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
     outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
     events: dict[str, EventSection] = Field({}, description="tables [events.NAME]")
-    run: RunSection = Field(description="a table [run] with t_end and h")
+    run: RunSection | None = Field(None, description="a table [run] with t_end and h")
 
     @model_validator(mode="after")
     def _names_bodies(self) -> "SystemFile":
@@ -411,8 +411,10 @@ class SystemFile(Table):
         return self
 
 
-def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> tuple[System, RunOptions]:
-    """Read and check a system file and the modal files it names.
+def read_system(
+    path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None
+) -> tuple[System, RunOptions | None]:
+    """Read and check a system file and the modal files it names; return the system, and its run if it has [run].
 
     Parameters
     ----------
@@ -453,7 +455,7 @@ def read_system(path: str | os.PathLike[str], changes: Mapping[str, Any] | None 
             log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:
         raise SystemFileError(f"{path}: {error}") from error
-    return system, data.run.options()
+    return system, None if data.run is None else data.run.options()
 
 
 def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], units: Units) -> Body:

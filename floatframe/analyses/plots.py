@@ -81,7 +81,8 @@ def plot_frequency_response(response: FrequencyResponse, *, time_unit: float = 1
 
     pairs = [(o, i) for o in range(len(response.outputs)) for i in range(len(response.inputs))]
     amplitudes, phases = response.amplitudes, response.phases
-    sizes = {pair: float(amplitudes[:, pair[0], pair[1]].max()) for pair in pairs}
+    finite = np.where(np.isfinite(amplitudes), amplitudes, 0.0)
+    sizes = {pair: float(finite[:, pair[0], pair[1]].max()) for pair in pairs}
     largest = {response.units[o][i]: 0.0 for o, i in pairs}
     for (o, i), size in sizes.items():
         largest[response.units[o][i]] = max(largest[response.units[o][i]], size)
@@ -95,10 +96,9 @@ def plot_frequency_response(response: FrequencyResponse, *, time_unit: float = 1
         if sizes[o, i] <= NOTHING * largest[unit]:
             still.append(label)
             continue
-        size = amplitudes[:, o, i]
-        axes[units.index(unit)].loglog(
-            hertz, np.where(size > 0, size, np.nan), color=f"C{k % 10}", linewidth=1.4, label=label
-        )
+        curve = amplitudes[:, o, i]
+        curve = np.where((curve > 0) & np.isfinite(curve), curve, np.nan)
+        axes[units.index(unit)].loglog(hertz, curve, color=f"C{k % 10}", linewidth=1.4, label=label)
         axes[-1].semilogx(hertz, phases[:, o, i], color=f"C{k % 10}", linewidth=1.1)
     for unit, ax in zip(units, axes, strict=False):
         ax.set_ylabel(f"amplitude [{unit}]")

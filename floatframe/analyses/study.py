@@ -23,7 +23,7 @@ from floatframe.analyses.system_modes import SystemModes, system_modes
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.integration import integrate
 from floatframe.measuring import measured, sensor_of
-from floatframe.run_section import RunOptions
+from floatframe.run_section import RunOptions, required_run
 from floatframe.study_file import TAKES, Output, Study
 from floatframe.system import System
 from floatframe.trajectory import Trajectory
@@ -100,7 +100,9 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
     """Raise if the system, a key path or an output is not there; before the long work, in this process."""
     from floatframe.system_file import read_system  # it imports the analyses for its channels
 
-    plain, _ = read_system(study.system)
+    plain, run = read_system(study.system)
+    if study.analysis in MOTIONS:
+        required_run(run, study.system)
     try:
         system, _ = read_system(study.system, study.changes(point))
     except (FloatframeError, CmsError) as error:
@@ -141,17 +143,23 @@ class StudyPoint:
         from floatframe.system_file import read_system  # it imports the analyses for its channels
 
         try:
-            system, run = read_system(self.study.system, self.study.changes(point))
+            system, given = read_system(self.study.system, self.study.changes(point))
             if self.study.analysis == "eig":
                 modes = system_modes(linearize(system))
                 found = [taken_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
             else:
-                motion = MOTIONS[self.study.analysis](system, run)
+                motion = self.motion(system, given)
                 found = [taken(output, system, motion) for output in self.study.outputs]
         except (FloatframeError, CmsError) as error:
             n = len(self.study.outputs)
             return StudyRow(point, (float("nan"),) * n, ("",) * n, str(error))
         return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found))
+
+    def motion(self, system: System, given: RunOptions | None) -> Trajectory:
+        """Return the motion of the analysis; an equilibrium as one of one time."""
+        if self.study.analysis == "static":
+            return equilibrium_of(system)
+        return MOTIONS[self.study.analysis](system, required_run(given, self.study.system))
 
 
 def driven_times(run: RunOptions) -> Array:
@@ -164,7 +172,7 @@ def motion_of_run(system: System, run: RunOptions) -> Trajectory:
     return integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every)
 
 
-def equilibrium_of(system: System, run: RunOptions) -> Trajectory:
+def equilibrium_of(system: System) -> Trajectory:
     """Return the equilibrium at rest, a motion of one time."""
     rest = static_equilibrium(system)
     return snapshot(system, rest.state, rest.u_dot, rest.w)
@@ -172,7 +180,6 @@ def equilibrium_of(system: System, run: RunOptions) -> Trajectory:
 
 MOTIONS: dict[str, Callable[[System, RunOptions], Trajectory]] = {
     "run": motion_of_run,
-    "static": equilibrium_of,
     "kinematics": lambda system, run: kinematics(system, driven_times(run)),
     "inverse": lambda system, run: inverse_dynamics(system, driven_times(run)).motion,
 }

@@ -40,9 +40,11 @@ def run_command(
     from floatframe.errors import ResultsError
     from floatframe.flexible_body import FlexibleBody
     from floatframe.integration import integrate
+    from floatframe.run_section import required_run
     from floatframe.system_file import read_system
 
-    model, options = read_system(system)
+    model, given = read_system(system)
+    options = required_run(given, system)
     sources = [Path(body.source) for body in model.bodies if isinstance(body, FlexibleBody) and body.source]
     path = output_path(output, system.with_suffix(".h5"), ResultsError, overwrite_of=(system, *sources))
     compute(

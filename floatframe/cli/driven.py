@@ -115,12 +115,14 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
     from floatframe.analyses.kinematics import kinematics
     from floatframe.errors import ModelError, ResultsError
     from floatframe.integration import integrate
+    from floatframe.run_section import required_run
     from floatframe.system_file import read_system
 
     choices = [*ELASTICITY, *(["dynamic"] if suffix == ".inverse.h5" else [])]
     if elastic not in choices:
         raise ModelError(f"--elastic {elastic}: expected one of {', '.join(choices)}{nearest(elastic, choices)}")
-    model, run = read_system(file)
+    model, given = read_system(file)
+    run = required_run(given, file)
     path = output_path(output, file.with_suffix(suffix), ResultsError, overwrite_of=(file,))
     with stages(remaining=True) as clock, clock(f"{model.name}: motion of the drives") as advance:
         if elastic == "dynamic":

@@ -94,3 +94,12 @@ def test_campbell_draws_a_picture_and_writes_a_table(pendulum, tmp_path):
 def test_what_cannot_be_understood_is_refused_with_words(pendulum, words, message):
     output = invoke(words[0], pendulum, *words[1:], code=2)
     assert message in " ".join(output.split())
+
+
+def test_a_system_without_a_run_can_be_analysed_but_not_run(pendulum):
+    pendulum.write_text(PENDULUM[: PENDULUM.index("[run]")])
+    for command in ("static", "eig", "linearize"):
+        invoke(command, pendulum)
+    invoke("campbell", pendulum, "--speeds", "0:0:1", "-o", pendulum.with_suffix(".csv"))
+    for command in ("run", "kinematics"):
+        assert "expected a table [run] with t_end and h" in " ".join(invoke(command, pendulum, code=2).split())
