@@ -180,6 +180,19 @@ def test_a_job_that_does_not_fit_its_mesh_is_refused(job_file, old, new, words):
     assert words in str(caught.value)
 
 
+def test_quads_warped_beyond_the_limit_are_refused_unless_they_are_accepted(job_file, tmp_path):
+    path = job_file(TRAY)
+    text = (tmp_path / "tray.msh").read_text()
+    head, nodes = text.split("$Nodes\n")
+    lines = nodes.split("\n")
+    number, x, y, _ = lines[1].split()
+    lines[1] = f"{number} {x} {y} 0.2"  # a corner of the floor lifted
+    (tmp_path / "tray.msh").write_text(head + "$Nodes\n" + "\n".join(lines))
+    with pytest.raises(FeModelsError, match=r"1 quad cells are warped beyond 20 degrees.*split them into triangles"):
+        job_body(read_job(path))
+    job_body(read_job(job_file(TRAY.replace("[materials.steel]", 'accept = "warped"\n\n[materials.steel]', 1))))
+
+
 def test_a_surface_mesh_without_thickness_and_a_shell_to_be_cut_are_refused(job_file):
     solid = TRAY[: TRAY.index("[materials.tin]")] + "[reduction]\nn_modes = 1\n"
     with pytest.raises(FeModelsError, match=r"expected solid cells .* a shell needs its thickness \(tables \[shells"):
