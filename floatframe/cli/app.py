@@ -125,7 +125,7 @@ def print_run(trajectory: "Trajectory") -> None:
         ("units", units.name),
         ("bodies", ", ".join(body_words(body) for body in record["bodies"])),
         ("integrator", integrator_words(run)),
-        ("step", f"{run['h']:.6g} {second}"),
+        ("step", step_words(run, second)),
         ("time", f"{record['t_first']:.6g} to {record['t_last']:.6g} {second}, {record['n_outputs']} outputs"),
         ("steps", str(record["n_steps"])),
     ]
@@ -194,6 +194,13 @@ def body_words(body: dict[str, Any]) -> str:
     """Return name, number of modes and whether it is stiffened."""
     stiffened = ", stiffened" if body["is_stiffened"] else ""
     return f"{body['name']} ({body['n_modes']} modes{stiffened})"
+
+
+def step_words(run: dict[str, Any], second: str) -> str:
+    """Return the step size, or what stands for it where the step is controlled."""
+    if run.get("error_tolerance") is not None:
+        return f"as the error allows, up to {run['h']:.6g} {second}"
+    return f"{run['h']:.6g} {second}"
 
 
 def integrator_words(run: dict[str, Any]) -> str:

@@ -5,9 +5,25 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatframe.integration as integration
-from floatframe import ConvergenceError, GeneralizedAlpha, ModelError, hht, integrate, newmark, resume, trapezoidal
+from floatframe import (
+    ConvergenceError,
+    FlexibleBody,
+    GeneralizedAlpha,
+    Gravity,
+    JointForce,
+    ModelError,
+    System,
+    hht,
+    integrate,
+    newmark,
+    resume,
+    trapezoidal,
+)
+from floatframe.mechanisms import slider_crank
 from floatframe.rotations import rotation_matrix
+from floatframe.time_functions import cycloidal_spin_up
 from tests.floatframe import test_restart
+from tests.floatframe.bodies import PointMasses, reduced_body
 from tests.floatframe.orders import slope
 from tests.floatframe.test_free_body import spinning
 from tests.floatframe.test_pendulum import exact, pendulum  # noqa: F401
@@ -108,6 +124,21 @@ def test_resumed_run_with_controlled_steps_is_the_uninterrupted_one_bit_for_bit(
         assert again.head.summary[name] == whole.head.summary[name]
 
 
+def test_driven_mechanism_with_friction_is_that_of_fixed_short_steps():
+    """Drives depend on time, friction on the reactions: the same end as with many fixed steps, in fewer."""
+    plain = slider_crank(drive=cycloidal_spin_up(30.0, 0.3), angle=0.2)
+    friction = JointForce("rub", "guide", "distance", friction_coefficient=0.2, friction_speed=0.05)
+    system = System(plain.bodies, plain.joints, [Gravity((0, -9.81, 0)), friction])
+    fixed = integrate(system, GeneralizedAlpha(0.8, 1e-10), 0.4, 1e-4, output_every=400)
+    motion = integrate(system, GeneralizedAlpha(0.8, 1e-10, error_tolerance=1e-7), 0.4, 0.04)
+    assert motion.head.summary["n_steps"] < 0.5 * fixed.head.summary["n_steps"]
+    scale = np.abs(fixed.energies.work).max()
+    assert fixed.energies.dissipated[-1] > 0.01 * scale
+    assert_allclose(motion.energies.dissipated, fixed.energies.dissipated, rtol=0, atol=2e-3 * scale)
+    for name in plain.bodies:
+        assert_allclose(motion.body(name.name).r, fixed.body(name.name).r, rtol=0, atol=1e-5)
+
+
 CASES = {"newmark": newmark(tolerance=1e-11), "hht": hht(-0.2, tolerance=1e-11)}
 
 
@@ -130,9 +161,6 @@ def test_named_cases_are_those_of_generalized_alpha():
 
 def test_trapezoidal_rule_keeps_the_energy_of_a_linear_oscillator():
     """A body that only vibrates, in modes that do not move its frame: linear, so that energy is kept to rounding."""
-    from floatframe import FlexibleBody, System
-    from tests.floatframe.bodies import PointMasses, reduced_body
-
     masses = np.array([1.0, 1.0, 2.0, 2.0])
     places = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
     phi = np.zeros((4, 3, 1))
