@@ -162,7 +162,8 @@ def test_stiffened_pair_moves_as_with_generalized_alpha():
     system = floating_pair("revolute", body=STIFFENED)
     fine = integrate(system, GeneralizedAlpha(0.9, 1e-11), 0.1, 2.5e-4, output_every=400).body("soft").q[-1]
     for method in SCHEMES.values():
-        errors = [np.abs(integrate(system, method, 0.1, h).body("soft").q[-1] - fine).max() for h in (0.01, 0.005)]
+        ends = [integrate(system, method, 0.1, h, output_every=10).body("soft").q[-1] for h in (0.01, 0.005)]
+        errors = [np.abs(end - fine).max() for end in ends]
         assert 3 < errors[0] / errors[1] < 5.5, (method, errors)
         assert errors[1] < 0.03 * np.abs(fine).max()
 
@@ -227,12 +228,12 @@ def test_decaying_scheme_has_its_spectral_radius_and_is_the_conserving_one_for_o
     assert_allclose(one.body("body").q, other.body("body").q, rtol=0, atol=1e-14)
 
 
-@pytest.mark.parametrize("n_steps", [250, pytest.param(10000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("n_steps", [240, pytest.param(9999, marks=pytest.mark.long)])
 def test_energy_of_the_variational_scheme_stays_in_a_band(n_steps):
     """No drift: the band of the second half is that of the first, and narrows with the square of the step."""
     bands = []
     for h in (0.05, 0.025):
-        motion = integrate(spinning(), Variational(), n_steps * h, h)
+        motion = integrate(spinning(), Variational(), n_steps * h, h, output_every=3)
         error = motion.energies.total - motion.energies.total[0]
         first, second = np.array_split(error, 2)
         assert abs(second.mean() - first.mean()) < 0.3 * np.ptp(error)
