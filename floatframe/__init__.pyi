@@ -122,3 +122,4 @@ from .system import System as System
 from .time_functions import TimeFunction as TimeFunction
 from .trajectory import Trajectory as Trajectory
 from .trajectory import read_results as read_results
+from .validity import ValidityNote as ValidityNote

@@ -43,6 +43,6 @@ def indefinite_mass_words(names: tuple[str, ...]) -> str:
     told = ", ".join(repr(name) for name in names)
     return (
         f"the mass matrix of the stiffened body {told} is not positive definite there: its deformation is beyond the "
-        "second order; reduce it in a mean-axis frame (Tisserand) or one held at both ends, not clamped where it is "
-        "hinged, or split it into parts"
+        "second order; reduce it in a mean-axis frame (Tisserand), not one that is held where the body is hinged, or "
+        "split it into parts"
     )

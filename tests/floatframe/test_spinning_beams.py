@@ -7,12 +7,12 @@ from scipy.optimize import brentq
 
 import cms
 import fe_models as fm
-from floatframe import FlexibleBody, GeneralizedAlpha, System, integrate
+from floatframe import FixedJoint, FlexibleBody, GeneralizedAlpha, Marker, System, integrate
 from floatframe.analyses import linearize, steady_rotation, system_modes
 from floatframe.analyses.equilibrium import Equilibrium, turning
 from floatframe.mechanisms import rotating_blade, spin_up_beam, spinning_shaft
 from floatframe.sensors import interface_motion
-from floatframe.time_functions import cycloidal_spin_up
+from floatframe.time_functions import cycloidal_spin_up, smooth_step
 from tests.bodies import bar
 from tests.references.exact_beam import ExactBeam
 from tests.references.planar_dynamics import Problem
@@ -121,6 +121,43 @@ def test_spin_up_of_a_body_of_solids(first_seconds):
     of_deflection, of_shortening = errors(tip_in_turning_axes(tip, data, motion.t), first_seconds)
     assert of_deflection < 0.005
     assert of_shortening < 0.01
+
+
+def in_turning_axes(positions, data, t):
+    """Return the displacement of the tip in axes that turn with the hub, (n_t, 3)."""
+    return np.column_stack([tip_in_turning_axes(positions, data, t), positions[:, 2]])
+
+
+def test_spin_up_with_pitch_is_that_of_the_beam_in_parts():
+    """In space: on top of the spin the root turns by 0.6 rad about the beam; one body against six, each bent little."""
+    data, pitch = SIMO_VU_QUOC, smooth_step(1.0, 4.0, 0.0, 0.6)
+    inertia = data["rho_I"] / data["rho_A"]
+    material = fm.Material("beam", E=data["EI"] / inertia, nu=0.3, rho=data["rho_A"])
+    section = fm.GeneralSection(A=1.0, Iy=2 * inertia, Iz=inertia, J=2 * inertia)
+    n = 6
+    part = reduced(coupled_beam(data["L"] / n, section, material, 4), 4, cms.TisserandFrame())
+    whole = reduced(coupled_beam(data["L"], section, material, 16), 12, cms.TisserandFrame())
+
+    def motion_of(beam, others=0, stiffening="auto"):
+        system = spin_up_beam(
+            beam, speed=data["speed"], duration=data["T"], pitch=pitch, stiffening=stiffening
+        )  # fmt: skip
+        bodies, joints, last = list(system.bodies), list(system.joints), "beam"
+        for k in range(1, others + 1):
+            name = f"part {k}"
+            bodies.append(FlexibleBody(name, beam, position=(k * data["L"] / n, 0, 0)))
+            joints.append(FixedJoint(f"weld {k}", Marker(last, "tip"), Marker(name, "root")))
+            last = name
+        motion = integrate(System(bodies, joints), GeneralizedAlpha(0.9, 1e-9), 8.0, 0.02)
+        return in_turning_axes(interface_motion(motion, last, beam, "tip").position, data, motion.t)
+
+    parts = motion_of(part, n - 1)
+    scale = np.abs(parts).max(axis=0)  # shortening, deflection in and across the plane of the spin
+    assert (scale[1:] > 0.1).all()
+    found = np.abs(motion_of(whole) - parts).max(axis=0) / scale
+    assert found[0] < 0.01
+    assert (found[1:] < 0.005).all()
+    assert (np.abs(motion_of(whole, stiffening=False) - parts).max(axis=0) / scale > 0.1).all()
 
 
 @pytest.mark.long
