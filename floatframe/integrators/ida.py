@@ -77,9 +77,10 @@ class Ida:
         solver = solver_class()(
             made.residual, rtol=self.rtol, atol=self.atol, max_num_steps=MOST_STEPS, linsolver="dense"
         )
-        solution = solver.solve(t, y_0, made.rates(float(t[0]), y_0))
+        asked = t if n_steps > 1 else np.array([t[0], 0.5 * (t[0] + t[1]), t[1]])  # two times ask for every step
+        solution = solver.solve(asked, y_0, made.rates(float(t[0]), y_0))
         rows, n_good, failure = [new_rows(compiled.model, 0)], 0, None
-        for k, y in enumerate(np.atleast_2d(solution.y)[1:], start=first + 1):
+        for k, y in enumerate(np.atleast_2d(solution.y)[len(asked) - n_steps :], start=first + 1):
             if not np.isfinite(y).all() or made.problem:
                 break
             own.time[0] = t[k - first]

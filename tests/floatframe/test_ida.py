@@ -48,6 +48,13 @@ def test_rigid_pendulum_keeps_its_energy_to_the_tolerance():
     assert_allclose(total, total[0], rtol=0, atol=1e-5)
 
 
+def test_one_output_is_that_of_many():
+    one, many = (integrate(rigid_pendulum(angle=0.4), Ida(), 0.2, h) for h in (0.2, 0.05))
+    assert len(one.t) == 2
+    name = one.body_names[0]
+    assert_allclose(one.body(name).r[-1], many.body(name).r[-1], rtol=0, atol=1e-6)
+
+
 def test_flexible_double_pendulum_converges_to_it_with_generalized_alpha():
     """The difference is the error of generalized-alpha: of second order, down to the tolerance of IDA."""
     upper = reduced_body(random_point_masses(2, 5), stiffness(2, omega=5.0), name="upper")
