@@ -97,7 +97,9 @@ from .joints import SphericalJoint as SphericalJoint
 from .joints import UniversalJoint as UniversalJoint
 from .markers import Marker as Marker
 from .measuring import AngleSensor as AngleSensor
+from .measuring import ControlSensor as ControlSensor
 from .measuring import CoordinateSensor as CoordinateSensor
+from .measuring import CouplerSensor as CouplerSensor
 from .measuring import DisplacementSensor as DisplacementSensor
 from .measuring import ElongationSensor as ElongationSensor
 from .measuring import EnergySensor as EnergySensor

@@ -10,7 +10,9 @@ from cms.words import nearest
 from floatframe.markers import Marker
 from floatframe.measuring import (
     AngleSensor,
+    ControlSensor,
     CoordinateSensor,
+    CouplerSensor,
     DisplacementSensor,
     ElongationSensor,
     EnergySensor,
@@ -33,7 +35,9 @@ PLACE = ("body", "marker", "relative_to", "relative_marker")
 SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up to "|" are needed
     **dict.fromkeys(PLACE_QUANTITIES, ("body", "|", "marker", "relative_to", "relative_marker")),
     "angle": ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
+    "control": ("of", "|"),
     "coordinate": ("joint", "coordinate", "|"),
+    "coupler": ("of", "|"),
     "displacement": ("body", "marker", "|"),
     "elongation": ("body", "position_a", "position_b", "|"),
     "energy": ("|",),
@@ -63,7 +67,7 @@ class SensorSection(Table):
     axis: Vector3 | None = Field(None, description="an axis in the axes of marker_a, [x, y, z]; default: z")
     joint: str | None = Field(None, description="the name of a joint")
     coordinate: str | None = Field(None, description="a coordinate of the joint")
-    of: str | None = Field(None, description="the name of a joint or spring-damper")
+    of: str | None = Field(None, description="the name of a joint or spring-damper; of a coupler, of a user force")
     axes: choice("kind of axes", lambda: AXES) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(AXES)}"
     )
@@ -108,7 +112,9 @@ class SensorSection(Table):
 
 
 BY_KEYS: dict[str, Any] = {  # sensors whose fields are the keys of their table
+    "control": ControlSensor,
     "coordinate": CoordinateSensor,
+    "coupler": CouplerSensor,
     "elongation": ElongationSensor,
     "energy": EnergySensor,
     "mode": ModeSensor,

@@ -6,6 +6,7 @@ from cms.words import nearest
 from floatframe.errors import ModelError
 from floatframe.measuring.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
 from floatframe.measuring.measurement import Measurement
+from floatframe.measuring.networks import ControlSensor, CouplerSensor
 from floatframe.measuring.places import AngleSensor, DisplacementSensor, PlaceSensor
 from floatframe.measuring.stresses import ElongationSensor, StrainGauge, StressSensor, VonMisesSensor
 from floatframe.system import System
@@ -14,7 +15,9 @@ from floatframe.trajectory import Trajectory
 __all__ = [
     "SENSORS",
     "AngleSensor",
+    "ControlSensor",
     "CoordinateSensor",
+    "CouplerSensor",
     "DisplacementSensor",
     "ElongationSensor",
     "EnergySensor",
@@ -33,7 +36,9 @@ __all__ = [
 
 Sensor = (
     AngleSensor
+    | ControlSensor
     | CoordinateSensor
+    | CouplerSensor
     | DisplacementSensor
     | ElongationSensor
     | EnergySensor
@@ -48,7 +53,9 @@ Sensor = (
 
 SENSORS = {
     "angle": AngleSensor,
+    "control": ControlSensor,
     "coordinate": CoordinateSensor,
+    "coupler": CouplerSensor,
     "displacement": DisplacementSensor,
     "elongation": ElongationSensor,
     "energy": EnergySensor,

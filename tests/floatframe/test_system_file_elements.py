@@ -8,7 +8,9 @@ from floatframe import (
     GROUND,
     AxialDistance,
     Bushing,
+    ControlSensor,
     CoordinateCoupler,
+    CouplerSensor,
     FloatframeError,
     Gravity,
     JointCoordinate,
@@ -21,6 +23,10 @@ from floatframe import (
     SphereContact,
     System,
     UserForce,
+    coupler_motion,
+    integrate,
+    measured,
+    user_force_motion,
 )
 from floatframe.system_file import read_system
 from floatframe.time_functions import harmonic, table
@@ -185,6 +191,26 @@ def test_file_becomes_the_system_it_describes(write):
     )  # fmt: skip
     for name, found in system.compiled.model._asdict().items():
         assert_array_equal(found, getattr(expected.compiled.model, name), err_msg=name)
+
+
+def test_sensors_of_couplers_and_control_measure_what_the_motion_has(write):
+    """A motor and its gear: columns by name with their units, the same numbers as from Python."""
+    sensors = '[sensors.mesh]\ntype = "coupler"\nof = "mesh"\n\n[sensors.loop]\ntype = "control"\nof = "pid"\n\n[run]'
+    tyre = MACHINE[MACHINE.index("[joints.tyre]") : MACHINE.index("[couplers.mesh]")]
+    system, run = read_system(write((tyre, ""), ("[run]", sensors)))
+    motion = integrate(system, run.integrator, 0.02, 1e-3)
+    found = measured(system, motion)
+    mesh, loop = found["mesh"], found["loop"]
+    assert list(mesh.columns) == [f"{what} {k}" for k in (1, 2, 3) for what in ("value", "rate", "force")]
+    assert [mesh.units[f"{what} 1"] for what in ("value", "rate", "force")] == ["rad", "rad/s", "N m"]
+    assert [mesh.units[f"{what} 2"] for what in ("value", "rate", "force")] == ["m", "m/s", "N"]
+    assert list(loop.columns) == ["phi", "phi_dot", "phi force", "x", "x_dot", "e"]
+    assert_array_equal(loop.columns["phi force"], user_force_motion(system, motion, "pid").force["phi"])
+    assert_array_equal(mesh.columns["force 2"], coupler_motion(system, motion, "mesh").force[:, 1])
+    with pytest.raises(FloatframeError, match="no user force 'pdi'"):
+        measured(system, motion, [ControlSensor("s", "pdi")])
+    with pytest.raises(FloatframeError, match="no coupler 'pid'"):
+        measured(system, motion, [CouplerSensor("s", "pid")])
 
 
 @pytest.mark.parametrize(
