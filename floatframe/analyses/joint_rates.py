@@ -5,10 +5,10 @@ import numpy as np
 from cms.arrays import Array
 from floatframe.analyses.marker_jacobian import marker_jacobian
 from floatframe.compiled import CompiledSystem
-from floatframe.joints import ScrewJoint
+from floatframe.joints import ScrewJoint, SlidingJoint
 from floatframe.joints.rows import DISTANCE, GAUGE_B, SLIDE, TURN, TURN_B
 from floatframe.kernels.model import Work
-from floatframe.marker_data import joint_markers, marker_pose, n_q_of
+from floatframe.marker_data import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.rotations import tilde
 from floatframe.state import State
 from floatframe.system import System
@@ -31,8 +31,13 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
     """
     model, placed, n_q = compiled.model, compiled.placed, n_q_of(system)
     rows: dict[str, Array] = {}
+    n_lines = 0
     for joint in system.joints:
         ends = joint_markers(system, joint, placed)
+        if isinstance(joint, SlidingJoint):
+            rows[f"{joint.name}.distance"] = sliding_row(compiled, work, n_lines, ends[1])
+            n_lines += 1
+            continue
         (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q) for end in ends)
         described = [row for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate]
         if not described:
@@ -59,3 +64,20 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
                 value = A_a @ row.x @ slip
             rows[f"{joint.name}.{row.coordinate}"] = np.asarray(value)
     return rows
+
+
+def sliding_row(compiled: CompiledSystem, work: Work, k: int, marker_b: MarkerData) -> Array:
+    """Return the row of the rate along deformed line k: n·(v_B - v_A)/|r'|, A fixed in the line, (n_u,)."""
+    model, line = compiled.model, work.line[k]
+    m = int(model.line_marker[k])
+    i = int(model.m_body[m])
+    n, first = int(model.n_q[i]), int(model.m_psi0[m])
+    n_0, slope = line[4:7], line[2]  # see kernels/deformed_line.py
+    row = np.zeros(int(model.u0[-1]))
+    psi = work.psi[first : first + 3 * n].reshape(3, n)
+    of_a = work.R[i] @ np.hstack([np.eye(3), -tilde(work.rho[m]), psi])
+    row[int(model.u0[i]) : int(model.u0[i + 1])] -= n_0 @ of_a / slope
+    if marker_b.body >= 0:
+        of_b = marker_jacobian(compiled, work, marker_b)[:3]
+        row[int(model.u0[marker_b.body]) : int(model.u0[marker_b.body + 1])] += n_0 @ of_b / slope
+    return row

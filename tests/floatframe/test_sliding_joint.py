@@ -1,5 +1,6 @@
 """A point on the deformed line of a beam: rigid limits, a moving mass against its own equations, energy."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.integrate import solve_ivp
 import cms
 from floatframe import (
     GROUND,
+    ConstantOrientation,
     FlexibleBody,
     FloatframeError,
     GeneralizedAlpha,
@@ -26,8 +28,12 @@ from floatframe import (
     System,
     integrate,
     mobility,
+    static_equilibrium,
 )
+from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.joint_results import joint_coordinate
+from floatframe.kernels.model import new_work
+from floatframe.linearization import linearized, set_iterate
 from floatframe.mode_choice import frozen_to_rigid
 from floatframe.sensors import interface_motion, point_motion
 from floatframe.system_file import read_system
@@ -284,3 +290,35 @@ def test_system_file_knows_the_joint(tmp_path):
     (tmp_path / "bad.toml").write_text(text.replace('line = ["s4", "s8"]', ""))
     with pytest.raises(FloatframeError, match="line: missing"):
         read_system(tmp_path / "bad.toml")
+
+
+@pytest.mark.parametrize("geometric", [False, True])
+def test_row_of_its_rate_gives_the_rate_of_the_results(geometric):
+    """In the middle of a motion, the beam bent."""
+    system = swinging(False, beam(2.0, geometric=geometric))
+    motion = integrate(system, GeneralizedAlpha(0.9), 0.1, 5e-4)
+    compiled, state = system.compiled, motion.state(-1)
+    work = new_work(compiled.model)
+    set_iterate(work, state)
+    linearized(compiled.model, work, 1.0, 0.0, 0.0)
+    row = coordinate_rows(system, compiled, work, state)["slide.distance"]
+    u = state.u.copy()
+    for i, first in enumerate(compiled.model.u0[:-1]):
+        u[first : first + 3] = work.R[i].T @ u[first : first + 3]
+    assert_allclose(row @ u, joint_coordinate(system, motion, "slide", "distance").rate[-1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("is_aligned", [False, True])
+def test_equilibrium_of_a_mass_held_in_the_middle(is_aligned):
+    """M g L³/48 + 5/384 rho g L⁴ over EI; small, so that the shortening plays no part."""
+    slide = SlidingJoint(
+        "slide", Marker("beam", FIRST), Marker("slider"), line=FURTHER, is_aligned=is_aligned, motions={"distance": 0.5}
+    )
+    system = simply_supported(beam(n_bending=18), slide, slider(0.5, 0.5), 0.1)  # the shear jumps in the middle
+    if not is_aligned:  # or it could turn about its point
+        system = replace(
+            system, joints=[*system.joints, ConstantOrientation("level", Marker(GROUND), Marker("slider"))]
+        )
+    found = static_equilibrium(system).state.r[1]
+    exact = 0.1 * LENGTH**3 / EI * (0.5 / 48 + 5 / 384 * RHO_A * LENGTH)
+    assert_allclose(found, [0.5 * LENGTH, -exact, 0], rtol=0, atol=1e-4 * exact)
