@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import cms
 from floatframe import GROUND, GeneralizedAlpha, Marker, RevoluteJoint, integrate
 from floatframe.analyses.channels import Channel, channel_rows
-from floatframe.errors import ModelError
+from floatframe.errors import ModelError, SystemFileError
 from floatframe.flexible_body import FlexibleBody
 from floatframe.forces import Gravity, PointForce
 from floatframe.joints import FixedJoint, SphericalJoint
@@ -20,6 +21,7 @@ from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_e
 from floatframe.sensors import interface_motion
 from floatframe.state import State
 from floatframe.system import System
+from floatframe.system_file import read_system
 from tests.floatframe.bodies import (
     random_point_masses,
     random_second_order,
@@ -376,3 +378,25 @@ def test_stiffening_of_a_body_without_matrices_is_refused():
     with pytest.raises(ModelError, match="expected true, false or 'auto', got 'yes'"):
         FlexibleBody("body", body, stiffening="yes")
     assert not FlexibleBody("body", body).is_stiffened
+
+
+def test_stiffening_in_a_system_file(tmp_path):
+    """By default it counts where the file holds it; true asks for it, false leaves it out."""
+    reduced = stiffened_body(random_point_masses(2, 3), stiffness(2))
+    cms.write(reduced, tmp_path / "with.h5")
+    cms.write(replace(reduced, geometric=None), tmp_path / "without.h5")
+
+    def read(body, key=""):
+        text = f'[system]\nunits = "m-kg-s"\n[bodies.part]\n{body}\n{key}\n[run]\nt_end = 1.0\nh = 1e-2\n'
+        (tmp_path / "system.toml").write_text(text)
+        return read_system(tmp_path / "system.toml")[0].bodies[0]
+
+    assert read('file = "with.h5"').is_stiffened
+    assert not read('file = "without.h5"').is_stiffened
+    assert not read('file = "with.h5"', "stiffening = false").is_stiffened
+    assert_array_equal(read('file = "with.h5"').reduced.geometric.interfaces, reduced.geometric.interfaces)
+    with pytest.raises(SystemFileError, match="holds no geometric stiffness"):
+        read('file = "without.h5"', "stiffening = true")
+    rigid = "mass = 1.0\ninertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
+    with pytest.raises(SystemFileError, match="stiffening: a rigid body has none"):
+        read(rigid, "stiffening = true")
