@@ -51,6 +51,7 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
         typer.echo(json_module.dumps(record, indent=2))
         return
     units = model.units
+    reach = 1e-9 * model.compiled.length
     print_table(
         "Equilibrium",
         ("body", f"origin [{units.length_symbol}]", "rotation vector [rad]", "largest modal coordinate>"),
