@@ -51,12 +51,16 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
         typer.echo(json_module.dumps(record, indent=2))
         return
     units = model.units
-    reach = 1e-9 * model.compiled.length
     print_table(
         "Equilibrium",
         ("body", f"origin [{units.length_symbol}]", "rotation vector [rad]", "largest modal coordinate>"),
         [
-            (b["name"], vector_words(b["position"]), vector_words(b["rotation_vector"]), f"{b['largest_q']:.4g}")
+            (
+                b["name"],
+                vector_words(b["position"], model.compiled.length),
+                vector_words(b["rotation_vector"]),
+                f"{b['largest_q']:.4g}",
+            )
             for b in record["bodies"]
         ],
     )
