@@ -114,6 +114,8 @@ def off_at_start(events: Sequence[Event]) -> frozenset[str]:
 
 def with_forces_off(system: System, off: frozenset[str]) -> System:
     """Return the system with these forces at zero; its results have the same columns."""
+    if not off:
+        return system
     forces: list[Force] = []
     for force in system.forces:
         is_off = getattr(force, "name", "") in off

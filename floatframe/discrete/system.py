@@ -127,12 +127,11 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
     for c, name in enumerate(compiled.connection_names):
         if model.c_law[c] not in (JOINT, SPRING_LAW):
             raise ModelError(f"{scheme}: {name!r} is of a kind that is not known to it; use generalized-alpha")
+        if max(model.m_line[model.c_a[c]], model.m_line[model.c_b[c]]) >= 0:
+            words = "slides along a deformed line, which is not known to it"
+            raise ModelError(f"{scheme}: {name!r} {words}; use generalized-alpha")
         if not np.isin(model.row_kind[model.c_w0[c] : model.c_w0[c + 1]], ROWS).all():
             raise ModelError(f"{scheme}: joint {name!r} is of a kind that is not known to it; use generalized-alpha")
-    for c, name in enumerate(compiled.connection_names):
-        if max(model.m_line[model.c_a[c]], model.m_line[model.c_b[c]]) >= 0:
-            raise ModelError(f"{scheme}: {name!r} slides along a deformed line, which is not known to it; "
-                             "use generalized-alpha")  # fmt: skip
     bodies = central_bodies(model, compiled.body_names, scheme)
     connections, n_held = [], 0
     for c in range(len(model.c_size)):
