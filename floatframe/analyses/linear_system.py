@@ -176,7 +176,7 @@ def linearize(
     Omega, Omega_t = turning_matrices(model, work)
     N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.u0[:-1]])
     if N.shape[1] == 0:
-        raise ModelError(f"system {system.name!r}: its joints allow no motion; nothing can be linearised")
+        raise ModelError(f"system {system.name!r}: its joints and drives allow no motion; nothing can be linearised")
     return LinearSystem(
         about,
         M=N.T @ parts.M @ N,

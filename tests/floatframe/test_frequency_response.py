@@ -258,11 +258,13 @@ def test_response_draws_and_writes_what_the_textbook_says(pendulum):
 
 
 def test_plot_of_responses_has_a_panel_for_each_unit_and_one_for_phases():
-    push = Channel("push", Marker("mass"), (1, 0, 0))
+    push = Channel("push", Marker("mass", position=(0, 0.5, 0)), (1, 0, 0))
     turn = Channel("turn", Marker("mass"), (0, 0, 1), "rotation")
-    linear = linearize(oscillator(), inputs=[push], outputs=[push, turn])
+    still = Channel("still", Marker("mass"), (0, 1, 0), rate=1)
+    linear = linearize(oscillator(), inputs=[push], outputs=[push, turn, still])
     figure = plot_frequency_response(frequency_response(linear, np.geomspace(0.1, 10, 30)))
     assert [ax.get_ylabel() for ax in figure.axes] == ["amplitude [m/N]", "amplitude [rad/N]", "phase [degrees]"]
+    assert figure.get_suptitle() == "no response: still / push"
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [

@@ -337,6 +337,6 @@ def test_mistakes_in_sensors_are_answered_with_key_and_choices(spin, old, new, w
 def test_film_is_coloured_by_stress_on_request(spin):
     run("run", spin)
     results = spin.with_suffix(".h5")
-    run("animate", results, "--color", "von-mises", "-o", spin.with_name("film.gif"))
+    run("animate", results, "--color", "von-mises", "--fps", "1", "--speed", "0.003", "-o", spin.with_name("film.gif"))
     assert spin.with_name("film.gif").read_bytes().startswith(b"GIF8")
     assert "did you mean 'von-mises'" in run("animate", results, "--color", "von-mieses", code=2)

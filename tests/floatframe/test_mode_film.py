@@ -70,7 +70,8 @@ def test_flexible_body_moves_by_frame_and_modes_together():
             mode_scene(system, linear.equilibrium, modes, 1, QUARTERS, color=VON_MISES)
 
 
-def test_eig_draws_modes_into_films_and_pictures(tmp_path):
+def test_eig_draws_modes_into_films_and_pictures(tmp_path, monkeypatch):
+    monkeypatch.setattr("floatframe.mode_film.N_FRAMES", 3)
     path = tmp_path / "pendulum.toml"
     path.write_text(PENDULUM)
 
