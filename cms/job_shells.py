@@ -44,8 +44,6 @@ def check_shells(
         raise ValueError("shells: belong to a mesh; give [body] mesh, or remove the tables")
     if body.plane is not None:
         raise ValueError("body.plane: belongs to beams alone; remove it")
-    if body.part is not None:
-        raise ValueError("body.part: a shell cannot be cut; remove it")
     for name, shell in shells.items():
         if shell.material is None and len(materials) != 1:
             raise ValueError(f"shells.{name}.material: missing; there are {len(materials)} materials, name one")

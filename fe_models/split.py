@@ -17,11 +17,13 @@ from fe_models.beams.line_mesh import LineMesh
 from fe_models.boundary import area_centroid, boundary_facets
 from fe_models.errors import MeshError
 from fe_models.mesh import Mesh
+from fe_models.shells.shell_mesh import ShellMesh
 from fe_models.unused_nodes import drop_unused_nodes
 
 __all__ = ["Cut", "Split", "cut_name", "split_mesh"]
 
-AnyMesh = TypeVar("AnyMesh", Mesh, LineMesh)
+AnyMesh = TypeVar("AnyMesh", Mesh, LineMesh, ShellMesh)
+SomeMesh = Mesh | LineMesh | ShellMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,8 @@ def split_mesh(
     Parameters
     ----------
     mesh
-        Solid cells or lines. Groups are kept, less what is in other parts; empty ones are dropped.
+        Solid cells, lines, or the cells of a shell with its stiffeners. Groups are kept, less what is in other parts;
+        empty ones are dropped.
     n
         Number of parts of equal length, 2 or more.
     at
@@ -102,15 +105,17 @@ def split_mesh(
         clash = [name for name in sets if name in mesh.node_sets]
         if clash:
             raise MeshError(f"split: the mesh has a node set {clash[0]!r} already; rename it")
-        whole: Mesh | LineMesh = replace(mesh, node_sets={**mesh.node_sets, **sets})
-        parts.append(restricted(whole, {kind: rows == k for kind, rows in part_of.items()}, f"part {k + 1} of {n}"))
+        whole: SomeMesh = replace(mesh, node_sets={**mesh.node_sets, **sets})
+        behind = shared[k, k + 1] if k < n - 1 else np.zeros(0, np.int64)
+        chosen = {kind: rows == k for kind, rows in part_of.items()}
+        parts.append(restricted(whole, chosen, behind, f"part {k + 1} of {n}"))
     for k in range(n - 1):
         nodes = shared[k, k + 1]
         cuts.append(Cut(cut_name(k + 1), center_of_cut(parts[k], cut_name(k + 1)), len(nodes)))
     return Split(cast("tuple[AnyMesh, ...]", tuple(parts)), tuple(cuts), direction)
 
 
-def cut_places(mesh: Mesh | LineMesh, axis: Array, n: int | None, at: ArrayLike | None) -> Array:
+def cut_places(mesh: SomeMesh, axis: Array, n: int | None, at: ArrayLike | None) -> Array:
     """Return the places of the cuts along an axis, ascending, (n - 1,)."""
     low, high = mesh_extent(mesh, axis)
     words = f"along ({', '.join(f'{x:.4g}' for x in axis)})"
@@ -146,32 +151,44 @@ def unit(where: str, vector: ArrayLike) -> Array:
     return np.asarray(v / np.linalg.norm(v))
 
 
-def cells_of(mesh: Mesh | LineMesh) -> Mapping[str, IntArray]:
+def cells_of(mesh: SomeMesh) -> Mapping[str, IntArray]:
     """Return type -> nodes of the cells, (n_cells, nodes per cell)."""
     return {"line": mesh.lines} if isinstance(mesh, LineMesh) else mesh.cells
 
 
-def cell_centers(mesh: Mesh | LineMesh) -> dict[str, Array]:
+def cell_centers(mesh: SomeMesh) -> dict[str, Array]:
     """Return type -> mean of the nodes of each cell, (n_cells, 3)."""
     return {kind: mesh.nodes[cells].mean(axis=1) for kind, cells in cells_of(mesh).items()}
 
 
-def mesh_extent(mesh: Mesh | LineMesh, axis: Array) -> tuple[float, float]:
+def mesh_extent(mesh: SomeMesh, axis: Array) -> tuple[float, float]:
     """Return the least and greatest place of the nodes of cells along an axis."""
     used = np.unique(np.concatenate([cells.ravel() for cells in cells_of(mesh).values()]))
     s = mesh.nodes[used] @ axis
     return float(s.min()), float(s.max())
 
 
-def nodes_of(mesh: Mesh | LineMesh, kept: Mapping[str, Array]) -> IntArray:
+def nodes_of(mesh: SomeMesh, kept: Mapping[str, Array]) -> IntArray:
     """Return the nodes of the cells that are kept, ascending."""
     return np.unique(np.concatenate([cells[kept[kind]].ravel() for kind, cells in cells_of(mesh).items()]))
 
 
-def restricted(mesh: Mesh | LineMesh, kept: Mapping[str, Array], what: str) -> Mesh | LineMesh:
-    """Return the mesh of the cells that are kept, type -> (n_cells,) bool, everything renumbered."""
+def restricted(mesh: SomeMesh, kept: Mapping[str, Array], behind: IntArray, what: str) -> SomeMesh:
+    """Return the mesh of the cells that are kept, everything renumbered.
+
+    Parameters
+    ----------
+    kept
+        Type of cells -> which, (n_cells,) bool.
+    behind
+        Nodes of the cut to the next part, which has what lies in the cut.
+    what
+        Of the mesh it is, in words.
+    """
     source = f"{mesh.source}, {what}" if mesh.source else what
-    return lines_kept(mesh, kept, source) if isinstance(mesh, LineMesh) else cells_kept(mesh, kept, source)
+    if isinstance(mesh, LineMesh):
+        return lines_kept(mesh, kept, source)
+    return shell_kept(mesh, kept, behind, source) if isinstance(mesh, ShellMesh) else cells_kept(mesh, kept, source)
 
 
 def lines_kept(mesh: LineMesh, kept: Mapping[str, Array], source: str) -> LineMesh:
@@ -186,6 +203,37 @@ def lines_kept(mesh: LineMesh, kept: Mapping[str, Array], source: str) -> LineMe
         node_sets=without_empty({group: moved(place, m) for group, m in mesh.node_sets.items()}),
         orientations=None if mesh.orientations is None else mesh.orientations[rows],
         offsets=None if mesh.offsets is None else mesh.offsets[rows],
+        node_numbers=mesh.node_numbers[nodes] if mesh.node_numbers.size else mesh.node_numbers,
+        source=source,
+    )
+
+
+def shell_kept(mesh: ShellMesh, kept: Mapping[str, Array], behind: IntArray, source: str) -> ShellMesh:
+    """Return the mesh of some flat cells with the stiffeners between their nodes, but for those on the cut behind."""
+    nodes = nodes_of(mesh, kept)
+    place = places(len(mesh.nodes), nodes)
+    own = np.zeros(len(mesh.nodes), dtype=bool)
+    own[nodes] = True
+    rows = own[mesh.lines].all(axis=1)
+    on_cut = np.zeros(len(mesh.nodes), dtype=bool)
+    on_cut[behind] = True
+    rows &= ~on_cut[mesh.lines].all(axis=1)
+    line_place = places(len(mesh.lines), np.flatnonzero(rows))
+    cell_place = {kind: places(len(mesh.cells[kind]), np.flatnonzero(chosen)) for kind, chosen in kept.items()}
+    cells = {kind: place[mesh.cells[kind][chosen]] for kind, chosen in kept.items() if chosen.any()}
+    cell_sets = {
+        group: without_empty({kind: moved(cell_place[kind], m) for kind, m in by_type.items()})
+        for group, by_type in mesh.cell_sets.items()
+    }
+    return replace(
+        mesh,
+        nodes=mesh.nodes[nodes],
+        cells=cells,
+        cell_sets={group: by_type for group, by_type in cell_sets.items() if by_type},
+        cell_numbers={kind: numbers[kept[kind]] for kind, numbers in mesh.cell_numbers.items() if kind in cells},
+        lines=place[mesh.lines[rows]],
+        line_sets=without_empty({group: moved(line_place, m) for group, m in mesh.line_sets.items()}),
+        node_sets=without_empty({group: moved(place, m) for group, m in mesh.node_sets.items()}),
         node_numbers=mesh.node_numbers[nodes] if mesh.node_numbers.size else mesh.node_numbers,
         source=source,
     )
@@ -234,7 +282,7 @@ def without_empty(groups: Mapping[str, IntArray]) -> dict[str, IntArray]:
     return {name: members for name, members in groups.items() if members.size}
 
 
-def center_of_cut(part: Mesh | LineMesh, name: str) -> Array:
+def center_of_cut(part: SomeMesh, name: str) -> Array:
     """Return the area centroid of the facets on a cut, the mean of its nodes where there are none, (3,)."""
     nodes = part.node_sets[name]
     if isinstance(part, Mesh):

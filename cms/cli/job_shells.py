@@ -14,23 +14,20 @@ if TYPE_CHECKING:
     from fe_models.shells.shell_mesh import ShellMesh
     from fe_models.shells.shell_property import ShellProperty
 
-__all__ = ["body_of_shell"]
+__all__ = ["body_of_shell", "shell_interface_of", "shell_mesh"]
 
 
 def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
     """Read and check the mesh, and make the body with the thicknesses, stiffeners and attachments of the job."""
     from cms.cli.job_beams import attachments_of, properties_of
-    from cms.cli.reduce_job import load_cases_of
-    from fe_models.importers.read_mesh import read_shell_mesh
+    from cms.cli.reduce_job import load_cases_of, part_of_mesh
     from fe_models.shells.body import shell_body
     from fe_models.shells.quality import WARP_LIMIT
     from fe_models.shells.shell_report import report_shell
 
     units = unit_system(job.body.units)
-    groups = [group for shell in job.shells.values() for group in shell.cells]
-    lines = [group for section in job.sections.values() for group in section.lines]
     with stages("read mesh"):
-        mesh = read_shell_mesh(str(job.body.mesh), groups=None if groups == ["all"] else groups, stiffeners=lines)
+        mesh = part_of_mesh(job, shell_mesh(job))
     properties = shell_properties_of(job)
     stiffeners = properties_of(job) if job.sections else None
     masses, springs, links = attachments_of(job, mesh)
@@ -56,6 +53,15 @@ def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | N
             warp_limit=180.0 if "warped" in job.body.accept else WARP_LIMIT,
         )
         return body.with_load_cases(*load_cases_of(job, body, mesh))
+
+
+def shell_mesh(job: Job) -> "ShellMesh":
+    """Read the triangles and quads of the job, and the lines of its stiffeners."""
+    from fe_models.importers.read_mesh import read_shell_mesh
+
+    groups = [group for shell in job.shells.values() for group in shell.cells]
+    lines = [group for section in job.sections.values() for group in section.lines]
+    return read_shell_mesh(str(job.body.mesh), groups=None if groups == ["all"] else groups, stiffeners=lines)
 
 
 def shell_properties_of(job: Job) -> "dict[str, ShellProperty]":

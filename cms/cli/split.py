@@ -99,8 +99,9 @@ def split_job(request: SplitRequest) -> list[Path]:
 
 
 def mesh_of(job: Job) -> Any:
-    """Read the mesh of a job that can be cut: of solid cells, or of lines."""
+    """Read the mesh of a job that can be cut: of solid cells, of a shell, or of lines."""
     from cms.cli.job_beams import frame_mesh
+    from cms.cli.job_shells import shell_mesh
     from fe_models.importers import read_mesh
     from fe_models.unused_nodes import drop_unused_nodes
 
@@ -109,7 +110,7 @@ def mesh_of(job: Job) -> Any:
     if job.ties:
         raise JobError("ties: beams tied to a solid cannot be cut; cut one without the other")
     if job.shells:
-        raise JobError("shells: a shell cannot be cut; remove the tables to cut a solid or lines")
+        return shell_mesh(job)
     if job.sections:
         return frame_mesh(job)
     if job.body.mesh is None:
@@ -120,10 +121,11 @@ def mesh_of(job: Job) -> Any:
 def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...]) -> dict[str, int]:
     """Return interface -> number of the part it is on, from 0; `JobError` if it is on two, or on a cut."""
     from cms.cli.job_beams import frame_interface
+    from cms.cli.job_shells import shell_interface_of
     from cms.cli.reduce_job import interface_of
     from fe_models.errors import InterfaceError
 
-    maker = frame_interface if job.sections else interface_of
+    maker: Any = shell_interface_of if job.shells else frame_interface if job.sections else interface_of
     tolerance = COORDINATE * float(np.ptp(mesh.nodes, axis=0).max())
     homes: dict[str, int] = {}
     for name, section in job.interfaces.items():
@@ -183,8 +185,10 @@ def edit_job(
     body["part"] = table
     keep_groups(document, "materials", "cells", getattr(part, "cell_sets", {}))
     keep_groups(document, "sections", "lines", getattr(part, "line_sets", {}))
+    keep_groups(document, "shells", "cells", getattr(part, "cell_sets", {}))
     used = {section.material for name, section in job.sections.items() if name in document.get("sections", {})}
-    if job.sections and None not in used:
+    used |= {shell.material for name, shell in job.shells.items() if name in document.get("shells", {})}
+    if (job.sections or job.shells) and None not in used:
         keep(document, "materials", [name for name in job.materials if name in used])
     keep(document, "interfaces", inside)
     interfaces = document.setdefault("interfaces", tomlkit.table(is_super_table=True))

@@ -6,7 +6,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.cli.reduce_job import job_body, reduce_job
-from cms.cli.split import mesh_of
 from cms.errors import JobError
 from cms.job import read_job
 from cms.job_shells import ShellSection
@@ -151,7 +150,6 @@ def test_a_job_makes_the_shell_with_its_ribs_masses_interfaces_and_loads(job_fil
         ('cells = "floor"\n', "", 'shells.floor: cells = "all", but there are 2 tables'),
         ('lines = "rib"\n', "", "sections.rib.lines: missing"),
         ('units = "m-kg-s"', 'units = "m-kg-s"\nplane = "xy"', "body.plane: belongs to beams alone"),
-        ('units = "m-kg-s"', 'units = "m-kg-s"\npart = {number = 1, of = 2}', "body.part: a shell cannot be cut"),
         (
             "[masses.bob]",
             '[ties.bob]\nkind = "rigid"\nfaces = "wall"\nnode = "corner"\n[masses.bob]',
@@ -193,12 +191,10 @@ def test_quads_warped_beyond_the_limit_are_refused_unless_they_are_accepted(job_
     job_body(read_job(job_file(TRAY.replace("[materials.steel]", 'accept = "warped"\n\n[materials.steel]', 1))))
 
 
-def test_a_surface_mesh_without_thickness_and_a_shell_to_be_cut_are_refused(job_file):
+def test_a_surface_mesh_without_thickness_is_refused(job_file):
     solid = TRAY[: TRAY.index("[materials.tin]")] + "[reduction]\nn_modes = 1\n"
     with pytest.raises(FeModelsError, match=r"expected solid cells .* a shell needs its thickness \(tables \[shells"):
         job_body(read_job(job_file(solid)))
-    with pytest.raises(JobError, match="shells: a shell cannot be cut"):
-        mesh_of(read_job(job_file(TRAY)))
 
 
 def test_every_key_of_shells_is_documented():

@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fe_models import LineMesh, MeshError, split_mesh, straight_line
+from fe_models import LineMesh, MeshError, flat_plate, split_mesh, straight_line
 from fe_models.mesh import Mesh
 from tests.bodies import box_mesh
 
@@ -122,3 +124,23 @@ def ladder() -> LineMesh:
     """Cells 0-1 and 1-2 with centres outside a thin part, whose own cell hangs on node 1."""
     nodes = np.array([[0.0, 0, 0], [0.5, 0, 0], [1, 0, 0], [0.5, 1, 0]])
     return LineMesh(nodes, np.array([[0, 1], [1, 2], [1, 3]]))
+
+
+def test_a_shell_keeps_its_stiffeners_each_once():
+    plate = flat_plate(3.0, 1.0, 6, 2)
+    grid = np.flatnonzero((plate.nodes[:, 0] % 1.0 < 1e-9) & (plate.nodes[:, 0] < 2.5)).reshape(-1, 3)  # across
+    along = np.flatnonzero(np.abs(plate.nodes[:, 1]) < 1e-9)
+    along = along[np.argsort(plate.nodes[along, 0])]
+    lines = np.concatenate([grid[:, :2], grid[:, 1:], np.stack([along[:-1], along[1:]], axis=1)])
+    mesh = replace(plate, lines=lines, line_sets={"rib": np.arange(len(lines))}, node_sets={"edge": along})
+    split = split_mesh(mesh, 3)
+    assert [part.n_cells for part in split.parts] == [4, 4, 4]
+    found = [part.nodes[part.lines].round(9) for part in split.parts]
+    whole = {tuple(map(tuple, line)) for line in mesh.nodes[mesh.lines].round(9)}
+    assert sum(len(part) for part in found) == len(whole)
+    assert {tuple(map(tuple, line)) for part in found for line in part} == whole
+    for k, part in enumerate(split.parts):
+        assert len(part.line_sets["rib"]) == len(part.lines)
+        assert (part.nodes[part.lines].mean(axis=1)[:, 0] >= k - 1e-9).all()
+        assert (part.nodes[part.lines].mean(axis=1)[:, 0] < k + 1 - 1e-9).all()  # those on a cut are behind it
+        assert_allclose(part.nodes[part.node_sets["edge"]][:, 1], 0)
