@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cms.arrays import Array
 from floatframe.errors import ModelError
@@ -145,6 +144,8 @@ class EventWatch:
 
         if beyond(1.0) == 0.0:
             return 1.0
+        from scipy.optimize import brentq  # slow to import, seldom wanted
+
         part = float(brentq(beyond, 0.0, 1.0, xtol=event.tolerance, rtol=4 * np.finfo(float).eps))
         while part < 1.0 and beyond(part) < 0.0:
             part = min(1.0, part + event.tolerance)

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import brentq
 
 from cms.arrays import Array
 from floatframe.arrays import number, unit_vector
@@ -19,6 +18,8 @@ def exact_dissipation(e: float) -> float:
     With f = k xⁿ (1 + h x_dot/v_0) the energy integral over the contact, v dv/(1 + h v/v_0) = -(k/m) xⁿ dx, taken from
     v_0 to -e v_0, gives h (1 + e) = log((1 + h)/(1 - h e)), whatever k, n, m.
     """
+    from scipy.optimize import brentq  # slow to import, seldom wanted
+
     if e >= 1.0:
         return 0.0
 

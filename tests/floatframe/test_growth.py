@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks.floatframe_growth import growth_with_bodies
+from benchmarks.floatframe_growth import FIRST_STEP, growth_with_bodies
 
 RUN = """
 import resource, sys
@@ -36,3 +36,11 @@ def test_memory_does_not_grow_with_the_length_of_a_run(tmp_path):
     assert sizes[1] > 10 * sizes[0]
     assert peaks[1] - peaks[0] < 0.1 * (sizes[1] - sizes[0])
     assert np.all(np.array(peaks) < 1e9)
+
+
+@pytest.mark.long
+def test_the_first_step_ends_within_two_seconds_of_processor_time_of_the_start():
+    run = [sys.executable, "-c", FIRST_STEP]
+    subprocess.run(run, check=True, capture_output=True)  # leaves the compiled code in the cache
+    seconds = [float(subprocess.run(run, check=True, capture_output=True, text=True).stdout) for _ in range(3)]
+    assert min(seconds) < 2.0
