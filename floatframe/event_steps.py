@@ -18,6 +18,7 @@ from floatframe.trajectory import Trajectory
 
 __all__ = ["EventWatch"]
 
+SPRINGS, WORK = 3, 10  #: columns of `Rows.diagnostics`
 MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
 
 
@@ -110,12 +111,16 @@ class EventWatch:
                 return carry, row, work, None
             self.switch((self.off | set(event.switch_off)) - set(event.switch_on))
             fresh = integrator.start(self.system, t, carry.state)
+            stored, work_done = float(row.diagnostics[-1, SPRINGS]), carry.work
             carry = replace(
-                fresh, work=carry.work, n_iterations=carry.n_iterations, n_steps=carry.n_steps,
+                fresh, work=work_done, n_iterations=carry.n_iterations, n_steps=carry.n_steps,
                 n_rejected=carry.n_rejected, h_next=0.0,
             )  # fmt: skip
             work = new_work(self.system.compiled.model)
             carry, row = integrator.observe(self.system, t, carry, work)
+            gained = float(row.diagnostics[-1, SPRINGS]) - stored  # energy that springs bring or take with them
+            carry = replace(carry, work=work_done + np.array([gained, 0.0]))
+            row.diagnostics[-1, WORK] += gained
             self.row = row
             where, size, number = t, t_end - t, 0
             if size <= 1e-12 * h:

@@ -21,10 +21,11 @@ __all__ = ["DIRECTIONS", "Event", "off_at_start", "require_events", "with_forces
 
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
-#: the same force without any load, which keeps its place in the system
+#: the same force without any load, which keeps its place in the system; one with nothing at all is refused, hence the
+#: functions that are zero
 SILENT: dict[type, dict[str, Any]] = {
     PointForce: {"force": np.zeros(3), "torque": np.zeros(3)},
-    SpringDamper: {"stiffness": 0.0, "damping": 0.0, "preload": 0.0, "characteristic": None},
+    SpringDamper: {"stiffness": 0.0, "damping": 0.0, "preload": 0.0, "characteristic": constant(0.0)},
     JointForce: {
         "stiffness": 0.0,
         "damping": 0.0,
@@ -39,7 +40,7 @@ SILENT: dict[type, dict[str, Any]] = {
         "stiffness": np.zeros((6, 6)),
         "damping": np.zeros((6, 6)),
         "preload": np.zeros(6),
-        "characteristics": {},
+        "characteristics": {"x": constant(0.0)},
     },
 }
 

@@ -44,9 +44,10 @@ def recorded_system(trajectory: Trajectory, path: str | Path | None = None) -> S
         system, _ = read_system(source)
     finally:
         notes.setLevel(level)
+    compiled = system.compiled
     for kind, found, expected in (
         ("bodies", [body.name for body in system.bodies], list(trajectory.body_names)),
-        ("joints and springs", list(system.compiled.connection_names), list(trajectory.connection_names)),
+        ("joints and springs", list(compiled.joint_names + compiled.spring_names), list(trajectory.connection_names)),
     ):
         if found != expected:
             raise ResultsError(

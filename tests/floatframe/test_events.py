@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import floatframe.integration as integration
 from floatframe import (
     GROUND,
+    Bushing,
     EnergyMomentum,
     Event,
     GeneralizedAlpha,
@@ -18,6 +19,7 @@ from floatframe import (
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
+    SpringDamper,
     System,
     integrate,
     resume,
@@ -84,6 +86,30 @@ def test_a_force_is_switched_on_and_off_and_output_times_stay():
                     rtol=0, atol=1e-8)  # fmt: skip
     balance = motion.energies.balance
     assert_allclose(balance, balance[0], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["bushing", "spring-damper", "joint-force"])
+def test_each_kind_that_pulls_back_lets_go(kind):
+    """A body on a stiffness k falls from rest to x = -0.1 with v² = 2 g |x| - k x²/m, then freely."""
+    k, m, x = 40.0, 2.0, -0.1
+    force = {
+        "bushing": Bushing("hold", Marker(GROUND), Marker("block"), stiffness=[0, 0, k, 0, 0, 0]),
+        "spring-damper": SpringDamper(
+            "hold", Marker(GROUND, position=(0, 0, 5)), Marker("block"), stiffness=k, damping=0.0, free_length=5.0
+        ),
+        "joint-force": JointForce("hold", "guide", "distance", stiffness=k),
+    }[kind]
+    events = [Event("let go", "guide.distance", x, "falling", switch_off=("hold",))]
+    motion = integrate(falling(*events, forces=[force]), trapezoidal(), 0.4, 1e-3)
+    (event,) = motion.head.summary["events"]
+    late = motion.t >= event["t"]
+    v = -np.sqrt(2 * G * -x - k * x**2 / m)
+    s = motion.t[late] - event["t"]
+    assert_allclose(motion.body("block").r[late, 2], x + v * s - G / 2 * s**2, rtol=0, atol=1e-6)
+    energies = motion.energies
+    assert_allclose(energies.springs[late], 0, rtol=0, atol=0)
+    assert_allclose(energies.work[late], -k * x**2 / 2, rtol=1e-6)  # what the spring took with it
+    assert np.ptp(energies.balance) < 1e-5 * k * x**2 / 2
 
 
 def test_angles_are_followed_beyond_a_full_turn():

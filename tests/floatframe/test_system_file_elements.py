@@ -28,6 +28,7 @@ from floatframe import (
     measured,
     user_force_motion,
 )
+from floatframe.recorded_system import recorded_system
 from floatframe.system_file import read_system
 from floatframe.time_functions import harmonic, table
 
@@ -191,6 +192,18 @@ def test_file_becomes_the_system_it_describes(write):
     )  # fmt: skip
     for name, found in system.compiled.model._asdict().items():
         assert_array_equal(found, getattr(expected.compiled.model, name), err_msg=name)
+
+
+def test_the_system_of_results_is_found_again_with_couplers_and_control(write):
+    tyre = MACHINE[MACHINE.index("[joints.tyre]") : MACHINE.index("[couplers.mesh]")]
+    path = write((tyre, ""))
+    system, run = read_system(path)
+    motion = integrate(system, run.integrator, 0.002, 1e-3)
+    again = recorded_system(motion, path)
+    assert again is not None
+    assert again.compiled.connection_names == system.compiled.connection_names
+    with pytest.raises(FloatframeError, match=r"joints and springs are .*other.*; give the system file of the run"):
+        recorded_system(motion, write((tyre, ""), ("[forces.stop]", "[forces.other]")))
 
 
 def test_sensors_of_couplers_and_control_measure_what_the_motion_has(write):
