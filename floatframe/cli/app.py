@@ -69,9 +69,15 @@ def resume_command(
 
     Example: floatframe resume swing.toml -o swing.h5
     """
+    from floatframe.errors import ResultsError
     from floatframe.integration import resume
     from floatframe.system_file import read_system
 
+    if system.suffix in (".h5", ".segments"):
+        raise ResultsError(
+            f"{system}: expected the system file (TOML) of the run, got its results; name them with -o: floatframe "
+            f"resume {system.with_suffix('').with_suffix('.toml').name} -o {system}"
+        )
     model, _ = read_system(system)
     path = output or system.with_suffix(".h5")
     compute(model.name, path, lambda on_progress: resume(model, path, progress=on_progress))

@@ -6,11 +6,12 @@ from typing import Protocol
 import numpy as np
 
 from cms.arrays import Array
-from floatframe.kernels.model import Memory, Rows, Work
+from floatframe.errors import ConvergenceError
+from floatframe.kernels.model import Memory, Rows, Work, new_work
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["Carry", "Failure", "Integrator", "memory_of", "observed"]
+__all__ = ["Carry", "Failure", "Integrator", "memory_of", "observed", "one_step_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,16 @@ class Integrator(Protocol):
             The memory after the last good step; the rows of results; how many steps were good; why the next was not,
             or None.
         """
+
+
+def one_step_of(method: Integrator, system: System, t: float, h: float, carry: Carry) -> Carry:
+    """Return the memory one step of size h later, as `advance` makes it; `ConvergenceError` if it fails."""
+    work = new_work(system.compiled.model)
+    after, _, _, failure = method.advance(system, carry, work, t0=t, h=h, first=0, n_steps=1, every=2)
+    if failure is not None:
+        words = f"the step of {h:g} from t = {t:g} failed: {failure.words}"
+        raise ConvergenceError(words, t=t, h=h, residual=failure.residual)
+    return after
 
 
 def memory_of(carry: Carry) -> Memory:

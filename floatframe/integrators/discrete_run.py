@@ -1,7 +1,6 @@
 """What the conserving and variational schemes share: how a run of them starts, goes on and is observed."""
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -10,14 +9,14 @@ from floatframe.discrete.bodies import Placed, placed_bodies, state_of
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.newton import StepError
 from floatframe.discrete.system import DiscreteSystem, discrete_system
-from floatframe.errors import ConvergenceError
+from floatframe.errors import ModelError
 from floatframe.initial import consistent_state, solve_accelerations, with_compatible_velocities
-from floatframe.integrators.carry import Carry, Failure, observed
-from floatframe.kernels.model import Rows, Work, new_rows, new_work
+from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
+from floatframe.kernels.model import Rows, Work, new_rows
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["DiscreteMethod", "StepResult", "advance_discrete", "observe_discrete", "start_discrete", "step"]
+__all__ = ["DiscreteScheme", "StepResult", "check_options"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,70 +29,73 @@ class StepResult:
     n_iterations: int
 
 
-class DiscreteMethod(Protocol):
-    """A scheme that steps from bodies to bodies."""
+class DiscreteScheme:
+    """A scheme that steps from bodies to bodies; what it is besides its `one_step`."""
+
+    tolerance: float
+    max_iterations: int
 
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """Return the bodies, multipliers and work after a step; `StepError` if it fails."""
+        raise NotImplementedError
+
+    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+        """Return the memory at the beginning, from a state made consistent; `a` holds the multipliers of the joints."""
+        consistent = consistent_state(system, state, t=t)
+        n_held = discrete_system(system, type(self).__name__).n_held
+        return Carry(
+            consistent.state, consistent.u_dot, np.zeros(n_held), 0.0, consistent.w, np.zeros(2), np.zeros(2)
+        )  # fmt: skip
+
+    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
+        return one_step_of(self, system, t, h, carry)
+
+    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the results at the carried state, with accelerations and reactions of the equations of motion."""
+        compiled = system.compiled
+        work.time[0] = t
+        fitting = with_compatible_velocities(compiled, work, carry.state)
+        u_dot, w = solve_accelerations(compiled, work, fitting)
+        _, rows = observed(system, t, replace(carry, u_dot=u_dot, w=w), work)
+        return carry, rows
+
+    def advance(
+        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Carry, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
+        ds = discrete_system(system, type(self).__name__)
+        rows = [new_rows(system.compiled.model, 0)]
+        n_good, failure = 0, None
+        for k in range(first, first + n_steps):
+            placed = placed_bodies(ds.bodies, ds.model, carry.state)
+            t_0, t_1 = t0 + k * h, t0 + (k + 1) * h
+            try:
+                result = self.one_step(ds, placed, Span(t_0, t_1, 0.5 * (t_0 + t_1)), carry.a)
+            except StepError as error:
+                failure = Failure(f"{error}; choose a smaller h, or look for a singular position", error.excess)
+                break
+            carry = replace(
+                carry,
+                state=state_of(ds.bodies, result.placed),
+                a=result.f,
+                h=h,
+                work=carry.work + np.array(result.work),
+                n_iterations=carry.n_iterations + result.n_iterations,
+                n_steps=carry.n_steps + 1,
+            )
+            n_good += 1
+            if (k + 1) % every == 0:
+                carry, row = self.observe(system, t_1, carry, work)
+                rows.append(row)
+        joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
+        return carry, joined, n_good, failure
 
 
-def start_discrete(system: System, t: float, state: State | None, scheme: str) -> Carry:
-    """Return the memory at the beginning: a consistent state; `a` holds the multipliers of the joints."""
-    consistent = consistent_state(system, state, t=t)
-    n_held = discrete_system(system, scheme).n_held
-    return Carry(
-        consistent.state, consistent.u_dot, np.zeros(n_held), 0.0, consistent.w, np.zeros(2), np.zeros(2)
-    )  # fmt: skip
-
-
-def observe_discrete(system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-    """Return the results at the carried state, with accelerations and reactions of the equations of motion there."""
-    compiled = system.compiled
-    work.time[0] = t
-    fitting = with_compatible_velocities(compiled, work, carry.state)
-    u_dot, w = solve_accelerations(compiled, work, fitting)
-    _, rows = observed(system, t, replace(carry, u_dot=u_dot, w=w), work)
-    return carry, rows
-
-
-def advance_discrete(
-    method: DiscreteMethod, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int,
-    every: int,
-) -> tuple[Carry, Rows, int, Failure | None]:  # fmt: skip
-    """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
-    ds = discrete_system(system, type(method).__name__)
-    rows = [new_rows(system.compiled.model, 0)]
-    n_good, failure = 0, None
-    for k in range(first, first + n_steps):
-        placed = placed_bodies(ds.bodies, ds.model, carry.state)
-        t_0, t_1 = t0 + k * h, t0 + (k + 1) * h
-        try:
-            result = method.one_step(ds, placed, Span(t_0, t_1, 0.5 * (t_0 + t_1)), carry.a)
-        except StepError as error:
-            failure = Failure(f"{error}; choose a smaller h, or look for a singular position", error.excess)
-            break
-        carry = replace(
-            carry,
-            state=state_of(ds.bodies, result.placed),
-            a=result.f,
-            h=h,
-            work=carry.work + np.array(result.work),
-            n_iterations=carry.n_iterations + result.n_iterations,
-            n_steps=carry.n_steps + 1,
-        )
-        n_good += 1
-        if (k + 1) % every == 0:
-            carry, row = observe_discrete(system, t_1, carry, work)
-            rows.append(row)
-    joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
-    return carry, joined, n_good, failure
-
-
-def step(method, system: System, t: float, h: float, carry: Carry) -> Carry:
-    """Return the memory one step of size h later; `ConvergenceError` if it fails."""
-    work = new_work(system.compiled.model)
-    after, _, _, failure = method.advance(system, carry, work, t0=t, h=h, first=0, n_steps=1, every=2)
-    if failure is not None:
-        words = f"the step of {h:g} from t = {t:g} failed: {failure.words}"
-        raise ConvergenceError(words, t=t, h=h, residual=failure.residual)
-    return after
+def check_options(scheme: DiscreteScheme) -> None:
+    """Raise `ModelError` if tolerance or number of iterations is impossible."""
+    name = type(scheme).__name__
+    if not 0.0 < scheme.tolerance < 1.0:
+        raise ModelError(f"{name}: tolerance: expected 0 < tolerance < 1, got {scheme.tolerance}")
+    if scheme.max_iterations < 1:
+        raise ModelError(f"{name}: max_iterations: expected at least 1, got {scheme.max_iterations}")

@@ -12,18 +12,13 @@ from floatframe.discrete.newton import solve_step, work_of
 from floatframe.discrete.rotation import cross, turned
 from floatframe.discrete.system import DiscreteSystem
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure
-from floatframe.integrators.discrete_run import StepResult, advance_discrete, observe_discrete, start_discrete
-from floatframe.integrators.discrete_run import step as step_discrete
-from floatframe.kernels.model import Rows, Work
-from floatframe.state import State
-from floatframe.system import System
+from floatframe.integrators.discrete_run import DiscreteScheme, StepResult, check_options
 
 __all__ = ["EnergyDecaying", "EnergyMomentum"]
 
 
 @dataclass(frozen=True)
-class EnergyMomentum:
+class EnergyMomentum(DiscreteScheme):
     """Energy, linear and angular momentum to the tolerance of Newton's method, second order [1]_ [2]_ [3]_.
 
     In coordinates of the centre of mass (discrete/bodies.py), ' at the end of a step, mean values overlined in words:
@@ -56,33 +51,13 @@ class EnergyMomentum:
     def __post_init__(self) -> None:
         check_options(self)
 
-    def start(self, system: System, t: float, state: State | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent."""
-        return start_discrete(system, t, state, type(self).__name__)
-
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
-        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
-        return step_discrete(self, system, t, h, carry)
-
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state."""
-        return observe_discrete(system, t, carry, work)
-
-    def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
-        return advance_discrete(
-            self, system, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
-        )  # fmt: skip
-
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """Return the bodies, multipliers and work after a step."""
         return conserving_step(ds, placed, span, f, 1.0, self.tolerance, self.max_iterations)
 
 
 @dataclass(frozen=True)
-class EnergyDecaying:
+class EnergyDecaying(DiscreteScheme):
     """The scheme of `EnergyMomentum` with dissipation in the modes that h does not resolve: energy never rises.
 
     In place of (1) and (4), with the modes Phi of the pencil (K, M - Bᵀ J⁻¹ B at q = 0) and their frequencies omega,
@@ -110,38 +85,9 @@ class EnergyDecaying:
         if not 0.0 <= self.rho_inf <= 1.0:
             raise ModelError(f"EnergyDecaying: rho_inf: expected 0 <= rho_inf <= 1, got {self.rho_inf}")
 
-    def start(self, system: System, t: float, state: State | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent."""
-        return start_discrete(system, t, state, type(self).__name__)
-
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
-        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
-        return step_discrete(self, system, t, h, carry)
-
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state."""
-        return observe_discrete(system, t, carry, work)
-
-    def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
-        return advance_discrete(
-            self, system, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
-        )  # fmt: skip
-
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """Return the bodies, multipliers and work after a step."""
         return conserving_step(ds, placed, span, f, self.rho_inf, self.tolerance, self.max_iterations)
-
-
-def check_options(method: EnergyMomentum | EnergyDecaying) -> None:
-    """Raise `ModelError` if tolerance or number of iterations is impossible."""
-    name = type(method).__name__
-    if not 0.0 < method.tolerance < 1.0:
-        raise ModelError(f"{name}: tolerance: expected 0 < tolerance < 1, got {method.tolerance}")
-    if method.max_iterations < 1:
-        raise ModelError(f"{name}: max_iterations: expected at least 1, got {method.max_iterations}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from floatframe.compiled import CompiledSystem
 from floatframe.constraint_words import open_joints
 from floatframe.errors import ModelError
 from floatframe.initial import acceleration_rates, consistent_state, velocity_correction
-from floatframe.integrators.carry import Carry, Failure, memory_of, observed
-from floatframe.kernels.model import MASS, STIFFNESS, Model, Rows, Work, new_rows, new_work
+from floatframe.integrators.carry import Carry, Failure, memory_of, observed, one_step_of
+from floatframe.kernels.model import MASS, STIFFNESS, Model, Rows, Work, new_rows
 from floatframe.linearization import displaced, modal_diagonals
 from floatframe.state import State
 from floatframe.system import System
@@ -110,14 +110,7 @@ class GeneralizedAlpha:
         ConvergenceError
             If Newton's method fails.
         """
-        from floatframe.errors import ConvergenceError
-
-        work = new_work(system.compiled.model)
-        after, _, _, failure = self.advance(system, carry, work, t0=t, h=h, first=0, n_steps=1, every=2)
-        if failure is not None:
-            words = f"the step of {h:g} from t = {t:g} failed: {failure.words}"
-            raise ConvergenceError(words, t=t, h=h, residual=failure.residual)
-        return after
+        return one_step_of(self, system, t, h, carry)
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the results at the carried state; the carry learns the power at it."""

@@ -8,8 +8,7 @@ from cms.arrays import Array
 from floatframe.compiled import CompiledSystem
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.initial import assembled, consistent_state, solve_accelerations, with_compatible_velocities
-from floatframe.integrators.carry import Carry, Failure, observed
-from floatframe.integrators.discrete_run import step as one_step
+from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
 from floatframe.kernels.model import COUPLER, USER_FORCE, Rows, Work, new_rows, new_work
 from floatframe.rotations import euler_parameter_rates
 from floatframe.state import State
@@ -57,7 +56,7 @@ class Ida:
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory a time h later; `ConvergenceError` if it fails."""
-        return one_step(self, system, t, h, carry)
+        return one_step_of(self, system, t, h, carry)
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the results at the carried state; the carry learns the power at it."""

@@ -12,10 +12,8 @@ from floatframe.discrete.newton import Solution, StepError, pair_of, solve_step,
 from floatframe.discrete.rotation import cross, dot, turned
 from floatframe.discrete.system import DiscreteSystem
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure
-from floatframe.integrators.discrete_run import StepResult, advance_discrete, observe_discrete, start_discrete
-from floatframe.integrators.discrete_run import step as step_discrete
-from floatframe.kernels.model import Rows, Work
+from floatframe.integrators.carry import Carry
+from floatframe.integrators.discrete_run import DiscreteScheme, StepResult, check_options
 from floatframe.state import State
 from floatframe.system import System
 
@@ -23,7 +21,7 @@ __all__ = ["Variational"]
 
 
 @dataclass(frozen=True)
-class Variational:
+class Variational(DiscreteScheme):
     """Symplectic, momentum exact, energy bounded without drift, joints closed in positions and velocities, order two.
 
     Coordinates of the centre of mass c, R_GB, q (discrete/bodies.py). Between two configurations with
@@ -53,10 +51,7 @@ class Variational:
     max_iterations: int = 25
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.tolerance < 1.0:
-            raise ModelError(f"Variational: tolerance: expected 0 < tolerance < 1, got {self.tolerance}")
-        if self.max_iterations < 1:
-            raise ModelError(f"Variational: max_iterations: expected at least 1, got {self.max_iterations}")
+        check_options(self)
 
     def start(self, system: System, t: float, state: State | None = None) -> Carry:
         """Return the memory at the beginning, from a state made consistent."""
@@ -66,23 +61,7 @@ class Variational:
                     f"Variational: force {getattr(force, 'name', '')!r} has friction by the normal force, which this "
                     "scheme does not know; use energy-momentum or generalized-alpha"
                 )
-        return start_discrete(system, t, state, type(self).__name__)
-
-    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
-        """Return the memory one step of size h later; `ConvergenceError` if it fails."""
-        return step_discrete(self, system, t, h, carry)
-
-    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
-        """Return the results at the carried state."""
-        return observe_discrete(system, t, carry, work)
-
-    def advance(
-        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
-    ) -> tuple[Carry, Rows, int, Failure | None]:
-        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
-        return advance_discrete(
-            self, system, carry, work, t0=t0, h=h, first=first, n_steps=n_steps, every=every
-        )  # fmt: skip
+        return super().start(system, t, state)
 
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """(1), (2): return the bodies, multipliers and work after a step."""

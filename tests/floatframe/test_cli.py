@@ -323,3 +323,10 @@ def test_info_tells_the_mobility_of_a_system_file(tmp_path):
     assert (record["gruebler"], record["mobility"]) == (-4, 1)
     assert record["redundant_by_joint"] == {"pin": 5}
     assert "constraints that repeat others   5 of pin" in CliRunner().invoke(app, ["info", str(path)]).stdout
+
+
+def test_resume_asks_for_the_system_file_where_it_gets_the_results(results):
+    result = run("resume", results)
+    assert result.exit_code == 2
+    assert "expected the system file (TOML) of the run, got its results" in " ".join(result.output.split())
+    assert "resume swing.toml -o" in " ".join(result.output.split())
