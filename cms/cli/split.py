@@ -203,7 +203,10 @@ def edit_job(
 
 
 def edit_reduction(reduction: Any, job: Job, interfaces: list[str]) -> None:
-    """Leave out what the table says of interfaces of other parts; a nodal frame goes to an interface of this one."""
+    """Leave out what the table says of interfaces of other parts; mean axes instead of a nodal frame.
+
+    Neighbours hold parts at both ends: with geometric stiffness a frame clamped at one of them carries little.
+    """
     for key in ("free", "loads"):
         if key in reduction:
             for name in [name for name in reduction[key] if name not in interfaces]:
@@ -214,13 +217,11 @@ def edit_reduction(reduction: Any, job: Job, interfaces: list[str]) -> None:
         name not in interfaces for where, name in named_interfaces(job.reduction).items() if "neighbours" in where
     ):
         raise JobError("reduction.neighbours: they name interfaces of several parts; remove the table")
-    if (
-        reduction.get("frame", FRAMES[0]) == "nodal"
-        and reduction.get("at") not in interfaces
-        and "dofs" not in reduction
-    ):
-        reduction["frame"] = "nodal"
-        reduction["at"] = interfaces[0]
+    if reduction.get("frame", FRAMES[0]) == "nodal":
+        reduction["frame"] = "tisserand"
+        for key in ("at", "dofs"):
+            if key in reduction:
+                del reduction[key]
 
 
 def keep(document: Any, key: str, names: list[str]) -> None:

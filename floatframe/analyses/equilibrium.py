@@ -31,6 +31,7 @@ from floatframe.linearization import (
     solve,
     with_modal_weight,
 )
+from floatframe.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.rotations import rotation_matrix
 from floatframe.state import State
 from floatframe.system import System
@@ -127,6 +128,9 @@ def steady_rotation(
         forces, gaps = work.residual.copy(), work.g.copy()
         size = _size(W, forces)
         scale_of_forces = _forces_at_work(compiled, work, parts, W)
+        if not np.isfinite(size + scale_of_forces):  # a stiffened body beyond the second order
+            error = np.inf
+            break
         error = size / scale_of_forces if scale_of_forces > 0 else 0.0
         is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
         told = tolerance * np.abs(w).max(initial=0.0) + _rounding(compiled, parts, state)
@@ -148,8 +152,12 @@ def steady_rotation(
         part = min(1.0, LARGEST_TURN / max(_largest_motion(compiled, y), 1e-300))
         state = displaced(model, state, part * in_ground_axes(model, state, y))
         w = w + part * dw
+    lost = indefinite_masses(system, state)
     raise ConvergenceError(
-        f"no equilibrium found in {max_iterations} steps: forces are out of balance by {error:.2g} of those at work, "
+        f"no equilibrium found in {iteration} steps: loads at or above buckling bend it too far, or it lies far away; "
+        f"{indefinite_mass_words(lost)}"
+        if lost
+        else f"no equilibrium found in {iteration} steps: forces are out of balance by {error:.2g} of those at work, "
         f"most at body {_worst_body(compiled, W, forces)!r}; hold what can fall or drift, start nearer, or add damping "
         "and integrate until it rests",
         t=0.0,
@@ -187,13 +195,13 @@ def _tangent(compiled: CompiledSystem, work: Work) -> tuple[Linearized, tuple[Ar
 
 
 def _size(W: tuple[Array, ...], forces: Array) -> float:
-    """Return the length of forces in the norm of W⁻¹: for one mass, force by the root of its mass."""
+    """Return the length of forces in the norm of W⁻¹: for one mass, force by the root of its mass; nan without one."""
     total, first = 0.0, 0
     for block in W:
         f = forces[first : first + len(block)]
         total += float(f @ np.linalg.solve(block, f))
         first += len(block)
-    return float(np.sqrt(total))
+    return float(np.sqrt(total)) if total >= 0 else float("nan")
 
 
 def _forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: tuple[Array, ...]) -> float:

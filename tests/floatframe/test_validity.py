@@ -21,8 +21,10 @@ from floatframe import (
     System,
     integrate,
     read_results,
+    static_equilibrium,
 )
 from floatframe.cli.app import app
+from floatframe.errors import ConvergenceError
 from floatframe.kernels.entry import observe_state
 from floatframe.kernels.model import Memory, new_work
 from floatframe.mechanisms import spin_up_beam, spinning_shaft
@@ -186,3 +188,23 @@ def test_a_rotor_above_its_critical_speed_is_out_of_a_linear_frame_and_in_a_stif
 def test_notes_are_read_as_they_were_written():
     notes = (ValidityNote("blade", "speed", 0.2, 1.5, 0.1, 0.2, is_stiffened=False, has_matrices=True),)
     assert notes_from_json(notes_to_json(notes)) == notes
+
+
+def test_an_equilibrium_above_buckling_is_refused_and_one_below_is_found():
+    """A frame as a bent column has it would need a negative kinetic energy of the second order."""
+    beam = soft_beam()
+    EI, length = ALLOY.E * 0.02**4 / 12, 2.0
+    euler = np.pi**2 * EI / (4 * length**2)
+
+    def under(load):
+        return System(
+            [FlexibleBody("column", beam)],
+            [FixedJoint("foot", GROUND, Marker("column", "root"))],
+            [PointForce("push", Marker("column", "tip"), (-load * euler, 0, 1e-3 * euler))],
+        )
+
+    assert abs(static_equilibrium(under(0.5)).state.q).max() < 0.1
+    with pytest.raises(
+        ConvergenceError, match=r"at or above buckling.*'column' is not positive definite.*split it into"
+    ):
+        static_equilibrium(under(1.9))

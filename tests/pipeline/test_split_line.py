@@ -12,7 +12,8 @@ from cms.cli.split import SplitRequest, split_job
 from cms.errors import JobError
 from cms.families import Families
 from cms.job import read_job
-from floatframe import linearize, static_equilibrium, system_modes
+from floatframe import GeneralizedAlpha, integrate, linearize, static_equilibrium, system_modes
+from floatframe.sensors import interface_motion
 from floatframe.system_file import read_system
 from tests.bodies import box_mesh
 from tests.decks import write_deck
@@ -96,12 +97,51 @@ def test_parts_keep_what_is_theirs(beam):
     assert [path.name for path in files] == ["part_1.toml", "part_2.toml", "part_3.toml", "system.toml"]
     parts = [read_job(path) for path in files[:-1]]
     assert [set(part.interfaces) for part in parts] == [{"foot", "cut_1"}, {"cut_1", "cut_2"}, {"tip", "cut_2"}]
-    assert [part.reduction.at for part in parts] == ["foot", "cut_1", "tip"]
+    assert [(part.reduction.frame, part.reduction.at) for part in parts] == [("tisserand", None)] * 3
     assert [set(part.masses) for part in parts] == [set(), {"bob"}, set()]
     assert all(set(part.load_cases) == {"weight"} for part in parts)
     assert "[materials.steel]   # of everything" in files[0].read_text()
     masses = [reduce_job(part).moments.m for part in parts]
     assert_allclose(sum(masses), reduce_job(read_job(job)).moments.m, rtol=1e-12)
+
+
+BLADE = 'shape = "rectangle"\nwidth = 0.02\nheight = 0.005\norientation = [0, 1, 0]'
+SPIN = """
+gravity = [0, 0, -9.81]
+[joints.hub]
+type = "revolute"
+body_a = "ground"
+body_b = "{body}"
+marker_b = "foot"
+axis = [0, 0, 1]
+motions.angle = {{type = "cycloidal-spin-up", omega = 20, duration = 0.5}}
+"""
+
+
+def test_a_beam_of_stiffened_parts_spins_up_as_the_whole_one(beam):
+    """A blade that sags by a twentieth of its length, which frames clamped at one end of each part do not carry."""
+    job = beam(n_modes=8)
+    job.with_name("nodes.csv").write_text(
+        "node,x,y,z,sets\n" + "".join(f"{i},{i / 12},0,0,{({0: 'foot', 12: 'tip'}).get(i, '')}\n" for i in range(13))
+    )
+    text = job.read_text().replace('shape = "tube"\nradius = 0.03\nthickness = 0.004', BLADE)
+    job.write_text(text[: text.index("[masses.bob]")] + text[text.index("[load_cases") :])
+    files = split_job(SplitRequest(job, 3))
+    reduced_parts(files)
+    cms.write(reduce_job(read_job(job)), job.with_name("mast.h5"))
+    whole = job.with_name("whole.toml")
+    whole.write_text('[system]\nunits = "m-kg-s"' + SPIN.format(body="mast") + '[bodies.mast]\nfile = "mast.h5"\n')
+    joined = files[-1].read_text().replace("gravity = [0, 0, 0]\n", SPIN.format(body="mast_1"))
+    files[-1].write_text(joined)
+    tips = []
+    for path, name in ((whole, "mast"), (files[-1], "mast_3")):
+        system = read_system(path)[0]
+        motion = integrate(system, GeneralizedAlpha(0.8, 1e-8), 0.15, 1e-3)
+        body = next(body for body in system.bodies if body.name == name)
+        assert body.is_stiffened
+        tips.append(interface_motion(motion, name, body.reduced, "tip").position)
+    assert np.abs(tips[0][:, 2]).max() > 0.04
+    assert_allclose(tips[1], tips[0], rtol=0, atol=2e-4)
 
 
 SOLID = """
