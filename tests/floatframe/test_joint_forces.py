@@ -28,7 +28,7 @@ from floatframe import (
 from floatframe.time_functions import harmonic, smooth_step, table
 from tests.floatframe.bodies import random_point_masses, reduced_body, stiffness
 from tests.floatframe.test_joints import AXIS, pair
-from tests.floatframe.test_tangent import C_K, Iterate, newton_matrix
+from tests.floatframe.test_tangent import C_K, Iterate, newton_matrices
 
 METHOD = GeneralizedAlpha(0.9, 1e-11)
 TABLE = table(np.linspace(-9, 9, 19), -(np.linspace(-9, 9, 19) ** 3))
@@ -50,17 +50,7 @@ def test_newton_matrix_is_the_derivative_of_the_residual(joint, coordinates):
     forces += [JointForce("second", "j", coordinates[0], damping=0.4)]
     iterate = Iterate(System(plain.bodies, plain.joints, forces), 1)
     iterate.work.time[0] = 0.37
-    n_u = int(iterate.model.u0[-1])
-    n = n_u + iterate.n_w
-    _, parts = iterate.residual(np.zeros(n_u), np.zeros(n - n_u))
-    exact = newton_matrix(iterate.model, parts, iterate.n_w)
-    step = 1e-5
-    approximate = np.zeros((n, n))
-    for k in range(n):
-        x = step * np.eye(n)[k]
-        plus, _ = iterate.residual(x[:n_u], x[n_u:])
-        minus, _ = iterate.residual(-x[:n_u], -x[n_u:])
-        approximate[:, k] = (plus - minus) / (2 * step)
+    exact, approximate = newton_matrices(iterate)
     assert_allclose(exact, approximate, rtol=0, atol=1e-8 * max(np.abs(approximate).max(), 1 / C_K))
 
 

@@ -112,20 +112,24 @@ def newton_matrix(model, parts, n_w):
     return matrix
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_newton_matrix_is_the_derivative_of_the_residual(seed):
-    iterate = Iterate(system_with_everything(), seed)
+def newton_matrices(iterate, *, step=1e-5):
+    """Return the Newton matrix at an iterate, and the central differences of the residual."""
     n_u = int(iterate.model.u0[-1])
     n = n_u + iterate.n_w
     _, parts = iterate.residual(np.zeros(n_u), np.zeros(n - n_u))
-    exact = newton_matrix(iterate.model, parts, iterate.n_w)
-    step = 1e-5
     approximate = np.zeros((n, n))
     for k in range(n):
         x = step * np.eye(n)[k]
         plus, _ = iterate.residual(x[:n_u], x[n_u:])
         minus, _ = iterate.residual(-x[:n_u], -x[n_u:])
         approximate[:, k] = (plus - minus) / (2 * step)
+    return newton_matrix(iterate.model, parts, iterate.n_w), approximate
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_newton_matrix_is_the_derivative_of_the_residual(seed):
+    iterate = Iterate(system_with_everything(), seed)
+    exact, approximate = newton_matrices(iterate)
     assert_allclose(exact, approximate, rtol=0, atol=2e-9 * np.abs(approximate).max())
 
 
