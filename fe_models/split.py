@@ -219,17 +219,12 @@ def shell_kept(mesh: ShellMesh, kept: Mapping[str, Array], behind: IntArray, sou
     on_cut[behind] = True
     rows &= ~on_cut[mesh.lines].all(axis=1)
     line_place = places(len(mesh.lines), np.flatnonzero(rows))
-    cell_place = {kind: places(len(mesh.cells[kind]), np.flatnonzero(chosen)) for kind, chosen in kept.items()}
     cells = {kind: place[mesh.cells[kind][chosen]] for kind, chosen in kept.items() if chosen.any()}
-    cell_sets = {
-        group: without_empty({kind: moved(cell_place[kind], m) for kind, m in by_type.items()})
-        for group, by_type in mesh.cell_sets.items()
-    }
     return replace(
         mesh,
         nodes=mesh.nodes[nodes],
         cells=cells,
-        cell_sets={group: by_type for group, by_type in cell_sets.items() if by_type},
+        cell_sets=cell_sets_kept(mesh, kept),
         cell_numbers={kind: numbers[kept[kind]] for kind, numbers in mesh.cell_numbers.items() if kind in cells},
         lines=place[mesh.lines[rows]],
         line_sets=without_empty({group: moved(line_place, m) for group, m in mesh.line_sets.items()}),
@@ -241,17 +236,12 @@ def shell_kept(mesh: ShellMesh, kept: Mapping[str, Array], behind: IntArray, sou
 
 def cells_kept(mesh: Mesh, kept: Mapping[str, Array], source: str) -> Mesh:
     """Return the mesh of some solid cells."""
-    cell_place = {kind: places(len(mesh.cells[kind]), np.flatnonzero(rows)) for kind, rows in kept.items()}
     cells = {kind: mesh.cells[kind][rows] for kind, rows in kept.items() if rows.any()}
-    cell_sets = {
-        group: without_empty({kind: moved(cell_place[kind], m) for kind, m in by_type.items()})
-        for group, by_type in mesh.cell_sets.items()
-    }
     part = drop_unused_nodes(
         replace(
             mesh,
             cells=cells,
-            cell_sets={group: by_type for group, by_type in cell_sets.items() if by_type},
+            cell_sets=cell_sets_kept(mesh, kept),
             cell_numbers={kind: numbers[kept[kind]] for kind, numbers in mesh.cell_numbers.items() if kind in cells},
         )
     )
@@ -262,6 +252,16 @@ def cells_kept(mesh: Mesh, kept: Mapping[str, Array], source: str) -> Mesh:
         notes=mesh.notes,  # nodes of other parts are no finding
         source=source,
     )
+
+
+def cell_sets_kept(mesh: Mesh | ShellMesh, kept: Mapping[str, Array]) -> dict[str, dict[str, IntArray]]:
+    """Return the groups of cells that have some left, with their new numbers."""
+    place = {kind: places(len(mesh.cells[kind]), np.flatnonzero(rows)) for kind, rows in kept.items()}
+    sets = {
+        group: without_empty({kind: moved(place[kind], m) for kind, m in by_type.items()})
+        for group, by_type in mesh.cell_sets.items()
+    }
+    return {group: by_type for group, by_type in sets.items() if by_type}
 
 
 def places(n: int, kept: IntArray) -> IntArray:

@@ -1,6 +1,8 @@
 """`cms split`: the job of one body becomes jobs of its parts, and the system that joins them again."""
 
+import json
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,7 +82,8 @@ def split_job(request: SplitRequest) -> list[Path]:
         raise JobError(f"--output {folder}: this is a file; expected a folder")
     mesh = mesh_of(job)
     split = split_mesh(mesh, request.n, at=request.at, axis=request.axis)
-    homes = homes_of(job, mesh, split.parts)
+    names_of_cuts = [cut.name for cut in split.cuts]
+    homes = homes_of(job, mesh, split.parts, names_of_cuts)
     files: dict[Path, str] = {}
     for k, part in enumerate(split.parts):
         document = tomlkit.parse(request.job.read_text(encoding="utf-8-sig"))
@@ -118,7 +121,7 @@ def mesh_of(job: Job) -> Any:
     return drop_unused_nodes(read_mesh(job.body.mesh))
 
 
-def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...]) -> dict[str, int]:
+def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...], cuts: list[str]) -> dict[str, int]:
     """Return interface -> number of the part it is on, from 0; `JobError` if it is on two, or on a cut."""
     from cms.cli.job_beams import frame_interface
     from cms.cli.job_shells import shell_interface_of
@@ -137,8 +140,11 @@ def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...]) -> dict[str, int]:
                 continue
             if len(there) == len(whole) and np.abs(there - whole).max() <= tolerance:
                 homes[name] = k
-                on_cut = [cut for cut, nodes in part.node_sets.items() if cut.startswith("cut_") and shares(
-                    part.nodes[nodes], there, tolerance)]  # fmt: skip
+                on_cut = [
+                    cut
+                    for cut in cuts
+                    if cut in part.node_sets and shares(part.nodes[part.node_sets[cut]], there, tolerance)
+                ]
                 if on_cut:
                     raise JobError(
                         f"interfaces.{name}: it has nodes on {on_cut[0]}; a node can follow one interface only: take "
@@ -197,7 +203,7 @@ def edit_job(
         interface.update({"kind": request.kind, "nodes": cut.name, "reference": [float(x) for x in cut.point]})
         interfaces[cut.name] = interface
     for key in ("masses", "springs", "links"):
-        keep(document, key, attached(getattr(job, key), key, part))
+        keep(document, key, attached(getattr(job, key), key, part, cuts))
     keep(document, "load_cases", loads_on(job, part, inside, request))
     edit_reduction(document["reduction"], job, [*inside, *(cut.name for cut in cuts)])
 
@@ -246,9 +252,9 @@ def keep_groups(document: Any, key: str, groups_key: str, groups: Mapping[str, A
             document[key][name][groups_key] = there
 
 
-def attached(tables: Mapping[str, Any], key: str, part: Any) -> list[str]:
+def attached(tables: Mapping[str, Any], key: str, part: Any, cuts: "list[Cut]") -> list[str]:
     """Return the attachments that are on this part; `JobError` if one is on a cut, where two parts would have it."""
-    on_cut = [set(nodes.tolist()) for name, nodes in part.node_sets.items() if name.startswith("cut_")]
+    on_cut = [set(part.node_sets[cut.name].tolist()) for cut in cuts]
     names = []
     for name, table in tables.items():
         groups = [*getattr(table, "nodes", ()), *getattr(table, "followers", ())]
@@ -268,11 +274,12 @@ def attached(tables: Mapping[str, Any], key: str, part: Any) -> list[str]:
 def loads_on(job: Job, part: Any, inside: list[str], request: SplitRequest) -> list[str]:
     """Return the load cases of this part: gravity, pressure on its faces, forces at its interfaces."""
     names = []
+    groups = part.cell_sets if job.shells else getattr(part, "face_sets", {})
     for name, case in job.load_cases.items():
         if case.kind == "gravity" or (case.at is not None and case.at in inside):
             names.append(name)
         elif case.kind == "pressure" and case.faces is not None:
-            if case.faces in part.face_sets:
+            if case.faces in groups:
                 names.append(name)
         elif case.at is None:
             raise JobError(
@@ -282,25 +289,30 @@ def loads_on(job: Job, part: Any, inside: list[str], request: SplitRequest) -> l
     return names
 
 
+def key(name: str) -> str:
+    """Return a name as a key of TOML, in quotes where it needs them."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name)
+
+
 def system_text(job: Job, n: int) -> str:
     """Return a system file of the parts, joined at their cuts where they were drawn."""
-    name = job.body.name
+    name = str(job.body.name)
     lines = [
-        f"# {name} in {n} parts, each with a frame of its own. Reduce them first: cms reduce part_1.toml, ...",
+        f"# {name!r} in {n} parts, each with a frame of its own. Reduce them first: cms reduce part_1.toml, ...",
         "[system]",
         f'units = "{job.body.units}"',
         "gravity = [0, 0, 0]",
         "",
     ]
     for k in range(1, n + 1):
-        lines += [f"[bodies.{name}_{k}]", f'file = "part_{k}.h5"', ""]
+        lines += [f"[bodies.{key(f'{name}_{k}')}]", f'file = "part_{k}.h5"', ""]
     for k in range(1, n):
         lines += [
             f"[joints.cut_{k}]",
             'type = "fixed"',
-            f'body_a = "{name}_{k}"',
+            f"body_a = {json.dumps(f'{name}_{k}')}",
             f'marker_a = "cut_{k}"',
-            f'body_b = "{name}_{k + 1}"',
+            f"body_b = {json.dumps(f'{name}_{k + 1}')}",
             f'marker_b = "cut_{k}"',
             "",
         ]

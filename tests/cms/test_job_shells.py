@@ -6,6 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from cms.cli.reduce_job import job_body, reduce_job
+from cms.cli.split import SplitRequest, split_job
 from cms.errors import JobError
 from cms.job import read_job
 from cms.job_shells import ShellSection
@@ -201,3 +202,16 @@ def test_every_key_of_shells_is_documented():
     text = DOCUMENT.read_text(encoding="utf-8")
     for key in ShellSection.model_fields:
         assert f"`{key}`" in text, key
+
+
+def test_a_shell_in_parts_has_all_its_mass_and_load(job_file):
+    path = job_file(TRAY)
+    parts = [read_job(file) for file in split_job(SplitRequest(path, at=(0.6,), axis=(1, 0, 0)))[:-1]]
+    assert [set(part.shells) for part in parts] == [{"floor"}, {"floor", "wall"}]
+    assert [set(part.materials) for part in parts] == [{"steel"}, {"steel", "tin"}]
+    assert [set(part.interfaces) for part in parts] == [{"hinge", "cut_1"}, {"top", "cut_1"}]
+    assert [set(part.masses) for part in parts] == [{"bob"}, set()]
+    whole, *reduced = (reduce_job(job) for job in (read_job(path), *parts))
+    assert_allclose(sum(part.moments.m for part in reduced), whole.moments.m, rtol=1e-12)
+    forces = [part.frame.axes @ part.load_case("blow").force for part in (whole, *reduced)]
+    assert_allclose(forces[1] + forces[2], forces[0], rtol=0, atol=1e-9 * np.abs(forces[0]).max())

@@ -259,3 +259,13 @@ def test_command_names_the_option_that_is_wrong(beam, arguments, message, monkey
     result = CliRunner().invoke(app, ["split", str(job), *arguments])
     assert result.exit_code == 2
     assert message in " ".join(result.output.split())
+
+
+def test_names_that_toml_would_not_take_bare_and_groups_named_like_cuts(beam):
+    job = beam(n_modes=2)
+    text = job.read_text().replace("[body]", '[body]\nname = "my mast"').replace('"tip"', '"cut_tip"')
+    job.write_text(text.replace("[interfaces.tip]", "[interfaces.cut_tip]"))
+    (job.parent / "nodes.csv").write_text((job.parent / "nodes.csv").read_text().replace(",tip", ",cut_tip"))
+    system = reduced_parts(split_job(SplitRequest(job, 2)))
+    assert [body.name for body in system.bodies] == ["my mast_1", "my mast_2"]
+    assert "cut_tip" in [interface.name for interface in system.bodies[1].reduced.interfaces]
