@@ -8,8 +8,8 @@ Processor time of the steps and of one output in ten, so that other work on the 
 import time
 
 from floatframe import EnergyDecaying, EnergyMomentum, GeneralizedAlpha, Variational, integrate
-from tests.floatframe.test_free_body import spinning
-from tests.floatframe.test_pendulum import pendulum
+from tests.floatframe.bodies.test_free_body import spinning
+from tests.floatframe.integrators.test_pendulum import pendulum
 
 N_STEPS = 100
 

@@ -25,12 +25,12 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse.linalg as sla
 
-import cms.mode_search as mode_search
-from cms.eigen import eigenmodes
-from cms.factorization import factorize
-from cms.sparse_product import SymmetricProduct
-from cms.submatrix import principal_block
-from cms.threads import one_blas_thread
+import cms.solvers.mode_search as mode_search
+from cms.solvers.eigen import eigenmodes
+from cms.solvers.factorization import factorize
+from cms.solvers.sparse_product import SymmetricProduct
+from fe_models.body.submatrix import principal_block
+from fe_models.foundation.threads import one_blas_thread
 
 TOLERANCE = 1e-5
 BLOCKS = (1, 4, 8, 16, 24, 32)

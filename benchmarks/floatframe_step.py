@@ -15,11 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from floatframe.compiling.system import compiled_system
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from floatframe import GROUND, FlexibleBody, GeneralizedAlpha, Gravity, Marker, RevoluteJoint, System
 from floatframe.kernels.model import new_work
-from tests.floatframe.bodies import random_point_masses, stiffened_body
+from tests.floatframe.point_masses import random_point_masses, stiffened_body
 
 H = 1e-3
 AXES = ((0, 1, 0), (0, 0.8, 0.6))
@@ -52,7 +54,7 @@ def measure(systems, n_steps, n_runs):
     """Return the least time per step of each system, the systems taken in turn, and the counts of the first."""
     method = GeneralizedAlpha(0.8)
     carries = [method.start(system, 0.0) for system in systems]
-    works = [new_work(system.compiled.model) for system in systems]
+    works = [new_work(compiled_system(system).model) for system in systems]
     best, counts = [np.inf] * len(systems), []
     for _ in range(n_runs):
         for k, (system, work) in enumerate(zip(systems, works, strict=True)):

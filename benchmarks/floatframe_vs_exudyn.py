@@ -22,7 +22,7 @@ import scipy.sparse as sp
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.floatframe_step import m_orthonormal_body, measure
 from floatframe import GROUND, FlexibleBody, GeneralizedAlpha, Marker, SphericalJoint, System, integrate
-from floatframe.sensors import interface_motion
+from floatframe.results.place_motion import interface_motion
 
 H, T_TIP, SPIN = 1e-3, 0.2, (0.3, 1.0, 0.4)
 
@@ -77,7 +77,7 @@ class Mesh:
 
 def node_masses(part):
     """Return the masses of the points as the benchmark of a step draws them."""
-    from tests.floatframe.bodies import random_point_masses
+    from tests.floatframe.point_masses import random_point_masses
 
     points = random_point_masses(part.n_q, 3, n_points=200, softness=1.0)
     assert np.array_equal(points.c, part.nodes)

@@ -21,8 +21,8 @@ N_MODES = 50
 def main():
     import cms
     import fe_models
-    from cms.frames import TisserandFrame, frame_condition
-    from cms.geometric_reduction import reduced_geometric_stiffness
+    from cms.reduced_basis.frames import TisserandFrame, frame_condition
+    from cms.second_order.geometric_reduction import reduced_geometric_stiffness
     from fe_models.parts import mesh_connecting_rod
 
     million = next((a for a in sys.argv[1:] if a in SIZES), "0.1")
@@ -44,7 +44,7 @@ def main():
         reduced = cms.reduce(body, modes, families=families)
         clock("reduce")
         line = clock.total()
-        from cms.finishing import finish
+        from cms.reduced_basis.finishing import finish
 
         condition = frame_condition(body, TisserandFrame())
         Phi = finish(body, modes, condition).Phi

@@ -14,8 +14,8 @@ import cms
 import fe_models as fm
 from fe_models.beams.torsion import rectangle_torsion_constant
 from fe_models.shells import elements
-from tests.fe_models import test_shell_benchmarks as cases
-from tests.fe_models.shells import KINDS, SI, STEEL, frequencies, of_nodes, plate, solved
+from tests.fe_models.shells import test_benchmarks as cases
+from tests.fe_models.small_shells import KINDS, SI, STEEL, frequencies, of_nodes, plate, solved
 
 
 def errors(kind, n):

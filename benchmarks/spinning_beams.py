@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import cms
 from floatframe.errors import ConvergenceError
 from floatframe.mechanisms import rotating_blade
-from tests.floatframe import test_spinning_beams as beams
+from tests.floatframe.compiling import test_spinning_beams as beams
 from tests.references.rotating_beam import cantilever_frequencies
 
 

@@ -1,5 +1,7 @@
 """Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
 
+from fe_models.foundation.errors import BodyError, CmsError, ModalFileError, UnitsError
+
 __all__ = [
     "BodyError",
     "CmsError",
@@ -11,18 +13,6 @@ __all__ = [
     "ModeSetError",
     "UnitsError",
 ]
-
-
-class CmsError(Exception):
-    """Root of every error that `cms` raises on purpose; its text is meant for the user."""
-
-
-class BodyError(CmsError, ValueError):
-    """A finite element body, coupling or interface is not what it claims to be."""
-
-
-class UnitsError(CmsError, ValueError):
-    """An unknown unit system, or units that do not fit together."""
 
 
 class ModeSetError(CmsError, ValueError):
@@ -39,10 +29,6 @@ class CompareError(CmsError, ValueError):
 
 class EigenError(CmsError, RuntimeError):
     """Vibration modes could not be found to the tolerance, or their number does not agree with the inertia."""
-
-
-class ModalFileError(CmsError, ValueError):
-    """A file is not a readable modal file."""
 
 
 class JobError(CmsError, ValueError):

@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
-from cms.damping import Damping, modal_damping
 from cms.errors import BodyError
-from cms.finishing import elastic_eigenvectors
-from cms.frames import (
+from cms.reduced_basis.damping import Damping, modal_damping
+from cms.reduced_basis.finishing import elastic_eigenvectors
+from cms.reduced_basis.frames import (
     BuckensFrame,
     Frame,
     NodalFrame,
@@ -28,15 +27,17 @@ from cms.frames import (
     determinate_rows,
     placed,
 )
-from cms.geometric_conversion import converted_geometric_stiffness, require_convertible
-from cms.invariants import Moments, moments_from_gram
-from cms.load_cases import ReducedLoadCase
-from cms.nodal_sums import NodalSums
-from cms.orientation import orientation
-from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
-from cms.rigid_modes import rigid_motion_of_points
-from cms.source_columns import SourceColumns, share_words
-from cms.stress_modes import PointStress, turned_stress
+from cms.reduced_basis.stress_modes import turned_stress
+from cms.reduced_body.invariants import Moments, moments_from_gram
+from cms.reduced_body.nodal_sums import NodalSums
+from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.reduced_body.source_columns import SourceColumns, share_words
+from cms.reduced_body.stress import PointStress
+from cms.second_order.geometric_conversion import converted_geometric_stiffness, require_convertible
+from cms.solvers.orientation import orientation
+from fe_models.body.load_cases import ReducedLoadCase
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["convert_frame"]
 

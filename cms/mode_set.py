@@ -6,8 +6,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cms.arrays import Array, frozen, require_finite
 from cms.errors import ModeSetError
+from fe_models.foundation.arrays import Array, frozen, require_finite
 
 __all__ = ["ModeSet"]
 

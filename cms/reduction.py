@@ -6,25 +6,26 @@ from importlib import metadata
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
-from cms.damping import Damping, modal_damping
 from cms.errors import BodyError, ModeSetError
-from cms.families import Families
-from cms.fe_body import FEBody, Interface
-from cms.finishing import FinishedBasis, finish
-from cms.frames import Frame, TisserandFrame, frame_condition
-from cms.geometric_reduction import stiffness_of_states
-from cms.invariants import Moments, moments_from_gram
-from cms.load_cases import LoadCase, ReducedLoadCase
-from cms.matrix_moments import gram_from_matrices
+from cms.families.families import Families
+from cms.families.rigid_modes import geometric_rigid_modes
 from cms.mode_set import ModeSet
-from cms.nodal_sums import NodalSums, node_weights, weighted_rigid_modes
-from cms.node_motion import reference_motion
-from cms.quadratic_modes import quadratic_modes
-from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
-from cms.rigid_modes import geometric_rigid_modes
-from cms.stress_modes import nodal_stress_modes, point_stress_modes
-from cms.unit_states import UnitStates, require_geometric_stiffness, states_of
+from cms.reduced_basis.damping import Damping, modal_damping
+from cms.reduced_basis.finishing import FinishedBasis, finish
+from cms.reduced_basis.frames import Frame, TisserandFrame, frame_condition
+from cms.reduced_basis.matrix_moments import gram_from_matrices
+from cms.reduced_basis.node_motion import reference_motion
+from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
+from cms.reduced_basis.stress_modes import nodal_stress_modes, point_stress_modes
+from cms.reduced_body.invariants import Moments, moments_from_gram
+from cms.reduced_body.nodal_sums import NodalSums
+from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.second_order.geometric_reduction import stiffness_of_states
+from cms.second_order.quadratic_modes import quadratic_modes
+from cms.second_order.unit_states import UnitStates, require_geometric_stiffness, states_of
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.load_cases import LoadCase, ReducedLoadCase
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["reduce"]
 
@@ -60,13 +61,13 @@ def reduce(
         system stiffens the body by its spin, accelerations and interface loads. It costs the static solution of 12 +
         6 n_interfaces loads and one pass over the elements.
     quadratic
-        Whether to add quadratic modes, the displacement of second order of every kept node (`cms.quadratic_modes`),
+        Whether to add quadratic modes, the displacement of second order of every kept node (`quadratic_modes`),
         with the geometric stiffness that is their inertia. For slender bodies: three static solutions a kept node.
     families
         The families that made `modes`, so that the geometric stiffness takes their factorisation; it makes its own by
         default.
     states
-        The static states of the unit loads in this frame (`cms.unit_states`), so that the geometric stiffness needs no
+        The static states of the unit loads in this frame (`unit_states`), so that the geometric stiffness needs no
         factorisation any more.
 
     Raises

@@ -1,7 +1,10 @@
 """Errors of this package: one root, leaves that are also the built-in kind a caller would expect."""
 
+from fe_models.foundation.errors import BodyError, FeModelsError, UnitsError
+
 __all__ = [
     "BeamError",
+    "BodyError",
     "FeModelsError",
     "InterfaceError",
     "LoadError",
@@ -9,11 +12,8 @@ __all__ = [
     "MeshError",
     "SectionError",
     "ShellError",
+    "UnitsError",
 ]
-
-
-class FeModelsError(Exception):
-    """Root of every error that `fe_models` raises on purpose; its text is meant for the user."""
 
 
 class MeshError(FeModelsError, ValueError):

@@ -10,16 +10,16 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cms.arrays import Array, IntArray
-from cms.fe_body import FEBody
-from cms.load_cases import LoadCase
-from cms.rigid_modes import rigid_motion_of_points
-from fe_models.beams.line_mesh import LineMesh
-from fe_models.boundary import boundary_facets, facet_weights, first_of_equal_rows
-from fe_models.cell_shapes import quadrature, shape_values
+from fe_models.body.fe_body import FEBody
+from fe_models.body.load_cases import LoadCase
+from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.errors import LoadError
-from fe_models.mesh import Mesh
-from fe_models.selections import AnyMesh, Selection, selected_facets
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.meshes.boundary import boundary_facets, facet_weights, first_of_equal_rows
+from fe_models.meshes.cell_shapes import quadrature, shape_values
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.selections import AnyMesh, Selection, selected_facets
 
 __all__ = ["gravity_load", "interface_load", "nodal_load", "pressure_load", "selection_load"]
 

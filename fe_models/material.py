@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import IntArray
-from cms.words import nearest
 from fe_models.errors import MaterialError
-from fe_models.mesh import Mesh
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.words import nearest
+from fe_models.meshes.mesh import Mesh
 
 __all__ = ["Material", "assign_materials"]
 

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from cms.arrays import Array, IntArray
-from cms.errors import BodyError
-from cms.fe_body import FEBody, Interface, put_translations
-from cms.mass_loads import MassLoads
-from cms.units import Units, unit_system
-from cms.words import nearest
+from fe_models.body.fe_body import FEBody, Interface, put_translations
+from fe_models.body.mass_loads import MassLoads
 from fe_models.errors import MeshError
-from fe_models.solid import scalar_mass_gram
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.words import nearest
+from fe_models.solids.body import scalar_mass_gram
 
 __all__ = ["ScalarMassModel", "body_from_matrices", "body_from_npz", "scalar_mass_of"]
 
@@ -28,7 +28,7 @@ INTERFACE_KEYS = ("kind", "nodes", "reference", "triad", "weights")
 
 @dataclass(frozen=True, eq=False)
 class ScalarMassModel:
-    """Exact integrals over mass of a body whose mass matrix is M_s ⊗ 1₃ (`cms.fe_body.ElementModel`)."""
+    """Exact integrals over mass of a body whose mass matrix is M_s ⊗ 1₃ (`fe_models.body.fe_body.ElementModel`)."""
 
     name: str
     M_s: sp.csr_array  #: scalar mass, (n_nodes, n_nodes) [kg]
@@ -50,7 +50,7 @@ class ScalarMassModel:
         """Refuse: matrices do not know the elements."""
         raise BodyError(
             f"body {self.name!r}: it came as bare matrices, which know no stress; build it from its mesh "
-            f"(fe_models.solid.solid_body) for stresses"
+            f"(fe_models.solids.body.solid_body) for stresses"
         )
 
     @property
@@ -73,7 +73,7 @@ class ScalarMassModel:
     def _no_elements(self) -> BodyError:
         return BodyError(
             f"body {self.name!r}: it came as bare matrices, which know no geometric stiffness; build it from its mesh "
-            f"(fe_models.solid.solid_body), or reduce it without"
+            f"(fe_models.solids.body.solid_body), or reduce it without"
         )
 
 

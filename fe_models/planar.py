@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from cms.elimination import eliminate_dofs
-from cms.errors import BodyError
-from cms.fe_body import FEBody, Interface
-from cms.rigid_modes import rigid_motion_of_points
+from fe_models.body.elimination import eliminate_dofs
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.errors import BodyError
 
 __all__ = ["planar"]
 

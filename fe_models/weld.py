@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from cms.arrays import Array, IntArray
-from cms.elimination import eliminate_dofs
-from cms.errors import BodyError
-from cms.fe_body import ElementModel, FEBody, Interface, Recovery, StressPointModel
-from cms.load_cases import LoadCase
-from cms.mass_loads import MassLoads
-from cms.rigid_modes import rigid_motion_of_points
+from fe_models.body.elimination import eliminate_dofs
+from fe_models.body.fe_body import ElementModel, FEBody, Interface, Recovery, StressPointModel
+from fe_models.body.load_cases import LoadCase
+from fe_models.body.mass_loads import MassLoads
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
 
 __all__ = ["WeldedModel", "weld"]
 
@@ -23,7 +23,7 @@ Place = tuple[str, str]  #: name of a body, name of its interface
 
 @dataclass(frozen=True, eq=False)
 class WeldedModel:
-    """The element models of the parts side by side (`cms.fe_body.ElementModel`)."""
+    """The element models of the parts side by side (`fe_models.body.fe_body.ElementModel`)."""
 
     parts: tuple[ElementModel, ...]
     n_mesh_dof: tuple[int, ...]  #: of each part
@@ -91,7 +91,7 @@ class WeldedModel:
 
 @dataclass(frozen=True, eq=False)
 class WeldedPoints:
-    """The stress points of the parts that have some (`cms.fe_body.StressPointModel`)."""
+    """The stress points of the parts that have some (`fe_models.body.fe_body.StressPointModel`)."""
 
     parts: tuple[tuple[str, StressPointModel, slice], ...]  #: name of the part, its points, its rows of the mesh dofs
 

@@ -1,5 +1,3 @@
-from .added_mass import AddedMass as AddedMass
-from .added_mass import with_masses as with_masses
 from .analyses import Channel as Channel
 from .analyses import CoordinateChannel as CoordinateChannel
 from .analyses import Equilibrium as Equilibrium
@@ -25,36 +23,25 @@ from .analyses import steady_rotation as steady_rotation
 from .analyses import sweep as sweep
 from .analyses import system_modes as system_modes
 from .analyses import with_motors as with_motors
-from .analyses.study import run_study as run_study
-from .coordinates import AxialAngle as AxialAngle
-from .coordinates import AxialDistance as AxialDistance
-from .coordinates import JointCoordinate as JointCoordinate
-from .coordinates import PointDistance as PointDistance
-from .couplers import CoordinateCoupler as CoordinateCoupler
-from .descriptions import FlexiblePart as FlexiblePart
-from .descriptions import corotational as corotational
-from .descriptions import finite_segments as finite_segments
-from .errors import (
-    ConvergenceError as ConvergenceError,
-)
-from .errors import (
-    FloatframeError as FloatframeError,
-)
-from .errors import (
-    ModelError as ModelError,
-)
-from .errors import (
-    ResultsError as ResultsError,
-)
-from .errors import (
-    SystemFileError as SystemFileError,
-)
-from .events import Event as Event
-from .export import export_csv as export_csv
-from .export import export_vtk as export_vtk
-from .flexible_body import FlexibleBody as FlexibleBody
-from .force_results import coupler_motion as coupler_motion
-from .force_results import user_force_motion as user_force_motion
+from .bodies.added_mass import AddedMass as AddedMass
+from .bodies.added_mass import with_masses as with_masses
+from .bodies.coordinates import AxialAngle as AxialAngle
+from .bodies.coordinates import AxialDistance as AxialDistance
+from .bodies.coordinates import JointCoordinate as JointCoordinate
+from .bodies.coordinates import PointDistance as PointDistance
+from .bodies.flexible_body import FlexibleBody as FlexibleBody
+from .bodies.ground import GROUND as GROUND
+from .bodies.ground import Ground as Ground
+from .bodies.markers import Marker as Marker
+from .bodies.rigid_body import RigidBody as RigidBody
+from .errors import ConvergenceError as ConvergenceError
+from .errors import FloatframeError as FloatframeError
+from .errors import ModelError as ModelError
+from .errors import ResultsError as ResultsError
+from .errors import SystemFileError as SystemFileError
+from .flexible_parts import FlexiblePart as FlexiblePart
+from .flexible_parts import corotational as corotational
+from .flexible_parts import finite_segments as finite_segments
 from .forces import BodyLoad as BodyLoad
 from .forces import Bushing as Bushing
 from .forces import Gravity as Gravity
@@ -63,14 +50,7 @@ from .forces import PointForce as PointForce
 from .forces import SphereContact as SphereContact
 from .forces import SpringDamper as SpringDamper
 from .forces import UserForce as UserForce
-from .ground import GROUND as GROUND
-from .ground import Ground as Ground
-from .initial import ConsistentState as ConsistentState
-from .initial import consistent_state as consistent_state
-from .initial import mobility as mobility
-from .integration import Progress as Progress
-from .integration import integrate as integrate
-from .integration import resume as resume
+from .functions.time_functions import TimeFunction as TimeFunction
 from .integrators import EnergyDecaying as EnergyDecaying
 from .integrators import EnergyMomentum as EnergyMomentum
 from .integrators import GeneralizedAlpha as GeneralizedAlpha
@@ -79,8 +59,6 @@ from .integrators import Variational as Variational
 from .integrators import hht as hht
 from .integrators import newmark as newmark
 from .integrators import trapezoidal as trapezoidal
-from .joint_results import joint_coordinate as joint_coordinate
-from .joint_results import joint_coordinates as joint_coordinates
 from .joints import ConstantOrientation as ConstantOrientation
 from .joints import CylindricalJoint as CylindricalJoint
 from .joints import DistanceJoint as DistanceJoint
@@ -95,33 +73,45 @@ from .joints import ScrewJoint as ScrewJoint
 from .joints import SlidingJoint as SlidingJoint
 from .joints import SphericalJoint as SphericalJoint
 from .joints import UniversalJoint as UniversalJoint
-from .markers import Marker as Marker
-from .measuring import AngleSensor as AngleSensor
-from .measuring import ControlSensor as ControlSensor
-from .measuring import CoordinateSensor as CoordinateSensor
-from .measuring import CouplerSensor as CouplerSensor
-from .measuring import DisplacementSensor as DisplacementSensor
-from .measuring import ElongationSensor as ElongationSensor
-from .measuring import EnergySensor as EnergySensor
-from .measuring import ModeSensor as ModeSensor
-from .measuring import MomentumSensor as MomentumSensor
-from .measuring import PlaceSensor as PlaceSensor
-from .measuring import ReactionSensor as ReactionSensor
-from .measuring import StrainGauge as StrainGauge
-from .measuring import StressSensor as StressSensor
-from .measuring import VonMisesSensor as VonMisesSensor
-from .measuring import measured as measured
-from .mode_film import animate_mode as animate_mode
-from .mode_film import draw_mode as draw_mode
-from .rigid_body import RigidBody as RigidBody
-from .sensors import interface_motion as interface_motion
-from .sensors import largest_von_mises as largest_von_mises
-from .sensors import nodal_stress as nodal_stress
-from .sensors import point_motion as point_motion
+from .joints.coordinate_coupler import CoordinateCoupler as CoordinateCoupler
+from .motion.events import Event as Event
+from .motion.integration import Progress as Progress
+from .motion.integration import integrate as integrate
+from .motion.integration import resume as resume
+from .pictures.mode_film import animate_mode as animate_mode
+from .pictures.mode_film import draw_mode as draw_mode
+from .results.coordinate_elements import coupler_motion as coupler_motion
+from .results.coordinate_elements import user_force_motion as user_force_motion
+from .results.export import export_csv as export_csv
+from .results.export import export_vtk as export_vtk
+from .results.joint_coordinates import joint_coordinate as joint_coordinate
+from .results.joint_coordinates import joint_coordinates as joint_coordinates
+from .results.place_motion import interface_motion as interface_motion
+from .results.place_motion import largest_von_mises as largest_von_mises
+from .results.place_motion import nodal_stress as nodal_stress
+from .results.place_motion import point_motion as point_motion
+from .results.sensors import AngleSensor as AngleSensor
+from .results.sensors import ControlSensor as ControlSensor
+from .results.sensors import CoordinateSensor as CoordinateSensor
+from .results.sensors import CouplerSensor as CouplerSensor
+from .results.sensors import DisplacementSensor as DisplacementSensor
+from .results.sensors import ElongationSensor as ElongationSensor
+from .results.sensors import EnergySensor as EnergySensor
+from .results.sensors import ModeSensor as ModeSensor
+from .results.sensors import MomentumSensor as MomentumSensor
+from .results.sensors import PlaceSensor as PlaceSensor
+from .results.sensors import ReactionSensor as ReactionSensor
+from .results.sensors import StrainGauge as StrainGauge
+from .results.sensors import StressSensor as StressSensor
+from .results.sensors import VonMisesSensor as VonMisesSensor
+from .results.sensors import measured as measured
+from .results.trajectory import Trajectory as Trajectory
+from .results.trajectory import read_results as read_results
+from .results.validity import ValidityNote as ValidityNote
+from .start.initial import ConsistentState as ConsistentState
+from .start.initial import consistent_state as consistent_state
+from .start.initial import mobility as mobility
 from .state import State as State
-from .study_file import read_study as read_study
+from .studies.study import run_study as run_study
+from .studies.study_file import read_study as read_study
 from .system import System as System
-from .time_functions import TimeFunction as TimeFunction
-from .trajectory import Trajectory as Trajectory
-from .trajectory import read_results as read_results
-from .validity import ValidityNote as ValidityNote

@@ -2,11 +2,13 @@
 
 from typing import Any
 
+from fe_models.foundation.errors import ReportedError
+
 __all__ = ["ConvergenceError", "FloatframeError", "ModelError", "ResultsError", "SystemFileError"]
 
 
-class FloatframeError(Exception):
-    """Root of every error that `floatframe` raises on purpose; its text is meant for the user."""
+class FloatframeError(ReportedError):
+    """Root of every error that `floatframe` raises on purpose."""
 
 
 class ModelError(FloatframeError, ValueError):

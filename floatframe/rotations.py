@@ -7,7 +7,7 @@ that R_dot = R tilde(omega_B).
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 
 __all__ = [
     "euler_parameter_rates",

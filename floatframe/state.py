@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from cms.arrays import Array, frozen
+from fe_models.foundation.arrays import Array, frozen
 
 __all__ = ["State"]
 

@@ -2,29 +2,30 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from cms.units import Units, unit_system
-from cms.words import nearest
-from floatframe.couplers import CoordinateCoupler
+from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.words import nearest
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
-from floatframe.flexible_body import FlexibleBody
 from floatframe.forces import Force, Gravity
-from floatframe.ground import GROUND
 from floatframe.joints import Joint
-from floatframe.rigid_body import RigidBody
+from floatframe.joints.coordinate_coupler import CoordinateCoupler
 
-if TYPE_CHECKING:
-    from floatframe.analyses.channels import AnyChannel
-    from floatframe.compiled import CompiledSystem
-    from floatframe.events import Event
-    from floatframe.measuring import Sensor
-
-__all__ = ["Body", "System"]
+__all__ = ["Body", "Named", "System"]
 
 Body = RigidBody | FlexibleBody
 REDUNDANT = ("refuse", "minimum-norm")
+
+
+class Named(Protocol):
+    """What a system carries for those who measure, linearise or run it: sensors, channels, events."""
+
+    @property
+    def name(self) -> str:
+        """Its name, used once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +47,10 @@ class System:
     #: constraints that repeat others: "refuse" them by name, or share their reactions ("minimum-norm")
     redundant: str = "refuse"
     couplers: Sequence[CoordinateCoupler] = ()  #: between coordinates of joints
-    sensors: Sequence["Sensor"] = field(default=(), kw_only=True)  #: what is measured on its motions
-    inputs: Sequence["AnyChannel"] = field(default=(), kw_only=True)  #: forces that act on it when it is linearised
-    outputs: Sequence["AnyChannel"] = field(default=(), kw_only=True)  #: what is then observed
-    events: Sequence["Event"] = field(default=(), kw_only=True)  #: what a run does when a value passes a level
+    sensors: Sequence[Named] = field(default=(), kw_only=True)  #: what is measured on its motions
+    inputs: Sequence[Named] = field(default=(), kw_only=True)  #: forces that act on it when it is linearised
+    outputs: Sequence[Named] = field(default=(), kw_only=True)  #: what is then observed
+    events: Sequence[Named] = field(default=(), kw_only=True)  #: what a run does when a value passes a level
     source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
 
     def __post_init__(self) -> None:
@@ -75,13 +76,6 @@ class System:
                     f"the system in {self.units.name!r}; give the system the units of the body, or read the body in "
                     f"those of the system: cms.read(file, units={self.units.name!r})"
                 )
-
-    @cached_property
-    def compiled(self) -> "CompiledSystem":
-        """The system as flat arrays; made once."""
-        from floatframe.compiled import compile_system
-
-        return compile_system(self)
 
     def body(self, name: str) -> Body:
         """Return the body of that name; `ModelError` with the choices if there is none."""

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from cms.fe_body import FEBody, Interface
-from fe_models.cell_shapes import CELL_SHAPES, shape_values
+from fe_models.body.fe_body import FEBody, Interface
 from fe_models.material import Material
-from fe_models.mesh import Mesh
+from fe_models.meshes.cell_shapes import CELL_SHAPES, shape_values
+from fe_models.meshes.mesh import Mesh
 
 STEEL = Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
 ALUMINIUM = Material("aluminium", E=7.0e10, nu=0.33, rho=2700.0)
@@ -57,8 +57,8 @@ def box_mesh(nx=2, ny=2, nz=2, lx=1.0, ly=1.0, lz=1.0, kind="hexahedron") -> Mes
 
 def bar(nx=8, ny=1, nz=1, length=1.0, width=0.05, height=0.04, kind="hexahedron20", material=STEEL) -> FEBody:
     """A free bar along x with rigid interfaces "left" and "right", still to be coupled, at its end faces."""
-    from cms.units import unit_system
-    from fe_models.solid import solid_body
+    from fe_models.foundation.units import unit_system
+    from fe_models.solids.body import solid_body
 
     mesh = box_mesh(nx, ny, nz, length, width, height, kind)
     ends = [

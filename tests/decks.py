@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fe_models.mesh import Mesh
+from fe_models.meshes.mesh import Mesh
 
 ABAQUS = {"tetra": "C3D4", "tetra10": "C3D10", "hexahedron": "C3D8", "hexahedron20": "C3D20", "wedge": "C3D6"}
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from cms.invariants import moments_from_gram
-from cms.load_cases import ReducedLoadCase
-from cms.nodal_sums import NodalSums
-from cms.reduced_body import BodyFrame, ReducedBody, ReducedInterface
-from cms.source_columns import source_columns
-from cms.stress_modes import PointStress
-from cms.units import unit_system
+from cms.reduced_body.invariants import moments_from_gram
+from cms.reduced_body.nodal_sums import NodalSums
+from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.reduced_body.source_columns import source_columns
+from cms.reduced_body.stress import PointStress
+from fe_models.body.load_cases import ReducedLoadCase
+from fe_models.foundation.units import unit_system
 
 
 def synthetic_reduced_body(*, n_q: int = 5, n_nodes: int = 40, seed: int = 0, units: str = "mm-t-s") -> ReducedBody:

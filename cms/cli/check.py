@@ -10,7 +10,7 @@ import typer
 
 from cms.cli.console import print_table, say
 from cms.quality.record import QualityRecord, has_failed, worst
-from cms.reduced_body import ReducedBody
+from cms.reduced_body.reduced_body import ReducedBody
 
 __all__ = ["check_file", "print_records", "quality_report"]
 
@@ -19,7 +19,7 @@ WORDS = {"pass": "passes", "warn": "passes with warnings", "fail": "fails", "inf
 
 def check_file(file: Path, job: Path | None, *, band: float | None, as_json: bool) -> int:
     """Check a modal file and print the verdicts; the exit code is 1 if one fails, else 0."""
-    from cms.modal_file import read
+    from cms.modal_file.file import read
     from cms.quality.body_check import check_body
     from cms.quality.errors import QualityError
 
@@ -39,12 +39,12 @@ def check_file(file: Path, job: Path | None, *, band: float | None, as_json: boo
 def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple[QualityRecord, ...]:
     """Check a reduced body against the full model and the mode set of a job, with one factorisation."""
     from cms.cli.console import stages
-    from cms.cli.job_mode_set import job_mode_set
-    from cms.cli.reduce_job import coupled_body, uncoupled_body
-    from cms.families import Families
-    from cms.job import read_job
-    from cms.quality.full_reference import FullReference, usable_band
+    from cms.families.families import Families
+    from cms.jobs.body_of_job import coupled_body, uncoupled_body
+    from cms.jobs.job import read_job
+    from cms.jobs.mode_set_of_job import job_mode_set
     from cms.quality.reduction_check import check_reduction, require_same_units
+    from cms.quality.reference.full_reference import FullReference, usable_band
 
     job = read_job(path)
     with stages() as clock:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from cms.cli.console import print_table, say, stages
 from cms.errors import CompareError
-from cms.words import nearest
+from fe_models.foundation.words import nearest
 
 if TYPE_CHECKING:
     from cms.compare.comparison import Comparison
-    from cms.fe_body import FEBody
-    from cms.job import Job
-    from cms.quality.transient import Snapshots
+    from cms.jobs.job import Job
+    from cms.quality.reference.transient import Snapshots
+    from fe_models.body.fe_body import FEBody
 
 __all__ = ["CompareRequest", "parse_load", "parse_sets", "run_compare"]
 
@@ -57,7 +57,7 @@ def run_compare(request: CompareRequest) -> None:
     """
     from cms.compare.compare import compare
     from cms.compare.mode_counts import mode_counts
-    from cms.job import read_job
+    from cms.jobs.job import read_job
 
     require_job(request.job)
     counts = mode_counts(request.modes)
@@ -131,7 +131,7 @@ def parse_load(text: str) -> Any:
     CompareError
         If the text is not of this form.
     """
-    from cms.interface_loads import point_load
+    from cms.families.interface_loads import point_load
 
     name, _, rest = text.partition(":")
     values: dict[str, float] = {}
@@ -167,15 +167,15 @@ def output_folder(path: Path) -> Path:
 
 def body_of(job: "Job", clock: Any, reports: list[Any]) -> "FEBody":
     """Return the coupled body of the job."""
-    from cms.cli.reduce_job import job_body
+    from cms.jobs.body_of_job import job_body
 
     return job_body(job, clock, on_report=reports.append)
 
 
 def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[Any]) -> Mapping[str, dict[str, Any]]:
     """Return the options of every set: those of the job for its own set, loads for the sets that take them."""
-    from cms.cli.job_mode_set import set_options
-    from cms.job_reduction import mode_set_options
+    from cms.jobs.mode_set_of_job import set_options
+    from cms.jobs.reduction_table import mode_set_options
 
     options: dict[str, dict[str, Any]] = {}
     for name in names:
@@ -203,7 +203,7 @@ def read_motion(path: Path, body: "FEBody") -> "Snapshots":
     import numpy as np
 
     from cms.errors import CmsError
-    from cms.quality.transient import Snapshots
+    from cms.quality.reference.transient import Snapshots
 
     try:
         with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as file:
@@ -227,8 +227,8 @@ def read_motion(path: Path, body: "FEBody") -> "Snapshots":
 
 def write_report(folder: Path, comparison: "Comparison", stills: int) -> list[Path]:
     """Write HTML, JSON and CSV; return their paths."""
-    from cms.paths import replace_file
     from cms.report import comparison_csv, comparison_html, comparison_json
+    from fe_models.foundation.paths import replace_file
 
     texts = {
         "html": comparison_html(comparison, stills=stills),

@@ -8,7 +8,6 @@ import functools
 import logging
 import os
 import sys
-import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,10 +16,12 @@ from typing import Any, ParamSpec, TypeVar
 
 import typer
 
+from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.stages import Stages
+
 __all__ = [
     "INTERRUPTED",
     "USER_ERROR",
-    "Stages",
     "bug",
     "commands",
     "guarded",
@@ -119,7 +120,7 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(0) from None
         except Exception as error:
-            if isinstance(error, expected_errors()):
+            if isinstance(error, ReportedError):
                 print_error(str(error))
                 raise typer.Exit(USER_ERROR) from None
             if isinstance(error, OSError) and error.filename is not None:
@@ -134,15 +135,6 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
             raise typer.Exit(FAULT) from None
 
     return safe
-
-
-def expected_errors() -> tuple[type[Exception], ...]:
-    """Return the roots of the errors whose text is meant for the user."""
-    from cms.errors import CmsError
-    from fe_models.errors import FeModelsError
-    from floatframe.errors import FloatframeError
-
-    return CmsError, FeModelsError, FloatframeError
 
 
 def bug(error: BaseException) -> str:
@@ -225,31 +217,6 @@ def out() -> Any:
 
 
 # Progress ------------------------------------------------------------------------------------------------------------
-
-
-class Stages:
-    """The stages of a job: a bar for the one that runs, seconds for those that are done."""
-
-    def __init__(self, show: Any = None) -> None:
-        self.seconds: dict[str, float] = {}
-        self._show = show
-
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[Callable[[float], None]]:
-        """Run a stage; the value is a function that takes the finished fraction, 0 to 1."""
-        begin = time.perf_counter()
-        task = self._show.add_task(name, total=None) if self._show is not None else None
-
-        def advance(fraction: float) -> None:
-            if self._show is not None:
-                self._show.update(task, total=1.0, completed=fraction)
-
-        try:
-            yield advance
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
-        if self._show is not None:
-            self._show.update(task, total=1.0, completed=1.0)
 
 
 @contextmanager

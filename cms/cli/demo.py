@@ -39,12 +39,12 @@ def run_demo(folder: Path) -> None:
 
 def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
     """Run every command, each announced."""
-    # the border of the product: the command lines alone may import outward
-    from cms.cli.app import info_command, info_record, reduce_command, view_command
-    from cms.paths import replace_file
-    from floatframe.cli.app import animate_command, plot_command, run_command
+    from cms.cli.info import info_command, info_record
+    from cms.cli.reduce import reduce_command
+    from cms.cli.view import view_command
+    from fe_models.foundation.paths import replace_file
 
-    modal, results = folder / "rod.h5", folder / "swing.h5"
+    modal = folder / "rod.h5"
     step(folder, "cms reduce rod.toml -o rod.h5")
     reduce_command(folder / "rod.toml", modal)
     step(folder, "cms info rod.h5")
@@ -53,13 +53,33 @@ def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
     replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
     step(folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
     view_command(modal, MODE, folder / f"m{MODE}.png", folder / f"m{MODE}.gif")
-    step(folder, "floatframe run swing.toml -o swing.h5")
     wait_for_kernels()
-    run_command(folder / "swing.toml", results)
-    step(folder, "floatframe plot swing.h5 -o swing.png")
-    plot_command(results, folder / "swing.png")
-    step(folder, "floatframe animate swing.h5 -o swing.mp4")
-    animate_command(results, folder / "swing.mp4")
+    run_floatframe(folder, "run swing.toml -o swing.h5")
+    run_floatframe(folder, "plot swing.h5 -o swing.png")
+    run_floatframe(folder, "animate swing.h5 -o swing.mp4")
+
+
+def run_floatframe(folder: Path, words: str) -> None:
+    """Run a command of `floatframe` in the folder, as a user does: this package does not know that one.
+
+    Raises
+    ------
+    typer.Exit
+        With the exit code of the command, which has said what is wrong.
+    """
+    step(folder, f"floatframe {words}")
+    sys.stdout.flush()
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "floatframe.cli", *words.split()], cwd=folder, env=environment(), check=False
+    )
+    if done.returncode:
+        raise typer.Exit(done.returncode)
+
+
+def environment() -> dict[str, str]:
+    """Return the environment of processes beside: they find the packages where this one did."""
+    search = os.pathsep.join([str(Path(cms.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return os.environ | {"PYTHONPATH": search}
 
 
 def list_files(folder: Path) -> None:
@@ -87,9 +107,8 @@ def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
 
     A minute on a fresh machine, which the other steps use as well. Where it fails, the run compiles them itself.
     """
-    search = os.pathsep.join([str(Path(cms.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     worker = subprocess.Popen(
-        [sys.executable, "-P", "-m", "cms.cli.compile_kernels"], env=os.environ | {"PYTHONPATH": search},
+        [sys.executable, "-P", "-m", "floatframe.cli.compile_kernels"], env=environment(),
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
 
@@ -107,7 +126,7 @@ def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
 
 def put_inputs(folder: Path) -> None:
     """Put the mesh and the job files into the folder; a job that was changed there is left alone and told."""
-    from cms.paths import replace_file
+    from fe_models.foundation.paths import replace_file
     from fe_models.parts import shipped_mesh
 
     try:

@@ -8,12 +8,12 @@ import numpy as np
 
 from cms.cli.console import output_path, say, stages
 from cms.errors import JobError, ModalFileError
-from cms.words import nearest
+from fe_models.foundation.words import nearest
 
 if TYPE_CHECKING:
-    from cms.damping import Damping
-    from cms.frames import Frame
-    from cms.reduced_body import ReducedBody
+    from cms.reduced_basis.damping import Damping
+    from cms.reduced_basis.frames import Frame
+    from cms.reduced_body.reduced_body import ReducedBody
 
 __all__ = ["FrameRequest", "frame_of", "numbers", "run_frame"]
 
@@ -42,7 +42,7 @@ def run_frame(request: FrameRequest) -> "ReducedBody":
         If the frame is unknown, the file lacks what it rests on, or the output cannot be written.
     """
     from cms.frame_conversion import convert_frame
-    from cms.modal_file import convert_units, read, write
+    from cms.modal_file.file import convert_units, read, write
 
     frame = frame_of(request)
     default = request.file.with_name(f"{request.file.stem}_{request.to}.h5")
@@ -70,7 +70,7 @@ def frame_of(request: FrameRequest) -> "Frame":
     JobError
         If it is unknown, or an option does not belong to it or cannot be read.
     """
-    from cms.frames import FRAMES, NodalFrame
+    from cms.reduced_basis.frames import FRAMES, NodalFrame
 
     if request.to not in FRAMES:
         raise JobError(f"--to {request.to}: unknown frame{nearest(request.to, FRAMES)}")
@@ -90,7 +90,7 @@ def frame_of(request: FrameRequest) -> "Frame":
 
 def damping_of(request: FrameRequest) -> "Damping | None":
     """Return the damping that replaces that of the file, if one was asked for."""
-    from cms.damping import ModalDamping
+    from cms.reduced_basis.damping import ModalDamping
 
     return None if request.ratio is None else ModalDamping(request.ratio)
 

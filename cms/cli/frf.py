@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import Array
 from cms.cli.console import output_path, print_table, say
 from cms.quality.errors import QualityError
-from cms.quality.frf import POINTS, compare_responses, frequency_grid
-from cms.quality.port_model import FrequencyResponse, file_response
-from cms.quality.ports import COMPONENTS
-from cms.reduced_body import ReducedBody
-from cms.words import nearest
+from cms.quality.of_reduction.frf import POINTS, compare_responses, frequency_grid
+from cms.quality.reference.port_model import FrequencyResponse, file_response
+from cms.quality.reference.ports import COMPONENTS
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
 
 __all__ = ["FrfRequest", "parse_band", "parse_component", "run_frf"]
 
@@ -38,7 +38,7 @@ class FrfRequest:
 
 def run_frf(request: FrfRequest) -> None:
     """Compute the response, print its peaks, and write what was asked for."""
-    from cms.modal_file import read
+    from cms.modal_file.file import read
 
     frequencies = parse_band(request.band)
     pairs = tuple(parse_component(text) for text in request.components or COMPONENTS[:3])
@@ -103,13 +103,13 @@ def checked_output(path: Path, request: FrfRequest) -> Path:
 def full_response(request: FrfRequest, reduced: ReducedBody, frequencies: Array, damping: float) -> FrequencyResponse:
     """Compute the response of the full model of a job between the two interfaces."""
     from cms.cli.console import stages
-    from cms.cli.reduce_job import coupled_body, uncoupled_body
-    from cms.families import Families
-    from cms.job import read_job
-    from cms.quality.port_model import modal_response
-    from cms.quality.ports import Ports
+    from cms.families.families import Families
+    from cms.jobs.body_of_job import coupled_body, uncoupled_body
+    from cms.jobs.job import read_job
     from cms.quality.reduction_check import require_same_units
-    from cms.quality.reference_response import reference_response
+    from cms.quality.reference.port_model import modal_response
+    from cms.quality.reference.ports import Ports
+    from cms.quality.reference.reference_response import reference_response
 
     assert request.job is not None
     job = read_job(request.job)
@@ -135,7 +135,7 @@ def print_peaks(
     pairs: tuple[tuple[int, int], ...],
 ) -> None:
     """Print the largest peaks of each component, and the error against the full model."""
-    from cms.quality.frf import peaks
+    from cms.quality.of_reduction.frf import peaks
 
     unit = response_unit
     rows = []

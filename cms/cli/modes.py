@@ -10,7 +10,7 @@ import typer
 from cms.cli.console import print_table, say, stages
 from cms.cli.record import body_record
 from cms.mode_set import ModeSet
-from cms.reduced_body import ReducedBody
+from cms.reduced_body.reduced_body import ReducedBody
 
 __all__ = ["list_modes", "mode_record"]
 
@@ -23,9 +23,10 @@ FRAME_WORDS = {
 
 def list_modes(path: Path, *, as_json: bool) -> None:
     """Make the mode set and the reduced body of a job, and print what they consist of; writes no file."""
-    from cms.cli.job_mode_set import job_mode_set
-    from cms.cli.reduce_job import frame_of, job_body
-    from cms.job import read_job
+    from cms.jobs.body_of_job import job_body
+    from cms.jobs.job import read_job
+    from cms.jobs.mode_set_of_job import job_mode_set
+    from cms.jobs.parts_of_job import frame_of
     from cms.reduction import reduce
 
     job = read_job(path)

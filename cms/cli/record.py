@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.invariants import Moments
-from cms.reduced_body import ReducedBody
+from cms.reduced_body.invariants import Moments
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
 
 __all__ = ["body_record", "body_size", "central_inertia", "in_hertz"]
 

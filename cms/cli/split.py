@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cms.errors import JobError
-from cms.job import Job, read_job
-from cms.job_reduction import FRAMES, named_interfaces
-from cms.paths import replace_file
+from cms.jobs.job import Job, read_job
+from cms.jobs.reduction_table import FRAMES, named_interfaces
+from fe_models.foundation.paths import replace_file
 
 if TYPE_CHECKING:
-    from fe_models.split import Cut
+    from fe_models.meshes.split import Cut
 
 __all__ = ["SplitRequest", "direction_of", "places_of", "split_job"]
 
@@ -70,7 +70,7 @@ def split_job(request: SplitRequest) -> list[Path]:
     """
     import tomlkit
 
-    from fe_models.split import split_mesh
+    from fe_models.meshes.split import split_mesh
 
     job = read_job(request.job)
     if request.kind not in CUT_KINDS:
@@ -103,10 +103,10 @@ def split_job(request: SplitRequest) -> list[Path]:
 
 def mesh_of(job: Job) -> Any:
     """Read the mesh of a job that can be cut: of solid cells, of a shell, or of lines."""
-    from cms.cli.job_beams import frame_mesh
-    from cms.cli.job_shells import shell_mesh
+    from cms.jobs.attachments_of_job import frame_mesh
+    from cms.jobs.shell_body import shell_mesh
     from fe_models.importers import read_mesh
-    from fe_models.unused_nodes import drop_unused_nodes
+    from fe_models.meshes.unused_nodes import drop_unused_nodes
 
     if job.body.matrices is not None:
         raise JobError("body.matrices: bare matrices cannot be cut; give the mesh they were made of")
@@ -123,9 +123,9 @@ def mesh_of(job: Job) -> Any:
 
 def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...], cuts: list[str]) -> dict[str, int]:
     """Return interface -> number of the part it is on, from 0; `JobError` if it is on two, or on a cut."""
-    from cms.cli.job_beams import frame_interface
-    from cms.cli.job_shells import shell_interface_of
-    from cms.cli.reduce_job import interface_of
+    from cms.jobs.attachments_of_job import frame_interface
+    from cms.jobs.parts_of_job import interface_of
+    from cms.jobs.shell_body import shell_interface_of
     from fe_models.errors import InterfaceError
 
     maker: Any = shell_interface_of if job.shells else frame_interface if job.sections else interface_of

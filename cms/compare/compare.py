@@ -16,13 +16,13 @@ from cms.compare.reference import Question, full_results, reference_of, solution
 from cms.compare.set_result import set_result
 from cms.compare.verdicts import answer, ranking
 from cms.errors import CompareError
-from cms.families import Families
-from cms.fe_body import FEBody
+from cms.families.families import Families
 from cms.mode_sets import MODE_SETS
-from cms.quality.frf import DAMPING
-from cms.quality.ports import Ports
-from cms.quality.transient import Snapshots
-from cms.words import nearest
+from cms.quality.of_reduction.frf import DAMPING
+from cms.quality.reference.ports import Ports
+from cms.quality.reference.transient import Snapshots
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.words import nearest
 
 __all__ = ["compare"]
 

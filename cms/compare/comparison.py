@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from cms.arrays import Array, IntArray
 from cms.quality.record import QualityRecord
-from cms.units import Units
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.units import Units
 
 __all__ = ["Comparison", "Drawing", "FullResults", "Point", "SetResult"]
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from cms.arrays import Array
-from cms.families import Families
-from cms.independent import Columns, gram, independent_columns
-from cms.quality.ports import Ports
-from cms.sparse_product import SymmetricProduct
-from cms.tall import inner, subtract
+from cms.families.families import Families
+from cms.quality.reference.ports import Ports
+from cms.reduced_basis.independent import Columns, gram, independent_columns
+from cms.solvers.sparse_product import SymmetricProduct
+from cms.solvers.tall import inner, subtract
+from fe_models.foundation.arrays import Array
 
 __all__ = ["Coordinates", "ReferenceBasis"]
 

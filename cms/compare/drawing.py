@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
 from cms.compare.comparison import Drawing
-from cms.fe_body import FEBody
 from cms.rendering.shape import surface_edges
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["draw_modes", "thinned_surface"]
 

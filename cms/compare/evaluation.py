@@ -5,19 +5,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as la
 
-from cms.arrays import Array
 from cms.compare.coordinates import Coordinates
 from cms.compare.free_shapes import Subset
 from cms.compare.full_model import FullModel
-from cms.quality.completeness import NO_ENERGY, StaticCompleteness, completeness_records
-from cms.quality.conditioning import conditioning_record, dropped_record
-from cms.quality.deformation import DeformationError, deformation_record, lengths, nodal_lengths, relative
-from cms.quality.free_basis import FreeBasis
-from cms.quality.frequencies import compare_shapes, frequency_records, mac
-from cms.quality.frf import ResponseComparison, compare_responses, response_record
-from cms.quality.port_model import FrequencyResponse, PortModel, modal_response
+from cms.quality.of_body.conditioning import conditioning_record, dropped_record
+from cms.quality.of_reduction.completeness import NO_ENERGY, StaticCompleteness, completeness_records
+from cms.quality.of_reduction.deformation import DeformationError, deformation_record, lengths, nodal_lengths, relative
+from cms.quality.of_reduction.free_basis import FreeBasis
+from cms.quality.of_reduction.frequencies import compare_shapes, frequency_records, mac
+from cms.quality.of_reduction.frf import ResponseComparison, compare_responses, response_record
+from cms.quality.of_reduction.residuals import ResidualBounds, residual_record
 from cms.quality.record import QualityRecord, judge
-from cms.quality.residuals import ResidualBounds, residual_record
+from cms.quality.reference.port_model import FrequencyResponse, PortModel, modal_response
+from fe_models.foundation.arrays import Array
 
 __all__ = ["Reference", "drawn_entry", "judge_subset"]
 
@@ -64,7 +64,7 @@ def nodal_root(c: Coordinates) -> Array:
 def frequency_part(
     reference: Reference, c: Coordinates, basis: FreeBasis, Phi: Array, root: Array
 ) -> tuple[QualityRecord, ...]:
-    """Free-free frequencies and shapes in the band; see `cms.quality.frequencies`."""
+    """Free-free frequencies and shapes in the band; see `cms.quality.of_reduction.frequencies`."""
     n, time, shapes = reference.full.n_band, reference.time, basis.vibrating
     massed = np.minimum(mac(Phi, shapes, c.M @ shapes), 1.0)
     full, reduced = reference.full.frequencies[:n] / time, basis.frequencies(time)
@@ -116,7 +116,7 @@ def drawn_entry(full: FrequencyResponse) -> tuple[int, int]:
 
 
 def motion_part(reference: Reference, c: Coordinates, basis: FreeBasis, U: Array, root: Array) -> QualityRecord:
-    """Deformation error of the reference motion; see `cms.quality.deformation.deformation_error`."""
+    """Deformation error of the reference motion; see `cms.quality.of_reduction.deformation.deformation_error`."""
     a, X = reference.full.amplitudes, basis.vibrating
     in_M = U - X @ (X.T @ (c.M @ U))
     in_K = U - basis.Phi @ ((basis.Phi.T @ (c.K @ U)) / basis.omega2[:, None])
@@ -156,7 +156,7 @@ def mass_part(reference: Reference, c: Coordinates, basis: FreeBasis, directions
 
 
 def residual_part(reference: Reference, c: Coordinates, basis: FreeBasis) -> QualityRecord:
-    """Residual bound of the frequencies in the band; see `cms.quality.residuals`.
+    """Residual bound of the frequencies in the band; see `cms.quality.of_reduction.residuals`.
 
     |phi - theta G M phi|²_K / theta = theta phiᵀ M G M phi - 1 for phiᵀ M phi = 1, known to about 1e-8 in the bound.
     """

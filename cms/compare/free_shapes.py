@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from cms.arrays import Array, IntArray
 from cms.compare.coordinates import Coordinates
 from cms.errors import ModeSetError
-from cms.finishing import RIGID_ENERGY, elastic_eigenvectors
-from cms.independent import RANK_TOLERANCE
-from cms.quality.free_basis import FreeBasis
+from cms.quality.of_reduction.free_basis import FreeBasis
+from cms.reduced_basis.finishing import RIGID_ENERGY, elastic_eigenvectors
+from cms.reduced_basis.independent import RANK_TOLERANCE
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Subset", "independent_subset", "judged_subset"]
 

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse.linalg as sla
 
-from cms.arrays import Array, frozen
 from cms.compare.pulse import Pulse
 from cms.errors import CompareError
-from cms.families import Families
-from cms.fe_body import FEBody
-from cms.paths import replace_file
-from cms.quality.completeness import acceleration_labels
-from cms.quality.port_model import PortModel
-from cms.quality.ports import Ports
-from cms.quality.reference_response import reference_response
-from cms.quality.transient import Snapshots, transient
-from cms.rigid_modes import geometric_rigid_modes
+from cms.families.families import Families
+from cms.families.rigid_modes import geometric_rigid_modes
+from cms.quality.of_reduction.completeness import acceleration_labels
+from cms.quality.reference.port_model import PortModel
+from cms.quality.reference.ports import Ports
+from cms.quality.reference.reference_response import reference_response
+from cms.quality.reference.transient import Snapshots, transient
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.paths import replace_file
 
 __all__ = ["FullModel", "read_full_model", "reference_digest", "solve_full_model", "write_full_model"]
 

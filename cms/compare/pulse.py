@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
 from cms.errors import CompareError
-from cms.fe_body import FEBody
-from cms.quality.transient import LoadHistory, interface_forces
+from cms.quality.reference.transient import LoadHistory, interface_forces
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
 
 __all__ = ["Pulse", "default_pulse"]
 

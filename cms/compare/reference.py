@@ -18,10 +18,10 @@ from cms.compare.full_model import (
 )
 from cms.compare.pulse import Pulse
 from cms.errors import CompareError
-from cms.families import Families
-from cms.quality.frf import LOWEST, frequency_grid
-from cms.quality.port_model import modal_response
-from cms.quality.transient import Snapshots
+from cms.families.families import Families
+from cms.quality.of_reduction.frf import LOWEST, frequency_grid
+from cms.quality.reference.port_model import modal_response
+from cms.quality.reference.transient import Snapshots
 
 __all__ = ["Question", "Solution", "full_results", "reference_of", "solution"]
 

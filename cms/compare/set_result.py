@@ -8,7 +8,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cms.arrays import Array
 from cms.compare.comparison import Point, SetResult
 from cms.compare.coordinates import Coordinates, ReferenceBasis
 from cms.compare.evaluation import Reference, judge_subset
@@ -16,9 +15,10 @@ from cms.compare.free_shapes import judged_subset
 from cms.compare.subsets import SUBSETS
 from cms.compare.verdicts import is_good, set_sentence, shown_point
 from cms.errors import CmsError, ModeSetError
-from cms.families import Families
+from cms.families.families import Families
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
+from fe_models.foundation.arrays import Array
 
 __all__ = ["set_result"]
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
 from cms.mode_set import ModeSet
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["SUBSETS", "Subset", "column_subset", "leading_subset", "residual_subset", "whole_set"]
 

@@ -5,18 +5,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.axis_functions import AXIS_FUNCTIONS, AxisFunctions, axis_functions
-from cms.coupled_field import coupled_field
 from cms.errors import ModeSetError
-from cms.fe_body import FEBody
+from cms.families.rigid_modes import geometric_rigid_modes
+from cms.families.static_modes import COMPONENTS
 from cms.mode_set import ModeSet
-from cms.rigid_modes import geometric_rigid_modes
-from cms.static_modes import COMPONENTS
-from cms.words import nearest
+from cms.mode_sets.axis_functions import AXIS_FUNCTIONS, AxisFunctions, axis_functions
+from cms.mode_sets.mesh_field import coupled_field
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
 
 if TYPE_CHECKING:
-    from cms.families import Families
+    from cms.families.families import Families
 
 __all__ = ["assumed_modes"]
 

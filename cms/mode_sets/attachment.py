@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from cms.families import Families
-from cms.fe_body import FEBody
-from cms.flexibility import BoundaryConditions
+from cms.families.families import Families
+from cms.families.flexibility import BoundaryConditions
+from cms.families.static_modes import boundary_groups, boundary_labels
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import boundary_block, mode_set, rigid_block, static_block, vibration_block
 from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
-from cms.static_modes import boundary_groups, boundary_labels
+from fe_models.body.fe_body import FEBody
 
 __all__ = ["attachment", "unrestrained_attachment"]
 

@@ -4,19 +4,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.balancing import balance
 from cms.errors import ModeSetError
-from cms.families import Families
-from cms.fe_body import FEBody
-from cms.finishing import elastic_eigenvectors
-from cms.independent import Columns, gram, independent_columns
+from cms.families.families import Families
+from cms.families.receptance import boundary_scale
 from cms.mode_set import ModeSet
+from cms.mode_sets.balancing import balance
 from cms.mode_sets.blocks import mode_set, rigid_block, static_block
 from cms.mode_sets.selection import families_of, require_interfaces
-from cms.receptance import boundary_scale
-from cms.sparse_product import SymmetricProduct
-from cms.tall import combine
+from cms.reduced_basis.finishing import elastic_eigenvectors
+from cms.reduced_basis.independent import Columns, gram, independent_columns
+from cms.solvers.sparse_product import SymmetricProduct
+from cms.solvers.tall import combine
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
 
 __all__ = ["balanced_truncation"]
 
@@ -44,7 +44,7 @@ def balanced_truncation(
     (2) damping: that of the body projected, and a modal ratio, since without damping there is no Gramian
     (3) loads and responses at all boundary dofs, each in the unit in which its own static elastic response is 1, so
         that a stiff direction and a soft one, a force and a moment, count alike
-    (4) position-velocity balancing (`cms.balancing`): one symmetric projection, ranked by its singular values
+    (4) position-velocity balancing (`cms.mode_sets.balancing`): one symmetric projection, ranked by its singular values
 
     The number of directions is that of `n_modes`, or as many as leave a part of at most `tolerance` of the sum of the
     position-velocity singular values. All singular values are in `data` of the set ("hankel", "hankel signs",

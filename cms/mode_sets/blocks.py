@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.eigen import EigenResult
-from cms.families import Families
-from cms.fe_body import FEBody
+from cms.families.families import Families
+from cms.families.static_modes import boundary_groups, boundary_labels
 from cms.mode_set import ModeSet
-from cms.static_modes import boundary_groups, boundary_labels
+from cms.solvers.eigen import EigenResult
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
 
 __all__ = [
     "Block",

@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cms.eigen import EigenResult
-from cms.families import Families
-from cms.fe_body import FEBody
-from cms.flexibility import BoundaryConditions
-from cms.mixed_boundary import free_directions
+from cms.families.families import Families
+from cms.families.flexibility import BoundaryConditions
+from cms.families.mixed_boundary import free_directions
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import Block, constraint_block, inertia_relief_block, mode_set, vibration_block
 from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+from cms.solvers.eigen import EigenResult
+from fe_models.body.fe_body import FEBody
 
 __all__ = ["craig_bampton", "craig_bampton_ir", "guyan"]
 

@@ -5,10 +5,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as la
 
-from cms.arrays import Array
-from cms.eigen import EigenResult
-from cms.families import Families
-from cms.fe_body import FEBody
+from cms.families.families import Families
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import (
     Block,
@@ -20,7 +17,10 @@ from cms.mode_sets.blocks import (
     vibration_block,
 )
 from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
-from cms.tall import combine
+from cms.solvers.eigen import EigenResult
+from cms.solvers.tall import combine
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
 
 __all__ = ["craig_chang", "dual_craig_bampton", "herting", "macneal", "normal_modes", "rubin"]
 
@@ -96,7 +96,7 @@ def macneal(
 ) -> ModeSet:
     """Span of MacNeal's set, that of `rubin`: his reduction differs in the pencil alone, which lacks residual inertia.
 
-    A floating frame needs the inertia of every shape, so here it is kept; `cms.reduced_pencil.macneal_pencil` has the
+    A floating frame needs the inertia of every shape, so here it is kept; `reduced_pencil.macneal_pencil` has the
     pencil itself, to compare. Parameters and errors are those of `rubin`.
     """
     modes = rubin(body, n_modes=n_modes, cutoff=cutoff, verify=verify, families=families)
@@ -113,7 +113,7 @@ def dual_craig_bampton(
 ) -> ModeSet:
     """Span of the dual Craig-Bampton set, that of `rubin`: it differs in its unknowns, which are interface forces.
 
-    A floating frame needs displacements; `cms.reduced_pencil.dual_craig_bampton_pencil` has the pencil itself, to
+    A floating frame needs displacements; `reduced_pencil.dual_craig_bampton_pencil` has the pencil itself, to
     compare. Parameters and errors are those of `rubin`.
     """
     modes = rubin(body, n_modes=n_modes, cutoff=cutoff, verify=verify, families=families)

@@ -9,18 +9,18 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.linalg.lapack import dpstrf
 
-from cms.arrays import Array
-from cms.centrifugal import CENTRIFUGAL
 from cms.errors import FactorizationError, ModeSetError
-from cms.factorization import factorize
-from cms.families import Families
-from cms.fe_body import FEBody
-from cms.independent import Columns, gram
+from cms.families.families import Families
+from cms.families.receptance import boundary_scale, largest_error, receptance_of_pencil
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import mode_set, rigid_block, static_block
 from cms.mode_sets.selection import families_of, require_interfaces
-from cms.receptance import boundary_scale, largest_error, receptance_of_pencil
-from cms.sparse_product import SymmetricProduct
+from cms.reduced_basis.independent import Columns, gram
+from cms.second_order.centrifugal import CENTRIFUGAL
+from cms.solvers.factorization import factorize
+from cms.solvers.sparse_product import SymmetricProduct
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
 
 __all__ = ["krylov"]
 

@@ -6,13 +6,13 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.errors import ModeSetError
-from cms.families import Families
-from cms.fe_body import FEBody
-from cms.flexibility import BoundaryConditions
-from cms.interface_loads import InterfaceLoad, boundary_load
+from cms.families.families import Families
+from cms.families.flexibility import BoundaryConditions
+from cms.families.interface_loads import InterfaceLoad, boundary_load
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import constraint_block, mode_set, vibration_block
 from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+from fe_models.body.fe_body import FEBody
 
 __all__ = ["benfield_hruda"]
 

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from cms.eigen import EigenResult
 from cms.errors import ModeSetError
-from cms.families import Families
-from cms.fe_body import FEBody
+from cms.families.families import Families
+from cms.solvers.eigen import EigenResult
+from fe_models.body.fe_body import FEBody
 
 __all__ = ["checked_modes", "families_of", "require_interfaces"]
 

@@ -8,14 +8,14 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.coupled_field import coupled_field
 from cms.errors import ModeSetError
-from cms.fe_body import FEBody
 from cms.mode_set import ModeSet
+from cms.mode_sets.mesh_field import coupled_field
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
 
 if TYPE_CHECKING:
-    from cms.families import Families
+    from cms.families.families import Families
 
 __all__ = ["user_basis"]
 
@@ -36,7 +36,7 @@ def user_basis(
         A coupled body.
     columns
         Displacement columns over the dofs of the coupled body (n_dof, k), or over those of its mesh (n_mesh_dof, k),
-        which are then brought to the coupled body (`cms.coupled_field`: rigid interfaces take the nearest rigid motion,
+        which are then brought to the coupled body (`mesh_field`: rigid interfaces take the nearest rigid motion,
         and how near that is stands in the options of the set). Or a file: .npy with the array, .npz with `columns` and,
         if need be, `labels` and `frequencies`.
     labels

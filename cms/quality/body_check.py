@@ -1,19 +1,19 @@
 """Everything a reduced body can be asked without its full model."""
 
-from cms.quality.buckling import check_buckling
-from cms.quality.effective_mass import check_driven_mass
-from cms.quality.identities import (
+from cms.quality.of_body.buckling import check_buckling
+from cms.quality.of_body.effective_mass import check_driven_mass
+from cms.quality.of_body.identities import (
     check_energy_shares,
     check_frame_condition,
     check_free_frequencies,
     check_inertia_tensor,
     check_modal_mass,
 )
-from cms.quality.interface_motions import check_interface_motions, check_rigid_interfaces
+from cms.quality.of_body.interface_motions import check_interface_motions, check_rigid_interfaces
+from cms.quality.of_body.step_size import check_damping, check_dropped_columns, check_step_size
+from cms.quality.of_body.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
 from cms.quality.record import QualityRecord
-from cms.quality.step_size import check_damping, check_dropped_columns, check_step_size
-from cms.quality.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
-from cms.reduced_body import ReducedBody
+from cms.reduced_body.reduced_body import ReducedBody
 
 __all__ = ["BODY_CHECKS", "check_body"]
 

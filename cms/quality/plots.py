@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cms.quality.deformation import DeformationError
-from cms.quality.port_model import FrequencyResponse
+from cms.quality.of_reduction.deformation import DeformationError
+from cms.quality.reference.port_model import FrequencyResponse
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

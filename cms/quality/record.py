@@ -13,7 +13,7 @@ import numpy as np
 
 from cms.quality.errors import QualityError
 from cms.quality.limits import LIMITS
-from cms.words import nearest
+from fe_models.foundation.words import nearest
 
 __all__ = ["VERDICTS", "QualityRecord", "Verdict", "has_failed", "information", "judge", "plain", "worst"]
 

@@ -1,25 +1,25 @@
 """Everything a mode set and its reduced body can be asked against the full model."""
 
-from cms.fe_body import FEBody
 from cms.mode_set import ModeSet
 from cms.quality.body_check import check_body
-from cms.quality.completeness import completeness_records, static_completeness
-from cms.quality.conditioning import column_condition, conditioning_record, dropped_record
-from cms.quality.deformation import deformation_error, deformation_record
 from cms.quality.errors import QualityError
-from cms.quality.free_basis import free_basis
-from cms.quality.frequencies import compare_frequencies, frequency_records
-from cms.quality.frf import response_comparison, response_record
-from cms.quality.full_reference import FullReference, usable_band
-from cms.quality.full_shapes import full_shapes, same_body_record
-from cms.quality.held_mass import held_mass, held_mass_record
-from cms.quality.interface_stiffening import has_both_kinds, interface_stiffening, stiffening_record
-from cms.quality.mass_properties import check_grounding, check_invariants, check_mass_properties
-from cms.quality.port_model import port_model
+from cms.quality.of_body.conditioning import column_condition, conditioning_record, dropped_record
+from cms.quality.of_reduction.completeness import completeness_records, static_completeness
+from cms.quality.of_reduction.deformation import deformation_error, deformation_record
+from cms.quality.of_reduction.free_basis import free_basis
+from cms.quality.of_reduction.frequencies import compare_frequencies, frequency_records
+from cms.quality.of_reduction.frf import response_comparison, response_record
+from cms.quality.of_reduction.full_shapes import full_shapes, same_body_record
+from cms.quality.of_reduction.held_mass import held_mass, held_mass_record
+from cms.quality.of_reduction.interface_stiffening import has_both_kinds, interface_stiffening, stiffening_record
+from cms.quality.of_reduction.mass_properties import check_grounding, check_invariants, check_mass_properties
+from cms.quality.of_reduction.residuals import residual_bounds, residual_record
 from cms.quality.record import QualityRecord
-from cms.quality.residuals import residual_bounds, residual_record
-from cms.quality.transient import Snapshots
-from cms.reduced_body import ReducedBody
+from cms.quality.reference.full_reference import FullReference, usable_band
+from cms.quality.reference.port_model import port_model
+from cms.quality.reference.transient import Snapshots
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.body.fe_body import FEBody
 
 __all__ = ["check_reduction", "require_same_units"]
 

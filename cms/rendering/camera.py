@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
 from cms.rendering.scene import Scene
+from fe_models.foundation.arrays import Array
 
 __all__ = ["Camera", "fitted_camera"]
 

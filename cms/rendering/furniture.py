@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import Array
 from cms.rendering.camera import Camera
 from cms.rendering.film import Image
 from cms.rendering.scene import Scene, frame_of
 from cms.rendering.shape import colormap
+from fe_models.foundation.arrays import Array
 
 __all__ = ["Layout", "compose", "layout_of"]
 

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import Array
 from cms.rendering.camera import Camera
 from cms.rendering.film import Image, average_of_blocks
 from cms.rendering.scene import Lines, Scene, Surface, frame_of
 from cms.rendering.shape import colormap, smooth_neighbours, surface_edges, triangle_normals
+from fe_models.foundation.arrays import Array
 
 __all__ = ["matplotlib_view"]
 

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
 from cms.rendering.camera import VIEW_ANGLE, Camera
 from cms.rendering.film import Image
 from cms.rendering.scene import Lines, Scene, Surface, frame_of
 from cms.rendering.shape import FEATURE_ANGLE, colormap, surface_edges
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["pyvista_view"]
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen, frozen_int
 from cms.rendering.errors import SceneError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["Lines", "Scene", "Surface", "Triad", "frame_of"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from cms.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["colormap", "smooth_neighbours", "surface_edges", "triangle_normals"]
 

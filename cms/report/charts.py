@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import Array
 from cms.compare.comparison import Comparison, Point, SetResult
 from cms.quality.limits import LIMITS
 from cms.quality.record import plain
 from cms.report.palette import FULL_MODEL, style_of
 from cms.report.words import share
+from fe_models.foundation.arrays import Array
 
 __all__ = [
     "MAC_HEIGHT",

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import Array
 from cms.compare.comparison import Comparison, Drawing
 from cms.rendering import Lines, RenderError, Scene, Surface, render_picture
 from cms.rendering.shape import colormap
-from cms.view import view_axes
+from cms.report.view import view_axes
+from fe_models.foundation.arrays import Array
 
 __all__ = ["shapes_json", "still_pictures"]
 

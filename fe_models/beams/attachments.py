@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.beams.slices import Slices, second_moments
 from fe_models.errors import BeamError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["PointMass", "RigidLink", "Spring"]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cms.arrays import Array
-from fe_models.beams.line_mesh import LineMesh
 from fe_models.errors import BeamError
+from fe_models.foundation.arrays import Array
+from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["LineGeometry", "line_geometry"]
 

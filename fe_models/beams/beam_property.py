@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import IntArray
-from cms.words import nearest
-from fe_models.beams.line_mesh import LineMesh
 from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.sections import Section
 from fe_models.errors import SectionError
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.words import nearest
 from fe_models.material import Material
+from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["BeamProperty", "assign_properties", "section_of"]
 

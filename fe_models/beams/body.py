@@ -5,20 +5,20 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import scipy.sparse as sp
 
-from cms.arrays import Array, IntArray
-from cms.fe_body import FEBody, Interface, Recovery
-from cms.rigid_modes import rigid_motion_of_points
-from cms.units import Units
 from fe_models.beams.attachments import PointMass, RigidLink, Spring, point_slices, spring_matrix
 from fe_models.beams.axes import line_geometry
 from fe_models.beams.beam_property import BeamProperty, assign_properties, section_of
 from fe_models.beams.elements import Elements
-from fe_models.beams.line_mesh import LineMesh
 from fe_models.beams.links import link_rigidly
 from fe_models.beams.model import BeamModel
 from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.skin import Skin, make_skin
+from fe_models.body.fe_body import FEBody, Interface, Recovery
+from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.errors import BeamError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.units import Units
+from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["beam_body"]
 

@@ -9,7 +9,7 @@ act at the shear centre (y_s, z_s): v_s = v - z_s theta_x, w_s = w + y_s theta_x
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 
 __all__ = ["end_forces_at_centroid", "interpolation", "local_stiffness", "shear_parameter"]
 

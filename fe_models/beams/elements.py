@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
 from fe_models.beams.axes import LineGeometry
 from fe_models.beams.beam_property import BeamProperty
 from fe_models.beams.element import (
@@ -13,6 +12,7 @@ from fe_models.beams.element import (
 )
 from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.slices import Slices
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Elements", "gauss_points"]
 

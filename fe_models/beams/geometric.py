@@ -7,7 +7,7 @@ the strains of a section are Gamma = Rᵀ r' - e and kappa, the axial vector of 
 
 and a twisted fibre at distance o from the axis becomes longer by ½ kappa_x² o² besides. The section force n, the moment
 m and the tension n·e of the fibres work on these second-order terms, and so do the loads off the axis on the second
-order of the rotation of their section (`cms.mass_loads.rotation_work`): the transverse stress of a spinning shaft.
+order of the rotation of their section (`mass_loads.rotation_work`): the transverse stress of a spinning shaft.
 
 n(s) and m(s) are those of the loaded element, in equilibrium with the loads along it: n' + q = 0, m' + e × n + mu = 0.
 Then the geometric stiffness is that of the exact section forces, and it meets a rigid rotation to rounding.
@@ -17,11 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.mass_loads import MassLoads, rotation_work
 from fe_models.beams.attachments import Spring, spring_matrix
 from fe_models.beams.axes import skew
 from fe_models.beams.slices import Slices
+from fe_models.body.mass_loads import MassLoads, rotation_work
+from fe_models.foundation.arrays import Array
 
 __all__ = [
     "BeamLines", "line_geometric_stiffness", "point_geometric_stiffness", "slice_forces", "spring_geometric_stiffness",

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cms.arrays import Array, IntArray
-from cms.errors import BodyError
-from cms.fe_body import Interface
-from fe_models.beams.line_mesh import LineMesh
+from fe_models.body.fe_body import Interface
 from fe_models.errors import InterfaceError
-from fe_models.selections import AnyMesh, Selection
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.selections import AnyMesh, Selection
 
 __all__ = ["NodeIndices", "line_interface", "node_interface"]
 

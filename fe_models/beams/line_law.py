@@ -6,12 +6,12 @@ from functools import cache
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.beam_line import BeamLine, Law
 from fe_models.beams.beam_property import BeamProperty, section_of
 from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.sections import Section
+from fe_models.body.beam_line import BeamLine, Law
 from fe_models.errors import SectionError
+from fe_models.foundation.arrays import Array
 
 __all__ = ["beam_line"]
 

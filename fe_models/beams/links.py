@@ -5,10 +5,10 @@ from collections.abc import Iterable
 import numpy as np
 import scipy.sparse as sp
 
-from cms.elimination import eliminate_dofs
-from cms.fe_body import FEBody
-from cms.rigid_modes import rigid_motion_of_points
 from fe_models.beams.attachments import RigidLink
+from fe_models.body.elimination import eliminate_dofs
+from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.errors import BeamError
 
 __all__ = ["link_rigidly"]

@@ -5,9 +5,6 @@ from functools import cached_property
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
-from cms.errors import BodyError
-from cms.mass_loads import MassLoads
 from fe_models.beams.attachments import Spring, spring_matrix
 from fe_models.beams.axes import LineGeometry
 from fe_models.beams.element import end_forces_at_centroid
@@ -22,13 +19,16 @@ from fe_models.beams.geometric import (
 from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.skin import Skin
 from fe_models.beams.slices import Slices
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
 
 __all__ = ["BeamModel"]
 
 
 @dataclass(frozen=True, eq=False)
 class BeamModel:
-    """Element model of a frame (`cms.fe_body.ElementModel`); its dofs: six per node, then three per skin node."""
+    """Element model of a frame (`fe_body.ElementModel`); its dofs: six per node, then three per skin node."""
 
     nodes: Array  #: of the mesh, (n_nodes, 3) [m]
     pieces: tuple[Slices, ...]  #: of the lines if there are some, then of the point masses if there are some

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
 from fe_models.errors import SectionError
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["circle_points", "ring_cap", "triangulate_polygon"]
 

@@ -1,15 +1,15 @@
-"""Named stress points at the ends of chosen lines (`cms.fe_body.StressPointModel`)."""
+"""Named stress points at the ends of chosen lines (`fe_models.body.fe_body.StressPointModel`)."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen, frozen_int
-from cms.fe_body import FEBody
 from fe_models.beams.model import BeamModel
 from fe_models.beams.section_properties import SectionProperties
+from fe_models.body.fe_body import FEBody
 from fe_models.errors import BeamError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["SectionPoints", "section_points"]
 

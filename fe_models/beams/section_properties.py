@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.errors import SectionError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["SectionProperties", "normal_stress"]
 

@@ -10,11 +10,11 @@ from typing import Protocol
 
 import numpy as np
 
-from cms.arrays import Array
 from fe_models.beams.outline import circle_points, ring_cap, triangulate_polygon
 from fe_models.beams.section_properties import SectionProperties, normal_stress
 from fe_models.beams.torsion import rectangle_torsion_constant, rectangle_torsion_stress
 from fe_models.errors import SectionError
+from fe_models.foundation.arrays import Array
 
 __all__ = ["SECTIONS", "BoxSection", "Circle", "GeneralSection", "ISection", "Rectangle", "Section", "Tube"]
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.beams.axes import LineGeometry
 from fe_models.beams.section_properties import SectionProperties
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["Skin", "make_skin"]
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
 __all__ = ["Slices", "second_moments"]
 

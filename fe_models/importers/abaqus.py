@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
-from cms.words import nearest
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import nearest
 from fe_models.importers.abaqus_deck import DeckBlock, mesh_blocks
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 

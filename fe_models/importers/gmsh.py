@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["read_gmsh"]

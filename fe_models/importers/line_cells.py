@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import IntArray
-from cms.words import nearest
-from fe_models.beams.line_mesh import LineMesh
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.words import nearest
 from fe_models.importers.raw_mesh import RawBlock, RawMesh, collect_cells, require_nodes
+from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["collect_lines", "line_mesh_from_raw"]
 

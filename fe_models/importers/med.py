@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import IntArray
-from fe_models.cell_shapes import CELL_SHAPES
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import IntArray
 from fe_models.importers.node_order import mirrored_cells, mirrored_order
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
+from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_med"]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import IntArray
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import IntArray
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["read_nastran"]

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
-from fe_models.cell_shapes import CELL_SHAPES, cell_jacobians
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians
 
 __all__ = ["mirrored_cells", "mirrored_order", "require_node_order"]
 

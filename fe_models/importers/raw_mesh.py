@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
-from fe_models.boundary import first_of_equal_rows
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.node_order import require_node_order
-from fe_models.mesh import FACE_TYPES, SOLID_TYPES, Mesh
+from fe_models.meshes.boundary import first_of_equal_rows
+from fe_models.meshes.mesh import FACE_TYPES, SOLID_TYPES, Mesh
 
 __all__ = ["RawBlock", "RawMesh", "collect_cells", "mesh_from_raw", "require_nodes"]
 

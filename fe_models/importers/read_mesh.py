@@ -5,9 +5,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TypeVar
 
-from cms.words import nearest
-from fe_models.beams.line_mesh import LineMesh
 from fe_models.errors import FeModelsError, MeshError
+from fe_models.foundation.words import nearest
 from fe_models.importers.abaqus import read_abaqus
 from fe_models.importers.gmsh import read_gmsh
 from fe_models.importers.line_cells import line_mesh_from_raw
@@ -16,8 +15,9 @@ from fe_models.importers.nastran import read_nastran
 from fe_models.importers.raw_mesh import RawMesh, mesh_from_raw
 from fe_models.importers.shell_cells import shell_mesh_from_raw
 from fe_models.importers.vtk import read_vtk
-from fe_models.mesh import Mesh
-from fe_models.shells.shell_mesh import ShellMesh
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = ["MESH_FORMATS", "read_line_mesh", "read_mesh", "read_shell_mesh"]
 

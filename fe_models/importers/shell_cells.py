@@ -4,13 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import IntArray
-from cms.words import nearest
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.words import nearest
 from fe_models.importers.line_cells import collect_lines
 from fe_models.importers.raw_mesh import RawBlock, RawMesh, collect_cells, require_nodes
-from fe_models.shells.shapes import FLAT_TYPES
-from fe_models.shells.shell_mesh import ShellMesh
+from fe_models.meshes.shell_mesh import FLAT_TYPES, ShellMesh
 
 __all__ = ["shell_mesh_from_raw"]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
-from cms.words import nearest
-from fe_models.beams.line_mesh import LineMesh
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import nearest
+from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["read_tables"]
 

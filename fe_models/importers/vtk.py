@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cms.arrays import IntArray
 from fe_models.errors import MeshError
+from fe_models.foundation.arrays import IntArray
 from fe_models.importers.node_order import mirrored_cells, mirrored_order
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 

@@ -7,19 +7,19 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from cms.arrays import Array, IntArray
-from cms.fe_body import FEBody, Interface, Recovery
-from cms.units import Units
 from fe_models.beams.attachments import PointMass, RigidLink, Spring
 from fe_models.beams.beam_property import BeamProperty
 from fe_models.beams.body import assembled, beam_body, skin_rows
-from fe_models.beams.line_mesh import LineMesh
 from fe_models.beams.links import link_rigidly
+from fe_models.body.fe_body import FEBody, Interface, Recovery
 from fe_models.errors import ShellError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.units import Units
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.elements import ShellCells, shell_cells
 from fe_models.shells.model import ShellModel
 from fe_models.shells.quality import WARP_LIMIT, cell_quality
-from fe_models.shells.shell_mesh import ShellMesh
 from fe_models.shells.shell_property import ShellProperty, assign_shell_properties
 from fe_models.shells.skin import ShellSkin, make_shell_skin
 from fe_models.shells.stiffeners import element_model_of, with_frame

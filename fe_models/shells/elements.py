@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
 from fe_models.beams.axes import skew
 from fe_models.beams.slices import Slices
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.shells.geometry import CellPlanes, cell_planes
 from fe_models.shells.quad import quad_strains
 from fe_models.shells.shapes import FlatShape, flat_quadrature, flat_shape

@@ -8,7 +8,7 @@ M = ∫ z sigma, Q; ∫ z² sigma = N t²/12. Over the middle surface, a and b a
     +  Q_a [u,a·psi + ½ e_a·(theta × (theta × n))]
 
 and the loads work on the second order of the rotation, on the normal and on the levers between nodes and middle surface
-(`cms.mass_loads.rotation_work`), to which the nodal forces of the cell itself belong as well. The drilling stress of
+(`mass_loads.rotation_work`), to which the nodal forces of the cell itself belong as well. The drilling stress of
 quads, which vanishes with the mesh, is left out. The mean of Q is that of the nodal forces, Σ f_z x / area: so that the
 cell turns as a whole under the forces it has (triangles carry most of Q by the change of M along their sides).
 """
@@ -17,9 +17,9 @@ from functools import cache
 
 import numpy as np
 
-from cms.arrays import Array, frozen
-from cms.mass_loads import MassLoads, rotation_work
 from fe_models.beams.geometric import slice_couples, slice_forces
+from fe_models.body.mass_loads import MassLoads, rotation_work
+from fe_models.foundation.arrays import Array, frozen
 from fe_models.shells.elements import DRILLING_SHARE, STRAIN_DEGREE, ShellCells, translations
 from fe_models.shells.shapes import flat_quadrature, flat_shape
 from fe_models.shells.strains import inverse_2x2, jacobians

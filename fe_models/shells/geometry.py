@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen
 from fe_models.beams.axes import skew
+from fe_models.foundation.arrays import Array, IntArray, frozen
 
 __all__ = ["CellPlanes", "cell_planes"]
 

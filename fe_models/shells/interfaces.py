@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cms.arrays import Array
-from cms.fe_body import Interface
 from fe_models.beams.interfaces import node_interface
-from fe_models.boundary import facet_weights
-from fe_models.selections import Selection, selected_facets
-from fe_models.shells.shell_mesh import ShellMesh
+from fe_models.body.fe_body import Interface
+from fe_models.foundation.arrays import Array
+from fe_models.meshes.boundary import facet_weights
+from fe_models.meshes.selections import Selection, selected_facets
+from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.skin import cell_edges
 
 __all__ = ["shell_interface"]

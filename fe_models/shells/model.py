@@ -6,10 +6,10 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from cms.arrays import Array, IntArray
-from cms.errors import BodyError
-from cms.mass_loads import MassLoads
 from fe_models.beams.geometric import slice_forces
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
 from fe_models.shells.elements import ShellCells
 from fe_models.shells.geometric import cell_geometric_stiffness
 from fe_models.shells.skin import ShellSkin
@@ -21,7 +21,7 @@ TOP, MIDDLE, BOTTOM = 0.5, 0.0, -0.5  #: heights in the thickness, z/t
 
 @dataclass(frozen=True, eq=False)
 class ShellModel:
-    """Element model of a shell (`cms.fe_body.ElementModel`); its dofs: six per node, then three per skin point."""
+    """Element model of a shell (`fe_body.ElementModel`); its dofs: six per node, then three per skin point."""
 
     n_nodes: int
     groups: tuple[ShellCells, ...]

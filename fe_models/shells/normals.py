@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from cms.arrays import IntArray
-from fe_models.shells.shell_mesh import ShellMesh
+from fe_models.foundation.arrays import IntArray
+from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.skin import cell_edges
 
 __all__ = ["orient_normals"]

@@ -18,7 +18,7 @@ condensed, so that strains are a linear function of the nodal dofs alone.
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from fe_models.shells.shapes import flat_quadrature, flat_shape
 from fe_models.shells.strains import N_STRAINS, FlatStrains, inverse_2x2, jacobians
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cms.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["WARP_LIMIT", "CellQuality", "cell_quality"]
 

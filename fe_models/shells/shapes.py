@@ -5,11 +5,9 @@ from functools import cache
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 
-__all__ = ["FLAT_TYPES", "FlatShape", "flat_quadrature", "flat_shape"]
-
-FLAT_TYPES = ("triangle", "quad")  #: meshio names and node order
+__all__ = ["FlatShape", "flat_quadrature", "flat_shape"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,13 @@
-"""Named stress points at top, middle and bottom of the centres of chosen cells (`cms.fe_body.StressPointModel`)."""
+"""Named stress points at top, middle and bottom of the centres of chosen cells (`fe_body.StressPointModel`)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array, IntArray, frozen
-from cms.fe_body import FEBody
+from fe_models.body.fe_body import FEBody
 from fe_models.errors import ShellError
+from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.shells.elements import ShellCells
 from fe_models.shells.model import BOTTOM, MIDDLE, TOP, ShellModel
 from fe_models.shells.stiffeners import StiffenedModel

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import IntArray
-from cms.words import nearest
 from fe_models.errors import ShellError
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.words import nearest
 from fe_models.material import Material
-from fe_models.shells.shell_mesh import ShellMesh
+from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = ["ShellProperty", "assign_shell_properties"]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from cms.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.shells.elements import ShellCells
 
 __all__ = ["ShellSkin", "cell_edges", "make_shell_skin"]

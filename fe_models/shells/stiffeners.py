@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from cms.arrays import Array, IntArray, frozen_int
-from cms.errors import BodyError
-from cms.fe_body import ElementModel, FEBody, Recovery
-from cms.mass_loads import MassLoads
 from fe_models.beams.model import BeamModel
+from fe_models.body.fe_body import ElementModel, FEBody, Recovery
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.errors import BodyError
 from fe_models.shells.model import ShellModel
 
 __all__ = ["StiffenedModel", "with_frame"]
@@ -17,7 +17,7 @@ __all__ = ["StiffenedModel", "with_frame"]
 
 @dataclass(frozen=True, eq=False)
 class StiffenedModel:
-    """Shell and frame that share nodes (`cms.fe_body.ElementModel`).
+    """Shell and frame that share nodes (`fe_models.body.fe_body.ElementModel`).
 
     Dofs: six per node of the shell, three per skin point of the shell, three per skin point of the frame.
     """

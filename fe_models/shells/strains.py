@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 
 __all__ = ["N_STRAINS", "FlatStrains", "inverse_2x2", "jacobians", "plane_elasticity"]
 

@@ -6,7 +6,7 @@ from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium, ste
 from floatframe.analyses.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies
 from floatframe.analyses.inverse_dynamics import InverseDynamics, drive_forces, inverse_dynamics, with_motors
 from floatframe.analyses.kinematics import kinematics
-from floatframe.analyses.linear_system import LinearSystem, linearize
+from floatframe.analyses.linearization import LinearSystem, linearize
 from floatframe.analyses.parameter_study import Locus, campbell, root_locus
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.sweep import sweep

@@ -1,24 +1,35 @@
 """Channels: named scalars as inputs (a force, a torque) and outputs (a motion, a stress) of a linearised system."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.words import nearest
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
 from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.analyses.marker_jacobian import marker_jacobian
-from floatframe.arrays import array_of_shape, unit_vector
-from floatframe.compiled import CompiledSystem
+from floatframe.bodies.markers import Marker
+from floatframe.checked_values import array_of_shape, unit_vector
+from floatframe.compiling.markers import find_marker
+from floatframe.compiling.system import CompiledSystem
 from floatframe.errors import ModelError
 from floatframe.kernels.model import Work
-from floatframe.marker_data import find_marker
-from floatframe.markers import Marker
+from floatframe.results.sensors.stresses import flexible_body, modes_at
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
-from floatframe.system import System
+from floatframe.system import Named, System
 
-__all__ = ["AnyChannel", "Channel", "CoordinateChannel", "StressChannel", "channel_rows", "channel_units"]
+__all__ = [
+    "AnyChannel",
+    "Channel",
+    "CoordinateChannel",
+    "StressChannel",
+    "channel_rows",
+    "channel_units",
+    "channels_of",
+]
 
 QUANTITIES = ("translation", "rotation")
 RATES = ("displacement", "velocity", "acceleration")
@@ -80,6 +91,11 @@ class StressChannel:
 AnyChannel = Channel | CoordinateChannel | StressChannel
 
 
+def channels_of(carried: Iterable[Named]) -> tuple[AnyChannel, ...]:
+    """Return the inputs or outputs that a system carries as channels: it knows their names only."""
+    return cast(tuple[AnyChannel, ...], tuple(carried))
+
+
 def require_rate(where: str, rate: int) -> None:
     """Raise `ModelError` unless a rate is 0, 1 or 2."""
     if rate not in (0, 1, 2):
@@ -130,8 +146,6 @@ def coordinate_row(system: System, compiled: CompiledSystem, work: Work, channel
 
 def stress_row(system: System, compiled: CompiledSystem, channel: StressChannel) -> Array:
     """Return the row of a stress component, (n_u,)."""
-    from floatframe.measuring.stresses import flexible_body, modes_at
-
     body = flexible_body(system, f"channel {channel.name}", channel.body)
     row = np.zeros(int(compiled.model.u0[-1]))
     i = compiled.body_names.index(channel.body)

@@ -3,15 +3,15 @@
 import numpy as np
 import scipy.linalg as la
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven_motion import Instant, rigid_columns, rigid_equations
 from floatframe.analyses.joint_rates import coordinate_rows, driven_coordinates
-from floatframe.compiled import CompiledSystem
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError
-from floatframe.freedoms import dependent_rows, unit_rows
 from floatframe.joints.rows import HELD
 from floatframe.kernels.model import new_work
-from floatframe.linearization import set_iterate
+from floatframe.start.freedoms import dependent_rows, unit_rows
+from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
 from floatframe.system import System
 
@@ -27,7 +27,7 @@ def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[s
 
     Flexible bodies count as rigid.
     """
-    compiled = system.compiled
+    compiled = compiled_system(system)
     work = new_work(compiled.model)
     work.time[0] = t
     set_iterate(work, state)

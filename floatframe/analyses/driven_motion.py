@@ -21,14 +21,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.compiled import CompiledSystem
-from floatframe.constraint_words import open_joints
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import CompiledSystem
 from floatframe.errors import ConvergenceError
-from floatframe.initial import has_normal_friction
 from floatframe.joints.rows import HELD, HELD_DISTANCES
 from floatframe.kernels.model import Work
-from floatframe.linearization import displaced, in_ground_axes, linearized, set_iterate, solve
+from floatframe.start.constraint_words import open_joints
+from floatframe.start.initial import has_normal_friction
+from floatframe.start.newton_equations import displaced, in_ground_axes, linearized, set_iterate, solve
 from floatframe.state import State
 
 __all__ = ["ELASTICITY", "Elasticity", "Instant", "frozen_bodies", "quasi_static_bodies", "rigid_columns"]

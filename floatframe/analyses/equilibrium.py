@@ -14,15 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from cms.arrays import Array
-from floatframe.analyses.tangents import held_rows, turning_matrices
-from floatframe.arrays import array_of_shape
-from floatframe.compiled import CompiledSystem
+from fe_models.foundation.arrays import Array
+from floatframe.analyses.system_matrices import held_rows, turning_matrices
+from floatframe.checked_values import array_of_shape
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.initial import assembled, checked, require_independent_constraints
 from floatframe.joints.rows import HELD_VELOCITIES
 from floatframe.kernels.model import Work, new_work
-from floatframe.linearization import (
+from floatframe.rotations import rotation_matrix
+from floatframe.start.initial import assembled, checked, require_independent_constraints
+from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
+from floatframe.start.newton_equations import (
     Linearized,
     displaced,
     in_ground_axes,
@@ -31,8 +33,6 @@ from floatframe.linearization import (
     solve,
     with_modal_weight,
 )
-from floatframe.mass_positivity import indefinite_mass_words, indefinite_masses
-from floatframe.rotations import rotation_matrix
 from floatframe.state import State
 from floatframe.system import System
 
@@ -107,7 +107,7 @@ def steady_rotation(
     """
     omega = array_of_shape("steady_rotation: omega", omega, (3,))
     center = array_of_shape("steady_rotation: center", center, (3,))
-    compiled = system.compiled
+    compiled = compiled_system(system)
     model = compiled.model
     rolling = [name for name, row in zip(compiled.owners, model.row_kind, strict=True) if row in HELD_VELOCITIES]
     if rolling:

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.analyses.linear_system import LinearSystem
+from fe_models.foundation.arrays import Array
+from floatframe.analyses.linearization import LinearSystem
 from floatframe.analyses.system_modes import system_modes
 from floatframe.errors import ModelError
 

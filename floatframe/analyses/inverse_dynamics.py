@@ -13,17 +13,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven_motion import Elasticity, quasi_static_bodies
 from floatframe.analyses.joint_rates import driven_coordinates
 from floatframe.analyses.kinematics import kinematics
 from floatframe.errors import ModelError
 from floatframe.forces import JointForce
-from floatframe.joint_results import CoordinateMotion, joint_coordinate
+from floatframe.functions.time_functions import table
+from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
+from floatframe.results.trajectory import Trajectory
 from floatframe.state import State
 from floatframe.system import System
-from floatframe.time_functions import table
-from floatframe.trajectory import Trajectory
 
 __all__ = ["InverseDynamics", "drive_forces", "inverse_dynamics", "with_motors"]
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.analyses.marker_jacobian import marker_jacobian
-from floatframe.compiled import CompiledSystem
+from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
+from floatframe.compiling.system import CompiledSystem
 from floatframe.joints import ScrewJoint, SlidingJoint
 from floatframe.joints.rows import DISTANCE, GAUGE_B, SLIDE, TURN, TURN_B
 from floatframe.kernels.model import Work
-from floatframe.marker_data import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.rotations import tilde
 from floatframe.state import State
 from floatframe.system import System
@@ -72,7 +72,7 @@ def sliding_row(compiled: CompiledSystem, work: Work, k: int, marker_b: MarkerDa
     m = int(model.line_marker[k])
     i = int(model.m_body[m])
     n, first = int(model.n_q[i]), int(model.m_psi0[m])
-    n_0, slope = line[4:7], line[2]  # see kernels/deformed_line.py
+    n_0, slope = line[4:7], line[2]  # see kernels/connections/deformed_line.py
     row = np.zeros(int(model.u0[-1]))
     psi = work.psi[first : first + 3 * n].reshape(3, n)
     of_a = work.R[i] @ np.hstack([np.eye(3), -tilde(work.rho[m]), psi])

@@ -10,24 +10,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven_freedoms import SingularityGuard, free_coordinates
 from floatframe.analyses.driven_motion import ELASTICITY, Elasticity, Instant, frozen_bodies
 from floatframe.analyses.joint_rates import driven_coordinates
 from floatframe.analyses.snapshot import observed_state
-from floatframe.compiled import CompiledSystem
-from floatframe.constraint_words import conflict_of_drives
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.freedoms import constraint_mobility
-from floatframe.initial import assembled, checked
-from floatframe.integration import head_of, joint_rows
 from floatframe.joints.rows import HELD_VELOCITIES
 from floatframe.kernels.model import Rows, Work, new_work
-from floatframe.linearization import displaced
-from floatframe.results import MemorySource, ResultsWriter
+from floatframe.motion.integration import head_of, joint_rows
+from floatframe.results.results_file import MemorySource, ResultsWriter
+from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.start.constraint_words import conflict_of_drives
+from floatframe.start.freedoms import constraint_mobility
+from floatframe.start.initial import assembled, checked
+from floatframe.start.newton_equations import displaced
 from floatframe.state import State
 from floatframe.system import System
-from floatframe.trajectory import Trajectory, read_results
 
 __all__ = ["Kinematics", "kinematics"]
 
@@ -83,7 +83,7 @@ def kinematics(
     if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
         raise ModelError("kinematics: times: expected two or more rising numbers")
     name = next((key for key, value in ELASTICITY.items() if value is elasticity), "user")
-    compiled = system.compiled
+    compiled = compiled_system(system)
     work = new_work(compiled.model)
     work.time[0] = t[0]
     state = compiled.placed if state is None else checked(compiled, state)
@@ -131,7 +131,7 @@ def kinematics(
 
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:
     """Return the motion at the first time; `ModelError` unless the drives decide all of it."""
-    compiled = system.compiled
+    compiled = compiled_system(system)
     rolling = np.flatnonzero(np.isin(compiled.model.row_kind, HELD_VELOCITIES))
     if len(rolling):
         raise ModelError(

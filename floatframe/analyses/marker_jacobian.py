@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.compiled import CompiledSystem
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.markers import MarkerData
+from floatframe.compiling.system import CompiledSystem
 from floatframe.kernels.model import Work
-from floatframe.marker_data import MarkerData
 from floatframe.rotations import right_jacobian, tilde
 
 __all__ = ["marker_jacobian"]

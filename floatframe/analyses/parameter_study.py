@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
-from floatframe.analyses.linear_system import LinearSystem, linearize
+from floatframe.analyses.linearization import LinearSystem, linearize
 from floatframe.analyses.system_modes import system_modes
-from floatframe.arrays import array_of_shape, unit_vector
+from floatframe.checked_values import array_of_shape, unit_vector
 from floatframe.errors import ModelError
 from floatframe.system import System
 

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.compiled import CompiledSystem
-from floatframe.integration import head_of, joint_rows
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.kernels.model import Memory, Rows, Work, new_work
-from floatframe.results import MemorySource
+from floatframe.motion.integration import head_of, joint_rows
+from floatframe.results.results_file import MemorySource
+from floatframe.results.trajectory import Trajectory
 from floatframe.state import State
 from floatframe.system import System
-from floatframe.trajectory import Trajectory
 
 __all__ = ["observed_state", "snapshot"]
 
@@ -25,10 +25,10 @@ def snapshot(
     system: System, state: State, u_dot: Array | None = None, w: Array | None = None, *, t: float = 0.0
 ) -> Trajectory:
     """Return a state, with accelerations and wrenches (zero by default), as a trajectory of one time."""
-    model = system.compiled.model
+    model = compiled_system(system).model
     u_dot = np.zeros(int(model.u0[-1])) if u_dot is None else u_dot
     w = np.zeros(int(model.c_w0[-1])) if w is None else w
-    rows, _ = observed_state(system.compiled, new_work(model), state, u_dot, w, t)
+    rows, _ = observed_state(compiled_system(system), new_work(model), state, u_dot, w, t)
     head = head_of(system, Snapshot(), t, t, 1.0, 1)  # type: ignore[arg-type]
     return Trajectory(head, MemorySource(joint_rows(system, [rows])), is_complete=True)
 

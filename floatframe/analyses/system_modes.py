@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from cms.arrays import Array
-from floatframe.analyses.linear_system import LinearSystem
+from fe_models.foundation.arrays import Array
+from floatframe.analyses.linearization import LinearSystem
 
 __all__ = ["SystemModes", "system_modes"]
 

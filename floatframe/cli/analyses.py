@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
+from floatframe.compiling.system import compiled_system
 
 if TYPE_CHECKING:
     from floatframe.analyses import Equilibrium, LinearSystem, SystemModes
     from floatframe.analyses.channels import AnyChannel
-    from floatframe.body_colors import BodyColor
+    from floatframe.pictures.body_colors import BodyColor
     from floatframe.system import System
 
 __all__ = ["register"]
@@ -57,7 +58,7 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
         [
             (
                 b["name"],
-                vector_words(b["position"], model.compiled.length),
+                vector_words(b["position"], compiled_system(model).length),
                 vector_words(b["rotation_vector"]),
                 f"{b['largest_q']:.4g}",
             )
@@ -66,7 +67,9 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
     )
     if record["reactions"]:
         force = max(abs(value) for r in record["reactions"] for value in r["force"])
-        moment = max(force * model.compiled.length, *(abs(value) for r in record["reactions"] for value in r["moment"]))
+        moment = max(
+            force * compiled_system(model).length, *(abs(value) for r in record["reactions"] for value in r["moment"])
+        )
         print_table(
             "Reactions on markers A, ground axes",
             (
@@ -109,10 +112,10 @@ def eig_command(
 
     Example: floatframe eig rotor.toml --speed 100 --axis z
     """
-    from cms.words import nearest
+    from fe_models.foundation.words import nearest
     from floatframe.analyses import system_modes
-    from floatframe.body_colors import BODY_COLORS
     from floatframe.errors import ModelError
+    from floatframe.pictures.body_colors import BODY_COLORS
 
     if color not in BODY_COLORS:
         raise ModelError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
@@ -171,7 +174,7 @@ def campbell_command(
 
     import numpy as np
 
-    from cms.paths import replace_file
+    from fe_models.foundation.paths import replace_file
     from floatframe.analyses import campbell
     from floatframe.analyses.plots import plot_campbell
     from floatframe.errors import ModelError
@@ -206,7 +209,7 @@ def draw_mode_film(
     model: "System", about: "Equilibrium", modes: "SystemModes", k: int, path: Path, color: "BodyColor"
 ) -> None:
     """Draw a mode into a film, or a picture where the name of the file ends like one."""
-    from floatframe.mode_film import animate_mode, draw_mode
+    from floatframe.pictures.mode_film import animate_mode, draw_mode
 
     with stages(remaining=True) as clock, clock(f"film of mode {k}") as advance:
         if path.suffix.lower() == ".png":
@@ -218,7 +221,7 @@ def draw_mode_film(
 
 def read(path: Path) -> "System":
     """Return the system of a file."""
-    from floatframe.system_file import read_system
+    from floatframe.system_file.read_system import read_system
 
     return read_system(path)[0]
 
@@ -236,7 +239,7 @@ def linearized(
     import numpy as np
 
     from floatframe.analyses import linearize, steady_rotation
-    from floatframe.arrays import unit_vector
+    from floatframe.checked_values import unit_vector
 
     omega = speed * np.asarray(unit_vector("--axis", vector(axis, "--axis")))
     about = steady_rotation(system, omega, center=vector(center, "--center"))
@@ -279,9 +282,9 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
 
     from floatframe.rotations import rotation_log, rotation_matrix
 
-    model, names = system.compiled.model, system.compiled.connection_names
+    model, names = compiled_system(system).model, compiled_system(system).connection_names
     bodies = []
-    for i, name in enumerate(system.compiled.body_names):
+    for i, name in enumerate(compiled_system(system).body_names):
         q = rest.state.q[model.q0[i] : model.q0[i + 1]]
         bodies.append(
             {

@@ -12,11 +12,11 @@ from floatframe.cli import analyses, driven, linear, sweep
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from cms.cli.console import Stages
-    from cms.reduced_body import ReducedBody
-    from floatframe.integration import Progress
+    from cms.reduced_body.reduced_body import ReducedBody
+    from fe_models.foundation.stages import Stages
+    from floatframe.motion.integration import Progress
+    from floatframe.results.trajectory import Trajectory
     from floatframe.system import System
-    from floatframe.trajectory import Trajectory
 
 __all__ = ["app"]
 
@@ -37,11 +37,11 @@ def run_command(
 
     Example: floatframe run swing.toml -o swing.h5
     """
+    from floatframe.bodies.flexible_body import FlexibleBody
     from floatframe.errors import ResultsError
-    from floatframe.flexible_body import FlexibleBody
-    from floatframe.integration import integrate
-    from floatframe.run_section import required_run
-    from floatframe.system_file import read_system
+    from floatframe.motion.integration import integrate
+    from floatframe.system_file.read_system import read_system
+    from floatframe.system_file.run_section import required_run
 
     model, given = read_system(system)
     options = required_run(given, system)
@@ -70,8 +70,8 @@ def resume_command(
     Example: floatframe resume swing.toml -o swing.h5
     """
     from floatframe.errors import ResultsError
-    from floatframe.integration import resume
-    from floatframe.system_file import read_system
+    from floatframe.motion.integration import resume
+    from floatframe.system_file.read_system import read_system
 
     if system.suffix in (".h5", ".segments"):
         raise ResultsError(
@@ -85,7 +85,7 @@ def resume_command(
 
 def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], Trajectory]") -> None:
     """Run a motion with a progress bar; print what it is, or where the part of it is that an interruption left."""
-    from floatframe.results import SEGMENTS
+    from floatframe.results.results_file import SEGMENTS
 
     try:
         with stages(remaining=True) as clock:
@@ -187,7 +187,7 @@ def known_system(trajectory: "Trajectory") -> "System | None":
     """Return the system of a motion from the file its results name; None, with a note, where that cannot be read."""
     from cms.errors import CmsError
     from floatframe.errors import FloatframeError
-    from floatframe.recorded_system import recorded_system
+    from floatframe.system_file.recorded_system import recorded_system
 
     try:
         return recorded_system(trajectory)
@@ -237,7 +237,7 @@ def info_command(
 
     Example: floatframe info swing.h5 --json
     """
-    from floatframe.trajectory import read_results
+    from floatframe.results.trajectory import read_results
 
     if file.suffix == ".toml":
         print_mobility(file, as_json=json)
@@ -256,9 +256,9 @@ def info_command(
 
 def print_mobility(path: Path, *, as_json: bool) -> None:
     """Print the mobility of a system file: counted, true, and constraints that repeat others."""
-    from floatframe.flexible_body import FlexibleBody
-    from floatframe.initial import mobility
-    from floatframe.system_file import read_system
+    from floatframe.bodies.flexible_body import FlexibleBody
+    from floatframe.start.initial import mobility
+    from floatframe.system_file.read_system import read_system
 
     system, _ = read_system(path)
     found = mobility(system)
@@ -318,13 +318,13 @@ def plot_command(
     import io
 
     from cms.errors import CmsError
-    from cms.paths import replace_file
-    from floatframe.animation import bodies_of
+    from fe_models.foundation.paths import replace_file
     from floatframe.errors import ResultsError
-    from floatframe.measuring import measured, sensor_of
-    from floatframe.overview import plot_overview
-    from floatframe.sensor_plots import plot_sensors
-    from floatframe.trajectory import read_results
+    from floatframe.pictures.animation import bodies_of
+    from floatframe.pictures.overview import plot_overview
+    from floatframe.pictures.sensor_plots import plot_sensors
+    from floatframe.results.sensors import measured, sensor_of
+    from floatframe.results.trajectory import read_results
 
     trajectory = read_results(file)
     path = output_path(output, file.with_suffix(".png"), ResultsError, overwrite_of=(file,))
@@ -375,12 +375,12 @@ def animate_command(
 
     Example: floatframe animate swing.h5 --color von-mises
     """
-    from cms.words import nearest
-    from floatframe.animation import animate, bodies_of
-    from floatframe.body_colors import BODY_COLORS
+    from fe_models.foundation.words import nearest
+    from floatframe.bodies.rigid_body import RigidBody
     from floatframe.errors import ResultsError
-    from floatframe.rigid_body import RigidBody
-    from floatframe.trajectory import read_results
+    from floatframe.pictures.animation import animate, bodies_of
+    from floatframe.pictures.body_colors import BODY_COLORS
+    from floatframe.results.trajectory import read_results
 
     if color not in BODY_COLORS:
         raise ResultsError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
@@ -413,10 +413,10 @@ def export_command(
 
     Example: floatframe export swing.h5 -o swing.pvd --every 10
     """
-    from floatframe.animation import bodies_of
     from floatframe.errors import ResultsError
-    from floatframe.export import export_csv, export_vtk
-    from floatframe.trajectory import read_results
+    from floatframe.pictures.animation import bodies_of
+    from floatframe.results.export import export_csv, export_vtk
+    from floatframe.results.trajectory import read_results
 
     trajectory = read_results(file)
     path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file,))

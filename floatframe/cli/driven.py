@@ -9,10 +9,10 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from cms.units import Units
-    from floatframe.joint_results import CoordinateMotion
+    from fe_models.foundation.units import Units
+    from floatframe.results.joint_coordinates import CoordinateMotion
+    from floatframe.results.trajectory import Trajectory
     from floatframe.system import System
-    from floatframe.trajectory import Trajectory
 
 __all__ = ["register"]
 
@@ -110,13 +110,13 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
     """Compute the motion that the drives of a system file decide; return system, motion and where it was written."""
     import numpy as np
 
-    from cms.words import nearest
+    from fe_models.foundation.words import nearest
     from floatframe.analyses.driven_motion import ELASTICITY
     from floatframe.analyses.kinematics import kinematics
     from floatframe.errors import ModelError, ResultsError
-    from floatframe.integration import integrate
-    from floatframe.run_section import required_run
-    from floatframe.system_file import read_system
+    from floatframe.motion.integration import integrate
+    from floatframe.system_file.read_system import read_system
+    from floatframe.system_file.run_section import required_run
 
     choices = [*ELASTICITY, *(["dynamic"] if suffix == ".inverse.h5" else [])]
     if elastic not in choices:
@@ -142,7 +142,7 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
 def coordinates_record(system: "System", motion: "Trajectory") -> dict[str, Any]:
     """Return ranges of all joint coordinates, and forces of the driven ones, in plain types."""
     from floatframe.analyses.joint_rates import driven_coordinates
-    from floatframe.joint_results import joint_coordinates
+    from floatframe.results.joint_coordinates import joint_coordinates
 
     driven = driven_coordinates(system)
     return {
@@ -184,7 +184,7 @@ def coordinate_record(coordinate: "CoordinateMotion", is_driven: bool, units: "U
 
 def print_coordinates(record: dict[str, Any]) -> None:
     """Print the ranges of the joint coordinates."""
-    from cms.units import unit_system
+    from fe_models.foundation.units import unit_system
 
     second = unit_system(record["units"]).time_symbol
     print_table(

@@ -54,7 +54,7 @@ def linearize_command(
 
     Example: floatframe linearize crane.toml --input jib/tip:z --out jib/tip:z
     """
-    from cms.paths import replace_file
+    from fe_models.foundation.paths import replace_file
     from floatframe.errors import ModelError
 
     model = read(system)
@@ -109,7 +109,7 @@ def response_command(
     """
     import io
 
-    from cms.paths import replace_file
+    from fe_models.foundation.paths import replace_file
     from floatframe.analyses.frequency_response import frequency_response, resolved_frequencies
     from floatframe.analyses.plots import plot_frequency_response
     from floatframe.errors import ModelError
@@ -149,12 +149,12 @@ def channel_of(system: "System", text: str) -> "AnyChannel":
     """Return a channel by the name of an input or output, "joint.coordinate" or "body/interface:component"."""
     import numpy as np
 
-    from cms.words import nearest
-    from floatframe.analyses.channels import Channel, CoordinateChannel
+    from fe_models.foundation.words import nearest
+    from floatframe.analyses.channels import Channel, CoordinateChannel, channels_of
+    from floatframe.bodies.markers import Marker
     from floatframe.errors import ModelError
-    from floatframe.markers import Marker
 
-    named = {channel.name: channel for channel in (*system.outputs, *system.inputs)}
+    named = {channel.name: channel for channel in channels_of((*system.outputs, *system.inputs))}
     if text in named:
         return named[text]
     joint, _, coordinate = text.rpartition(".")

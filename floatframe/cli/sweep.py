@@ -9,7 +9,7 @@ import typer
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.analyses.study import StudyTable
+    from floatframe.studies.study import StudyTable
 
 __all__ = ["register"]
 
@@ -43,11 +43,11 @@ def sweep_command(
     """
     import io
 
-    from cms.paths import replace_file
-    from floatframe.analyses.study import run_study
-    from floatframe.analyses.study_plots import plot_study
+    from fe_models.foundation.paths import replace_file
     from floatframe.errors import ModelError
-    from floatframe.study_file import read_study
+    from floatframe.studies.study import run_study
+    from floatframe.studies.study_file import read_study
+    from floatframe.studies.study_plots import plot_study
 
     described = read_study(study)
     inputs = (study, Path(described.system))
@@ -97,7 +97,7 @@ def headers(table: "StudyTable") -> list[str]:
 
 def print_study(table: "StudyTable") -> None:
     """Print the table, and why points failed."""
-    from floatframe.analyses.study_plots import shown
+    from floatframe.studies.study_plots import shown
 
     rows = [
         (

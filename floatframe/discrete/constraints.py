@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.discrete.functions import value_of
 from floatframe.discrete.markers import Load, MarkerStep
 from floatframe.discrete.rotation import dot

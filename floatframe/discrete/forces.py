@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody
 from floatframe.discrete.constraints import Loads, Pair, Span, angle_change, angle_loads, end_angle, slip_change
 from floatframe.discrete.functions import along_imaginary, value_of

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.kernels.model import Model
 
 __all__ = ["along_imaginary", "value_of"]

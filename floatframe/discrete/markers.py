@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody, bent
 from floatframe.discrete.rotation import cross, dot, exponential, left_jacobian, relative_cayley, turned
 from floatframe.kernels.model import Model

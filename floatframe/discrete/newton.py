@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from cms.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, step_of
 from floatframe.discrete.constraints import Span, add_reaction
 from floatframe.discrete.markers import BodyMarker, Load, MarkerStep, marker_step

@@ -10,8 +10,8 @@ the change of a vector that turns with a body and changes in it, exact for a ste
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.linearization import product
+from fe_models.foundation.arrays import Array
+from floatframe.start.newton_equations import product
 
 __all__ = ["cayley", "cayley_parameters", "cross", "dot", "exponential", "left_jacobian", "relative_cayley", "turned"]
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import compiled_system
 from floatframe.discrete.bodies import BodyStep, CentralBody, central_bodies
 from floatframe.discrete.constraints import Loads, Pair, Span, add_reaction, constraint_value, reaction_direction
 from floatframe.discrete.forces import Given, body_load, coordinate_load, point_load, spring_load
@@ -118,7 +119,7 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
     ModelError
         If a joint or force is of a kind that the scheme does not know, or a mode has no mass.
     """
-    compiled = system.compiled
+    compiled = compiled_system(system)
     model = compiled.model
     for force in system.forces:
         if not isinstance(force, KNOWN_FORCES):

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field
 
-from floatframe.arrays import number
+from floatframe.bodies.markers import Named
+from floatframe.checked_values import number
 from floatframe.errors import ModelError
-from floatframe.markers import Named
-from floatframe.time_functions import TimeFunction, constant
+from floatframe.functions.time_functions import TimeFunction, constant
 
 __all__ = ["BodyLoad"]
 
@@ -29,6 +29,6 @@ class BodyLoad:
             object.__setattr__(self, "amplitude", constant(value))
         if not isinstance(self.amplitude, TimeFunction):
             raise ModelError(
-                f"force {self.name!r}: amplitude: expected a number or a function of floatframe.time_functions, got "
+                f"force {self.name!r}: amplitude: expected a number or a function of functions.time_functions, got "
                 f"{self.amplitude!r}"
             )

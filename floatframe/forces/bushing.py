@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.arrays import array_of_shape
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Place
+from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
-from floatframe.markers import Place
-from floatframe.time_functions import TimeFunction
+from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["DEFORMATIONS", "Bushing"]
 
@@ -57,7 +57,7 @@ class Bushing:
                 )
             if not isinstance(function, TimeFunction):
                 raise ModelError(
-                    f"{where}: characteristics: {name}: expected a function of floatframe.time_functions, such as "
+                    f"{where}: characteristics: {name}: expected a function of functions.time_functions, such as "
                     f"table(x, force), got {function!r}"
                 )
         if not (self.stiffness.any() or self.damping.any() or self.preload.any() or self.characteristics):

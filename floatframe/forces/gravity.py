@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from cms.arrays import Array
-from floatframe.arrays import array_of_shape
+from fe_models.foundation.arrays import Array
+from floatframe.checked_values import array_of_shape
 
 __all__ = ["Gravity"]
 

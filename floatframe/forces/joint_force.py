@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from floatframe.arrays import number
+from floatframe.checked_values import number
 from floatframe.errors import ModelError
-from floatframe.time_functions import TimeFunction
+from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["JointForce"]
 
@@ -43,7 +43,7 @@ class JointForce:
         for name in ("motor", "characteristic"):
             if not isinstance(getattr(self, name), TimeFunction | None):
                 raise ModelError(
-                    f"{where}: {name}: expected a function of floatframe.time_functions, got {getattr(self, name)!r}"
+                    f"{where}: {name}: expected a function of functions.time_functions, got {getattr(self, name)!r}"
                 )
         numbers = self.stiffness, self.damping, self.preload, self.friction, self.friction_coefficient
         if not any(numbers) and self.motor is None and self.characteristic is None:

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.arrays import array_of_shape
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Marker
+from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
-from floatframe.markers import Marker
-from floatframe.time_functions import TimeFunction
+from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["PointForce"]
 
@@ -27,7 +27,7 @@ class PointForce:
     def __post_init__(self) -> None:
         if not isinstance(self.amplitude, TimeFunction | None):
             raise ModelError(
-                f"force {self.name!r}: amplitude: expected a function of floatframe.time_functions, got "
+                f"force {self.name!r}: amplitude: expected a function of floatframe.functions.time_functions, got "
                 f"{self.amplitude!r}"
             )
         for name in ("force", "torque"):

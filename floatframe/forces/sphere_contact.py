@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.arrays import number, unit_vector
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Marker
+from floatframe.checked_values import number, unit_vector
 from floatframe.errors import ModelError
-from floatframe.markers import Marker
 
 __all__ = ["DISSIPATIONS", "SphereContact", "exact_dissipation", "hertz_stiffness"]
 

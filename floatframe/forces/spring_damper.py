@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from floatframe.arrays import number
+from floatframe.bodies.markers import Marker
+from floatframe.checked_values import number
 from floatframe.errors import ModelError
-from floatframe.markers import Marker
-from floatframe.time_functions import TimeFunction
+from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["SpringDamper"]
 
@@ -37,7 +37,7 @@ class SpringDamper:
             object.__setattr__(self, "free_length", value)
         if not isinstance(self.characteristic, TimeFunction | None):
             raise ModelError(
-                f"{where}: characteristic: expected a function of floatframe.time_functions, such as table(x, force), "
+                f"{where}: characteristic: expected a function of functions.time_functions, such as table(x, force), "
                 f"got {self.characteristic!r}"
             )
         if self.stiffness == 0 and self.damping == 0 and self.preload == 0 and self.characteristic is None:

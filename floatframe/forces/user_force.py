@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from floatframe.arrays import number
-from floatframe.coordinates import Coordinate, coordinate_words
+from floatframe.bodies.coordinates import Coordinate, coordinate_words
+from floatframe.checked_values import number
 from floatframe.errors import ModelError
-from floatframe.expressions import CONSTANTS, FUNCTIONS
-from floatframe.time_functions import TimeFunction
+from floatframe.functions.expressions import CONSTANTS, FUNCTIONS
+from floatframe.functions.time_functions import TimeFunction
 
 __all__ = ["UserForce"]
 
@@ -16,7 +16,7 @@ __all__ = ["UserForce"]
 class UserForce:
     """Forces Q along coordinates x, and states z with z_dot = g, as functions of t, x, x_dot and z.
 
-    With expressions (see `floatframe.expressions`), in which `phi` is the value of the coordinate of that name,
+    With expressions (see `functions.expressions`), in which `phi` is the value of the coordinate of that name,
     `phi_dot` its rate, `t` the time, and states, parameters and tables go by their names:
 
         UserForce("pid", {"phi": JointCoordinate("hub", "angle")},
@@ -54,7 +54,7 @@ class UserForce:
         for key, function in self.functions.items():
             if not isinstance(function, TimeFunction):
                 raise ModelError(
-                    f"{where}: functions: {key}: expected a function of floatframe.time_functions, got {function!r}"
+                    f"{where}: functions: {key}: expected a function of functions.time_functions, got {function!r}"
                 )
         for key in self.forces:
             if key not in self.coordinates:

@@ -5,7 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError
 from floatframe.kernels.model import Memory, Rows, Work, new_work
 from floatframe.state import State
@@ -66,7 +67,7 @@ class Integrator(Protocol):
 
 def one_step_of(method: Integrator, system: System, t: float, h: float, carry: Carry) -> Carry:
     """Return the memory one step of size h later, as `advance` makes it; `ConvergenceError` if it fails."""
-    work = new_work(system.compiled.model)
+    work = new_work(compiled_system(system).model)
     after, _, _, failure = method.advance(system, carry, work, t0=t, h=h, first=0, n_steps=1, every=2)
     if failure is not None:
         words = f"the step of {h:g} from t = {t:g} failed: {failure.words}"
@@ -96,5 +97,5 @@ def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array,
     from floatframe.kernels.entry import observe_state
 
     memory = memory_of(carry)
-    rows = observe_state(system.compiled.model, work, memory, t)
+    rows = observe_state(compiled_system(system).model, work, memory, t)
     return memory.power, rows

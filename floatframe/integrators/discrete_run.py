@@ -4,15 +4,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import compiled_system
 from floatframe.discrete.bodies import Placed, placed_bodies, state_of
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.newton import StepError
 from floatframe.discrete.system import DiscreteSystem, discrete_system
 from floatframe.errors import ModelError
-from floatframe.initial import consistent_state, solve_accelerations, with_compatible_velocities
 from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
 from floatframe.kernels.model import Rows, Work, new_rows
+from floatframe.start.initial import consistent_state, solve_accelerations, with_compatible_velocities
 from floatframe.state import State
 from floatframe.system import System
 
@@ -53,7 +54,7 @@ class DiscreteScheme:
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the results at the carried state, with accelerations and reactions of the equations of motion."""
-        compiled = system.compiled
+        compiled = compiled_system(system)
         work.time[0] = t
         fitting = with_compatible_velocities(compiled, work, carry.state)
         u_dot, w = solve_accelerations(compiled, work, fitting)
@@ -65,7 +66,7 @@ class DiscreteScheme:
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
         ds = discrete_system(system, type(self).__name__)
-        rows = [new_rows(system.compiled.model, 0)]
+        rows = [new_rows(compiled_system(system).model, 0)]
         n_good, failure = 0, None
         for k in range(first, first + n_steps):
             placed = placed_bodies(ds.bodies, ds.model, carry.state)

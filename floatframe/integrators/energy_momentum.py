@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, step_of
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.newton import solve_step, work_of

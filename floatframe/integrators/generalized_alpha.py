@@ -5,14 +5,14 @@ from math import ceil
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.compiled import CompiledSystem
-from floatframe.constraint_words import open_joints
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
-from floatframe.initial import acceleration_rates, consistent_state, velocity_correction
 from floatframe.integrators.carry import Carry, Failure, memory_of, observed, one_step_of
 from floatframe.kernels.model import MASS, STIFFNESS, Model, Rows, Work, new_rows
-from floatframe.linearization import displaced, modal_diagonals
+from floatframe.start.constraint_words import open_joints
+from floatframe.start.initial import acceleration_rates, consistent_state, velocity_correction
+from floatframe.start.newton_equations import displaced, modal_diagonals
 from floatframe.state import State
 from floatframe.system import System
 
@@ -99,7 +99,7 @@ class GeneralizedAlpha:
     def start(self, system: System, t: float, state: State | None = None) -> Carry:
         """Return the memory at the beginning: the state made consistent, its accelerations and their rates."""
         consistent = consistent_state(system, state, t=t)
-        rates = acceleration_rates(system.compiled, consistent, t)
+        rates = acceleration_rates(compiled_system(system), consistent, t)
         return Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
@@ -126,7 +126,7 @@ class GeneralizedAlpha:
         """
         from floatframe.kernels.entry import advance_steps
 
-        compiled = system.compiled
+        compiled = compiled_system(system)
         carry = self.prepared(system, carry, h, t0 + first * h)
         memory = memory_of(carry)
         n_rows = (first + n_steps) // every - first // every
@@ -195,7 +195,7 @@ class GeneralizedAlpha:
             return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
         if carry.h != 0.0:
             return replace(carry, a=carry.u_dot + h / carry.h * (carry.a - carry.u_dot), h=h, h_next=h)
-        compiled = system.compiled
+        compiled = compiled_system(system)
         h = self.first_step(compiled, h, carry.a)
         alpha_m, alpha_f, beta, _ = self.coefficients
         rates = carry.a / (1 + h**2 * squared_frequencies(compiled.model))
@@ -209,7 +209,7 @@ class GeneralizedAlpha:
         """Say why a step failed."""
         from floatframe.kernels.generalized_alpha import INACCURATE, SINGULAR_BODY, SINGULAR_CONNECTION
 
-        compiled = system.compiled
+        compiled = compiled_system(system)
         status, _, _, index, excess = outcome
         if status == SINGULAR_BODY:
             name = compiled.body_names[index]

@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.compiled import CompiledSystem
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import FloatframeError, ModelError
-from floatframe.initial import assembled, consistent_state, solve_accelerations, with_compatible_velocities
 from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
 from floatframe.kernels.model import COUPLER, USER_FORCE, Rows, Work, new_rows, new_work
 from floatframe.rotations import euler_parameter_rates
+from floatframe.start.initial import assembled, consistent_state, solve_accelerations, with_compatible_velocities
 from floatframe.state import State
 from floatframe.system import System
 
@@ -47,7 +47,7 @@ class Ida:
     def start(self, system: System, t: float, state: State | None = None) -> Carry:
         """Return the memory at the beginning, from a state made consistent."""
         solver_class()
-        compiled = system.compiled
+        compiled = compiled_system(system)
         for c, name in enumerate(compiled.connection_names):
             if compiled.model.c_law[c] in (COUPLER, USER_FORCE):
                 raise ModelError(f"Ida: {name!r} has a memory of its own, which this scheme does not know; use another")
@@ -68,7 +68,7 @@ class Ida:
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
-        compiled = system.compiled
+        compiled = compiled_system(system)
         own = new_work(compiled.model)
         t = t0 + h * np.arange(first, first + n_steps + 1)
         made = Motion(compiled, own)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, still
 from floatframe.discrete.constraints import Span, add_reaction, rate_in_time
 from floatframe.discrete.markers import Load

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.arrays import unit_vector
+from fe_models.foundation.arrays import Array
+from floatframe.checked_values import unit_vector
 from floatframe.errors import ModelError
-from floatframe.time_functions import TimeFunction, constant
+from floatframe.functions.time_functions import TimeFunction, constant
 
 __all__ = ["axis_in_b", "checked_axes", "checked_motions", "normals_of", "turning_frame"]
 
@@ -58,7 +58,7 @@ def checked_motions(joint: Any) -> None:
         motions[name] = constant(motion) if isinstance(motion, int | float) else motion
         if not isinstance(motions[name], TimeFunction):
             raise ModelError(
-                f"{where}: {name}: expected a function of floatframe.time_functions or a number, got {motion!r}; a "
-                "Python function can be sampled with floatframe.time_functions.sampled"
+                f"{where}: {name}: expected a function of functions.time_functions or a number, got {motion!r}; a "
+                "Python function can be sampled with floatframe.functions.time_functions.sampled"
             )
     object.__setattr__(joint, "motions", motions)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.arrays import rotation_of
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Place
+from floatframe.checked_values import rotation_of
 from floatframe.joints.rows import FORCE, GAUGE, MOMENT, Row, orientation_rows
-from floatframe.markers import Place
 
 __all__ = ["ConstantOrientation"]
 

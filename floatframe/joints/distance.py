@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.arrays import number
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Place
+from floatframe.checked_values import number
 from floatframe.errors import ModelError
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import checked_motions
 from floatframe.joints.rows import DISTANCE, NO_MOMENT, ROD, Row
-from floatframe.markers import Place
-from floatframe.time_functions import TimeFunction
 
 __all__ = ["DistanceJoint"]
 

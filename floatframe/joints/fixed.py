@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from cms.arrays import Array
-from floatframe.arrays import rotation_of
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Place
+from floatframe.checked_values import rotation_of
 from floatframe.joints.rows import MOMENT, Row, orientation_rows, point_rows
-from floatframe.markers import Place
 
 __all__ = ["FixedJoint"]
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Place
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import checked_axes, checked_motions, normals_of
 from floatframe.joints.rows import NO_MOMENT, SLIDE, Row, arm_rows, slide_row
-from floatframe.markers import Place
-from floatframe.time_functions import TimeFunction
 
 __all__ = ["PointOnPlane"]
 

@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.arrays import number
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Place
+from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.joints.axis_frame import checked_axes, normals_of
 from floatframe.joints.rows import MOMENT_B, RIM, RIM_HEIGHT, ROLL, Row, arm_rows
-from floatframe.markers import Place
 
 __all__ = ["RollingDisc"]
 

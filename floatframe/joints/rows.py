@@ -24,10 +24,10 @@ d = r_B - r_A and f(t) the prescribed motion of a row (constant c without):
               TWIST_B      TWIST about an axis of B
               RIM x        N - rho × F = 0, along x in ground axes     the force acts at the rim of a disc on B
 
-Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/deformed_line.py.
+Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/connections/deformed_line.py.
 
 rho leads from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
-kernels/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is COUPLE.
+connections/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is COUPLE.
 
 Joints whose points coincide need one moment (N = M), the others take the force at the point of B and have ARM rows.
 """
@@ -37,8 +37,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.time_functions import TimeFunction
+from fe_models.foundation.arrays import Array
+from floatframe.functions.time_functions import TimeFunction
 
 __all__ = [
     "ARM",

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array
-from floatframe.arrays import unit_vector
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Marker, Place
+from floatframe.checked_values import unit_vector
 from floatframe.errors import ModelError
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import checked_motions
 from floatframe.joints.rows import LINE, LINE_FREE, LINE_TURN, MOMENT, NO_MOMENT, Row, orientation_rows
-from floatframe.markers import Marker, Place
-from floatframe.time_functions import TimeFunction
 
 __all__ = ["SlidingJoint"]
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Place
 from floatframe.joints.rows import NO_MOMENT, Row, point_rows
-from floatframe.markers import Place
 
 __all__ = ["SphericalJoint"]
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.arrays import Array
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Place
 from floatframe.errors import ModelError
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import checked_axes, checked_motions
 from floatframe.joints.rows import DOT, MOMENT, Row, point_rows, turn_row, turn_row_b
-from floatframe.markers import Place
-from floatframe.time_functions import TimeFunction
 
 __all__ = ["UniversalJoint"]
 

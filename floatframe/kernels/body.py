@@ -11,12 +11,12 @@ W_ab = S_ab q, 1C(q) = 1C + K_t q, s = S + 1C q + 1/2 qᵀ K_t q (K_t, K_r: zero
     (2) s × a + J alpha + Σ B_k q_ddot_k + q_dotᵀK_r q_dot + 2 (Σ q_dot_k D_k) omega + omega × (J omega)  = tau
     (3) 1C_k(q)·a + B_k·alpha + (M q_ddot)_k + 2 Y_k·omega - omegaᵀ D_k omega + (D q_dot + K q)_k         = h_k
 
-The matrices K_ab and K_r of a stiffened body are part of its S_ab (`floatframe.stiffening`), so that B, D and J hold
+The matrices K_ab and K_r of a stiffened body are part of its S_ab (`compiling.stiffening`), so that B, D and J hold
 them as they are written here. One pass over S_ab (9 n² numbers), one over 4C (3 n²), and over K_t, K_r (6 n²) carry
 the cost.
 """
 
-from floatframe.kernels.compilation import inner, view
+from floatframe.kernels.compiler.compilation import inner, view
 from floatframe.kernels.dense import add_products
 from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.kernels.rotation import cross

@@ -1,6 +1,6 @@
 """Small dense matrices: LU factorisation with partial pivoting, and solves. Row-major, in place."""
 
-from floatframe.kernels.compilation import inner
+from floatframe.kernels.compiler.compilation import inner
 
 __all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns"]
 

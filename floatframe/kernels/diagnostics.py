@@ -19,17 +19,17 @@ from floatframe.joints.rows import (
     TWIST_B,
 )
 from floatframe.kernels.body import body_mass_product, modal_term
-from floatframe.kernels.compilation import inner
-from floatframe.kernels.connection import normal_force, row_rate, spring_tension
-from floatframe.kernels.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
-from floatframe.kernels.coupler import coupler_power
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.connection import normal_force, row_rate, spring_tension
+from floatframe.kernels.connections.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
+from floatframe.kernels.connections.coupler import coupler_power
+from floatframe.kernels.connections.pair_force import pair_energy, pair_power
+from floatframe.kernels.connections.relative_motion import loaded_axis, loaded_coordinate
+from floatframe.kernels.connections.time_function import time_function
+from floatframe.kernels.connections.user_force import user_force_power
 from floatframe.kernels.marker import rotate, rotate_back
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, N_DRIFTS, SPRING, STIFFNESS, USER_FORCE
-from floatframe.kernels.pair_law import pair_energy, pair_power
-from floatframe.kernels.relative_motion import loaded_axis, loaded_coordinate
 from floatframe.kernels.rotation import cross
-from floatframe.kernels.time_function import time_function
-from floatframe.kernels.user_force import user_force_power
 
 __all__ = ["diagnose", "power"]
 

@@ -8,16 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from cms.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels import source_digest
-from floatframe.kernels.compilation import entry
-from floatframe.kernels.connection import constraint_rates
+from floatframe.kernels.compiler.compilation import entry
+from floatframe.kernels.compiler.structure import as_memory, as_model, as_rows, as_work, table_of
+from floatframe.kernels.connections.connection import constraint_rates
 from floatframe.kernels.diagnostics import power
 from floatframe.kernels.evaluation import evaluate, linearize
 from floatframe.kernels.generalized_alpha import DONE, SINGULAR_BODY, SINGULAR_CONNECTION, advance, write_row
 from floatframe.kernels.model import Memory, Model, Rows, Work, new_rows
 from floatframe.kernels.schur import correction, factorize_bodies
-from floatframe.kernels.structure import as_memory, as_model, as_rows, as_work, table_of
 
 __all__ = [
     "Outcome",

@@ -1,12 +1,12 @@
 """Evaluation of the whole system at one iterate: residuals, and their derivatives body by body."""
 
 from floatframe.kernels.body import body_forces, body_tangent
-from floatframe.kernels.compilation import inner
-from floatframe.kernels.connection import connection_derivatives, connection_rows
-from floatframe.kernels.deformed_line import slide_marker
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.connection import connection_derivatives, connection_rows
+from floatframe.kernels.connections.deformed_line import slide_marker
+from floatframe.kernels.connections.time_function import time_function
 from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, rotate, wrench_to_body
 from floatframe.kernels.rotation import right_jacobian
-from floatframe.kernels.time_function import time_function
 
 __all__ = ["evaluate", "linearize", "tangent_of_body"]
 

@@ -2,14 +2,14 @@
 
 import math
 
-from floatframe.kernels.compilation import inner
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.user_force import resize_states
 from floatframe.kernels.diagnostics import diagnose, power
 from floatframe.kernels.evaluation import evaluate
 from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
 from floatframe.kernels.schur import correction, factorize_bodies
 from floatframe.kernels.step_start import begin_step
-from floatframe.kernels.user_force import resize_states
 
 __all__ = ["DIVERGED", "DONE", "INACCURATE", "SINGULAR_BODY", "SINGULAR_CONNECTION", "advance", "write_row"]
 

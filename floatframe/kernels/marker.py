@@ -9,7 +9,7 @@ derivative (t: rows of rho, r: rows of th), E = exp(th), T' = left Jacobian at t
     wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_t(q)ᵀ f + (T' Psi_r(q))ᵀ m
 """
 
-from floatframe.kernels.compilation import inner
+from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.dense import add_products
 from floatframe.kernels.rotation import cross, exp_matrix, left_jacobian, left_jacobian_derivative
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cms.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = [
     "BUSHING",
@@ -100,7 +100,7 @@ class Model(NamedTuple):
     row_soft: Array  #: compliance over c_k, zero but for redundant constraints, (n_w,)
     row_force0: IntArray  #: forces along its coordinate: first, and the end, (n_w,)
     row_force1: IntArray  #: (n_w,)
-    joint_forces: Array  #: columns as in kernels/coordinate_force.py, (n_joint_forces, 7)
+    joint_forces: Array  #: columns as in kernels/connections/coordinate_force.py, (n_joint_forces, 7)
     joint_force_motor: IntArray  #: function of time, -1 for none, (n_joint_forces,)
     joint_force_table: IntArray  #: function of the coordinate, -1 for none, (n_joint_forces,)
     piece0: IntArray  #: first piece of each function of time, and the end, (n_functions + 1,)
@@ -111,8 +111,8 @@ class Model(NamedTuple):
     springs: Array  #: stiffness, damping, free length, preload, (n_springs, 4)
     bushings: Array  #: stiffness, damping (36 each), preload (6), (n_bushings, 78)
     bushing_table: IntArray  #: force as a function of each deformation, -1 for none, (n_bushings, 6)
-    contacts: Array  #: columns as in kernels/contact.py, (n_contacts, 9)
-    # coordinates of couplers and user forces, and the forces along them, see kernels/port.py
+    contacts: Array  #: columns as in kernels/connections/contact.py, (n_contacts, 9)
+    # coordinates of couplers and user forces, and the forces along them, see kernels/connections/element_coordinate.py
     port0: IntArray  #: first port of each coupler, then of each user force, and the end, (n_networks + 1,)
     p_a: IntArray  #: marker A, (n_p,)
     p_b: IntArray  #: marker B, (n_p,)
@@ -122,7 +122,7 @@ class Model(NamedTuple):
     p_factor: Array  #: coefficient in a coupler, (n_p,)
     p_core: IntArray  #: row of the unknown that is its force, or of the multiplier, (n_p,)
     core: IntArray  #: row of the multiplier of each coupler, of the first force of each user force, (n_networks,)
-    # markers that slide along the deformed line through stations, see kernels/deformed_line.py
+    # markers that slide along the deformed line through stations, see kernels/connections/deformed_line.py
     m_line: IntArray  #: line of a sliding marker, -1 for none, (n_m,)
     line_marker: IntArray  #: the marker that slides, its position that of s = 0, (n_lines,)
     line_other: IntArray  #: marker B, (n_lines,)
@@ -140,7 +140,7 @@ class Model(NamedTuple):
     state_row: IntArray  #: row of each state; those of its rate and algorithmic rate follow, (n_states,)
     state_start: Array  #: values at the start, (n_states,)
     tape0: IntArray  #: first operation of each expression, and the end, (n_tapes + 1,)
-    tape_op: IntArray  #: codes of floatframe.expressions, (n_operations,)
+    tape_op: IntArray  #: codes of floatframe.functions.expressions, (n_operations,)
     tape_a: IntArray  #: operands, (n_operations,)
     tape_b: IntArray  #: (n_operations,)
     tape_c: Array  #: constants, (n_operations,)
@@ -207,12 +207,12 @@ class Work(NamedTuple):
     m_omega: Array  #: angular velocity, ground axes, (n_m, 3)
     m_wrench: Array  #: force and moment on the marker, ground axes, (n_m, 6)
     m_bias: Array  #: acceleration and angular acceleration at zero u_dot, ground axes, (n_m, 6)
-    line: Array  #: place and shape at the sliding markers, see kernels/deformed_line.py, (n_lines, 16)
+    line: Array  #: place and shape at the sliding markers, see kernels/connections/deformed_line.py, (n_lines, 16)
     # connections
     g: Array  #: residual of the rows, scaled, (n_w,)
     P: Array  #: derivative of the rows by marker motion (r, phi, v, omega), ground axes, (n_m, most rows, 12)
     V: Array  #: derivative of the rows by their own wrench, (n_c, most rows, most rows)
-    pair: Array  #: what a bushing or contact makes of the motion of its markers, see kernels/pair_law.py, (128,)
+    pair: Array  #: what a bushing or contact makes of the motion of its markers, see connections/pair_force.py, (128,)
     # user forces
     inputs: Array  #: t, values and rates of the coordinates, states
     outputs: Array  #: forces, rates of states
@@ -221,7 +221,7 @@ class Work(NamedTuple):
     tape: Array  #: results of the operations of an expression
     tape_bar: Array  #: derivatives of its value by them
     state_base: Array  #: known parts of states and of their algorithmic rates after the step, (n_states, 2)
-    state_scheme: Array  #: kappa, rho, see kernels/user_force.py, (2,)
+    state_scheme: Array  #: kappa, rho, see kernels/connections/user_force.py, (2,)
     # linear algebra
     H: Array  #: tangent of each body, then its LU factors, flat
     pivot: IntArray  #: (n_u,)

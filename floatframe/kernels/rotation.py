@@ -6,7 +6,7 @@ s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³; below t = 1/2 their ser
 
 import math
 
-from floatframe.kernels.compilation import inner
+from floatframe.kernels.compiler.compilation import inner
 
 __all__ = [
     "cross",

@@ -7,8 +7,8 @@ With z = H⁻¹(-c_k residual), X = H⁻¹ J_columnᵀ and Z = J_row X the conne
 and Z do not turn with the body, so that they can serve for many steps; P, R and V are those of the iterate.
 """
 
-from floatframe.kernels.compilation import inner
-from floatframe.kernels.connection import connection_derivatives
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.connection import connection_derivatives
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.evaluation import linearize
 

@@ -1,8 +1,8 @@
 """What force elements with memory do at the beginning of a step."""
 
-from floatframe.kernels.compilation import inner
-from floatframe.kernels.port import predict_port
-from floatframe.kernels.user_force import begin_states
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.element_coordinate import predict_port
+from floatframe.kernels.connections.user_force import begin_states
 
 __all__ = ["begin_step"]
 

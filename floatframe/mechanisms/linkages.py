@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from cms.reduced_body import ReducedBody
-from cms.units import Units, unit_system
-from floatframe.descriptions.flexible_part import PartMaker
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.units import Units, unit_system
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import Marker
+from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
-from floatframe.ground import GROUND
+from floatframe.flexible_parts.flexible_part import PartMaker
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints import Joint, PointOnLine, PrismaticJoint, RevoluteJoint, SphericalJoint, UniversalJoint
-from floatframe.markers import Marker
 from floatframe.mechanisms.rods import Rod, turning
-from floatframe.rigid_body import RigidBody
 from floatframe.system import System
-from floatframe.time_functions import TimeFunction
 
 __all__ = ["four_bar", "slider_crank"]
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from cms.reduced_body import ReducedBody
-from cms.units import Units, unit_system
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.units import Units, unit_system
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import Marker
 from floatframe.errors import ModelError
 from floatframe.forces import Gravity
-from floatframe.ground import GROUND
 from floatframe.joints import RevoluteJoint
-from floatframe.markers import Marker
 from floatframe.mechanisms.rods import Rod
 from floatframe.system import System
 
@@ -99,7 +99,7 @@ def chain(
 
 def _axes_of(place: Marker, rod: ReducedBody | None, body: object) -> np.ndarray:
     """Return the axes of an interface as placed, ground axes, (3, 3)."""
-    from floatframe.flexible_body import FlexibleBody
+    from floatframe.bodies.flexible_body import FlexibleBody
 
     assert rod is not None and isinstance(body, FlexibleBody) and place.interface is not None  # noqa: PT018
     return np.asarray(body.frame_orientation @ rod.interface(place.interface).triad)

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from cms.arrays import Array
-from cms.reduced_body import ReducedBody
-from floatframe.descriptions.flexible_part import PartMaker
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.markers import Marker
+from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
-from floatframe.flexible_body import FlexibleBody
+from floatframe.flexible_parts.flexible_part import PartMaker
 from floatframe.forces import Force
 from floatframe.joints import Joint
-from floatframe.markers import Marker
-from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters, rotation_matrix, tilde
 from floatframe.system import Body
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from cms.reduced_body import ReducedBody
-from cms.units import Units, unit_system
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.units import Units, unit_system
+from floatframe.bodies.markers import Marker
+from floatframe.bodies.rigid_body import RigidBody
 from floatframe.joints import FixedJoint
-from floatframe.markers import Marker
 from floatframe.mechanisms.rods import Rod, turning
-from floatframe.rigid_body import RigidBody
 from floatframe.system import System
 
 __all__ = ["satellite"]

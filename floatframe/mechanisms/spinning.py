@@ -7,16 +7,16 @@ from typing import Literal
 
 import numpy as np
 
-from cms.reduced_body import ReducedBody
+from cms.reduced_body.reduced_body import ReducedBody
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import Marker
+from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
-from floatframe.flexible_body import FlexibleBody
-from floatframe.ground import GROUND
+from floatframe.functions.time_functions import TimeFunction, cycloidal_spin_up
 from floatframe.joints import FixedJoint, Joint, PointOnLine, RevoluteJoint, SphericalJoint
-from floatframe.markers import Marker
 from floatframe.mechanisms.rods import between
-from floatframe.rigid_body import RigidBody
 from floatframe.system import System
-from floatframe.time_functions import TimeFunction, cycloidal_spin_up
 
 __all__ = ["rotating_blade", "spin_up_beam", "spinning_shaft"]
 

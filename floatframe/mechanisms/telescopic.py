@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cms.reduced_body import ReducedBody
+from cms.reduced_body.reduced_body import ReducedBody
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import Marker
 from floatframe.errors import ModelError
-from floatframe.ground import GROUND
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints import Joint, RevoluteJoint, SlidingJoint, UniversalJoint
-from floatframe.markers import Marker
 from floatframe.mechanisms.rods import Rod, turning
 from floatframe.system import System
-from floatframe.time_functions import TimeFunction
 
 __all__ = ["telescopic_slider_crank"]
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import Marker
+from floatframe.bodies.rigid_body import RigidBody
 from floatframe.forces import Gravity
-from floatframe.ground import GROUND
 from floatframe.joints import SphericalJoint
-from floatframe.markers import Marker
-from floatframe.rigid_body import RigidBody
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.system import System
 

@@ -7,17 +7,18 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from cms.couplings import couple
-from cms.damping import ModalDamping, RayleighDamping
 from cms.errors import BodyError
-from cms.fe_body import FEBody, Interface
 from cms.frame_conversion import convert_frame
-from cms.frames import BuckensFrame, NodalFrame, TisserandFrame
-from cms.modal_file import read
+from cms.modal_file.file import read
 from cms.mode_sets import craig_bampton
+from cms.reduced_basis.damping import ModalDamping, RayleighDamping
+from cms.reduced_basis.frames import BuckensFrame, NodalFrame, TisserandFrame
 from cms.reduction import reduce
+from fe_models.body.couplings import couple
+from fe_models.body.fe_body import FEBody, Interface
 from fe_models.loads import gravity_load, interface_load
 from tests.bodies import bar, beam, box_mesh, chain, distorted, with_interfaces
+from tests.root import ROOT
 from tests.synthetic import synthetic_reduced_body
 
 TURNED = ((0.0, 1.0, 0.0), (-0.6, 0.0, 0.8), (0.8, 0.0, 0.6))
@@ -36,8 +37,8 @@ SLACK = 1e-8  #: roundoff times the condition of M in another frame, relative to
 
 def uneven_bar(kinds=("rigid", "distributing")):
     """A bar of two densities with distorted cells and an interface of each kind, so that no two frames coincide."""
-    from cms.units import unit_system
-    from fe_models.solid import solid_body
+    from fe_models.foundation.units import unit_system
+    from fe_models.solids.body import solid_body
     from tests.bodies import ALUMINIUM, STEEL
 
     mesh = distorted(box_mesh(6, 1, 1, 1.0, 0.08, 0.05, "hexahedron"), amount=0.3)
@@ -142,7 +143,7 @@ def test_buckens_frame_has_the_least_deformation_of_all_frames(made):
     w[: len(body.node_volumes)] = body.node_volumes
     weights = w[reduced.node_ids]  # every node of this thin mesh is on the surface
     assert_allclose(weights.sum(), w.sum(), rtol=1e-14)
-    from cms.rigid_modes import rigid_motion_of_points
+    from fe_models.body.rigid_motion import rigid_motion_of_points
 
     Psi_R = rigid_motion_of_points(reduced.nodes, np.zeros(3))
     slope = np.einsum("n,nac,nak->ck", weights, Psi_R, reduced.Phi)
@@ -296,9 +297,8 @@ def test_a_body_of_point_masses_keeps_its_moments_in_sums():
 
 
 def test_a_file_of_version_1_is_converted_and_says_what_it_lacks():
-    from pathlib import Path
 
-    old = read(Path(__file__).parent / "data" / "version_1.h5")
+    old = read(ROOT / "tests" / "cms" / "modal_file" / "data" / "version_1.h5")
     assert old.columns is None
     new = convert_frame(old, TisserandFrame())
     assert_allclose(new.moments.C2, 0, rtol=0, atol=1e-10)

@@ -6,8 +6,8 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import BodyError, UnitsError
-from cms.units import unit_system
 from fe_models.errors import MeshError
+from fe_models.foundation.units import unit_system
 from fe_models.matrices import body_from_matrices, body_from_npz, scalar_mass_of
 from tests.bodies import bar, beam
 

@@ -4,12 +4,12 @@ from numpy.testing import assert_allclose
 
 import cms
 import fe_models as fm
-from cms.coupled_field import coupled_field
-from cms.eigen import eigenmodes
 from cms.errors import BodyError
-from cms.rigid_modes import geometric_rigid_modes
+from cms.families.rigid_modes import geometric_rigid_modes
+from cms.mode_sets.mesh_field import coupled_field
+from cms.solvers.eigen import eigenmodes
 from tests import bodies
-from tests.fe_models.frames import SI, STEEL, straight, supported_frequencies
+from tests.fe_models.small_frames import SI, STEEL, straight, supported_frequencies
 
 ROUNDOFF = 1e-12
 WIDTH, HEIGHT = 0.05, 0.07

@@ -24,11 +24,12 @@ from floatframe import (
     integrate,
 )
 from floatframe.cli.app import app
+from floatframe.compiling.system import compiled_system
+from floatframe.functions.time_functions import polynomial_of_time
 from floatframe.mechanisms import slider_crank
 from floatframe.mechanisms.rods import slender_inertia
-from floatframe.step_advice import step_advice
-from floatframe.time_functions import polynomial_of_time
-from tests.floatframe.bodies import random_point_masses, reduced_body
+from floatframe.motion.step_advice import step_advice
+from tests.floatframe.point_masses import random_point_masses, reduced_body
 
 CRANK = """
 [system]
@@ -236,10 +237,10 @@ def test_a_mode_without_mass_and_stiffness_is_named():
     M = np.array(body.M)
     M[2] = M[:, 2] = 0.0
     with pytest.raises(ModelError, match=r"body 'rod': mode 3 .* has neither mass nor stiffness"):
-        _ = System([FlexibleBody("rod", replace(body, M=M))]).compiled
+        _ = compiled_system(System([FlexibleBody("rod", replace(body, M=M))]))
 
 
 def test_a_motor_on_a_driven_coordinate_is_refused():
     system = slider_crank(drive=polynomial_of_time([0.0, 5.0]))
     with pytest.raises(ModelError, match="the coordinate 'angle' of joint 'main' is prescribed"):
-        _ = System(system.bodies, system.joints, [JointForce("motor", "main", "angle", preload=1.0)]).compiled
+        _ = compiled_system(System(system.bodies, system.joints, [JointForce("motor", "main", "angle", preload=1.0)]))

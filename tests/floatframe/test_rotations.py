@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from floatframe.kernels import rotation as kernels
-from floatframe.kernels.compilation import entry
+from floatframe.kernels.compiler.compilation import entry
 from floatframe.rotations import (
     euler_parameter_rates,
     euler_parameters,

@@ -7,8 +7,8 @@ from scipy.special import ellipk
 
 import cms
 import floatframe as ff
-from cms.cli.reduce_job import reduce_job
-from cms.job import read_job
+from cms.jobs.job import read_job
+from cms.jobs.reduce_job import reduce_job
 
 GRAVITY = 9.81
 JOB = """

@@ -5,7 +5,6 @@ import re
 import subprocess
 import sys
 from dataclasses import fields, is_dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +15,9 @@ import cms
 import fe_models
 import floatframe as ff
 from fe_models.parts import shipped_mesh
+from tests.root import ROOT
 
-README = Path(__file__).resolve().parents[2] / "README.md"
+README = ROOT / "README.md"
 GRAVITY = 9810.0
 
 

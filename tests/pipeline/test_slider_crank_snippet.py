@@ -1,15 +1,15 @@
 """The slider-crank of the user guide: fewer than 25 lines, and the motion is that of the mechanism."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 from numpy.testing import assert_allclose
 
 from floatframe import measured
-from floatframe.time_functions import cycloidal_spin_up
+from floatframe.functions.time_functions import cycloidal_spin_up
+from tests.root import ROOT
 
-GUIDE = Path(__file__).resolve().parents[2] / "docs" / "user_guide.md"
+GUIDE = ROOT / "docs" / "user_guide.md"
 
 
 def test_slider_crank_with_a_flexible_rod_takes_fewer_than_25_lines_and_moves_as_one():

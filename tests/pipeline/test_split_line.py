@@ -7,14 +7,15 @@ from typer.testing import CliRunner
 
 import cms
 from cms.cli.app import app
-from cms.cli.reduce_job import job_body, reduce_job
 from cms.cli.split import SplitRequest, split_job
 from cms.errors import JobError
-from cms.families import Families
-from cms.job import read_job
+from cms.families.families import Families
+from cms.jobs.body_of_job import job_body
+from cms.jobs.job import read_job
+from cms.jobs.reduce_job import reduce_job
 from floatframe import GeneralizedAlpha, integrate, linearize, static_equilibrium, system_modes
-from floatframe.sensors import interface_motion
-from floatframe.system_file import read_system
+from floatframe.results.place_motion import interface_motion
+from floatframe.system_file.read_system import read_system
 from tests.bodies import box_mesh
 from tests.decks import write_deck
 

@@ -13,10 +13,10 @@ import scipy.sparse as sp
 import cms
 import fe_models as fm
 from floatframe import GeneralizedAlpha, corotational, finite_segments, integrate
-from floatframe.descriptions import FlexiblePart
+from floatframe.flexible_parts import FlexiblePart
+from floatframe.functions.time_functions import TimeFunction, cycloidal_spin_up, polynomial_of_time
 from floatframe.mechanisms import slider_crank
-from floatframe.sensors import interface_motion, point_motion
-from floatframe.time_functions import TimeFunction, cycloidal_spin_up, polynomial_of_time
+from floatframe.results.place_motion import interface_motion, point_motion
 from tests.bodies import box_mesh
 from tests.references.exact_beam import ExactBeam
 from tests.references.planar_dynamics import Problem, rotation

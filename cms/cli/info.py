@@ -1,0 +1,143 @@
+"""`cms info`: what is in a modal file, as tables or as JSON."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cms.cli.console import print_table, say, vector_words
+
+if TYPE_CHECKING:
+    from cms.reduced_body.reduced_body import ReducedBody
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cms.cli.console import guarded
+
+if TYPE_CHECKING:
+    pass
+from cms.cli.arguments import ModalFile
+
+__all__ = ["info_record", "print_body"]
+
+
+def info_record(file: Path, units: str | None = None) -> str:
+    """Return what is in a modal file as JSON text."""
+    import json
+
+    from cms.cli.record import body_record
+    from cms.modal_file.file import digest, read
+
+    return json.dumps({**body_record(read(file, units=units)), "digest": digest(file)}, indent=2)
+
+
+def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
+    """Print mass properties, modes and interfaces of a body; provenance too if everything is wanted."""
+    from cms.cli.record import body_record, body_size
+
+    record = body_record(body)
+    length, mass, inertia = (
+        body.units.length_symbol, body.units.mass_symbol, f"{body.units.mass_symbol} {body.units.length_symbol}²"
+    )  # fmt: skip
+    frame = record["frame"]
+    tensor, largest = record["inertia_about_center_of_mass"], record["principal_moments"][-1]
+    size = body_size(body)
+    rows = [
+        ("name", record["name"]),
+        ("units", f"{body.units.name} (force {body.units.force_symbol}, stress {body.units.stress_symbol})"),
+        ("frame B", frame["kind"] + (f" at {frame['at']}" if frame["at"] else "")),
+        ("origin of B", f"{vector_words(frame['origin'], size)} {length} (mesh coordinates)"),
+        *[(f"{a} axis of B", f"{vector_words(axis, 1.0)} (mesh axes)") for a, axis in turned_axes(frame["axes"])],
+        ("mass", f"{record['mass']:.6g} {mass}"),
+        ("centre of mass", f"{vector_words(record['center_of_mass']['B'], size)} {length} (in B)"),
+        ("", f"{vector_words(record['center_of_mass']['mesh'], size)} {length} (mesh coordinates)"),
+        ("inertia about it", f"{vector_words(tensor[0], largest)} {inertia} (axes of B)"),
+        ("", vector_words(tensor[1], largest)),
+        ("", vector_words(tensor[2], largest)),
+        ("principal moments", f"{vector_words(record['principal_moments'])} {inertia}"),
+        ("mass moments", "exact" if record["moments_are_exact"] else "approximate (from bare matrices)"),
+        ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
+        ("stress of modes", stress_words(record["stress"])),
+        ("geometric stiffness", "spin, accelerations, interface loads" if record["geometric_stiffness"] else "none"),
+        *([("quadratic modes", "second order at the kept nodes")] if record["quadratic_modes"] else []),
+    ]
+    print_table("Body", ("", ""), rows)
+    print_table(
+        "Modes (the frame B held)",
+        ("mode>", "Hz>", "damping>", "energy from"),
+        [
+            (mode["number"], hertz(mode["frequency_hz"]), percent(mode["damping_ratio"]), mode["label"])
+            for mode in record["modes"]
+        ],
+    )
+    free = ", ".join(hertz(f) for f in record["free_frequencies_hz"])
+    say(f"Free-free frequencies [Hz]: {free or 'none'}\n")
+    if selected := record["provenance"].get("mode set selected"):
+        say(f"Selected: {selected}\n")
+    print_table(
+        "Interfaces",
+        ("name", "kind", "nodes>", f"position in B [{length}]"),
+        [(i["name"], i["kind"], i["nodes"], vector_words(i["position"], size)) for i in record["interfaces"]],
+    )
+    force = body.units.force_symbol
+    if record["load_cases"]:
+        print_table(
+            "Load cases (of amplitude 1, in B)",
+            ("name", "kind", f"force [{force}]", f"torque about the origin [{force} {length}]"),
+            [
+                (c["name"], c["kind"], vector_words(c["force"], scale), vector_words(c["torque"], scale * size))
+                for c, scale in ((case, load_scale(case, record["mass"])) for case in record["load_cases"])
+            ],
+        )
+    if everything:
+        print_table("Provenance", ("", ""), list(record["provenance"].items()))
+
+
+def turned_axes(axes: Any) -> list[tuple[str, Any]]:
+    """Return the axes of B by name, columns of their matrix; none where they are those of the mesh."""
+    columns = [[row[k] for row in axes] for k in range(3)]
+    unit = [[float(i == k) for i in range(3)] for k in range(3)]
+    return [] if columns == unit else list(zip("xyz", columns, strict=True))
+
+
+def load_scale(case: Any, mass: float) -> float:
+    """Return the size of the forces of a load case, also of one in balance: by its resultant and its modal forces."""
+    return max(map(abs, [*case["force"], *(h * mass**0.5 for h in case["modal_forces"])]), default=0.0)
+
+
+def stress_words(stress: Any) -> str:
+    """Return where the stress of the modes is known."""
+    places = ["at the kept nodes"] if stress["nodal"] else []
+    places += [f"at {stress['points']} points"] if stress["points"] else []
+    return " and ".join(places) or "not kept"
+
+
+def hertz(value: float | None) -> str:
+    """Return a frequency with six digits; a shape without mass has none."""
+    return "static" if value is None else f"{value:.6g}"
+
+
+def percent(value: float | None) -> str:
+    """Return a damping ratio in percent."""
+    return "" if not value else f"{100 * value:.3g} %"
+
+
+@guarded
+def info_command(
+    file: ModalFile,
+    json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
+    units: Annotated[str | None, typer.Option(help="Show numbers in another unit system, such as m-kg-s.")] = None,
+) -> None:
+    """Show what is in a modal file: mass, inertia, units, frame, modes, interfaces, load cases, provenance.
+
+    Example: cms info rod.h5 --json
+
+    Example: cms info rod.h5 --units m-kg-s
+    """
+    if json:
+        typer.echo(info_record(file, units))
+        return
+    from cms.modal_file.file import digest, read
+
+    print_body(read(file, units=units), everything=True)
+    say(f"digest {digest(file)}")

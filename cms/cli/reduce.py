@@ -1,0 +1,69 @@
+"""`cms reduce`: a job becomes a modal file."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cms.cli.console import print_table, say, stages
+
+if TYPE_CHECKING:
+    from cms.jobs.job import Job
+    from cms.reduced_body.reduced_body import ReducedBody
+    from fe_models.foundation.stages import Stages
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cms.cli.console import guarded, output_path
+from cms.cli.info import print_body
+
+if TYPE_CHECKING:
+    pass
+from cms.cli.arguments import Output
+
+__all__ = ["reduce_and_write"]
+
+
+def reduce_and_write(job: "Job", path: Path) -> "ReducedBody":
+    """Run a job, write its modal file, and print what was done."""
+    from cms.jobs.reduce_job import reduce_job
+    from cms.modal_file.file import write
+
+    reports: list[Any] = []
+    try:
+        with stages() as clock:
+            reduced = reduce_job(job, clock, on_report=reports.append)
+            with clock("write"):
+                write(reduced, path)
+    finally:  # a mesh that is refused is better understood with its numbers
+        for report in reports:
+            print_table("Mesh", ("", ""), report.rows())
+    print_body(reduced)
+    print_times(clock)
+    say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    return reduced
+
+
+def print_times(clock: "Stages") -> None:
+    """Print the time of each stage."""
+    rows = [(name, f"{seconds:.2f}") for name, seconds in clock.seconds.items()]
+    print_table("Time", ("stage", "s>"), [*rows, ("all", f"{sum(clock.seconds.values()):.2f}")])
+
+
+@guarded
+def reduce_command(
+    job: Annotated[Path, typer.Argument(help="Job file (TOML), see docs/job_file.md.")],
+    output: Output = None,
+) -> None:
+    """Reduce a finite element body to a modal file.
+
+    Without -o the modal file stands beside the job file: rod.toml gives rod.h5.
+
+    Example: cms reduce rod.toml -o rod.h5
+    """
+    from cms.errors import JobError
+    from cms.jobs.job import read_job
+
+    read = read_job(job)
+    inputs = (job, *(path for path in (read.body.mesh, read.body.matrices) if path is not None))
+    path = output_path(output, job.with_suffix(".h5"), JobError, overwrite_of=inputs)
+    reduce_and_write(read, path)

@@ -1,0 +1,1 @@
+"""Families of modes of one body, all from one factorisation of its interior stiffness."""

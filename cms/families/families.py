@@ -1,0 +1,299 @@
+"""All mode families of one body from one factorisation of its interior stiffness (THEORY §2)."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cms.errors import BodyError, ModeSetError
+from cms.families.fixed_interface import FixedInterfaceBody, fix_interfaces
+from cms.families.flexibility import BoundaryConditions, CondensedBody, Flexibility
+from cms.families.rigid_modes import determinate_partition, independent_rigid_modes
+from cms.families.static_modes import (
+    COMPONENTS,
+    attachment_modes,
+    boundary_groups,
+    boundary_labels,
+    constraint_modes,
+    inertia_relief_modes,
+    redundant_constraint_modes,
+    residual_attachment_modes,
+    unrestrained_attachment_modes,
+)
+from cms.families.vibration_modes import elastic_modes, fixed_interface_modes, no_modes
+from cms.solvers.eigen import EigenResult
+from cms.solvers.tall import combine
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["Families"]
+
+GROUNDED = 1e-6  #: |K Psi_R| / (|K| |Psi_R|) above which a body is not free
+
+
+class Families:
+    """The mode families of a body, each computed once, when first asked for; a context manager that frees the factor.
+
+    >>> with Families(body) as families:                                   # doctest: +SKIP
+    ...     sets = [rubin(body, n_modes=k, families=families) for k in range(20)]
+
+    Held dofs h: the boundary dofs, and interior ones where those leave a rigid-body motion free (THEORY §1). With them
+    held the interior stiffness K_II is factorised, once; static and vibration modes for every boundary condition
+    follow by the condensed stiffness S of h.
+    """
+
+    def __init__(self, body: FEBody) -> None:
+        """Prepare the families of a coupled body; nothing is computed yet.
+
+        Raises
+        ------
+        BodyError
+            If the interfaces of the body have no boundary dofs yet.
+        """
+        body.require_coupled()
+        self.body = body
+        self._stack = ExitStack()
+        self._is_open = True
+        self._modes: dict[bytes, list[_Found]] = {}
+        self._flexibilities: dict[bytes, Flexibility] = {}
+
+    def __enter__(self) -> "Families":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the factorisation; what was computed stays."""
+        self._is_open = False
+        self._stack.close()
+
+    # -- partition -------------------------------------------------------------------------------------------------
+
+    @property
+    def Psi_R(self) -> Array:
+        """Rigid-body modes about the mean of the nodes, independent ones only, (n_dof, n_r)."""
+        return self._rigid[0]
+
+    @cached_property
+    def _rigid(self) -> tuple[Array, IntArray]:
+        return independent_rigid_modes(self.body)
+
+    @cached_property
+    def _partition(self) -> tuple[IntArray, IntArray]:
+        return determinate_partition(self.body, self.Psi_R)
+
+    @property
+    def r(self) -> IntArray:
+        """Determinate dofs R, (n_r,), ascending; interior ones among them where B leaves a rigid motion free."""
+        return self._partition[0]
+
+    @cached_property
+    def e(self) -> IntArray:
+        """Excess boundary dofs E = B without R, in the order of `body.b`, (n_e,)."""
+        return self.body.b[~np.isin(self.body.b, self.r)]
+
+    @property
+    def h(self) -> IntArray:
+        """Held dofs: B, then the interior dofs of R, (n_h,)."""
+        return np.concatenate([self.body.b, self._partition[1]])
+
+    @cached_property
+    def fixed(self) -> FixedInterfaceBody:
+        """Interior partition and its factorisation."""
+        if not self._is_open:
+            raise ModeSetError(f"families of body {self.body.name!r}: closed; make new ones")
+        return self._stack.enter_context(fix_interfaces(self.body, self._partition[1]))
+
+    # -- static families -------------------------------------------------------------------------------------------
+
+    @cached_property
+    def Psi_C(self) -> Array:
+        """Constraint modes of the held dofs, (n_dof, n_h)."""
+        return constraint_modes(self.fixed)
+
+    @cached_property
+    def S(self) -> Array:
+        """Stiffness condensed to the held dofs, Psi_Cᵀ K Psi_C, (n_h, n_h) [N/m]."""
+        S = self.body.K[:, self.h].T @ self.Psi_C
+        return (S + S.T) / 2
+
+    @cached_property
+    def condensed(self) -> CondensedBody:
+        """The parts every flexibility is made from."""
+        return CondensedBody(self.fixed, self.Psi_C, self.S, self.Psi_R)
+
+    @cached_property
+    def free(self) -> Flexibility:
+        """Elastic flexibility Pᵀ G_R P of the free body.
+
+        Raises
+        ------
+        BodyError
+            If the body is held to the ground: K times its rigid-body modes is not zero.
+        """
+        self._require_free()
+        r = np.flatnonzero(np.isin(self.h, self.r))
+        return Flexibility(self.condensed, BoundaryConditions.free(len(self.h)), r)
+
+    @cached_property
+    def Psi_RC(self) -> Array:
+        """Redundant constraint modes, (n_dof, n_e)."""
+        return redundant_constraint_modes(self.free)
+
+    @cached_property
+    def Psi_A(self) -> Array:
+        """Attachment modes, (n_dof, n_e)."""
+        return attachment_modes(self.free)
+
+    @cached_property
+    def Psi_H(self) -> Array:
+        """Inertia-relief modes, (n_dof, n_r)."""
+        return inertia_relief_modes(self.fixed, self.Psi_R)
+
+    @cached_property
+    def Psi_U(self) -> Array:
+        """Unrestrained attachment modes, (n_dof, n_b)."""
+        return unrestrained_attachment_modes(self.free)
+
+    def residual_attachment(self, free_modes: EigenResult) -> Array:
+        """Return Psi_U without the part of the kept free modes, (n_dof, n_b)."""
+        return residual_attachment_modes(self.body, self.Psi_U, free_modes)
+
+    def static(self, F: Array) -> Array:
+        """Return G_R F, the static response to load columns with R held, (n_dof, k)."""
+        return self.free.held(F)
+
+    def project(self, F: Array) -> Array:
+        """Return P F, loads in balance with the rigid-body accelerations they cause, (n_dof, k)."""
+        return F - self.free.M_N @ (self.free.N.T @ F)
+
+    def flexibility(self, F: Array) -> Array:
+        """Return Pᵀ G_R P F, the elastic response of the free body to load columns, (n_dof, k)."""
+        return self.free.solve(F)
+
+    # -- vibration families ----------------------------------------------------------------------------------------
+
+    def fixed_modes(
+        self, *, n_modes: int | None = None, cutoff: float | None = None, verify: bool = False
+    ) -> EigenResult:
+        """Vibration modes with B held, over all dofs; without the rigid-body motions B may leave free."""
+        if len(self.h) > len(self.body.b):
+            directions = np.eye(len(self.h))[:, len(self.body.b) :]
+            return self.elastic_modes(BoundaryConditions(directions), n_modes=n_modes, cutoff=cutoff, verify=verify)
+        return self._cached(
+            b"fixed", n_modes, cutoff, verify, lambda **asked: fixed_interface_modes(self.fixed, **asked)
+        )
+
+    def free_modes(
+        self, *, n_modes: int | None = None, cutoff: float | None = None, verify: bool = False
+    ) -> EigenResult:
+        """Elastic vibration modes of the free body, over all dofs."""
+        return self._cached(b"free", n_modes, cutoff, verify, lambda **asked: elastic_modes(self.free, **asked))
+
+    def elastic_modes(
+        self,
+        conditions: BoundaryConditions,
+        *,
+        n_modes: int | None = None,
+        cutoff: float | None = None,
+        verify: bool = False,
+    ) -> EigenResult:
+        """Elastic vibration modes under these conditions of the held dofs, over all dofs."""
+        return self._cached(
+            conditions.key,
+            n_modes,
+            cutoff,
+            verify,
+            lambda **asked: elastic_modes(self.flexibility_under(conditions), **asked),
+        )
+
+    def flexibility_under(self, conditions: BoundaryConditions) -> Flexibility:
+        """Return the flexibility of the body under these conditions of the held dofs."""
+        if conditions.key not in self._flexibilities:
+            self._require_free()
+            self._flexibilities[conditions.key] = Flexibility(self.condensed, conditions)
+        return self._flexibilities[conditions.key]
+
+    def without_boundary(self, Phi: Array) -> Array:
+        """Return Phi - Psi_C Phi_h: beside Psi_C the same span, and zero on the held dofs, (n_dof, k)."""
+        return Phi - combine(self.Psi_C, Phi[self.h])
+
+    # -- words -----------------------------------------------------------------------------------------------------
+
+    def rigid_labels(self, family: str) -> tuple[str, ...]:
+        """Return one label per rigid-body mode, such as 'rigid-body rx'."""
+        return tuple(f"{family} {COMPONENTS[k]}" for k in self._rigid[1])
+
+    def held_labels(self, family: str) -> tuple[str, ...]:
+        """Return one label per held dof."""
+        extra = self.body.dofs[self._partition[1]]
+        return (
+            *boundary_labels(self.body, family),
+            *(f"{family} node {node} {COMPONENTS[component]}" for node, component in extra),
+        )
+
+    def held_groups(self, family: str) -> tuple[str, ...]:
+        """Return one group per held dof."""
+        return (*boundary_groups(self.body, family), *[f"{family} determinate"] * len(self._partition[1]))
+
+    # -- inside ----------------------------------------------------------------------------------------------------
+
+    def _require_free(self) -> None:
+        force = np.abs(self.body.K @ self.Psi_R).max(axis=0)
+        scale = np.abs(self.body.K).max() * np.abs(self.Psi_R).max(axis=0)
+        if (force > GROUNDED * scale).any():
+            raise BodyError(
+                f"body {self.body.name!r}: K times its rigid-body modes is {(force / scale).max():.1e} of |K|, "
+                "expected 0: held to the ground, or nodes not where K has them; release it, or mend the nodes"
+            )
+
+    def _cached(
+        self,
+        key: bytes,
+        n_modes: int | None,
+        cutoff: float | None,
+        verify: bool,
+        compute: Callable[..., EigenResult],
+    ) -> EigenResult:
+        if n_modes == 0:
+            return no_modes(self.body.n_dof)
+        for found in self._modes.get(key, []):
+            if (part := found.part(n_modes, cutoff, verify)) is not None:
+                return part
+        modes = compute(n_modes=n_modes, cutoff=cutoff, verify=verify)
+        self._modes[key] = [_Found(modes, cutoff)]
+        return modes
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Modes found before, to take fewer of them."""
+
+    modes: EigenResult
+    cutoff: float | None
+
+    def part(self, n_modes: int | None, cutoff: float | None, verify: bool) -> EigenResult | None:
+        frequencies = self.modes.frequencies
+        if verify and not self.modes.is_proven:
+            return None
+        if n_modes is not None:
+            return _first(self.modes, n_modes) if n_modes <= len(frequencies) else None
+        known = max(self.cutoff or 0.0, frequencies[-1] * (1 - 1e-9) if len(frequencies) else 0.0)
+        if cutoff is None or cutoff > known:
+            return None
+        return _first(self.modes, int((frequencies <= cutoff).sum()))
+
+
+def _first(modes: EigenResult, k: int) -> EigenResult:
+    if k == len(modes.omega2):
+        return modes
+    return replace(
+        modes,
+        omega2=modes.omega2[:k],
+        frequencies=modes.frequencies[:k],
+        Phi=modes.Phi[:, :k],
+        residuals=modes.residuals[:k],
+    )

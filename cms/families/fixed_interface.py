@@ -1,0 +1,101 @@
+"""The body with all boundary dofs held: its interior stiffness, factorised once, serves many columns (DESIGN 3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
+from cms.solvers.factorization import Factorization, factorize
+from fe_models.body.fe_body import MULTIPLIER, FEBody
+from fe_models.body.submatrix import principal_block
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import node_list
+
+__all__ = ["FixedInterfaceBody", "fix_interfaces"]
+
+ZERO_ENERGY = 1e-8  #: |K u| / (|K|_max |u|) below which u is a motion without energy
+
+
+@dataclass(frozen=True, eq=False)
+class FixedInterfaceBody:
+    """Interior partition of a coupled body and the factorisation of K_II; use as a context manager to free it."""
+
+    body: FEBody
+    i: IntArray  #: interior dofs: all others, ascending, (n_i,)
+    b: IntArray  #: held dofs: the boundary dofs in the order of `body.b`, then extra ones, (n_b,)
+    K_ii: sp.csc_array  #: (n_i, n_i) [N/m]
+    M_ii: sp.csc_array  #: (n_i, n_i) [kg]
+    factorization: Factorization  #: of K_ii
+
+    def __enter__(self) -> "FixedInterfaceBody":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.factorization.close()
+
+    @property
+    def n_multipliers(self) -> int:
+        """Number of multiplier dofs: interior dofs without mass that make K_ii indefinite."""
+        return int((self.body.dofs[:, 1] == MULTIPLIER).sum())
+
+
+def fix_interfaces(body: FEBody, extra: IntArray | None = None) -> FixedInterfaceBody:
+    """Hold all boundary dofs of a coupled body and factorise its interior stiffness.
+
+    Parameters
+    ----------
+    extra
+        More dofs to hold, where the interfaces alone leave a rigid-body motion free (`determinate_partition`).
+
+    Raises
+    ------
+    ModeSetError
+        If no dof is held (the body has no interface), or no interior dof is left.
+    BodyError
+        If it moves without energy while its interfaces are held: a mechanism; the text says where.
+    """
+    body.require_coupled()
+    b = body.b if extra is None else np.concatenate([body.b, np.setdiff1d(extra, body.b)])
+    i = np.setdiff1d(np.arange(body.n_dof), b)
+    if len(b) == 0:
+        raise ModeSetError(f"body {body.name!r} has no interface; give it at least one, or take free modes")
+    if len(i) == 0:
+        raise ModeSetError(f"body {body.name!r}: all {body.n_dof} dofs are boundary dofs; nothing is left to reduce")
+    K_ii = principal_block(body.K, i)
+    M_ii = principal_block(body.M, i)
+    is_definite = not (body.dofs[:, 1] == MULTIPLIER).any()
+    try:
+        factorization = factorize(K_ii, definite=is_definite)
+    except FactorizationError as error:
+        raise BodyError(_mechanism_message(body, i, K_ii, M_ii)) from error
+    return FixedInterfaceBody(body, i, b, K_ii, M_ii, factorization)
+
+
+def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array) -> str:
+    """Say which nodes move without energy while the interfaces are held."""
+    from cms.solvers.eigen import eigenmodes
+
+    start = f"body {body.name!r}: with all interfaces held its stiffness is singular"
+    try:
+        modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1))
+    except (EigenError, FactorizationError):  # the message about the mechanism matters more than why its picture failed
+        return f"{start}; it has a mechanism, or a part that no interface holds"
+    energy = np.abs(K_ii @ modes.Phi).max(axis=0) / (np.abs(K_ii.data).max() * np.abs(modes.Phi).max(axis=0))
+    is_free = energy < ZERO_ENERGY
+    if not is_free.any():
+        return f"{start}; its smallest energy is {energy.min():.1e} of the largest stiffness"
+    return (
+        f"{start}: {int(is_free.sum())}{'+' if is_free.all() else ''} motions without energy, largest at "
+        f"{moving_nodes(body, i, modes.Phi[:, is_free])}; hold these nodes by an interface, join the parts, or "
+        "mend the mesh"
+    )
+
+
+def moving_nodes(body: FEBody, rows: IntArray, Phi: Array) -> str:
+    """Name the three nodes that move most in these motions over the given dofs, with their positions."""
+    is_translation = (body.dofs[rows, 1] >= 0) & (body.dofs[rows, 1] < 3)
+    chosen = is_translation if is_translation.any() else np.ones(len(rows), bool)
+    size = np.bincount(body.dofs[rows[chosen], 0], (Phi[chosen] ** 2).sum(axis=1), minlength=len(body.nodes))
+    order = np.argsort(-np.round(size / size.max(), 6), kind="stable")  # nodes that move alike: in their order
+    return node_list(order[: min(3, np.count_nonzero(size))].tolist(), body.nodes)

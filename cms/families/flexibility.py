@@ -1,0 +1,267 @@
+"""The inverse of K under any boundary conditions of the interfaces, from one factorisation of K_II (THEORY §2).
+
+Whatever is fixed, free, sprung or loaded at the interfaces changes only the boundary: the condensed stiffness
+S = K_BB - K_BI K_II⁻¹ K_IB, which is small and dense. Rigid-body motions that stay free are projected out, so that the
+operator is the elastic flexibility Pᵀ G P of the body as it is held, and vibration modes need no other factorisation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.errors import BodyError, EigenError
+from cms.families.fixed_interface import FixedInterfaceBody, moving_nodes
+from cms.solvers.factorization import Inertia, factorize
+from cms.solvers.tall import combine, inner
+from fe_models.body.fe_body import FEBody
+from fe_models.body.submatrix import principal_block
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["BoundaryConditions", "CondensedBody", "Flexibility"]
+
+RIGID_ENERGY = 1e-14  #: squared motion against the conditions, below which a rigid-body motion is free
+COUNTED = 1e-11  #: eigenvalue of the scaled boundary block against its largest, above which its sign is certain
+SINGULAR = 1e-13  #: least eigenvalue of the scaled condensed stiffness, below which there is a mechanism
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedBody:
+    """A body with its held dofs h: the boundary B, and what else it takes to hold it (`determinate_partition`)."""
+
+    fixed: FixedInterfaceBody  #: interior factorisation; `fixed.b` are the held dofs h
+    Psi_C: Array  #: constraint modes, (n_dof, n_h)
+    S: Array  #: Psi_Cᵀ K Psi_C = K_hh + K_hI Psi_C,I, (n_h, n_h) [N/m]
+    Psi_R: Array  #: independent rigid-body modes, (n_dof, n_r)
+
+    @property
+    def body(self) -> FEBody:
+        """The body."""
+        return self.fixed.body
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryConditions:
+    """What the held dofs may do: u_h = Z z, with springs and masses of the neighbours on them."""
+
+    Z: Array  #: free directions, orthonormal columns, (n_h, n_z)
+    K_load: Array | None = None  #: stiffness of the neighbours over the held dofs, (n_h, n_h) [N/m]
+    M_load: Array | None = None  #: mass of the neighbours over the held dofs, (n_h, n_h) [kg]
+
+    @classmethod
+    def free(cls, n_h: int) -> "BoundaryConditions":
+        """Return those of a free body."""
+        return cls(np.eye(n_h))
+
+    @property
+    def key(self) -> bytes:
+        """What tells these conditions from others."""
+        parts = (self.Z, self.K_load, self.M_load)
+        return b"|".join(b"" if part is None else np.ascontiguousarray(part).tobytes() for part in parts)
+
+
+class Flexibility:
+    """x = G f on the dofs that are free under the conditions: the interior ones and z, u = T x (n_dof, n).
+
+    (1) f <- P f, P = 1 - M N Nᵀ: in balance with the acceleration of the M-orthonormal rigid-body motions N left free
+    (2) v = K_II⁻¹ f_I;  g = Zᵀ (f_h - K_hI v)
+    (3) (Zᵀ (S + K_load) Z)_ee z_e = g_e, z = 0 at as many pivots r as there are rigid-body motions
+    (4) u_h = Z z;  u_I = v + Psi_C,I u_h
+    (5) u <- Pᵀ u, so that Nᵀ M u = 0
+
+    M and K include the load of the neighbours. Symmetric; its null space is M N. The solver of `eigenmodes`.
+    """
+
+    def __init__(self, condensed: CondensedBody, conditions: BoundaryConditions, r: IntArray | None = None) -> None:
+        """Make the operator; r names pivots among the columns of Z instead of a choice by pivoted QR."""
+        self.condensed, self.conditions = condensed, conditions
+        body, h, Z = condensed.body, condensed.fixed.b, conditions.Z
+        self._K_hi = sp.csr_array(body.K[:, h].T)[:, condensed.fixed.i]
+        S = condensed.S if conditions.K_load is None else condensed.S + conditions.K_load
+        S_z = Z.T @ S @ Z
+        motions = _free_motions(condensed, conditions)
+        on_z = Z.T @ motions[h]
+        n_n = motions.shape[1]
+        self.r = _pivots(on_z / _lengths(body, h, Z)[:, None]) if r is None else r
+        self.e = np.setdiff1d(np.arange(Z.shape[1]), self.r)
+        self._factor = _cholesky(condensed, Z, S_z, self.e)
+        self.T = None if Z.shape[0] == Z.shape[1] else _expansion(condensed, Z)
+        self.M = self._with_load(body.M, conditions.M_load)
+        self.K = self._with_load(body.K, conditions.K_load)
+        self.N, self.M_N = self._orthonormal(motions if self.T is None else self.T.T @ motions)
+        self.n = self.M.shape[0]
+        self.n_rigid = n_n
+
+    @property
+    def description(self) -> str:
+        """Solver in words for the provenance."""
+        return f"{self.condensed.fixed.factorization.description}, boundary by its condensed stiffness"
+
+    @property
+    def inertia(self) -> Inertia:
+        """Of K - sigma M at a shift between the rigid-body motions and the first elastic mode."""
+        n_negative = self.condensed.fixed.n_multipliers + self.n_rigid
+        return Inertia(n_negative, 0, self.n - n_negative)
+
+    def solve(self, f: Array) -> Array:
+        """Return Pᵀ G P f, (n, k), f (n, k): steps (1) to (5)."""
+        if self.n_rigid:
+            f = f - combine(self.M_N, inner(self.N, f))
+        u = self.held(f)
+        if self.n_rigid:
+            u -= combine(self.N, inner(self.M_N, u))
+        return u
+
+    def held(self, f: Array) -> Array:
+        """Return the static response to f with the pivots held, (n, k): steps (2) to (4)."""
+        fixed, Z = self.condensed.fixed, self.conditions.Z
+        i, h = fixed.i, fixed.b
+        n_i = len(i)
+        f_i, f_z = (f[i], Z.T @ f[h]) if self.T is None else (f[:n_i], f[n_i:])
+        v = fixed.factorization.solve(f_i)
+        g = f_z - Z.T @ (self._K_hi @ v)
+        z = np.zeros((Z.shape[1], f.shape[1]))
+        z[self.e] = self.solve_boundary(g[self.e])
+        u = combine(self.condensed.Psi_C, Z @ z)
+        u[i] += v
+        return u if self.T is None else np.concatenate([u[i], z])
+
+    def solve_boundary(self, g: Array) -> Array:
+        """Return z_e of the loads g_e on the condensed stiffness, (n_e, k)."""
+        size, factor = self._factor
+        return g * 0.0 if not len(size) else size[:, None] * la.cho_solve(factor, size[:, None] * g)
+
+    def count_below(self, sigma: float) -> int:
+        """Elastic modes below sigma [1/s²], by the inertia of K - sigma M, block by block.
+
+        Negative eigenvalues of K_II - sigma M_II, which one more factorisation counts, and of the rest condensed onto
+        z, which is small and dense; less those of the multipliers and the rigid-body motions.
+
+        Raises
+        ------
+        EigenError
+            If pivots are zero within rounding, so that they cannot be counted.
+        """
+        fixed, conditions = self.condensed.fixed, self.conditions
+        i, h, Z = fixed.i, fixed.b, conditions.Z
+        body = fixed.body
+        A_hz = (body.K[:, h] - sigma * body.M[:, h]) @ Z
+        A_zz = Z.T @ A_hz[h]
+        for load, factor in ((conditions.K_load, 1.0), (conditions.M_load, -sigma)):
+            if load is not None:
+                A_zz = A_zz + factor * (Z.T @ load @ Z)
+        with factorize(sp.csc_array(fixed.K_ii - sigma * fixed.M_ii), definite=False) as shifted:
+            inertia = shifted.inertia
+            A_zz = A_zz - A_hz[i].T @ shifted.solve(A_hz[i]) if A_zz.size else A_zz
+        size = 1 / np.sqrt(np.where(np.diag(A_zz) != 0, np.abs(np.diag(A_zz)), 1.0))
+        values = la.eigvalsh((A_zz + A_zz.T) / 2 * np.outer(size, size)) if A_zz.size else np.zeros(0)
+        if inertia.n_zero or (len(values) and np.abs(values).min() < COUNTED * np.abs(values).max()):
+            raise EigenError(
+                "eigenmodes: pivots are zero within rounding, so that modes cannot be counted there; ask for another "
+                "number of modes, or do without the proof"
+            )
+        return inertia.n_negative + int((values < 0).sum()) - fixed.n_multipliers - self.n_rigid
+
+    def expand(self, x: Array) -> Array:
+        """Return displacement columns over all dofs, (n_dof, k), of columns x, (n, k)."""
+        return x if self.T is None else self.T @ x
+
+    def _with_load(self, A: sp.csc_array, load: Array | None) -> sp.csc_array:
+        if load is not None:
+            h, n = self.condensed.fixed.b, A.shape[0]
+            row, column = np.nonzero(load)
+            A = sp.csc_array(A + sp.csc_array((load[row, column], (h[row], h[column])), shape=(n, n)))
+        if self.T is None:
+            return A
+        if self.T.shape[1] == len(self.condensed.fixed.i):
+            return principal_block(A, self.condensed.fixed.i)
+        A = sp.csc_array(self.T.T @ A @ self.T)
+        A.sort_indices()
+        return A
+
+    def _orthonormal(self, motions: Array) -> tuple[Array, Array]:
+        """Return the rigid-body motions M-orthonormal, and M times them."""
+        if not motions.shape[1]:
+            return motions, motions
+        M_N = self.M @ motions
+        G = motions.T @ M_N
+        size = np.sqrt(np.maximum(np.diag(G), 0.0))
+        if not size.all() or la.eigvalsh(G / np.outer(size, size))[0] < 1e-10:
+            raise BodyError(
+                f"body {self.condensed.body.name!r}: has no inertia in some rigid-body motion; free and attachment "
+                "modes need all of them; take constraint modes (guyan, craig-bampton), or add the missing mass"
+            )
+        L = la.cholesky(G / np.outer(size, size), lower=True)
+        scale = la.solve_triangular(L, np.diag(1 / size), lower=True).T
+        return motions @ scale, M_N @ scale
+
+
+def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> Array:
+    """Return the rigid-body motions the conditions leave free, (n_dof, n_n)."""
+    h, Z = condensed.fixed.b, conditions.Z
+    Psi_R = condensed.Psi_R
+    size = _lengths(condensed.body, h, np.eye(len(h)))
+    scaled = Psi_R[h] / size[:, None]
+    column = np.abs(scaled).max(axis=0)
+    scaled = scaled / column
+    against = scaled - (Z / size[:, None]) @ (Z.T @ (scaled * size[:, None]))
+    energy = against.T @ against
+    if conditions.K_load is not None:
+        stiffness = np.abs(condensed.S * np.outer(size, size)).max()
+        spring = Psi_R[h] / column
+        energy = energy + spring.T @ conditions.K_load @ spring / stiffness
+    values, vectors = la.eigh((energy + energy.T) / 2)
+    if values[0] < -1e-12 * max(values[-1], 1.0):
+        raise BodyError(
+            f"body {condensed.body.name!r}: the stiffness of its neighbours has negative energy in a rigid-body "
+            "motion; expected a symmetric positive semidefinite matrix"
+        )
+    return (Psi_R / column) @ vectors[:, values < RIGID_ENERGY]
+
+
+def _lengths(body: FEBody, h: IntArray, Z: Array) -> Array:
+    """Unit of every direction: 1 for translations, 1 / body length for rotations, (n_z,)."""
+    is_rotation = (body.dofs[h, 1] >= 3).astype(float)
+    turned = Z.T**2 @ is_rotation > 0.5
+    return np.where(turned, 1 / (body.length or 1.0), 1.0)
+
+
+def _pivots(motions: Array) -> IntArray:
+    """Return as many rows as there are motions, which hold them, ascending."""
+    n = motions.shape[1]
+    if n == 0:
+        return np.zeros(0, np.int64)
+    _, _, pivots = la.qr(motions.T, mode="economic", pivoting=True)
+    return np.sort(pivots[:n]).astype(np.int64)
+
+
+def _cholesky(condensed: CondensedBody, Z: Array, S_z: Array, e: IntArray) -> tuple[Array, tuple[Array, bool]]:
+    """Factorise S_ee, scaled by its diagonal; refuse a mechanism."""
+    S_ee = S_z[np.ix_(e, e)]
+    if not len(e):
+        return np.zeros(0), (S_ee, True)
+    diagonal = np.diag(S_ee)
+    size = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    scaled = S_ee * np.outer(size, size)
+    values, vectors = la.eigh((scaled + scaled.T) / 2)
+    is_free = values < SINGULAR
+    if is_free.any():
+        body = condensed.body
+        moved = condensed.Psi_C @ (Z[:, e] @ (size[:, None] * vectors[:, is_free]))
+        raise BodyError(
+            f"body {body.name!r}: {int(is_free.sum())} motions besides the rigid ones cost no energy: a mechanism, "
+            f"largest at {moving_nodes(body, np.arange(body.n_dof), moved)}; join the parts or add what holds them"
+        )
+    return size, la.cho_factor(scaled, lower=True)
+
+
+def _expansion(condensed: CondensedBody, Z: Array) -> sp.csc_array:
+    """T of u = T x, x = (interior, z), (n_dof, n_i + n_z)."""
+    fixed = condensed.fixed
+    n_i = len(fixed.i)
+    row, column = np.nonzero(Z)
+    rows = np.concatenate([fixed.i, fixed.b[row]])
+    columns = np.concatenate([np.arange(n_i), n_i + column])
+    values = np.concatenate([np.ones(n_i), Z[row, column]])
+    return sp.csc_array((values, (rows, columns)), shape=(condensed.body.n_dof, n_i + Z.shape[1]))

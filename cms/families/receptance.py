@@ -1,0 +1,65 @@
+"""Receptance of the boundary: displacement of every boundary dof per unit force on every other, by frequency."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, frozen
+
+__all__ = ["Receptance", "boundary_scale", "largest_error", "receptance_of_modes", "receptance_of_pencil"]
+
+
+def boundary_scale(body: FEBody) -> Array:
+    """Length of the lever that makes every boundary dof a translation: 1, or the body length for rotations, (n_b,).
+
+    A moment F times this length and a rotation times it compare with forces F and translations.
+    """
+    return np.where(body.dofs[body.b, 1] >= 3, body.length or 1.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Receptance:
+    """Sum of modes: H(omega) = Σ_k b_k b_kᵀ / ((1 + i eta) k_k - omega² m_k), k and m diagonal."""
+
+    b: Array  #: modes at the boundary dofs, scaled, (n_b, n)
+    k: Array  #: modal stiffness, (n,)
+    m: Array  #: modal mass, (n,); 0 for static shapes
+    loss: float  #: loss factor eta: twice the modal damping ratio at resonance
+
+    def __post_init__(self) -> None:
+        for name in ("b", "k", "m"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def at(self, frequencies: Array) -> np.ndarray:
+        """Return H at these frequencies, (n_f, n_b, n_b) complex [m/N with scaled rotations]."""
+        omega2 = (2 * np.pi * np.asarray(frequencies)) ** 2
+        dynamic = (1 + 1j * self.loss) * self.k - omega2[:, None] * self.m
+        return np.einsum("bk,fk,ck->fbc", self.b, 1 / dynamic, self.b, optimize=True)
+
+
+def receptance_of_modes(body: FEBody, Phi: Array, omega2: Array, *, loss: float) -> Receptance:
+    """Return the receptance of M-orthonormal modes, (n_dof, n); omega² = 0 for rigid-body modes."""
+    return Receptance(boundary_scale(body)[:, None] * Phi[body.b], omega2, np.ones(len(omega2)), loss)
+
+
+def receptance_of_pencil(b: Array, K: Array, M: Array, *, loss: float, omega2: float) -> Receptance:
+    """Return the receptance of a reduced pencil.
+
+    Parameters
+    ----------
+    b
+        Scaled boundary rows of the columns, (n_b, n).
+    K, M
+        Pencil of the columns, (n, n); K + omega² M positive definite.
+    omega2
+        A positive number in between their scales [1/s²], as the first elastic omega².
+    """
+    mu, Y = la.eigh(M, K + omega2 * M)
+    return Receptance(b @ Y, 1 - omega2 * mu, np.maximum(mu, 0.0), loss)
+
+
+def largest_error(H: np.ndarray, reference: np.ndarray) -> float:
+    """Largest over the frequencies of |H - H_ref| / |H_ref| in the Frobenius norm."""
+    return float((np.linalg.norm(H - reference, axis=(1, 2)) / np.linalg.norm(reference, axis=(1, 2))).max())

@@ -1,0 +1,159 @@
+"""Rigid-body modes of a free body by three routes that must span the same space (THEORY §2)."""
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.errors import BodyError
+from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = [
+    "determinate_dofs",
+    "determinate_partition",
+    "geometric_rigid_modes",
+    "independent_rigid_modes",
+    "null_space_rigid_modes",
+    "static_rigid_modes",
+]
+
+HOLDS = 1e-4  #: pivot above which a dof holds a motion well enough to rest a factorisation on it
+RANK_TOLERANCE = 1e-8  #: of rigid-body modes restricted to some dofs, rotations scaled by the body length
+
+
+def geometric_rigid_modes(body: FEBody, *, origin: Array | None = None) -> Array:
+    """Rigid-body modes from the positions of the nodes: u = d + theta × c, rotations theta, multipliers 0.
+
+    Parameters
+    ----------
+    origin
+        Point the rotations are about, (3,) [m]; the origin of the mesh by default.
+
+    Returns
+    -------
+    Array
+        (n_dof, 6); columns d_x d_y d_z [-] and theta_x theta_y theta_z [m].
+    """
+    motion = rigid_motion_of_points(body.nodes, np.zeros(3) if origin is None else origin)
+    node, component = body.dofs.T
+    Psi_R = np.zeros((body.n_dof, 6))
+    is_translation = (component >= 0) & (component < 3)
+    is_rotation = component >= 3
+    Psi_R[is_translation] = motion[node[is_translation], component[is_translation]]
+    Psi_R[is_rotation, component[is_rotation]] = 1.0
+    return Psi_R
+
+
+def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
+    """Choose six of the candidate dofs that just prevent rigid-body motion (the set R of THEORY §1).
+
+    Pivoted QR of the rigid-body modes restricted to the candidates, rotations scaled by the body length.
+
+    Raises
+    ------
+    BodyError
+        If the candidates leave a rigid-body motion free.
+    """
+    Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))[candidates]
+    Psi_R[:, 3:] /= body.length  # theta of one per body length: comparable to a unit translation
+    Psi_R[body.dofs[candidates, 1] >= 3] *= body.length  # a rotation dof counts as the translation at that length
+    _, R, pivots = la.qr(Psi_R.T, mode="economic", pivoting=True)
+    pivot_sizes = np.abs(np.diag(R))
+    rank = int((pivot_sizes > RANK_TOLERANCE * max(pivot_sizes.max(initial=0.0), 1.0)).sum())
+    if rank < 6:
+        raise BodyError(
+            f"body {body.name!r}: {len(candidates)} dofs hold only {rank} of the 6 rigid-body motions; "
+            "take an interface with six dofs, or more nodes that are not on one line"
+        )
+    return np.sort(candidates[pivots[:6]])
+
+
+def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
+    """Rigid-body modes about the mean of the nodes, without those the body's dofs do not know.
+
+    Returns
+    -------
+    Psi_R
+        (n_dof, n_r): n_r is 6 in space, 3 for a body of plane dofs, 1 for a row of masses; columns d [-], theta [m].
+    components
+        Which of d_x d_y d_z theta_x theta_y theta_z they are, (n_r,).
+
+    Raises
+    ------
+    BodyError
+        If the body has no displacement dofs.
+    """
+    Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
+    scaled = _in_lengths(body, Psi_R)
+    scaled[:, 3:] /= body.length or 1.0
+    _, R, pivots = la.qr(scaled, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(R))
+    rank = int((sizes > RANK_TOLERANCE * sizes.max(initial=0.0)).sum()) if sizes.any() else 0
+    if rank == 0:
+        raise BodyError(f"body {body.name!r}: has no displacement dofs; expected components 0..5")
+    components = np.sort(pivots[:rank]).astype(np.int64)
+    return Psi_R[:, components], components
+
+
+def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArray]:
+    """Choose the statically determinate dofs R among the boundary dofs, and interior ones where those do not suffice.
+
+    (1) pivoted QR of the rigid-body modes restricted to B, rotations scaled by the body length
+    (2) where their rank there is below n_r: the same over the interior dofs for the motions B leaves free
+
+    Parameters
+    ----------
+    Psi_R
+        Independent rigid-body modes, (n_dof, n_r).
+
+    Returns
+    -------
+    r
+        Determinate dofs, (n_r,), ascending.
+    extra
+        Those of them that are interior dofs; empty for a body whose interfaces hold it.
+    """
+    scaled = _in_lengths(body, Psi_R)
+    scaled /= np.abs(scaled).max(axis=0)
+    n_r = scaled.shape[1]
+    b = body.b
+    Q, R, pivots = la.qr(scaled[b].T, pivoting=True) if len(b) else (np.eye(n_r), np.zeros((n_r, 0)), b)
+    rank = int((np.abs(np.diag(R)) > HOLDS).sum())
+    held = b[pivots[:rank]]
+    extra = np.zeros(0, np.int64)
+    if rank < n_r:
+        i = body.i
+        *_, pivots = la.qr((scaled[i] @ Q[:, rank:]).T, mode="economic", pivoting=True)
+        extra = np.sort(i[pivots[: n_r - rank]])
+    return np.sort(np.concatenate([held, extra])), extra
+
+
+def _in_lengths(body: FEBody, Psi_R: Array) -> Array:
+    """Return rigid-body modes with rotation dofs counted as the translation at one body length."""
+    scaled = Psi_R.copy()
+    scaled[body.dofs[:, 1] >= 3] *= body.length or 1.0
+    return scaled
+
+
+def static_rigid_modes(body: FEBody, r: IntArray) -> Array:
+    """Rigid-body modes as static solutions for a unit displacement of each of the determinate dofs r, (n_dof, 6).
+
+    Interior part -K_ff⁻¹ K_fr with f all dofs but r: a route through the stiffness matrix only.
+    """
+    from cms.solvers.factorization import factorize
+
+    f = np.setdiff1d(np.arange(body.n_dof), r)
+    columns = body.K[:, r].toarray()
+    Psi_R = np.zeros((body.n_dof, len(r)))
+    Psi_R[r, np.arange(len(r))] = 1.0
+    with factorize(sp.csc_array(body.K[f][:, f]), definite=not (body.dofs[:, 1] < 0).any()) as factorization:
+        Psi_R[f] = -factorization.solve(columns[f])
+    return Psi_R
+
+
+def null_space_rigid_modes(body: FEBody) -> Array:
+    """Rigid-body modes as the zero-frequency vibration modes of the free body, (n_dof, 6), M-orthonormal."""
+    from cms.solvers.eigen import eigenmodes
+
+    return eigenmodes(body.K, body.M, n_modes=6).Phi

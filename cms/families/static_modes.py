@@ -1,0 +1,169 @@
+"""Static modes of a body by its boundary dofs (THEORY §2)."""
+
+import numpy as np
+
+from cms.families.fixed_interface import FixedInterfaceBody
+from cms.families.flexibility import Flexibility
+from cms.solvers.eigen import EigenResult
+from cms.solvers.tall import combine
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+
+__all__ = [
+    "attachment_modes",
+    "boundary_groups",
+    "boundary_labels",
+    "constraint_modes",
+    "inertia_relief_modes",
+    "redundant_constraint_modes",
+    "residual_attachment_modes",
+    "unrestrained_attachment_modes",
+]
+
+COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
+STIFF = 1e-14  #: compliance over the largest one (rotations times the body length squared), below which it is rounding
+STILL = 1e-24  #: the same of the energy of a response to inertia loads, where both factors are rounding
+BLOCK = 60  #: right-hand sides solved at once; wider blocks gain nothing measurable and cost memory
+
+
+def constraint_modes(fixed: FixedInterfaceBody) -> Array:
+    """Constraint modes Psi_C: unit displacement of one boundary dof, the other boundary dofs held.
+
+    Interior part -K_II⁻¹ K_IB; columns in the order of the held dofs `fixed.b`.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_b), translations per translation [-] or per rotation [m].
+    """
+    body, i, b = fixed.body, fixed.i, fixed.b
+    Psi_C = np.zeros((body.n_dof, len(b)))
+    Psi_C[b, np.arange(len(b))] = 1.0
+    K_b = body.K[:, b]
+    for first in range(0, len(b), BLOCK):
+        columns = slice(first, min(first + BLOCK, len(b)))
+        Psi_C[i, columns] = fixed.factorization.solve(-K_b[:, columns].toarray()[i])
+    return Psi_C
+
+
+def redundant_constraint_modes(free: Flexibility) -> Array:
+    """Redundant constraint modes Psi_RC: unit displacement of one E dof, the other E dofs and R held.
+
+    Parameters
+    ----------
+    free
+        The flexibility of the free body, whose pivots are R.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_e), the constraint modes of the E dofs.
+    """
+    return free.condensed.Psi_C[:, free.e]
+
+
+def attachment_modes(free: Flexibility) -> Array:
+    """Attachment modes Psi_A: unit force on one E dof, R held; Psi_A = Psi_C,E S_EE⁻¹.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_e), translations per force [m/N] or per moment [1/N].
+    """
+    return combine(free.condensed.Psi_C[:, free.e], free.solve_boundary(np.eye(len(free.e))))
+
+
+def inertia_relief_modes(fixed: FixedInterfaceBody, Psi_R: Array) -> Array:
+    """Inertia-relief modes Psi_H: static response to the loads M Psi_R of rigid-body accelerations, all of B held.
+
+    Interior part K_II⁻¹ (M Psi_R)_I.
+
+    Parameters
+    ----------
+    Psi_R
+        Rigid-body modes, (n_dof, n_r).
+
+    Returns
+    -------
+    Array
+        (n_dof, n_r), translations per acceleration [s²] or per angular acceleration [m s²]; zero, not rounding, where
+        the body does not give way (a planar one, out of its plane).
+    """
+    Psi_H = np.zeros(Psi_R.shape)
+    F = (fixed.body.M @ Psi_R)[fixed.i]
+    Psi_H[fixed.i] = fixed.factorization.solve(F)
+    is_rotation = np.arange(Psi_R.shape[1]) >= 3
+    energy = np.einsum("nk,nk->k", F, Psi_H[fixed.i]) / _unit(fixed.body, is_rotation)
+    Psi_H[:, energy <= STILL * energy.max(initial=0.0)] = 0.0
+    return Psi_H
+
+
+def unrestrained_attachment_modes(free: Flexibility) -> Array:
+    """Unrestrained attachment modes Psi_U = Pᵀ G_R P F_B: unit force on each boundary dof of the free body.
+
+    The force is in balance with the rigid-body acceleration it causes, so the choice of R does not matter.
+    G_R P F_B = Psi_C,E S_EE⁻¹ F_E - (G_R M N) N_Bᵀ with M-orthonormal rigid-body modes N: six solves, whatever n_b.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_b), with Psi_Rᵀ M Psi_U = 0; translations per force [m/N] or per moment [1/N]. Zero, not rounding,
+        where the free body answers a load by acceleration alone.
+    """
+    n_b, h = len(free.condensed.body.b), free.condensed.fixed.b
+    on_boundary = np.zeros((len(h), n_b))  # u_h of the unit forces with R held
+    on_boundary[free.e] = free.solve_boundary(np.eye(len(h), n_b)[free.e])
+    u = combine(free.condensed.Psi_C, on_boundary)
+    u -= combine(free.held(free.M_N), free.N[h[:n_b]].T)
+    u = u - combine(free.N, free.M_N.T @ u)
+    body, b = free.condensed.body, h[:n_b]
+    compliance = u[b, np.arange(n_b)] * _unit(body, body.dofs[b, 1] >= 3)
+    u[:, compliance <= STIFF * compliance.max(initial=0.0)] = 0.0
+    return u
+
+
+def residual_attachment_modes(body: FEBody, Psi_U: Array, free_modes: EigenResult) -> Array:
+    """Residual attachment modes: Psi_U - Phi Lambda⁻¹ Phi_Bᵀ, the unrestrained ones without the part of the kept modes.
+
+    Parameters
+    ----------
+    Psi_U
+        Unrestrained attachment modes, (n_dof, n_b).
+    free_modes
+        Elastic modes of the free body that are kept.
+
+    Returns
+    -------
+    Array
+        (n_dof, n_b).
+    """
+    if not len(free_modes.omega2):
+        return Psi_U
+    residual = Psi_U - combine(free_modes.Phi, (free_modes.Phi[body.b] / free_modes.omega2).T)
+    residual[:, ~Psi_U.any(axis=0)] = 0.0  # what does not give way leaves nothing
+    return residual
+
+
+def _unit(body: FEBody, is_rotation: np.ndarray) -> Array:
+    """What makes compliances comparable: the body length squared for rotations, else 1."""
+    return np.where(is_rotation, body.length**2 or 1.0, 1.0)
+
+
+def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:
+    """Return one label per boundary dof, such as 'constraint big_end ux' or 'constraint bolts node 12 uz'."""
+    labels = []
+    for interface in body.interfaces:
+        for dof in interface.dofs if interface.dofs is not None else ():
+            node, component = body.dofs[dof]
+            at_node = f" node {node}" if interface.kind == "nodes" and len(interface.nodes) > 1 else ""
+            labels.append(f"{family} {interface.name}{at_node} {COMPONENTS[component]}")
+    return tuple(labels)
+
+
+def boundary_groups(body: FEBody, family: str) -> tuple[str, ...]:
+    """Return one group per boundary dof, such as 'constraint big_end'."""
+    return tuple(
+        f"{family} {interface.name}"
+        for interface in body.interfaces
+        for _ in (interface.dofs if interface.dofs is not None else ())
+    )

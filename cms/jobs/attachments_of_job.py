@@ -1,0 +1,135 @@
+"""Lines of a job: their mesh, sections, interfaces, and what is attached to their nodes."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cms.errors import JobError
+from cms.jobs.beam_tables import BeamSection
+from cms.jobs.job import Job
+from fe_models.body.fe_body import Interface
+from fe_models.foundation.words import nearest
+
+if TYPE_CHECKING:
+    from fe_models.beams.beam_property import BeamProperty
+    from fe_models.meshes.line_mesh import LineMesh
+    from fe_models.meshes.shell_mesh import ShellMesh
+
+__all__ = ["attachments_of", "frame_interface", "frame_mesh", "one_node", "properties_of"]
+
+GENERAL_KEYS = {
+    "area": "A",
+    "iy": "Iy",
+    "iz": "Iz",
+    "torsion": "J",
+    "shear_area_y": "A_sy",
+    "shear_area_z": "A_sz",
+}  #: key of the job -> field of `GeneralSection`
+
+
+def frame_mesh(job: Job) -> "LineMesh":
+    """Read the lines of the job: two tables, or the groups of its mesh that have sections."""
+    from fe_models.importers.read_mesh import read_line_mesh
+    from fe_models.importers.tables import read_tables
+
+    if job.body.nodes is not None and job.body.lines is not None:
+        return read_tables(job.body.nodes, job.body.lines)
+    if job.body.mesh is None:
+        raise JobError("job: expected a mesh, or tables of nodes and lines, got neither")
+    groups = [group for section in job.sections.values() for group in section.lines]
+    return read_line_mesh(job.body.mesh, groups=None if groups == ["all"] else groups)
+
+
+def properties_of(job: Job) -> "dict[str, BeamProperty]":
+    """Return group of lines -> its section, material and theory."""
+    from fe_models.beams.beam_property import BeamProperty
+    from fe_models.material import Material
+
+    made: dict[str, BeamProperty] = {}
+    for section in job.sections.values():
+        name = section.material or next(iter(job.materials))
+        table = job.materials[name]
+        item = BeamProperty(
+            shape_of(section),
+            Material(name, E=table.young, nu=table.poisson, rho=table.density),
+            offset=section.offset or (0.0, 0.0),
+            orientation=section.orientation,
+            shear=section.shear,
+            rotary_inertia=section.rotary_inertia,
+            added_mass=section.added_mass,
+        )
+        made |= dict.fromkeys(section.lines, item)
+    return made
+
+
+def shape_of(section: BeamSection) -> Any:
+    """Return the cross-section of a table."""
+    from fe_models.beams.sections import SECTIONS
+
+    given = {GENERAL_KEYS.get(key, key): value for key, value in section.dimensions.items()}
+    if "outline" in given:
+        given["outline"] = np.array(given["outline"])
+    return SECTIONS[section.shape](**given)
+
+
+def attachments_of(job: Job, mesh: "LineMesh | ShellMesh") -> tuple[list[Any], list[Any], list[Any]]:
+    """Return point masses, springs and rigid links of the job on this mesh."""
+    from fe_models.beams.attachments import PointMass, RigidLink, Spring
+
+    masses = [
+        PointMass(
+            one_node(mesh, f"masses.{name}.node", table.node),
+            table.mass,
+            table.inertia,
+            table.offset or (0.0, 0.0, 0.0),
+        )
+        for name, table in job.masses.items()
+    ]
+    springs = [
+        Spring(
+            (
+                one_node(mesh, f"springs.{name}.nodes", table.nodes[0]),
+                one_node(mesh, f"springs.{name}.nodes", table.nodes[1]),
+            ),
+            table.stiffness,
+            damping=table.damping,
+            point=table.point,
+            triad=np.eye(3) if table.triad is None else np.array(table.triad).T,  # the job lists axes, columns are axes
+        )
+        for name, table in job.springs.items()
+    ]
+    links = [
+        RigidLink(
+            one_node(mesh, f"links.{name}.node", table.node),
+            np.unique(
+                np.concatenate([nodes_named(mesh, f"links.{name}.followers", group) for group in table.followers])
+            ),
+        )
+        for name, table in job.links.items()
+    ]
+    return masses, springs, links
+
+
+def one_node(mesh: "LineMesh | ShellMesh", where: str, group: str) -> int:
+    """Return the node of a group that holds just one; `JobError` with the key otherwise."""
+    nodes = nodes_named(mesh, where, group)
+    if len(nodes) != 1:
+        raise JobError(f'{where} = "{group}": expected a group of one node, got {len(nodes)} nodes')
+    return int(nodes[0])
+
+
+def nodes_named(mesh: "LineMesh | ShellMesh", where: str, group: str) -> np.ndarray:
+    """Return the nodes of a group of the lines."""
+    if group not in mesh.node_sets:
+        raise JobError(f'{where} = "{group}": the lines have no such group of nodes{nearest(group, mesh.node_sets)}')
+    return mesh.node_sets[group]
+
+
+def frame_interface(name: str, section: Any, mesh: "LineMesh") -> Interface:
+    """Return one interface on the lines: its selection, kind, reference point and axes."""
+    from cms.jobs.parts_of_job import selection_of
+    from fe_models.beams.interfaces import line_interface
+
+    chosen = selection_of(section.selection, getattr(section, section.selection))
+    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+    return line_interface(mesh, name, chosen, kind=section.kind, reference=section.reference, triad=triad)

@@ -1,0 +1,94 @@
+"""The finite element body of a job: read, checked, assembled, its interfaces coupled."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cms.errors import JobError
+from cms.jobs.job import Job
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.stages import Stages
+from fe_models.foundation.units import unit_system
+
+if TYPE_CHECKING:
+    pass
+from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh
+
+__all__ = ["coupled_body", "job_body", "uncoupled_body"]
+
+
+def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
+    """Run a job up to the coupled body: read, check, assemble, couple the interfaces."""
+    stages = stages or Stages()
+    body = uncoupled_body(job, stages, on_report=on_report)
+    with stages("couple interfaces"):
+        return coupled_body(job, body)
+
+
+def coupled_body(job: Job, body: FEBody) -> FEBody:
+    """Couple the interfaces of the body of a job, and make it planar where that is asked for."""
+    from cms.jobs.beam_tables import PLANES
+    from cms.second_order.centrifugal import CENTRIFUGAL, centrifugal_loads
+    from fe_models.body.couplings import couple
+
+    if CENTRIFUGAL in (job.reduction.extra or ()):
+        body = body.with_load_cases(*centrifugal_loads(body))  # rigid interfaces eliminate what they act on
+    if job.body.plane is None:
+        return couple(body)
+    from fe_models.planar import planar
+
+    return planar(couple(body), normal=PLANES[job.body.plane])
+
+
+def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
+    """Run a job up to the body whose interfaces are still to be coupled."""
+    if job.shells:
+        from cms.jobs.shell_body import body_of_shell
+
+        return body_of_shell(job, stages, on_report)
+    if job.sections and not job.ties:
+        from cms.jobs.frame_body import body_of_frame
+
+        return body_of_frame(job, stages, on_report)
+    if job.body.mesh is not None:
+        return body_of_mesh(job, job.body.mesh, stages, on_report)
+    if job.body.matrices is not None:
+        return body_of_matrices(job, job.body.matrices, stages)
+    raise JobError("job: expected either mesh or matrices, got neither")
+
+
+def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
+    """Read and check the mesh, and assemble it with the materials and interfaces of the job."""
+    from fe_models.importers import read_mesh
+    from fe_models.meshes.unused_nodes import drop_unused_nodes
+    from fe_models.reports.mesh_report import report_mesh
+    from fe_models.solids.body import solid_body
+
+    units = unit_system(job.body.units)
+    materials = materials_of(job)
+    with stages("read mesh"):
+        mesh = part_of_mesh(job, read_mesh(path))
+    with stages("check mesh"):
+        report = report_mesh(mesh, materials, units=units)
+        if on_report is not None:
+            on_report(report)
+        report.raise_for_errors(accept=job.body.accept)
+        mesh = drop_unused_nodes(mesh)
+        interfaces = () if job.ties else interfaces_of(job, mesh)
+    name = str(job.body.name)
+    with stages("assemble") as advance:
+        body = solid_body(mesh, materials, name=name, units=units, interfaces=interfaces, progress=advance)
+    if job.ties:
+        from cms.jobs.mixed_body import body_of_mixed
+
+        body = body_of_mixed(job, stages, body, mesh, on_report)
+    return body.with_load_cases(*load_cases_of(job, body, mesh))
+
+
+def body_of_matrices(job: Job, path: Path, stages: Stages) -> FEBody:
+    """Read a body of bare matrices, which brings its interfaces along."""
+    from fe_models.matrices import body_from_npz
+
+    with stages("read matrices"):
+        body = body_from_npz(path, name=job.body.name, units=unit_system(job.body.units))
+        return body.with_load_cases(*load_cases_of(job, body))

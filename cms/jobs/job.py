@@ -1,0 +1,336 @@
+"""The reduction job: what `cms reduce` reads (docs/job_file.md)."""
+
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+
+from cms.errors import JobError
+from cms.jobs.beam_tables import (
+    PLANES,
+    BeamSection,
+    LinkSection,
+    MassSection,
+    SpringSection,
+    TieSection,
+    check_beams,
+    names,
+)
+from cms.jobs.damping_table import DampingSection
+from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
+from cms.jobs.shell_tables import ShellSection, check_shells
+from fe_models.body.fe_body import INTERFACE_KINDS
+from fe_models.body.load_cases import LOAD_CASE_KINDS
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, read_toml, validated
+from fe_models.foundation.units import UNIT_SYSTEMS
+from fe_models.foundation.words import nearest
+
+__all__ = ["SELECTIONS", "DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
+
+SELECTIONS = ("faces", "nodes", "plane", "cylinder", "box", "nearest")  #: keys that select the nodes of an interface
+ACCEPTABLE = ("overlap", "parts", "transition", "units", "warped")  #: errors of the mesh report that may be meant
+KEYS_OF_LOADS = {
+    "pressure": ("pressure",),
+    "gravity": ("acceleration",),
+    "force": ("force", "torque", "at", "reference"),
+}  #: keys of a load case by its kind, beside the selections of pressure and force
+
+Name = Annotated[str, StringConstraints(min_length=1)]
+Positive = Annotated[float, Field(gt=0)]
+
+
+def accepted(value: Any) -> tuple[str, ...]:
+    """Return kinds of findings of the mesh report that the user has looked at and accepts."""
+    words = names(value)
+    for word in words:
+        if word not in ACCEPTABLE:
+            raise ValueError(f"{word!r} is not a finding that can be accepted{nearest(word, ACCEPTABLE)}")
+    return words
+
+
+Names = Annotated[tuple[str, ...], BeforeValidator(names)]
+Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted)]
+
+
+class PartSection(Table):
+    """[body] part: one of several parts of the mesh, cut across an axis; its cuts are node sets cut_1, cut_2, ..."""
+
+    number: Annotated[int, Field(ge=1)] = Field(description="a whole number from 1, which part")
+    of: Annotated[int, Field(ge=2)] | None = Field(
+        None, description="a whole number, 2 or more, the number of parts of equal length"
+    )
+    at: tuple[float, ...] | None = Field(None, description="a list of numbers, the places of the cuts along the axis")
+    axis: Vector3 | None = Field(None, description="the direction across which is cut, [x, y, z]; default: the longest")
+
+    @field_validator("at", mode="before")
+    @classmethod
+    def _list(cls, value: Any) -> Any:
+        if not isinstance(value, list) or not value or any(is_no_number(x) for x in value):
+            raise ValueError("expected a list of numbers, the places of the cuts along the axis")
+        return tuple(float(x) for x in value)
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> "PartSection":
+        if (self.of is None) == (self.at is None):
+            raise ValueError(f"expected either of or at, got {'both' if self.of else 'neither'}")
+        n = self.of or len(self.at or ()) + 1
+        if self.number > n:
+            raise ValueError(f"number: there are {n} parts, got number {self.number}")
+        return self
+
+
+class BodySection(Table):
+    """[body]: where the model comes from."""
+
+    name: Name | None = Field(None, description="the name of the body, text; default: the name of the job file")
+    mesh: Path | None = Field(None, description="the path of a mesh file, relative to the job file")
+    matrices: Path | None = Field(None, description="the path of an .npz file with M, K, nodes, dofs")
+    nodes: Path | None = Field(None, description="the path of a table of nodes, for beams")
+    lines: Path | None = Field(None, description="the path of a table of lines, for beams")
+    plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"the plane beams deform in, one of {', '.join(PLANES)}; default: space"
+    )
+    part: PartSection | None = Field(None, description="a table {number, of or at, axis}: one part of the mesh alone")
+    units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
+        description=f"the unit system of the numbers, one of {', '.join(UNIT_SYSTEMS)}"
+    )
+    accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
+
+    @field_validator("mesh", "matrices", "nodes", "lines", mode="before")
+    @classmethod
+    def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
+        if not isinstance(value, str) or not value:
+            raise ValueError("expected the path of a file, text")
+        path = Path(info.context or ".") / value
+        if not path.is_file():
+            raise ValueError(f"no such file: {path}{near_file(path)}")
+        return path
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "BodySection":
+        if (self.nodes is None) != (self.lines is None):
+            raise ValueError(f"{'lines' if self.nodes else 'nodes'}: missing; tables of nodes and lines come together")
+        if self.part is not None and self.matrices is not None:
+            raise ValueError("part: matrices cannot be cut; remove it, or give the mesh")
+        given = [key for key in ("mesh", "matrices", "lines") if getattr(self, key) is not None]
+        if len(given) != 1:
+            got = "both" if given == ["mesh", "matrices"] else " and ".join(given) or "neither"
+            raise ValueError(
+                f"expected either mesh or matrices, got {got}; beams may have tables of nodes and lines instead"
+            )
+        return self
+
+
+class MaterialSection(Table):
+    """[materials.NAME]: an isotropic material and the cells that have it."""
+
+    young: Positive = Field(description="a number above 0, Young's modulus [stress unit]")
+    poisson: Annotated[float, Field(gt=-1, lt=0.5)] = Field(description="a number between -1 and 0.5, Poisson's ratio")
+    density: Positive = Field(description="a number above 0, the density [mass / length^3]")
+    cells: Names = Field(("all",), description='"all", the name of a group of cells, or a list of names')
+
+
+class PlaneSection(Table):
+    """Nodes on a plane."""
+
+    point: Vector3 = Field(description="a point of the plane, [x, y, z]")
+    normal: Vector3 = Field(description="a direction normal to the plane, [x, y, z]")
+    tolerance: Positive | None = Field(None, description="a number above 0, the largest distance of a node")
+
+
+class CylinderSection(Table):
+    """Nodes on the surface of a cylinder."""
+
+    point: Vector3 = Field(description="a point on the axis, [x, y, z]")
+    axis: Vector3 = Field(description="the direction of the axis, [x, y, z]")
+    radius: Positive = Field(description="a number above 0, the radius")
+    span: Range | None = Field(None, description="two numbers, [from, to] along the axis, measured from point")
+    tolerance: Positive | None = Field(None, description="a number above 0, the largest distance from the surface")
+
+
+class BoxSection(Table):
+    """Nodes in a box along the axes."""
+
+    lo: Vector3 = Field(description="the corner with the least coordinates, [x, y, z]")
+    hi: Vector3 = Field(description="the corner with the greatest coordinates, [x, y, z]")
+
+
+class NearestSection(Table):
+    """The node nearest to a point."""
+
+    point: Vector3 = Field(description="a point, [x, y, z]")
+
+
+class InterfaceSection(Table):
+    """[interfaces.NAME]: a place where the body meets its neighbours."""
+
+    kind: choice("kind", lambda: INTERFACE_KINDS) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(INTERFACE_KINDS)}"
+    )
+    faces: Name | None = Field(None, description="the name of a group of faces")
+    nodes: Name | None = Field(None, description="the name of a group of nodes")
+    plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
+    cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
+    box: BoxSection | None = Field(None, description="a table {lo, hi}")
+    nearest: NearestSection | None = Field(None, description="a table {point}")
+    reference: Vector3 | None = Field(None, description="the reference point, [x, y, z]")
+    triad: Matrix3 | None = Field(None, description="the axes of the interface, [x axis, y axis, z axis]")
+    on: choice("part", lambda: ("solid", "lines")) | None = Field(  # type: ignore[valid-type]
+        None, description="solid or lines: what it is on, where a body has both"
+    )
+
+    @property
+    def selection(self) -> str:
+        """The key of the selection that is given."""
+        return next(key for key in SELECTIONS if getattr(self, key) is not None)
+
+    @model_validator(mode="after")
+    def _one_selection(self) -> "InterfaceSection":
+        given = [key for key in SELECTIONS if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected exactly one of {', '.join(SELECTIONS)}; got {', '.join(given) or 'none'}")
+        return self
+
+
+class LoadCaseSection(Table):
+    """[load_cases.NAME]: a named load, whose modal forces and stresses go into the modal file."""
+
+    kind: choice("kind", lambda: LOAD_CASE_KINDS) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(LOAD_CASE_KINDS)}"
+    )
+    pressure: float | None = Field(None, description="a number, positive pushes on the surface [stress unit]")
+    acceleration: Vector3 | None = Field(None, description="the acceleration of free fall, [x, y, z]")
+    force: Vector3 | None = Field(None, description="the total force, [x, y, z]")
+    torque: Vector3 | None = Field(None, description="the total torque about the reference point, [x, y, z]")
+    at: Name | None = Field(None, description="the name of an interface, at whose reference point it acts")
+    reference: Vector3 | None = Field(None, description="the point the force acts at, [x, y, z]")
+    faces: Name | None = Field(None, description="the name of a group of faces")
+    nodes: Name | None = Field(None, description="the name of a group of nodes")
+    plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
+    cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
+    box: BoxSection | None = Field(None, description="a table {lo, hi}")
+    nearest: NearestSection | None = Field(None, description="a table {point}")
+
+    @property
+    def selection(self) -> str | None:
+        """The key of the selection that is given, if one is."""
+        return next((key for key in SELECTIONS if getattr(self, key) is not None), None)
+
+    @model_validator(mode="after")
+    def _keys_of_the_kind(self) -> "LoadCaseSection":
+        allowed = KEYS_OF_LOADS[self.kind] + (() if self.kind == "gravity" else SELECTIONS)
+        given = [key for key in type(self).model_fields if key != "kind" and getattr(self, key) is not None]
+        for key in given:
+            if key not in allowed:
+                raise ValueError(f"a load case of kind {self.kind!r} has no key {key}{nearest(key, allowed)}")
+        places = [key for key in given if key in (*SELECTIONS, "at")]
+        if self.kind != "gravity" and len(places) != 1:
+            choices = ", ".join(("at", *SELECTIONS) if self.kind == "force" else SELECTIONS)
+            raise ValueError(f"expected exactly one of {choices}; got {', '.join(places) or 'none'}")
+        amounts = ("force", "torque") if self.kind == "force" else KEYS_OF_LOADS[self.kind]
+        if not any(key in given for key in amounts):
+            raise ValueError(f"{' or '.join(amounts)}: missing; how large is the load?")
+        if self.at is not None and self.reference is not None:
+            raise ValueError("reference: an interface has its own; remove the key, or select the nodes instead of at")
+        return self
+
+
+class Job(Table):
+    """A reduction job: one body, its materials, its interfaces, and how to reduce it."""
+
+    body: BodySection = Field(description="a table [body] with mesh and units")
+    materials: dict[str, MaterialSection] = Field({}, description="tables [materials.NAME]")
+    shells: dict[str, ShellSection] = Field({}, description="tables [shells.NAME]")
+    sections: dict[str, BeamSection] = Field({}, description="tables [sections.NAME] of beams")
+    masses: dict[str, MassSection] = Field({}, description="tables [masses.NAME]")
+    springs: dict[str, SpringSection] = Field({}, description="tables [springs.NAME]")
+    links: dict[str, LinkSection] = Field({}, description="tables [links.NAME]")
+    ties: dict[str, TieSection] = Field({}, description="tables [ties.NAME] of beams to a solid")
+    interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")
+    load_cases: dict[str, LoadCaseSection] = Field({}, description="tables [load_cases.NAME]")
+    reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
+    damping: DampingSection | None = Field(
+        None, description="a table [damping] with ratio, ratios, ramp, or alpha and beta"
+    )
+
+    @property
+    def materials_of_cells(self) -> dict[str, MaterialSection]:
+        """The materials of solid cells: all, but for those that only sections of beams name; none of shells."""
+        if self.shells or (self.sections and not self.ties):
+            return {}
+        named = {section.material for section in self.sections.values()}
+        return {
+            name: material
+            for name, material in self.materials.items()
+            if name not in named or "cells" in material.model_fields_set or len(self.materials) == 1
+        }
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> "Job":
+        if not self.body.matrices and not self.materials:
+            raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
+        attached = {"masses": self.masses, "springs": self.springs, "links": self.links, "ties": self.ties}
+        if self.shells:
+            check_shells(self.shells, self.sections, self.body, self.materials)
+            if self.ties:
+                raise ValueError("ties: belong to a mesh of solid and lines; stiffeners share the nodes of the shell")
+            attached = {}
+        check_beams(self.sections, attached, self.materials)
+        if self.body.lines and not self.sections:
+            raise ValueError("sections: missing; lines need at least one table [sections.NAME]")
+        if self.body.matrices and (self.sections or self.body.plane):
+            raise ValueError("sections: matrices have their elements inside; remove the tables, and plane")
+        if self.body.plane and (self.ties or not self.sections):
+            raise ValueError("body.plane: belongs to beams alone; remove it")
+        if self.body.part and self.ties:
+            raise ValueError("body.part: beams tied to a solid cannot be cut; remove it, or cut one without the other")
+        if self.body.lines and self.ties:
+            raise ValueError("ties: belong to a mesh of solid and lines; remove the tables")
+        for name, interface in self.interfaces.items():
+            if (interface.on is not None) != bool(self.ties):
+                what = "missing; solid or lines?" if self.ties else "only where beams are tied to a solid; remove it"
+                raise ValueError(f"interfaces.{name}.on: {what}")
+        if self.body.matrices and self.materials:
+            raise ValueError("materials: matrices have their material inside; remove the tables [materials.NAME]")
+        if self.body.matrices and self.interfaces:
+            raise ValueError(
+                "interfaces: matrices bring their interfaces in the .npz file (interface/NAME/nodes); remove the tables"
+            )
+        of_cells = self.materials_of_cells
+        if len(of_cells) > 1:
+            everywhere = [name for name, material in of_cells.items() if material.cells == ("all",)]
+            if everywhere:
+                raise ValueError(
+                    f'materials.{everywhere[0]}: cells = "all", but there are {len(of_cells)} materials; '
+                    "name the group of cells of each"
+                )
+        for where, name in named_interfaces(self.reduction).items():
+            if not self.body.matrices and name not in self.interfaces:
+                raise ValueError(f"reduction.{where}: there is no such interface{nearest(name, self.interfaces)}")
+        for name, case in self.load_cases.items():
+            if not self.body.matrices and case.at is not None and case.at not in self.interfaces:
+                raise ValueError(
+                    f'load_cases.{name}.at = "{case.at}": there is no such interface{nearest(case.at, self.interfaces)}'
+                )
+            if self.body.matrices and case.selection is not None:
+                raise ValueError(
+                    f"load_cases.{name}.{case.selection}: matrices have no mesh to select on; give at = an interface"
+                )
+        return self
+
+
+def read_job(path: str | os.PathLike[str]) -> Job:
+    """Read and check a job file.
+
+    Raises
+    ------
+    JobError
+        With every problem: key path, value, what was expected, choices and the nearest name.
+    """
+    path = Path(path)
+    job = validated(Job, read_toml(path, JobError), path, JobError, context=path.parent)
+    if job.body.name is None:
+        job = job.model_copy(update={"body": job.body.model_copy(update={"name": path.stem})})
+    return job

@@ -1,0 +1,119 @@
+"""The mode set a job asks for, with its options as the functions take them."""
+
+from typing import Any
+
+import numpy as np
+
+from cms.families.families import Families
+from cms.families.interface_loads import InterfaceLoad, condensed_load
+from cms.jobs.reduction_table import AUTO, LoadSection, NeighbourSection, ReductionSection, mode_set_options
+from cms.mode_set import ModeSet
+from cms.mode_sets import MODE_SETS
+from cms.mode_sets.characteristic_modes import with_characteristic_modes
+from cms.mode_sets.extra_columns import EXTRA_COLUMNS
+from cms.mode_sets.selection import families_of
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+
+__all__ = ["job_mode_set"]
+
+
+def job_mode_set(body: FEBody, reduction: ReductionSection, *, families: Families | None = None) -> ModeSet:
+    """Make the mode set of the table [reduction] for a coupled body.
+
+    Parameters
+    ----------
+    families
+        The families of the body, to share them with other sets.
+
+    Raises
+    ------
+    CmsError, FeModelsError
+        If the set cannot be made with these options, or a neighbour cannot be read.
+    """
+    with families_of(body, families) as families:
+        options = set_options(body, reduction)
+
+        def added(modes: ModeSet) -> ModeSet:
+            return with_additions(body, modes, reduction, families)
+
+        if reduction.n_modes != AUTO:
+            return added(MODE_SETS[reduction.set](body, **options, families=families))
+        from cms.compare.mode_selection import select_modes
+
+        has_additions = reduction.extra or reduction.interface_modes is not None or reduction.interface_cutoff
+        return select_modes(
+            body,
+            set=reduction.set,
+            error=reduction.error or 0.0,
+            band=reduction.band or (0.0, 0.0),
+            measure=reduction.measure or "frequency",
+            options=options,
+            added=added if has_additions else None,
+            families=families,
+        ).modes
+
+
+def with_additions(body: FEBody, modes: ModeSet, reduction: ReductionSection, families: Families) -> ModeSet:
+    """Reduce all-node interfaces to their characteristic modes and add extra columns, as the job asks for."""
+    if reduction.interface_modes is not None or reduction.interface_cutoff is not None:
+        cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * body.units.time
+        modes = with_characteristic_modes(
+            modes, body, n_modes=reduction.interface_modes, cutoff=cutoff, together=bool(reduction.interfaces_together)
+        )
+    for name in reduction.extra or ():
+        modes = EXTRA_COLUMNS[name](modes, body, families=families)
+    return modes
+
+
+def set_options(body: FEBody, reduction: ReductionSection) -> dict[str, Any]:
+    """Return the options of the set as its function takes them: frequencies in cycles per time unit of the body."""
+    options: dict[str, Any] = {}
+    time = body.units.time
+    is_auto = reduction.n_modes == AUTO
+    for key in mode_set_options(reduction.set):
+        value = getattr(reduction, key)
+        if value is None or (is_auto and key in ("n_modes", "band")):
+            continue
+        if key == "cutoff":
+            options[key] = value * time
+        elif key in ("shifts", "band"):
+            options[key] = tuple(x * time for x in value)
+        elif key == "loads":
+            made = [load_of(name, section) for name, section in value.items()]
+            options["loads"] = [*options.get("loads", []), *made]
+        elif key == "neighbours":
+            options["loads"] = [*options.get("loads", []), *(neighbour_load(body, section) for section in value)]
+        else:
+            options[key] = value
+    return options
+
+
+def load_of(name: str, section: LoadSection) -> InterfaceLoad:
+    """Return the load of one interface."""
+    return InterfaceLoad(
+        (name,), _matrix(section.mass, section.inertia), _matrix(section.stiffness, section.rotational_stiffness)
+    )
+
+
+def neighbour_load(body: FEBody, section: NeighbourSection) -> InterfaceLoad:
+    """Read the neighbour's job, build its body, and condense it to the shared interfaces."""
+    from cms.errors import JobError
+    from cms.jobs.body_of_job import job_body
+    from cms.jobs.job import read_job
+
+    job = read_job(section.job)
+    neighbour = job_body(job)
+    if neighbour.units != body.units:
+        raise JobError(
+            f"{section.job}: the neighbour is in units {neighbour.units.name}, body {body.name!r} in "
+            f"{body.units.name}; give both the same units"
+        )
+    return condensed_load(neighbour, section.interfaces)
+
+
+def _matrix(translation: tuple[tuple[float, ...], ...] | None, rotation: tuple[float, ...] | None) -> Array:
+    if translation is not None and len(translation) == 6:
+        return np.array(translation)
+    first = (0.0, 0.0, 0.0) if translation is None else translation[0]
+    return np.diag([*first, *(rotation or (0.0, 0.0, 0.0))])

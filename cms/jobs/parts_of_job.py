@@ -1,0 +1,114 @@
+"""What a job says of one thing each: materials, interfaces, selections, load cases, the body frame."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cms.errors import JobError
+from cms.jobs.job import InterfaceSection, Job, LoadCaseSection
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.load_cases import LoadCase
+
+if TYPE_CHECKING:
+    from cms.reduced_basis.frames import Frame
+    from fe_models.material import Material
+    from fe_models.meshes.line_mesh import LineMesh
+    from fe_models.meshes.mesh import Mesh
+    from fe_models.meshes.shell_mesh import ShellMesh
+    from fe_models.meshes.split import AnyMesh
+
+__all__ = ["frame_of", "interface_of", "interfaces_of", "load_cases_of", "materials_of", "part_of_mesh", "selection_of"]
+
+
+def part_of_mesh(job: Job, mesh: "AnyMesh") -> "AnyMesh":
+    """Return the part of the mesh that the job asks for, by default all of it."""
+    from fe_models.meshes.split import split_mesh
+
+    part = job.body.part
+    return mesh if part is None else split_mesh(mesh, part.of, at=part.at, axis=part.axis).parts[part.number - 1]
+
+
+def materials_of(job: Job) -> "Material | dict[str, Material]":
+    """Return one material for all cells, or group of cells -> material."""
+    from fe_models.material import Material
+
+    made = {
+        name: Material(name, E=section.young, nu=section.poisson, rho=section.density)
+        for name, section in job.materials_of_cells.items()
+    }
+    if [section.cells for section in job.materials_of_cells.values()] == [("all",)]:
+        return next(iter(made.values()))
+    return {group: made[name] for name, section in job.materials_of_cells.items() for group in section.cells}
+
+
+def interfaces_of(job: Job, mesh: "Mesh") -> tuple[Interface, ...]:
+    """Return the interfaces of the job on this mesh; no two may share a node."""
+    from fe_models.solids.interfaces import check_overlap
+
+    interfaces = tuple(interface_of(name, section, mesh) for name, section in job.interfaces.items())
+    check_overlap(interfaces)
+    return interfaces
+
+
+def interface_of(name: str, section: InterfaceSection, mesh: "Mesh") -> Interface:
+    """Return one interface: its selection, kind, reference point and axes."""
+    from fe_models.solids import interfaces
+
+    makers = {
+        "rigid": interfaces.rigid_interface,
+        "distributing": interfaces.distributing_interface,
+        "nodes": interfaces.nodes_interface,
+    }
+    chosen = selection_of(section.selection, getattr(section, section.selection))
+    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+    return makers[section.kind](mesh, name, chosen, reference=section.reference, triad=triad)
+
+
+def selection_of(key: str, given: Any) -> Any:
+    """Return the selection that a key of the job names, with the options given."""
+    from fe_models.meshes import selections
+
+    types = {
+        "faces": selections.FaceGroup,
+        "nodes": selections.NodeSet,
+        "plane": selections.Plane,
+        "cylinder": selections.Cylinder,
+        "box": selections.Box,
+        "nearest": selections.NearestNode,
+    }
+    selection: Any = types[key]
+    return selection(given) if isinstance(given, str) else selection(**given.model_dump())
+
+
+def load_cases_of(job: Job, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | None" = None) -> tuple[LoadCase, ...]:
+    """Return the load cases of the job on this body, not yet coupled."""
+    return tuple(load_case_of(name, section, body, mesh) for name, section in job.load_cases.items())
+
+
+def load_case_of(
+    name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | None"
+) -> LoadCase:
+    """Return one load case; the job has checked that its keys fit its kind."""
+    from fe_models import loads
+
+    if section.acceleration is not None:
+        return loads.gravity_load(body, name, section.acceleration)
+    force, torque = section.force or (0.0, 0.0, 0.0), section.torque or (0.0, 0.0, 0.0)
+    if section.at is not None:
+        return loads.interface_load(body, name, section.at, force=force, torque=torque)
+    if mesh is None or section.selection is None:
+        raise JobError(f"load_cases.{name}: there is no mesh to select on; give at = an interface")
+    chosen = selection_of(section.selection, getattr(section, section.selection))
+    if section.pressure is not None:
+        return loads.pressure_load(body, mesh, name, chosen, section.pressure)
+    return loads.selection_load(body, mesh, name, chosen, force=force, torque=torque, reference=section.reference)
+
+
+def frame_of(job: Job) -> "Frame":
+    """Return the body frame of the job."""
+    from cms.reduced_basis.frames import FRAMES, NodalFrame
+
+    reduction = job.reduction
+    if reduction.frame == "nodal":
+        return NodalFrame(reduction.at, reduction.origin, reduction.axes, reduction.dofs)
+    return FRAMES[reduction.frame](origin=reduction.origin, axes=reduction.axes)

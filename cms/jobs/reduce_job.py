@@ -1,0 +1,77 @@
+"""The whole line of a reduction job: mesh or matrices, interfaces, mode set, reduced body."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from cms.jobs.body_of_job import job_body
+from cms.jobs.job import Job
+from cms.jobs.parts_of_job import frame_of
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.stages import Stages
+
+if TYPE_CHECKING:
+    from cms.mode_set import ModeSet
+    from cms.second_order.unit_states import UnitStates
+
+__all__ = ["reduce_job"]
+
+
+def reduce_job(
+    job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None
+) -> ReducedBody:
+    """Run a job up to the reduced body.
+
+    Parameters
+    ----------
+    job
+        A checked job.
+    stages
+        Takes the time of each stage and shows its progress; none by default.
+    on_report
+        Called with the mesh report, before it is judged.
+
+    Raises
+    ------
+    CmsError, FeModelsError
+        If the mesh, a material, an interface or the mode set does not do.
+    """
+    from cms.reduction import reduce
+    from cms.second_order.unit_states import require_geometric_stiffness
+
+    stages = stages or Stages()
+    coupled = job_body(job, stages, on_report=on_report)
+    if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
+        require_geometric_stiffness(coupled)  # before the long work
+    modes, states = modes_and_states(job, coupled, stages)
+    with stages("reduce"):
+        return reduce(
+            coupled,
+            modes,
+            frame=frame_of(job),
+            damping=None if job.damping is None else job.damping.damping,
+            stress=job.reduction.stress is not False,
+            quadratic=bool(job.reduction.quadratic_modes),
+            states=states,
+        )
+
+
+def modes_and_states(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSet, UnitStates | None]":
+    """Make what needs the factorisation, which is freed before the reduction: that needs the memory.
+
+    The static states of unit loads are for the geometric stiffness; None where it is left out or not known.
+    """
+    from cms.families.families import Families
+    from cms.jobs.mode_set_of_job import job_mode_set
+    from cms.second_order.unit_states import has_geometric_stiffness, unit_states
+
+    wanted = job.reduction.geometric_stiffness
+    if wanted is None:
+        wanted = has_geometric_stiffness(coupled)
+    with Families(coupled) as families:
+        with stages(f"mode set {job.reduction.set}"):
+            modes = job_mode_set(coupled, job.reduction, families=families)
+        if not wanted and not job.reduction.quadratic_modes:
+            return modes, None
+        with stages("static states"):
+            return modes, unit_states(coupled, frame=frame_of(job), families=families)

@@ -1,0 +1,297 @@
+"""The table [reduction] of a job: the mode set, its options, and the body frame (docs/job_file.md)."""
+
+import inspect
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+
+from cms.families.static_modes import COMPONENTS
+from cms.mode_sets import MODE_SETS
+from cms.mode_sets.axis_functions import AXIS_FUNCTIONS
+from cms.mode_sets.extra_columns import EXTRA_COLUMNS
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
+from fe_models.foundation.words import nearest
+
+__all__ = [
+    "FRAMES",
+    "SET_OPTIONS",
+    "LoadSection",
+    "NeighbourSection",
+    "ReductionSection",
+    "mode_set_options",
+    "named_interfaces",
+]
+
+FRAMES = ("nodal", "tisserand", "buckens")
+MEASURE_NAMES = ("frequency", "frf")  #: of `cms.compare.mode_selection`, whose import would cost every command its time
+SET_OPTIONS = (
+    "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
+    "load_cases", "damping_ratio", "n_rich", "functions", "n_axial", "n_bending", "n_torsion", "axis", "point",
+    "poisson", "columns",
+)  # fmt: skip
+#: keys that belong to some mode sets
+AUTO = "auto"  #: instead of a number of modes: as few as meet error over band
+AUTO_OPTIONS = ("error", "band", "measure")  #: keys that belong to n_modes = "auto"
+
+Name = Annotated[str, StringConstraints(min_length=1)]
+Positive = Annotated[float, Field(gt=0)]
+Rows = tuple[tuple[float, ...], ...]
+
+
+def components(value: Any) -> tuple[str, ...]:
+    """Return one component or a list of components of an interface."""
+    words = [value] if isinstance(value, str) else value
+    if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
+        raise ValueError(f"expected a list of components, each once, of {', '.join(COMPONENTS)}")
+    for word in words:
+        if word not in COMPONENTS:
+            raise ValueError(f"unknown component {word!r}{nearest(str(word), COMPONENTS)}")
+    return tuple(words)
+
+
+def amount(value: Any) -> tuple[float, float, float]:
+    """Return one number for all axes, or three, none negative."""
+    values = [value] * 3 if not isinstance(value, list | tuple) else value
+    if len(values) != 3 or any(is_no_number(x) or x < 0 for x in values):
+        raise ValueError("expected one number, 0 or more, or three, [x, y, z]")
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def amount_or_matrix(value: Any) -> Rows:
+    """Return one number or three as one row, or six rows of six numbers."""
+    if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
+        if [len(row) for row in value if isinstance(row, list | tuple)] != [6] * 6 or len(value) != 6:
+            raise ValueError("expected one number, three, or six rows of six numbers")
+        if any(is_no_number(x) for row in value for x in row):
+            raise ValueError("expected numbers in every row")
+        return tuple(tuple(float(x) for x in row) for row in value)
+    return (amount(value),)
+
+
+def count_or_auto(value: Any) -> Any:
+    """Return a number of modes, or "auto"."""
+    if value != AUTO and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
+        raise ValueError('expected a whole number, 0 or more, of vibration modes, or "auto"')
+    return value
+
+
+def shift_list(value: Any) -> tuple[float, ...]:
+    """Return one expansion frequency or a list of them."""
+    values = value if isinstance(value, list | tuple) else [value]
+    if not values or any(is_no_number(x) or x < 0 for x in values):
+        raise ValueError("expected a list of frequencies, 0 or more, in Hz")
+    return tuple(float(x) for x in values)
+
+
+def extras(value: Any) -> tuple[str, ...]:
+    """Return one kind of extra columns or a list of kinds."""
+    words = [value] if isinstance(value, str) else value
+    if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
+        raise ValueError(f"expected a list, each once, of {', '.join(EXTRA_COLUMNS)}")
+    for word in words:
+        if word not in EXTRA_COLUMNS:
+            raise ValueError(f"unknown extra columns {word!r}{nearest(str(word), EXTRA_COLUMNS)}")
+    return tuple(words)
+
+
+Components = Annotated[tuple[str, ...], BeforeValidator(components)]
+Amount = Annotated[tuple[float, float, float], BeforeValidator(amount)]
+AmountOrMatrix = Annotated[Rows, BeforeValidator(amount_or_matrix)]
+CountOrAuto = Annotated[int | str, BeforeValidator(count_or_auto)]
+Count = Annotated[int, Field(ge=0)]
+Shifts = Annotated[tuple[float, ...], BeforeValidator(shift_list)]
+Extras = Annotated[tuple[str, ...], BeforeValidator(extras)]
+
+
+class LoadSection(Table):
+    """[reduction.loads.NAME]: mass and stiffness of the neighbours at one interface."""
+
+    mass: AmountOrMatrix | None = Field(None, description="a number, 0 or more, or six rows of six")
+    inertia: Amount | None = Field(None, description="a number, 0 or more, or three, [x, y, z]")
+    stiffness: AmountOrMatrix | None = Field(None, description="a number, 0 or more, or three, or six rows of six")
+    rotational_stiffness: Amount | None = Field(None, description="a number, 0 or more, or three, [x, y, z]")
+
+    @model_validator(mode="after")
+    def _once(self) -> "LoadSection":
+        for matrix, rest in (("mass", "inertia"), ("stiffness", "rotational_stiffness")):
+            given = getattr(self, matrix)
+            if given is not None and len(given) == 6 and getattr(self, rest) is not None:
+                raise ValueError(f"{matrix} as six rows holds the {rest} too; remove {rest}")
+        if self.mass is not None and len(self.mass) == 1 and len(set(self.mass[0])) > 1:
+            raise ValueError("mass: expected one number, or six rows of six numbers")
+        parts = [row for part in (self.mass, self.stiffness) if part for row in part]
+        parts += [part for part in (self.inertia, self.rotational_stiffness) if part]
+        if not any(x for row in parts for x in row):
+            raise ValueError("expected a mass, inertia, stiffness or rotational_stiffness above 0")
+        return self
+
+
+class NeighbourSection(Table):
+    """[[reduction.neighbours]]: a neighbouring body, whose mass and stiffness are condensed to shared interfaces."""
+
+    job: Path = Field(description="the path of the neighbour's job file, relative to this one")
+    interfaces: dict[str, str] = Field(description='a table {"our interface" = "its interface"}')
+
+    @field_validator("job", mode="before")
+    @classmethod
+    def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
+        if not isinstance(value, str) or not value:
+            raise ValueError("expected the path of a job file, text")
+        path = Path(info.context or ".") / value
+        if not path.is_file():
+            raise ValueError(f"no such file: {path}{near_file(path)}")
+        return path
+
+    @field_validator("interfaces")
+    @classmethod
+    def _some(cls, value: dict[str, str]) -> dict[str, str]:
+        if not value:
+            raise ValueError('expected at least one pair, {"our interface" = "its interface"}')
+        return value
+
+
+def held_dofs(value: Any) -> tuple[tuple[int, int], ...]:
+    """Return six pairs of node and component."""
+    pairs = value if isinstance(value, list | tuple) else ()
+    good = [isinstance(p, list | tuple) and len(p) == 2 and all(type(x) is int and x >= 0 for x in p) for p in pairs]
+    if len(pairs) != 6 or not all(good) or any(component > 5 for _, component in pairs):
+        raise ValueError("expected six pairs [node, component 0-5], nodes counted from 0")
+    return tuple((node, component) for node, component in pairs)
+
+
+HeldDofs = Annotated[tuple[tuple[int, int], ...], BeforeValidator(held_dofs)]
+
+
+class ReductionSection(Table):
+    """[reduction]: the mode set, its options, and the body frame."""
+
+    set: choice("mode set", lambda: tuple(MODE_SETS)) = Field(  # type: ignore[valid-type]
+        "craig-bampton", description="the name of a mode set"
+    )
+    n_modes: CountOrAuto | None = Field(None, description='a whole number, 0 or more, of vibration modes, or "auto"')
+    error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description='a number between 0 and 1, the error that n_modes = "auto" meets'
+    )
+    band: Range | None = Field(None, description="two frequencies in Hz, [from, to]")
+    measure: choice("measure", lambda: MEASURE_NAMES) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(MEASURE_NAMES)}"
+    )
+    cutoff: Positive | None = Field(None, description="a number above 0, the highest frequency of the modes [Hz]")
+    verify: bool | None = Field(None, description="true or false: prove that no mode was missed")
+    free: dict[str, Components] | None = Field(
+        None, description='a table of interfaces and their free components, {pin = ["rz"]}'
+    )
+    loads: dict[str, LoadSection] | None = Field(None, description="tables [reduction.loads.INTERFACE]")
+    neighbours: list[NeighbourSection] | None = Field(None, description="tables [[reduction.neighbours]]")
+    n_blocks: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="a whole number, 1 or more, of Krylov blocks at every shift"
+    )
+    shifts: Shifts | None = Field(None, description="a list of frequencies, 0 or more, in Hz")
+    tolerance: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number between 0 and 1")
+    load_cases: bool | None = Field(None, description="true or false: whether load cases are among the Krylov loads")
+    damping_ratio: Annotated[float, Field(ge=0)] | None = Field(
+        None, description="a number, 0 or more, of critical damping, for balancing"
+    )
+    n_rich: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="a whole number, 1 or more, of free modes to balance"
+    )
+    functions: choice("functions", lambda: tuple(AXIS_FUNCTIONS)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(AXIS_FUNCTIONS)}"
+    )
+    n_axial: Count | None = Field(None, description="a whole number, 0 or more, of functions along the axis")
+    n_bending: Count | None = Field(None, description="a whole number, 0 or more, of functions for each direction")
+    n_torsion: Count | None = Field(None, description="a whole number, 0 or more, of functions of torsion")
+    axis: Vector3 | None = Field(None, description="the direction of the axis, [x, y, z]")
+    point: Vector3 | None = Field(None, description="a point on the axis, [x, y, z]")
+    poisson: Annotated[float, Field(gt=-1, le=0.5)] | None = Field(
+        None, description="a number between -1 and 0.5, Poisson's ratio"
+    )
+    columns: Path | None = Field(None, description="the path of a .npy or .npz file of columns, relative to the job")
+    extra: Extras | None = Field(None, description=f"a list of extra columns, of {', '.join(EXTRA_COLUMNS)}")
+    interface_modes: Count | None = Field(
+        None, description="a whole number, 0 or more, of modes of each all-node interface"
+    )
+    interface_cutoff: Positive | None = Field(
+        None, description="a number above 0, the highest frequency of interface modes [Hz]"
+    )
+    interfaces_together: bool | None = Field(None, description="true or false: one problem for all all-node interfaces")
+    frame: choice("frame", lambda: FRAMES) = Field(  # type: ignore[valid-type]
+        "tisserand", description=f"one of {', '.join(FRAMES)}"
+    )
+    at: Name | None = Field(None, description="the name of an interface, which carries a nodal frame")
+    dofs: HeldDofs | None = Field(None, description="six pairs [node, component 0-5], which a nodal frame holds")
+    origin: Vector3 | None = Field(None, description="the origin of the body frame in mesh coordinates, [x, y, z]")
+    axes: Matrix3 | None = Field(None, description="the axes of the body frame, [x axis, y axis, z axis]")
+    stress: bool | None = Field(None, description="true or false: whether to keep the stress of the modes")
+    geometric_stiffness: bool | None = Field(
+        None, description="true or false: whether to add the geometric stiffness; default: where the elements are known"
+    )
+    quadratic_modes: bool | None = Field(
+        None, description="true or false: whether to add the displacement of second order of the kept nodes"
+    )
+
+    @field_validator("columns", mode="before")
+    @classmethod
+    def _file_beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
+        return NeighbourSection._beside_the_job(value, info)
+
+    @model_validator(mode="after")
+    def _options_of_the_set(self) -> "ReductionSection":
+        allowed = mode_set_options(self.set)
+        of_auto = self._options_of_auto()
+        for key in SET_OPTIONS:
+            if getattr(self, key) is not None and key not in allowed and key not in of_auto:
+                raise ValueError(f"mode set {self.set!r} has no option {key}{nearest(key, allowed)}")
+        if {"n_modes", "cutoff"} <= set(allowed) and (self.n_modes is None) == (self.cutoff is None):
+            given = "neither" if self.n_modes is None else "both"
+            raise ValueError(f"expected either n_modes (how many) or cutoff (up to which frequency in Hz), got {given}")
+        if "loads" in allowed and not self.loads and not self.neighbours:
+            raise ValueError(
+                f"mode set {self.set!r} needs the mass or stiffness of the neighbours at the interfaces: give tables "
+                "[reduction.loads.INTERFACE] or [[reduction.neighbours]]"
+            )
+        if self.set == "normal" and self.n_modes == 0:
+            raise ValueError("mode set 'normal' with n_modes = 0 holds only rigid-body motion; choose n_modes >= 1")
+        if "columns" in allowed and self.columns is None:
+            raise ValueError(f"mode set {self.set!r} needs columns: the path of a .npy or .npz file")
+        if self.interface_modes is not None and self.interface_cutoff is not None:
+            raise ValueError("expected either interface_modes or interface_cutoff, got both")
+        if self.interfaces_together is not None and self.interface_modes is None and self.interface_cutoff is None:
+            raise ValueError("interfaces_together belongs to interface_modes or interface_cutoff; got neither")
+        if self.at is not None and self.frame != "nodal":
+            raise ValueError(f'at = "{self.at}" belongs to frame = "nodal"; got frame = "{self.frame}"')
+        if self.dofs is not None and (self.frame != "nodal" or self.at is not None):
+            got = f'at = "{self.at}"' if self.at is not None else f'frame = "{self.frame}"'
+            raise ValueError(f'dofs belong to frame = "nodal" without at; got {got}')
+        return self
+
+    def _options_of_auto(self) -> tuple[str, ...]:
+        """Return the keys that n_modes = "auto" takes; refuse them without it, and it without them."""
+        if self.n_modes == AUTO:
+            for key in ("error", "band"):
+                if getattr(self, key) is None:
+                    raise ValueError(f'n_modes = "auto" needs {key}: which error over which band is accepted?')
+            return AUTO_OPTIONS
+        for key in ("error", "measure"):
+            if getattr(self, key) is not None:
+                raise ValueError(f'{key} belongs to n_modes = "auto"; got n_modes = {self.n_modes}')
+        return ()
+
+
+def mode_set_options(name: str) -> tuple[str, ...]:
+    """Return the options of a mode set that a job can give."""
+    takes = inspect.signature(MODE_SETS[name]).parameters
+    return tuple(key for key in SET_OPTIONS if key in takes or (key == "neighbours" and "loads" in takes))
+
+
+def named_interfaces(reduction: ReductionSection) -> Mapping[str, str]:
+    """Return where the table names interfaces of the body: key path -> name."""
+    named = {} if reduction.at is None else {f'at = "{reduction.at}"': reduction.at}
+    named |= {f"free.{name}": name for name in reduction.free or {}}
+    named |= {f"loads.{name}": name for name in reduction.loads or {}}
+    for neighbour in reduction.neighbours or []:
+        named |= {f"neighbours.interfaces.{name}": name for name in neighbour.interfaces}
+    return named

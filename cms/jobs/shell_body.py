@@ -1,0 +1,89 @@
+"""Shells of a reduction job: a body of triangles and quads, with stiffeners and what is attached to its nodes."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cms.jobs.job import InterfaceSection, Job
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.foundation.stages import Stages
+from fe_models.foundation.units import unit_system
+
+if TYPE_CHECKING:
+    from fe_models.meshes.shell_mesh import ShellMesh
+    from fe_models.shells.shell_property import ShellProperty
+
+__all__ = ["body_of_shell", "shell_interface_of", "shell_mesh"]
+
+
+def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
+    """Read and check the mesh, and make the body with the thicknesses, stiffeners and attachments of the job."""
+    from cms.jobs.attachments_of_job import attachments_of, properties_of
+    from cms.jobs.parts_of_job import load_cases_of, part_of_mesh
+    from fe_models.reports.shell_report import report_shell
+    from fe_models.shells.body import shell_body
+    from fe_models.shells.quality import WARP_LIMIT
+
+    units = unit_system(job.body.units)
+    with stages("read mesh"):
+        mesh = part_of_mesh(job, shell_mesh(job))
+    properties = shell_properties_of(job)
+    stiffeners = properties_of(job) if job.sections else None
+    masses, springs, links = attachments_of(job, mesh)
+    with stages("check mesh"):
+        materials = {item.material: None for item in properties.values()}
+        materials |= {item.material: None for item in (stiffeners or {}).values()}
+        report = report_shell(mesh, materials, units=units, springs=springs, links=links)
+        if on_report is not None:
+            on_report(report)
+        report.raise_for_errors(accept=job.body.accept)
+        interfaces = tuple(shell_interface_of(name, section, mesh) for name, section in job.interfaces.items())
+    with stages("assemble"):
+        body = shell_body(
+            mesh,
+            properties["all"] if set(properties) == {"all"} else properties,
+            name=str(job.body.name),
+            units=units,
+            interfaces=interfaces,
+            stiffeners=stiffeners,
+            point_masses=masses,
+            springs=springs,
+            links=links,
+            warp_limit=180.0 if "warped" in job.body.accept else WARP_LIMIT,
+        )
+        return body.with_load_cases(*load_cases_of(job, body, mesh))
+
+
+def shell_mesh(job: Job) -> "ShellMesh":
+    """Read the triangles and quads of the job, and the lines of its stiffeners."""
+    from fe_models.importers.read_mesh import read_shell_mesh
+
+    groups = [group for shell in job.shells.values() for group in shell.cells]
+    lines = [group for section in job.sections.values() for group in section.lines]
+    return read_shell_mesh(str(job.body.mesh), groups=None if groups == ["all"] else groups, stiffeners=lines)
+
+
+def shell_properties_of(job: Job) -> "dict[str, ShellProperty]":
+    """Return group of cells -> its thickness and material."""
+    from fe_models.material import Material
+    from fe_models.shells.shell_property import ShellProperty
+
+    made: dict[str, ShellProperty] = {}
+    for shell in job.shells.values():
+        name = shell.material or next(iter(job.materials))
+        table = job.materials[name]
+        material = Material(name, E=table.young, nu=table.poisson, rho=table.density)
+        item = ShellProperty(shell.thickness, material, offset=shell.offset, added_mass=shell.added_mass)
+        made |= dict.fromkeys(shell.cells, item)
+    return made
+
+
+def shell_interface_of(name: str, section: InterfaceSection, mesh: "ShellMesh") -> Interface:
+    """Return one interface on the shell: its selection, kind, reference point and axes."""
+    from cms.jobs.parts_of_job import selection_of
+    from fe_models.shells.interfaces import shell_interface
+
+    chosen = selection_of(section.selection, getattr(section, section.selection))
+    triad = None if section.triad is None else np.array(section.triad).T  # the job lists axes, columns are axes
+    return shell_interface(mesh, name, chosen, kind=section.kind, reference=section.reference, triad=triad)

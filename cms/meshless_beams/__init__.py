@@ -1,0 +1,1 @@
+"""Reduced bodies of straight beams from assumed functions, without a mesh."""

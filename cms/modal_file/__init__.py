@@ -1,0 +1,1 @@
+"""The modal file: a reduced body as self-describing HDF5."""

@@ -1,0 +1,283 @@
+"""A reduced body as the content of a modal file, and back."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from cms.errors import ModalFileError
+from cms.modal_file.entries import ENTRIES, entry_of, unit_of
+from cms.reduced_body.geometric_stiffness import GeometricStiffness
+from cms.reduced_body.invariants import Moments
+from cms.reduced_body.nodal_sums import NodalSums
+from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
+from cms.reduced_body.source_columns import SourceColumns
+from cms.reduced_body.stress import PointStress
+from fe_models.body.load_cases import ReducedLoadCase
+from fe_models.foundation.arrays import require_shape
+from fe_models.foundation.sealed_hdf5 import Attribute, Content, Dataset
+from fe_models.foundation.units import UNIT_SYSTEMS, Units
+
+__all__ = ["FORMAT", "Contents", "body_of", "content_of", "require_same_invariants"]
+
+FORMAT = "modal-file"
+SI = UNIT_SYSTEMS["m-kg-s"]
+INVARIANT_DEFECT = 1e-12  #: largest difference of a stored 1C-5C from that of the moments, over the largest entry
+UNIT_LOADS = ("translation", "rotation", "spin")  #: of the geometric stiffness, beside those of the interfaces
+INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
+
+
+# Body to content -----------------------------------------------------------------------------------------------------
+
+
+def content_of(body: ReducedBody, version: int) -> Content:
+    """Return what the modal file of a body says."""
+    values = values_of(body)
+    datasets = {}
+    for path, value in values.items():
+        known = entry_of(path)
+        if known is None:
+            raise ModalFileError(f"dataset {path} is not among those of a modal file: {', '.join(ENTRIES)}")
+        datasets[path] = Dataset(value, unit_of(path, body.units), known.description)
+    return Content(FORMAT, version, datasets, attributes_of(body))
+
+
+def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
+    """Return the attributes of all groups."""
+    attributes: dict[str, Mapping[str, Attribute]] = {
+        "/": {"name": body.name, "n_modes": body.n_q, "n_nodes": len(body.nodes)},
+        "/units": {field.name: getattr(body.units, field.name) for field in fields(Units)},
+        "/frame": {"kind": body.frame.kind, "at": body.frame.at},
+        "/modes": {},
+        "/moments": {"is_exact": int(body.moments.is_exact)},
+        "/invariants": {},
+        "/nodes": {},
+        "/surface": {},
+        "/interfaces": {"count": len(body.interfaces)},
+        "/load_cases": {"count": len(body.load_cases)},
+        "/stress": {"has_nodal": int(body.stress is not None), "has_points": int(body.point_stress is not None)},
+        "/provenance": dict(body.provenance),
+    }
+    for k, interface in enumerate(body.interfaces):
+        attributes[f"/interfaces/{k}"] = {
+            "name": interface.name,
+            "kind": interface.kind,
+            "has_rotation": int(interface.has_rotation),
+        }
+    for k, case in enumerate(body.load_cases):
+        attributes[f"/load_cases/{k}"] = {"name": case.name, "kind": case.kind}
+    if body.columns is not None:
+        attributes["/columns"] = {}
+    if body.geometric is not None:
+        attributes["/geometric"] = {}
+    if body.quadratic is not None:
+        attributes["/quadratic"] = {}
+    if body.nodal_sums is not None:
+        attributes["/nodal_sums"] = {"is_volume": int(body.nodal_sums.is_volume)}
+    return attributes
+
+
+def values_of(body: ReducedBody) -> dict[str, Any]:
+    """Return the values of all datasets by path."""
+    moments, sums, columns, points = body.moments, body.nodal_sums, body.columns, body.point_stress
+    values: dict[str, Any] = {
+        "/frame/origin": body.frame.origin,
+        "/frame/axes": body.frame.axes,
+        "/frame/dofs": body.frame.dofs,
+        "/modes/M": body.M,
+        "/modes/K": body.K,
+        "/modes/D": body.D,
+        "/modes/frequencies": body.frequencies,
+        "/modes/free_frequencies": body.free_frequencies,
+        "/modes/labels": body.labels,
+        "/modes/sources": body.sources,
+        "/modes/energy_shares": body.energy_shares,
+        "/moments/m": np.array(moments.m),
+        "/nodes/position": body.nodes,
+        "/nodes/id": body.node_ids,
+        "/nodes/Phi": body.Phi,
+        "/surface/triangles": body.surface,
+    }
+    values |= {f"/moments/{name}": getattr(moments, name) for name in ("S", "R", "C1", "P", "S_kl")}
+    values |= {f"/invariants/{name}": getattr(moments, name) for name in INVARIANTS}
+    for k, interface in enumerate(body.interfaces):
+        names = ("position", "triad", "Psi", "members")
+        values |= {f"/interfaces/{k}/{name}": getattr(interface, name) for name in names}
+    if body.geometric is not None:
+        values |= {f"/geometric/{name}": getattr(body.geometric, name) for name in UNIT_LOADS}
+        values |= {f"/interfaces/{k}/K_geometric": K for k, K in enumerate(body.geometric.interfaces)}
+    if body.quadratic is not None:
+        values["/quadratic/g"] = body.quadratic
+    if columns is not None:
+        values |= {f"/columns/{name}": getattr(columns, name) for name in ("labels", "groups", "A", "F")}
+    if sums is not None:
+        values["/nodal_sums/w"] = np.array(sums.w)
+        values |= {f"/nodal_sums/{name}": getattr(sums, name) for name in ("S", "R", "U1", "U2")}
+    for k, case in enumerate(body.load_cases):
+        values |= {f"/load_cases/{k}/{name}": getattr(case, name) for name in ("force", "torque", "h")}
+    if body.stress is not None:
+        values["/stress/nodal"] = body.stress
+    if points is not None:
+        values["/stress/points/names"], values["/stress/points/position"] = points.names, points.positions
+        values["/stress/points/modes"] = points.modes
+    return values
+
+
+# Content to body -----------------------------------------------------------------------------------------------------
+
+
+class Contents:
+    """Datasets and attributes of a file by path, with words for what is missing or of another kind."""
+
+    def __init__(self, content: Content) -> None:
+        self.content = content
+
+    def array(self, path: str) -> np.ndarray:
+        """Return the numbers of a dataset."""
+        values = self._values(path)
+        if isinstance(values, tuple):
+            raise ModalFileError(f"dataset {path}: expected numbers, got text")
+        return values
+
+    def arrays(self, group: str, *names: str) -> dict[str, Any]:
+        """Return the numbers of datasets of a group by name."""
+        return {name: self.array(f"{group}/{name}") for name in names}
+
+    def words(self, path: str) -> tuple[str, ...]:
+        """Return the strings of a dataset."""
+        values = self._values(path)
+        if not isinstance(values, tuple):
+            raise ModalFileError(f"dataset {path}: expected text, got numbers")
+        return values
+
+    def attribute(self, path: str, name: str, kind: type) -> Any:
+        """Return an attribute of that kind."""
+        value = self.content.attributes.get(path, {}).get(name)
+        if not isinstance(value, kind):
+            got = "nothing" if value is None else repr(value)
+            raise ModalFileError(f"attribute {name!r} of {path}: expected {kind.__name__}, got {got}")
+        return value
+
+    def numbered(self, group: str) -> tuple[str, ...]:
+        """Return the paths of the groups that a group counts; none if it is not there."""
+        count = self.attribute(group, "count", int) if group in self.content.attributes else 0
+        return tuple(f"{group}/{k}" for k in range(count))
+
+    def has(self, group: str, name: str | None = None) -> bool:
+        """Whether an optional group is there, and says so by its attribute where it has one."""
+        there = group in self.content.attributes
+        return there and (name is None or bool(self.attribute(group, name, int)))
+
+    def _values(self, path: str) -> Any:
+        if path not in self.content.datasets:
+            raise ModalFileError(f"dataset {path} is missing; the file was not written by a complete writer")
+        return self.content.datasets[path].values
+
+
+def body_of(content: Content) -> ReducedBody:
+    """Return the body that a file describes; what a file of an older version lacks is None or empty."""
+    contents = Contents(content)
+    array, words, attribute = contents.array, contents.words, contents.attribute
+    is_1 = content.version < 2  # the version before held dofs, and rotations told apart
+    moments = Moments(
+        m=float(array("/moments/m")),
+        **contents.arrays("/moments", "S", "R", "C1", "P", "S_kl"),
+        is_exact=bool(attribute("/moments", "is_exact", int)),
+    )
+    return ReducedBody(
+        name=attribute("/", "name", str),
+        units=units_of(contents),
+        frame=BodyFrame(
+            kind=attribute("/frame", "kind", str),
+            origin=array("/frame/origin"),
+            axes=array("/frame/axes"),
+            at=attribute("/frame", "at", str),
+            dofs=np.zeros((0, 2), np.int64) if is_1 else array("/frame/dofs"),
+        ),
+        **contents.arrays("/modes", "M", "K", "D", "free_frequencies", "energy_shares"),
+        labels=words("/modes/labels"),
+        sources=words("/modes/sources"),
+        moments=moments,
+        nodes=array("/nodes/position"),
+        node_ids=array("/nodes/id"),
+        Phi=array("/nodes/Phi"),
+        surface=array("/surface/triangles"),
+        interfaces=tuple(interface_of(contents, group) for group in contents.numbered("/interfaces")),
+        provenance={name: str(value) for name, value in content.attributes.get("/provenance", {}).items()},
+        columns=columns_of(contents) if contents.has("/columns") else None,
+        nodal_sums=nodal_sums_of(contents) if contents.has("/nodal_sums") else None,
+        load_cases=tuple(
+            ReducedLoadCase(
+                attribute(group, "name", str), attribute(group, "kind", str),
+                **contents.arrays(group, "force", "torque", "h"),
+            )
+            for group in contents.numbered("/load_cases")
+        ),
+        stress=array("/stress/nodal") if contents.has("/stress", "has_nodal") else None,
+        point_stress=PointStress(
+            words("/stress/points/names"), array("/stress/points/position"), array("/stress/points/modes")
+        )
+        if contents.has("/stress", "has_points")
+        else None,
+        geometric=geometric_of(contents) if contents.has("/geometric") else None,
+        quadratic=array("/quadratic/g") if contents.has("/quadratic") else None,
+    )  # fmt: skip
+
+
+def interface_of(contents: Contents, group: str) -> ReducedInterface:
+    """Return one interface; version 1 did not tell a Psi without rotation from one that happens to be zero."""
+    kind = contents.attribute(group, "kind", str)
+    arrays = contents.arrays(group, "position", "triad", "Psi", "members")
+    if contents.content.version < 2:
+        has_rotation = kind != "nodes" or bool(np.asarray(arrays["Psi"])[3:].any())
+    else:
+        has_rotation = bool(contents.attribute(group, "has_rotation", int))
+    return ReducedInterface(contents.attribute(group, "name", str), kind, **arrays, has_rotation=has_rotation)
+
+
+def columns_of(contents: Contents) -> SourceColumns:
+    """Return the columns of the mode set."""
+    arrays = contents.arrays("/columns", "A", "F")
+    return SourceColumns(contents.words("/columns/labels"), contents.words("/columns/groups"), **arrays)
+
+
+def nodal_sums_of(contents: Contents) -> NodalSums:
+    """Return the weighted sums over the nodes."""
+    return NodalSums(
+        w=float(contents.array("/nodal_sums/w")),
+        **contents.arrays("/nodal_sums", "S", "R", "U1", "U2"),
+        is_volume=bool(contents.attribute("/nodal_sums", "is_volume", int)),
+    )
+
+
+def geometric_of(contents: Contents) -> GeometricStiffness:
+    """Return the geometric stiffness; that of the interfaces stands with them."""
+    of_loads = contents.arrays("/geometric", *UNIT_LOADS)
+    n = of_loads["spin"].shape[-1]
+    groups = contents.numbered("/interfaces")
+    of_interfaces = [contents.array(f"{group}/K_geometric") for group in groups]
+    for group, K in zip(groups, of_interfaces, strict=True):
+        require_shape(f"dataset {group}/K_geometric", K, (6, n, n))
+    return GeometricStiffness(**of_loads, interfaces=np.stack(of_interfaces) if groups else np.zeros((0, 6, n, n)))
+
+
+def units_of(contents: Contents) -> Units:
+    """Return the units of a file; a known name must have its known factors."""
+    kinds = {field.name: type(getattr(SI, field.name)) for field in fields(Units)}
+    units = Units(**{name: contents.attribute("/units", name, kind) for name, kind in kinds.items()})
+    if UNIT_SYSTEMS.get(units.name, units) != units:
+        raise ModalFileError(f"units {units.name!r}: expected the factors of that system, got {units}")
+    return units
+
+
+def require_same_invariants(content: Content, moments: Moments) -> None:
+    """Raise unless the stored invariants, written for other readers, are those of the moments."""
+    for name in INVARIANTS:
+        stored = Contents(content).array(f"/invariants/{name}")
+        expected = getattr(moments, name)
+        scale = np.abs(expected).max(initial=0.0)
+        if stored.shape != expected.shape or np.abs(stored - expected).max(initial=0.0) > INVARIANT_DEFECT * scale:
+            raise ModalFileError(
+                f"dataset /invariants/{name} does not follow from the moments; the file was written by a faulty writer"
+            )

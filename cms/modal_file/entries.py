@@ -1,0 +1,164 @@
+"""What a modal file holds: every dataset with its dimensions and its description (specified in docs/modal_file.md).
+
+The shapes are M-orthonormal, Phi.T M Phi = 1, so that a shape has the dimension mass^(-1/2) and q has mass^(1/2)
+length.
+"""
+
+import re
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from cms.errors import ModalFileError
+from fe_models.foundation.sealed_hdf5 import Content, Dataset
+from fe_models.foundation.units import Units
+
+__all__ = ["ENTRIES", "Dimensions", "Entry", "entry_of", "in_units", "unit_text"]
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """Exponents of mass, length and time."""
+
+    mass: float = 0.0
+    length: float = 0.0
+    time: float = 0.0
+
+    def factor(self, old: Units, new: Units) -> float:
+        """Return what numbers in old units are multiplied by to be in new ones."""
+        ratio = (old.mass / new.mass) ** self.mass * (old.length / new.length) ** self.length
+        return float(ratio * (old.time / new.time) ** self.time)
+
+
+NONE, MASS, LENGTH, RATE = Dimensions(), Dimensions(1), Dimensions(0, 1), Dimensions(0, 0, -1)
+SHAPE, TURN = Dimensions(-0.5), Dimensions(-0.5, -1)  #: translation and rotation of a unit of q
+VOLUME = Dimensions(0, 3)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One dataset, or one for each of a numbered group."""
+
+    dimensions: Dimensions
+    description: str
+    last_rows: Dimensions | None = None  #: of rows 3-5, where they are rotations and rows 0-2 translations
+
+
+def entry(description: str, dimensions: Dimensions = NONE, last_rows: Dimensions | None = None) -> Entry:
+    """Return an entry, without dimension unless one is given."""
+    return Entry(dimensions, description, last_rows)
+
+
+# fmt: off
+ENTRIES = {
+    "/frame/origin": entry("origin of the body frame B in mesh coordinates", LENGTH),
+    "/frame/axes": entry("columns: axes of B in mesh axes; c_mesh = origin + axes c_B"),
+    "/frame/dofs": entry("dofs that a nodal frame holds: node of the mesh from 0, component (3-5 are rotations)"),
+    "/modes/M": entry("modal mass Phi.T M Phi: the identity, zero rows for massless shapes"),
+    "/modes/K": entry("modal stiffness Phi.T K Phi: diagonal of squared angular frequencies", Dimensions(0, 0, -2)),
+    "/modes/D": entry("modal damping Phi.T D Phi", RATE),
+    "/modes/frequencies": entry("of each mode with B held, cycles per time unit; infinite for massless shapes", RATE),
+    "/modes/free_frequencies": entry("elastic frequencies of the unsupported body, ascending, cycles per time unit",
+                                     RATE),
+    "/modes/labels": entry("one per mode, in words"),
+    "/modes/sources": entry("names of the groups of source columns"),
+    "/modes/energy_shares": entry("share of each source (column) in a mode's energy (row)"),
+    "/moments/m": entry("mass", MASS),
+    "/moments/S": entry("first moment, int c_a", Dimensions(1, 1)),
+    "/moments/R": entry("second moment, int c_a c_b", Dimensions(1, 2)),
+    "/moments/C1": entry("1C, int phi_a,k", Dimensions(0.5)),
+    "/moments/P": entry("int c_a phi_b,k; index order a, b, k", Dimensions(0.5, 1)),
+    "/moments/S_kl": entry("int phi_a,k phi_b,l; index order a, b, k, l"),
+    "/invariants/J0": entry("inertia tensor of the undeformed body about the origin of B", Dimensions(1, 2)),
+    "/invariants/C1": entry("1C_k, int phi_k; index order a, k", Dimensions(0.5)),
+    "/invariants/C2": entry("2C_k, int c x phi_k; index order a, k", Dimensions(0.5, 1)),
+    "/invariants/C3": entry("3C_k, int (c.phi_k 1 - phi_k c^T); index order k, a, b", Dimensions(0.5, 1)),
+    "/invariants/C4": entry("4C_kl, int phi_l x phi_k; index order k, l, a"),
+    "/invariants/C5": entry("5C_kl, int (phi_k.phi_l 1 - phi_l phi_k^T); index order k, l, a, b"),
+    "/nodes/position": entry("undeformed position of the kept nodes in B", LENGTH),
+    "/nodes/id": entry("index of the kept nodes in the mesh, from 0"),
+    "/nodes/Phi": entry("translation of the kept nodes in B; index order node, component, mode", SHAPE),
+    "/surface/triangles": entry("kept nodes of each triangle, from 0"),
+    "/interfaces/<i>/position": entry("undeformed reference point in B", LENGTH),
+    "/interfaces/<i>/triad": entry("columns: undeformed axes of the interface in B"),
+    "/interfaces/<i>/Psi": entry("translation and rotation of the reference point in B for each mode", SHAPE, TURN),
+    "/interfaces/<i>/members": entry("kept nodes of the interface, from 0"),
+    "/interfaces/<i>/K_geometric": entry("geometric stiffness of a unit force (0-2) and moment (3-5) at the reference "
+                                         "point, axes of B; index order load, k, l",
+                                         Dimensions(-1, -1), Dimensions(-1, -2)),
+    "/columns/labels": entry("one per column of the mode set, in words"),
+    "/columns/groups": entry("the source each column belongs to"),
+    "/columns/A": entry("coordinates of the modes in the columns, scaled; index order column, mode", RATE),
+    "/columns/F": entry("forces of the modes on the columns, scaled; A F: part of a column in a mode's energy", RATE),
+    "/nodal_sums/w": entry("sum over the nodes of their weight w, the volume each stands for", VOLUME),
+    "/nodal_sums/S": entry("sum of w c_a", Dimensions(0, 4)),
+    "/nodal_sums/R": entry("sum of w c_a c_b", Dimensions(0, 5)),
+    "/nodal_sums/U1": entry("sum of w phi_a,k; index order a, k", Dimensions(-0.5, 3)),
+    "/nodal_sums/U2": entry("sum of w (c x phi_k)_a; index order a, k", Dimensions(-0.5, 4)),
+    "/geometric/translation": entry("geometric stiffness K_t,a of the loads -rho e_a of a frame acceleration minus "
+                                    "gravity; index order a, k, l", Dimensions(0, -1)),
+    "/geometric/rotation": entry("K_r,a of the loads -rho e_a x c of an angular acceleration; index order a, k, l"),
+    "/geometric/spin": entry("K_ab of -rho/2 [e_a x (e_b x c) + e_b x (e_a x c)], products of angular velocities; "
+                             "index order ab (xx yy zz xy yz zx), k, l"),
+    "/quadratic/g": entry("displacement of second order of the kept nodes in B, 1/2 sum q_k q_l g_kl; index order "
+                          "node, component, k, l", Dimensions(-1, -1)),
+    "/load_cases/<i>/force": entry("resultant force in B", Dimensions(1, 1, -2)),
+    "/load_cases/<i>/torque": entry("resultant torque about the origin of B", Dimensions(1, 2, -2)),
+    "/load_cases/<i>/h": entry("modal forces Phi.T f", Dimensions(0.5, 1, -2)),
+    "/stress/nodal": entry("stress of each mode at the kept nodes in axes of B; index order node, component "
+                           "(xx yy zz yz xz xy), mode", Dimensions(0.5, -2, -2)),
+    "/stress/points/names": entry("one per stress point, in words"),
+    "/stress/points/position": entry("undeformed position of the stress points in B", LENGTH),
+    "/stress/points/modes": entry("stress of each mode at the stress points; index order as /stress/nodal",
+                                  Dimensions(0.5, -2, -2)),
+}  #: by path; `<i>` stands for the number of a group
+# fmt: on
+
+
+def entry_of(path: str) -> Entry | None:
+    """Return the entry of a dataset; None for one that this version does not know."""
+    return ENTRIES.get(re.sub(r"/\d+/", "/<i>/", path))
+
+
+def unit_of(path: str, units: Units) -> str:
+    """Return the unit of a dataset in ASCII; both where the rows differ."""
+    found = ENTRIES[re.sub(r"/\d+/", "/<i>/", path)]
+    first = unit_text(units, found.dimensions)
+    return first if found.last_rows is None else f"{first} (rows 0-2), {unit_text(units, found.last_rows)} (rows 3-5)"
+
+
+def unit_text(units: Units, dimensions: Dimensions) -> str:
+    """Return a unit in ASCII, such as 't^(1/2) mm' or 's^-2'; '1' if there is none."""
+    parts = []
+    for field in fields(dimensions):
+        power, symbol = getattr(dimensions, field.name), getattr(units, f"{field.name}_symbol")
+        if power:
+            exponent = f"{power:g}" if power == int(power) else f"({2 * power:g}/2)"
+            parts.append(symbol if power == 1 else f"{symbol}^{exponent}")
+    return " ".join(parts) or "1"
+
+
+def in_units(content: Content, old: Units, new: Units) -> Content:
+    """Return the content of a modal file with its numbers in other units.
+
+    Datasets that this version does not know are left out: their dimensions are not known either.
+    """
+    attributes = dict(content.attributes) | {"/units": {f.name: getattr(new, f.name) for f in fields(Units)}}
+    weights = attributes.get("/nodal_sums", {})
+    datasets = {}
+    for path, dataset in content.datasets.items():
+        found = entry_of(path)
+        if found is None:
+            continue
+        values = dataset.values
+        if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+            dimensions = found.dimensions
+            if path.startswith("/nodal_sums/") and not weights.get("is_volume", 1):  # every node counts 1
+                dimensions = Dimensions(dimensions.mass, dimensions.length - VOLUME.length, dimensions.time)
+            values = values * dimensions.factor(old, new)
+            if found.last_rows is not None:
+                if len(values) != 6:
+                    raise ModalFileError(f"dataset {path}: expected six rows, got {len(values)}")
+                values[3:] = dataset.values[3:] * found.last_rows.factor(old, new)
+        datasets[path] = Dataset(values, unit_of(path, new), found.description)
+    return Content(content.format, content.version, datasets, attributes)

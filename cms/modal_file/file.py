@@ -1,0 +1,79 @@
+"""The modal file: a reduced body as self-describing HDF5 (specified in docs/modal_file.md)."""
+
+import os
+from pathlib import Path
+
+from cms.errors import CmsError, ModalFileError
+from cms.modal_file.content import FORMAT, body_of, content_of, require_same_invariants
+from cms.modal_file.entries import in_units
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.sealed_hdf5 import read_sealed, write_sealed
+from fe_models.foundation.units import Units, unit_system
+
+__all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
+
+VERSION = 2  #: of the format; a reader refuses greater ones, and reads all that are less
+
+
+def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
+    """Write a reduced body to a modal file; a file of that name is replaced in one step or left as it is.
+
+    Raises
+    ------
+    ModalFileError
+        If the file cannot be written.
+    """
+    write_sealed(content_of(reduced, VERSION), path)
+
+
+def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> ReducedBody:
+    """Read a modal file; every array equals the written one bit for bit, unless it is wanted in other units.
+
+    Parameters
+    ----------
+    path
+        File of this or an older version.
+    units
+        Unit system of the numbers, or its name; those of the file by default.
+
+    Raises
+    ------
+    ModalFileError
+        If the file is missing, truncated, altered, of another kind or of a newer version, or if what it says does not
+        fit together.
+    UnitsError
+        If the unit system is unknown.
+    """
+    wanted = unit_system(units) if isinstance(units, str) else units
+    content = read_sealed(path, format=FORMAT, version=VERSION)
+    try:
+        body = body_of(content)
+        require_same_invariants(content, body.moments)
+    except CmsError as error:
+        raise ModalFileError(f"{Path(path)}: {error}") from error
+    return body if wanted is None else convert_units(body, wanted)
+
+
+def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
+    """Return the same body in other units; the body itself if it has them already.
+
+    q has mass^(1/2) length: modal coordinates, as initial values, are other numbers in other units.
+
+    Raises
+    ------
+    UnitsError
+        If the unit system is unknown.
+    """
+    new = unit_system(units) if isinstance(units, str) else units
+    if new == reduced.units:
+        return reduced
+    record = {"units converted from": reduced.units.name}
+    content = in_units(content_of(reduced, VERSION), reduced.units, new)
+    provenance = {"/provenance": dict(reduced.provenance) | record}
+    attributes = dict(content.attributes) | provenance
+    return body_of(type(content)(content.format, content.version, content.datasets, attributes))
+
+
+def digest(path: str | os.PathLike[str]) -> str:
+    """Return the digest of a modal file: equal for equal contents (sha256, 64 hexadecimal digits)."""
+    return str(read_sealed(path, format=FORMAT, version=VERSION).attributes["/"]["digest"])

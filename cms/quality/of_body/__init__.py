@@ -1,0 +1,1 @@
+"""What a reduced body can be asked from its modal file alone."""

@@ -1,0 +1,95 @@
+"""The free reduced body as one small pencil over rigid motion and modal coordinates, from a modal file alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.reduced_basis.finishing import elastic_eigenvectors
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array, frozen
+
+__all__ = ["FreePencil", "free_elastic_modes", "free_pencil", "port_rows"]
+
+
+@dataclass(frozen=True, eq=False)
+class FreePencil:
+    """M x'' + D x' + K x = f for x = (translation of B, rotation of B, q), small motion, components in B."""
+
+    M: Array  #: (6 + n_q, 6 + n_q)
+    K: Array  #: (6 + n_q, 6 + n_q)
+    D: Array  #: (6 + n_q, 6 + n_q)
+
+    def __post_init__(self) -> None:
+        for name in ("M", "K", "D"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+def free_pencil(reduced: ReducedBody) -> FreePencil:
+    """Return the pencil of THEORY §6 at rest.
+
+    M = [m 1, -S~, 1C; S~, J(0), 2C; 1Cᵀ, 2Cᵀ, M*], K = diag(0, K*), D = diag(0, D*).
+    """
+    moments, n = reduced.moments, reduced.n_q
+    M = np.zeros((6 + n, 6 + n))
+    M[:3, :3] = moments.m * np.eye(3)
+    M[3:6, :3] = skew(moments.S)
+    M[:3, 3:6] = M[3:6, :3].T
+    M[3:6, 3:6] = moments.J0
+    M[:3, 6:], M[3:6, 6:] = moments.C1, moments.C2
+    M[6:, :6] = M[:6, 6:].T
+    M[6:, 6:] = reduced.M
+    K, D = np.zeros_like(M), np.zeros_like(M)
+    K[6:, 6:], D[6:, 6:] = reduced.K, reduced.D
+    return FreePencil(M, K, D)
+
+
+def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
+    """Elastic modes of the free reduced body, ascending, then its massless shapes.
+
+    Rigid motion is condensed by M_rr x_r + M_rq q = 0.
+
+    Returns
+    -------
+    omega2
+        Squared frequencies, stiffness of massless shapes, (n,) [1/s²].
+    X
+        Shapes over x, (6 + n_q, n).
+    is_massive
+        (n,) bool.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the body has no inertia about some axis.
+    """
+    pencil = free_pencil(reduced)
+    M_rr, M_rq = pencil.M[:6, :6], pencil.M[:6, 6:]
+    T = np.vstack([-np.linalg.solve(M_rr, M_rq), np.eye(reduced.n_q)])
+    G_M = T.T @ pencil.M @ T
+    Z, is_massive, _ = elastic_eigenvectors(reduced.K, (G_M + G_M.T) / 2, stiffness_scale(reduced))
+    omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
+    order = np.lexsort((omega2, np.logical_not(is_massive)))
+    return omega2[order], T @ Z[:, order], is_massive[order]
+
+
+def stiffness_scale(reduced: ReducedBody) -> float:
+    """Smallest positive K_kk / M_kk of the modes [1/s²]; 1 where there is none."""
+    mass, stiffness = np.diag(reduced.M), np.diag(reduced.K)
+    has_both = (mass > 0) & (stiffness > 0)
+    return float((stiffness[has_both] / mass[has_both]).min()) if has_both.any() else 1.0
+
+
+def port_rows(reduced: ReducedBody, name: str) -> Array:
+    """Motion of an interface's reference point with x, components in B, (6, 6 + n_q)."""
+    interface = reduced.interface(name)
+    rows = np.zeros((6, 6 + reduced.n_q))
+    rows[:3, :6] = rigid_motion_of_points(interface.position[None], np.zeros(3))[0]
+    rows[3:, 3:6] = np.eye(3)
+    rows[:, 6:] = interface.Psi
+    return rows
+
+
+def skew(v: Array) -> Array:
+    """Return v~ with v~ w = v × w, (3, 3)."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

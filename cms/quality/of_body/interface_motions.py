@@ -1,0 +1,87 @@
+"""What the interfaces of a reduced body can do: rigid members, and motions that no mode provides."""
+
+import numpy as np
+
+from cms.quality.of_body.free_pencil import port_rows, stiffness_scale
+from cms.quality.of_body.identities import body_length, mode_size
+from cms.quality.record import QualityRecord, information, judge
+from cms.reduced_body.reduced_body import ReducedBody, ReducedInterface
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array
+
+__all__ = ["check_interface_motions", "check_rigid_interfaces", "missing_motions"]
+
+MISSING = 1e-7  #: singular value of the scaled interface motions over the largest, below which one is missing
+COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
+
+
+def check_rigid_interfaces(reduced: ReducedBody) -> QualityRecord:
+    """Members of a rigid interface follow its reference point: Phi_m = Psi_t + Psi_r × (c_m - c)."""
+    defects = {
+        interface.name: rigid_defect(reduced, interface)
+        for interface in reduced.interfaces
+        if interface.kind == "rigid" and len(interface.members)
+    }
+    if not defects or reduced.n_q == 0:
+        return information("rigid-interfaces", "the file holds no members of rigid interfaces")
+    name = max(defects, key=lambda key: defects[key])
+    reason = f"largest departure is {defects[name]:.1e} of a mode's largest displacement, at {name!r}"
+    return judge("rigid-interfaces", defects[name], reason, {"defects": defects})
+
+
+def rigid_defect(reduced: ReducedBody, interface: ReducedInterface) -> float:
+    """Largest departure of the members from rigid motion, over the largest displacement of the mode."""
+    motion = rigid_motion_of_points(reduced.nodes[interface.members], interface.position) @ interface.Psi
+    own = reduced.Phi[interface.members]
+    return float((np.abs(own - motion) / mode_size(reduced)).max())
+
+
+def check_interface_motions(reduced: ReducedBody) -> QualityRecord:
+    """Every interface can move in all six directions, independently of the others, by rigid motion and modes."""
+    if not reduced.interfaces:
+        return information("interface-motions", "the body has no interfaces")
+    missing = missing_motions(reduced)
+    n = len(missing)
+    data = {"directions": missing, "labels": motion_labels(reduced)}
+    if n == 0:
+        reason = "joints can move every interface in every direction without locking"
+    else:
+        strongest = np.asarray(motion_labels(reduced))[np.argsort(-np.abs(missing), axis=1)[:, 0]]
+        reason = f"{n} combination{'s' if n > 1 else ''} cannot move, mostly {', '.join(dict.fromkeys(strongest))}"
+    return judge("interface-motions", float(n), reason, data)
+
+
+def missing_motions(reduced: ReducedBody) -> Array:
+    """Combinations of interface motions that neither rigid motion nor a mode provides, (n_missing, 6 n_interfaces).
+
+    Left null space of the motions of all reference points with x, rotations times the body length, modes times
+    omega_1 / omega_k, so that a stiff static shape counts as much as its compliance.
+    """
+    length = body_length(reduced)
+    stiffness = np.diag(reduced.K)
+    weight = np.sqrt(stiffness_scale(reduced) / np.where(stiffness > 0, stiffness, np.inf))
+    scale = np.tile(np.repeat([1.0, length], 3), len(reduced.interfaces))
+    A = scale[:, None] * np.vstack([port_rows(reduced, interface.name) for interface in reduced.interfaces])
+    A[:, 3:6] /= length
+    A[:, :6] /= np.sqrt(reduced.moments.m)
+    A[:, 6:] *= weight
+    wanted = np.concatenate([provided_rows(interface) for interface in reduced.interfaces])
+    row_size = np.linalg.norm(A[wanted], axis=1, keepdims=True)
+    U, singular, _ = np.linalg.svd(A[wanted] / np.where(row_size > 0, row_size, 1.0))
+    sizes = np.zeros(int(wanted.sum()))
+    sizes[: len(singular)] = singular
+    null = U[:, sizes < MISSING * sizes.max(initial=1.0)].T
+    result = np.zeros((len(null), len(wanted)))
+    result[:, wanted] = null
+    return result
+
+
+def provided_rows(interface: ReducedInterface) -> Array:
+    """Which of the six motions an interface has: one of nodes on one line has no rotation, (6,) bool."""
+    has_rotation = bool(interface.Psi[3:].any()) or interface.kind != "nodes"
+    return np.array([True] * 3 + [has_rotation] * 3)
+
+
+def motion_labels(reduced: ReducedBody) -> tuple[str, ...]:
+    """Return one label per motion: 'big_end ux' to 'small_end rz'."""
+    return tuple(f"{interface.name} {component}" for interface in reduced.interfaces for component in COMPONENTS)

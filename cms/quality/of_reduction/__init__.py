@@ -1,0 +1,1 @@
+"""How a mode set compares with its full model."""

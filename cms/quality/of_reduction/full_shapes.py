@@ -1,0 +1,129 @@
+"""The modes of a modal file over all dofs of its full model, found again in the span of a mode set.
+
+A file keeps its modes at some nodes only. Where those determine x in phi_file = [Psi_R Phi] x, the full shapes follow,
+in any frame; what is left at the nodes says whether file, model and mode set belong together. Where they do not (a beam
+that keeps its ends), the mode set is finished again in the frame the file names, and taken if it fits the kept nodes.
+"""
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from cms.errors import BodyError, ModeSetError
+from cms.mode_set import ModeSet
+from cms.quality.of_reduction.free_basis import FreeBasis
+from cms.quality.record import QualityRecord, information, judge
+from cms.quality.reference.ports import Ports
+from cms.reduced_basis.finishing import finish
+from cms.reduced_basis.frames import FRAMES, Axes, Frame, NodalFrame, frame_condition
+from cms.reduced_body.reduced_body import BodyFrame, ReducedBody
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, frozen
+
+__all__ = ["FullShapes", "full_shapes", "same_body_record"]
+
+WELL_DETERMINED = 1e-7  #: smallest over largest singular value of the nodal rows, below which x is not determined
+FITS = 1e-6  #: misfit at the kept nodes, above which a mode set finished again is not the file's
+
+
+@dataclass(frozen=True, eq=False)
+class FullShapes:
+    """Modes of a file over all dofs, mesh axes."""
+
+    Phi: Array  #: (n_dof, n_q)
+    misfit: float  #: largest distance at the kept nodes and interfaces, over a mode's largest displacement
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "Phi", frozen(self.Phi))
+
+
+def full_shapes(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> FullShapes | None:
+    """Find the file's modes over all dofs of a mode set's body; None where they cannot be known."""
+    if len(reduced.node_ids) and reduced.node_ids.max() >= len(body.nodes):
+        return None
+    X = np.hstack([basis.N, basis.Phi])
+    wanted = np.vstack([reduced.Phi.reshape(-1, reduced.n_q), *(i.Psi for i in reduced.interfaces)])
+    wanted = motion_scale(body, reduced)[:, None] * wanted
+    rows = kept_motion(body, reduced, X)
+    size = np.linalg.norm(rows, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    x, _, rank, singular = np.linalg.lstsq(rows / size, wanted, rcond=None)
+    if rank == X.shape[1] and singular[-1] > WELL_DETERMINED * singular[0]:
+        return FullShapes(X @ (x / size[:, None]), misfit(rows / size @ x, wanted))
+    again = finished_again(body, basis, reduced)
+    if again is None or again.shape[1] != reduced.n_q:
+        return None
+    distance = misfit(kept_motion(body, reduced, again), wanted)
+    return FullShapes(again, distance) if distance < FITS else None
+
+
+def kept_motion(body: FEBody, reduced: ReducedBody, X: Array) -> Array:
+    """Motion of the kept nodes and reference points with columns X, axes of B, rotations times the length, (n, k)."""
+    axes = reduced.frame.axes
+    at_nodes = body.translations(X)[reduced.node_ids]
+    rows = [np.einsum("ba,nbk->nak", axes, at_nodes).reshape(-1, X.shape[1])]
+    turn = np.kron(np.eye(2), axes.T)
+    rows += [turn @ (Ports.of_body(body, [interface.name]).A @ X) for interface in reduced.interfaces]
+    return motion_scale(body, reduced)[:, None] * np.vstack(rows)
+
+
+def motion_scale(body: FEBody, reduced: ReducedBody) -> Array:
+    """1 for translations, the body length for rotations, one per kept motion, (n,)."""
+    length = body.length or 1.0
+    return np.concatenate([np.ones(3 * len(reduced.nodes)), *[np.repeat([1.0, length], 3)] * len(reduced.interfaces)])
+
+
+def misfit(found: Array, wanted: Array) -> float:
+    """Largest distance over the largest motion of each mode."""
+    largest = np.abs(wanted).max(axis=0, initial=0.0)
+    return float((np.abs(found - wanted).max(axis=0) / np.where(largest > 0, largest, 1.0)).max(initial=0.0))
+
+
+def finished_again(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> Array | None:
+    """Finish the span of the mode set in the frame that the file names, (n_dof, n_q); None if that cannot be done."""
+    n = basis.Phi.shape[1]
+    modes = ModeSet("again", basis.Phi, tuple(f"shape {k + 1}" for k in range(n)), np.full(n, np.nan))
+    try:
+        return finish(body, modes, frame_condition(body, named_frame(reduced.frame))).Phi
+    except (BodyError, ModeSetError):
+        return None
+
+
+def named_frame(frame: BodyFrame) -> Frame:
+    """Return the frame that a file names."""
+    x, y, z = frame.origin.tolist()
+    axes = cast(Axes, tuple(tuple(float(v) for v in axis) for axis in frame.axes.T))
+    if frame.kind == "nodal":
+        dofs = None if frame.at or not len(frame.dofs) else tuple((int(n), int(c)) for n, c in frame.dofs)
+        return NodalFrame(frame.at or None, (x, y, z), axes, dofs)
+    if frame.kind not in FRAMES:
+        raise BodyError(f"frame kind {frame.kind!r} is unknown; expected one of {', '.join(FRAMES)}")
+    return FRAMES[frame.kind](origin=(x, y, z), axes=axes)
+
+
+def same_body_record(body: FEBody, basis: FreeBasis, reduced: ReducedBody, shapes: FullShapes | None) -> QualityRecord:
+    """Record "same-body": free-free frequencies of the file are those of the set, its modes lie in the set's span."""
+    own = basis.frequencies()
+    stored = reduced.free_frequencies
+    if len(own) != len(stored):
+        reason = f"the mode set gives {len(own)} elastic free-free modes, the file holds {len(stored)}"
+        return judge("same-body", np.inf, reason, {"set": own, "file": stored})
+    distance = float(np.abs(stored / own - 1).max(initial=0.0))
+    reason = f"free-free frequencies of file and mode set differ by {distance:.1e}"
+    if shapes is None:
+        reason += "; its kept nodes do not determine the modes over the whole body"
+        return judge("same-body", distance, reason, {"set": own, "file": stored})
+    K = shapes.Phi.T @ (body.K @ shapes.Phi)
+    stiff = np.sqrt(np.outer(np.diag(reduced.K), np.diag(reduced.K)))
+    defect = float((np.abs(K - reduced.K) / np.where(stiff > 0, stiff, 1.0)).max(initial=0.0))
+    reason += f", modes at its nodes by {shapes.misfit:.1e}, Phiᵀ K Phi by {defect:.1e}"
+    return judge(
+        "same-body", max(distance, shapes.misfit, defect), reason,
+        {"frequencies": distance, "misfit": shapes.misfit, "stiffness": defect},
+    )  # fmt: skip
+
+
+def undetermined(name: str) -> QualityRecord:
+    """Return the record of a question that needs the full shapes where they cannot be found."""
+    return information(name, "the kept nodes of the file do not determine its modes over the whole body")

@@ -1,0 +1,123 @@
+"""Damping of the modes of a reduced body: ratios by mode or by frequency, or Rayleigh's mix of mass and stiffness.
+
+A ratio zeta puts D_kk = 2 zeta omega_k M_kk, with omega_k the frequency of mode k in the body frame at hand: a nodal
+frame has those with its nodes held, the mean-axis frame the free-free ones. The same ratios in two frames are two
+dampings.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.errors import ModeSetError
+from fe_models.foundation.arrays import Array
+
+__all__ = [
+    "CUSTOMARY_STEPS",
+    "Damping",
+    "ModalDamping",
+    "PerModeDamping",
+    "RampDamping",
+    "RayleighDamping",
+    "modal_damping",
+]
+
+CUSTOMARY_STEPS = ((100.0, 0.01), (1000.0, 0.1))  #: 1 % below 100 Hz, 10 % below 1 kHz, critical above
+
+
+@dataclass(frozen=True)
+class ModalDamping:
+    """The same damping ratio for every mode: D = diag(2 ratio omega)."""
+
+    ratio: float  #: of critical damping, 0 <= ratio
+
+    def __post_init__(self) -> None:
+        _require_ratios("ratio", (self.ratio,))
+
+
+@dataclass(frozen=True)
+class PerModeDamping:
+    """A damping ratio for each mode in the order of the reduced body; the last one holds for all further modes."""
+
+    ratios: tuple[float, ...]  #: of critical damping
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ratios", tuple(float(ratio) for ratio in self.ratios))
+        if not self.ratios:
+            raise ModeSetError("damping: ratios: expected at least one, got none")
+        _require_ratios("ratios", self.ratios)
+
+
+@dataclass(frozen=True)
+class RampDamping:
+    """Ratios by steps of frequency; by default the customary ones: modes above the band of interest are held still.
+
+    A mode below the frequency of a step, and not below that of an earlier one, has its ratio.
+    """
+
+    steps: tuple[tuple[float, float], ...] = CUSTOMARY_STEPS  #: (frequency [Hz], ratio below it), ascending
+    above: float = 1.0  #: ratio from the last frequency on
+
+    def __post_init__(self) -> None:
+        steps = tuple((float(frequency), float(ratio)) for frequency, ratio in self.steps)
+        object.__setattr__(self, "steps", steps)
+        frequencies = [frequency for frequency, _ in steps]
+        if not steps or not all(0 < f < np.inf for f in frequencies) or sorted(set(frequencies)) != frequencies:
+            raise ModeSetError(f"damping: steps: expected pairs (frequency in Hz, ratio), ascending, got {self.steps}")
+        _require_ratios("steps", (*(ratio for _, ratio in steps), self.above))
+
+
+@dataclass(frozen=True)
+class RayleighDamping:
+    """D = alpha M + beta K."""
+
+    alpha: float = 0.0  #: [1/s]
+    beta: float = 0.0  #: [s]
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.alpha < np.inf and 0 <= self.beta < np.inf):
+            raise ModeSetError(f"damping: alpha = {self.alpha}, beta = {self.beta}; expected 0 or more")
+
+
+Damping = ModalDamping | PerModeDamping | RampDamping | RayleighDamping
+
+
+def modal_damping(damping: Damping, M: Array, K: Array, *, second: float = 1.0) -> Array:
+    """Return the damping matrix of a diagonal modal pencil, (n_q, n_q) [1/s]; massless shapes get none by ratios.
+
+    Parameters
+    ----------
+    damping
+        Which kind.
+    M, K
+        Diagonal, (n_q, n_q) [1] and [1/s²].
+    second
+        Time unit of K in seconds: steps of a ramp are in Hz.
+    """
+    mass, stiffness = np.diag(M), np.maximum(np.diag(K), 0.0)
+    if isinstance(damping, RayleighDamping):
+        return np.diag(damping.alpha * mass + damping.beta * stiffness)
+    return np.diag(2 * damping_ratios(damping, mass, stiffness, second) * np.sqrt(stiffness * mass))
+
+
+def damping_ratios(
+    damping: ModalDamping | PerModeDamping | RampDamping, mass: Array, stiffness: Array, second: float
+) -> Array:
+    """Return the ratio of each mode, (n_q,)."""
+    n_q = len(mass)
+    if isinstance(damping, ModalDamping):
+        return np.full(n_q, damping.ratio)
+    if isinstance(damping, PerModeDamping):
+        if len(damping.ratios) > n_q:
+            raise ModeSetError(f"damping: {len(damping.ratios)} ratios, but only {n_q} modes; leave the last ones out")
+        return np.array([damping.ratios[min(k, len(damping.ratios) - 1)] for k in range(n_q)])
+    hertz = np.sqrt(np.divide(stiffness, mass, out=np.full(n_q, np.inf), where=mass > 0)) / (2 * np.pi * second)
+    limits = np.array([frequency for frequency, _ in damping.steps])
+    ratios = np.array([*(ratio for _, ratio in damping.steps), damping.above])
+    return ratios[np.searchsorted(limits, hertz, side="right")]
+
+
+def _require_ratios(key: str, ratios: tuple[float, ...]) -> None:
+    for ratio in ratios:
+        if not 0 <= ratio < np.inf:
+            raise ModeSetError(f"damping: {key} = {ratio}; expected 0 or more (0.01 is 1 % of critical)")

@@ -1,0 +1,55 @@
+"""Stress modes: the stress of each mode at kept nodes and at named points, in the axes of the body frame."""
+
+import numpy as np
+
+from cms.reduced_body.stress import PointStress
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["nodal_stress_modes", "point_stress_modes", "turned_stress"]
+
+COLUMNS_AT_ONCE = 16  #: stress is known at all nodes before it is cut to the kept ones
+
+
+def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array | None:
+    """Return the stress of the shapes at some nodes in the axes of B, (n, 6, n_q) [Pa per unit]; None if unknown.
+
+    Parameters
+    ----------
+    body
+        Coupled or not.
+    Phi
+        Shapes over its dofs, (n_dof, n_q).
+    nodes
+        Indices into `FEBody.nodes`, (n,); reference nodes, which are not of the mesh, have no stress: zero.
+    axes
+        Columns: axes of B in mesh axes, (3, 3).
+    """
+    model = body.element_model
+    if model is None or not model.has_nodal_stress:
+        return None
+    modes = np.zeros((len(nodes), 6, Phi.shape[1]))
+    for begin in range(0, Phi.shape[1], COLUMNS_AT_ONCE):
+        columns = slice(begin, begin + COLUMNS_AT_ONCE)
+        everywhere = model.nodal_stress(body.mesh_displacement(Phi[:, columns]), nodes=nodes)
+        on_mesh = nodes < len(everywhere)
+        modes[on_mesh, :, columns] = everywhere[nodes[on_mesh]]
+    return turned_stress(modes, axes)
+
+
+def point_stress_modes(body: FEBody, Phi: Array, origin: Array, axes: Array) -> PointStress | None:
+    """Return the stress of the shapes at the stress points of the body; None if it has none."""
+    points = body.stress_points
+    if points is None:
+        return None
+    modes = points.stress(body.mesh_displacement(Phi))
+    return PointStress(points.names, (np.asarray(points.positions) - origin) @ axes, turned_stress(modes, axes))
+
+
+def turned_stress(stress: Array, axes: Array) -> Array:
+    """Return stress components in other axes: Rᵀ sigma R, (n, 6, k), R = axes with the new axes as columns."""
+    if np.array_equal(axes, np.eye(3)):
+        return np.asarray(stress)
+    tensor = np.asarray(stress)[:, [[0, 5, 4], [5, 1, 3], [4, 3, 2]]]
+    turned = np.einsum("ia,nijk,jb->nabk", axes, tensor, axes, optimize=True)
+    return np.stack([turned[:, a, b] for a, b in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=1)

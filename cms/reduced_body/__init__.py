@@ -1,0 +1,1 @@
+"""The reduced body, and what it holds: invariants, geometric stiffness, stress, labels."""

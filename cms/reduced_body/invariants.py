@@ -1,0 +1,121 @@
+"""Inertia invariants of a body with deformation modes, all from seven canonical moments (THEORY §5)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+
+__all__ = ["Moments", "moments_from_gram"]
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Canonical moments of a body about the origin of its frame B.
+
+    c: undeformed position, phi_k: shape k (translation), both in B; integrals over mass. Shapes are without unit
+    when q is a length; with M-orthonormal shapes the unit of phi is 1/sqrt(kg) and q has sqrt(kg) m.
+    """
+
+    m: float  #: mass, ∫ 1 [kg]
+    S: Array  #: first moment, ∫ c_a, (3,) [kg m]
+    R: Array  #: second moment, ∫ c_a c_b, (3, 3) [kg m²]
+    C1: Array  #: 1C, ∫ phi_a,k, (3, n_q) [kg]
+    P: Array  #: ∫ c_a phi_b,k, (3, 3, n_q) [kg m]
+    S_kl: Array  #: ∫ phi_a,k phi_b,l, (3, 3, n_q, n_q) [kg]
+    is_exact: bool = True  #: False: from bare matrices that are not M_s ⊗ 1
+
+    def __post_init__(self) -> None:
+        n = np.asarray(self.C1).shape[-1]
+        for name, shape in {"S": (3,), "R": (3, 3), "C1": (3, n), "P": (3, 3, n), "S_kl": (3, 3, n, n)}.items():
+            array = frozen(getattr(self, name))
+            require_shape(f"moments: {name}", array, shape)
+            require_finite(f"moments: {name}", array)
+            object.__setattr__(self, name, array)
+        object.__setattr__(self, "m", float(self.m))
+
+    @property
+    def n_q(self) -> int:
+        """Number of shapes."""
+        return self.C1.shape[1]
+
+    @property
+    def center_of_mass(self) -> Array:
+        """Undeformed centre of mass in B, (3,) [m]."""
+        return self.S / self.m
+
+    @cached_property
+    def J0(self) -> Array:
+        """Inertia tensor of the undeformed body about the frame origin, tr(R) 1 - R, (3, 3) [kg m²]."""
+        return frozen(np.trace(self.R) * np.eye(3) - self.R)
+
+    @cached_property
+    def C2(self) -> Array:
+        """2C, ∫ c × phi_k, (3, n_q) [kg m]."""
+        P = self.P
+        return frozen(np.stack([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]]))
+
+    @cached_property
+    def C3(self) -> Array:
+        """3C_k = ∫ (c·phi_k 1 - phi_k cᵀ) = tr(P_k) 1 - P_kᵀ, (n_q, 3, 3) [kg m]."""
+        P_k = np.moveaxis(self.P, 2, 0)
+        return frozen(np.trace(P_k, axis1=1, axis2=2)[:, None, None] * np.eye(3) - P_k.transpose(0, 2, 1))
+
+    @cached_property
+    def C4(self) -> Array:
+        """4C_kl = ∫ phi_l × phi_k, (n_q, n_q, 3) [kg]; antisymmetric in k, l."""
+        S = self.S_kl
+        # (phi_l × phi_k)_x = phi_y,l phi_z,k - phi_z,l phi_y,k, and S[a, b, l, k] = ∫ phi_a,l phi_b,k
+        return frozen(np.stack([(S[1, 2] - S[2, 1]).T, (S[2, 0] - S[0, 2]).T, (S[0, 1] - S[1, 0]).T], axis=-1))
+
+    @cached_property
+    def C5(self) -> Array:
+        """5C_kl = ∫ (phi_k·phi_l 1 - phi_l phi_kᵀ), (n_q, n_q, 3, 3) [kg]."""
+        S = self.S_kl
+        dot = np.einsum("aakl->kl", S)
+        return frozen(dot[:, :, None, None] * np.eye(3) - np.einsum("ablk->klab", S))
+
+    @cached_property
+    def M(self) -> Array:
+        """M*_kl = ∫ phi_k · phi_l, (n_q, n_q) [kg]."""
+        return frozen(np.einsum("aakl->kl", self.S_kl))
+
+    @property
+    def gram(self) -> Array:
+        """The Gram matrix ∫ a aᵀ, a = [1, c, phi_x, phi_y, phi_z], (4 + 3 n_q, 4 + 3 n_q), of these moments."""
+        n = self.n_q
+        gram = np.zeros((4 + 3 * n, 4 + 3 * n))
+        gram[0, 0], gram[0, 1:4], gram[1:4, 1:4] = self.m, self.S, self.R
+        gram[0, 4:] = self.C1.reshape(-1)
+        gram[1:4, 4:] = self.P.reshape(3, -1)
+        gram[4:, 4:] = self.S_kl.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n)
+        gram[1:4, 0], gram[4:, :4] = gram[0, 1:4], gram[:4, 4:].T
+        return gram
+
+    def inertia(self, q: Array) -> Array:
+        """Return J(q) = J0 + Σ q_k (3C_k + 3C_kᵀ) + Σ q_k q_l 5C_kl, (3, 3) [kg m²], symmetric."""
+        linear = np.einsum("k,kab->ab", q, self.C3)
+        return self.J0 + linear + linear.T + np.einsum("k,l,klab->ab", q, q, self.C5)
+
+
+def moments_from_gram(gram: Array, *, is_exact: bool = True) -> Moments:
+    """Cut the canonical moments from the Gram matrix ∫ a aᵀ, a = [1, c, phi_x, phi_y, phi_z].
+
+    Parameters
+    ----------
+    gram
+        (4 + 3 n_q, 4 + 3 n_q), components of all shapes grouped: all x, then all y, then all z.
+    """
+    n = (gram.shape[0] - 4) // 3
+    gram = (gram + gram.T) / 2  # symmetric by definition; the product that made it rounds the halves apart
+    blocks = [slice(4 + a * n, 4 + (a + 1) * n) for a in range(3)]
+    return Moments(
+        m=float(gram[0, 0]),
+        S=gram[0, 1:4],
+        R=gram[1:4, 1:4],
+        C1=np.stack([gram[0, block] for block in blocks]),
+        P=np.stack([gram[1:4, block] for block in blocks], axis=1),
+        S_kl=np.stack([np.stack([gram[rows, columns] for columns in blocks]) for rows in blocks]),
+        is_exact=is_exact,
+    )

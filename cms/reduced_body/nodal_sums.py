@@ -1,0 +1,33 @@
+"""Sums over the nodes of a body, weighted by the volume each stands for: the norm of a Buckens frame (THEORY §4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+
+__all__ = ["NodalSums"]
+
+
+@dataclass(frozen=True, eq=False)
+class NodalSums:
+    """Weighted sums over all nodes about the origin of a frame B, w: weight of a node, translations only.
+
+    Together they are [1, c]ᵀ W [1, c, Phi] as far as a frame needs them: C of W-least deformation follows from them.
+    """
+
+    w: float  #: sum of the weights [m³, or 1 where the nodes count equally]
+    S: Array  #: Σ w c, (3,) [· m]
+    R: Array  #: Σ w c_a c_b, (3, 3) [· m²]
+    U1: Array  #: Σ w phi_k, (3, n_q)
+    U2: Array  #: Σ w c × phi_k, (3, n_q) [· m]
+    is_volume: bool = True  #: False: every node counts 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "w", float(self.w))
+        n = np.asarray(self.U1).shape[-1]
+        for name, shape in {"S": (3,), "R": (3, 3), "U1": (3, n), "U2": (3, n)}.items():
+            array = frozen(getattr(self, name))
+            require_shape(f"nodal sums: {name}", array, shape)
+            require_finite(f"nodal sums: {name}", array)
+            object.__setattr__(self, name, array)

@@ -1,0 +1,193 @@
+"""The reduced body: what the modal file holds and the multibody engine needs, but for pictures free of mesh size."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from cms.errors import BodyError
+from cms.reduced_body.geometric_stiffness import GeometricStiffness
+from cms.reduced_body.invariants import Moments
+from cms.reduced_body.nodal_sums import NodalSums
+from cms.reduced_body.source_columns import SourceColumns
+from cms.reduced_body.stress import PointStress
+from fe_models.body.load_cases import ReducedLoadCase
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
+from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest
+
+__all__ = ["BodyFrame", "ReducedBody", "ReducedInterface"]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyFrame:
+    """The frame B in which the elastic displacement is measured, as it lies in the undeformed mesh.
+
+    c_mesh = origin + axes @ c_B.
+    """
+
+    kind: str  #: "nodal", "tisserand" or "buckens"
+    origin: Array  #: in mesh coordinates, (3,) [m]
+    axes: Array = field(default_factory=lambda: np.eye(3))  #: columns: axes of B in mesh axes, (3, 3)
+    at: str = ""  #: interface that carries a nodal frame; "": other dofs
+    #: dofs that a nodal frame holds, (node of the mesh, component), (6, 2); empty: another kind, or not on record
+    dofs: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "origin", frozen(self.origin))
+        object.__setattr__(self, "axes", frozen(self.axes))
+        object.__setattr__(self, "dofs", frozen_int(self.dofs))
+        if self.dofs.shape != (len(self.dofs), 2):
+            raise BodyError(f"body frame: dofs: expected (n, 2) of (node, component), got {self.dofs.shape}")
+        require_shape("body frame: origin", self.origin, (3,))
+        require_shape("body frame: axes", self.axes, (3, 3))
+        require_finite("body frame: origin", self.origin)
+        require_finite("body frame: axes", self.axes)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedInterface:
+    """An interface of a reduced body: its reference point in B and the motion of that point with q."""
+
+    name: str
+    kind: str  #: "rigid", "distributing" or "nodes" (then Psi is the mean motion of the members)
+    position: Array  #: undeformed reference point in B, (3,) [m]
+    triad: Array  #: undeformed axes as columns in B, (3, 3)
+    Psi: Array  #: translation and rotation of the point in B for each mode, (6, n_q) [-, 1/m]
+    members: IntArray  #: member nodes, indices into `ReducedBody.nodes`, (n_members,)
+    #: False: Psi has no rotation (rows 3-5 are zero) and is the mean translation of the members, which lie on one line
+    has_rotation: bool = True
+
+    def __post_init__(self) -> None:
+        where = f"interface {self.name!r}"
+        for name in ("position", "triad", "Psi"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+            require_finite(f"{where}: {name}", getattr(self, name))
+        object.__setattr__(self, "members", frozen_int(self.members))
+        require_shape(f"{where}: position", self.position, (3,))
+        require_shape(f"{where}: triad", self.triad, (3, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedBody:
+    """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (THEORY §3-5).
+
+    Units of q follow from Phi.T M Phi = 1: sqrt(kg) m; Phi q is a length.
+    """
+
+    name: str
+    units: Units
+    frame: BodyFrame
+    M: Array  #: Phi.T M Phi, (n_q, n_q): the identity, but for massless static shapes (zero there)
+    K: Array  #: Phi.T K Phi, (n_q, n_q): diagonal of omega² [1/s²]
+    D: Array  #: modal damping, (n_q, n_q) [1/s]; zero when none was asked for
+    labels: tuple[str, ...]  #: one per mode: where its energy comes from, in words
+    energy_shares: Array  #: share of each source column group in the mode's energy, (n_q, n_sources)
+    sources: tuple[str, ...]  #: names of the groups of source columns, (n_sources,)
+    moments: Moments
+    free_frequencies: Array  #: of the unsupported reduced body, elastic only, ascending [Hz]
+    nodes: Array  #: kept nodes (surface, interfaces) in B, (n_kept, 3) [m]
+    node_ids: IntArray  #: their indices in the mesh the body came from, (n_kept,)
+    Phi: Array  #: translations of the kept nodes in B, (n_kept, 3, n_q)
+    surface: IntArray  #: triangles of kept nodes, (n_tri, 3)
+    interfaces: tuple[ReducedInterface, ...]
+    provenance: Mapping[str, str] = field(default_factory=dict)  #: versions, digests, options, solver
+    columns: SourceColumns | None = None  #: columns of the mode set; None: not on record
+    nodal_sums: NodalSums | None = None  #: what a Buckens frame needs; None: not on record
+    load_cases: tuple[ReducedLoadCase, ...] = ()
+    #: stress of the modes at the kept nodes, xx yy zz yz xz xy in axes of B, (n_kept, 6, n_q) [Pa per unit of q]; None:
+    #: left out, or unknown. Zero at reference nodes, which belong to no element
+    stress: Array | None = None
+    point_stress: PointStress | None = None  #: stress of the modes at named points; None: left out, or there are none
+    geometric: GeometricStiffness | None = None  #: for geometric stiffening; None: left out, or not known
+    #: g_kl of the kept nodes in B, displacement ½ Σ q_k q_l g_kl, (n_kept, 3, n_q, n_q) [1/(kg m)]; None: left out
+    quadratic: Array | None = None
+
+    def __post_init__(self) -> None:
+        where = f"reduced body {self.name!r}"
+        put = object.__setattr__
+        for name in ("M", "K", "D", "energy_shares", "free_frequencies", "nodes", "Phi"):
+            put(self, name, frozen(getattr(self, name)))
+            require_finite(f"{where}: {name}", getattr(self, name))
+        for name in ("node_ids", "surface"):
+            put(self, name, frozen_int(getattr(self, name)))
+        if self.stress is not None:
+            put(self, "stress", frozen(self.stress))
+            require_shape(f"{where}: stress", self.stress, (len(self.nodes), 6, self.n_q))
+            require_finite(f"{where}: stress", self.stress)
+        if self.quadratic is not None:
+            put(self, "quadratic", frozen(self.quadratic))
+            require_shape(f"{where}: quadratic", self.quadratic, (len(self.nodes), 3, self.n_q, self.n_q))
+            require_finite(f"{where}: quadratic", self.quadratic)
+            if self.geometric is None:
+                raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
+        for name in ("labels", "sources", "interfaces", "load_cases"):
+            put(self, name, tuple(getattr(self, name)))
+        put(self, "provenance", MappingProxyType(dict(self.provenance)))
+        n, n_kept = self.n_q, len(self.nodes)
+        for name, shape in {
+            "M": (n, n),
+            "K": (n, n),
+            "D": (n, n),
+            "nodes": (n_kept, 3),
+            "Phi": (n_kept, 3, n),
+            "node_ids": (n_kept,),
+            "energy_shares": (n, len(self.sources)),
+        }.items():
+            require_shape(f"{where}: {name}", getattr(self, name), shape)
+        if len(self.labels) != n:
+            raise BodyError(f"{where}: {n} modes need as many labels, got {len(self.labels)}")
+        if self.moments.n_q != n:
+            raise BodyError(f"{where}: {n} modes, but moments of {self.moments.n_q}")
+        widths = {f"load case {case.name!r}: h": case.h.shape for case in self.load_cases}
+        if self.columns is not None:
+            widths["columns"] = (np.asarray(self.columns.A).shape[1],)
+        if self.nodal_sums is not None:
+            widths["nodal sums"] = (np.asarray(self.nodal_sums.U1).shape[1],)
+        if self.point_stress is not None:
+            widths["stress points"] = (np.asarray(self.point_stress.modes).shape[2],)
+        if self.geometric is not None:
+            widths["geometric stiffness"] = (self.geometric.n_q,)
+            if self.geometric.n_interfaces != len(self.interfaces):
+                raise BodyError(
+                    f"{where}: {len(self.interfaces)} interfaces, but geometric stiffness of "
+                    f"{self.geometric.n_interfaces}"
+                )
+        for name, width in widths.items():
+            if width != (n,):
+                raise BodyError(f"{where}: {n} modes, but {name} of {width[0]}")
+        if self.surface.size and (self.surface.min() < 0 or self.surface.max() >= n_kept):
+            raise BodyError(f"{where}: surface: nodes outside 0..{n_kept - 1}")
+        for interface in self.interfaces:
+            require_shape(f"{where}: interface {interface.name!r}: Psi", interface.Psi, (6, n))
+            if interface.members.size and (interface.members.min() < 0 or interface.members.max() >= n_kept):
+                raise BodyError(f"{where}: interface {interface.name!r}: members outside 0..{n_kept - 1}")
+
+    @property
+    def n_q(self) -> int:
+        """Number of modes."""
+        return np.asarray(self.K).shape[0]
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies of the modes in this frame (its origin and axes held), (n_q,) [Hz]; massless: inf."""
+        mass = np.diag(self.M)
+        omega2 = np.divide(np.diag(self.K), mass, out=np.full(self.n_q, np.inf), where=mass > 0)
+        return np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi)
+
+    def interface(self, name: str) -> ReducedInterface:
+        """Return the interface of that name; `BodyError` with the choices if there is none."""
+        for interface in self.interfaces:
+            if interface.name == name:
+                return interface
+        choices = [interface.name for interface in self.interfaces]
+        raise BodyError(f"reduced body {self.name!r}: no interface {name!r}{nearest(name, choices)}")
+
+    def load_case(self, name: str) -> ReducedLoadCase:
+        """Return the load case of that name; `BodyError` with the choices if there is none."""
+        for case in self.load_cases:
+            if case.name == name:
+                return case
+        choices = [case.name for case in self.load_cases]
+        raise BodyError(f"reduced body {self.name!r}: no load case {name!r}{nearest(name, choices)}")

@@ -1,0 +1,81 @@
+"""Where modes come from: the share of each column of the mode set in the energy of a mode, and a label in words."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.errors import BodyError
+from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+
+__all__ = ["SourceColumns", "source_columns"]
+
+
+@dataclass(frozen=True, eq=False)
+class SourceColumns:
+    """The columns a reduced body was made of, and what is needed to tell their shares in any mode.
+
+    With phi_k = Σ_c v_c A_ck and F_ck = v_cᵀ K phi_k the term A_ck F_ck is the part of column c in the energy
+    phi_kᵀ K phi_k. Scaling a column changes neither term; it is scaled so that A and F have the same size and unit.
+    Both are linear in the mode, so they follow the modes into another frame.
+    """
+
+    labels: tuple[str, ...]  #: one per column, (n_columns,)
+    groups: tuple[str, ...]  #: one per column
+    A: Array  #: coordinates of the modes in the columns, (n_columns, n_q) [1/s]
+    F: Array  #: forces of the modes on the columns, (n_columns, n_q) [1/s]
+
+    def __post_init__(self) -> None:
+        n = len(tuple(self.labels))
+        for name in ("labels", "groups"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if len(self.groups) != n:
+            raise BodyError(f"source columns: {n} labels, but {len(self.groups)} groups")
+        for name in ("A", "F"):
+            array = frozen(getattr(self, name))
+            require_shape(f"source columns: {name}", array, (n, np.asarray(self.A).shape[-1]))
+            require_finite(f"source columns: {name}", array)
+            object.__setattr__(self, name, array)
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The groups, each once, in their order."""
+        return tuple(dict.fromkeys(self.groups))
+
+    def shares(self) -> Array:
+        """Return |A_ck F_ck| over their sum, (n_q, n_columns), rows sum to 1.
+
+        The terms alone sum to the energy, but some are negative where columns work against each other.
+        """
+        work = np.abs(np.asarray(self.A) * self.F)
+        total = work.sum(axis=0)
+        return np.divide(work, total, out=np.zeros_like(work), where=total > 0).T
+
+    def group_shares(self) -> Array:
+        """Return the shares of the groups, (n_q, n_sources)."""
+        return self.shares() @ np.array([[group == s for s in self.sources] for group in self.groups], dtype=float)
+
+    def mode_labels(self) -> tuple[str, ...]:
+        """Say in words which columns carry a mode's energy: the largest one or two with their shares."""
+        return tuple(share_words(self.labels, shares) for shares in self.shares())
+
+    def of_modes(self, Z: Array) -> "SourceColumns":
+        """Return the same columns for the modes Phi Z."""
+        return replace(self, A=np.asarray(self.A) @ Z, F=np.asarray(self.F) @ Z)
+
+
+def share_words(labels: tuple[str, ...], shares: Array) -> str:
+    """Return 'constraint left ux (93 %)', or the two greatest where one is not nearly all."""
+    order = np.argsort(shares)[::-1]
+    parts = [order[0]] if shares[order[0]] > 0.9 or len(order) < 2 or shares[order[1]] < 0.05 else order[:2]
+    return ", ".join(f"{labels[k]} ({100 * shares[k]:.0f} %)" for k in parts)
+
+
+def source_columns(labels: tuple[str, ...], groups: tuple[str, ...], A: Array, F: Array) -> SourceColumns:
+    """Return the columns with A and F scaled to one size, column by column: A_c s and F_c / s, s² = |F_c| / |A_c|.
+
+    A column without forces (a rigid-body motion) has no part in any energy; both rows are then zero.
+    """
+    size_A, size_F = np.linalg.norm(A, axis=1), np.linalg.norm(F, axis=1)
+    works = (size_A > 0) & (size_F > 0)
+    s = np.sqrt(np.divide(size_F, size_A, out=np.ones(len(A)), where=works))[:, None]
+    return SourceColumns(labels, groups, np.where(works[:, None], A * s, 0.0), np.where(works[:, None], F / s, 0.0))

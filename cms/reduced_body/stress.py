@@ -1,0 +1,40 @@
+"""Stress at named points of a reduced body, and what it is compared by."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+
+__all__ = ["PointStress", "von_mises"]
+
+
+@dataclass(frozen=True, eq=False)
+class PointStress:
+    """Stress modes at named points beside the nodes, such as the outer points of beam sections."""
+
+    names: tuple[str, ...]  #: one per point
+    positions: Array  #: undeformed, in B, (n_points, 3) [m]
+    modes: Array  #: stress xx yy zz yz xz xy for each mode, in axes of B, (n_points, 6, n_q) [Pa per unit of q]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "names", tuple(self.names))
+        n = len(self.names)
+        for name in ("positions", "modes"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+            require_finite(f"stress points: {name}", getattr(self, name))
+        require_shape("stress points: positions", self.positions, (n, 3))
+        require_shape("stress points: modes", self.modes, (n, 6, np.asarray(self.modes).shape[-1]))
+
+
+def von_mises(stress: Array) -> Array:
+    """Return the von Mises stress sqrt(3/2 s:s), s the deviator, of components xx yy zz yz xz xy on axis 1 [Pa].
+
+    Parameters
+    ----------
+    stress
+        (n, 6) or (n, 6, k).
+    """
+    xx, yy, zz, yz, xz, xy = np.moveaxis(np.asarray(stress), 1, 0)
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return np.asarray(np.sqrt(normal / 2 + 3 * (yz**2 + xz**2 + xy**2)))

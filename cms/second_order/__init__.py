@@ -1,0 +1,1 @@
+"""Second order of small deflections: unit loads, geometric stiffness, quadratic modes."""

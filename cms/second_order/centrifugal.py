@@ -1,0 +1,59 @@
+"""Centrifugal loads of steady rotation, one for each product of two angular velocities (THEORY §7)."""
+
+import numpy as np
+
+from fe_models.body.fe_body import FEBody
+from fe_models.body.load_cases import LoadCase
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["CENTRIFUGAL", "centrifugal_loads"]
+
+CENTRIFUGAL = "centrifugal"  #: kind of these load cases
+PRODUCTS = ("xx", "yy", "zz", "yz", "xz", "xy")  #: omega_a omega_b, one load each
+COLUMNS = 60  #: unit displacements whose moments are asked for at once
+
+
+def centrifugal_loads(body: FEBody) -> tuple[LoadCase, ...]:
+    """Return the loads -∫ ρ [e_a × (e_b × c) + e_b × (e_a × c)] / 2 of the products omega_a omega_b, a load case each.
+
+    (1) solid nodes: the field is linear in the position c, which isoparametric elements interpolate exactly, so f = M u
+        with its nodal values is exact for consistent mass; it has no curl, nodal rotations take none of it
+    (2) nodes with rotations, where the elements are known: f_ab · u = (a = b) ∫ c · u - ∫ (c_a u_b + c_b u_a) / 2 for
+        every unit displacement u, from the moments of the elements; this has the couples of the cross-sections, such as
+        the torque on a flat blade
+
+    A rotation ω loads the body with Σ over a, b of omega_a omega_b f_ab: the mixed ones count twice. The origin does
+    not matter to the elastic response: another one adds a uniform field, which a rigid-body acceleration balances.
+
+    Parameters
+    ----------
+    body
+        Before coupling, where it will have rigid interfaces.
+    """
+    node, component = body.dofs.T
+    is_translation = (component >= 0) & (component < 3)
+    F = np.zeros((body.n_dof, len(PRODUCTS)))
+    for k, product in enumerate(PRODUCTS):  # (1)
+        a, b = (np.eye(3)["xyz".index(letter)] for letter in product)
+        field = -(np.cross(a, np.cross(b, body.nodes)) + np.cross(b, np.cross(a, body.nodes))) / 2
+        F[is_translation, k] = field[node[is_translation], component[is_translation]]
+    F = body.M @ F
+    rows = np.flatnonzero(np.isin(node, node[component >= 3]) & (component >= 0))
+    if body.element_model is not None and len(rows):  # (2)
+        P = _moments(body, rows)
+        for k, (a, b) in enumerate(["xyz".index(letter) for letter in product] for product in PRODUCTS):
+            F[rows, k] = (a == b) * np.trace(P) - (P[a, b] + P[b, a]) / 2
+    return tuple(LoadCase(f"{CENTRIFUGAL} {name}", CENTRIFUGAL, f) for name, f in zip(PRODUCTS, F.T, strict=True))
+
+
+def _moments(body: FEBody, dofs: IntArray) -> Array:
+    """Moments ∫ c_a u_b over mass of the unit displacement of each of these dofs, (3, 3, n_dofs)."""
+    assert body.element_model is not None
+    parts = []
+    for first in range(0, len(dofs), COLUMNS):
+        chosen = dofs[first : first + COLUMNS]
+        u = np.zeros((body.n_dof, len(chosen)))
+        u[chosen, np.arange(len(chosen))] = 1.0
+        gram = body.element_model.mass_gram(body.mesh_displacement(u))
+        parts.append(gram[1:4, 4:].reshape(3, 3, len(chosen)))
+    return np.concatenate(parts, axis=2)

@@ -1,0 +1,168 @@
+"""The geometric stiffness of a reduced body in another body frame, from what it holds itself (THEORY §7).
+
+A load is a load per mass A c + b and a wrench at each interface. With its reaction it is in balance; the stress of a
+balanced load does not depend on the support: its matrix is the same combination of the matrices of the old unit loads.
+
+(1) the unit loads of the new frame, in old coordinates
+(2) the reaction of the new frame: that of a rigid-body acceleration (Tisserand), a wrench at its interface (nodal)
+(3) the matrices of the balanced loads, from the old ones
+(4) over the new shapes (phi - Psi_R C) Z: K over [Psi_R phi] follows from the loads, since a rotation turns them
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.errors import BodyError
+from cms.reduced_body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
+from cms.reduced_body.reduced_body import BodyFrame, ReducedBody
+from cms.second_order.unit_loads import unit_mass_loads
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array
+
+__all__ = ["converted_geometric_stiffness", "require_convertible"]
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """k loads of a reduced body, in axes of its frame and about its origin."""
+
+    mass: MassLoads
+    wrenches: Array  #: force and moment at every interface, (k, n_interfaces, 6)
+
+
+def require_convertible(reduced: ReducedBody, frame: BodyFrame) -> None:
+    """Raise `BodyError` where the reaction of the new frame is no combination of unit loads."""
+    if reduced.geometric is None or frame.kind == "tisserand":
+        return
+    if frame.kind == "nodal" and frame.at and is_node(reduced, frame.at):
+        return
+    raise BodyError(
+        f"reduced body {reduced.name!r}: its geometric stiffness can go to a Tisserand frame or to a nodal frame at an "
+        f"interface with one reference node, not to this {frame.kind} frame, whose reaction it does not know; reduce "
+        "the body anew in that frame, or leave the geometric stiffness out (cms frame --no-geometric-stiffness, or "
+        "replace(body, geometric=None, quadratic=None))"
+    )
+
+
+def is_node(reduced: ReducedBody, name: str) -> bool:
+    """Return whether an interface is one node with six dofs."""
+    interface = reduced.interface(name)
+    return interface.has_rotation and (interface.kind != "nodes" or len(interface.members) == 1)
+
+
+def converted_geometric_stiffness(
+    reduced: ReducedBody, frame: BodyFrame, *, C: Array, Z: Array, p: Array, R: Array
+) -> GeometricStiffness:
+    """Return the matrices of the unit loads of the new frame over the new shapes.
+
+    Parameters
+    ----------
+    frame
+        The new frame.
+    C, Z, p, R
+        As `cms.frame_conversion.Change`: rigid part of each shape, new shapes in the old ones, place of the new frame.
+    """
+    loads = new_unit_loads(reduced, p, R)  # (1)
+    loads = with_reaction(reduced, loads, frame)  # (2)
+    K = of_balanced(reduced, loads)  # (3)
+    phi = reduced.moments
+    Psi = np.array([interface.Psi for interface in reduced.interfaces]).reshape(-1, 6, reduced.n_q)
+    on_modes = turned_work(loads, phi.C1, phi.P, Psi)
+    on_rigid = turned_work(loads, *rotation_moments(reduced))
+    C_theta = C[3:]
+    K = K - np.einsum("ak,jal->jkl", C_theta, on_modes) - np.einsum("jak,al->jkl", on_modes, C_theta)  # (4)
+    K = K + np.einsum("ak,jab,bl->jkl", C_theta, on_rigid, C_theta, optimize=True)
+    K = np.einsum("lk,jlm,mn->jkn", Z, (K + K.transpose(0, 2, 1)) / 2, Z, optimize=True)
+    if frame.kind == "tisserand":
+        K[:6] = 0.0  # accelerations of mean axes are the reaction itself
+    return GeometricStiffness(K[:3], K[3:6], K[6:12], K[12:].reshape(len(reduced.interfaces), 6, *K.shape[1:]))
+
+
+def new_unit_loads(reduced: ReducedBody, p: Array, R: Array) -> Loads:
+    """Return step (1): loads per mass of the new axes about the new origin, and unit wrenches along the new axes."""
+    n = len(reduced.interfaces)
+    mass, none = unit_mass_loads(BodyFrame("", p, R)), MassLoads.none(6 * n)
+    wrenches = np.zeros((12 + 6 * n, n, 6))
+    for i in range(n):
+        wrenches[12 + 6 * i : 18 + 6 * i, i] = np.kron(np.eye(2), R).T
+    return Loads(MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), wrenches)
+
+
+def with_reaction(reduced: ReducedBody, loads: Loads, frame: BodyFrame) -> Loads:
+    """Return step (2): the loads and what keeps each in balance."""
+    force, torque = resultants(reduced, loads)
+    if frame.kind == "tisserand":
+        m, S, J0 = reduced.moments.m, reduced.moments.S, reduced.moments.J0
+        S_tilde = np.cross(S, np.eye(3)).T
+        M_R = np.block([[m * np.eye(3), -S_tilde], [S_tilde, J0]])
+        motion = np.linalg.solve(M_R, np.hstack([force, torque]).T)
+        return replace(loads, mass=loads.mass.plus_rigid(-motion, np.zeros(3)))
+    index = [interface.name for interface in reduced.interfaces].index(frame.at)
+    wrenches = np.array(loads.wrenches)
+    wrenches[:, index, :3] -= force
+    wrenches[:, index, 3:] -= torque - np.cross(reduced.interfaces[index].position, force)
+    return replace(loads, wrenches=wrenches)
+
+
+def resultants(reduced: ReducedBody, loads: Loads) -> tuple[Array, Array]:
+    """Return force and torque about the origin of each load, (k, 3) each."""
+    moments, A, b = reduced.moments, loads.mass.A, loads.mass.b
+    force = moments.m * b + A @ moments.S
+    V = np.einsum("jab,bc->jac", A, moments.R) + b[:, :, None] * moments.S  # ∫ f cᵀ
+    torque = axial(V)
+    for i, interface in enumerate(reduced.interfaces):
+        force = force + loads.wrenches[:, i, :3]
+        torque = torque + loads.wrenches[:, i, 3:] + np.cross(interface.position, loads.wrenches[:, i, :3])
+    return force, torque
+
+
+def of_balanced(reduced: ReducedBody, loads: Loads) -> Array:
+    """Return step (3): K of balanced loads over the old shapes, (k, n_q, n_q).
+
+    A c + b is a combination of the unit loads: b of translations, the antisymmetric part of A of rotations, the
+    symmetric one of products of angular velocities, whose A is 1 - e_a e_aᵀ or -½ (e_a e_bᵀ + e_b e_aᵀ).
+    """
+    old = reduced.geometric
+    assert old is not None
+    A, b = loads.mass.A, loads.mass.b
+    K = np.tensordot(-b, old.translation, axes=1) + np.tensordot(-axial(A) / 2, old.rotation, axes=1)
+    symmetric = (A + A.transpose(0, 2, 1)) / 2
+    half_trace = np.trace(A, axis1=1, axis2=2) / 2
+    amounts = [half_trace - symmetric[:, a, a] if a == c else -2 * symmetric[:, a, c] for a, c in SPIN_PAIRS]
+    K = K + np.tensordot(np.stack(amounts, axis=1), old.spin, axes=1)
+    return np.asarray(K + np.tensordot(loads.wrenches, old.interfaces, axes=2))
+
+
+def turned_work(loads: Loads, C1: Array, P: Array, Psi: Array) -> Array:
+    """Return the work on shapes of the loads turned about each axis, moments by half, (k, 3, n).
+
+    Parameters
+    ----------
+    C1, P
+        ∫ phi_a,k (3, n) and ∫ c_a phi_b,k (3, 3, n) of the shapes.
+    Psi
+        Motion of the interfaces, (n_interfaces, 6, n).
+    """
+    turn = np.stack([np.cross(e, np.eye(3)).T for e in np.eye(3)])  # e_a~
+    work = np.einsum("xab,jbc,cak->jxk", turn, loads.mass.A, P, optimize=True)
+    work = work + np.einsum("xab,jb,ak->jxk", turn, loads.mass.b, C1, optimize=True)
+    six = np.stack([np.kron(np.diag([1.0, 0.5]), e) for e in turn])
+    return np.asarray(work + np.einsum("xab,jib,iak->jxk", six, loads.wrenches, Psi, optimize=True))
+
+
+def rotation_moments(reduced: ReducedBody) -> tuple[Array, Array, Array]:
+    """Return C1, P and Psi of the three unit rotations e_k × c about the origin."""
+    e = np.stack([np.cross(axis, np.eye(3)).T for axis in np.eye(3)])  # e_k × c = e[k] c
+    C1 = np.einsum("kab,b->ak", e, reduced.moments.S)
+    P = np.einsum("kbc,ac->abk", e, reduced.moments.R)
+    Psi = np.zeros((len(reduced.interfaces), 6, 3))
+    for i, interface in enumerate(reduced.interfaces):
+        Psi[i, :3] = np.einsum("kab,b->ak", e, interface.position)
+        Psi[i, 3:] = np.eye(3) if interface.has_rotation else 0.0
+    return C1, P, Psi
+
+
+def axial(V: Array) -> Array:
+    """Return Σ o × f of V = Σ f oᵀ, (..., 3); twice theta of V = theta~."""
+    return np.stack([V[..., 2, 1] - V[..., 1, 2], V[..., 0, 2] - V[..., 2, 0], V[..., 1, 0] - V[..., 0, 1]], axis=-1)

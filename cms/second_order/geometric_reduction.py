@@ -1,0 +1,128 @@
+"""Geometric stiffness of a reduced body from its elements: a static solution and a matrix per unit load (THEORY §7).
+
+(1) unit loads f_j, balanced by the support of the frame: P f_j (`cms.second_order.unit_loads`)
+(2) static states u_j = G_R P f_j, by the factorisation that gave the modes; only their stress counts
+(3) Phiᵀ K_geo(sigma_j) Phi of the elements
+(4) rigid links: the forces on followers, internal less applied, on the second order of the rotation they follow
+(5) interfaces that are a mean of their members: the applied loads on the second order of the mean
+"""
+
+import numpy as np
+
+from cms.families.families import Families
+from cms.reduced_basis.frames import FrameCondition
+from cms.reduced_basis.node_motion import is_mean, reference_motion, translation_rows
+from cms.reduced_body.geometric_stiffness import GeometricStiffness
+from cms.second_order.link_work import followers, link_work
+from cms.second_order.mean_work import mean_second_order
+from cms.second_order.unit_states import UnitStates, states_of
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array
+
+__all__ = ["elastic_part", "reduced_geometric_stiffness", "stiffness_of_states"]
+
+LOADS_AT_ONCE = 60  #: whose displacements over the mesh are held at once
+
+
+def reduced_geometric_stiffness(
+    body: FEBody, Phi: Array, condition: FrameCondition, *, families: Families | None = None
+) -> GeometricStiffness:
+    """Return the geometric stiffness of shapes for all unit loads of a body frame.
+
+    Parameters
+    ----------
+    body
+        A coupled body with an element model.
+    Phi
+        Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
+    condition
+        The frame; it is the support of all loads.
+    families
+        The families of this body, whose factorisation is taken; made and freed here by default.
+
+    Raises
+    ------
+    BodyError
+        If the body has no element model that knows its geometric stiffness.
+    ModeSetError
+        If the families are those of another body.
+    """
+    return stiffness_of_states(body, Phi, states_of(body, condition, families))
+
+
+def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> GeometricStiffness:
+    """Return steps (3) to (5) of the static states of the unit loads; the factorisation is needed no more."""
+    K = np.zeros((states.mass.k, Phi.shape[1], Phi.shape[1]))
+    for first in range(0, len(states.loaded), LOADS_AT_ONCE):
+        some = slice(first, first + LOADS_AT_ONCE)
+        loads = states.loaded[some]
+        mass = MassLoads(states.mass.A[loads], states.mass.b[loads])
+        K[loads] = elastic_part(body, states.u[:, some], mass, Phi)
+    K -= mean_part(body, states.on_dofs, Phi, states.condition.frame.axes)
+    return GeometricStiffness(
+        translation=K[:3],
+        rotation=K[3:6],
+        spin=K[6:12],
+        interfaces=K[12:].reshape(len(body.interfaces), 6, *K.shape[1:]),
+    )
+
+
+def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:
+    """Return steps (3) and (4) of static states u, (n_dof, k), under their loads per mass, (k, n, n)."""
+    model = body.element_model
+    assert model is not None
+    u_mesh = body.mesh_displacement(u)
+    K = model.geometric_stiffness(u_mesh, mass, body.mesh_displacement(Phi))
+    if body.recovery is None:
+        return K
+    T, dofs = body.recovery.matrix, body.recovery.dofs
+    nodes = followers(T, dofs, body.dofs)
+    if not len(nodes):
+        return K
+    forces = model.internal_forces(u_mesh, nodes=nodes)
+    on_followers = forces - model.mass_forces(mass)
+    on_followers[~np.isin(dofs[:, 0], nodes)] = 0.0
+    return K + link_work(T, dofs, body.dofs, on_followers, Phi)
+
+
+def mean_part(body: FEBody, on_dofs: Array, Phi: Array, axes: Array) -> Array:
+    """Return step (5): work of the loads on the second order of the interfaces' own motion, (k, n, n).
+
+    A distributing interface hands what acts on its reference node to its members. The other ones that are no node of
+    the body are read off several members, or by a lever: that counts for their own unit loads, 12 + 6 i + c.
+    """
+    work = distributing_part(body, on_dofs, Phi)
+    turn = np.kron(np.eye(2), axes)
+    for number, interface in enumerate(body.interfaces):
+        own = slice(12 + 6 * number, 18 + 6 * number)
+        motion, _, turns = reference_motion(body, interface)
+        if interface.kind == "distributing":
+            continue
+        if is_mean(body, interface):
+            gamma = members_second_order(body, interface, Phi, turns)
+            work[own] += np.einsum("cj,ckl->jkl", turn, gamma, optimize=True)
+        else:
+            six = np.stack([np.zeros(6, np.int64), np.arange(6)], axis=1)
+            work[own] += link_work(motion, six, body.dofs, np.asarray(turn, np.float64), Phi)
+    return work
+
+
+def distributing_part(body: FEBody, on_dofs: Array, Phi: Array) -> Array:
+    """Return the work of loads on reference nodes that are the mean of their members, (k, n, n)."""
+    n = Phi.shape[1]
+    work = np.zeros((on_dofs.shape[1], n, n))
+    for interface in body.interfaces:
+        if interface.kind == "distributing":
+            _, _, turns = reference_motion(body, interface)
+            gamma = members_second_order(body, interface, Phi, turns)
+            work += np.einsum("cj,ckl->jkl", on_dofs[np.asarray(interface.dofs)], gamma, optimize=True)
+    return work
+
+
+def members_second_order(body: FEBody, interface: Interface, Phi: Array, turns: bool) -> Array:
+    """Return the second order of the mean motion of the members with the shapes, (6, n, n), mesh axes."""
+    rows = translation_rows(body, interface.nodes)
+    v = np.asarray(rows @ Phi).reshape(len(interface.nodes), 3, -1)
+    weights = np.asarray(interface.weights)
+    return mean_second_order(body.nodes[interface.nodes], weights, interface.reference, v, turns=turns)

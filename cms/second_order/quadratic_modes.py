@@ -1,0 +1,89 @@
+"""Quadratic modes: the displacement of second order in q of every kept node, such as the shortening of a bent beam.
+
+    r = c + Phi q + ½ Σ q_k q_l g_kl
+
+The geometric stiffness of a unit force at a node is minus its displacement of second order, K_kl = -e·g_kl (THEORY §7):
+g is had node by node from the same static solutions and the same pass over the elements, and it is the field whose
+inertia the geometric stiffness of the other unit loads carries. So the two are one, and never counted twice.
+"""
+
+import numpy as np
+
+from cms.errors import BodyError
+from cms.families.families import Families
+from cms.reduced_basis.frames import FrameCondition
+from cms.reduced_basis.node_motion import translation_rows
+from cms.second_order.geometric_reduction import distributing_part, elastic_part
+from cms.second_order.link_work import link_work
+from cms.second_order.unit_loads import balanced, together
+from cms.second_order.unit_states import require_geometric_stiffness
+from fe_models.body.fe_body import FEBody
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["MOST_NUMBERS", "quadratic_modes"]
+
+NODES_AT_ONCE = 60  #: three static solutions each
+MOST_NUMBERS = 2.5e7  #: of the field, 200 MB
+
+
+def quadratic_modes(
+    body: FEBody, Phi: Array, condition: FrameCondition, nodes: IntArray, *, families: Families | None = None
+) -> Array:
+    """Return g of some nodes in the frame B, (n_nodes, 3, n_q, n_q), symmetric in the modes [m per q²].
+
+    Parameters
+    ----------
+    body
+        A coupled body with an element model.
+    Phi
+        Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
+    condition
+        The frame.
+    nodes
+        Indices of nodes, (n_nodes,). Each costs three static solutions.
+    families
+        The families of this body, whose factorisation is taken; made and freed here by default.
+
+    Raises
+    ------
+    BodyError
+        If the elements do not know their geometric stiffness, or the field would be too large.
+    """
+    require_geometric_stiffness(body)
+    n = Phi.shape[1]
+    if 3 * len(nodes) * n * n > MOST_NUMBERS:
+        raise BodyError(
+            f"body {body.name!r}: quadratic modes of {len(nodes)} nodes and {n} modes are {3 * len(nodes) * n * n:.2g} "
+            f"numbers, expected {MOST_NUMBERS:.2g} at most; they are meant for slender bodies with few nodes and modes"
+            ": model it by beams, or leave them out: interfaces have their second order from the geometric stiffness"
+        )
+    if families is None:
+        with Families(body) as own:
+            return quadratic_modes(body, Phi, condition, nodes, families=own)
+    g = np.empty((len(nodes), 3, n, n))
+    for begin in range(0, len(nodes), NODES_AT_ONCE):
+        part = slice(begin, begin + NODES_AT_ONCE)
+        g[part] = -unit_force_stiffness(body, Phi, condition, nodes[part], families)
+    return g
+
+
+def unit_force_stiffness(
+    body: FEBody, Phi: Array, condition: FrameCondition, nodes: IntArray, families: Families
+) -> Array:
+    """Return the geometric stiffness of unit forces along the axes of B at nodes, (n_nodes, 3, n_q, n_q)."""
+    axes = condition.frame.axes
+    along_b = np.kron(np.eye(len(nodes)), axes)  # columns: components in mesh axes, node by node
+    on_dofs = np.asarray(translation_rows(body, nodes).T @ along_b)
+    loads = balanced(body, together(body, MassLoads.none(on_dofs.shape[1]), on_dofs), condition)
+    K = elastic_part(body, families.flexibility(loads.F), loads.mass, Phi)
+    K -= distributing_part(body, loads.on_dofs, Phi)
+    if body.recovery is not None:  # a node that follows a rotation moves by its second order too
+        dofs = body.recovery.dofs
+        applied = np.zeros((len(dofs), on_dofs.shape[1]))
+        place = np.full(len(body.nodes), -1, np.int64)
+        place[nodes] = np.arange(len(nodes))
+        rows = np.flatnonzero((dofs[:, 1] >= 0) & (dofs[:, 1] < 3) & (place[dofs[:, 0]] >= 0))
+        applied[rows] = along_b[3 * place[dofs[rows, 0]] + dofs[rows, 1]]
+        K -= link_work(body.recovery.matrix, dofs, body.dofs, applied, Phi)
+    return K.reshape(len(nodes), 3, *K.shape[1:])

@@ -1,0 +1,84 @@
+"""Unit loads of a body and their balance: what the geometric stiffness of a floating frame is made for (THEORY §7).
+
+Per mass, about the origin of the frame B and along its axes: -e_a of the acceleration of its origin, -e_a × c of the
+angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] of the products of angular velocities; then a unit force
+and a unit moment at every interface. All are balanced by the same support, W Psi_R of the condition of the frame.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.reduced_basis.frames import FrameCondition
+from cms.reduced_basis.node_motion import reference_motion
+from cms.reduced_body.geometric_stiffness import SPIN_PAIRS
+from cms.reduced_body.reduced_body import BodyFrame
+from fe_models.body.fe_body import FEBody
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array
+
+__all__ = ["UnitLoads", "balanced", "unit_loads", "unit_mass_loads"]
+
+BALANCED = 1e-10  #: of a load: what is left of it when its support carries all of it
+
+
+@dataclass(frozen=True, eq=False)
+class UnitLoads:
+    """Loads per mass and loads on dofs, side by side; a load j is the sum of both."""
+
+    mass: MassLoads  #: k loads
+    on_dofs: Array  #: over the dofs of the body, (n_dof, k) [N, N m]
+    F: Array  #: both together, over the dofs of the body, (n_dof, k)
+    is_zero: np.ndarray  #: whether nothing is left of the load, (k,) bool
+
+
+def unit_loads(body: FEBody, frame: BodyFrame) -> UnitLoads:
+    """Return the 12 loads per mass, then six loads for each interface."""
+    mass = unit_mass_loads(frame)
+    none = MassLoads.none(6 * len(body.interfaces))
+    turn = np.kron(np.eye(2), frame.axes)
+    columns = [reference_motion(body, interface)[0].T @ turn for interface in body.interfaces]
+    on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns])
+    return together(body, MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), on_dofs)
+
+
+def unit_mass_loads(frame: BodyFrame) -> MassLoads:
+    """Return the 12 loads per mass of a frame: 3 translations, 3 rotations, 6 products in the order `SPIN_PAIRS`."""
+    e = frame.axes.T  # e[a]: axis a of B
+    A, b = np.zeros((12, 3, 3)), np.zeros((12, 3))
+    b[:3] = -e
+    for a in range(3):
+        A[3 + a] = -np.cross(e[a], np.eye(3)).T
+    for j, (p, q) in enumerate(SPIN_PAIRS):
+        A[6 + j] = float(p == q) * np.eye(3) - (np.outer(e[p], e[q]) + np.outer(e[q], e[p])) / 2
+    b[3:] = -A[3:] @ frame.origin
+    return MassLoads(A, b)
+
+
+def balanced(body: FEBody, loads: UnitLoads, condition: FrameCondition) -> UnitLoads:
+    """Return P f = f - W Psi_R (Psi_Rᵀ W Psi_R)⁻¹ Psi_Rᵀ f: each load with the reaction of the support.
+
+    Where the support is the mass itself (a Tisserand frame), the reaction is the load of a rigid-body acceleration.
+    """
+    amounts = np.asarray(np.linalg.solve(condition.Psi_R.T @ condition.W, condition.Psi_R.T @ loads.F), np.float64)
+    if condition.frame.kind == "tisserand":
+        after = together(body, loads.mass.plus_rigid(-amounts, condition.center), loads.on_dofs)
+    else:
+        after = together(body, loads.mass, loads.on_dofs - condition.W @ amounts)
+    is_zero = np.abs(after.F).max(axis=0) <= BALANCED * np.abs(loads.F).max(axis=0)
+    is_zero &= _size(body, after.mass) <= BALANCED * _size(body, loads.mass)  # sections are loaded even so
+    return UnitLoads(after.mass, after.on_dofs, after.F, is_zero)
+
+
+def _size(body: FEBody, mass: MassLoads) -> Array:
+    """Largest force per mass at the nodes and over a length of the body, (k,)."""
+    at_nodes = np.abs(mass.at(body.nodes)).max(axis=(0, 1))
+    return np.asarray(at_nodes + np.abs(mass.A).max(axis=(1, 2)) * body.length)
+
+
+def together(body: FEBody, mass: MassLoads, on_dofs: Array) -> UnitLoads:
+    """Return both kinds of loads with their sum over the dofs of the body."""
+    assert body.element_model is not None
+    on_mesh = body.element_model.mass_forces(mass)
+    F = on_dofs + (on_mesh if body.recovery is None else body.recovery.matrix.T @ on_mesh)
+    return UnitLoads(mass, on_dofs, F, np.asarray(~F.any(axis=0)))

@@ -1,0 +1,122 @@
+"""Static states of the unit loads of a body: what its geometric stiffness needs of the factorisation (THEORY §7)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.errors import BodyError, ModeSetError
+from cms.families.families import Families
+from cms.reduced_basis.frames import Frame, FrameCondition, TisserandFrame, frame_condition
+from cms.second_order.unit_loads import balanced, unit_loads
+from cms.solvers.tall import combine
+from fe_models.body.fe_body import FEBody
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["UnitStates", "has_geometric_stiffness", "require_geometric_stiffness", "states_of", "unit_states"]
+
+
+@dataclass(frozen=True, eq=False)
+class UnitStates:
+    """The balanced unit loads of a body in one frame, and the static response to those that load it."""
+
+    body: FEBody
+    condition: FrameCondition  #: the frame, which is the support of all loads
+    mass: MassLoads  #: loads per mass, k
+    on_dofs: Array  #: loads on the dofs of the body, (n_dof, k) [N, N m]
+    loaded: IntArray  #: which of the k loads leave something, (n_loaded,)
+    u: Array  #: their responses, up to a rigid motion, (n_dof, n_loaded)
+
+
+def unit_states(body: FEBody, *, frame: Frame | None = None, families: Families | None = None) -> UnitStates:
+    """Return the static states of the unit loads of a body in a frame, for `reduce(..., states=...)`.
+
+    Made while the factorisation of the mode set is there, they let it be freed before the reduction, which then needs
+    the memory for itself: that matters from some hundred thousand dofs on.
+
+    Parameters
+    ----------
+    body
+        A coupled body with an element model.
+    frame
+        Body reference frame of the reduction; Tisserand (mean axis) by default.
+    families
+        The families of this body, whose factorisation is taken; made and freed here by default.
+
+    Raises
+    ------
+    BodyError
+        If the body has no element model that knows its geometric stiffness, or the frame cannot be attached.
+    ModeSetError
+        If the families are those of another body.
+    """
+    require_geometric_stiffness(body)
+    return states_of(body, frame_condition(body, frame or TisserandFrame()), families)
+
+
+def states_of(body: FEBody, condition: FrameCondition, families: Families | None) -> UnitStates:
+    """Return the static states for a frame made ready."""
+    require_geometric_stiffness(body)
+    if families is None:
+        with Families(body) as own:
+            return states_of(body, condition, own)
+    if families.body is not body:
+        raise ModeSetError(
+            f"families: made for body {families.body.name!r}, but the geometric stiffness is asked of another one, "
+            f"{body.name!r}; make Families of the very body"
+        )
+    loads = balanced(body, unit_loads(body, condition.frame), condition)
+    loaded = np.flatnonzero(~loads.is_zero)
+    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, static_states(families, loads.F[:, loaded]))
+
+
+def has_geometric_stiffness(body: FEBody) -> bool:
+    """Return whether the elements behind the body know their geometric stiffness."""
+    return body.element_model is not None and body.element_model.has_geometric_stiffness
+
+
+def require_geometric_stiffness(body: FEBody) -> None:
+    """Raise `BodyError` unless the elements know their geometric stiffness."""
+    if not has_geometric_stiffness(body):
+        raise BodyError(
+            f"body {body.name!r}: geometric stiffness needs the elements, and it came without them (bare matrices); "
+            "build it from its mesh (fe_models.solid_body, beam_body), or reduce it without (geometric=False, in a job "
+            "geometric_stiffness = false)"
+        )
+
+
+def static_states(families: Families, F: Array) -> Array:
+    """Return the response to balanced loads with R held, (n_dof, k); it needs no inertia, as P would.
+
+    v = K_II⁻¹ f_I;  S_ee z_e = (f_h - K_hI v)_e with z = 0 at R;  u = v + Psi_C z.
+    """
+    body = families.body
+    if not F.shape[1]:
+        return np.zeros(F.shape)
+    i, h = families.fixed.i, families.h
+    v = families.fixed.factorization.solve(F[i])
+    z = np.zeros((len(h), F.shape[1]))
+    e = np.flatnonzero(~np.isin(h, families.r))
+    if len(e):
+        g = F[h] - (body.K[:, h].T @ embedded(v, i, body.n_dof))
+        S_ee = families.S[np.ix_(e, e)]
+        size = 1 / np.sqrt(np.where(np.diag(S_ee) > 0, np.diag(S_ee), 1.0))
+        try:
+            factor = la.cho_factor(S_ee * np.outer(size, size))
+        except la.LinAlgError as error:
+            raise BodyError(
+                f"body {body.name!r}: motions besides the rigid ones cost no energy: a mechanism; join the parts or "
+                "add what holds them"
+            ) from error
+        z[e] = size[:, None] * la.cho_solve(factor, size[:, None] * g[e])
+    u = combine(families.Psi_C, z)
+    u[i] += v
+    return u
+
+
+def embedded(v: Array, rows: IntArray, n: int) -> Array:
+    """Return v in some rows of n, zero in the others."""
+    whole = np.zeros((n, v.shape[1]))
+    whole[rows] = v
+    return whole

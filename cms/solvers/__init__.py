@@ -1,0 +1,1 @@
+"""Factorisation and eigensolvers of large sparse symmetric pencils."""

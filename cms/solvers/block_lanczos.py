@@ -1,0 +1,190 @@
+"""Block Lanczos iteration for the largest eigenvalues of a shift-inverted pencil.
+
+S = (K - sigma M)⁻¹ M is self-adjoint in the inner product (x, y) = xᵀ M y, also where M is only semidefinite. Its
+largest eigenvalues theta = 1 / (omega² - sigma) are the modes nearest above the shift.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.solvers.sparse_product import SymmetricProduct
+from cms.solvers.tall import combine, inner, ordered, subtract
+from fe_models.foundation.arrays import Array
+
+__all__ = ["BlockLanczos", "RitzPairs"]
+
+DEPENDENT = 1e-10  #: length of a new direction against the block it came from, below which it is rounding
+TAME = 1e-3  #: shortest to longest new direction, above which one pass leaves them orthogonal to 1e-13
+SETTLED = 1e-12  #: part of the shortest new direction that a pass may take off without a new product by M
+ROUNDOFF = 1e-14  #: defect of M-orthonormal columns that is left as it is
+MAX_PASSES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class RitzPairs:
+    """Eigenpairs of the projected operator, largest theta first."""
+
+    theta: Array  #: (m,) [s²]
+    S: Array  #: vectors over the basis, (m, m)
+    coupling: Array  #: of S x - theta x over the next block, (b, m) [s²]
+    residuals: Array  #: |S x - theta x|_M / |theta| of unit x, by the recurrence, (m,)
+
+
+class BlockLanczos:
+    """A growing M-orthonormal basis V with its projection T = Vᵀ M S V, and the block that comes next.
+
+    (1) W = S V_j                                                 one block solve
+    (2) A = V_jᵀ M W; W <- W - V Rᵀ - V_j A                       the recurrence: R couples V_j to the basis before it
+    (3) C = Vᵀ M W; W <- W - V C                                  full reorthogonalisation of what is left
+    (4) W = V_{j+1} R by the eigenvectors of Wᵀ M W, dependent directions dropped; (3) and (4) again where W was nearly
+        dependent
+    (5) T gains the block column [Rᵀ; A] + C; R of (4) couples to the next block
+    (6) thick restart when the basis is full: V <- V X of the leading Ritz pairs, whose residuals all lie in V_{j+1}
+
+    Full reorthogonalisation leaves no spurious copies to sort out; one pass is enough because (2) has taken off all
+    that is not rounding. Blocks lie in Fortran order, the basis by rows: solver and products read them as they are.
+    """
+
+    def __init__(
+        self, solve: Callable[[Array], Array], M: SymmetricProduct, n: int, *, block: int, capacity: int
+    ) -> None:
+        self.solve, self.M, self.n, self.block = solve, M, n, block
+        self.n_solves = 0
+        self.m = 0  # columns of V that T knows
+        self._rows = np.empty((min(capacity, n) + block, n))  # V.T: rows are the basis vectors
+        self._T = np.zeros((len(self._rows), len(self._rows)))
+        self._random = np.random.default_rng(0)
+        self._M_next = self._start()  # M V_{j+1}; V_{j+1} itself follows V in the rows
+        self._R = np.zeros((self._M_next.shape[1], 0))  # coupling of the next block to all of V
+        self._coupled = 0  # first column of V it is coupled to
+
+    @property
+    def V(self) -> Array:
+        """The basis, (n, m)."""
+        return self._rows[: self.m].T
+
+    @property
+    def V_and_next(self) -> Array:
+        """The basis and the block that comes next, (n, m + b)."""
+        return self._rows[: self.m + self._M_next.shape[1]].T
+
+    @property
+    def is_exhausted(self) -> bool:
+        """Whether V spans everything the operator can reach."""
+        return self._M_next.shape[1] == 0
+
+    @property
+    def capacity(self) -> int:
+        """Columns V can hold before a restart."""
+        return len(self._rows) - self.block
+
+    def grow(self, capacity: int) -> None:
+        """Make room for more columns."""
+        size = min(capacity, self.n) + self.block
+        if size > len(self._rows):
+            rows, T = np.empty((size, self.n)), np.zeros((size, size))
+            used = self.V_and_next.shape[1]
+            rows[:used], T[: self.m, : self.m] = self._rows[:used], self._T[: self.m, : self.m]
+            self._rows, self._T = rows, T
+
+    def advance(self) -> None:
+        """Add the next block to the basis."""
+        M_new = self._M_next
+        first, last = self.m, self.m + M_new.shape[1]
+        block = slice(first, last)
+        self.m = last
+        W = self._apply(M_new)  # (1)
+        A = inner(M_new, W)  # (2)
+        near = np.concatenate([self._R[:, self._coupled :].T, A])
+        subtract(W, self.V[:, self._coupled :], near)
+        C, R, M_next = self._append(W, np.linalg.norm(near, axis=0).max())  # (3), (4)
+        C[self._coupled :] += near  # (5)
+        self._T[:last, block] = C
+        self._T[block, :last] = C.T
+        self._T[block, block] = (C[block] + C[block].T) / 2
+        self._R = np.zeros((len(R), last))
+        self._R[:, block] = R
+        self._coupled = first
+        if len(R) == 0 and last < self.n:  # an invariant subspace: look for what the start did not contain
+            M_next = self._start()
+            self._R = np.zeros((M_next.shape[1], last))
+            self._coupled = last
+        self._M_next = M_next
+
+    def ritz(self) -> RitzPairs:
+        """Eigenpairs of T with their residuals |R s|."""
+        theta, S = la.eigh(self._T[: self.m, : self.m])
+        theta, S = theta[::-1], S[:, ::-1]
+        scale = np.maximum(np.abs(theta), np.finfo(float).tiny)
+        coupling = self._R @ S
+        return RitzPairs(theta, S, coupling, np.linalg.norm(coupling, axis=0) / scale)
+
+    def restart(self, ritz: RitzPairs, keep: int) -> None:
+        """Keep the span of the leading Ritz vectors only; the next block stays."""
+        S = np.ascontiguousarray(ritz.S[:, :keep].T)
+        for first in range(0, self.n, 65536):  # in place, in slices: no second basis in memory
+            part = slice(first, first + 65536)
+            self._rows[:keep, part] = S @ self._rows[: self.m, part]
+        self._rows[keep : keep + len(self._R)] = self._rows[self.m : self.m + len(self._R)]
+        self._T[: self.m, : self.m] = 0.0
+        self._T[np.arange(keep), np.arange(keep)] = ritz.theta[:keep]
+        self._R = self._R @ S.T
+        self._coupled = 0
+        self.m = keep
+
+    def _apply(self, M_x: Array) -> Array:
+        self.n_solves += M_x.shape[1]
+        return ordered(self.solve(M_x), "F")
+
+    def _start(self) -> Array:
+        """Append an M-orthonormal random block in the range of the operator, orthogonal to V; return M times it."""
+        width = min(self.block, self.n - self.m)
+        random = self._random.standard_normal((width, self.n)).T
+        _, _, M_W = self._append(self._apply(self.M @ random), 0.0)
+        return M_W
+
+    def _append(self, W: Array, length: float) -> tuple[Array, Array, Array]:
+        """Split W = V C + V_next R, V_next in the rows after V; return C, R, M V_next (steps 3 and 4). W is lost.
+
+        `length` is that of what was taken off W before: a remainder is rounding by its measure.
+        """
+        V = self.V
+        C_sum = np.zeros((self.m, W.shape[1]))
+        R_sum = np.eye(W.shape[1])
+        M_W = self.M @ W
+        for k_pass in range(MAX_PASSES):
+            C = inner(V, M_W)
+            gram = _symmetric(inner(W, M_W))
+            longest = np.sqrt(max(np.diag(gram).max(initial=0.0), 0.0))
+            subtract(W, V, C)
+            C_sum += C @ R_sum
+            gram -= C.T @ C  # of W - V C, as long as little cancels
+            taken = np.abs(C).max(initial=0.0)
+            if not taken**2 <= SETTLED**2 * la.eigvalsh(gram)[0]:
+                M_W = self.M @ W
+                gram = _symmetric(inner(W, M_W))
+            length2, U = la.eigh(gram)
+            floor = DEPENDENT * max(length, longest) if k_pass == 0 else 0.1
+            kept = length2 > floor**2
+            scaled = U[:, kept] / np.sqrt(length2[kept])
+            W, M_W = combine(W, scaled), combine(M_W, scaled)
+            R_sum = (U[:, kept] * np.sqrt(length2[kept])).T @ R_sum
+            if not kept.any():
+                break
+            if length2[kept][0] > (TAME * longest) ** 2:
+                defect = _symmetric(inner(W, M_W))
+                if np.abs(defect - np.eye(len(defect))).max() > ROUNDOFF:
+                    U = la.cholesky(defect)
+                    W, M_W = (combine(X, la.solve_triangular(U, np.eye(len(U)))) for X in (W, M_W))
+                    R_sum = U @ R_sum
+                break
+            M_W = self.M @ W
+        self._rows[self.m : self.m + W.shape[1]] = W.T
+        return C_sum, R_sum, M_W
+
+
+def _symmetric(G: Array) -> Array:
+    return (G + G.T) / 2

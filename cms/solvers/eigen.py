@@ -1,0 +1,226 @@
+"""Vibration modes: the lowest eigenpairs of K x = omega² M x, by count or up to a frequency."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import EigenError
+from cms.solvers.factorization import Factorization, factorize
+from cms.solvers.inverse import Inverse
+from cms.solvers.mode_search import DenseSearch, KrylovSearch
+from cms.solvers.orientation import orientation
+from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
+from cms.solvers.tall import combine
+from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.threads import one_blas_thread
+
+__all__ = ["EigenResult", "eigenmodes"]
+
+SMALL = 300  #: dofs up to which dense matrices are faster
+LARGEST_DENSE = 3000  #: dofs up to which dense matrices are affordable, where many of the modes are wanted
+SHIFT = 1e-6  #: of a free body, as a part of the median of K_kk / M_kk: near its first elastic omega²
+SHIFT_SMALL = 1e-4  #: the same for the few dofs of a dense pencil
+ZERO = 1e-13  #: the same part, below which omega² is rounding of K: a rigid-body mode
+TIGHTEST, LOOSEST = 1e-13, 0.1  #: tolerances that rounding allows, and that say anything
+MISMATCH = 1e-3  #: defect of K x = omega² M x that only a factorisation of another matrix explains
+MOST_PROOFS = 3
+GAP = 1e-4  #: relative gap between two omega² in which modes can be counted
+
+
+@dataclass(frozen=True, eq=False)
+class EigenResult:
+    """Modes by ascending frequency, M-orthonormal."""
+
+    omega2: Array  #: (n_modes,) [1/s²]; exactly 0 for rigid-body modes
+    frequencies: Array  #: (n_modes,) [Hz]
+    Phi: Array  #: (n, n_modes)
+    residuals: Array  #: |x - (omega² - sigma) (K - sigma M)⁻¹ M x|_M of x before its last inverse iteration, (n_modes,)
+    n_solves: int  #: columns solved for
+    method: str  #: solver and its settings, in words
+    is_proven: bool  #: whether the inertia of a second factorisation proved that no mode was missed
+
+    def __post_init__(self) -> None:
+        for name in ("omega2", "frequencies", "Phi", "residuals"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+def eigenmodes(
+    K: sp.csc_array,
+    M: sp.csc_array,
+    *,
+    n_modes: int | None = None,
+    cutoff: float | None = None,
+    factorization: Inverse | None = None,
+    shift: float | None = None,
+    tolerance: float = 1e-5,
+    verify: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> EigenResult:
+    """Lowest vibration modes of a sparse symmetric pencil.
+
+    (1) block Lanczos on S = (K - sigma M)⁻¹ M until the leading residuals are below the tolerance
+    (2) Y = S X / theta: one inverse iteration of the Ritz vectors X gives their true residuals |Y - X|_M, and takes out
+        what the M-norm does not see (multipliers, massless dofs)
+    (3) Rayleigh-Ritz in the span of Y; Yᵀ (K - sigma M) Y = Yᵀ M X / theta needs no product by K
+    (4) signs, and directions within multiple frequencies, by `orientation`
+
+    Parameters
+    ----------
+    K
+        Stiffness, (n, n); semidefinite (a free body), and indefinite only by Lagrange multipliers.
+    M
+        Mass, (n, n), semidefinite: massless dofs and multipliers have none.
+    n_modes
+        Number of modes.
+    cutoff
+        Instead of a number: all modes up to this frequency [Hz].
+    factorization
+        Of K - shift M if it exists already; made and freed here by default.
+    shift
+        sigma [1/s²], below all omega²; 0 with a factorisation, otherwise a small negative one that also serves a free
+        body.
+    tolerance
+        Largest residual |x - (omega² - sigma) S x|_M of a unit x: a bound of the relative error of omega² - sigma,
+        whose actual error goes with its square.
+    verify
+        Prove by the inertia of one more factorisation, just above the last mode, that none was missed. It holds a
+        second factor in memory.
+    progress
+        Called with the numbers of modes found and wanted (0 as long as that is not known).
+
+    Raises
+    ------
+    EigenError
+        If more modes are asked for than exist, an eigenvalue lies below the shift, the residuals stay above the
+        tolerance, or the inertia counts other modes than were found.
+    FactorizationError
+        If K - shift M is singular.
+    """
+    K, M = sp.csc_array(K), sp.csc_array(M)
+    n = K.shape[0]
+    if K.shape != (n, n) or M.shape != (n, n):
+        raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
+    wanted = Wanted(n_modes, None if cutoff is None else (2 * np.pi * cutoff) ** 2)
+    if wanted.count is not None and wanted.count > n:
+        raise EigenError(f"eigenmodes: n_modes = {n_modes}, but there are {n} dofs; choose n_modes <= {n}")
+    if not TIGHTEST <= tolerance <= LOOSEST:
+        raise EigenError(f"eigenmodes: tolerance = {tolerance:g}; expected {TIGHTEST:g} to {LOOSEST:g}")
+    is_large_part = wanted.count is not None and 3 * wanted.count > n
+    is_dense = n <= SMALL or (is_large_part and n <= LARGEST_DENSE)
+    scale = frequency_scale(K, M)
+    if shift is None:
+        shift = 0.0 if factorization is not None else -(SHIFT_SMALL if is_dense else SHIFT) * scale
+    with ExitStack() as stack:
+        stack.enter_context(one_blas_thread())
+        if factorization is None:
+            factorization = stack.enter_context(_factorize_shifted(K, M, shift))
+        if factorization.n != n:
+            raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
+        operator = ShiftInverted(M, shift, factorization, tolerance, progress)
+        search = (DenseSearch if is_dense else KrylovSearch)(operator, wanted)
+        modes = search.modes(wanted)
+        if verify:
+            modes = _proven_modes(K, M, search, modes, wanted)
+        k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
+        residuals, method = modes.residuals, search.description
+        n_solves, solver = operator.n_solves, factorization.description
+        omega2 = _zero_rigid(modes.omega2, zero=max(ZERO * scale, 1e-9 * abs(shift)))
+        Phi = modes.expand()
+        del search, modes  # the basis
+    Phi = combine(Phi, orientation(Phi, omega2)[:, :k], order="C")
+    omega2 = omega2[:k]
+    _require_match(K, M, Phi, omega2, shift, tolerance)
+    method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"
+    return EigenResult(omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=verify)
+
+
+def frequency_scale(K: sp.csc_array, M: sp.csc_array) -> float:
+    """Median of K_kk / M_kk [1/s²], which is near the highest omega² of the mesh."""
+    stiffness, mass = K.diagonal(), M.diagonal()
+    has_both = (stiffness > 0) & (mass > 0)
+    if not has_both.any():
+        raise EigenError("eigenmodes: no dof has both stiffness and mass; expected a body that can vibrate")
+    return float(np.median(stiffness[has_both] / mass[has_both]))
+
+
+def _proven_modes(
+    K: sp.csc_array, M: sp.csc_array, search: KrylovSearch | DenseSearch, modes: Modes, wanted: Wanted
+) -> Modes:
+    """Return the modes once their number agrees with the inertia; look for more as long as it is larger."""
+    operator = search.operator
+    for _ in range(MOST_PROOFS):
+        last, sigma = counting_shift(modes.omega2, modes.n_wanted, wanted, operator.shift)
+        n_below = _count_below(K, M, sigma, operator.factorization)
+        if n_below == last:
+            return modes
+        if n_below < last:
+            raise EigenError(
+                f"eigenmodes: found {last} modes below {_hertz(sigma):.6g} Hz, but the inertia counts {n_below}; "
+                "expected symmetric K and M, and a factorisation of them"
+            )
+        modes = search.modes(wanted, at_least=n_below)
+    raise EigenError(
+        f"eigenmodes: the inertia counts {n_below} modes below {_hertz(sigma):.6g} Hz, found {last}; ask for more modes"
+    )
+
+
+def counting_shift(omega2: Array, k: int, wanted: Wanted, shift: float) -> tuple[int, float]:
+    """Return where modes can be counted: their number below, and a shift in a gap at or after the last wanted one."""
+    levels = np.concatenate([[shift], omega2])  # levels[j]: mode j, counted from 1
+    for j in range(k, len(omega2)):
+        low, high = levels[j], levels[j + 1]
+        if high - low > GAP * (high - shift):
+            sigma = (low + high) / 2
+            if wanted.omega2 is not None and j == k:
+                margin = GAP * (high - shift) / 4
+                sigma = min(max(wanted.omega2, low + margin), high - margin)
+            return j, sigma
+    return len(omega2), levels[-1] + GAP * (levels[-1] - shift)
+
+
+def _factorize_shifted(K: sp.csc_array, M: sp.csc_array, sigma: float) -> Factorization:
+    A = K if sigma == 0 else sp.csc_array(K - sigma * M)
+    return factorize(A, definite=sigma <= 0 and bool((A.diagonal() > 0).all()))
+
+
+def _count_below(K: sp.csc_array, M: sp.csc_array, sigma: float, at_shift: Inverse) -> int:
+    """Modes between the shift and sigma, by Sylvester's law: K - sigma M has one more negative eigenvalue for each."""
+    with _factorize_shifted(K, M, sigma) as factorization:
+        inertia = factorization.inertia
+    if inertia.n_zero or at_shift.inertia.n_zero:
+        raise EigenError(
+            f"eigenmodes: {inertia.n_zero} pivots at {_hertz(sigma):.6g} Hz are zero within rounding, so that modes "
+            "cannot be counted there; ask for another number of modes, or do without the proof"
+        )
+    return inertia.n_negative - at_shift.inertia.n_negative
+
+
+def _zero_rigid(omega2: Array, *, zero: float) -> Array:
+    if (omega2 < -zero).any():
+        raise EigenError(
+            f"eigenmodes: omega² = {omega2.min():.6g} is negative; expected a stiffness without negative energy"
+        )
+    return np.where(omega2 <= zero, 0.0, omega2)
+
+
+def _require_match(K: sp.csc_array, M: sp.csc_array, Phi: Array, omega2: Array, shift: float, tolerance: float) -> None:
+    """Check K x = omega² M x on one random combination: the iteration itself sees K only through its factorisation."""
+    if not len(omega2):
+        return
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=len(omega2)) / np.sqrt(omega2 - shift)
+    force = K @ (Phi @ signs)
+    inertia = M @ (Phi @ (omega2 * signs))
+    size = np.linalg.norm(force) + np.linalg.norm(M @ (Phi @ ((omega2 - shift) * signs)))
+    defect = np.linalg.norm(force - inertia) / size
+    if not defect < max(MISMATCH, 1e3 * tolerance):
+        raise EigenError(
+            f"eigenmodes: K x - omega² M x is {defect:.1e} of its terms; expected a factorisation of K - shift M "
+            f"(shift = {shift:g}) of these very matrices"
+        )
+
+
+def _hertz(omega2: float) -> float:
+    return float(np.sqrt(max(omega2, 0.0)) / (2 * np.pi))

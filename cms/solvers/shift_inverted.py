@@ -1,0 +1,118 @@
+"""The shift-inverted operator S = (K - sigma M)⁻¹ M, and modes refined by one more application of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.errors import EigenError
+from cms.solvers.inverse import Inverse
+from cms.solvers.sparse_product import SymmetricProduct
+from cms.solvers.tall import combine, inner
+from fe_models.foundation.arrays import Array
+
+__all__ = ["Modes", "ShiftInverted", "Wanted", "measured_residual", "refined_modes"]
+
+SAMPLES = 4  #: columns for the measurement of all residuals together
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """How many modes are asked for: the first `count`, or all up to `omega2`."""
+
+    count: int | None
+    omega2: float | None
+
+    def __post_init__(self) -> None:
+        if (self.count is None) == (self.omega2 is None):
+            raise EigenError("eigenmodes: expected either n_modes or cutoff, got both or none of them")
+        if self.count is not None and self.count < 1:
+            raise EigenError(f"eigenmodes: n_modes = {self.count}; expected at least 1")
+        if self.omega2 is not None and not 0 < self.omega2 < np.inf:
+            raise EigenError("eigenmodes: cutoff: expected a finite frequency above 0")
+
+
+class ShiftInverted:
+    """The operator S with its tolerance; counts the columns it solves for."""
+
+    def __init__(
+        self,
+        M: sp.csc_array,
+        shift: float,
+        factorization: Inverse,
+        tolerance: float,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        self.M, self.M_product, self.shift, self.tolerance = M, SymmetricProduct(M), shift, tolerance
+        self.n = M.shape[0]
+        self.n_solves = 0
+        self.factorization, self._progress = factorization, progress
+
+    def solve(self, b: Array) -> Array:
+        """Return (K - sigma M)⁻¹ b, (n, k)."""
+        self.n_solves += b.shape[1]
+        return self.factorization.solve(b)
+
+    def report(self, found: int, wanted: int) -> None:
+        """Tell the caller how far the search is."""
+        if self._progress is not None:
+            self._progress(found, wanted)
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes as coefficients of a block of columns: the wanted ones, and a few guards after them."""
+
+    omega2: Array  #: ascending, (n_wanted + n_guards,)
+    n_wanted: int
+    residuals: Array  #: of the wanted ones before the last improvement, (n_wanted,)
+    Y: Array  #: (n, p)
+    Z: Array  #: coefficients, M-orthonormal Phi = Y Z, (p, n_wanted + n_guards)
+
+    def expand(self) -> Array:
+        """Return the M-orthonormal modes Phi, (n, n_wanted + n_guards)."""
+        return combine(self.Y, self.Z)
+
+
+def refined_modes(operator: ShiftInverted, X: Array, theta: Array, n_wanted: int) -> Modes:
+    """Modes from M-orthonormal Ritz vectors X, (n, p), by one inverse iteration and Rayleigh-Ritz.
+
+    (1) Y = S X / theta; residuals |Y - X|_M
+    (2) Yᵀ (K - sigma M) Y = Yᵀ M X / theta = H,  Yᵀ M Y = G;  H z = (omega² - sigma) G z
+    """
+    M_X = operator.M_product @ X
+    Y = operator.solve(M_X)
+    Y /= theta
+    M_X /= theta
+    H = inner(Y, M_X)
+    del M_X
+    X -= Y
+    residuals = np.sqrt(np.maximum(np.einsum("nk,nk->k", X, operator.M_product @ X), 0.0))[:n_wanted]
+    del X
+    G = inner(Y, operator.M_product @ Y)
+    mu, Z = la.eigh((H + H.T) / 2, (G + G.T) / 2)
+    return Modes(mu + operator.shift, n_wanted, residuals, Y, Z)
+
+
+def measured_residual(operator: ShiftInverted, modes: Modes) -> tuple[float, float]:
+    """Measure (Σ_j |r_j|_M²)^½ of the wanted modes, r_j = x_j - (omega_j² - sigma) S x_j, with few columns.
+
+    The sum Σ ± r_j with random signs has the expected squared length Σ |r_j|² in any norm. Mean over `SAMPLES` sums.
+
+    Returns
+    -------
+    residual
+        In the M-norm: an estimate of the root of the sum, and by it a bound of each |r_j|_M.
+    defect
+        The same without M, as a part of the columns themselves: it also sees what has no mass.
+    """
+    k = modes.n_wanted
+    Z, above_shift = modes.Z[:, :k], modes.omega2[:k] - operator.shift
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(k, SAMPLES))
+    r = combine(modes.Y, Z @ signs)
+    size = np.linalg.norm(r)
+    r -= operator.solve(operator.M_product @ combine(modes.Y, Z @ (above_shift[:, None] * signs)))
+    squared = np.einsum("nk,nk->", r, operator.M_product @ r)
+    return float(np.sqrt(max(squared, 0.0) / SAMPLES)), float(np.linalg.norm(r) / size) if size else 0.0

@@ -1,0 +1,1 @@
+"""What a finite element body is: `FEBody`, its interfaces, couplings and loads."""

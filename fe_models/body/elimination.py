@@ -1,0 +1,62 @@
+"""Elimination: some dofs of a body become a linear combination of others (a congruence); FEBody to FEBody."""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.body.fe_body import FEBody, Recovery
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.errors import BodyError
+
+__all__ = ["eliminate_dofs"]
+
+
+def eliminate_dofs(body: FEBody, slaves: IntArray, T_s: sp.sparray) -> FEBody:
+    """Return the body with u_slaves = T_s u put into M, K, D and the load cases: Tᵀ A T.
+
+    The nodes stay, the recovery to the dofs of the mesh is carried along, boundary dofs are renumbered.
+
+    Parameters
+    ----------
+    body
+        Any body.
+    slaves
+        Dofs that leave, (n_slaves,).
+    T_s
+        Over all dofs of the body, zero in the columns of the slaves, (n_slaves, n_dof).
+
+    Raises
+    ------
+    BodyError
+        If a slave depends on a slave, or is a boundary dof.
+    """
+    where = f"body {body.name!r}"
+    is_kept = np.ones(body.n_dof, dtype=bool)
+    is_kept[slaves] = False
+    keep = np.flatnonzero(is_kept)
+    T_s = sp.csr_array(T_s)
+    if abs(T_s[:, np.flatnonzero(~is_kept)]).sum() != 0:
+        raise BodyError(f"{where}: an eliminated dof depends on another one; name the leader of both")
+    for interface in body.interfaces:
+        if interface.dofs is not None and not is_kept[interface.dofs].all():
+            raise BodyError(f"{where}: interface {interface.name!r}: its boundary dofs cannot follow others")
+    selection = sp.csr_array((np.ones(len(keep)), (keep, np.arange(len(keep)))), shape=(body.n_dof, len(keep)))
+    placement = sp.csr_array((np.ones(len(slaves)), (slaves, np.arange(len(slaves)))), shape=(body.n_dof, len(slaves)))
+    T = sp.csr_array(selection + placement @ T_s[:, keep])
+    new_index = np.full(body.n_dof, -1, np.int64)
+    new_index[keep] = np.arange(len(keep))
+    before = Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
+    return replace(
+        body,
+        M=T.T @ body.M @ T,
+        K=T.T @ body.K @ T,
+        D=None if body.D is None else T.T @ body.D @ T,
+        dofs=body.dofs[keep],
+        interfaces=tuple(
+            interface if interface.dofs is None else replace(interface, dofs=new_index[interface.dofs])
+            for interface in body.interfaces
+        ),
+        recovery=Recovery(sp.csr_array(before.matrix @ T), before.dofs),
+        load_cases=tuple(replace(case, f=T.T @ case.f) for case in body.load_cases),
+    )

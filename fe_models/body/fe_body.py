@@ -1,0 +1,337 @@
+"""The finite element model of one body, as every source hands it to the reduction."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.body.load_cases import LoadCase, check_load_cases
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import (
+    Array,
+    IntArray,
+    frozen,
+    frozen_int,
+    require_finite,
+    require_shape,
+    symmetric_csc,
+)
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.words import nearest
+
+__all__ = ["INTERFACE_KINDS", "MULTIPLIER", "ElementModel", "FEBody", "Interface", "Recovery", "StressPointModel"]
+
+MULTIPLIER = -1  #: component code of a Lagrange multiplier of a distributing (RBE3) interface
+INTERFACE_KINDS = ("rigid", "distributing", "nodes")
+
+
+class ElementModel(Protocol):
+    """What only the elements know of a displacement field: exact integrals over mass, stress, geometric stiffness."""
+
+    @property
+    def has_nodal_stress(self) -> bool:
+        """Whether `nodal_stress` can be asked for; bare matrices and pure frames of beams do not know it."""
+
+    def mass_gram(self, u: Array) -> Array:
+        """Integrals over mass ∫ a aᵀ of a = [1, c, u_x, u_y, u_z] (THEORY §5).
+
+        Parameters
+        ----------
+        u
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
+
+        Returns
+        -------
+        Array
+            (4 + 3 k, 4 + 3 k) [kg × units of the products]; u_x of all columns first, then u_y, u_z.
+        """
+
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Stress at the nodes, averaged over the adjoining elements of one material.
+
+        Parameters
+        ----------
+        u
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
+        nodes
+            Whose stress is wanted; None: that of all. Nodes of an interface may be beyond the mesh: they have none. The
+            others may show zero.
+
+        Returns
+        -------
+        Array
+            (n_mesh_nodes, 6, k) [Pa], components xx, yy, zz, yz, xz, xy; zero at nodes without solid elements.
+        """
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """Whether the three functions below can be asked for; bare matrices do not know them."""
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Nodal forces of loads per mass, consistent: their work on any u is that of the loads on its field.
+
+        Returns
+        -------
+        Array
+            (n_mesh_dof, loads.k) [N, N m].
+        """
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Nodal forces that hold the displacements u: f_int = K u of the elements, without couplings.
+
+        Parameters
+        ----------
+        u
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
+        nodes
+            Whose forces are wanted; None: those of all. The others may show zero.
+
+        Returns
+        -------
+        Array
+            (n_mesh_dof, k) [N, N m].
+        """
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Return Phiᵀ K_geo(sigma_j) Phi of static states u_j, (k, n, n), symmetric, linear in the state (THEORY §7).
+
+        K_geo is the second derivative of the potential energy by the displacements at fixed stress: solids
+        ∫ sigma_ab u_c,a u_c,b. Elements with rotations take them as rotation vectors, and add the work of what acts off
+        their axis (section, offset) on the second order of the rotation, for which they need the loads. Together:
+        K_geo(sigma_j) of the rigid rotation theta, (theta × c, theta), is (theta × f, ½ theta × m) with f, m the nodal
+        forces `internal_forces` - `mass_forces`, plus ∫ (theta × load)·N over mass.
+
+        Parameters
+        ----------
+        u
+            Displacements of the static states, (n_mesh_dof, k): only their stress counts, not their rigid part.
+        loads
+            The loads per mass that act in these states.
+        Phi
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, n).
+        """
+
+
+class StressPointModel(Protocol):
+    """Stress of a displacement field at named points, such as the outer points of beam sections."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One per point, such as "shaft 3 a top": (n_points,)."""
+
+    @property
+    def positions(self) -> Array:
+        """Undeformed, mesh axes, (n_points, 3) [m]."""
+
+    def stress(self, u: Array) -> Array:
+        """Return the stress, (n_points, 6, k) [Pa], components as in `ElementModel.nodal_stress`, mesh axes.
+
+        Parameters
+        ----------
+        u
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """A named place where the body meets its neighbours.
+
+    kind "rigid" (RBE2): the member nodes move rigidly with the reference node;
+    kind "distributing" (RBE3): the reference node follows the weighted mean motion of the members;
+    kind "nodes": every dof of every member node is a boundary dof.
+    """
+
+    name: str
+    kind: str
+    nodes: IntArray  #: member nodes, indices into `FEBody.nodes`, (n_members,)
+    reference: Array  #: reference point in mesh coordinates, (3,) [m]
+    triad: Array = field(default_factory=lambda: np.eye(3))  #: columns: axes of the interface in mesh axes, (3, 3)
+    weights: Array | None = None  #: weights of the members (area), summing to 1, (n_members,); None: equal
+    dofs: IntArray | None = None  #: boundary dofs, indices into `FEBody.dofs`; None until `couple` has made them
+
+    def __post_init__(self) -> None:
+        where = f"interface {self.name!r}"
+        if self.kind not in INTERFACE_KINDS:
+            raise BodyError(f"{where}: unknown kind {self.kind!r}{nearest(self.kind, INTERFACE_KINDS)}")
+        object.__setattr__(self, "nodes", frozen_int(self.nodes))
+        object.__setattr__(self, "reference", frozen(self.reference))
+        object.__setattr__(self, "triad", frozen(self.triad))
+        if self.nodes.ndim != 1 or self.nodes.size == 0:
+            raise BodyError(f"{where}: expected member nodes, got none")
+        if np.unique(self.nodes).size != self.nodes.size:
+            raise BodyError(f"{where}: a member node is listed twice")
+        require_shape(f"{where}: reference", self.reference, (3,))
+        require_finite(f"{where}: reference", self.reference)
+        require_shape(f"{where}: triad", self.triad, (3, 3))
+        require_finite(f"{where}: triad", self.triad)
+        if np.abs(self.triad.T @ self.triad - np.eye(3)).max() > 1e-8 or np.linalg.det(self.triad) < 0:
+            raise BodyError(f"{where}: triad: expected orthonormal right-handed axes as columns")
+        weights = np.full(self.nodes.size, 1.0) if self.weights is None else np.asarray(self.weights, dtype=float)
+        require_shape(f"{where}: weights", weights, (self.nodes.size,))
+        require_finite(f"{where}: weights", weights)
+        if (weights < 0).any() or weights.sum() <= 0:
+            raise BodyError(f"{where}: weights: expected no negative weight and a positive sum")
+        object.__setattr__(self, "weights", frozen(weights / weights.sum()))
+        if self.dofs is not None:
+            object.__setattr__(self, "dofs", frozen_int(self.dofs))
+
+
+@dataclass(frozen=True, eq=False)
+class Recovery:
+    """The way from a coupled body back to the dofs of its mesh: u_mesh = matrix @ u."""
+
+    matrix: sp.csr_array  #: (n_mesh_dof, n_dof)
+    dofs: IntArray  #: (node, component) of the mesh dofs, (n_mesh_dof, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class FEBody:
+    """Finite element model of one free body.
+
+    Dof k is component `dofs[k, 1]` (0-2 translation, 3-5 rotation, `MULTIPLIER`) of node `dofs[k, 0]`, mesh axes.
+    A body is *coupled* when every interface has its boundary dofs (`cms.couple`); mode sets want a coupled body.
+
+    Raises
+    ------
+    BodyError
+        If shapes do not fit, a matrix is not symmetric or not finite, or an interface names unknown nodes.
+    """
+
+    name: str
+    M: sp.csc_array  #: mass, (n_dof, n_dof) [kg, kg m²]
+    K: sp.csc_array  #: stiffness, (n_dof, n_dof) [N/m, N m]
+    nodes: Array  #: positions in mesh axes, (n_nodes, 3) [m]
+    dofs: IntArray  #: (node, component) of every dof, (n_dof, 2)
+    interfaces: tuple[Interface, ...] = ()
+    units: Units = field(default_factory=lambda: unit_system("m-kg-s"))
+    D: sp.csc_array | None = None  #: viscous damping, (n_dof, n_dof) [N s/m, N m s]
+    surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of nodes, (n_tri, 3)
+    element_model: ElementModel | None = None  #: None: bare matrices, then exact only what matrices can give
+    recovery: Recovery | None = None  #: None: the dofs are those of the mesh
+    load_cases: tuple[LoadCase, ...] = ()  #: named loads over the dofs of this body
+    stress_points: StressPointModel | None = None  #: stress at points beside the nodes; None: there are none
+    #: volume each node stands for, none negative, (n_nodes,) [m³]; None: unknown, nodes with translations count equally
+    node_volumes: Array | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)  #: where it came from: file, digest, options
+
+    def __post_init__(self) -> None:
+        where = f"body {self.name!r}"
+        put = object.__setattr__
+        put(self, "nodes", frozen(self.nodes))
+        put(self, "dofs", frozen_int(self.dofs))
+        put(self, "surface", frozen_int(self.surface))
+        put(self, "interfaces", tuple(self.interfaces))
+        put(self, "provenance", MappingProxyType(dict(self.provenance)))
+        if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or len(self.nodes) == 0:
+            raise BodyError(f"{where}: nodes: expected (n_nodes, 3), got {self.nodes.shape}")
+        require_finite(f"{where}: nodes", self.nodes)
+        if self.dofs.ndim != 2 or self.dofs.shape[1] != 2:
+            raise BodyError(f"{where}: dofs: expected (n_dof, 2) of (node, component), got {self.dofs.shape}")
+        if len(self.dofs) == 0:
+            raise BodyError(f"{where}: dofs: expected at least one dof, got none")
+        if self.dofs[:, 0].min() < 0 or self.dofs[:, 0].max() >= len(self.nodes):
+            raise BodyError(
+                f"{where}: dofs: expected nodes 0..{len(self.nodes) - 1}, got "
+                f"{self.dofs[:, 0].min()}..{self.dofs[:, 0].max()}"
+            )
+        if self.dofs[:, 1].min() < MULTIPLIER or self.dofs[:, 1].max() > 5:
+            raise BodyError(
+                f"{where}: dofs: expected components 0..5, got {self.dofs[:, 1].min()}..{self.dofs[:, 1].max()}"
+            )
+        n_dof = len(self.dofs)
+        put(self, "M", symmetric_csc(f"{where}: M", self.M, n_dof))
+        put(self, "K", symmetric_csc(f"{where}: K", self.K, n_dof))
+        if self.D is not None:
+            put(self, "D", symmetric_csc(f"{where}: D", self.D, n_dof))
+        if self.node_volumes is not None:
+            put(self, "node_volumes", frozen(self.node_volumes))
+            require_shape(f"{where}: node_volumes", self.node_volumes, (len(self.nodes),))
+            require_finite(f"{where}: node_volumes", self.node_volumes)
+            if (self.node_volumes < 0).any() or not self.node_volumes.any():
+                raise BodyError(f"{where}: node_volumes: expected no negative volume and a positive sum")
+        put(self, "load_cases", check_load_cases(where, self.load_cases, n_dof))
+        names = [interface.name for interface in self.interfaces]
+        if len(set(names)) != len(names):
+            raise BodyError(f"{where}: two interfaces have the same name; got {', '.join(names)}")
+        for interface in self.interfaces:
+            if interface.nodes.min() < 0 or interface.nodes.max() >= len(self.nodes):
+                raise BodyError(f"{where}: interface {interface.name!r}: nodes outside 0..{len(self.nodes) - 1}")
+        if self.surface.size and (self.surface.min() < 0 or self.surface.max() >= len(self.nodes)):
+            raise BodyError(f"{where}: surface: nodes outside 0..{len(self.nodes) - 1}")
+
+    @property
+    def n_dof(self) -> int:
+        """Number of dofs."""
+        return len(self.dofs)
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether every interface has its boundary dofs."""
+        return all(interface.dofs is not None for interface in self.interfaces)
+
+    @property
+    def b(self) -> IntArray:
+        """Boundary dofs: those of all interfaces in their order, (n_b,)."""
+        self.require_coupled()
+        parts = [interface.dofs for interface in self.interfaces if interface.dofs is not None]
+        return np.concatenate(parts) if parts else np.zeros(0, np.int64)
+
+    @property
+    def i(self) -> IntArray:
+        """Interior dofs: all others, ascending, (n_i,)."""
+        return np.setdiff1d(np.arange(self.n_dof), self.b)
+
+    @property
+    def length(self) -> float:
+        """Diagonal of the bounding box of the nodes [m]; scales rotations."""
+        return float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
+
+    def interface(self, name: str) -> Interface:
+        """Return the interface of that name; `BodyError` with the choices if there is none."""
+        for interface in self.interfaces:
+            if interface.name == name:
+                return interface
+        choices = [interface.name for interface in self.interfaces]
+        raise BodyError(f"body {self.name!r}: no interface {name!r}{nearest(name, choices)}")
+
+    def require_coupled(self) -> None:
+        """Raise `BodyError` unless every interface has its boundary dofs."""
+        if not self.is_coupled:
+            missing = ", ".join(interface.name for interface in self.interfaces if interface.dofs is None)
+            raise BodyError(
+                f"body {self.name!r}: interfaces {missing} have no boundary dofs yet; call cms.couple(body)"
+            )
+
+    def mesh_displacement(self, u: Array) -> Array:
+        """Return displacement columns over the dofs of the mesh, (n_mesh_dof, k), of columns u, (n_dof, k)."""
+        return u if self.recovery is None else self.recovery.matrix @ u
+
+    def translations(self, u: Array) -> Array:
+        """Return translations at all nodes, (n_nodes, 3, k), of displacement columns u, (n_dof, k) [m].
+
+        Nodes without translational dofs (a distributing reference node has them) stay at zero.
+        """
+        field_ = np.zeros((len(self.nodes), 3, u.shape[1]))
+        if self.recovery is not None:
+            put_translations(field_, self.recovery.dofs, self.recovery.matrix @ u)
+        put_translations(field_, self.dofs, u)
+        return field_
+
+    def with_interfaces(self, *interfaces: Interface) -> "FEBody":
+        """Return the body with these interfaces added (still to be coupled)."""
+        return replace(self, interfaces=(*self.interfaces, *interfaces))
+
+    def with_load_cases(self, *load_cases: LoadCase) -> "FEBody":
+        """Return the body with these load cases added."""
+        return replace(self, load_cases=(*self.load_cases, *load_cases))
+
+
+def put_translations(field_: Array, dofs: IntArray, u: Array) -> None:
+    """Write the translational rows of u into field_, (n_nodes, 3, k)."""
+    rows = np.flatnonzero((dofs[:, 1] >= 0) & (dofs[:, 1] < 3))
+    field_[dofs[rows, 0], dofs[rows, 1]] = u[rows]

@@ -1,0 +1,78 @@
+"""Load cases: named force vectors on a body, carried through couplings and into the reduced body."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.errors import BodyError
+
+__all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
+
+LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: in words of the job file; a body takes any text
+
+
+@dataclass(frozen=True, eq=False)
+class LoadCase:
+    """A named load of unit amplitude: generalised forces over the dofs of its body.
+
+    A coupling u_mesh = T u carries it by congruence of the work, f = Tᵀ f_mesh; so does a reduction, Phiᵀ f.
+    """
+
+    name: str
+    kind: str  #: what it is, in one word, such as those of `LOAD_CASE_KINDS`
+    f: Array  #: work-conjugate to the dofs of the body, mesh axes, (n_dof,) [N, N m]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "f", frozen(self.f))
+        if not self.name:
+            raise BodyError("load case: expected a name, got none")
+        if self.f.ndim != 1:
+            raise BodyError(f"load case {self.name!r}: f: expected one number per dof, got shape {self.f.shape}")
+        require_finite(f"load case {self.name!r}: f", self.f)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedLoadCase:
+    """A named load on a reduced body: its resultant and its modal forces, for an amplitude of one."""
+
+    name: str
+    kind: str
+    force: Array  #: resultant in B, (3,) [N]
+    torque: Array  #: resultant about the undeformed origin of B, (3,) [N m]
+    h: Array  #: modal forces Phiᵀ f, (n_q,) [N per unit of Phi]
+
+    def __post_init__(self) -> None:
+        where = f"load case {self.name!r}"
+        for name in ("force", "torque", "h"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+            require_finite(f"{where}: {name}", getattr(self, name))
+        require_shape(f"{where}: force", self.force, (3,))
+        require_shape(f"{where}: torque", self.torque, (3,))
+        if self.h.ndim != 1:
+            raise BodyError(f"{where}: h: expected one number per mode, got shape {self.h.shape}")
+
+
+def check_load_cases(where: str, load_cases: Iterable[LoadCase], n_dof: int) -> tuple[LoadCase, ...]:
+    """Return the load cases as a tuple after checking that their names differ and their lengths fit.
+
+    Raises
+    ------
+    BodyError
+        If one does not fit.
+    """
+    checked = tuple(load_cases)
+    names = [case.name for case in checked]
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise BodyError(f"{where}: two load cases are named {twice!r}; give each its own name")
+    for case in checked:
+        require_shape(f"{where}: load case {case.name!r}: f", case.f, (n_dof,))
+    return checked
+
+
+def load_columns(load_cases: Iterable[LoadCase], n_dof: int) -> Array:
+    """Return the forces of load cases side by side, (n_dof, n_load_cases)."""
+    columns = [case.f for case in load_cases]
+    return np.stack(columns, axis=1) if columns else np.zeros((n_dof, 0))

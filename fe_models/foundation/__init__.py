@@ -1,0 +1,1 @@
+"""What every package stands on: arrays, units, words, errors, files, threads; imports nothing of ours."""

@@ -1,0 +1,77 @@
+"""Arrays as the frozen types hold them: float64, C order, finite, read-only."""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from fe_models.foundation.errors import BodyError
+
+__all__ = ["Array", "IntArray", "frozen", "frozen_int", "require_finite", "require_shape", "symmetric_csc"]
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SYMMETRY_DEFECT = 1e-8  #: largest |A - A.T| / |A| that is taken for rounding of a symmetric matrix
+
+
+def frozen(values: Any) -> Array:
+    """Return a read-only float64 array in C order (a copy only where one is needed)."""
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.flags.writeable:
+        array = array.view()
+        array.flags.writeable = False
+    return array
+
+
+def frozen_int(values: Any) -> IntArray:
+    """Return a read-only int64 array in C order (a copy only where one is needed)."""
+    array = np.ascontiguousarray(values, dtype=np.int64)
+    if array.flags.writeable:
+        array = array.view()
+        array.flags.writeable = False
+    return array
+
+
+def require_finite(where: str, array: Array) -> None:
+    """Raise `BodyError` naming `where` if the array holds a NaN or an infinity."""
+    bad = ~np.isfinite(array)
+    if bad.any():
+        first = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise BodyError(f"{where}: expected finite numbers, got {int(bad.sum())} NaN or infinite, first at {first}")
+
+
+def require_shape(where: str, array: Array, shape: tuple[int, ...]) -> None:
+    """Raise `BodyError` naming `where` unless the array has that shape."""
+    if array.shape != shape:
+        raise BodyError(f"{where}: expected shape {shape}, got {array.shape}")
+
+
+def symmetric_csc(where: str, matrix: Any, n: int) -> sp.csc_array:
+    """Return the matrix as CSC (n, n) with sorted indices after checking shape, finiteness and symmetry."""
+    # the compressed rows of a symmetric matrix are its compressed columns
+    csc = sp.csc_array(matrix.T if sp.issparse(matrix) and matrix.format == "csr" else matrix)
+    require_shape(where, csc, (n, n))
+    if not csc.has_canonical_format:
+        csc = csc.copy()
+        csc.sum_duplicates()
+    csc.data = np.asarray(csc.data, dtype=np.float64)
+    require_finite(where, csc.data)
+    defect = symmetry_defect(csc)
+    if defect > SYMMETRY_DEFECT:
+        raise BodyError(f"{where}: expected a symmetric matrix, got |A - A.T| = {defect:.2e} |A|")
+    return csc
+
+
+def symmetry_defect(csc: sp.csc_array) -> float:
+    """Return max |(A - A.T) x| / max |A| for a fixed random vector x.
+
+    Two products instead of a transposed copy: a copy of the stiffness of a million dofs costs a gigabyte.
+    """
+    if csc.nnz == 0:
+        return 0.0
+    scale = np.abs(csc.data).max()
+    x = np.random.default_rng(0).uniform(0.5, 1.5, csc.shape[0])
+    defect = np.abs(csc @ x - csc.T @ x).max()
+    return float(defect / scale) if scale else 0.0

@@ -1,0 +1,33 @@
+"""The stages of long work: how far each is, and how many seconds each took."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+__all__ = ["Stages"]
+
+
+class Stages:
+    """The stages of a job: a bar for the one that runs, seconds for those that are done."""
+
+    def __init__(self, show: Any = None) -> None:
+        self.seconds: dict[str, float] = {}
+        self._show = show
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[Callable[[float], None]]:
+        """Run a stage; the value is a function that takes the finished fraction, 0 to 1."""
+        begin = time.perf_counter()
+        task = self._show.add_task(name, total=None) if self._show is not None else None
+
+        def advance(fraction: float) -> None:
+            if self._show is not None:
+                self._show.update(task, total=1.0, completed=fraction)
+
+        try:
+            yield advance
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+        if self._show is not None:
+            self._show.update(task, total=1.0, completed=1.0)

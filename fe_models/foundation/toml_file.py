@@ -1,0 +1,151 @@
+"""TOML files at the border: read, checked against a pydantic model, every problem told at once in the user's words.
+
+A model's field descriptions say what is expected ("a number above 0, Young's modulus"); a message is made of the key
+path, the value that was found and that description.
+"""
+
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.words import nearest
+
+__all__ = ["Matrix3", "Range", "Table", "Vector3", "choice", "read_toml", "validated"]
+
+
+class Table(BaseModel):
+    """A table of a TOML file: no unknown keys, no conversion of types, no NaN or infinity."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=Table)
+
+
+def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
+    """Return the content of a TOML file; raise `error` with the place and the reason if it is none."""
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise error(f"{path}: no such file{near_file(path)}") from None
+    except OSError as problem:
+        raise error(f"{path}: cannot be read: {problem.strerror}") from problem
+    except UnicodeDecodeError as problem:
+        raise error(
+            f"{path}: expected a text file in UTF-8 (TOML), got other bytes at position {problem.start}"
+        ) from None
+    except tomllib.TOMLDecodeError as problem:
+        raise error(f"{path}: not valid TOML: {problem}") from None
+
+
+def validated(
+    model: type[Model], data: Mapping[str, Any], path: Path, error: type[Exception], context: Any = None
+) -> Model:
+    """Return the checked model; raise `error` with every problem on a line of its own."""
+    try:
+        return model.model_validate(data, context=context)
+    except ValidationError as problem:
+        details = problem.errors(include_url=False)
+        problems = [describe(model, detail) for detail in details]
+    if len(problems) == 1:
+        raise error(f"{path}: {problems[0]}")
+    raise error("\n".join([f"{path}: {len(problems)} problems:", *(f"  {text}" for text in problems)]))
+
+
+def describe(model: type[BaseModel], detail: ErrorDetails) -> str:
+    """Return one problem as 'key.path = value: what is wrong or expected'."""
+    location = detail["loc"]
+    key = key_path(location)
+    parent = table_at(model, location[:-1]) if location else None
+    field = parent.model_fields.get(str(location[-1])) if parent is not None else None
+    if detail["type"] == "extra_forbidden":
+        return f"{key}: unknown key{nearest(str(location[-1]), parent.model_fields if parent else ())}"
+    expected = (field.description if field is not None else None) or "a table of keys"
+    if detail["type"] == "missing":
+        return f"{key}: missing; expected {expected}"
+    if detail["type"] == "value_error":
+        text = str(detail["ctx"]["error"])
+        shows_value = location and not isinstance(detail["input"], dict | BaseModel)
+        return f"{key} = {shown(detail['input'])}: {text}" if shows_value else f"{key}: {text}".removeprefix(": ")
+    return f"{key} = {shown(detail['input'])}: expected {expected}"
+
+
+def key_path(location: Sequence[str | int]) -> str:
+    """Return the location as TOML writes it: materials.steel.young."""
+    return ".".join(
+        str(part) if str(part).replace("_", "").replace("-", "").isalnum() else f'"{part}"' for part in location
+    )
+
+
+def table_at(model: type[BaseModel], location: Sequence[str | int]) -> type[BaseModel] | None:
+    """Return the model of the table at this location, or None if there is none."""
+    here: Any = model
+    for part in location:
+        if isinstance(here, type) and issubclass(here, BaseModel):
+            field = here.model_fields.get(str(part))
+            here = field.annotation if field is not None else None
+        else:
+            here = (get_args(here) or (None,))[-1]  # dict[str, Table], list[Table]
+        given = [option for option in get_args(here) if option is not type(None)]
+        if type(None) in get_args(here) and len(given) == 1:
+            here = given[0]  # Table | None
+    return here if isinstance(here, type) and issubclass(here, BaseModel) else None
+
+
+def shown(value: Any) -> str:
+    """Return a value as the user wrote it, shortened."""
+    text = {True: "true", False: "false"}.get(value) if isinstance(value, bool) else None
+    text = text or (f'"{value}"' if isinstance(value, str) else str(value))
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:
+    """Return the type of a string that must be one of the choices; the message has the nearest one."""
+
+    def check(value: Any) -> Any:
+        names = choices()
+        if value not in names:
+            raise ValueError(f"unknown {what}{nearest(str(value), names)}")
+        return value
+
+    return Annotated[str, BeforeValidator(check)]
+
+
+def numbers(value: Any, count: int = 3) -> tuple[float, ...]:
+    """Return so many finite numbers as floats."""
+    if not isinstance(value, list | tuple) or len(value) != count or any(is_no_number(x) for x in value):
+        raise ValueError({2: "expected two numbers, [from, to]", 3: "expected three numbers, [x, y, z]"}[count])
+    return tuple(float(x) for x in value)
+
+
+def interval(value: Any) -> tuple[float, ...]:
+    """Return two finite numbers in ascending order."""
+    low, high = numbers(value, 2)
+    if low >= high:
+        raise ValueError("expected two numbers, [from, to], the second greater")
+    return low, high
+
+
+def is_no_number(value: Any) -> bool:
+    """Whether a TOML value is anything but a finite number."""
+    return isinstance(value, bool) or not isinstance(value, int | float) or value - value != 0
+
+
+def rows(value: Any) -> tuple[tuple[float, ...], ...]:
+    """Return three rows of three numbers."""
+    try:
+        if not isinstance(value, list | tuple) or len(value) != 3:
+            raise ValueError
+        return tuple(numbers(row) for row in value)
+    except ValueError:
+        raise ValueError("expected three rows of three numbers, [[..., ..., ...], ...]") from None
+
+
+Vector3 = Annotated[tuple[float, float, float], BeforeValidator(numbers)]
+Range = Annotated[tuple[float, float], BeforeValidator(interval)]
+Matrix3 = Annotated[tuple[Vector3, Vector3, Vector3], BeforeValidator(rows)]

@@ -1,0 +1,150 @@
+"""The boundary of a solid mesh: facets that belong to one cell only, oriented outward."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.meshes.cell_shapes import facet_tables, quadrature, shape_values
+from fe_models.meshes.mesh import Mesh
+
+__all__ = [
+    "all_facets",
+    "area_centroid",
+    "boundary_facets",
+    "boundary_nodes",
+    "boundary_triangles",
+    "face_triangles",
+    "facet_weights",
+    "first_of_equal_rows",
+]
+
+_TRIANGLES = {
+    "triangle": ((0, 1, 2),),
+    "triangle6": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    "quad": ((0, 1, 2), (0, 2, 3)),
+    "quad8": ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7)),
+    "quad9": ((0, 4, 8), (4, 1, 8), (1, 5, 8), (5, 2, 8), (2, 6, 8), (6, 3, 8), (3, 7, 8), (7, 0, 8)),
+}  # flat triangles over the nodes of a face, turning the same way as the face
+
+CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  #: corner nodes of a face
+
+_known: WeakKeyDictionary[Mesh, Mapping[str, IntArray]] = WeakKeyDictionary()  # boundaries of meshes still in use
+
+
+def all_facets(mesh: Mesh) -> dict[str, IntArray]:
+    """Return face type -> facets of all solid cells, (n_cells x facets per cell, nodes per facet), outward.
+
+    A facet between two cells appears twice.
+    """
+    parts: dict[str, list[IntArray]] = {}
+    for kind, cells in mesh.cells.items():
+        for face_kind, local in facet_tables(kind).items():
+            parts.setdefault(face_kind, []).append(cells[:, local].reshape(-1, local.shape[1]))
+    return {face_kind: np.concatenate(blocks) for face_kind, blocks in parts.items()}
+
+
+def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
+    """Return face type -> facets that belong to one cell only, (n_facets, nodes per facet), oriented outward.
+
+    Facets are compared by their corner nodes. Rows are complete faces in meshio order (corners, middles, centre).
+    The result is kept as long as the mesh is.
+    """
+    if mesh not in _known:
+        _known[mesh] = MappingProxyType({kind: frozen_int(f) for kind, f in _single_facets(mesh).items()})
+    return _known[mesh]
+
+
+def _single_facets(mesh: Mesh) -> dict[str, IntArray]:
+    facets = all_facets(mesh)
+    boundary = {}
+    for n_corners in (3, 4):
+        kinds = [kind for kind in facets if CORNERS[kind] == n_corners]
+        if not kinds:
+            continue
+        corners = np.concatenate([facets[kind][:, :n_corners] for kind in kinds])
+        first, count = first_of_equal_rows(np.sort(corners, axis=1))
+        single = (count == 1)[first]
+        ends = np.cumsum([len(facets[kind]) for kind in kinds])
+        for kind, mask in zip(kinds, np.split(single, ends[:-1]), strict=True):
+            if mask.any():
+                boundary[kind] = facets[kind][mask]
+    return boundary
+
+
+def first_of_equal_rows(rows: IntArray) -> tuple[IntArray, IntArray]:
+    """Return for every row the number of its class of equal rows, (n,), and the size of every class, (n_classes,)."""
+    if len(rows) == 0:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    new = np.ones(len(rows), dtype=bool)
+    new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    number = np.cumsum(new) - 1
+    classes = np.empty(len(rows), dtype=np.int64)
+    classes[order] = number
+    return classes, np.bincount(number)
+
+
+def boundary_nodes(mesh: Mesh) -> IntArray:
+    """Return the nodes on the surface of the body, ascending, (n,)."""
+    facets = boundary_facets(mesh)
+    return np.unique(np.concatenate([f.ravel() for f in facets.values()])) if facets else np.zeros(0, np.int64)
+
+
+def boundary_triangles(mesh: Mesh) -> IntArray:
+    """Return flat triangles over all nodes of the surface, for drawing, (n_tri, 3), oriented outward."""
+    return face_triangles(boundary_facets(mesh))
+
+
+def face_triangles(faces: Mapping[str, IntArray]) -> IntArray:
+    """Return flat triangles over the nodes of faces by type, (n_tri, 3), turning the same way as the faces."""
+    parts = [nodes[:, np.array(_TRIANGLES[kind])].reshape(-1, 3) for kind, nodes in faces.items()]
+    return np.concatenate(parts) if parts else np.zeros((0, 3), np.int64)
+
+
+def facet_weights(nodes: Array, faces: Mapping[str, IntArray]) -> Array:
+    """Return the area of each node: the integral of its shape function over the faces, summed, (n_nodes,) [m²].
+
+    The sum is the area of the faces. Corners of flat quadratic triangles get exactly zero. Corners of eight-node
+    quads would get a negative share (-1/12 of the face); these faces are shared out by the diagonal of their mass
+    matrix instead (∫N_i² scaled to the area), which is positive and keeps the area of each face.
+
+    Parameters
+    ----------
+    nodes
+        Node coordinates, (n_nodes, 3) [m].
+    faces
+        Face type -> nodes, (n_faces, nodes per face).
+    """
+    weights = np.zeros(len(nodes))
+    for kind, rows in faces.items():
+        N, dA = _area_elements(nodes, kind, rows)
+        if kind == "quad8":
+            share = dA @ N**2
+            share *= (dA.sum(axis=1) / share.sum(axis=1))[:, None]
+        else:
+            share = dA @ N
+        share[np.abs(share) < 1e-12 * np.abs(share).max(initial=0.0)] = 0.0
+        np.add.at(weights, rows, share)
+    return weights
+
+
+def area_centroid(nodes: Array, faces: Mapping[str, IntArray]) -> tuple[float, Array]:
+    """Return the area of faces [m²] and its centroid ∫x dA / A, (3,) [m]."""
+    area, moment = 0.0, np.zeros(3)
+    for kind, rows in faces.items():
+        N, dA = _area_elements(nodes, kind, rows)
+        area += float(dA.sum())
+        moment += np.einsum("fn,fnd->d", dA @ N, nodes[rows])
+    return area, moment / area if area else moment
+
+
+def _area_elements(nodes: Array, kind: str, rows: IntArray) -> tuple[Array, Array]:
+    """Return shape functions (n_points, n_local) and weighted area elements (n_faces, n_points)."""
+    points, weights = quadrature(kind)
+    N, dN = shape_values(kind, points)
+    tangents = np.einsum("fnd,pna->fpad", nodes[rows], dN)
+    return N, np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2) * weights

@@ -1,0 +1,188 @@
+"""Shapes of the cells: reference nodes, facets, shape functions and quadrature, in the node order of meshio (VTK)."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray, frozen
+
+__all__ = ["CELL_SHAPES", "CellShape", "cell_jacobians", "facet_tables", "quadrature", "shape_values"]
+
+
+@dataclass(frozen=True)
+class CellShape:
+    """One kind of cell: its corners, what its other nodes are the middles of, and its polynomial space."""
+
+    name: str  #: meshio name
+    dim: int  #: 3 solid, 2 face
+    corners: tuple[tuple[float, ...], ...]  #: reference coordinates of the corner nodes
+    middles: tuple[tuple[int, ...], ...]  #: for every further node the corners it is the middle of
+    facets: tuple[tuple[int, ...], ...]  #: corner nodes of each facet, anticlockwise seen from outside
+    exponents: tuple[tuple[int, ...], ...]  #: monomials of the shape functions
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes of one cell."""
+        return len(self.corners) + len(self.middles)
+
+    @property
+    def nodes(self) -> Array:
+        """Reference coordinates of all nodes, (n_nodes, dim)."""
+        corners = np.array(self.corners, dtype=float)
+        middles = [corners[list(parents)].mean(axis=0) for parents in self.middles]
+        return np.vstack([corners, *middles])
+
+
+def _grid(dim: int, order: int) -> tuple[tuple[int, ...], ...]:
+    """Exponents of the tensor-product space: each at most `order`."""
+    return tuple(tuple(int(i) for i in e) for e in np.ndindex(*(order + 1,) * dim))
+
+
+def _total(dim: int, order: int) -> tuple[tuple[int, ...], ...]:
+    """Exponents of the complete space: sum at most `order`."""
+    return tuple(e for e in _grid(dim, order) if sum(e) <= order)
+
+
+def _serendipity(dim: int) -> tuple[tuple[int, ...], ...]:
+    """Exponents of the quadratic serendipity space: at most one of them is 2."""
+    return tuple(e for e in _grid(dim, 2) if e.count(2) <= 1)
+
+
+_TRI = ((0, 0), (1, 0), (0, 1))
+_QUAD = ((0, 0), (1, 0), (1, 1), (0, 1))
+_TET = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+_HEX = tuple((x, y, 0) for x, y in _QUAD) + tuple((x, y, 1) for x, y in _QUAD)
+_WEDGE = tuple((x, y, 0) for x, y in _TRI) + tuple((x, y, 1) for x, y in _TRI)
+
+_TRI_EDGES = ((0, 1), (1, 2), (2, 0))
+_QUAD_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
+_TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+_HEX_EDGES = (*_QUAD_EDGES, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+
+_TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
+_HEX_FACETS = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))  # -x +x -y +y -z +z
+_WEDGE_FACETS = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+_HEX_CENTRES = (*_HEX_FACETS, tuple(range(8)))
+
+CELL_SHAPES = {
+    shape.name: shape
+    for shape in (
+        CellShape("triangle", 2, _TRI, (), (), _total(2, 1)),
+        CellShape("triangle6", 2, _TRI, _TRI_EDGES, (), _total(2, 2)),
+        CellShape("quad", 2, _QUAD, (), (), _grid(2, 1)),
+        CellShape("quad8", 2, _QUAD, _QUAD_EDGES, (), _serendipity(2)),
+        CellShape("quad9", 2, _QUAD, (*_QUAD_EDGES, (0, 1, 2, 3)), (), _grid(2, 2)),
+        CellShape("tetra", 3, _TET, (), _TET_FACETS, _total(3, 1)),
+        CellShape("tetra10", 3, _TET, _TET_EDGES, _TET_FACETS, _total(3, 2)),
+        CellShape("hexahedron", 3, _HEX, (), _HEX_FACETS, _grid(3, 1)),
+        CellShape("hexahedron20", 3, _HEX, _HEX_EDGES, _HEX_FACETS, _serendipity(3)),
+        CellShape("hexahedron27", 3, _HEX, (*_HEX_EDGES, *_HEX_CENTRES), _HEX_FACETS, _grid(3, 2)),
+        CellShape("wedge", 3, _WEDGE, (), _WEDGE_FACETS, tuple((*e, k) for e in _total(2, 1) for k in (0, 1))),
+    )
+}  #: reference cells are the unit simplex, the unit square and cube, and triangle x interval
+
+
+@cache
+def facet_tables(kind: str) -> dict[str, IntArray]:
+    """Return face type -> local nodes of the facets of a solid cell, (n_facets, nodes per facet), oriented outward.
+
+    The facets are complete faces in meshio order: corners, then the middles of their edges, then their centre.
+    """
+    shape = CELL_SHAPES[kind]
+    n_corners = len(shape.corners)
+    middle = {frozenset(parents): n_corners + k for k, parents in enumerate(shape.middles)}
+    tables: dict[str, list[tuple[int, ...]]] = {}
+    for facet in shape.facets:
+        edges = [frozenset((facet[k], facet[(k + 1) % len(facet)])) for k in range(len(facet))]
+        local = (*facet, *(middle[key] for key in (*edges, frozenset(facet)) if key in middle))
+        name = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}[len(local)]
+        tables.setdefault(name, []).append(local)
+    return {name: np.array(rows, dtype=np.int64) for name, rows in tables.items()}
+
+
+def shape_values(kind: str, points: Array) -> tuple[Array, Array]:
+    """Return shape functions and their reference gradients at reference points.
+
+    The functions are the nodal basis of the monomials of the cell: N = p(x) V⁻¹ with V the monomials at the nodes.
+
+    Parameters
+    ----------
+    kind
+        Cell type, key of `CELL_SHAPES`.
+    points
+        Reference points, (n_points, dim).
+
+    Returns
+    -------
+    N, dN
+        (n_points, n_nodes) and (n_points, n_nodes, dim).
+    """
+    shape = CELL_SHAPES[kind]
+    exponents = np.array(shape.exponents)
+    vandermonde = _monomials(shape.nodes, exponents)
+    columns = [_monomials(points, exponents)]
+    for axis in range(shape.dim):
+        lowered = exponents.copy()
+        lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
+        columns.append(exponents[:, axis] * _monomials(points, lowered))
+    values = [np.linalg.solve(vandermonde.T, column.T).T for column in columns]
+    return frozen(values[0]), frozen(np.stack(values[1:], axis=2))
+
+
+def _monomials(points: Array, exponents: IntArray) -> Array:
+    return np.prod(points[:, None, :] ** exponents[None, :, :], axis=2)
+
+
+@cache
+def quadrature(kind: str) -> tuple[Array, Array]:
+    """Return reference points (n_points, dim) and weights (n_points,) exact for the volume of any cell of this kind.
+
+    The Jacobian determinant has degree <= 5 in each direction of a hexahedron (3 Gauss points each) and total degree
+    3 in a quadratic tetrahedron; simplices use the square collapsed onto them, x = 1 - s, y = s t (Gauss points,
+    Jacobian s). Faces use the same rules: their area integrand is smooth but no polynomial when the face is curved.
+    """
+    shape = CELL_SHAPES[kind]
+    if kind in ("tetra", "triangle"):  # constant Jacobian, linear shape functions: the centroid is exact
+        return frozen(shape.nodes.mean(axis=0)[None]), frozen([1 / 6 if kind == "tetra" else 1 / 2])
+    gauss = np.polynomial.legendre.leggauss
+    x, w = gauss(4 if kind == "triangle6" else 3)
+    x, w = (x + 1) / 2, w / 2
+    if len(shape.corners) == 2**shape.dim:
+        points = np.stack(np.meshgrid(*[x] * shape.dim, indexing="ij"), -1).reshape(-1, shape.dim)
+        weights = np.stack(np.meshgrid(*[w] * shape.dim, indexing="ij"), -1).reshape(-1, shape.dim).prod(axis=1)
+        return frozen(points), frozen(weights)
+    s, t = (a.ravel() for a in np.meshgrid(x, x, indexing="ij"))
+    triangle, weight = np.column_stack([1 - s, s * t]), np.outer(w, w).ravel() * s
+    if shape.dim == 2:
+        return frozen(triangle), frozen(weight)
+    if kind == "wedge":
+        points = np.column_stack([np.repeat(triangle, len(x), axis=0), np.tile(x, len(triangle))])
+        return frozen(points), frozen(np.outer(weight, w).ravel())
+    points = np.column_stack([np.repeat(1 - x, len(triangle)), np.kron(x[:, None], triangle)])
+    return frozen(points), frozen(np.kron(w * x**2, weight))
+
+
+def cell_jacobians(kind: str, coordinates: Array, points: Array) -> Array:
+    """Return the Jacobian determinants of solid cells at reference points.
+
+    Parameters
+    ----------
+    kind
+        Solid cell type.
+    coordinates
+        Node coordinates of the cells, (n_cells, n_nodes, 3) [m].
+    points
+        Reference points, (n_points, 3).
+
+    Returns
+    -------
+    Array
+        (n_cells, n_points) [m³].
+    """
+    dN = shape_values(kind, points)[1]
+    n_points, n_nodes, _ = dN.shape
+    gradients = np.ascontiguousarray(dN.transpose(1, 0, 2)).reshape(n_nodes, n_points * 3)
+    J = (coordinates.transpose(0, 2, 1) @ gradients).reshape(len(coordinates), 3, n_points, 3)
+    a, b, c = J[:, 0], J[:, 1], J[:, 2]
+    return np.einsum("epi,epi->ep", a, np.cross(b, c))

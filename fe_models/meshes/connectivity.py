@@ -1,0 +1,113 @@
+"""How the cells of a mesh hang together: parts, hinges, overlaps, and nodes at the same place."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import IntArray, frozen_int
+from fe_models.meshes.boundary import CORNERS, all_facets, boundary_facets, first_of_equal_rows
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.unused_nodes import used_nodes
+
+__all__ = ["Connectivity", "coincident_nodes", "connectivity"]
+
+
+@dataclass(frozen=True, eq=False)
+class Connectivity:
+    """Parts and broken joints between cells."""
+
+    part_cells: tuple[int, ...]  #: cells of each part (no node in common), largest first
+    part_node: tuple[int, ...]  #: a node of each part
+    n_facet_parts: int  #: parts that have no facet in common: more than `part_cells` where parts meet in a node or edge
+    n_overlapping: int  #: facets that belong to more than two cells
+    n_mismatched: int  #: facets on which two cells meet with different middle nodes
+    n_transitions: int  #: quadrilateral facets on which a triangular facet of another cell lies
+
+
+def connectivity(mesh: Mesh) -> Connectivity:
+    """Return parts and broken joints of a mesh."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n_nodes = len(mesh.nodes)
+    first = np.concatenate([np.repeat(cells[:, 0], cells.shape[1] - 1) for cells in mesh.cells.values()])
+    other = np.concatenate([cells[:, 1:].ravel() for cells in mesh.cells.values()])
+    links = coo_array((np.ones(first.size, np.int8), (first, other)), shape=(n_nodes, n_nodes))
+    _, part_of_node = connected_components(links, directed=False)
+    part_of_cell = np.concatenate([part_of_node[cells[:, 0]] for cells in mesh.cells.values()])
+    parts, count = np.unique(part_of_cell, return_counts=True)
+    order = np.argsort(-count, kind="stable")
+    heads = np.concatenate([cells[:, 0] for cells in mesh.cells.values()])
+    part_node = [int(heads[np.argmax(part_of_cell == part)]) for part in parts[order][:10]]
+
+    pairs, n_overlapping, n_mismatched = _facet_pairs(mesh)
+    n_cells = mesh.n_cells
+    neighbours = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(n_cells, n_cells))
+    n_facet_parts, _ = connected_components(neighbours, directed=False)
+    return Connectivity(
+        tuple(int(c) for c in count[order]),
+        tuple(part_node),
+        int(n_facet_parts),
+        n_overlapping,
+        n_mismatched,
+        _transitions(mesh),
+    )
+
+
+def _facet_pairs(mesh: Mesh) -> tuple[IntArray, int, int]:
+    """Return pairs of cells with a common facet, (n_pairs, 2), and the counts of overlapping and mismatched facets."""
+    start, owner = 0, {}  # cells are numbered through all types in the order of mesh.cells
+    for kind, cells in mesh.cells.items():
+        owner[kind] = np.arange(start, start + len(cells))
+        start += len(cells)
+    facets = all_facets(mesh)
+    owners = _owners(mesh, owner)
+    pairs, n_overlapping, n_mismatched = [np.zeros((0, 2), np.int64)], 0, 0
+    for n_corners in (3, 4):
+        kinds = [kind for kind in facets if CORNERS[kind] == n_corners]
+        if not kinds:
+            continue
+        corners = np.sort(np.concatenate([facets[kind][:, :n_corners] for kind in kinds]), axis=1)
+        middles = np.concatenate([facets[kind][:, n_corners:].sum(axis=1) for kind in kinds])
+        cell = np.concatenate([owners[kind] for kind in kinds])
+        classes, count = first_of_equal_rows(corners)
+        n_overlapping += int((count > 2).sum())
+        order = np.argsort(classes, kind="stable")
+        same = classes[order][1:] == classes[order][:-1]
+        pairs.append(np.column_stack([cell[order][1:][same], cell[order][:-1][same]]))
+        n_mismatched += int((middles[order][1:][same] != middles[order][:-1][same]).sum())
+    return np.concatenate(pairs), n_overlapping, n_mismatched
+
+
+def _owners(mesh: Mesh, owner: dict[str, IntArray]) -> dict[str, IntArray]:
+    """Return face type -> the cell of every row of `all_facets`."""
+    from fe_models.meshes.cell_shapes import facet_tables
+
+    parts: dict[str, list[IntArray]] = {}
+    for kind in mesh.cells:
+        for face_kind, local in facet_tables(kind).items():
+            parts.setdefault(face_kind, []).append(np.repeat(owner[kind], len(local)))
+    return {face_kind: np.concatenate(blocks) for face_kind, blocks in parts.items()}
+
+
+def _transitions(mesh: Mesh) -> int:
+    """Return how many boundary quadrilaterals carry a boundary triangle of three of their corners."""
+    facets = boundary_facets(mesh)
+    triangles = [np.sort(rows[:, :3], axis=1) for kind, rows in facets.items() if CORNERS[kind] == 3]
+    quads = [rows[:, :4] for kind, rows in facets.items() if CORNERS[kind] == 4]
+    if not triangles or not quads:
+        return 0
+    quad = np.concatenate(quads)
+    halves = np.sort(np.concatenate([np.delete(quad, k, axis=1) for k in range(4)]), axis=1)
+    tri = np.concatenate(triangles)
+    classes, _ = first_of_equal_rows(np.concatenate([halves, tri]))
+    return int(np.isin(classes[: len(halves)], classes[len(halves) :]).reshape(4, -1).any(axis=0).sum())
+
+
+def coincident_nodes(mesh: Mesh, distance: float) -> IntArray:
+    """Return the used nodes that have another used node within a distance [m], ascending, (n,)."""
+    from scipy.spatial import cKDTree
+
+    nodes = np.flatnonzero(used_nodes(mesh))
+    apart, _ = cKDTree(mesh.nodes[nodes]).query(mesh.nodes[nodes], k=2, distance_upper_bound=max(distance, 1e-300))
+    return frozen_int(nodes[np.isfinite(apart[:, 1])])

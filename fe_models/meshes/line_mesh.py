@@ -1,0 +1,84 @@
+"""The mesh of a frame: nodes, straight lines between two of them, and the groups that name sections and interfaces."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from fe_models.errors import BeamError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+
+__all__ = ["LineMesh", "straight_line"]
+
+
+@dataclass(frozen=True, eq=False)
+class LineMesh:
+    """Nodes and two-node lines of one body.
+
+    Raises
+    ------
+    BeamError
+        If shapes do not fit, a line names a node that does not exist, or a coordinate is not finite.
+    """
+
+    nodes: Array  #: (n_nodes, 3), in the length unit of the model
+    lines: IntArray  #: end nodes, (n_lines, 2)
+    line_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> rows of `lines`
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
+    orientations: Array | None = None  #: vector towards the local y axis per line, (n_lines, 3); NaN rows: default
+    offsets: Array | None = None  #: from node to end of the axis, mesh axes, (n_lines, 2, 3) [m]; None: zero
+    source: str = ""  #: file it was read from, or how it was made
+    digest: str = ""  #: sha256 of that file
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
+    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "nodes", frozen(self.nodes))
+        put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
+        put(self, "node_numbers", frozen_int(self.node_numbers))
+        for name in ("line_sets", "node_sets"):
+            put(self, name, MappingProxyType({group: frozen_int(m) for group, m in getattr(self, name).items()}))
+        n = len(self.lines)
+        if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or not len(self.nodes):
+            raise BeamError(f"line mesh: nodes: expected (n_nodes, 3), got {self.nodes.shape}")
+        if not np.isfinite(self.nodes).all():
+            raise BeamError("line mesh: nodes: expected finite coordinates, got NaN or infinity")
+        for what, members, size in [
+            ("lines", self.lines, len(self.nodes)),
+            *[(f"node set {g!r}", m, len(self.nodes)) for g, m in self.node_sets.items()],
+            *[(f"line set {g!r}", m, n) for g, m in self.line_sets.items()],
+        ]:
+            if members.size and (members.min() < 0 or members.max() >= size):
+                raise BeamError(f"line mesh: {what}: expected 0..{size - 1}, got {members.min()}..{members.max()}")
+        for name, shape in (("orientations", (n, 3)), ("offsets", (n, 2, 3))):
+            if getattr(self, name) is not None:
+                put(self, name, frozen(getattr(self, name)))
+                if getattr(self, name).shape != shape:
+                    raise BeamError(f"line mesh: {name}: expected {shape}, got {getattr(self, name).shape}")
+
+
+def straight_line(start: object, end: object, n: int, *, name: str = "beam") -> LineMesh:
+    """Return a straight line of n equal elements, its ends in the node sets "start" and "end", its lines in `name`.
+
+    Parameters
+    ----------
+    start, end
+        Points, (3,) [m].
+    n
+        Number of elements.
+    name
+        Of the line set.
+    """
+    a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    if n < 1 or a.shape != (3,) or b.shape != (3,):
+        raise BeamError(f"straight_line: expected two points (3,) and n >= 1, got {start}, {end}, n = {n}")
+    s = np.linspace(0.0, 1.0, n + 1)[:, None]
+    return LineMesh(
+        nodes=(1 - s) * a + s * b,
+        lines=np.stack([np.arange(n), np.arange(1, n + 1)], axis=1),
+        line_sets={name: np.arange(n)},
+        node_sets={"start": np.array([0]), "end": np.array([n])},
+        source=f"straight line of {n} elements",
+    )

@@ -1,0 +1,51 @@
+"""The mesh of one body: nodes, solid cells, and the groups that name materials and interfaces."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+
+__all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh"]
+
+SOLID_TYPES = ("tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27", "wedge")  #: meshio names, node order
+FACE_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Nodes and cells of one body, in the node order of meshio (VTK)."""
+
+    nodes: Array  #: (n_nodes, 3), in the length unit of the model
+    cells: Mapping[str, IntArray]  #: solid cells by type in `SOLID_TYPES`, (n_cells, nodes per cell)
+    cell_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> rows of `cells`
+    faces: Mapping[str, IntArray] = field(default_factory=dict)  #: two-dimensional cells by type: they only select
+    face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> rows of `faces`
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
+    source: str = ""  #: file it was read from, or how it was made
+    digest: str = ""  #: sha256 of that file
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
+    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
+    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "nodes", frozen(self.nodes))
+        put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "notes", tuple(self.notes))
+        for name in ("cells", "faces", "cell_numbers"):
+            put(self, name, MappingProxyType({kind: frozen_int(c) for kind, c in getattr(self, name).items()}))
+        for name in ("cell_sets", "face_sets"):
+            sets = {
+                group: MappingProxyType({kind: frozen_int(rows) for kind, rows in by_type.items()})
+                for group, by_type in getattr(self, name).items()
+            }
+            put(self, name, MappingProxyType(sets))
+        put(self, "node_sets", MappingProxyType({group: frozen_int(n) for group, n in self.node_sets.items()}))
+
+    @property
+    def n_cells(self) -> int:
+        """Number of solid cells."""
+        return sum(len(cells) for cells in self.cells.values())

@@ -1,0 +1,293 @@
+"""Selections: ways to say which nodes of a mesh are meant, by group or by geometry."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from fe_models.errors import InterfaceError
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import nearest
+from fe_models.meshes.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.shell_mesh import ShellMesh
+
+__all__ = ["Box", "Cylinder", "FaceGroup", "NearestNode", "NodeSet", "Plane", "Selection", "selected_facets"]
+
+_WHY_EMPTY = "nodes that belong to no solid cell, such as reference nodes, are dropped: select nodes of the solid"
+
+Vector = tuple[float, float, float]
+AnyMesh = Mesh | LineMesh | ShellMesh
+
+
+class Selection(Protocol):
+    """Something that chooses nodes of a mesh."""
+
+    def members(self, mesh: AnyMesh) -> IntArray:
+        """Return the chosen nodes, ascending; `InterfaceError` if there are none."""
+
+
+@dataclass(frozen=True)
+class FaceGroup:
+    """The nodes of a named group of faces, or of cells of a shell.
+
+    Where the faces are facets of the solid, the nodes are those of the complete facets, so that linear triangles
+    written over quadratic tetrahedra select the middle nodes too.
+    """
+
+    name: str
+
+    def members(self, mesh: AnyMesh) -> IntArray:
+        """Return the nodes of the group, ascending."""
+        return np.unique(np.concatenate([rows.ravel() for rows in self.facets(mesh).values()]))
+
+    def facets(self, mesh: AnyMesh) -> dict[str, IntArray]:
+        """Return face type -> faces of the group, as complete facets of the solid where they are such."""
+        if isinstance(mesh, LineMesh):
+            raise InterfaceError(f"face group {self.name!r}: a mesh of lines has no faces; select nodes")
+        if isinstance(mesh, ShellMesh):
+            return self._cells(mesh)
+        if self.name not in mesh.face_sets:
+            raise InterfaceError(
+                f"no face group {self.name!r}{_other_kind(mesh, self.name, 'face group')}"
+                f"{nearest(self.name, mesh.face_sets)}"
+            )
+        faces = {kind: mesh.faces[kind][rows] for kind, rows in mesh.face_sets[self.name].items() if rows.size}
+        if not faces:
+            raise InterfaceError(f"face group {self.name!r} is empty; {_WHY_EMPTY}")
+        _require_on_solid(mesh, f"face group {self.name!r}", np.concatenate([f.ravel() for f in faces.values()]))
+        return _complete(mesh, faces)
+
+    def _cells(self, mesh: ShellMesh) -> dict[str, IntArray]:
+        """Return cell type -> cells of the group of a shell."""
+        if self.name not in mesh.cell_sets:
+            raise InterfaceError(
+                f"no group of cells {self.name!r}{_other_kind(mesh, self.name, 'cell group')}"
+                f"{nearest(self.name, mesh.cell_sets)}"
+            )
+        cells = {kind: mesh.cells[kind][rows] for kind, rows in mesh.cell_sets[self.name].items() if rows.size}
+        if not cells:
+            raise InterfaceError(f"group of cells {self.name!r} is empty")
+        return cells
+
+
+@dataclass(frozen=True)
+class NodeSet:
+    """The nodes of a named node set."""
+
+    name: str
+
+    def members(self, mesh: AnyMesh) -> IntArray:
+        """Return the nodes of the set, ascending."""
+        if self.name not in mesh.node_sets:
+            raise InterfaceError(
+                f"no node set {self.name!r}{_other_kind(mesh, self.name, 'node set')}"
+                f"{nearest(self.name, mesh.node_sets)}"
+            )
+        nodes = np.unique(mesh.node_sets[self.name])
+        if nodes.size == 0:
+            raise InterfaceError(f"node set {self.name!r} is empty; {_WHY_EMPTY}")
+        _require_on_solid(mesh, f"node set {self.name!r}", nodes)
+        return nodes
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The surface nodes on a plane."""
+
+    point: Vector  #: [m]
+    normal: Vector  #: any length
+    tolerance: float | None = None  #: distance [m]; None: 1e-6 of the diagonal of the bounding box
+
+    def members(self, mesh: AnyMesh) -> IntArray:
+        """Return the surface nodes within the tolerance, ascending."""
+        surface = candidates(mesh)
+        normal = _unit("plane", "normal", self.normal)
+        tolerance = _tolerance("plane", self.tolerance, 1e-6 * _diagonal(mesh))
+        signed = (mesh.nodes[surface] - _point("plane", self.point)) @ normal
+        found = surface[np.abs(signed) <= tolerance]
+        if found.size == 0:
+            raise InterfaceError(
+                f"plane through {_text(self.point)} with normal {_text(self.normal)} has no surface "
+                f"node within {tolerance:.3g}; the body lies between {signed.min():.6g} and "
+                f"{signed.max():.6g} along the normal, the nearest node is "
+                f"{np.abs(signed).min():.3g} away"
+            )
+        return found
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """The surface nodes on the curved surface of a cylinder."""
+
+    point: Vector  #: on the axis [m]
+    axis: Vector  #: any length
+    radius: float  #: [m]
+    span: tuple[float, float] | None = None  #: range along the axis from `point` [m]; None: no limit
+    tolerance: float | None = None  #: difference to the radius [m]; None: 1e-3 of the radius
+
+    def members(self, mesh: AnyMesh) -> IntArray:
+        """Return the surface nodes within the tolerance, ascending.
+
+        Middle nodes on straight edges lie inside a coarse hole by its sagitta: give a larger tolerance for those.
+        """
+        if not self.radius > 0:
+            raise InterfaceError(f"cylinder: radius: expected a length above zero, got {self.radius}")
+        surface = candidates(mesh)
+        axis = _unit("cylinder", "axis", self.axis)
+        tolerance = _tolerance("cylinder", self.tolerance, 1e-3 * self.radius)
+        arm = mesh.nodes[surface] - _point("cylinder", self.point)
+        along = arm @ axis
+        off = np.abs(np.linalg.norm(arm - along[:, None] * axis, axis=1) - self.radius)
+        low, high = self.span if self.span is not None else (-np.inf, np.inf)
+        inside = (along >= low - tolerance) & (along <= high + tolerance)
+        found = surface[(off <= tolerance) & inside]
+        if found.size == 0:
+            where = f"cylinder about {_text(self.point)} along {_text(self.axis)} with radius {self.radius:g}"
+            if not inside.any():
+                raise InterfaceError(
+                    f"{where}: no surface node between {low:g} and {high:g} along the axis; the body "
+                    f"lies between {along.min():.6g} and {along.max():.6g}"
+                )
+            raise InterfaceError(
+                f"{where} has no surface node within {tolerance:.3g} of it; the nearest differs by "
+                f"{off[inside].min():.3g}"
+            )
+        return found
+
+
+@dataclass(frozen=True)
+class Box:
+    """The surface nodes inside a box along the axes."""
+
+    lo: Vector  #: [m]
+    hi: Vector  #: [m]
+
+    def members(self, mesh: AnyMesh) -> IntArray:
+        """Return the surface nodes inside, ascending; the walls, widened by 1e-9 of the body, belong to the box."""
+        lo, hi = _point("box", self.lo), _point("box", self.hi)
+        if (lo > hi).any():
+            raise InterfaceError(f"box: expected lo <= hi, got {_text(self.lo)} and {_text(self.hi)}")
+        surface = candidates(mesh)
+        X = mesh.nodes[surface]
+        slack = 1e-9 * _diagonal(mesh)
+        found = surface[((lo - slack <= X) & (hi + slack >= X)).all(axis=1)]
+        if found.size == 0:
+            away = np.linalg.norm(np.maximum(np.maximum(lo - X, X - hi), 0), axis=1)
+            raise InterfaceError(
+                f"box from {_text(self.lo)} to {_text(self.hi)} contains no surface node; the body "
+                f"lies from {_text(X.min(axis=0))} to {_text(X.max(axis=0))}, the nearest node is "
+                f"{away.min():.3g} away"
+            )
+        return found
+
+
+@dataclass(frozen=True)
+class NearestNode:
+    """The surface node nearest to a point."""
+
+    point: Vector  #: [m]
+
+    def members(self, mesh: AnyMesh) -> IntArray:
+        """Return that node, (1,)."""
+        surface = candidates(mesh)
+        point = _point("nearest node", self.point)
+        return surface[[int(np.linalg.norm(mesh.nodes[surface] - point, axis=1).argmin())]]
+
+
+def candidates(mesh: AnyMesh) -> IntArray:
+    """Return the nodes that geometry can select: of the surface of a solid, all of a frame or shell; ascending."""
+    return boundary_nodes(mesh) if isinstance(mesh, Mesh) else np.arange(len(mesh.nodes))
+
+
+def selected_facets(mesh: AnyMesh, selection: Selection) -> dict[str, IntArray]:
+    """Return face type -> facets of a selection: those of a face group, else boundary facets with all nodes chosen.
+
+    The facets of a shell are its cells.
+    """
+    if isinstance(selection, FaceGroup):
+        return selection.facets(mesh)
+    if isinstance(mesh, LineMesh):
+        return {}
+    chosen = np.zeros(len(mesh.nodes), dtype=bool)
+    chosen[selection.members(mesh)] = True
+    surface = boundary_facets(mesh) if isinstance(mesh, Mesh) else mesh.cells
+    whole = {kind: facets[chosen[facets].all(axis=1)] for kind, facets in surface.items()}
+    return {kind: facets for kind, facets in whole.items() if len(facets)}
+
+
+def _complete(mesh: Mesh, faces: Mapping[str, IntArray]) -> dict[str, IntArray]:
+    """Return the facets of the boundary with the same corners; the faces themselves unless all are found."""
+    result: dict[str, list[IntArray]] = {}
+    for kind, rows in faces.items():
+        n_corners = CORNERS[kind]
+        open_rows = np.sort(rows[:, :n_corners], axis=1)
+        is_found = np.zeros(len(rows), dtype=bool)
+        for facet_kind, facets in boundary_facets(mesh).items():
+            if CORNERS[facet_kind] != n_corners:
+                continue
+            classes, _ = first_of_equal_rows(np.concatenate([open_rows, np.sort(facets[:, :n_corners], axis=1)]))
+            mine, theirs = classes[: len(rows)], classes[len(rows) :]
+            is_found |= np.isin(mine, theirs)
+            result.setdefault(facet_kind, []).append(facets[np.isin(theirs, mine)])
+        if not is_found.all():
+            return dict(faces)
+    joined = {kind: np.concatenate(parts) for kind, parts in result.items()}
+    return {kind: rows for kind, rows in joined.items() if len(rows)}
+
+
+def _require_on_solid(mesh: AnyMesh, what: str, nodes: IntArray) -> None:
+    if not isinstance(mesh, Mesh):
+        return
+    used = np.zeros(len(mesh.nodes), dtype=bool)
+    for cells in mesh.cells.values():
+        used[cells] = True
+    loose = np.unique(nodes[~used[nodes]])
+    if loose.size:
+        raise InterfaceError(
+            f"{what}: {loose.size} of its nodes belong to no solid cell, first node {loose[0]}; "
+            f"select nodes of the solid, or merge the coincident nodes of skin and solid"
+        )
+
+
+def _other_kind(mesh: AnyMesh, name: str, wanted: str) -> str:
+    """Say that the name is that of another kind of group."""
+    if isinstance(mesh, LineMesh):
+        return f" ({name!r} is a group of lines)" if name in mesh.line_sets else ""
+    kinds = {"node set": mesh.node_sets, "cell group": mesh.cell_sets}
+    kinds |= {"line group": mesh.line_sets} if isinstance(mesh, ShellMesh) else {"face group": mesh.face_sets}
+    others = [kind for kind, sets in kinds.items() if kind != wanted and name in sets]
+    return f" ({name!r} is a {others[0]})" if others else ""
+
+
+def _point(where: str, point: Vector) -> Array:
+    array = np.asarray(point, dtype=float)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise InterfaceError(f"{where}: expected three finite coordinates, got {point}")
+    return array
+
+
+def _unit(where: str, name: str, vector: Vector) -> Array:
+    array = _point(f"{where}: {name}", vector)
+    length = np.linalg.norm(array)
+    if length == 0:
+        raise InterfaceError(f"{where}: {name}: expected a direction, got the zero vector")
+    return array / length
+
+
+def _tolerance(where: str, tolerance: float | None, default: float) -> float:
+    if tolerance is None:
+        return default
+    if not 0 <= tolerance < np.inf:
+        raise InterfaceError(f"{where}: tolerance: expected a length of zero or more, got {tolerance}")
+    return tolerance
+
+
+def _diagonal(mesh: AnyMesh) -> float:
+    return float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+
+
+def _text(vector: Vector | Array) -> str:
+    return f"({', '.join(f'{x:.6g}' for x in vector)})"

@@ -1,0 +1,124 @@
+"""The mesh of a shell body: nodes, triangles and quads, lines of stiffeners, and the groups that name them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from fe_models.errors import ShellError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+
+__all__ = ["FLAT_TYPES", "ShellMesh", "flat_plate", "mapped_shell"]
+
+FLAT_TYPES = ("triangle", "quad")  #: meshio names and node order
+
+
+@dataclass(frozen=True, eq=False)
+class ShellMesh:
+    """Nodes and flat cells of one body; lines between its nodes may stiffen it.
+
+    Raises
+    ------
+    ShellError
+        If shapes do not fit, a cell names a node that does not exist, or a coordinate is not finite.
+    """
+
+    nodes: Array  #: (n_nodes, 3), in the length unit of the model
+    cells: Mapping[str, IntArray]  #: by type in `FLAT_TYPES`, (n_cells, 3) and (n_cells, 4)
+    cell_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> rows of `cells`
+    lines: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: ends of stiffeners, (n_lines, 2)
+    line_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> rows of `lines`
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
+    source: str = ""  #: file it was read from, or how it was made
+    digest: str = ""  #: sha256 of that file
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
+    cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
+    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "nodes", frozen(self.nodes))
+        put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
+        put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "notes", tuple(self.notes))
+        for name in ("cells", "line_sets", "node_sets", "cell_numbers"):
+            put(self, name, MappingProxyType({key: frozen_int(rows) for key, rows in getattr(self, name).items()}))
+        sets = {
+            group: MappingProxyType({kind: frozen_int(rows) for kind, rows in by_type.items()})
+            for group, by_type in self.cell_sets.items()
+        }
+        put(self, "cell_sets", MappingProxyType(sets))
+        if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or not len(self.nodes):
+            raise ShellError(f"shell mesh: nodes: expected (n_nodes, 3), got {self.nodes.shape}")
+        if not np.isfinite(self.nodes).all():
+            raise ShellError("shell mesh: nodes: expected finite coordinates, got NaN or infinity")
+        for kind, cells in self.cells.items():
+            if kind not in FLAT_TYPES:
+                raise ShellError(f"shell mesh: cells: expected types {', '.join(FLAT_TYPES)}, got {kind!r}")
+            if cells.ndim != 2 or cells.shape[1] != len(kind.replace("triangle", "123").replace("quad", "1234")):
+                raise ShellError(f"shell mesh: {kind}: expected (n_cells, nodes per cell), got {cells.shape}")
+        for what, members, size in [
+            *[(kind, cells, len(self.nodes)) for kind, cells in self.cells.items()],
+            ("lines", self.lines, len(self.nodes)),
+            *[(f"node set {g!r}", m, len(self.nodes)) for g, m in self.node_sets.items()],
+            *[(f"line set {g!r}", m, len(self.lines)) for g, m in self.line_sets.items()],
+            *[
+                (f"cell set {g!r}", rows, len(self.cells.get(kind, ())))
+                for g, by_type in self.cell_sets.items()
+                for kind, rows in by_type.items()
+            ],
+        ]:
+            if members.size and (members.min() < 0 or members.max() >= size):
+                raise ShellError(f"shell mesh: {what}: expected 0..{size - 1}, got {members.min()}..{members.max()}")
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return sum(len(cells) for cells in self.cells.values())
+
+    def cell_name(self, kind: str, row: int) -> str:
+        """Return what to call a cell in a message: its number in the file where there is one."""
+        return f"{kind} {self.cell_numbers[kind][row] if kind in self.cell_numbers else row}"
+
+
+def mapped_shell(
+    surface: Callable[[Array, Array], Array], n_u: int, n_v: int, *, kind: str = "quad", name: str = "shell"
+) -> ShellMesh:
+    """Return a grid of n_u × n_v quads, or twice as many triangles, on a surface over the unit square.
+
+    Its cells are the group `name`, the nodes of its sides the node sets "u0", "u1", "v0", "v1". The normal is that of
+    (u, v): ∂X/∂u × ∂X/∂v. Diagonals of triangles alternate.
+
+    Parameters
+    ----------
+    surface
+        (u, v), (n,) each in 0..1 -> X, (n, 3) [m].
+    n_u, n_v
+        Cells along u and v.
+    kind
+        "quad" or "triangle".
+    """
+    if n_u < 1 or n_v < 1 or kind not in FLAT_TYPES:
+        raise ShellError(
+            f"mapped_shell: expected n_u, n_v >= 1 and a kind of {', '.join(FLAT_TYPES)}, got {n_u}, {n_v}, {kind!r}"
+        )
+    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, n_u + 1), np.linspace(0, 1, n_v + 1), indexing="ij"))
+    index = np.arange(u.size).reshape(n_u + 1, n_v + 1)
+    cells = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
+    if kind == "triangle":
+        is_odd = (np.add.outer(np.arange(n_u), np.arange(n_v)) % 2).astype(bool).ravel()
+        cells = np.where(is_odd[:, None], np.roll(cells, -1, axis=1), cells)
+        cells = np.stack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]], axis=1).reshape(-1, 3)
+    return ShellMesh(
+        nodes=surface(u, v),
+        cells={kind: cells},
+        cell_sets={name: {kind: np.arange(len(cells))}},
+        node_sets={"u0": index[0], "u1": index[-1], "v0": index[:, 0], "v1": index[:, -1]},
+        source=f"grid of {n_u} x {n_v} {kind}s",
+    )
+
+
+def flat_plate(a: float, b: float, n_a: int, n_b: int, *, kind: str = "quad", name: str = "shell") -> ShellMesh:
+    """Return the mesh of a rectangle 0..a × 0..b in the x-y plane, normal z; see `mapped_shell`."""
+    return mapped_shell(lambda u, v: np.stack([a * u, b * v, 0 * u], axis=1), n_a, n_b, kind=kind, name=name)

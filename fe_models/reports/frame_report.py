@@ -1,0 +1,110 @@
+"""Numbers of a frame and findings about it, before any solve."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from fe_models.beams.attachments import RigidLink, Spring
+from fe_models.errors import MeshError
+from fe_models.foundation.units import Units
+from fe_models.material import Material
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.reports.mesh_report import Finding
+from fe_models.reports.unit_check import implausible_units
+
+__all__ = ["FrameReport", "report_frame"]
+
+COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
+
+
+@dataclass(frozen=True, eq=False)
+class FrameReport:
+    """Numbers of a mesh of lines and findings about it."""
+
+    source: str
+    units: Units
+    n_nodes: int
+    n_lines: int
+    length: float  #: of all lines [m]
+    n_parts: int  #: parts that no line, link or spring joins
+    findings: tuple[Finding, ...]
+
+    def raise_for_errors(self, *, accept: Iterable[str] = ()) -> None:
+        """Raise `MeshError` with all errors but those of the accepted kinds."""
+        errors = [finding for finding in self.findings if finding.is_error and finding.kind not in set(accept)]
+        if errors:
+            raise MeshError(f"mesh {self.source}: " + "; ".join(finding.text for finding in errors))
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return label and value of each number, in words, for a table."""
+        rows = [
+            ("file", self.source),
+            ("nodes", str(self.n_nodes)),
+            ("lines", str(self.n_lines)),
+            ("length of all lines", f"{self.length:.6g} {self.units.length_symbol}"),
+            ("connected parts", str(self.n_parts)),
+        ]
+        return rows + [("error" if f.is_error else "warning", f.text) for f in self.findings]
+
+
+def report_frame(
+    mesh: LineMesh,
+    materials: Iterable[Material],
+    *,
+    units: Units,
+    springs: Iterable[Spring] = (),
+    links: Iterable[RigidLink] = (),
+) -> FrameReport:
+    """Measure a frame and judge whether it hangs together and its units are plausible.
+
+    Parameters
+    ----------
+    mesh
+        Nodes and lines.
+    materials
+        Those of the sections.
+    units
+        Declared unit system.
+    springs, links
+        They join parts too.
+    """
+    ends = mesh.nodes[mesh.lines]
+    size = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
+    n = len(mesh.nodes)
+    pairs = [mesh.lines, *[np.array([spring.nodes]) for spring in springs]]
+    pairs += [np.array([(link.node, follower) for follower in link.followers]) for link in links]
+    joined = np.concatenate(pairs)
+    graph = sp.coo_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(n, n))
+    n_parts, part = sp.csgraph.connected_components(graph, directed=False)
+    findings = []
+    if n_parts > 1:
+        first = [int(np.flatnonzero(part == k)[0]) for k in range(min(n_parts, 4))]
+        findings.append(
+            Finding(
+                "parts",
+                True,
+                f"{n_parts} parts that no line, link or spring joins, with the nodes {', '.join(_names(mesh, first))}; "
+                "merge coincident nodes, or accept parts that an interface holds together",
+            )
+        )
+    close = cKDTree(mesh.nodes).query_pairs(COINCIDENCE * size) if size else set()
+    apart = [pair for pair in close if part[pair[0]] != part[pair[1]]]
+    if apart:
+        findings.append(
+            Finding(
+                "coincident",
+                False,
+                f"{len(apart)} pairs of nodes of different parts lie at one place, first "
+                f"{' and '.join(_names(mesh, apart[0]))}; merge them if the parts are one",
+            )
+        )
+    findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, materials)]
+    length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+    return FrameReport(mesh.source, units, n, len(mesh.lines), length, n_parts, tuple(findings))
+
+
+def _names(mesh: LineMesh, nodes: Iterable[int]) -> list[str]:
+    return [str(mesh.node_numbers[node] if mesh.node_numbers.size else node) for node in nodes]

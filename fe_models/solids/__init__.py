@@ -1,0 +1,1 @@
+"""Solid bodies: elements, assembly, stress, geometric stiffness, interfaces on their faces."""

@@ -1,0 +1,200 @@
+"""A finite element body from a mesh of solid cells."""
+
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.mass_loads import MassLoads
+from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.threads import n_threads
+from fe_models.foundation.units import Units
+from fe_models.material import Material, assign_materials
+from fe_models.meshes.boundary import boundary_triangles
+from fe_models.meshes.cell_shapes import cell_jacobians
+from fe_models.meshes.mesh import Mesh
+from fe_models.solids.assembly import Progress, assemble, expand_scalar_mass
+from fe_models.solids.elements import reference_element
+from fe_models.solids.geometric import internal_forces, projected_geometric_stiffness
+from fe_models.solids.stress import nodal_stress, stiffest_at_nodes
+
+__all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
+
+CELLS_AT_ONCE = 8_000  #: whose Jacobians are held at once
+GRAM_BYTES = 64e6  #: of one block of rows of [1, X, u] and of M_s times it
+
+
+@dataclass(frozen=True, eq=False)
+class SolidModel:
+    """The elements behind a solid body (`fe_body.ElementModel`): mass moments, stress, geometric stiffness."""
+
+    mesh: Mesh
+    materials: tuple[Material, ...]
+    of_cell: Mapping[str, IntArray]  #: cell type -> material of each cell, (n_cells,)
+    M_s: sp.csr_array  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
+
+    @cached_property
+    def of_node(self) -> IntArray:
+        """The material whose stress each node shows: the stiffest of its elements, (n_nodes,)."""
+        return frozen_int(stiffest_at_nodes(self.mesh, self.materials, self.of_cell))
+
+    @property
+    def has_nodal_stress(self) -> bool:
+        """True: the elements know it."""
+        return True
+
+    def mass_gram(self, u: Array) -> Array:
+        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], (4 + 3 k, 4 + 3 k), exact; u is (3 n_nodes, k)."""
+        return scalar_mass_gram(self.M_s, self.mesh.nodes, np.asarray(u).reshape(len(self.mesh.nodes), 3, -1))
+
+    def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return the stress at the nodes, (n_nodes, 6, k) [Pa], xx yy zz yz xz xy, of columns u, (3 n_nodes, k).
+
+        Only the elements at `nodes` are visited where these are given; the other nodes show zero.
+        """
+        require_rows("nodal_stress", u, 3 * len(self.mesh.nodes))
+        return nodal_stress(self.mesh, self.materials, self.of_cell, self.of_node, u, nodes=nodes)
+
+    @property
+    def has_geometric_stiffness(self) -> bool:
+        """True: solid elements know it."""
+        return True
+
+    def mass_forces(self, loads: MassLoads) -> Array:
+        """Return the consistent nodal forces of loads per mass, (3 n_nodes, k): exact, the loads are linear in c."""
+        return np.asarray(self.M_s @ loads.at(self.mesh.nodes).reshape(len(self.mesh.nodes), -1)).reshape(-1, loads.k)
+
+    def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
+        """Return ∫ sigma grad N, (3 n_nodes, k) [N], of columns u; only at `nodes` where these are given."""
+        require_rows("internal_forces", u, 3 * len(self.mesh.nodes))
+        return internal_forces(self.mesh, self.materials, self.of_cell, u, nodes=nodes)
+
+    def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
+        """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); the stress alone makes it."""
+        require_rows("geometric_stiffness", u, 3 * len(self.mesh.nodes))
+        require_rows("geometric_stiffness", Phi, 3 * len(self.mesh.nodes))
+        return projected_geometric_stiffness(self.mesh, self.materials, self.of_cell, u, Phi)
+
+
+def solid_body(
+    mesh: Mesh,
+    materials: Material | Mapping[str, Material],
+    *,
+    name: str,
+    units: Units,
+    interfaces: Iterable[Interface] = (),
+    progress: Progress | None = None,
+) -> FEBody:
+    """Make the body of a mesh of solid cells: isoparametric elements, consistent mass, dof 3 i + c of every node i.
+
+    Parameters
+    ----------
+    mesh
+        Tetrahedra, hexahedra and wedges, mixed as they come; faces and lines do not enter.
+    materials
+        One for all cells, or group name -> material (`assign_materials`), in the units of the mesh.
+    name
+        Of the body.
+    units
+        In which coordinates and materials are.
+    interfaces
+        Named places, to be coupled later by `cms.couple`.
+    progress
+        Called with the finished fraction of the assembly, 0 to 1.
+
+    Returns
+    -------
+    FEBody
+        With `SolidModel` as its element model and the boundary triangles as its surface.
+
+    Raises
+    ------
+    MaterialError
+        If a group is unknown, or cells have no material or two.
+    MeshError
+        If there is no solid cell, a node belongs to none, or an element is inverted.
+    """
+    used, of_cell = assign_materials(mesh, materials)
+    properties = np.array([[material.lam, material.mu, material.rho] for material in used])
+    K, M_s = assemble(mesh, properties, of_cell, progress=progress)
+    n_nodes = len(mesh.nodes)
+    return FEBody(
+        name=name,
+        M=expand_scalar_mass(M_s),
+        K=K,
+        nodes=mesh.nodes,
+        dofs=np.stack([np.repeat(np.arange(n_nodes), 3), np.tile(np.arange(3), n_nodes)], axis=1),
+        interfaces=tuple(interfaces),
+        units=units,
+        surface=boundary_triangles(mesh),
+        node_volumes=node_volumes(mesh),
+        element_model=SolidModel(mesh, used, of_cell, M_s),
+        provenance=provenance(mesh, used, of_cell),
+    )
+
+
+def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
+    """Return Aᵀ M_s A with A = [1, X, u_x, u_y, u_z] (THEORY §5), (4 + 3 k, 4 + 3 k).
+
+    Parameters
+    ----------
+    M_s
+        Scalar mass, (n_nodes, n_nodes) [kg].
+    nodes
+        X, (n_nodes, 3) [m].
+    u
+        Translations of the nodes, (n_nodes, 3, k) [m].
+    """
+    n_nodes = len(nodes)
+    A = np.hstack([np.ones((n_nodes, 1)), nodes, u.reshape(n_nodes, -1)])
+    n_rows = max(1, int(GRAM_BYTES / (8 * A.shape[1])))
+
+    blocks = [slice(begin, begin + n_rows) for begin in range(0, n_nodes, n_rows)]
+    gram, n_parts = np.zeros(2 * (A.shape[1],)), n_threads()
+    with ThreadPoolExecutor(n_parts) as pool:
+        for begin in range(0, len(blocks), n_parts):  # sparse products in threads; the dense one has threads of its own
+            group = blocks[begin : begin + n_parts]
+            for rows, product in zip(group, pool.map(lambda rows: M_s[rows] @ A, group), strict=True):
+                gram += A[rows].T @ product
+    return np.asarray((gram + gram.T) / 2)  # symmetric by definition; the blocks round the halves apart
+
+
+def node_volumes(mesh: Mesh) -> Array:
+    """Return the volume each node stands for, (n_nodes,) [m³]: that of its elements, shared out by ∫N_n².
+
+    ∫N_n itself, which would be consistent, is negative at the corners of quadratic elements. The shares are those of
+    the reference cell; volumes by the few points of the stress, exact for cells with straight edges.
+    """
+    volumes = np.zeros(len(mesh.nodes))
+    for kind, cells in mesh.cells.items():
+        element = reference_element(kind)
+        share = element.mass.weights @ element.mass.values**2
+        for begin in range(0, len(cells), CELLS_AT_ONCE):
+            rows = cells[begin : begin + CELLS_AT_ONCE]
+            V = cell_jacobians(kind, mesh.nodes[rows], element.stress.points) @ element.stress.weights
+            volumes += np.bincount(rows.ravel(), np.outer(V, share / share.sum()).ravel(), minlength=len(volumes))
+    return volumes
+
+
+def provenance(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
+    """Say where the body came from: mesh, digest, elements, materials and the version of scikit-fem."""
+    record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
+    record |= {f"cells {kind}": str(len(cells)) for kind, cells in mesh.cells.items() if len(cells)}
+    for number, material in enumerate(materials):
+        count = sum(int((index == number).sum()) for index in of_cell.values())
+        record[f"material {material.name}"] = (
+            f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}, {count} cells"
+        )
+    return {key: value for key, value in record.items() if value} | {"scikit-fem": version("scikit-fem")}
+
+
+def require_rows(where: str, u: Array, n_rows: int) -> None:
+    """Raise `BodyError` unless u has that many rows and is two-dimensional."""
+    if u.ndim != 2 or u.shape[0] != n_rows:
+        raise BodyError(f"{where}: u: expected columns over {n_rows} dofs, got {u.shape}")

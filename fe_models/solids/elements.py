@@ -1,0 +1,173 @@
+"""Reference elements of the solids: shape functions of scikit-fem in the node order of meshio, and their quadrature.
+
+The orders are chosen so that, on an isoparametric (curved) element,
+
+- the consistent mass ∫ rho N_a N_b is exact: its integrand is a polynomial in the reference coordinates;
+- ∫ grad N_a is exact, so that a constant stress is in equilibrium to roundoff (patch test) on a distorted mesh;
+- ∫ (grad N_a)(grad N_b)ᵀ is exact wherever the Jacobian is constant.
+"""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.words import nearest
+from fe_models.meshes.cell_shapes import CELL_SHAPES
+from fe_models.meshes.mesh import SOLID_TYPES
+
+__all__ = ["ReferenceElement", "ShapeTable", "reference_element", "shape_table"]
+
+Degree = int | tuple[int, int]
+
+SKFEM_ELEMENTS = {
+    "tetra": "ElementTetP1",
+    "tetra10": "ElementTetP2",
+    "hexahedron": "ElementHex1",
+    "hexahedron20": "ElementHexS2",
+    "hexahedron27": "ElementHex2",
+    "wedge": "ElementWedge1",
+}
+# scikit-fem 12 labels its tetrahedron tables 5 to 8 one degree too high (measured; a test holds them to what is used
+# here), so label 8 gives degree 7. Degrees: stiffness, mass; per direction for hexahedra, (triangle, line) for wedges.
+RULES: dict[str, tuple[str, Degree, Degree]] = {
+    "tetra": ("tet", 1, 2),  # mass: N N = 2
+    "tetra10": ("tet", 5, 8),  # stiffness: 14 positive weights, degree 4; mass: 2 + 2 + 3 for the Jacobian = 7
+    "hexahedron": ("hex", 3, 5),  # mass: 1 + 1 + 2 = 4
+    "hexahedron20": ("hex", 5, 9),  # mass: 2 + 2 + 5 = 9
+    "hexahedron27": ("hex", 5, 9),
+    "wedge": ("wedge", (2, 3), (3, 5)),  # mass: triangle 1 + 1 + 1 = 3, line 1 + 1 + 2 = 4
+}
+# Stress is sampled where it is most accurate (the points of reduced integration for quadratic elements) and carried to
+# the nodes by the shape functions of the low-order element, which fit those points exactly.
+STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
+    "tetra": (("tet", 1), None),
+    "tetra10": (("tet", 2), "tetra"),
+    "hexahedron": (("hex", 3), "hexahedron"),
+    "hexahedron20": (("hex", 3), "hexahedron"),
+    "hexahedron27": (("hex", 3), "hexahedron"),
+    "wedge": (("wedge", (2, 3)), "wedge"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeTable:
+    """Shape functions at the points of a quadrature rule on the reference cell."""
+
+    points: Array  #: (n_points, 3)
+    weights: Array  #: (n_points,); their sum is the volume of the reference cell
+    values: Array  #: N_a, (n_points, n_nodes)
+    gradients: Array  #: ∂N_a/∂xi_j, derivatives by the reference coordinates, (n_points, n_nodes, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceElement:
+    """What assembly and stress recovery know of one cell type."""
+
+    kind: str  #: name in `SOLID_TYPES`
+    stiffness: ShapeTable
+    mass: ShapeTable
+    stress: ShapeTable  #: at the sampling points of the stress
+    extrapolation: Array  #: from the sampling points to the nodes, (n_nodes, n_points)
+
+    @property
+    def nodes(self) -> Array:
+        """Positions of the nodes in the reference cell, (n_nodes, 3)."""
+        return CELL_SHAPES[self.kind].nodes
+
+    @property
+    def n_nodes(self) -> int:
+        """Nodes per element."""
+        return CELL_SHAPES[self.kind].n_nodes
+
+    @cached_property
+    def axis_nodes(self) -> IntArray:
+        """The nodes at e_1, e_2, e_3 of the reference cell; node 0 is at its origin, (3,)."""
+        return np.array([int(np.flatnonzero((self.nodes == axis).all(axis=1))[0]) for axis in np.eye(3)])
+
+    @cached_property
+    def stiffness_integrals(self) -> Array:
+        """∫ ∂N_a/∂xi_k ∂N_b/∂xi_l over the reference cell, row 3 k + l, pairs b >= a by rows, (9, n_pairs)."""
+        a, b = np.triu_indices(self.n_nodes)
+        gradients = self.stiffness.gradients
+        return np.einsum("q,qpk,qpl->klp", self.stiffness.weights, gradients[:, a], gradients[:, b]).reshape(9, -1)
+
+    @cached_property
+    def mass_integrals(self) -> Array:
+        """∫ N_a N_b over the reference cell, pairs b >= a by rows, (n_pairs,)."""
+        a, b = np.triu_indices(self.n_nodes)
+        return np.einsum("q,qp,qp->p", self.mass.weights, self.mass.values[:, a], self.mass.values[:, b])
+
+
+def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
+    """Return points (n_points, 3) and weights (n_points,) of a rule of scikit-fem on "tet", "hex" or "wedge".
+
+    The wedge is the product of the triangle and the line made here: scikit-fem 12 repeats the triangle's points with
+    products of its weights and so gives half of the volume.
+    """
+    from skfem.quadrature import get_quadrature
+    from skfem.refdom import RefHex, RefLine, RefTet, RefTri
+
+    if cell == "wedge":
+        degree_triangle, degree_line = degree  # type: ignore[misc]
+        triangle, w_triangle = get_quadrature(RefTri, degree_triangle)
+        line, w_line = get_quadrature(RefLine, degree_line)
+        points = np.vstack([np.repeat(triangle, line.size, axis=1), np.tile(line, triangle.shape[1])])
+        return points.T.copy(), np.outer(w_triangle, w_line).ravel()
+    points, weights = get_quadrature({"tet": RefTet, "hex": RefHex}[cell], degree)
+    return points.T.copy(), weights
+
+
+def shape_table(kind: str, points: Array, weights: Array) -> ShapeTable:
+    """Evaluate the shape functions of a cell type, in meshio node order, at points (n_points, 3)."""
+    import skfem
+
+    element = getattr(skfem, SKFEM_ELEMENTS[kind])()
+    order = skfem_node_order(kind)
+    values = [element.lbasis(points.T, int(i)) for i in order]
+    N = np.stack([np.broadcast_to(value, len(points)) for value, _ in values], axis=1)
+    dN = np.stack([np.broadcast_to(gradient, (3, len(points))).T for _, gradient in values], axis=1)
+    return ShapeTable(frozen(points), frozen(weights), frozen(N), frozen(dN))
+
+
+def skfem_node_order(kind: str) -> IntArray:
+    """Return, for each meshio node of a cell type, the local number of the same node in scikit-fem, (n_nodes,)."""
+    import skfem
+
+    positions = np.asarray(getattr(skfem, SKFEM_ELEMENTS[kind])().doflocs)
+    distance = np.abs(CELL_SHAPES[kind].nodes[:, None] - positions[None]).max(axis=2)
+    order = distance.argmin(axis=1)
+    if (distance.min(axis=1) > 1e-12).any() or np.unique(order).size != len(positions):
+        raise MeshError(f"{kind}: the installed scikit-fem places its nodes elsewhere; expected scikit-fem 10 to 12")
+    return order
+
+
+@cache
+def reference_element(kind: str) -> ReferenceElement:
+    """Return the reference element of a cell type of `SOLID_TYPES`.
+
+    Raises
+    ------
+    MeshError
+        If the cell type is not a supported solid.
+    """
+    if kind not in SOLID_TYPES:
+        raise MeshError(f"solid elements: unknown cell type {kind!r}{nearest(kind, SOLID_TYPES)}")
+    cell, degree_stiffness, degree_mass = RULES[kind]
+    (stress_cell, stress_degree), low_order = STRESS_RULES[kind]
+    stress_points, stress_weights = quadrature(stress_cell, stress_degree)
+    if low_order is None:
+        extrapolation = np.ones((CELL_SHAPES[kind].n_nodes, len(stress_points)))
+    else:
+        nodes = CELL_SHAPES[kind].nodes
+        at_nodes = shape_table(low_order, nodes, np.ones(len(nodes))).values
+        extrapolation = at_nodes @ np.linalg.inv(shape_table(low_order, stress_points, stress_weights).values)
+    return ReferenceElement(
+        kind=kind,
+        stiffness=shape_table(kind, *quadrature(cell, degree_stiffness)),
+        mass=shape_table(kind, *quadrature(cell, degree_mass)),
+        stress=shape_table(kind, stress_points, stress_weights),
+        extrapolation=frozen(extrapolation),
+    )

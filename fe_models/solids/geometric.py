@@ -1,0 +1,122 @@
+"""Geometric stiffness of solid elements: Phiᵀ K_geo(sigma_j) Phi for many states j in one pass (THEORY §7).
+
+K_geo(sigma)_kl = ∫ sigma_ab Σ_c phi_k,c,a phi_l,c,b is linear in the stress. The products of gradients of a pair of
+columns do not depend on the state, so they are formed once at every point; a matrix product with the stress of all
+states does the sum over points. No sparse matrix is assembled.
+"""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.threads import n_threads, one_blas_thread
+from fe_models.material import Material
+from fe_models.meshes.mesh import Mesh
+from fe_models.solids.elements import ShapeTable, reference_element
+
+__all__ = ["internal_forces", "projected_geometric_stiffness"]
+
+CHUNK_BYTES = 1.5e6  #: of the products held at once by a thread: they shall stay in its cache
+
+
+def projected_geometric_stiffness(
+    mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray], u: Array, Phi: Array
+) -> Array:
+    """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the stress of the states u, (3 n_nodes, k).
+
+    Parameters
+    ----------
+    mesh, materials, of_cell
+        As in `fe_models.solids.stress.nodal_stress`.
+    u
+        Displacements of the states, dof 3 i + c is component c of node i, (3 n_nodes, k).
+    Phi
+        Columns, (3 n_nodes, n).
+    """
+    n_nodes, n = len(mesh.nodes), Phi.shape[1]
+    states = np.ascontiguousarray(u).reshape(n_nodes, 3, -1)
+    columns = np.ascontiguousarray(Phi).reshape(n_nodes, 3, -1)
+    lame = np.array([[material.lam, material.mu] for material in materials])
+    pairs = np.zeros((states.shape[2], n * (n + 1) // 2))
+    n_parts = n_threads()
+    with one_blas_thread(), ThreadPoolExecutor(n_parts) as pool:
+        for kind, cells in mesh.cells.items():
+            cuts = np.linspace(0, len(cells), n_parts + 1).astype(int)
+            futures = [
+                pool.submit(
+                    _pairs_of, mesh.nodes, cells[a:b], of_cell[kind][a:b], lame, geometric_table(kind), states, columns
+                )
+                for a, b in pairwise(cuts)
+                if b > a
+            ]
+            for future in futures:  # in their order: results repeat bit for bit
+                pairs += future.result()
+    K = np.empty((len(pairs), n, n))
+    row, column = np.triu_indices(n)
+    K[:, row, column] = pairs
+    K[:, column, row] = pairs
+    return K
+
+
+def internal_forces(
+    mesh: Mesh,
+    materials: tuple[Material, ...],
+    of_cell: Mapping[str, IntArray],
+    u: Array,
+    *,
+    nodes: IntArray | None = None,
+) -> Array:
+    """Return ∫ sigma grad N by the points of the geometric stiffness, (3 n_nodes, k); exact where `nodes` says so."""
+    from fe_models.solids.geometric_kernels import add_internal_forces
+
+    fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
+    forces = np.zeros(fields.shape)
+    lame = np.array([[material.lam, material.mu] for material in materials])
+    wanted = np.ones(len(mesh.nodes), dtype=bool)
+    if nodes is not None:
+        wanted[:] = False
+        wanted[nodes[nodes < len(wanted)]] = True
+    for kind, all_cells in mesh.cells.items():
+        is_wanted = wanted[all_cells].any(axis=1)
+        if is_wanted.any():
+            table = geometric_table(kind)
+            cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
+            add_internal_forces(mesh.nodes, cells, material, lame, table.gradients, table.weights, fields, forces)
+    forces[~wanted] = 0.0
+    return forces.reshape(3 * len(mesh.nodes), -1)
+
+
+def geometric_table(kind: str) -> ShapeTable:
+    """Return the quadrature of the geometric stiffness.
+
+    sigma · grad N must be exact where the cell is affine, so that a rigid rotation meets the nodal forces K u to
+    rounding. The four stress points of a quadratic tetrahedron do (degree 2); bricks need the points of the stiffness.
+    """
+    element = reference_element(kind)
+    return element.stress if kind == "tetra10" else element.stiffness
+
+
+def _pairs_of(
+    nodes: Array, cells: IntArray, material: IntArray, lame: Array, table: ShapeTable, states: Array, columns: Array
+) -> Array:
+    """Sum over the points of these cells, (n_states, n_pairs)."""
+    from fe_models.solids.geometric_kernels import stress_and_products
+
+    n_states, n = states.shape[2], columns.shape[2]
+    n_points, n_pairs = len(table.weights), n * (n + 1) // 2
+    n_chunk = min(len(cells), max(1, int(CHUNK_BYTES / (48 * n_points * max(n_pairs + n_states, 1)))))
+    sigma = np.empty((n_chunk, n_points, 6, n_states))
+    products = np.empty((n_chunk, n_points, 6, n_pairs))
+    total = np.zeros((n_states, n_pairs))
+    for begin in range(0, len(cells), n_chunk):
+        rows = slice(begin, min(begin + n_chunk, len(cells)))
+        n_rows = rows.stop - begin
+        stress_and_products(
+            nodes, cells[rows], material[rows], lame, table.gradients, table.weights, states, columns,
+            sigma[:n_rows], products[:n_rows],
+        )  # fmt: skip
+        total += sigma[:n_rows].reshape(-1, n_states).T @ products[:n_rows].reshape(-1, n_pairs)
+    return total

@@ -1,0 +1,115 @@
+"""Compiled loops of the geometric stiffness of solid elements; imported where they are used."""
+
+import numpy as np
+from numba import njit
+
+from fe_models.solids.assembly_kernels import jacobian
+
+__all__ = ["add_internal_forces", "stress_and_products"]
+
+jit = njit(cache=True, nogil=True, error_model="numpy")
+jit_fast = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+
+FIRST, SECOND = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])  # xx yy zz yz xz xy
+
+
+@jit_fast
+def add_gradient(field, cell, dN, Q, det, H):
+    """Write H_ij = ∂u_i / ∂x_j, (3, 3, k), of the columns field, (n_nodes, 3, k), at one point of one element."""
+    n_k = field.shape[2]
+    H[:] = 0.0
+    for a in range(cell.size):
+        for j in range(H.shape[0]):  # a size unknown to the compiler: no unrolling, faster to compile
+            g = (dN[a, 0] * Q[0, j] + dN[a, 1] * Q[1, j] + dN[a, 2] * Q[2, j]) / det
+            for i in range(H.shape[0]):
+                row, column = H[i, j], field[cell[a], i]
+                for k in range(n_k):
+                    row[k] += column[k] * g
+
+
+@jit
+def write_stress(H, lam, mu, factor, sigma):
+    """Write factor times the stress, (6, k), of the gradients H, (3, 3, k)."""
+    for k in range(H.shape[2]):
+        pressure = lam * (H[0, 0, k] + H[1, 1, k] + H[2, 2, k])
+        for c in range(3):
+            sigma[c, k] = factor * (pressure + 2.0 * mu * H[c, c, k])
+        for c in range(3, 6):
+            i, j = FIRST[c], SECOND[c]
+            sigma[c, k] = factor * mu * (H[i, j, k] + H[j, i, k])
+
+
+@jit_fast
+def write_products(G, P):
+    """Write Σ_c (u_c,a v_c,b + u_c,b v_c,a) of all pairs u <= v of columns, once where a = b, (6, n_pairs).
+
+    G: gradients G_ca, (3, 3, n). With the stress they give sigma : products = Σ sigma_ab u_c,a v_c,b over all a, b.
+    """
+    n = G.shape[2]
+    for ab in range(P.shape[0]):
+        a, b = FIRST[ab], SECOND[ab]
+        at = 0
+        for k in range(n):
+            row = P[ab, at : at + n - k]
+            if a == b:
+                x, y, z = G[0, a, k], G[1, a, k], G[2, a, k]
+                X, Y, Z = G[0, a, k:], G[1, a, k:], G[2, a, k:]
+                for m in range(n - k):
+                    row[m] = x * X[m] + y * Y[m] + z * Z[m]
+            else:
+                x, y, z, x2, y2, z2 = G[0, a, k], G[1, a, k], G[2, a, k], G[0, b, k], G[1, b, k], G[2, b, k]
+                X, Y, Z = G[0, b, k:], G[1, b, k:], G[2, b, k:]
+                X2, Y2, Z2 = G[0, a, k:], G[1, a, k:], G[2, a, k:]
+                for m in range(n - k):
+                    row[m] = x * X[m] + y * Y[m] + z * Z[m] + x2 * X2[m] + y2 * Y2[m] + z2 * Z2[m]
+            at += n - k
+
+
+@jit
+def stress_and_products(nodes, cells, of_cell, lame, dN, w, u, phi, sigma, products):
+    """Stress of the states times its share of volume, and products of gradients, at the points of some elements.
+
+    u: states, (n_nodes, 3, n_states); phi: columns, (n_nodes, 3, n); sigma: (n_cells, n_points, 6, n_states);
+    products: (n_cells, n_points, 6, n_pairs).
+    """
+    n_a = cells.shape[1]
+    x = np.empty((n_a, 3))
+    J, Q = np.empty((3, 3)), np.empty((3, 3))
+    H, G = np.empty((3, 3, u.shape[2])), np.empty((3, 3, phi.shape[2]))
+    for e in range(cells.shape[0]):
+        lam, mu = lame[of_cell[e], 0], lame[of_cell[e], 1]
+        for a in range(n_a):
+            for i in range(3):
+                x[a, i] = nodes[cells[e, a], i]
+        for q in range(w.size):
+            det = jacobian(x, dN[q], J, Q)
+            add_gradient(u, cells[e], dN[q], Q, det, H)
+            write_stress(H, lam, mu, w[q] * det, sigma[e, q])
+            add_gradient(phi, cells[e], dN[q], Q, det, G)
+            write_products(G, products[e, q])
+
+
+@jit
+def add_internal_forces(nodes, cells, of_cell, lame, dN, w, u, forces):
+    """Add ∫ sigma grad N_a of some elements to the forces at the nodes, (n_nodes, 3, k), as u."""
+    n_a, n_k = cells.shape[1], u.shape[2]
+    x = np.empty((n_a, 3))
+    J, Q = np.empty((3, 3)), np.empty((3, 3))
+    H, sigma = np.empty((3, 3, n_k)), np.empty((6, n_k))
+    for e in range(cells.shape[0]):
+        lam, mu = lame[of_cell[e], 0], lame[of_cell[e], 1]
+        for a in range(n_a):
+            for i in range(3):
+                x[a, i] = nodes[cells[e, a], i]
+        for q in range(w.size):
+            det = jacobian(x, dN[q], J, Q)
+            add_gradient(u, cells[e], dN[q], Q, det, H)
+            write_stress(H, lam, mu, w[q] * det, sigma)
+            for a in range(n_a):
+                for c in range(6):
+                    for turn in range(1 if c < 3 else 2):
+                        i, j = (FIRST[c], SECOND[c]) if turn == 0 else (SECOND[c], FIRST[c])
+                        g = (dN[q, a, 0] * Q[0, j] + dN[q, a, 1] * Q[1, j] + dN[q, a, 2] * Q[2, j]) / det
+                        row = forces[cells[e, a], i]
+                        for k in range(n_k):
+                            row[k] += sigma[c, k] * g

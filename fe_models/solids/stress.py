@@ -1,0 +1,105 @@
+"""Stress of a displacement field at the nodes of a solid mesh."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.threads import n_threads
+from fe_models.material import Material
+from fe_models.meshes.mesh import Mesh
+from fe_models.solids.elements import reference_element
+
+__all__ = ["nodal_stress", "stiffest_at_nodes"]
+
+
+def nodal_stress(
+    mesh: Mesh,
+    materials: tuple[Material, ...],
+    of_cell: Mapping[str, IntArray],
+    of_node: IntArray,
+    u: Array,
+    *,
+    nodes: IntArray | None = None,
+) -> Array:
+    """Return the stress at the nodes, (n_nodes, 6, k) [Pa], of displacement columns u, (3 n_nodes, k) [m].
+
+    (1) sigma = lam tr(eps) 1 + 2 mu eps at the sampling points of each element;
+    (2) carried to the element's nodes by the shape functions of its low-order relative (`ReferenceElement`);
+    (3) at each node the mean, weighted by element volume, over the elements of the node's material.
+    The result is linear in u. Components xx, yy, zz, yz, xz, xy.
+
+    Parameters
+    ----------
+    mesh, materials
+        The solid cells, and the materials that `of_cell` counts.
+    of_cell
+        Cell type -> material of each cell, (n_cells,).
+    of_node
+        The material whose stress each node shows, (n_nodes,); see `stiffest_at_nodes`.
+    u
+        Displacement columns, dof 3 i + c is component c of node i, (3 n_nodes, k).
+    nodes
+        Whose stress is wanted: only their elements are visited, the other nodes show zero; None: all.
+    """
+    from fe_models.solids.stress_kernels import add_element_stress, volume_at_nodes
+
+    lame = np.array([[material.lam, material.mu] for material in materials])
+    volume = np.zeros(len(mesh.nodes))
+    wanted = np.ones(len(mesh.nodes), dtype=bool)
+    if nodes is not None:
+        wanted[:] = False
+        wanted[nodes[nodes < len(wanted)]] = True
+    fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
+    n_columns = fields.shape[2]
+    stress = np.zeros((len(mesh.nodes), 6, n_columns))
+    cuts = np.linspace(0, n_columns, min(n_threads(), n_columns) + 1).astype(int) if n_columns else np.zeros(1, int)
+    with ThreadPoolExecutor(n_threads()) as pool:  # a thread owns its columns: no two write to one entry
+        for kind, all_cells in mesh.cells.items():
+            is_wanted = np.ones(len(all_cells), bool) if nodes is None else wanted[all_cells].any(axis=1)
+            cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
+            if not len(cells):
+                continue
+            element = reference_element(kind)
+            table = element.stress
+            volume_at_nodes(mesh.nodes, cells, material, of_node, table.gradients, table.weights, volume)
+            futures = [
+                pool.submit(
+                    add_element_stress,
+                    mesh.nodes,
+                    cells,
+                    material,
+                    of_node,
+                    lame,
+                    table.gradients,
+                    table.weights,
+                    element.extrapolation,
+                    fields,
+                    first,
+                    last,
+                    stress,
+                )
+                for first, last in pairwise(cuts.tolist())
+            ]
+            for future in futures:
+                future.result()
+    np.divide(stress, volume[:, None, None], out=stress, where=volume[:, None, None] > 0)
+    stress[~wanted] = 0.0
+    return stress
+
+
+def stiffest_at_nodes(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray]) -> IntArray:
+    """Return for each node the material with the largest modulus among its elements, (n_nodes,); ties: the first.
+
+    Stress jumps where materials meet; one number a node can show one side only. The stiffer side carries the larger
+    stress as a rule, and a fixed choice keeps the stress linear in the displacement.
+    """
+    order = np.argsort([-material.E for material in materials], kind="stable")
+    rank = np.empty(len(materials), np.int64)
+    rank[order] = np.arange(len(materials))
+    best = np.full(len(mesh.nodes), len(materials), np.int64)
+    for kind, cells in mesh.cells.items():
+        np.minimum.at(best, cells.ravel(), np.repeat(rank[of_cell[kind]], cells.shape[1]))
+    return order[np.minimum(best, len(materials) - 1)]

@@ -1,0 +1,78 @@
+"""Compiled loops of the stress recovery; imported where they are used."""
+
+import numpy as np
+from numba import njit
+
+from fe_models.solids.assembly_kernels import jacobian
+
+__all__ = ["add_element_stress", "volume_at_nodes"]
+
+jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@jit
+def volume_at_nodes(nodes, cells, of_cell, of_node, dN, w, volume):
+    """Add to volume, (n_nodes,), that of the elements which adjoin the node and have its material."""
+    n_a = cells.shape[1]
+    x = np.empty((n_a, 3))
+    J, Q = np.empty((3, 3)), np.empty((3, 3))
+    for e in range(cells.shape[0]):
+        for a in range(n_a):
+            for i in range(3):
+                x[a, i] = nodes[cells[e, a], i]
+        total = 0.0
+        for q in range(w.size):
+            total += w[q] * jacobian(x, dN[q], J, Q)
+        for a in range(n_a):
+            if of_cell[e] == of_node[cells[e, a]]:
+                volume[cells[e, a]] += total
+
+
+@jit
+def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolation, u, first, last, stress):
+    """Add to the columns first..last of stress, (n_nodes, 6, k), volume times stress of every element at its nodes.
+
+    u: displacement columns, (n_nodes, 3, k); lame: lam and mu of every material, (n_materials, 2); of_cell, of_node:
+    materials of elements and nodes. Columns are the inner loop: the geometry is worked out once for all of them.
+    """
+    n_a = cells.shape[1]
+    n_k = last - first
+    x = np.empty((n_a, 3))
+    J, Q = np.empty((3, 3)), np.empty((3, 3))
+    H = np.empty((3, 3, n_k))
+    sigma = np.empty((w.size, 6, n_k))
+    for e in range(cells.shape[0]):
+        lam, mu = lame[of_cell[e], 0], lame[of_cell[e], 1]
+        for a in range(n_a):
+            for i in range(3):
+                x[a, i] = nodes[cells[e, a], i]
+        total = 0.0
+        for q in range(w.size):
+            det = jacobian(x, dN[q], J, Q)
+            total += w[q] * det
+            H[:] = 0.0  # displacement gradient, H_ij = ∂u_i / ∂x_j
+            for a in range(n_a):
+                for j in range(J.shape[0]):  # a size unknown to the compiler: no unrolling, faster to compile
+                    g = (dN[q, a, 0] * Q[0, j] + dN[q, a, 1] * Q[1, j] + dN[q, a, 2] * Q[2, j]) / det
+                    for i in range(J.shape[0]):
+                        row, column = H[i, j], u[cells[e, a], i, first:last]
+                        for k in range(n_k):
+                            row[k] += column[k] * g
+            for k in range(n_k):
+                pressure = lam * (H[0, 0, k] + H[1, 1, k] + H[2, 2, k])
+                sigma[q, 0, k] = pressure + 2.0 * mu * H[0, 0, k]
+                sigma[q, 1, k] = pressure + 2.0 * mu * H[1, 1, k]
+                sigma[q, 2, k] = pressure + 2.0 * mu * H[2, 2, k]
+                sigma[q, 3, k] = mu * (H[1, 2, k] + H[2, 1, k])
+                sigma[q, 4, k] = mu * (H[0, 2, k] + H[2, 0, k])
+                sigma[q, 5, k] = mu * (H[0, 1, k] + H[1, 0, k])
+        for a in range(n_a):
+            node = cells[e, a]
+            if of_cell[e] != of_node[node]:
+                continue
+            for q in range(w.size):
+                factor = total * extrapolation[a, q]
+                for i in range(sigma.shape[1]):
+                    row, column = stress[node, i, first:last], sigma[q, i]
+                    for k in range(n_k):
+                        row[k] += factor * column[k]

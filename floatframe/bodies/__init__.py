@@ -1,0 +1,1 @@
+"""Bodies and the places on them: rigid, flexible, ground; markers; mass properties."""

@@ -1,0 +1,131 @@
+"""Small parts fixed to interfaces of a reduced body: their mass and inertia become part of the body.
+
+A part turns and moves with its interface: a particle at rho from the interface node has the position c = p + rho and
+the shape phi = Psi_t + Psi_r × rho, so that every moment of the body grows by sums over particles (THEORY §5). An
+inertia is carried by six particles on its principal axes. Against a rigid body fixed to the interface nothing is left
+out but the terms of second order in the elastic rotation, and none at all for a mass in the interface node.
+
+rod = with_masses(rod, [AddedMass("small_end", 0.3), AddedMass("big_end", 0.5, offset=(0, 0, 0.02), inertia=J)])
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cms.reduced_body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
+from floatframe.checked_values import array_of_shape, number
+from floatframe.errors import ModelError
+
+__all__ = ["AddedMass", "with_masses"]
+
+
+@dataclass(frozen=True, eq=False)
+class AddedMass:
+    """A small part fixed to an interface."""
+
+    interface: str  #: name of the interface
+    mass: float  #: [kg]
+    #: centre of mass from the interface node, in the axes of the interface, (3,) [m]
+    offset: Array = field(default_factory=lambda: np.zeros(3))
+    #: about that centre, in the axes of the interface, (3, 3) [kg m²]
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def __post_init__(self) -> None:
+        where = f"added mass at {self.interface!r}"
+        object.__setattr__(self, "mass", number(f"{where}: mass", self.mass, above=0.0))
+        object.__setattr__(self, "offset", array_of_shape(f"{where}: offset", self.offset, (3,)))
+        J = array_of_shape(f"{where}: inertia", self.inertia, (3, 3))
+        object.__setattr__(self, "inertia", J)
+        if np.abs(J - J.T).max() > 1e-9 * np.abs(J).max():
+            raise ModelError(f"{where}: inertia: expected a symmetric tensor, got {J.tolist()}")
+        if np.linalg.eigvalsh(second_moments(J))[0] < -1e-6 * np.abs(J).max():
+            raise ModelError(
+                f"{where}: inertia: no mass distribution has the principal moments {np.linalg.eigvalsh(J).tolist()}: "
+                "none may be negative or exceed the sum of the other two"
+            )
+
+    def particles(self) -> tuple[float, Array]:
+        """Return mass of each particle and their places from the interface node, axes of the interface, (n, 3)."""
+        if not self.inertia.any():
+            return self.mass, self.offset[None, :]
+        values, axes = np.linalg.eigh(second_moments(self.inertia))
+        arms = np.sqrt(3 * np.maximum(values, 0.0) / self.mass) * axes  # columns; two particles on each axis
+        return self.mass / 6, self.offset + np.concatenate([arms.T, -arms.T])
+
+
+def second_moments(J: Array) -> Array:
+    """Return ∫ x xᵀ of an inertia tensor, tr(J)/2 1 - J, (3, 3)."""
+    return np.asarray(0.5 * np.trace(J) * np.eye(3) - J)
+
+
+def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:
+    """Return the body with small parts fixed to its interfaces.
+
+    Modes, stiffness and interfaces stay; mass matrix, moments and, where the body has it, the geometric stiffness of
+    its inertia loads grow. The modes are then no longer those of free vibration of the body, and its frame no longer
+    that of Tisserand if it was: neither is needed by the equations of motion.
+
+    Raises
+    ------
+    ModelError
+        If an interface is not there.
+    """
+    moments, M, geometric = body.moments, np.array(body.M), body.geometric
+    for part in masses:
+        names = [interface.name for interface in body.interfaces]
+        if part.interface not in names:
+            raise ModelError(f"body {body.name!r}: no interface {part.interface!r}{nearest(part.interface, names)}")
+        k = names.index(part.interface)
+        node = body.interfaces[k]
+        m, places = part.particles()
+        for place in places:
+            rho = node.triad @ place
+            c = node.position + rho
+            phi = node.Psi[:3] + np.cross(node.Psi[3:], rho, axisa=0, axisb=0, axisc=0)
+            moments = replace(
+                moments,
+                m=moments.m + m,
+                S=moments.S + m * c,
+                R=moments.R + m * np.outer(c, c),
+                C1=moments.C1 + m * phi,
+                P=moments.P + m * np.einsum("a,bk->abk", c, phi),
+                S_kl=moments.S_kl + m * np.einsum("ak,bl->abkl", phi, phi),
+            )
+            M = M + m * phi.T @ phi
+            if geometric is not None:
+                geometric = with_particle(geometric, k, m, c, rho)
+    note = ", ".join(f"{part.mass:g} at {part.interface}" for part in masses)
+    return replace(
+        body,
+        M=M,
+        moments=moments,
+        geometric=geometric,
+        free_frequencies=np.zeros(0),
+        columns=None,
+        nodal_sums=None,
+        provenance={**body.provenance, "added masses": note},
+    )
+
+
+def with_particle(geometric: GeometricStiffness, k: int, m: float, c: Array, rho: Array) -> GeometricStiffness:
+    """Return the geometric stiffness with the inertia loads of a particle at rho from the node of interface k.
+
+    Its unit loads (see `GeometricStiffness`) are forces at the particle: a force f and the moment rho × f at the node.
+    """
+    K = geometric.interfaces[k]
+
+    def of_force(f: Array) -> Array:
+        return np.asarray(np.tensordot(np.concatenate([f, np.cross(rho, f)]), K, axes=1))
+
+    e = np.eye(3)
+    twice = [np.cross(e[a], np.cross(e[b], c)) + np.cross(e[b], np.cross(e[a], c)) for a, b in SPIN_PAIRS]
+    return replace(
+        geometric,
+        translation=geometric.translation + np.stack([of_force(-m * e[a]) for a in range(3)]),
+        rotation=geometric.rotation + np.stack([of_force(-m * np.cross(e[a], c)) for a in range(3)]),
+        spin=geometric.spin + np.stack([of_force(-0.5 * m * x) for x in twice]),
+    )

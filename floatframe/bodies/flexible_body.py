@@ -1,0 +1,89 @@
+"""A flexible body: a reduced body (modal file) with a place and a motion at the start."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.rigid_body import euler_parameters_from_user
+from floatframe.checked_values import array_of_shape
+from floatframe.errors import ModelError
+from floatframe.rotations import rotation_matrix
+
+__all__ = ["FlexibleBody"]
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleBody:
+    """An instance of a reduced body; several instances share its data.
+
+    Place and motion are those of the *mesh* axes, so that a body stands where its mesh was drawn unless it is moved,
+    and an input does not change when the same part is reduced in another body frame (nodal or Tisserand).
+
+    Raises
+    ------
+    ModelError
+        If a number is not finite or a shape is wrong.
+    """
+
+    name: str
+    reduced: ReducedBody
+    position: Array = field(default_factory=lambda: np.zeros(3))  #: of the mesh origin in ground axes, (3,) [m]
+    orientation: Array = field(default_factory=lambda: np.array([1.0, 0, 0, 0]))  #: Euler parameters, mesh axes, (4,)
+    velocity: Array = field(default_factory=lambda: np.zeros(3))  #: of the body point at the mesh origin, ground, (3,)
+    #: angular velocity in mesh axes, (3,) [rad/s]
+    omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
+    q: Array = field(default_factory=lambda: np.zeros(0))  #: modal coordinates at the start, (n_q,); empty: undeformed
+    q_dot: Array = field(default_factory=lambda: np.zeros(0))  #: their rates, (n_q,); empty: zero
+    source: str = ""  #: path of the modal file, for the record and the animation
+    #: whether the geometric stiffness counts: loads stiffen or soften the body (THEORY §7); "auto": if it is there
+    stiffening: bool | Literal["auto"] = "auto"
+
+    def __post_init__(self) -> None:
+        where = f"flexible body {self.name!r}"
+        put = object.__setattr__
+        for name in ("position", "velocity", "omega_B"):
+            put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))
+        put(self, "orientation", euler_parameters_from_user(f"{where}: orientation", self.orientation))
+        n = self.reduced.n_q
+        for name in ("q", "q_dot"):
+            value = getattr(self, name) if np.size(getattr(self, name)) else np.zeros(n)
+            put(self, name, array_of_shape(f"{where}: {name}", value, (n,)))
+        if not (isinstance(self.stiffening, bool) or self.stiffening == "auto"):
+            raise ModelError(f"{where}: stiffening: expected true, false or 'auto', got {self.stiffening!r}")
+        if self.stiffening is True and self.reduced.geometric is None:
+            raise ModelError(
+                f"{where}: stiffening is asked for, but the reduced body {self.reduced.name!r} holds no geometric "
+                "stiffness; reduce it anew with geometric stiffness from a body with an element model, or leave "
+                "stiffening out"
+            )
+        if self.reduced.moments.m <= 0:
+            raise ModelError(f"{where}: expected a mass above zero, got {self.reduced.moments.m:g}")
+
+    @property
+    def is_stiffened(self) -> bool:
+        """Whether the geometric stiffness of the reduced body counts."""
+        return self.stiffening is not False and self.reduced.geometric is not None
+
+    @property
+    def frame_orientation(self) -> Array:
+        """R_GB of the body frame at the start, (3, 3)."""
+        return rotation_matrix(self.orientation) @ self.reduced.frame.axes
+
+    @property
+    def frame_position(self) -> Array:
+        """Position of the frame origin at the start, ground axes, (3,) [m]."""
+        return self.position + rotation_matrix(self.orientation) @ self.reduced.frame.origin
+
+    @property
+    def frame_velocity(self) -> Array:
+        """Velocity of the frame origin at the start, ground axes, (3,) [m/s]."""
+        arm = np.cross(self.omega_B, self.reduced.frame.origin)
+        return self.velocity + rotation_matrix(self.orientation) @ arm
+
+    @property
+    def frame_omega(self) -> Array:
+        """Angular velocity at the start in the axes of the body frame, (3,) [rad/s]."""
+        return self.reduced.frame.axes.T @ self.omega_B

@@ -1,0 +1,1 @@
+"""From the description of a system to the arrays of the kernels."""

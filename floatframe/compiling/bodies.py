@@ -1,0 +1,110 @@
+"""Types of bodies as flat arrays: instances of one reduced body share one."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.rigid_body import RigidBody
+from floatframe.compiling.stiffening import stiffened_shape_moments
+from floatframe.kernels.model import N_BLOCKS
+from floatframe.system import Body
+
+__all__ = ["body_n_q", "body_types", "integers", "offsets", "stacked", "type_arrays"]
+
+
+def integers(values: list[int]) -> IntArray:
+    """Return an integer array, empty ones included."""
+    return np.array(values, dtype=np.int64)
+
+
+def offsets(sizes: IntArray) -> IntArray:
+    """Return where each of consecutive parts begins, and the end, (n + 1,)."""
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+
+def stacked(arrays: list, shape: tuple[int, ...]) -> Array:
+    """Return arrays of one shape as one, (n, *shape), writeable so that the kernels see one type."""
+    return np.array(arrays, dtype=float).reshape(len(arrays), *shape)
+
+
+def body_n_q(body: Body) -> int:
+    """Return the number of modes of a body."""
+    return body.reduced.n_q if isinstance(body, FlexibleBody) else 0
+
+
+def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], IntArray]:
+    """Return the distinct bodies, instances of one reduced body counted once, and the type of each body.
+
+    A reduced body that is not stiffened comes without its geometric stiffness.
+    """
+    types: list[RigidBody | ReducedBody] = []
+    kind, keys = [], []
+    for body in bodies:
+        data = body.reduced if isinstance(body, FlexibleBody) else body
+        key = id(data), isinstance(body, FlexibleBody) and body.is_stiffened
+        if key not in keys:
+            keys.append(key)
+            if isinstance(data, ReducedBody) and data.geometric is not None and not key[1]:
+                data = replace(data, geometric=None, quadratic=None)
+            types.append(data)
+        kind.append(keys.index(key))
+    return types, integers(kind)
+
+
+def type_arrays(types: list[RigidBody | ReducedBody]) -> dict[str, Any]:
+    """Return the constant arrays of the types of bodies."""
+    blocks: list[Array] = []
+    block0 = np.zeros((len(types), N_BLOCKS), np.int64)
+    is_diagonal = np.ones((len(types), 3), np.int64)
+    is_stiffened = np.zeros(len(types), np.int64)
+    mass, S, J0 = [], [], []
+    n = 0
+    for t, body in enumerate(types):
+        if isinstance(body, RigidBody):
+            mass.append(body.mass)
+            S.append(body.mass * body.center_of_mass)
+            J0.append(body.inertia_about_origin)
+            continue
+        moments = body.moments
+        mass.append(moments.m)
+        S.append(moments.S)
+        J0.append(moments.J0)
+        square = []
+        for k, matrix in enumerate((body.M, body.K, body.D)):
+            is_diagonal[t, k] = int(not np.any(matrix - np.diag(np.diag(matrix))))
+            square.append(np.diag(matrix) if is_diagonal[t, k] else matrix)
+        S_kl = moments.S_kl
+        unit_loads: list[Array] = []
+        if body.geometric is not None and body.n_q > 0:
+            is_stiffened[t] = 1
+            S_kl = stiffened_shape_moments(S_kl, body.geometric)
+            unit_loads = [
+                np.moveaxis(K, 2, 0) for K in (body.geometric.translation, body.geometric.rotation)
+            ]  # [l, a, k]
+        parts = [
+            moments.C1,
+            moments.C2,
+            np.moveaxis(moments.C3, 0, 2),
+            np.moveaxis(S_kl, 3, 0),  # [l, a, b, k]
+            np.transpose(moments.C4, (1, 2, 0)),  # [l, a, k]
+            *square,
+            *unit_loads,
+        ]
+        for k, part in enumerate(parts):
+            block0[t, k] = n
+            blocks.append(np.ascontiguousarray(part, dtype=float).ravel())
+            n += part.size
+    return {
+        "mass": np.array(mass, dtype=float),
+        "S": stacked(S, (3,)),
+        "J0": stacked(J0, (3, 3)),
+        "blocks": np.concatenate([*blocks, np.zeros(0)]),
+        "block0": block0,
+        "is_diagonal": is_diagonal,
+        "is_stiffened": is_stiffened,
+    }

@@ -1,0 +1,270 @@
+"""Couplers and user forces as flat arrays: ports on the markers of joints or of their own, and what couples them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
+from floatframe.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate
+from floatframe.compiling.bodies import integers, offsets
+from floatframe.compiling.callbacks import Callback, callback_of
+from floatframe.compiling.connections import Connections, End
+from floatframe.compiling.forces import Functions
+from floatframe.compiling.markers import MarkerData, find_marker, joint_markers, marker_pose
+from floatframe.errors import ModelError
+from floatframe.forces import UserForce
+from floatframe.functions.expressions import Tape, compile_expression
+from floatframe.joints.axis_frame import axis_in_b, turning_frame
+from floatframe.joints.coordinate_coupler import CoordinateCoupler
+from floatframe.joints.rows import (
+    COUPLE,
+    DISTANCE,
+    FORCE,
+    GAUGE_B,
+    NO_MOMENT,
+    PART,
+    PUSH,
+    SCREW,
+    SLIDE,
+    SPAN,
+    TURN,
+    TURN_B,
+    TWIST,
+    TWIST_B,
+    Row,
+)
+from floatframe.kernels.model import COUPLER, USER_FORCE
+from floatframe.system import System
+
+__all__ = ["Networks", "Port", "add_networks", "find_port", "port_value"]
+
+INTEGERS = (
+    "p_a", "p_b", "p_row", "p_force", "p_arm", "p_core", "core",
+    "user_forces", "user_states", "user_address", "user_tape0", "state0", "state_row",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Port:
+    """A coordinate found in the system: its markers and the directions it is made of."""
+
+    a: MarkerData
+    b: MarkerData
+    row: Row  #: of the kind PUSH, TWIST, TWIST_B or SPAN
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is an angle."""
+        return self.row.kind in (TWIST, TWIST_B)
+
+    @property
+    def has_arm(self) -> bool:
+        """Whether a force along it has a moment about the point of A that anything feels."""
+        return self.row.kind == PUSH and self.a.body >= 0
+
+
+@dataclass
+class Networks:
+    """Lists over ports and connections."""
+
+    names: tuple[str, ...] = ()
+    port0: list[int] = field(default_factory=lambda: [0])
+    p_a: list[int] = field(default_factory=list)
+    p_b: list[int] = field(default_factory=list)
+    p_row: list[int] = field(default_factory=list)
+    p_force: list[int] = field(default_factory=list)
+    p_arm: list[int] = field(default_factory=list)
+    p_factor: list[float] = field(default_factory=list)
+    p_core: list[int] = field(default_factory=list)
+    core: list[int] = field(default_factory=list)
+    user_forces: list[int] = field(default_factory=list)
+    user_states: list[int] = field(default_factory=list)
+    user_address: list[int] = field(default_factory=list)
+    user_tape0: list[int] = field(default_factory=list)
+    state0: list[int] = field(default_factory=lambda: [0])
+    state_row: list[int] = field(default_factory=list)
+    state_start: list[float] = field(default_factory=list)
+    tapes: list[Tape] = field(default_factory=list)
+    callbacks: list[Callback] = field(default_factory=list)
+
+    def arrays(self) -> dict[str, Any]:
+        """Return the arrays of the model."""
+        return {
+            "port0": integers(self.port0),
+            **{name: integers(getattr(self, name)) for name in INTEGERS},
+            "p_factor": np.array(self.p_factor, dtype=float),
+            "state_start": np.array(self.state_start, dtype=float),
+            "tape0": offsets(integers([len(tape.op) for tape in self.tapes])),
+            "tape_op": integers([op for tape in self.tapes for op in tape.op]),
+            "tape_a": integers([a for tape in self.tapes for a in tape.a]),
+            "tape_b": integers([b for tape in self.tapes for b in tape.b]),
+            "tape_c": np.array([c for tape in self.tapes for c in tape.c], dtype=float),
+        }
+
+
+def add_networks(system: System, made: Connections, functions: Functions) -> Networks:
+    """Add the couplers of a system, then its user forces."""
+    forces = [force for force in system.forces if isinstance(force, UserForce)]
+    networks = Networks((*(coupler.name for coupler in system.couplers), *(force.name for force in forces)))
+    for coupler in system.couplers:
+        add_coupler(system, made, networks, coupler)
+    for force in forces:
+        add_user_force(system, made, networks, functions, force)
+    return networks
+
+
+def add_coupler(system: System, made: Connections, networks: Networks, coupler: CoordinateCoupler) -> None:
+    """Add a coupler: the rows of its ports, then that of its multiplier."""
+    where = f"coupler {coupler.name!r}"
+    ports = [find_port(system, f"{where}: term {k + 1}", c, made) for k, (c, _) in enumerate(coupler.terms)]
+    factors = [factor for _, factor in coupler.terms]
+    as_placed = sum(f * port_value(port, made) for f, port in zip(factors, ports, strict=True))
+    scale = 1 / max(abs(factor) for factor in factors)
+    held = Row(COUPLE, np.array([scale, 0.0, 0.0]), c=as_placed, motion=coupler.constant)  # type: ignore[arg-type]
+    add_ports(made, networks, coupler.name, COUPLER, ports, factors, [True] * len(ports), [held])
+
+
+def add_user_force(
+    system: System, made: Connections, networks: Networks, functions: Functions, force: UserForce
+) -> None:
+    """Add a user force: the rows of its ports, then of its forces, then of its states."""
+    where = f"force {force.name!r}"
+    names, acting = list(force.coordinates), list(force.forces)
+    ports = [find_port(system, f"{where}: coordinates: {k}", c, made) for k, c in force.coordinates.items()]
+    rows = [Row(PART)] * (len(acting) + 3 * len(force.states))
+    has_force = [name in acting for name in names]
+    first = add_ports(made, networks, force.name, USER_FORCE, ports, [1.0] * len(ports), has_force, rows)
+    networks.p_core[-len(ports) :] = [first + acting.index(name) if name in acting else first for name in names]
+    networks.user_forces.append(len(acting))
+    networks.user_states.append(len(force.states))
+    networks.user_tape0.append(len(networks.tapes))
+    networks.state_row += [first + len(acting) + 3 * k for k in range(len(force.states))]
+    networks.state0.append(len(networks.state_row))
+    networks.state_start += list(force.states.values())
+    if force.function is not None:
+        networks.callbacks.append(callback_of(force, len(ports)))
+        networks.user_address.append(networks.callbacks[-1].address)
+        return
+    networks.user_address.append(0)
+    assert isinstance(force.forces, Mapping)  # checked by the force
+    numbers = {name: functions.index(function) for name, function in force.functions.items()}
+    texts = [(f"forces: {name}", text) for name, text in force.forces.items()]
+    texts += [(f"rates: {name}", force.rates[name]) for name in force.states]
+    for place, text in texts:
+        networks.tapes.append(
+            compile_expression(f"{where}: {place}", text, force.inputs, parameters=force.parameters, functions=numbers)
+        )
+
+
+def add_ports(
+    made: Connections,
+    networks: Networks,
+    name: str,
+    law: int,
+    ports: list[Port],
+    factors: list[float],
+    has_force: list[bool],
+    core: list[Row],
+) -> int:
+    """Add a connection with the rows of its ports, then those of its core; return the number of the first of these."""
+    rows: list[Row] = []
+    ends: list[End] = []
+    starts: list[tuple[int, int, int]] = []  # of each port, in the connection: value, force, arm
+    for port, acts in zip(ports, has_force, strict=True):
+        value = len(rows)
+        rows += [port.row, Row(PART)]
+        force = arm = NO_MOMENT
+        if acts:
+            force = len(rows)
+            rows += [Row(PART)] * 3
+            if port.has_arm:
+                arm = len(rows)
+                rows += [Row(PART)] * 3
+        starts.append((value, force, arm))
+        if port.is_angle:
+            ends += [End(port.a, 1.0, NO_MOMENT, force), End(port.b, -1.0, NO_MOMENT, force)]
+        else:
+            ends += [End(port.a, 1.0, force, arm), End(port.b, -1.0, force)]
+    marker, w0 = made.add(name, law, ends, [*rows, *core], has_rates=True)
+    for k, (value, force, arm) in enumerate(starts):
+        networks.p_a.append(marker + 2 * k)
+        networks.p_b.append(marker + 2 * k + 1)
+        networks.p_row.append(w0 + value)
+        networks.p_force.append(w0 + force if force >= 0 else -1)
+        networks.p_arm.append(w0 + arm if arm >= 0 else -1)
+        networks.p_factor.append(factors[k])
+        networks.p_core.append(w0 + len(rows))
+    networks.port0.append(len(networks.p_a))
+    networks.core.append(w0 + len(rows))
+    return w0 + len(rows)
+
+
+def find_port(system: System, where: str, coordinate: Coordinate, made: Connections) -> Port:
+    """Return the port of a coordinate; `ModelError` with the nearest name if it is not there."""
+    if isinstance(coordinate, JointCoordinate):
+        return joint_port(system, where, coordinate, made)
+    a = find_marker(system, f"{where}: marker_a", coordinate.marker_a)
+    b = find_marker(system, f"{where}: marker_b", coordinate.marker_b)
+    if a.body == b.body:
+        raise ModelError(f"{where}: expected markers on two bodies, got both on one")
+    (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
+    if isinstance(coordinate, AxialDistance):
+        return Port(a, b, Row(PUSH, coordinate.axis))
+    if isinstance(coordinate, AxialAngle):
+        axis_b = axis_in_b(coordinate.axis, None, A_a, A_b)
+        x, z, y = turning_frame(coordinate.axis, axis_b, A_a, A_b)
+        return Port(a, b, Row(TWIST, x, y, z=z))
+    if np.linalg.norm(r_b - r_a) == 0:
+        raise ModelError(f"{where}: its markers coincide as placed, so that their line has no direction; move one")
+    return Port(a, b, Row(SPAN))
+
+
+def joint_port(system: System, where: str, wanted: JointCoordinate, made: Connections) -> Port:
+    """Return the port of a coordinate of a joint."""
+    names = [joint.name for joint in system.joints]
+    if wanted.joint not in names:
+        raise ModelError(f"{where}: no joint {wanted.joint!r}{nearest(wanted.joint, names)}")
+    joint = system.joints[names.index(wanted.joint)]
+    if wanted.coordinate not in joint.coordinates:
+        raise ModelError(
+            f"{where}: joint {joint.name!r} has no coordinate {wanted.coordinate!r}"
+            f"{nearest(wanted.coordinate, list(joint.coordinates))}"
+        )
+    a, b = joint_markers(system, joint, made.placed)
+    (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
+    row = next(row for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate == wanted.coordinate)
+    if row.kind == DISTANCE:
+        return Port(a, b, Row(SPAN))
+    if row.kind == SCREW:
+        if wanted.coordinate == "distance":
+            return Port(a, b, Row(PUSH, np.cross(row.x, row.z)))
+        return Port(a, b, Row(TWIST, row.x, row.y, z=row.z))
+    if row.kind == GAUGE_B:
+        return Port(a, b, Row(TWIST_B, np.cross(row.z, row.y), row.x, z=row.z))
+    if row.kind == TURN_B:
+        return Port(a, b, Row(TWIST_B, row.x, row.y, z=row.z))
+    if row.kind == SLIDE or (row.kind != TURN and row.part == FORCE and not np.any(row.z)):
+        return Port(a, b, Row(PUSH, row.x))
+    x = row.x if row.kind == TURN else np.cross(row.z, row.x)
+    return Port(a, b, Row(TWIST, x, row.y, z=row.z))
+
+
+def port_value(port: Port, made: Connections) -> float:
+    """Return the value of a port as placed; angles between -pi and pi."""
+    (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (port.a, port.b))
+    row = port.row
+    if row.kind == SPAN:
+        return float(np.linalg.norm(r_b - r_a))
+    if row.kind == PUSH:
+        return float(A_a @ row.x @ (r_b - r_a))
+    if row.kind == TWIST_B:
+        return -turned(A_b, A_a, row.x, row.z, row.y)
+    return turned(A_a, A_b, row.x, row.z, row.y)
+
+
+def turned(A: Array, B: Array, x: Array, z: Array, y: Array) -> float:
+    """Return the angle of the direction y of B from z of A towards -x of A."""
+    return float(np.arctan2(-(A @ x) @ (B @ y), (A @ z) @ (B @ y)))

@@ -1,0 +1,103 @@
+"""Order and fill of the block elimination of connections that share bodies; done once per system."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import IntArray
+
+__all__ = ["Elimination", "plan_elimination"]
+
+
+class Elimination(NamedTuple):
+    """Where the blocks of the connection matrix are stored and in which order they are eliminated."""
+
+    order: IntArray
+    s_diagonal: IntArray
+    s_size: IntArray
+    pair_row: IntArray
+    pair_column: IntArray
+    pair_block: IntArray
+    after0: IntArray
+    after: IntArray
+    after_lower: IntArray
+    after_upper: IntArray
+    update0: IntArray
+    update: IntArray
+
+
+def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connection_of: IntArray) -> Elimination:
+    """Plan the block LU factorisation of a structurally symmetric matrix.
+
+    (1) two connections are neighbours if they have an end on one body;
+    (2) the connection with the fewest neighbours is eliminated next, its neighbours become neighbours of each other
+        (minimum degree: no fill for chains and trees);
+    (3) every block that is ever touched gets its place in one flat store.
+
+    Parameters
+    ----------
+    sizes
+        Rows of each connection.
+    ends_of_bodies
+        Markers that are ends of connections, for each body.
+    connection_of
+        Connection of each marker.
+    """
+    n = len(sizes)
+    neighbours: list[set[int]] = [set() for _ in range(n)]
+    for ends in ends_of_bodies:
+        group = {int(connection_of[m]) for m in ends}
+        for j in group:
+            neighbours[j] |= group - {j}
+    place: dict[tuple[int, int], int] = {}
+    n_store = 0
+
+    def block(i: int, j: int) -> int:
+        nonlocal n_store
+        if (i, j) not in place:
+            place[i, j] = n_store
+            n_store += sizes[i] * sizes[j]
+        return place[i, j]
+
+    diagonal = [block(j, j) for j in range(n)]
+    pairs = [(a, b) for ends in ends_of_bodies for a in ends for b in ends]
+    pair_block = [block(int(connection_of[a]), int(connection_of[b])) for a, b in pairs]
+    order: list[int] = []
+    after: list[int] = []
+    lower: list[int] = []
+    upper: list[int] = []
+    update: list[int] = []
+    after0, update0 = [0], [0]
+    left = set(range(n))
+    while left:
+        j = min(left, key=lambda c: (len(neighbours[c]), c))
+        left.remove(j)
+        later = sorted(neighbours[j])
+        order.append(j)
+        for i in later:
+            neighbours[i] |= neighbours[j] - {i}
+            neighbours[i].discard(j)
+            after.append(i)
+            lower.append(block(i, j))
+            upper.append(block(j, i))
+        update.extend(block(i, k) for i in later for k in later)
+        after0.append(len(after))
+        update0.append(len(update))
+
+    def integers(values: list[int]) -> IntArray:
+        return np.array(values, dtype=np.int64)
+
+    return Elimination(
+        order=integers(order),
+        s_diagonal=integers(diagonal),
+        s_size=integers([n_store]),
+        pair_row=integers([a for a, _ in pairs]),
+        pair_column=integers([b for _, b in pairs]),
+        pair_block=integers(pair_block),
+        after0=integers(after0),
+        after=integers(after),
+        after_lower=integers(lower),
+        after_upper=integers(upper),
+        update0=integers(update0),
+        update=integers(update),
+    )

@@ -1,0 +1,175 @@
+"""Markers found in their bodies, and where they are at the start."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import nearest
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import Marker, body_name
+from floatframe.compiling.bodies import body_n_q, integers, offsets
+from floatframe.compiling.stiffening import bending_of
+from floatframe.errors import ModelError
+from floatframe.joints import Joint
+from floatframe.rotations import rotation_exp, rotation_matrix
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = [
+    "MarkerData",
+    "find_marker",
+    "joint_markers",
+    "marker_bending",
+    "marker_pose",
+    "marker_shapes",
+    "marker_with_pose",
+    "n_q_of",
+]
+
+GROUND_INDEX = -1
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerData:
+    """A marker found in its body."""
+
+    body: int  #: index, -1 for the ground
+    position: Array  #: undeformed, body frame, (3,)
+    triad: Array  #: undeformed axes as columns, body frame, (3, 3)
+    psi: Array | None = None  #: (6, n_q)
+    bend: Array | None = None  #: K_P of a stiffened body, (6, n_q, n_q)
+
+
+def n_q_of(system: System) -> IntArray:
+    """Return the numbers of modes of the bodies, (n_b,)."""
+    return integers([body_n_q(body) for body in system.bodies])
+
+
+def find_body(system: System, where: str, name: str) -> int:
+    """Return the index of a body, -1 for the ground; `ModelError` with the nearest name if there is none."""
+    if name == GROUND.name:
+        return GROUND_INDEX
+    names = [body.name for body in system.bodies]
+    if name not in names:
+        raise ModelError(f"{where}: no body {name!r}{nearest(name, [GROUND.name, *names])}")
+    return names.index(name)
+
+
+def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
+    """Return a marker with its place in the body frame."""
+    if not isinstance(marker, Marker):
+        raise ModelError(f"{where}: expected a Marker, got {marker!r}")
+    index = find_body(system, where, body_name(marker.body))
+    body = system.bodies[index] if index >= 0 else None
+    triad = np.eye(3) if marker.triad is None else marker.triad
+    if not isinstance(body, FlexibleBody):
+        if marker.interface is not None:
+            raise ModelError(
+                f"{where}: body {body_name(marker.body)!r} is not flexible and has no interface "
+                f"{marker.interface!r}; give a position"
+            )
+        position = np.zeros(3) if marker.position is None else marker.position
+        return MarkerData(index, position, triad)
+    choices = [interface.name for interface in body.reduced.interfaces]
+    if marker.interface is None or marker.position is not None:
+        raise ModelError(
+            f"{where}: a marker on the flexible body {body.name!r} needs an interface and no position; choices: "
+            f"{', '.join(choices)}"
+        )
+    if marker.interface not in choices:
+        raise ModelError(
+            f"{where}: flexible body {body.name!r} has no interface {marker.interface!r}"
+            f"{nearest(marker.interface, choices)}"
+        )
+    interface = body.reduced.interface(marker.interface)
+    bend = bending_of(body.reduced, marker.interface) if body.is_stiffened else None
+    return MarkerData(index, interface.position, interface.triad @ triad, interface.Psi, bend)
+
+
+def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerData, MarkerData]:
+    """Return both markers of a joint; a body in the place of a marker is met where the other marker is placed."""
+    where = f"joint {joint.name!r}"
+    given_a, given_b = joint.marker_a, joint.marker_b
+    if isinstance(given_a, Marker):
+        a = find_marker(system, f"{where}: marker_a", given_a)
+        if isinstance(given_b, Marker):
+            b = find_marker(system, f"{where}: marker_b", given_b)
+        else:
+            b = marker_as_placed(system, f"{where}: marker_b", body_name(given_b), a, placed)
+    elif isinstance(given_b, Marker):
+        b = find_marker(system, f"{where}: marker_b", given_b)
+        a = marker_as_placed(system, f"{where}: marker_a", body_name(given_a), b, placed)
+    else:
+        raise ModelError(f"{where}: expected a Marker at one end at least, got two bodies; say where the joint is")
+    if a.body == b.body:
+        name = GROUND.name if a.body < 0 else system.bodies[a.body].name
+        raise ModelError(f"{where}: expected markers on two bodies, got both on {name!r}")
+    return a, b
+
+
+def marker_as_placed(system: System, where: str, name: str, other: MarkerData, placed: State) -> MarkerData:
+    """Return the marker of a body at the place of another marker, with the axes of the body."""
+    r_P, _ = marker_pose(other, placed, n_q_of(system))
+    marker = marker_with_pose(system, where, name, (r_P, np.eye(3)), placed)
+    return replace(marker, triad=np.eye(3))
+
+
+def marker_with_pose(system: System, where: str, name: str, pose: tuple[Array, Array], placed: State) -> MarkerData:
+    """Return the marker of a body at a position with axes, both in ground axes, as placed."""
+    index = find_body(system, where, name)
+    r_P, A_P = pose
+    if index < 0:
+        return MarkerData(index, r_P, A_P)
+    body = system.bodies[index]
+    if isinstance(body, FlexibleBody):
+        choices = ", ".join(interface.name for interface in body.reduced.interfaces)
+        raise ModelError(
+            f"{where}: a flexible body can be held at an interface only; give a Marker on {name!r}, one of: {choices}"
+        )
+    R = rotation_matrix(placed.p[index])
+    return MarkerData(index, R.T @ (r_P - placed.r[index]), R.T @ A_P)
+
+
+def marker_pose(marker: MarkerData, state: State, n_q: IntArray) -> tuple[Array, Array]:
+    """Return position (3,) and axes (3, 3) of a marker in ground axes."""
+    if marker.body < 0:
+        return marker.position, marker.triad
+    R = rotation_matrix(state.p[marker.body])
+    position, triad = marker.position, marker.triad
+    if marker.psi is not None:
+        q0 = offsets(n_q)
+        q = state.q[q0[marker.body] : q0[marker.body + 1]]
+        d = marker.psi @ q
+        if marker.bend is not None:
+            d = d - 0.5 * marker.bend @ q @ q
+        position, triad = position + d[:3], rotation_exp(d[3:]) @ triad
+    return state.r[marker.body] + R @ position, R @ triad
+
+
+def marker_shapes(markers: list[MarkerData]) -> tuple[IntArray, Array]:
+    """Return where the shapes of each marker begin (-1 for none), and the shapes, flat."""
+    start, parts, n = [], [], 0
+    for marker in markers:
+        start.append(-1 if marker.psi is None else n)
+        if marker.psi is not None:
+            parts.append(np.ascontiguousarray(marker.psi, dtype=float).ravel())
+            n += marker.psi.size
+    return integers(start), np.concatenate([*parts, np.zeros(0)])
+
+
+def marker_bending(markers: list[MarkerData]) -> tuple[IntArray, Array]:
+    """Return where K_P [l, 6, k] of each marker begins (-1 for none), and all of them, flat; one interface has one."""
+    start, known, parts, n = [], {}, [], 0
+    for marker in markers:
+        if marker.bend is None or marker.bend.size == 0:
+            start.append(-1)
+            continue
+        key = marker.bend.__array_interface__["data"][0], marker.bend.shape
+        if key not in known:
+            known[key] = n
+            parts.append(np.ascontiguousarray(np.moveaxis(marker.bend, 2, 0)).ravel())
+            n += marker.bend.size
+        start.append(known[key])
+    return integers(start), np.concatenate([*parts, np.zeros(0)])

@@ -1,0 +1,181 @@
+"""A small language for forces and control: `-k*phi - c*phi_dot + table(t)`, compiled to a tape of operations.
+
+Numbers, names, + - * / ** (or ^), comparisons < <= > >=, `a if x < b else c`, and the functions of `FUNCTIONS`. The
+text is parsed by Python's own parser and never run: only what is listed here exists. The kernels walk the tape and
+its exact gradient (kernels/connections/tape.py), so that nothing is compiled for a new expression.
+"""
+
+import ast
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from fe_models.foundation.words import nearest
+from floatframe.errors import ModelError
+
+__all__ = ["CONSTANTS", "FUNCTIONS", "Tape", "compile_expression"]
+
+#: operations without operands on the tape, of one operand, of two: codes in the kernels
+CONSTANT, INPUT, CALL, SELECT = range(4)
+NEGATIVE, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN = range(4, 19)
+ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, ATAN2, LESS, MIN, MAX = range(19, 28)
+
+FUNCTIONS = {  # name: (code, number of arguments)
+    "sin": (SIN, 1), "cos": (COS, 1), "tan": (TAN, 1), "asin": (ASIN, 1), "acos": (ACOS, 1), "atan": (ATAN, 1),
+    "sinh": (SINH, 1), "cosh": (COSH, 1), "tanh": (TANH, 1), "exp": (EXP, 1), "log": (LOG, 1), "sqrt": (SQRT, 1),
+    "abs": (ABS, 1), "sign": (SIGN, 1), "atan2": (ATAN2, 2), "min": (MIN, 2), "max": (MAX, 2),
+}  # fmt: skip
+CONSTANTS = {"pi": math.pi}
+OPERATORS: dict[type, int] = {
+    ast.Add: ADD, ast.Sub: SUBTRACT, ast.Mult: MULTIPLY, ast.Div: DIVIDE, ast.Pow: POWER, ast.BitXor: POWER,
+}  # fmt: skip
+MOST_OPERATIONS = 500
+
+
+@dataclass
+class Tape:
+    """Operations in their order: code, operands (numbers of earlier ones, or of an input), constant."""
+
+    op: list[int] = field(default_factory=list)
+    a: list[int] = field(default_factory=list)
+    b: list[int] = field(default_factory=list)
+    c: list[float] = field(default_factory=list)
+
+    def add(self, op: int, a: int = 0, b: int = 0, c: float = 0.0) -> int:
+        """Add an operation; return its number."""
+        self.op.append(op)
+        self.a.append(a)
+        self.b.append(b)
+        self.c.append(c)
+        return len(self.op) - 1
+
+
+def compile_expression(
+    where: str,
+    text: str,
+    inputs: Sequence[str],
+    *,
+    parameters: Mapping[str, float] | None = None,
+    functions: Mapping[str, int] | None = None,
+) -> Tape:
+    """Return the tape of an expression.
+
+    Parameters
+    ----------
+    where
+        What it is, for messages.
+    text
+        The expression.
+    inputs
+        Names of the numbers it is a function of, in their order.
+    parameters
+        Names with a value.
+    functions
+        Names of functions of one number (tables), and their numbers in the kernels.
+
+    Raises
+    ------
+    ModelError
+        With the token and its column, if it is not an expression or uses what does not exist.
+    """
+    try:
+        tree = ast.parse(text.strip().replace("^", "**"), mode="eval").body
+    except (SyntaxError, AttributeError, ValueError) as problem:
+        column = getattr(problem, "offset", None)
+        place = f" at column {column}" if column else ""
+        raise ModelError(f"{where}: {text!r} is not an expression{place}; see docs/system_file.md") from None
+    writer = Writer(where, text, tuple(inputs), dict(parameters or {}), dict(functions or {}), Tape())
+    writer.write(tree)
+    if len(writer.tape.op) > MOST_OPERATIONS:
+        raise ModelError(f"{where}: expected up to {MOST_OPERATIONS} operations, got {len(writer.tape.op)}")
+    return writer.tape
+
+
+@dataclass
+class Writer:
+    """Writes the nodes of a syntax tree on a tape."""
+
+    where: str
+    text: str
+    inputs: tuple[str, ...]
+    parameters: dict[str, float]
+    functions: dict[str, int]
+    tape: Tape
+
+    def refuse(self, node: ast.AST, words: str, hint: str = "") -> ModelError:
+        """Return the error about a node."""
+        column = getattr(node, "col_offset", 0) + 1
+        return ModelError(f"{self.where}: {words} at column {column} of {self.text!r}{hint}")
+
+    def write(self, node: ast.AST) -> int:
+        """Write a node; return the number of its operation."""
+        if isinstance(node, ast.Constant):
+            return self.number(node)
+        if isinstance(node, ast.Name):
+            return self.name(node)
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+            operand = self.write(node.operand)
+            return self.tape.add(NEGATIVE, operand) if isinstance(node.op, ast.USub) else operand
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+            a, b = self.write(node.left), self.write(node.right)
+            return self.tape.add(OPERATORS[type(node.op)], a, b)
+        if isinstance(node, ast.Call):
+            return self.call(node)
+        if isinstance(node, ast.Compare):
+            return self.compare(node)
+        if isinstance(node, ast.IfExp):
+            yes, no = self.write(node.body), self.write(node.orelse)
+            self.compare(node.test)
+            return self.tape.add(SELECT, yes, no)
+        raise self.refuse(node, f"{ast.unparse(node)!r} is no part of the language (see docs/system_file.md)")
+
+    def number(self, node: ast.Constant) -> int:
+        """Write a number."""
+        if isinstance(node.value, bool) or not isinstance(node.value, int | float):
+            raise self.refuse(node, f"expected a number, got {ast.unparse(node)}")
+        return self.tape.add(CONSTANT, c=float(node.value))
+
+    def name(self, node: ast.Name) -> int:
+        """Write an input, a parameter or a constant."""
+        if node.id in self.inputs:
+            return self.tape.add(INPUT, self.inputs.index(node.id))
+        known = {**CONSTANTS, **self.parameters}
+        if node.id in known:
+            return self.tape.add(CONSTANT, c=float(known[node.id]))
+        if node.id in self.functions or node.id in FUNCTIONS:
+            raise self.refuse(node, f"{node.id!r} is a function; expected {node.id}(...)")
+        raise self.refuse(node, f"unknown name {node.id!r}", nearest(node.id, [*self.inputs, *known]))
+
+    def call(self, node: ast.Call) -> int:
+        """Write a call of a function."""
+        if not isinstance(node.func, ast.Name) or node.keywords:
+            raise self.refuse(node, f"{ast.unparse(node)!r} is no part of the language")
+        name, n = node.func.id, len(node.args)
+        if name in self.functions:
+            if n != 1:
+                raise self.refuse(node, f"{name} takes one argument, got {n}")
+            return self.tape.add(CALL, self.write(node.args[0]), self.functions[name])
+        if name not in FUNCTIONS:
+            choices = [*FUNCTIONS, *self.functions]
+            raise self.refuse(node, f"unknown function {name!r}", nearest(name, choices))
+        code, expected = FUNCTIONS[name]
+        if n != expected:
+            raise self.refuse(node, f"{name} takes {expected} argument{'s' * (expected > 1)}, got {n}")
+        operands = [self.write(argument) for argument in node.args]
+        return self.tape.add(code, *operands)
+
+    def compare(self, node: ast.AST) -> int:
+        """Write a comparison: 1 if it holds, 0 if not."""
+        if not isinstance(node, ast.Compare) or len(node.ops) != 1:
+            raise self.refuse(node, f"expected one comparison such as x < 1, got {ast.unparse(node)!r}")
+        a, b = self.write(node.left), self.write(node.comparators[0])
+        kind = type(node.ops[0])
+        if kind is ast.Lt:
+            return self.tape.add(LESS, a, b)
+        if kind is ast.Gt:
+            return self.tape.add(LESS, b, a)
+        if kind not in (ast.LtE, ast.GtE):
+            raise self.refuse(node, "expected one of < <= > >=")
+        less = self.tape.add(LESS, b, a) if kind is ast.LtE else self.tape.add(LESS, a, b)
+        one = self.tape.add(CONSTANT, c=1.0)
+        return self.tape.add(SUBTRACT, one, less)

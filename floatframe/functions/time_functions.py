@@ -1,0 +1,153 @@
+"""Functions of time for prescribed motions, made of pieces: each a polynomial of degree five and one sine.
+
+The kernels know this one form; whatever the user gives (a table, a formula, a callable) is brought into it here.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from fe_models.foundation.arrays import Array, frozen
+from floatframe.checked_values import number
+from floatframe.errors import ModelError
+
+__all__ = [
+    "TimeFunction",
+    "constant",
+    "cycloidal_spin_up",
+    "harmonic",
+    "polynomial_of_time",
+    "sampled",
+    "smooth_step",
+    "table",
+]
+
+N_COEFFICIENTS = 9  #: of a piece: six of the polynomial in t - t_k, then amplitude, angular frequency, phase
+MOST_PIECES = 20000
+
+
+@dataclass(frozen=True, eq=False)
+class TimeFunction:
+    """A piecewise function: the first piece holds before its beginning too, the last without end."""
+
+    begins: Array  #: times where the pieces begin, rising, (n,) [s]
+    pieces: Array  #: coefficients, (n, 9): Σ_k c_k (t - t_k)^k + amplitude sin(omega (t - t_k) + phase)
+
+    def __post_init__(self) -> None:
+        begins, pieces = np.array(self.begins, dtype=float), np.array(self.pieces, dtype=float)
+        if begins.ndim != 1 or not len(begins) or pieces.shape != (len(begins), N_COEFFICIENTS):
+            raise ModelError(
+                f"TimeFunction: expected n times and ({N_COEFFICIENTS}) coefficients for each, got shapes "
+                f"{begins.shape} and {pieces.shape}"
+            )
+        if not np.isfinite(begins).all() or not np.isfinite(pieces).all() or (np.diff(begins) <= 0).any():
+            raise ModelError("TimeFunction: expected finite numbers and rising times")
+        object.__setattr__(self, "begins", frozen(begins))
+        object.__setattr__(self, "pieces", frozen(pieces))
+
+    def __call__(self, t: float, order: int = 0) -> float:
+        """Return the value at t, or its first or second derivative."""
+        k = max(int(np.searchsorted(self.begins, t, side="right")) - 1, 0)
+        x, c = t - self.begins[k], self.pieces[k]
+        amplitude, omega, phase = c[6:]
+        smooth = polynomial.polyval(x, polynomial.polyder(c[:6], order) if order else c[:6])
+        return float(smooth + amplitude * omega**order * np.sin(omega * x + phase + order * np.pi / 2))
+
+
+def one_piece(coefficients: list[float], sine: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> TimeFunction:
+    """Return a function of one piece that begins at t = 0."""
+    row = np.zeros((1, N_COEFFICIENTS))
+    row[0, : len(coefficients)] = coefficients
+    row[0, 6:] = sine
+    return TimeFunction(np.zeros(1), row)
+
+
+def constant(value: float) -> TimeFunction:
+    """Return a constant."""
+    return one_piece([number("constant: value", value)])
+
+
+def polynomial_of_time(coefficients: list[float]) -> TimeFunction:
+    """Return c_0 + c_1 t + c_2 t² + ..., up to t⁵."""
+    if not 1 <= len(coefficients) <= 6:
+        raise ModelError(f"polynomial: expected one to six coefficients, c_0 first, got {len(coefficients)}")
+    return one_piece([number("polynomial: coefficients", c) for c in coefficients])
+
+
+def harmonic(amplitude: float, omega: float, phase: float = 0.0, offset: float = 0.0) -> TimeFunction:
+    """Return offset + amplitude sin(omega t + phase); omega in rad/s."""
+    a, w, p, o = (
+        number(f"harmonic: {n}", v)
+        for n, v in zip(("amplitude", "omega", "phase", "offset"), (amplitude, omega, phase, offset), strict=True)
+    )
+    return one_piece([o], (a, w, p))
+
+
+def smooth_step(t_start: float, t_end: float, first: float, last: float) -> TimeFunction:
+    """Return the polynomial of degree five from first to last, with rate and second rate zero at both ends."""
+    t_start, t_end = number("smooth_step: t_start", t_start), number("smooth_step: t_end", t_end)
+    first, last = number("smooth_step: first", first), number("smooth_step: last", last)
+    if t_end <= t_start:
+        raise ModelError(f"smooth_step: expected t_end above t_start = {t_start:g}, got {t_end:g}")
+    T, rise = t_end - t_start, last - first
+    pieces = np.zeros((3, N_COEFFICIENTS))
+    pieces[0, 0] = first
+    pieces[1, :6] = [first, 0, 0, 10 * rise / T**3, -15 * rise / T**4, 6 * rise / T**5]
+    pieces[2, 0] = last
+    return TimeFunction(np.array([t_start - 1.0, t_start, t_end]), pieces)
+
+
+def cycloidal_spin_up(omega: float, duration: float) -> TimeFunction:
+    """Return the angle omega (t²/(2T) + (T/(2 pi))² (cos(2 pi t/T) - 1)/T) until T, then omega (t - T/2).
+
+    Its rate rises from zero to omega without a jump of the acceleration (the spin-up of rotating beams).
+    """
+    omega, T = number("cycloidal_spin_up: omega", omega), number("cycloidal_spin_up: duration", duration, above=0.0)
+    s = omega * T / (2 * np.pi) ** 2
+    pieces = np.zeros((3, N_COEFFICIENTS))
+    pieces[1] = [-s, 0, omega / (2 * T), 0, 0, 0, s, 2 * np.pi / T, np.pi / 2]
+    pieces[2, :2] = [omega * T / 2, omega]
+    return TimeFunction(np.array([-1.0, 0.0, T]), pieces)
+
+
+def table(t: Array, values: Array) -> TimeFunction:
+    """Return the cubic spline through a table, not-a-knot; beyond its ends it goes on along its tangents."""
+    from scipy.interpolate import CubicSpline
+
+    t, values = np.array(t, dtype=float), np.array(values, dtype=float)
+    if t.ndim != 1 or t.shape != values.shape or len(t) < 4:
+        raise ModelError(f"table: expected four or more times and as many values, got {t.shape} and {values.shape}")
+    if not np.isfinite(t).all() or not np.isfinite(values).all() or (np.diff(t) <= 0).any():
+        raise ModelError("table: expected finite numbers and rising times")
+    spline = CubicSpline(t, values)
+    pieces = np.zeros((len(t) + 1, N_COEFFICIENTS))
+    pieces[1:-1, :4] = spline.c[::-1].T
+    pieces[0, :2] = [values[0] - spline(t[0], 1), spline(t[0], 1)]
+    pieces[-1, :2] = [values[-1], spline(t[-1], 1)]
+    return TimeFunction(np.concatenate([[t[0] - 1.0], t]), pieces)
+
+
+def sampled(function: Callable[[float], float], t_start: float, t_end: float, tolerance: float) -> TimeFunction:
+    """Return the spline of a Python function, its knots doubled until it is met between them within the tolerance.
+
+    Raises
+    ------
+    ModelError
+        If the tolerance is not reached with 20000 pieces: the function jumps or has a kink.
+    """
+    n = 16
+    error = np.inf
+    while n <= MOST_PIECES:
+        t = np.linspace(t_start, t_end, n + 1)
+        spline = table(t, np.array([function(float(x)) for x in t]))
+        between = np.concatenate([t[:-1] + part * np.diff(t) for part in (0.21, 0.5, 0.79)])
+        error = max(abs(spline(float(x)) - function(float(x))) for x in between)
+        if error <= tolerance:
+            return spline
+        n *= 2
+    raise ModelError(
+        f"sampled: the function is met within {error:.3g} only, not {tolerance:.3g}, by {MOST_PIECES} pieces; it jumps "
+        "or has a kink: give pieces between them, or a larger tolerance"
+    )

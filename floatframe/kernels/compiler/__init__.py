@@ -1,0 +1,1 @@
+"""How kernels are compiled: the lean pipeline, its passes and its lowering."""

@@ -1,0 +1,72 @@
+"""Forces along joint coordinates: springs, dampers, friction, motors; see `floatframe.forces.joint_force`."""
+
+import math
+
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.time_function import time_function
+
+__all__ = ["coordinate_force", "coordinate_power", "coordinate_strain"]
+
+STIFFNESS, FREE, DAMPING, PRELOAD, FRICTION, COEFFICIENT, SPEED = range(7)  # columns of `joint_forces`
+
+
+@inner
+def excess(model, i, is_angle, x):
+    """Return a coordinate less its free value; of an angle the value between -pi and pi."""
+    x -= model.joint_forces[i, FREE]
+    return x - 2 * math.pi * math.floor(x / (2 * math.pi) + 0.5) if is_angle else x
+
+
+@inner
+def coordinate_force(model, work, k, is_angle, x, v, normal):
+    """Return the force of row k that acts to increase its coordinate x, and its derivatives by x, v and `normal`.
+
+    -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the forces there.
+    """
+    Q, Q_x, Q_v, Q_n = 0.0, 0.0, 0.0, 0.0
+    for i in range(model.row_force0[k], model.row_force1[k]):
+        f = model.joint_forces[i]
+        d = excess(model, i, is_angle, x)
+        Q += f[PRELOAD] - f[STIFFNESS] * d - f[DAMPING] * v
+        Q_x -= f[STIFFNESS]
+        Q_v -= f[DAMPING]
+        if model.joint_force_motor[i] >= 0:
+            value, _, _ = time_function(model, model.joint_force_motor[i], work.time[0])
+            Q += value
+        if model.joint_force_table[i] >= 0:
+            value, slope, _ = time_function(model, model.joint_force_table[i], d)
+            Q += value
+            Q_x += slope
+        if f[FRICTION] > 0.0 or f[COEFFICIENT] > 0.0:
+            ratio = math.tanh(v / f[SPEED])
+            most = f[FRICTION] + f[COEFFICIENT] * normal
+            Q -= most * ratio
+            Q_v -= most * (1.0 - ratio * ratio) / f[SPEED]
+            Q_n -= f[COEFFICIENT] * ratio
+    return Q, Q_x, Q_v, Q_n
+
+
+@inner
+def coordinate_strain(model, k, is_angle, x):
+    """Return the energy in the linear springs of row k."""
+    total = 0.0
+    for i in range(model.row_force0[k], model.row_force1[k]):
+        total += 0.5 * model.joint_forces[i, STIFFNESS] * excess(model, i, is_angle, x) ** 2
+    return total
+
+
+@inner
+def coordinate_power(model, work, k, is_angle, x, v, Q):
+    """Return the power that enters by row k, and that taken by dampers and friction; Q: its whole force."""
+    given, springs = 0.0, 0.0
+    for i in range(model.row_force0[k], model.row_force1[k]):
+        d = excess(model, i, is_angle, x)
+        springs -= model.joint_forces[i, STIFFNESS] * d
+        given += model.joint_forces[i, PRELOAD]
+        if model.joint_force_motor[i] >= 0:
+            value, _, _ = time_function(model, model.joint_force_motor[i], work.time[0])
+            given += value
+        if model.joint_force_table[i] >= 0:
+            value, _, _ = time_function(model, model.joint_force_table[i], d)
+            given += value
+    return given * v, (given + springs - Q) * v

@@ -1,0 +1,89 @@
+"""Forces between two markers that follow from their relative motion: bushings and contacts.
+
+The wrench w = (F on A, M on A, N with -N on B) has the rows w - law(motion) = 0; a contact has one unknown more, its
+speed of approach. Their derivatives are taken along unit variations of r_B - r_A, the rotations of A and B, and the
+rates of these three, one after the other.
+"""
+
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.bushing import (
+    INPUT,
+    LAW,
+    OUTPUT,
+    bushing_energy,
+    bushing_power,
+    bushing_state,
+    bushing_variation,
+)
+from floatframe.kernels.connections.contact import contact_energy, contact_power, contact_state, contact_variation
+from floatframe.kernels.model import BUSHING
+
+__all__ = ["pair_derivatives", "pair_energy", "pair_power", "pair_rows"]
+
+
+@inner
+def pair_state(model, work, c):
+    """Write what follows from the motion of the markers of connection c into work.pair."""
+    if model.c_law[c] == BUSHING:
+        bushing_state(model, work, c)
+    else:
+        contact_state(model, work, c)
+
+
+@inner
+def pair_rows(model, work, c, c_k):
+    """Write the residual of connection c."""
+    pair_state(model, work, c)
+    w0 = model.c_w0[c]
+    for k in range(model.c_size[c]):
+        work.g[w0 + k] = c_k * (work.w[w0 + k] - work.pair[LAW + k])
+
+
+@inner
+def pair_derivatives(model, work, c, c_k):
+    """Write P at both markers and V of connection c; both are zero before."""
+    a, b, size = model.c_a[c], model.c_b[c], model.c_size[c]
+    P_a, P_b, V, s = work.P[a], work.P[b], work.V[c], work.pair
+    pair_state(model, work, c)
+    for r in range(size):
+        V[r, r] = 1.0
+    for k in range(18):
+        s[INPUT + k] = 0.0
+    for k in range(18):
+        s[INPUT + k] = 1.0
+        if model.c_law[c] == BUSHING:
+            bushing_variation(model, work, c)
+        else:
+            contact_variation(model, work, c)
+        s[INPUT + k] = 0.0
+        part, j = k // 3, k % 3
+        for r in range(size):
+            change = c_k * s[OUTPUT + r]
+            if part == 0:
+                P_a[r, j], P_b[r, j] = change, -change
+            elif part == 1:
+                P_a[r, 3 + j] = -change
+            elif part == 2:
+                P_b[r, 3 + j] = -change
+            elif part == 3:
+                P_a[r, 6 + j], P_b[r, 6 + j] = change, -change
+            elif part == 4:
+                P_a[r, 9 + j] = -change
+            else:
+                P_b[r, 9 + j] = -change
+
+
+@inner
+def pair_energy(model, work, c):
+    """Return the energy held by connection c."""
+    if model.c_law[c] == BUSHING:
+        return bushing_energy(model, work, c)
+    return contact_energy(model, work, c)
+
+
+@inner
+def pair_power(model, work, c):
+    """Return the power that enters by tables of connection c, and that taken by damping and friction."""
+    if model.c_law[c] == BUSHING:
+        return bushing_power(model, work, c)
+    return 0.0, contact_power(model, work, c)

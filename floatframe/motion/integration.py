@@ -1,0 +1,394 @@
+"""The time loop: an integrator advanced in compiled batches, with output, progress and errors."""
+
+import logging
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, fields, replace
+from importlib.metadata import PackageNotFoundError, version
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.digest import file_digest
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.checked_values import number
+from floatframe.compiling.callbacks import raise_errors_of
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import ConvergenceError, ModelError, ResultsError
+from floatframe.integrators import CLASSES
+from floatframe.integrators.carry import Carry, Integrator
+from floatframe.kernels.model import Rows, new_work
+from floatframe.motion.event_steps import EventWatch
+from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
+from floatframe.motion.step_advice import step_advice
+from floatframe.motion.validity_watch import ValidityWatch
+from floatframe.results.results_file import (
+    SEGMENTS,
+    BodyEntry,
+    Head,
+    MemorySource,
+    ResultsWriter,
+    arrays_of,
+    last_restart,
+    validity_text,
+)
+from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
+from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["Progress", "integrate", "resume"]
+
+log = logging.getLogger(__name__)
+
+BATCH_STEPS = 200  #: steps per call of the compiled loop
+SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run is."""
+
+    t: float  #: time reached [s]
+    t_end: float
+    n_steps: int  #: done
+    n_total: int
+    n_iterations: int  #: of Newton's method, so far
+    notes: tuple[ValidityNote, ...] = ()  #: bodies that left the range of their linear frame, so far
+    n_rejected: int = 0  #: steps that were tried in vain, so far
+
+
+def integrate(
+    system: System,
+    integrator: Integrator,
+    t_end: float,
+    h: float,
+    *,
+    t_start: float = 0.0,
+    state: State | None = None,
+    output: str | os.PathLike[str] | None = None,
+    output_every: int = 1,
+    batch_steps: int = BATCH_STEPS,
+    progress: Callable[[Progress], None] | None = None,
+) -> Trajectory:
+    """Compute a motion from t_start to t_end.
+
+    Parameters
+    ----------
+    system
+        The system; its bodies as placed are made consistent first.
+    integrator
+        The method, such as `GeneralizedAlpha(rho_inf=0.8)`.
+    t_end
+        End time [s].
+    h
+        Step size [s], or distance of outputs and largest step where the integrator controls its step; made smaller by
+        less than one step in the whole run where it does not divide it.
+    t_start
+        Time at the beginning [s].
+    state
+        State to begin from, instead of the bodies as placed.
+    output
+        Results file; None keeps the motion in memory.
+    output_every
+        Write the results of every so many steps; the start is always written.
+    batch_steps
+        Steps per call of the compiled loop; the motion does not depend on it, bit for bit.
+    progress
+        Called after every batch. What it raises ends the run; closed results stay.
+
+    Returns
+    -------
+    Trajectory
+        The motion; with `output` it is read from the file when asked for.
+
+    Raises
+    ------
+    ModelError
+        If an argument or the system is impossible.
+    ConvergenceError
+        If a step fails; it carries the trajectory so far.
+    ResultsError
+        If the results cannot be written.
+    """
+    t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
+    h = number("integrate: h", h, above=0.0)
+    if t_end <= t_start:
+        raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
+    if output_every < 1 or batch_steps < 1:
+        raise ModelError(
+            f"integrate: expected output_every and batch_steps of at least 1, got {output_every} and {batch_steps}"
+        )
+    n_total = max(1, ceil((t_end - t_start) / h * (1 - 1e-12) - 1e-9))
+    step = (t_end - t_start) / n_total
+    if abs(step - h) > 1e-9 * h:
+        log.info("h = %g does not divide the time from %g to %g: h = %.9g is used", h, t_start, t_end, step)
+    advice = step_advice(system, step)
+    if advice is not None and advice.n_followed == 0:
+        log.warning("system %r: %s", system.name, advice.words)
+    head = head_of(system, integrator, t_start, t_end, step, output_every)
+    watch = EventWatch(system, head) if system.events else None
+    begun = system if watch is None else watch.system
+    carry = integrator.start(begun, t_start, state)
+    work = new_work(compiled_system(begun).model)
+    carry, rows = integrator.observe(begun, t_start, carry, work)
+    if watch is not None:
+        watch.begin(rows)
+    writer = None if output is None else ResultsWriter(output, head)
+    run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=watch)
+    run.keep(rows)
+    if writer is not None:
+        writer.close_segment(run.record(carry, 0))
+    return run.advance(carry, 0, batch_steps, progress)
+
+
+def resume(
+    system: System,
+    output: str | os.PathLike[str],
+    *,
+    progress: Callable[[Progress], None] | None = None,
+) -> Trajectory:
+    """Go on with a run that was interrupted, to the motion it would have become, bit for bit.
+
+    Parameters
+    ----------
+    system
+        The system that was run.
+    output
+        The results file the run was to write; its segments are beside it.
+    progress
+        As in `integrate`.
+
+    Raises
+    ------
+    ResultsError
+        If there is nothing to resume, or the segments are those of another system.
+    ConvergenceError
+        If a step fails.
+    """
+    head, record = last_restart(output)
+    run = dict(head.run)
+    kind = CLASSES.get(str(run["integrator"]))
+    if kind is None or any(part.name not in run for part in fields(kind)):
+        raise ResultsError(f"{output}: the interrupted run is of another version of this program; run it anew")
+    integrator = kind(**{part.name: run[part.name] for part in fields(kind)})
+    if run.get("digest") != system_digest(system, integrator):
+        raise ResultsError(
+            f"{output}: the interrupted run was of another system than {system.name!r}, or it has changed since; "
+            "resume it with the files it was begun with, or run it anew"
+        )
+    if record is None:
+        raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
+    carry, n_done = carry_of_record(record, system)
+    watch = EventWatch(system, head) if system.events else None
+    if watch is not None:
+        watch.restore(record)
+    path = Path(output)
+    writer = ResultsWriter(path.with_name(path.name.removesuffix(SEGMENTS)), head, goes_on=True)
+    n_total = round((run["t_end"] - run["t_start"]) / run["h"])
+    again = Run(
+        system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer,
+        notes=notes_from_json(validity_text(writer.path)),
+        seconds_before=float(record.get("seconds", 0.0)),
+        events=watch,
+    )  # fmt: skip
+    return again.advance(carry, n_done, BATCH_STEPS, progress)
+
+
+@dataclass
+class Run:
+    """One motion being computed, and where its results go."""
+
+    system: System
+    integrator: Integrator
+    head: Head
+    t_start: float
+    t_end: float
+    h: float
+    n_total: int
+    output_every: int
+    writer: ResultsWriter | None
+    notes: tuple[ValidityNote, ...] = ()  #: of the part that is done
+    kept: list[Rows] = field(default_factory=list)
+    seconds_before: float = 0.0  #: that the run has taken before it was interrupted
+    began: float = field(default_factory=time.perf_counter)
+    events: EventWatch | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Time the run has taken so far [s]."""
+        return self.seconds_before + time.perf_counter() - self.began
+
+    def record(self, carry: Carry, n_done: int) -> dict[str, np.ndarray]:
+        """Return what is needed to go on from here."""
+        events = {} if self.events is None else self.events.record()
+        return restart_record(carry, n_done) | {"seconds": np.array(self.seconds)} | events
+
+    def summary(self, carry: Carry) -> dict[str, Any]:
+        """Return what the run took, and its events."""
+        events = {} if self.events is None else {"events": self.events.happened}
+        return events | {
+            "n_steps": carry.n_steps,
+            "n_rejected": carry.n_rejected,
+            "n_iterations": carry.n_iterations,
+            "wall_time": self.seconds,
+        }
+
+    def __post_init__(self) -> None:
+        self.watch = ValidityWatch(self.system, self.notes)
+
+    def keep(self, rows: Rows) -> None:
+        """Take rows of results; tell when a body leaves the range of its linear frame."""
+        for note in self.watch.observe(rows):
+            log.warning("%s", note.words)
+        if self.writer is None:
+            self.kept.append(rows)
+        else:
+            self.writer.validity = notes_to_json(self.watch.notes)
+            self.writer.append(rows)
+
+    def advance(
+        self, carry: Carry, n_done: int, batch_steps: int, progress: Callable[[Progress], None] | None
+    ) -> Trajectory:
+        """Take the steps that are left, in batches that end where a run can go on; return the motion."""
+        begun = self.system if self.events is None else self.events.system
+        work = new_work(compiled_system(begun).model)
+        t_begun = self.t_start + n_done * self.h
+        _, row = self.integrator.observe(begun, t_begun, carry, work)  # the iterate to begin from
+        if self.events is not None:
+            self.events.begin(row)
+        closed = time.monotonic()
+        failure, has_stopped = None, False
+        try:
+            while n_done < self.n_total and failure is None and not has_stopped:
+                if n_done % RESTART_STEPS == 0:
+                    work.factors[:] = 0.0  # made anew, as after a resumption
+                    if self.writer is not None and n_done and time.monotonic() - closed > SEGMENT_SECONDS:
+                        self.writer.close_segment(self.record(carry, n_done))
+                        closed = time.monotonic()
+                n_batch = min(batch_steps, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
+                if self.events is None:
+                    carry, rows, n_good, failure = self.integrator.advance(
+                        self.system, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
+                        every=self.output_every,
+                    )  # fmt: skip
+                    self.keep(rows)
+                else:
+                    carry, rows, work, failure = self.events.step(
+                        self.integrator, carry, work, t0=self.t_start, h=self.h, k=n_done
+                    )
+                    n_good = int(failure is None)
+                    has_stopped = self.events.has_stopped
+                    if failure is None and (has_stopped or (n_done + 1) % self.output_every == 0):
+                        self.keep(rows)
+                n_done += n_good
+                if progress is not None:
+                    t = self.t_start + n_done * self.h
+                    counts = carry.n_iterations, self.watch.notes, carry.n_rejected
+                    progress(Progress(t, self.t_end, n_done, self.n_total, *counts))
+        except BaseException:
+            if self.writer is not None:
+                self.writer.close_segment(self.record(carry, n_done) if n_done % RESTART_STEPS == 0 else None)
+            raise
+        raise_errors_of(compiled_system(self.system).callbacks)
+        if failure is not None:
+            raise stopped(
+                self.system,
+                self.head,
+                self.kept,
+                self.writer,
+                failure,
+                self.t_start + n_done * self.h,
+                self.h,
+                self.watch.notes,
+                carry.state,
+            )
+        if self.writer is None:
+            head = replace(self.head, summary=self.summary(carry))
+            arrays = MemorySource(joint_rows(self.system, self.kept))
+            return Trajectory(head, arrays, is_complete=True, validity=self.watch.notes)
+        self.writer.finish(self.summary(carry))
+        return read_results(self.writer.path)
+
+
+def stopped(system, head, kept, writer, failure, t: float, h: float, notes, state: State) -> ConvergenceError:
+    """Return the error of a failed step, with the motion so far."""
+    words = f"system {system.name!r}: the step of {h:g} from t = {t:.9g} failed: {failure.words}"
+    advice = step_advice(system, h)
+    if advice is not None:
+        words += f"; {advice.words}"
+    words += "".join(f"; {note.words}" for note in notes)
+    lost = indefinite_mass_words(indefinite_masses(system, state))
+    words += f"; {lost}" if lost else ""
+    if writer is None:
+        trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False, validity=notes)
+    else:
+        writer.close_segment()
+        trajectory = read_results(writer.folder)
+        words += f"; the motion so far is in {str(writer.folder)!r}"
+    return ConvergenceError(words, t=t, h=h, residual=failure.residual, trajectory=trajectory)
+
+
+def joint_rows(system: System, kept: list[Rows]) -> dict[str, np.ndarray]:
+    """Return the datasets of a motion in memory."""
+    arrays = arrays_of(kept)
+    arrays["drift"] = arrays["drift"][:, : len(compiled_system(system).joint_names)]
+    return arrays
+
+
+def head_of(system: System, integrator: Integrator, t_start: float, t_end: float, h: float, every: int) -> Head:
+    """Return the head of the results of a run."""
+    compiled = compiled_system(system)
+    entries = []
+    for i, body in enumerate(system.bodies):
+        source = body.source if isinstance(body, FlexibleBody) else ""
+        entries.append(
+            BodyEntry(
+                body.name,
+                int(compiled.model.n_q[i]),
+                int(compiled.model.q0[i]),
+                int(compiled.model.u0[i]),
+                source,
+                digest_of(source),
+                isinstance(body, FlexibleBody) and body.is_stiffened,
+            )
+        )
+    try:
+        release = version("floatframe")
+    except PackageNotFoundError:
+        release = "unknown"
+    run = {
+        "integrator": type(integrator).__name__,
+        **asdict(integrator),  # type: ignore[call-overload]
+        "t_start": t_start,
+        "t_end": t_end,
+        "h": h,
+        "output_every": every,
+        "gravity": [float(x) for x in compiled.model.gravity],
+        "system_file": system.source,
+        "system_file_digest": file_digest(system.source),
+        "digest": system_digest(system, integrator),
+        "floatframe": release,
+    }
+    return Head(
+        system.name,
+        system.units.name,
+        tuple(entries),
+        compiled.joint_names,
+        compiled.spring_names,
+        tuple(int(k) for k in compiled.model.c_w0),
+        run,
+    )
+
+
+def digest_of(source: str) -> str:
+    """Return the digest of a modal file, "" for a body made in memory."""
+    if not source:
+        return ""
+    from cms.modal_file.file import digest
+
+    return digest(source)

@@ -1,0 +1,63 @@
+"""Restart records: all an integrator remembers, kept with the results, so that an interrupted run can go on.
+
+A record belongs to a step whose number is a multiple of `RESTART_STEPS`. There every run makes its Newton factors
+anew, so that a resumed run takes the same steps as one that was never interrupted, bit for bit.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import ResultsError
+from floatframe.integrators.carry import Carry, Integrator
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["RESTART_STEPS", "carry_of_record", "restart_record", "system_digest"]
+
+RESTART_STEPS = 200
+STATE = ("r", "p", "q", "u")
+ARRAYS = ("u_dot", "a", "w", "work", "power")
+STEPS = ("h", "h_next")
+COUNTS = ("n_iterations", "n_steps", "n_rejected")
+
+
+def restart_record(carry: Carry, n_done: int) -> dict[str, Array]:
+    """Return the memory of the integrator after n_done steps as arrays by name."""
+    record = {name: np.asarray(getattr(carry.state, name)) for name in STATE}
+    record |= {name: np.asarray(getattr(carry, name)) for name in ARRAYS}
+    return record | {
+        **{name: np.array(getattr(carry, name)) for name in STEPS + COUNTS},
+        "n_done": np.array(n_done),
+    }
+
+
+def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry, int]:
+    """Return the memory of the integrator and the number of steps done; `ResultsError` if it is of another system."""
+    placed = compiled_system(system).placed
+    for name in STATE:
+        if name not in record or record[name].shape != getattr(placed, name).shape:
+            raise ResultsError("restart: the record is of a system with other bodies; resume the system that was run")
+    values: dict[str, Any] = {name: np.asarray(record[name], dtype=float) for name in ARRAYS}
+    values |= {name: float(record[name]) for name in STEPS} | {name: int(record[name]) for name in COUNTS}
+    carry = Carry(State(*(np.asarray(record[name], dtype=float) for name in STATE)), **values)
+    return carry, int(record["n_done"])
+
+
+def system_digest(system: System, integrator: Integrator) -> str:
+    """Return the sha256 of everything the motion follows from: compiled system, its start, method and parameters."""
+    digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())  # type: ignore[call-overload]
+    if system.events:
+        digest.update(repr(system.events).encode())
+    compiled = compiled_system(system)
+    model = compiled.model._replace(user_address=np.zeros(0, np.int64))  # addresses change from process to process
+    parts = [*model, *(getattr(compiled.placed, name) for name in STATE)]
+    for part in parts:
+        array = np.ascontiguousarray(part)
+        digest.update(repr((array.shape, array.dtype.str)).encode() + array.tobytes())
+    return digest.hexdigest()

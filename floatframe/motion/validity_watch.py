@@ -1,0 +1,233 @@
+"""Watches a motion row by row, whether every flexible body stays in the range of its linear frame.
+
+The stiffness of a body under its loads is K + Σ lambda_j K_j, with the amplitudes lambda of the unit loads (THEORY §7):
+acceleration of the frame origin minus gravity, angular acceleration, products of the angular velocity, wrenches on the
+interfaces, all in body axes. In units of K its change is A = Σ lambda_j K^(-1/2) K_j K^(-1/2): the loads are
+-min(eig A) of those that buckle the body, and a linear frame is wrong in stiffness by max |eig A|.
+
+The eigenvalues are found once per batch of rows, where Σ |lambda_j| |K_j| is largest, and only if that bound is above
+the limit and what was seen before.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.linalg as la
+
+from cms.reduced_body.geometric_stiffness import SPIN_PAIRS
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.compiling.system import compiled_system
+from floatframe.forces import PointForce
+from floatframe.kernels.model import Rows
+from floatframe.results.validity import LINEAR, STIFFENED, Limits, ValidityNote
+from floatframe.system import System
+
+__all__ = ["ValidityWatch"]
+
+N_INERTIAL = 12  #: amplitudes of inertial loads: 3 accelerations, 3 angular accelerations, 6 products
+
+
+@dataclass(frozen=True, eq=False)
+class Wrench:
+    """Where the wrench on an interface is found."""
+
+    interface: int
+    sign: float
+    force: int  #: first column in w
+    moment: int  #: first column in w, -1 for none
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A point force on an interface."""
+
+    interface: int
+    force: PointForce
+    triad: Array  #: undeformed axes of the marker in the body frame, (3, 3)
+
+
+@dataclass(eq=False)
+class Watched:
+    """What is known of one flexible body."""
+
+    index: int
+    body: FlexibleBody
+    limits: Limits
+    frequency: float  #: lowest angular frequency [rad/s]
+    Psi_r: Array  #: rotations of the interfaces by q, (3 n, n_q)
+    scaled: Array  #: K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows without matrices
+    norms: Array  #: their largest |eigenvalue|, (n_loads,)
+    wrenches: list[Wrench] = field(default_factory=list)
+    loads: list[Load] = field(default_factory=list)
+
+
+class ValidityWatch:
+    """The notes of a motion; `observe` takes its rows in order."""
+
+    def __init__(self, system: System, notes: tuple[ValidityNote, ...] = ()) -> None:
+        """Begin with a system, and the notes of the part of the motion that is already done."""
+        self.system = system
+        self.found = {(note.body, note.kind): note for note in notes}
+        self.bodies = [
+            watched(i, body)
+            for i, body in enumerate(system.bodies)
+            if isinstance(body, FlexibleBody) and is_elastic(body)
+        ]
+        for part in self.bodies:
+            if len(part.norms):
+                find_loads(system, part)
+
+    @property
+    def notes(self) -> tuple[ValidityNote, ...]:
+        """What has been found, in the order of time."""
+        return tuple(sorted(self.found.values(), key=lambda note: note.t_first))
+
+    def observe(self, rows: Rows) -> tuple[ValidityNote, ...]:
+        """Take rows of results; return the notes that are new with them."""
+        if len(rows.t) == 0:
+            return ()
+        new = []
+        for part in self.bodies:
+            for kind, values in self.measures(part, rows):
+                k = int(np.nanargmax(values)) if np.isfinite(values).any() else 0
+                largest, limit = float(values[k]), getattr(part.limits, kind)
+                if not largest > limit:
+                    continue
+                key, t = (part.body.name, kind), float(rows.t[k])
+                if key not in self.found:
+                    first = float(rows.t[int(np.argmax(values > limit))])
+                    has_matrices = part.body.reduced.geometric is not None
+                    self.found[key] = ValidityNote(
+                        *key, limit, largest, first, t, part.body.is_stiffened, has_matrices
+                    )  # fmt: skip
+                    new.append(self.found[key])
+                elif largest > self.found[key].largest:
+                    self.found[key] = replace(self.found[key], largest=largest, t_largest=t)
+        return tuple(new)
+
+    def measures(self, part: Watched, rows: Rows) -> list[tuple[str, Array]]:
+        """Return what is compared, each over the rows, (n_t,)."""
+        model = compiled_system(self.system).model
+        i, q0, u0 = part.index, int(model.q0[part.index]), int(model.u0[part.index])
+        q = rows.q[:, q0 : q0 + part.body.reduced.n_q]
+        omega = rows.u[:, u0 + 3 : u0 + 6]
+        found = [("speed", np.linalg.norm(omega, axis=1) / part.frequency)]
+        if len(part.Psi_r):
+            angles = (q @ part.Psi_r.T).reshape(len(q), -1, 3)
+            found.append(("rotation", np.linalg.norm(angles, axis=2).max(axis=1)))
+        if len(part.norms):
+            found.append(("load", self.load_measure(part, rows, i, u0, omega)))
+        return found
+
+    def load_measure(self, part: Watched, rows: Rows, i: int, u0: int, omega: Array) -> Array:
+        """Return the change of the stiffness by the loads; -1 in the rows where it is not looked for."""
+        R = rotations(rows.p[:, i])
+        lam = np.zeros((len(rows.t), len(part.norms)))
+        acceleration = rows.u_dot[:, u0 : u0 + 3] - compiled_system(self.system).model.gravity
+        lam[:, :3] = in_body(R, acceleration)
+        lam[:, 3:6] = rows.u_dot[:, u0 + 3 : u0 + 6]
+        for k, (a, b) in enumerate(SPIN_PAIRS):
+            lam[:, 6 + k] = (1 if a == b else 2) * omega[:, a] * omega[:, b]
+        for wrench in part.wrenches:
+            o = N_INERTIAL + 6 * wrench.interface
+            lam[:, o : o + 3] += wrench.sign * in_body(R, rows.w[:, wrench.force : wrench.force + 3])
+            if wrench.moment >= 0:
+                lam[:, o + 3 : o + 6] += wrench.sign * in_body(R, rows.w[:, wrench.moment : wrench.moment + 3])
+        for load in part.loads:
+            o = N_INERTIAL + 6 * load.interface
+            lam[:, o : o + 6] += amplitudes(load, rows.t, R)
+        values = np.full(len(rows.t), -1.0)
+        bound = np.nan_to_num(np.abs(lam)) @ part.norms
+        k = int(np.argmax(bound))
+        seen = self.found.get((part.body.name, "load"))
+        if bound[k] > max(part.limits.load, seen.largest if seen else 0.0) and np.isfinite(lam[k]).all():
+            n = part.body.reduced.n_q
+            change = la.eigvalsh((lam[k] @ part.scaled).reshape(n, n))
+            values[k] = -change[0] if part.body.is_stiffened else np.abs(change).max()
+        return values
+
+
+def is_elastic(body: FlexibleBody) -> bool:
+    """Whether a body has a mode with mass."""
+    return bool(np.isfinite(body.reduced.frequencies).any() and (body.reduced.frequencies > 0).any())
+
+
+def watched(index: int, body: FlexibleBody) -> Watched:
+    """Return what is known of a body before the motion."""
+    reduced = body.reduced
+    frequencies = np.asarray(reduced.frequencies)
+    turning = [np.asarray(interface.Psi[3:]) for interface in reduced.interfaces if interface.has_rotation]
+    scaled, norms = scaled_unit_loads(reduced)
+    return Watched(
+        index=index,
+        body=body,
+        limits=STIFFENED if body.is_stiffened else LINEAR,
+        frequency=2 * np.pi * float(frequencies[frequencies > 0].min()),
+        Psi_r=np.concatenate(turning) if turning else np.zeros((0, reduced.n_q)),
+        scaled=scaled,
+        norms=norms,
+    )
+
+
+def scaled_unit_loads(reduced: ReducedBody) -> tuple[Array, Array]:
+    """Return K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²), and their norms; empty without matrices."""
+    n, geometric = reduced.n_q, reduced.geometric
+    values, vectors = la.eigh(reduced.K)
+    if geometric is None or not values[0] > 0:
+        return np.zeros((0, n * n)), np.zeros(0)
+    root = vectors / np.sqrt(values)
+    K = np.concatenate(
+        [geometric.translation, geometric.rotation, geometric.spin, geometric.interfaces.reshape(-1, n, n)]
+    )
+    scaled = root.T @ K @ root
+    return scaled.reshape(len(K), n * n), np.abs(np.linalg.eigvalsh(scaled)).max(axis=1)
+
+
+def find_loads(system: System, part: Watched) -> None:
+    """Write where the wrenches on the interfaces of a body are found."""
+    model = compiled_system(system).model
+    n = part.body.reduced.n_q
+    forces = [force for force in system.forces if isinstance(force, PointForce)]
+    load_of = {int(m): force for m, force in zip(model.l_marker, forces, strict=True)}
+    for m in np.flatnonzero((model.m_body == part.index) & (model.m_psi0 >= 0)):
+        o = int(model.m_psi0[m])
+        own = model.psi[o : o + 6 * n].reshape(6, n)
+        interface = next(k for k, i in enumerate(part.body.reduced.interfaces) if np.array_equal(i.Psi, own))
+        c = int(model.m_connection[m])
+        if c >= 0:
+            w0, moment = int(model.c_w0[c]), int(model.m_moment[m])
+            part.wrenches.append(Wrench(interface, float(model.m_sign[m]), w0, w0 + moment if moment >= 0 else -1))
+        elif int(m) in load_of:
+            part.loads.append(Load(interface, load_of[int(m)], np.asarray(model.m_triad[m])))
+
+
+def amplitudes(load: Load, t: Array, R: Array) -> Array:
+    """Return force and moment of a point force in body axes, (n_t, 6); a follower turns with the undeformed marker."""
+    force = load.force
+    factor = np.ones(len(t)) if force.amplitude is None else np.array([force.amplitude(x) for x in t])
+    six = []
+    for vector in (force.force, force.torque):
+        if force.is_follower:
+            six.append(np.broadcast_to(load.triad @ vector, (len(t), 3)))
+        else:
+            six.append(in_body(R, np.broadcast_to(vector, (len(t), 3))))
+    return factor[:, None] * np.concatenate(six, axis=1)
+
+
+def in_body(R: Array, vectors: Array) -> Array:
+    """Return vectors in body axes, (n_t, 3)."""
+    return np.asarray(np.einsum("tba,tb->ta", R, vectors))
+
+
+def rotations(p: Array) -> Array:
+    """Return R_GB of Euler parameters over time, (n_t, 3, 3)."""
+    w, x, y, z = p.T
+    return np.moveaxis(
+        np.array([
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]), 2, 0,
+    )  # fmt: skip

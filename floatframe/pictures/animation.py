@@ -1,0 +1,221 @@
+"""Films of a computed motion: deformed bodies coloured by displacement, rigid ones as boxes, over a ground grid."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cms.modal_file.file import digest, read
+from cms.reduced_body.reduced_body import ReducedBody, ReducedInterface
+from cms.rendering import Drawing, Lines, Scene, Surface, Triad, render_animation
+from cms.rendering.drawing import OnFrame
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.bodies.rigid_body import RigidBody
+from floatframe.errors import ResultsError
+from floatframe.pictures.body_colors import DISPLACEMENT, BodyColor
+from floatframe.pictures.film_times import FilmTimes, film_times, round_below, speed_words, time_words
+from floatframe.pictures.stage import box_of, ground_grid, view_axes
+from floatframe.results.recovery import nodal_displacements
+from floatframe.results.trajectory import BodyMotion, Trajectory
+
+__all__ = ["animate", "bodies_of", "motion_scene"]
+
+VISIBLE = 0.02  #: share of a body's diagonal below which its displacement is drawn larger
+DRAWN = 0.06  #: share of the diagonal to which it is then enlarged, at most
+TRAIL_COLOR, RIGID_COLOR = "#7d5ba6", "#9fb0bf"
+TRAIL_POINTS = 1500  #: of a trail, at most
+
+
+def animate(
+    trajectory: Trajectory,
+    bodies: Mapping[str, ReducedBody | RigidBody],
+    path: str | Path,
+    *,
+    fps: float = 25.0,
+    speed: float | None = None,
+    magnification: float | None = None,
+    up: Sequence[float] | None = None,
+    color: BodyColor = DISPLACEMENT,
+    on_frame: OnFrame | None = None,
+) -> Drawing:
+    """Draw a motion into a film.
+
+    Parameters
+    ----------
+    bodies
+        What the bodies of the trajectory look like, by name (`bodies_of` reads them from the modal files); one that
+        is missing is drawn as a small cube.
+    path
+        Ends in .gif or .mp4.
+    fps
+        Frames a second; fewer where the trajectory has not so many rows.
+    speed
+        Seconds of motion in a second of film; None: 1 if the film then lasts 2 to 12 s, else a round number.
+    magnification
+        How many times larger the elastic displacement is drawn; None: 1, or a round number where nobody would see it.
+    up
+        What points up in the film, ground axes, (3,); None: against gravity if the trajectory knows it, else z, or y
+        for a motion in the xy plane.
+    color
+        By what flexible bodies are coloured: `DISPLACEMENT` or `VON_MISES` of `floatframe.pictures.body_colors`.
+    on_frame
+        Called with the number of frames drawn and of all.
+
+    Raises
+    ------
+    ResultsError
+        If the trajectory has no rows, or a body does not fit it.
+    """
+    times = film_times(trajectory.t * trajectory.units.time, fps=fps, speed=speed, n_nodes=count_nodes(bodies))
+    scene = motion_scene(trajectory, bodies, times, magnification=magnification, up=up, color=color)
+    return render_animation(scene, path, fps=times.fps, on_frame=on_frame)
+
+
+def bodies_of(trajectory: Trajectory) -> dict[str, ReducedBody]:
+    """Return the reduced bodies of a trajectory by name, read from the modal files it names.
+
+    Raises
+    ------
+    ResultsError
+        If a modal file is not the one the motion was computed with.
+    """
+    found = {}
+    for entry in trajectory.head.bodies:
+        if entry.source:
+            if entry.digest and digest(entry.source) != entry.digest:
+                raise ResultsError(
+                    f"body {entry.name!r}: {entry.source} has changed since the motion was computed; run it again"
+                )
+            found[entry.name] = read(entry.source, units=trajectory.units)
+    return found
+
+
+def motion_scene(
+    trajectory: Trajectory,
+    bodies: Mapping[str, ReducedBody | RigidBody],
+    times: FilmTimes,
+    *,
+    magnification: float | None = None,
+    up: Sequence[float] | None = None,
+    color: BodyColor = DISPLACEMENT,
+) -> Scene:
+    """Return the scene of a motion: surfaces, interfaces and their trails, ground; else as `animate`."""
+    unknown = set(bodies) - set(trajectory.body_names)
+    if unknown:
+        raise ResultsError(
+            f"film: the trajectory has no body {sorted(unknown)[0]!r}; it has {', '.join(trajectory.body_names)}"
+        )
+    flexible = {name: body for name, body in bodies.items() if isinstance(body, ReducedBody)}
+    motions = {name: trajectory.body(name) for name in trajectory.body_names}
+    for name, reduced in flexible.items():
+        if motions[name].q.shape[1] != reduced.n_q:
+            raise ResultsError(
+                f"film: body {name!r} has {reduced.n_q} modes, but its motion {motions[name].q.shape[1]}"
+            )
+    rows = times.rows
+    displacements = {name: nodal_displacements(trajectory, name, body, rows) for name, body in flexible.items()}
+    if magnification is None:
+        magnification = chosen_magnification(flexible, displacements)
+    surfaces, triads, lines = [], [], []
+    scalars = {name: color.values(body, motions[name].q[rows]) for name, body in flexible.items()}
+    name_unit, unit_factor = color.unit(trajectory.units, largest_of(scalars))
+    frames = {name: (motion.r[rows], rotations(motion.p[rows])) for name, motion in motions.items()}
+    size = scene_size(flexible, frames)
+    for name, (r, R) in frames.items():
+        body = flexible.get(name)
+        if body is not None and len(body.surface):
+            moved = displacements[name]
+            nodes = r[:, None] + (body.nodes + magnification * moved) @ R.transpose(0, 2, 1)
+            surfaces.append(Surface(body.surface, nodes, scalars=unit_factor * scalars[name], name=name))
+            for interface in body.interfaces:
+                path = interface_path(motions[name], interface, magnification)
+                triads.append(Triad(path[rows], R @ interface.triad, 0.06 * size, interface.name))
+                lines.append(trail(path, rows))
+        else:
+            rigid = bodies.get(name)
+            corners, triangles = box_of(rigid if isinstance(rigid, RigidBody) else None, 0.04 * size)
+            moved = r[:, None] + corners @ R.transpose(0, 2, 1)
+            surfaces.append(Surface(triangles, moved, color=RIGID_COLOR, name=name))
+            triads.append(Triad(r, R, 0.06 * size, name))
+            lines.append(trail(motions[name].r, rows))
+    points = np.concatenate([surface.nodes.reshape(-1, 3)[::7] for surface in surfaces])
+    up_axis = up_of(trajectory, points) if up is None else np.asarray(up, dtype=float)
+    direction, up_axis = view_axes(points, up_axis)
+    ground, step = ground_grid(points, up_axis)
+    return Scene(
+        surfaces=tuple(surfaces),
+        lines=(ground, *(line for line in lines if np.ptp(line.points, axis=(0, 1)).max() > 1e-3 * size)),
+        triads=tuple(triads),
+        title=trajectory.head.system,
+        captions=(
+            f"{speed_words(times.speed)}; "
+            + (f"elastic displacement drawn {magnification:,.6g} times larger; " if magnification != 1 else "")
+            + f"ground grid {step:g} {trajectory.units.length_symbol}",
+        ),
+        frame_notes=time_words(trajectory.t[rows] * trajectory.units.time),
+        scalar_title=color.title if flexible else "",
+        scalar_unit=name_unit if flexible else "",
+        direction=direction,
+        up=up_axis,
+        size=(960, 720),
+    )
+
+
+def rotations(p: Array) -> Array:
+    """Return R_GB, (n, 3, 3), of Euler parameters (w, x, y, z), (n, 4)."""
+    return np.asarray(Rotation.from_quat(p[:, [1, 2, 3, 0]]).as_matrix())
+
+
+def count_nodes(bodies: Mapping[str, ReducedBody | RigidBody]) -> int:
+    """Return how many nodes a frame has."""
+    return sum(len(body.nodes) if isinstance(body, ReducedBody) else 8 for body in bodies.values())
+
+
+def diagonal(body: ReducedBody) -> float:
+    """Return the diagonal of the bounding box of a body's kept nodes [m]."""
+    return float(np.linalg.norm(np.ptp(body.nodes, axis=0)))
+
+
+def scene_size(flexible: Mapping[str, ReducedBody], frames: Mapping[str, tuple[Array, Array]]) -> float:
+    """Return a length by which glyphs are measured: the largest body, or what the origins sweep [m]."""
+    sizes = [diagonal(body) for body in flexible.values()]
+    if not sizes:
+        sizes = [float(np.linalg.norm(np.ptp(np.concatenate([r for r, _ in frames.values()]), axis=0)))]
+    return max(sizes) or 1.0
+
+
+def chosen_magnification(flexible: Mapping[str, ReducedBody], displacements: Mapping[str, Array]) -> float:
+    """Return 1 where the displacement is seen as it is, else the round number that draws it at 2.4 to 6 % of a body."""
+    share = max(
+        (float(np.abs(displacements[name]).max()) / diagonal(body) for name, body in flexible.items()), default=1.0
+    )
+    return 1.0 if share >= VISIBLE or share == 0 else round_below(DRAWN / share)
+
+
+def largest_of(scalars: Mapping[str, Array]) -> float:
+    """Return the largest size of the scalars of all bodies."""
+    return max((float(np.abs(values).max(initial=0.0)) for values in scalars.values()), default=0.0)
+
+
+def interface_path(motion: BodyMotion, interface: ReducedInterface, magnification: float) -> Array:
+    """Return the positions of an interface in all rows, ground axes, (n_t, 3)."""
+    local = interface.position + magnification * (motion.q @ interface.Psi[:3].T)
+    return np.asarray(motion.r + np.einsum("tab,tb->ta", rotations(motion.p), local))
+
+
+def trail(path: Array, rows: IntArray) -> Lines:
+    """Return the path of a point, (n_t, 3), up to each frame, a row: what is still to come lies on the point."""
+    kept = np.unique(np.r_[rows, np.arange(rows[0], rows[-1], max(len(path) // TRAIL_POINTS, 1))])
+    points = path[np.minimum(kept[None, :], rows[:, None])]
+    segments = np.stack([np.arange(len(kept) - 1), np.arange(1, len(kept))], axis=1)
+    return Lines(segments, points, color=TRAIL_COLOR, width=1.4, opacity=0.6)
+
+
+def up_of(trajectory: Trajectory, points: Array) -> Array:
+    """Return what is up, (3,): against gravity if known; else z, or y where the system is flat in z and moves in y."""
+    gravity = np.asarray(trajectory.head.run.get("gravity", np.zeros(3)), dtype=float)
+    if gravity.shape == (3,) and np.linalg.norm(gravity) > 0:
+        return -gravity
+    extent = np.ptp(points, axis=0)
+    return np.array([0.0, 1.0, 0.0]) if extent[2] < 0.3 * min(extent[:2]) else np.array([0.0, 0.0, 1.0])

@@ -1,0 +1,67 @@
+"""By what flexible bodies are coloured in films and pictures: elastic displacement, or von Mises stress."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.reduced_body.reduced_body import ReducedBody
+from cms.reduced_body.stress import von_mises
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.units import Units
+from floatframe.results.place_motion import stress_modes
+
+__all__ = ["BODY_COLORS", "DISPLACEMENT", "VON_MISES", "BodyColor", "length_unit", "stress_unit"]
+
+FRAMES_AT_ONCE = 16  #: of which the stress is known at all nodes at a time
+
+
+@dataclass(frozen=True)
+class BodyColor:
+    """A scalar at the kept nodes of a body by its modal coordinates."""
+
+    title: str
+    values: Callable[[ReducedBody, Array], Array]  #: of a body and q, (n, n_q): scalars, (n, n_kept)
+    unit: Callable[[Units, float], tuple[str, float]]  #: symbol that reads well for the largest value, factor to it
+
+
+def displacements(body: ReducedBody, q: Array) -> Array:
+    """Return the size of the elastic displacement, (n, n_kept) [m]."""
+    moved = (q @ body.Phi.reshape(-1, body.n_q).T).reshape(len(q), -1, 3)
+    return np.asarray(np.linalg.norm(moved, axis=2))
+
+
+def stresses(body: ReducedBody, q: Array) -> Array:
+    """Return von Mises' stress, all modes included, (n, n_kept) [Pa]; `ResultsError` without stress modes."""
+    modes = stress_modes(body.name, body)
+    found = np.empty((len(q), len(modes)))
+    for k in range(0, len(q), FRAMES_AT_ONCE):
+        part = np.tensordot(modes, q[k : k + FRAMES_AT_ONCE].T, axes=1)  # (n_kept, 6, n)
+        found[k : k + FRAMES_AT_ONCE] = von_mises(part).T
+    return found
+
+
+def length_unit(units: Units, largest: float) -> tuple[str, float]:
+    """Return the unit in which a length reads well, and the factor to it; metric lengths only."""
+    if units.length_symbol not in ("m", "mm", "cm"):
+        return units.length_symbol, 1.0
+    for symbol, metres in (("m", 1.0), ("mm", 1e-3), ("\N{GREEK SMALL LETTER MU}m", 1e-6)):
+        if largest * units.length >= 0.5 * metres:
+            return symbol, units.length / metres
+    return "nm", units.length / 1e-9
+
+
+def stress_unit(units: Units, largest: float) -> tuple[str, float]:
+    """Return the unit in which a stress reads well, and the factor to it; metric units only."""
+    if units.stress_symbol not in ("Pa", "kPa", "MPa", "GPa"):
+        return units.stress_symbol, 1.0
+    pascal = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}[units.stress_symbol]
+    for symbol, size in (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3)):
+        if largest * pascal >= (0.1 if symbol == "MPa" else 1.0) * size:
+            return symbol, pascal / size
+    return "Pa", pascal
+
+
+DISPLACEMENT = BodyColor("elastic displacement", displacements, length_unit)
+VON_MISES = BodyColor("von Mises stress", stresses, stress_unit)
+BODY_COLORS = {"displacement": DISPLACEMENT, "von-mises": VON_MISES}

@@ -1,0 +1,120 @@
+"""Plots of a computed motion: each function draws into the axes it is given, or into a figure of its own."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from floatframe.results.energy_balance import balance_defect, energy_scale
+from floatframe.results.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "plot_drift",
+    "plot_energies",
+    "plot_energy_balance",
+    "plot_modal_coordinates",
+    "plot_momentum",
+    "plot_positions",
+    "plot_reaction",
+]
+
+SHOWN = 1e-18  #: least drift on the axis: what is below is rounding of rounding
+FLOOR = 1e-300  #: below which a logarithmic axis shows nothing
+
+
+def plot_energies(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
+    """Kinetic, strain, gravity and spring energy, work of forces and dissipation, unless zero; and the total energy."""
+    ax, e = axes_for(trajectory, ax), trajectory.energies
+    parts = {"kinetic": e.kinetic, "strain": e.strain, "gravity": e.gravity, "springs": e.springs,
+             "work of forces": e.work, "dissipated": e.dissipated}  # fmt: skip
+    for name, values in parts.items():
+        if np.any(values):
+            ax.plot(trajectory.t, values, label=name)
+    ax.plot(trajectory.t, e.total, "k--", linewidth=1, label="total")
+    units = trajectory.units
+    return labelled(ax, f"energy [{units.force_symbol} {units.length_symbol}]")
+
+
+def plot_energy_balance(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
+    """Error of the energy balance over the largest energy that moves about."""
+    ax = axes_for(trajectory, ax)
+    defect = balance_defect(trajectory) / (energy_scale(trajectory) or 1.0)
+    ax.plot(trajectory.t, defect, "k", label="total - work + dissipated")
+    return labelled(ax, "error of the energy balance / largest energy")
+
+
+def plot_momentum(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
+    """Linear momentum, and angular momentum about the ground origin (right axis), by component."""
+    ax = axes_for(trajectory, ax)
+    units = trajectory.units
+    linear = f"{units.mass_symbol} {units.length_symbol}/{units.time_symbol}"
+    other = ax.twinx()
+    for a, axis in enumerate("xyz"):
+        ax.plot(trajectory.t, trajectory.linear_momentum[:, a], color=f"C{a}", label=f"linear {axis}")
+        other.plot(trajectory.t, trajectory.angular_momentum[:, a], "--", color=f"C{a}", label=f"angular {axis}")
+    labelled(other, f"angular momentum [{linear} {units.length_symbol}]")
+    return labelled(ax, f"linear momentum [{linear}]")
+
+
+def plot_positions(trajectory: Trajectory, body: str, ax: "Axes | None" = None) -> "Axes":
+    """Position of a body's frame origin in ground axes, by component."""
+    ax = axes_for(trajectory, ax)
+    for axis, values in zip("xyz", trajectory.body(body).r.T, strict=True):
+        ax.plot(trajectory.t, values, label=f"{body} {axis}")
+    return labelled(ax, f"position [{trajectory.units.length_symbol}]")
+
+
+def plot_modal_coordinates(
+    trajectory: Trajectory, body: str, ax: "Axes | None" = None, *, modes: Sequence[int] | None = None
+) -> "Axes":
+    """Modal coordinates of a body; `modes`: which, from 0 (all by default)."""
+    ax, units = axes_for(trajectory, ax), trajectory.units
+    q = trajectory.body(body).q
+    for k in range(q.shape[1]) if modes is None else modes:
+        ax.plot(trajectory.t, q[:, k], label=f"{body} q{k + 1}")
+    return labelled(ax, f"modal coordinate [{units.mass_symbol}$^{{1/2}}$ {units.length_symbol}]")
+
+
+def plot_reaction(trajectory: Trajectory, name: str, ax: "Axes | None" = None) -> "Axes":
+    """Force that a joint or spring-damper exerts on its marker A, by component in ground axes."""
+    ax = axes_for(trajectory, ax)
+    for axis, values in zip("xyz", trajectory.reaction(name).force.T, strict=True):
+        ax.plot(trajectory.t, values, label=f"{name} {axis}")
+    return labelled(ax, f"force [{trajectory.units.force_symbol}]")
+
+
+def plot_drift(trajectory: Trajectory, ax: "Axes | None" = None) -> "Axes":
+    """How far each joint is from being closed: distance and angle, logarithmic."""
+    ax, length = axes_for(trajectory, ax), trajectory.units.length_symbol
+    for name in trajectory.head.joints:
+        drift = trajectory.drift(name)
+        for kind, values in ((f"distance [{length}]", drift.distance), ("angle [rad]", drift.angle)):
+            size = np.abs(values)
+            if np.any(size > FLOOR):
+                ax.semilogy(trajectory.t, np.where(size > FLOOR, size, np.nan), label=f"{name} {kind}")
+    drawn = [np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()]
+    largest = max((float(np.nanmax(values)) for values in drawn if np.isfinite(values).any()), default=0.0)
+    ax.set_ylim(SHOWN, max(10 * largest, 1e4 * SHOWN))
+    return labelled(ax, f"drift of joints [{length}, rad]")
+
+
+def axes_for(trajectory: Trajectory, ax: "Axes | None") -> "Axes":
+    """Return the axes, or those of a new figure, with time along x."""
+    if ax is None:
+        from matplotlib.figure import Figure
+
+        ax = Figure(layout="constrained").add_subplot()
+    ax.set_xlabel(f"time [{trajectory.units.time_symbol}]")
+    ax.grid(alpha=0.3)
+    return ax
+
+
+def labelled(ax: "Axes", label: str) -> "Axes":
+    """Set the label of y, and a legend of the curves."""
+    ax.set_ylabel(label)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(fontsize="small")
+    return ax

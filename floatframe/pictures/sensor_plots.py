@@ -1,0 +1,82 @@
+"""Plots of what sensors measured: one panel a sensor and unit."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from floatframe.errors import ResultsError
+from floatframe.pictures.plots import labelled
+from floatframe.results.sensors.measurement import Measurement
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["panels_of", "plot_measurement", "plot_sensors"]
+
+NOTHING = 1e-9  #: of the largest column of a unit, below which a curve would lie on zero
+LEFT_OUT = ("number in the mesh",)  #: units of columns that are no curves
+
+
+def panels_of(measurement: Measurement) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the columns of each panel: a unit, and the names of the columns that have it."""
+    units = dict.fromkeys(measurement.units[name] for name in measurement.columns)
+    return tuple(
+        (unit, tuple(name for name in measurement.columns if measurement.units[name] == unit))
+        for unit in units
+        if unit not in LEFT_OUT
+    )
+
+
+def plot_measurement(
+    measurement: Measurement, ax: "Axes | None" = None, *, unit: str | None = None, time_symbol: str = "s"
+) -> "Axes":
+    """Plot the columns of one unit (default: the first one) over time."""
+    if ax is None:
+        from matplotlib.figure import Figure
+
+        ax = Figure(figsize=(7, 4), layout="constrained").add_subplot()
+    panels = dict(panels_of(measurement))
+    unit = next(iter(panels)) if unit is None else unit
+    largest = max(float(np.abs(measurement.columns[name]).max(initial=0.0)) for name in panels[unit])
+    for name in panels[unit]:
+        values = measurement.columns[name]
+        # components that stay zero would only crowd the legend
+        if len(panels[unit]) == 1 or np.abs(values).max(initial=0.0) > NOTHING * largest:
+            is_sum = name.split()[-1] in ("size", "total", "von")
+            ax.plot(measurement.t, values, label=name, linewidth=1.0 if is_sum else 1.5, color="k" if is_sum else None)
+    ax.set_xlabel(f"time [{time_symbol}]")
+    ax.set_title(measurement.sensor, fontsize="medium")
+    ax.grid(alpha=0.3)
+    columns = panels[unit]
+    if len(columns) == 1:
+        ax.set_ylabel(f"{columns[0]} [{unit}]")
+        return ax
+    return labelled(ax, f"{measurement.sensor} [{unit}]")
+
+
+def plot_sensors(measurements: Sequence[Measurement], *, title: str = "", time_symbol: str = "s") -> "Figure":
+    """Return a figure with a panel for every sensor, and for every unit of its columns.
+
+    Raises
+    ------
+    ResultsError
+        If there is nothing to plot.
+    """
+    from matplotlib.figure import Figure
+
+    panels = [(measurement, unit) for measurement in measurements for unit, _ in panels_of(measurement)]
+    if not panels:
+        raise ResultsError("plot: no sensor to plot; name a joint coordinate, or add tables [sensors.NAME]")
+    n_columns = 1 if len(panels) == 1 else 2
+    n_rows = (len(panels) + n_columns - 1) // n_columns
+    figure = Figure(figsize=(6.5 * n_columns, 3.4 * n_rows + 0.6), layout="constrained")
+    if title:
+        figure.suptitle(title)
+    axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
+    for (measurement, unit), ax in zip(panels, axes, strict=False):
+        plot_measurement(measurement, ax, unit=unit, time_symbol=time_symbol)
+    for ax in axes[len(panels) :]:
+        ax.remove()
+    return figure

@@ -1,0 +1,1 @@
+"""Computed motions: the file, the trajectory, and what is recovered from it."""

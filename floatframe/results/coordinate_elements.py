@@ -1,0 +1,90 @@
+"""Couplers and user forces over a motion: their coordinates, forces and states."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import ResultsError
+from floatframe.forces import UserForce
+from floatframe.results.trajectory import Trajectory
+from floatframe.system import System
+
+__all__ = ["PortMotion", "UserForceMotion", "coupler_motion", "user_force_motion"]
+
+
+@dataclass(frozen=True, eq=False)
+class PortMotion:
+    """Coordinates of a coupler over time, in the order of its terms, and the forces along them."""
+
+    t: Array  #: (n_t,) [s]
+    value: Array  #: distances, angles beyond full turns, (n_t, n_terms) [m, rad]
+    rate: Array  #: (n_t, n_terms) [m/s, rad/s]
+    force: Array  #: that acts to increase the coordinate, (n_t, n_terms) [N, N m]
+
+
+@dataclass(frozen=True, eq=False)
+class UserForceMotion:
+    """Coordinates, forces and states of a user force over time, by name, each (n_t,)."""
+
+    t: Array  #: (n_t,) [s]
+    value: Mapping[str, Array]  #: of the coordinates; angles beyond full turns
+    rate: Mapping[str, Array]
+    force: Mapping[str, Array]  #: that acts to increase its coordinate
+    states: Mapping[str, Array]
+
+
+def user_force_motion(system: System, trajectory: Trajectory, name: str) -> UserForceMotion:
+    """Return what a user force sees and does over a motion of the system.
+
+    Raises
+    ------
+    ResultsError
+        If there is no such force, or the motion is one of another system.
+    """
+    forces = [force for force in system.forces if isinstance(force, UserForce)]
+    names = [force.name for force in forces]
+    if name not in names:
+        raise ResultsError(f"user_force_motion: no user force {name!r}{nearest(name, names)}")
+    u = names.index(name)
+    model, w, force = compiled_system(system).model, unknowns(system, trajectory), forces[u]
+    k = len(system.couplers) + u
+    values = model.p_row[model.port0[k] : model.port0[k + 1]]
+    states = model.state_row[model.state0[u] : model.state0[u + 1]]
+    return UserForceMotion(
+        trajectory.t,
+        {each: w[:, row] for each, row in zip(force.coordinates, values, strict=True)},
+        {each: w[:, row + 1] for each, row in zip(force.coordinates, values, strict=True)},
+        {each: w[:, model.core[k] + j] for j, each in enumerate(force.forces)},
+        {each: w[:, row] for each, row in zip(force.states, states, strict=True)},
+    )
+
+
+def unknowns(system: System, trajectory: Trajectory) -> Array:
+    """Return all unknowns of connections, (n_t, n_w); `ResultsError` if they are those of another system."""
+    w = trajectory.source.read("w")
+    if w.shape[1] != int(compiled_system(system).model.c_w0[-1]):
+        raise ResultsError(f"the motion of {trajectory.head.system!r} is not one of the system {system.name!r}")
+    return w
+
+
+def coupler_motion(system: System, trajectory: Trajectory, name: str) -> PortMotion:
+    """Return the coordinates and forces of a coupler over a motion of the system.
+
+    Raises
+    ------
+    ResultsError
+        If there is no such coupler, or the motion is one of another system.
+    """
+    names = [coupler.name for coupler in system.couplers]
+    if name not in names:
+        raise ResultsError(f"coupler_motion: no coupler {name!r}{nearest(name, names)}")
+    model, w = compiled_system(system).model, unknowns(system, trajectory)
+    k = names.index(name)
+    ports = slice(int(model.port0[k]), int(model.port0[k + 1]))
+    rows = model.p_row[ports]
+    force = np.outer(w[:, model.core[k]], model.p_factor[ports])
+    return PortMotion(trajectory.t, w[:, rows], w[:, rows + 1], force)

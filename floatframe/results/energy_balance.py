@@ -1,0 +1,25 @@
+"""How well a computed motion keeps its energy."""
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.results.trajectory import Trajectory
+
+__all__ = ["balance_defect", "energy_scale"]
+
+
+def energy_scale(trajectory: Trajectory) -> float:
+    """Return the largest energy that moves about in the motion [J]: what an energy error is measured by.
+
+    Kinetic, strain and spring energy, the range of the potential of gravity (its zero is arbitrary), and the work of
+    forces and dampers.
+    """
+    e = trajectory.energies
+    parts = (e.kinetic, e.strain, e.springs, e.gravity - e.gravity.min(initial=np.inf), e.work, e.dissipated)
+    return max(float(np.abs(part).max(initial=0.0)) for part in parts)
+
+
+def balance_defect(trajectory: Trajectory) -> Array:
+    """Return total energy - work + dissipated, less its value at the start, (n_t,) [J]; exactly computed: zero."""
+    balance = trajectory.energies.balance
+    return np.asarray(balance - balance[:1])

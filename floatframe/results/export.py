@@ -1,0 +1,158 @@
+"""Motions for other programs: a table (CSV), and a series of deformed surfaces for ParaView (PVD and VTU)."""
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from cms.reduced_body.reduced_body import ReducedBody
+from cms.reduced_body.stress import von_mises
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.paths import replace_file
+from floatframe.errors import ResultsError
+from floatframe.results.place_motion import interface_motion
+from floatframe.results.recovery import elastic_displacements, nodal_displacements, require_same_modes
+from floatframe.results.sensors import measured, sensor_of, sensors_of
+from floatframe.results.trajectory import Trajectory
+from floatframe.rotations import rotation_matrix
+from floatframe.system import System
+
+__all__ = ["export_csv", "export_vtk", "motion_table"]
+
+
+def motion_table(
+    trajectory: Trajectory, bodies: Mapping[str, ReducedBody] | None = None, system: System | None = None
+) -> dict[str, Array]:
+    """Return the columns of a motion by name with unit, each (n_t,).
+
+    Time; of every body the place and motion of its frame; of the interfaces of the bodies given, position, velocity
+    and elastic displacement in B; of joints and springs force and moment on marker A; energies. With the system, also
+    its joint coordinates (value, rate, force along them) and all that its sensors measure.
+    """
+    units = trajectory.units
+    m, s = units.length_symbol, units.time_symbol
+    N, Nm = units.force_symbol, f"{units.force_symbol} {units.length_symbol}"
+    table: dict[str, Array] = {f"t [{s}]": trajectory.t}
+
+    def put(name: str, values: Array, unit: str, components: str = "xyz") -> None:
+        for k, component in enumerate(components):
+            table[f"{name} {component} [{unit}]"] = values[:, k]
+
+    for name in trajectory.body_names:
+        motion = trajectory.body(name)
+        put(f"{name} origin", motion.r, m)
+        put(f"{name} p", motion.p, "-", "wxyz")
+        put(f"{name} velocity", motion.v, f"{m}/{s}")
+        put(f"{name} omega_B", motion.omega_B, f"rad/{s}")
+    for name, reduced in (bodies or {}).items():
+        for interface in reduced.interfaces:
+            where = f"{name} {interface.name}"
+            place = interface_motion(trajectory, name, reduced, interface.name)
+            put(f"{where} position", place.position, m)
+            put(f"{where} velocity", place.velocity, f"{m}/{s}")
+            put(f"{where} elastic", elastic_displacements(trajectory, name, reduced, interface.name), m)
+    for name in trajectory.connection_names:
+        reaction = trajectory.reaction(name)
+        put(f"{name} force", reaction.force, N)
+        put(f"{name} moment", reaction.moment, Nm)
+    energies = trajectory.energies
+    for name in ("kinetic", "strain", "gravity", "springs", "work", "dissipated", "total", "balance"):
+        table[f"energy {name} [{Nm}]"] = getattr(energies, name)
+    if system is not None:
+        coordinates = [sensor_of(system, f"{j.name}.{c}") for j in system.joints for c in j.coordinates]
+        for measurement in measured(system, trajectory, [*coordinates, *sensors_of(system)]).values():
+            table |= dict(zip(measurement.headers, measurement.columns.values(), strict=True))
+    return table
+
+
+def export_csv(
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    bodies: Mapping[str, ReducedBody] | None = None,
+    system: System | None = None,
+) -> None:
+    """Write `motion_table` as comma-separated values, with 17 digits, so that every number reads back as it was."""
+    table = motion_table(trajectory, bodies, system)
+    names = [f'"{name}"' if "," in name else name for name in table]
+    rows = np.column_stack(list(table.values()))
+    lines = [",".join(names), *(",".join(repr(float(value)) for value in row) for row in rows)]
+    replace_file(Path(path), ("\n".join(lines) + "\n").encode())
+
+
+def export_vtk(
+    trajectory: Trajectory,
+    bodies: Mapping[str, ReducedBody],
+    path: str | os.PathLike[str],
+    *,
+    every: int = 1,
+    on_frame: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Write the deformed surfaces of the bodies given as a series for ParaView: one .pvd and a folder of .vtu files.
+
+    Point data: elastic displacement in ground axes, and the von Mises stress where every body knows it.
+
+    Parameters
+    ----------
+    path
+        Ends in .pvd; the .vtu files go into a folder of the same name without the ending.
+    every
+        Take every so many output times.
+    on_frame
+        Called with the numbers of times written and of all.
+
+    Returns
+    -------
+    list of Path
+        The .pvd file first.
+
+    Raises
+    ------
+    ResultsError
+        If no body has a surface, or one does not fit the motion.
+    """
+    import meshio
+
+    path = Path(path)
+    if path.suffix.lower() != ".pvd":
+        raise ResultsError(f"{path}: expected a file name that ends in .pvd")
+    drawn = {name: body for name, body in bodies.items() if len(body.surface)}
+    if not drawn:
+        raise ResultsError("export: no body with a surface; a motion of rigid bodies can be exported as .csv")
+    for name, body in drawn.items():
+        require_same_modes(trajectory, name, body)
+    folder = path.with_suffix("")
+    folder.mkdir(exist_ok=True)
+    motions = {name: trajectory.body(name) for name in drawn}
+    starts = np.cumsum([0, *(len(body.nodes) for body in drawn.values())])
+    triangles = np.concatenate([b.surface + k for b, k in zip(drawn.values(), starts[:-1], strict=True)])
+    number = np.repeat(np.arange(len(drawn)), [len(body.surface) for body in drawn.values()])
+    has_stress = all(body.stress is not None for body in drawn.values())
+    rows = range(0, len(trajectory.t), every)
+    written, entries = [path], []
+    for done, i in enumerate(rows):
+        points, displacement, stress = [], [], []
+        for name, body in drawn.items():
+            motion = motions[name]
+            R = rotation_matrix(motion.p[i])
+            elastic = nodal_displacements(trajectory, name, body, i)
+            points.append(motion.r[i] + (body.nodes + elastic) @ R.T)
+            displacement.append(elastic @ R.T)
+            if has_stress and body.stress is not None:
+                stress.append(von_mises(body.stress @ motion.q[i]))
+        data = {"elastic displacement": np.concatenate(displacement)}
+        if has_stress:
+            data["von Mises stress"] = np.concatenate(stress)
+        file = folder / f"{i:06d}.vtu"
+        meshio.Mesh(
+            np.concatenate(points), [("triangle", triangles)], point_data=data, cell_data={"body": [number]}
+        ).write(file)
+        written.append(file)
+        time = float(trajectory.t[i])
+        entries.append(f'<DataSet timestep="{time!r}" file="{escape(folder.name)}/{file.name}"/>')
+        if on_frame is not None:
+            on_frame(done + 1, len(rows))
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
+    replace_file(path, (head + "\n".join(entries) + "\n</Collection>\n</VTKFile>\n").encode())
+    return written

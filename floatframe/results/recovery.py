@@ -1,0 +1,90 @@
+"""From a motion back to the body: positions of nodes and interfaces in ground axes."""
+
+import numpy as np
+
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.compiling.stiffening import interface_deformation
+from floatframe.errors import ResultsError
+from floatframe.results.trajectory import Trajectory
+from floatframe.rotations import rotation_matrix
+
+__all__ = [
+    "elastic_displacements",
+    "interface_positions",
+    "nodal_displacements",
+    "nodal_positions",
+    "point_positions",
+]
+
+
+def require_same_modes(trajectory: Trajectory, body_name: str, reduced: ReducedBody) -> None:
+    """Raise `ResultsError` unless the reduced body has as many modes as the body of the trajectory."""
+    _, entry = trajectory.entry(body_name)
+    if entry.n_q != reduced.n_q:
+        raise ResultsError(
+            f"body {body_name!r} has {entry.n_q} modes in the trajectory, but the reduced body {reduced.name!r} has "
+            f"{reduced.n_q}; give the modal file of the run ({entry.source or 'made in memory'})"
+        )
+
+
+def nodal_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int) -> Array:
+    """Return positions of the kept nodes of a flexible body at an output time, ground axes, (n_kept, 3) [m].
+
+    r + R (c + Phi q), with all modes of the body, static ones included; of a stiffened body with quadratic modes also
+    the part of second order.
+
+    Raises
+    ------
+    ResultsError
+        If there is no such body, or the reduced body is another one.
+    """
+    require_same_modes(trajectory, body_name, reduced)
+    motion = trajectory.body(body_name)
+    local = reduced.nodes + nodal_displacements(trajectory, body_name, reduced, i_time)
+    return motion.r[i_time] + local @ rotation_matrix(motion.p[i_time]).T
+
+
+def nodal_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, i_time: int | IntArray) -> Array:
+    """Return displacements of the kept nodes in the body frame at one or several output times, (..., n_kept, 3) [m].
+
+    Phi q, and of a stiffened body with quadratic modes ½ Σ q_k q_l g_kl besides.
+    """
+    require_same_modes(trajectory, body_name, reduced)
+    _, entry = trajectory.entry(body_name)
+    q = trajectory.body(body_name).q[i_time]
+    displacement = np.einsum("nak,...k->...na", reduced.Phi, q, optimize=True)
+    if reduced.quadratic is not None and entry.is_stiffened:
+        displacement = displacement + 0.5 * np.einsum("nakl,...k,...l->...na", reduced.quadratic, q, q, optimize=True)
+    return np.asarray(displacement)
+
+
+def interface_positions(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
+    """Return positions of the reference point of an interface over time, ground axes, (n_t, 3) [m]."""
+    require_same_modes(trajectory, body_name, reduced)
+    motion = trajectory.body(body_name)
+    d = elastic_displacements(trajectory, body_name, reduced, interface)
+    return at_points(motion.r, motion.p, reduced.interface(interface).position + d)
+
+
+def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
+    """Return the displacement of an interface in the body frame over time, (n_t, 3) [m].
+
+    Psi q, and of a stiffened body with the part of second order, such as the shortening of a bent rod.
+    """
+    require_same_modes(trajectory, body_name, reduced)
+    _, entry = trajectory.entry(body_name)
+    q = trajectory.body(body_name).q
+    return interface_deformation(reduced, interface, q, is_stiffened=entry.is_stiffened)[:, :3]
+
+
+def point_positions(trajectory: Trajectory, body_name: str, point: Array) -> Array:
+    """Return positions of a point that is fixed in the frame of a body, ground axes, (n_t, 3) [m]."""
+    motion = trajectory.body(body_name)
+    return at_points(motion.r, motion.p, np.broadcast_to(np.asarray(point, dtype=float), motion.r.shape))
+
+
+def at_points(r: Array, p: Array, local: Array) -> Array:
+    """Return r + R local for each time, (n_t, 3)."""
+    w, v = p[:, :1], p[:, 1:]
+    return r + local + 2 * np.cross(v, np.cross(v, local) + w * local)

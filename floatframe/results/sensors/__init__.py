@@ -1,0 +1,116 @@
+"""Named sensors: what is measured on a motion, in Python and in the tables [sensors.NAME] of a system file."""
+
+from collections.abc import Sequence
+from typing import cast
+
+from fe_models.foundation.words import nearest
+from floatframe.errors import ModelError
+from floatframe.results.sensors.coordinate_elements import ControlSensor, CouplerSensor
+from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
+from floatframe.results.sensors.measurement import Measurement
+from floatframe.results.sensors.places import AngleSensor, DisplacementSensor, PlaceSensor
+from floatframe.results.sensors.stresses import ElongationSensor, StrainGauge, StressSensor, VonMisesSensor
+from floatframe.results.trajectory import Trajectory
+from floatframe.system import System
+
+__all__ = [
+    "SENSORS",
+    "AngleSensor",
+    "ControlSensor",
+    "CoordinateSensor",
+    "CouplerSensor",
+    "DisplacementSensor",
+    "ElongationSensor",
+    "EnergySensor",
+    "Measurement",
+    "ModeSensor",
+    "MomentumSensor",
+    "PlaceSensor",
+    "ReactionSensor",
+    "Sensor",
+    "StrainGauge",
+    "StressSensor",
+    "VonMisesSensor",
+    "measured",
+    "sensor_of",
+    "sensors_of",
+]
+
+Sensor = (
+    AngleSensor
+    | ControlSensor
+    | CoordinateSensor
+    | CouplerSensor
+    | DisplacementSensor
+    | ElongationSensor
+    | EnergySensor
+    | ModeSensor
+    | MomentumSensor
+    | PlaceSensor
+    | ReactionSensor
+    | StrainGauge
+    | StressSensor
+    | VonMisesSensor
+)
+
+SENSORS = {
+    "angle": AngleSensor,
+    "control": ControlSensor,
+    "coordinate": CoordinateSensor,
+    "coupler": CouplerSensor,
+    "displacement": DisplacementSensor,
+    "elongation": ElongationSensor,
+    "energy": EnergySensor,
+    "mode": ModeSensor,
+    "momentum": MomentumSensor,
+    "place": PlaceSensor,
+    "reaction": ReactionSensor,
+    "strain": StrainGauge,
+    "stress": StressSensor,
+    "von-mises": VonMisesSensor,
+}
+
+
+def measured(system: System, trajectory: Trajectory, sensors: Sequence[Sensor] | None = None) -> dict[str, Measurement]:
+    """Return what sensors measured on a motion of the system, by name; by default all sensors of the system.
+
+    Raises
+    ------
+    ModelError
+        If the motion is one of another system, or a sensor names what does not exist.
+    """
+    names = [body.name for body in system.bodies]
+    if names != list(trajectory.body_names):
+        raise ModelError(
+            f"measured: the motion has bodies {', '.join(trajectory.body_names)}, but system {system.name!r} "
+            f"{', '.join(names)}; give the system that was run"
+        )
+    return {
+        sensor.name: sensor.measure(system, trajectory)
+        for sensor in (sensors_of(system) if sensors is None else sensors)
+    }
+
+
+def sensors_of(system: System) -> tuple[Sensor, ...]:
+    """Return the sensors that a system carries: it knows their names only."""
+    return cast(tuple[Sensor, ...], system.sensors)
+
+
+def sensor_of(system: System, name: str) -> Sensor:
+    """Return a sensor of the system, or the joint coordinate "joint.coordinate" as one.
+
+    Raises
+    ------
+    ModelError
+        With the nearest name if there is none.
+    """
+    joint, _, coordinate = name.rpartition(".")
+    for each in system.joints:
+        if each.name == joint and coordinate in each.coordinates:
+            return CoordinateSensor(name, joint, coordinate)
+    for sensor in sensors_of(system):
+        if sensor.name == name:
+            return sensor
+    coordinates = [f"{each.name}.{c}" for each in system.joints for c in each.coordinates]
+    choices = [*(sensor.name for sensor in system.sensors), *coordinates]
+    raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {name!r}{nearest(name, choices)}")

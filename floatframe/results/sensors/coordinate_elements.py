@@ -1,0 +1,82 @@
+"""Sensors of couplers and user forces: their coordinates, rates, forces and states."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import ModelError
+from floatframe.forces import UserForce
+from floatframe.joints.rows import TWIST, TWIST_B
+from floatframe.results.coordinate_elements import coupler_motion, user_force_motion
+from floatframe.results.sensors.measurement import Measurement, unit_words
+from floatframe.results.trajectory import Trajectory
+from floatframe.system import System
+
+__all__ = ["ControlSensor", "CouplerSensor"]
+
+
+@dataclass(frozen=True, eq=False)
+class CouplerSensor:
+    """A coupler: value, rate and force of each of its terms, numbered from 1."""
+
+    name: str
+    of: str  #: name of the coupler
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return the columns "value 1", "rate 1", "force 1", "value 2", ..."""
+        names = [coupler.name for coupler in system.couplers]
+        if self.of not in names:
+            raise ModelError(f"sensor {self.name!r}: no coupler {self.of!r}{nearest(self.of, names)}")
+        found = coupler_motion(system, trajectory, self.of)
+        columns: dict[str, Array] = {}
+        units: dict[str, str] = {}
+        for k, is_angle in enumerate(angles_of(system, names.index(self.of))):
+            own = (f"value {k + 1}", f"rate {k + 1}", f"force {k + 1}")
+            columns |= dict(zip(own, (found.value[:, k], found.rate[:, k], found.force[:, k]), strict=True))
+            units |= dict(zip(own, port_units(system, is_angle), strict=True))
+        return Measurement(self.name, trajectory.t, columns, units)
+
+
+@dataclass(frozen=True, eq=False)
+class ControlSensor:
+    """A user force: its coordinates, their rates, its forces along them, its states, all by their names."""
+
+    name: str
+    of: str  #: name of the user force
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return the columns "phi", "phi_dot", "phi force", ..., and states by their names (without unit)."""
+        forces = [force for force in system.forces if isinstance(force, UserForce)]
+        names = [force.name for force in forces]
+        if self.of not in names:
+            raise ModelError(f"sensor {self.name!r}: no user force {self.of!r}{nearest(self.of, names)}")
+        found = user_force_motion(system, trajectory, self.of)
+        k = names.index(self.of)
+        columns: dict[str, Array] = {}
+        units: dict[str, str] = {}
+        for name, is_angle in zip(forces[k].coordinates, angles_of(system, len(system.couplers) + k), strict=True):
+            value, rate, force = port_units(system, is_angle)
+            columns |= {name: found.value[name], f"{name}_dot": found.rate[name]}
+            units |= {name: value, f"{name}_dot": rate}
+            if name in found.force:
+                columns[f"{name} force"], units[f"{name} force"] = found.force[name], force
+        columns |= found.states
+        units |= dict.fromkeys(found.states, "-")
+        return Measurement(self.name, trajectory.t, columns, units)
+
+
+def angles_of(system: System, k: int) -> list[bool]:
+    """Return which coordinates of coupler or user force number k are angles."""
+    model = compiled_system(system).model
+    rows = model.p_row[model.port0[k] : model.port0[k + 1]]
+    return [bool(is_angle) for is_angle in np.isin(model.row_kind[rows], (TWIST, TWIST_B))]
+
+
+def port_units(system: System, is_angle: bool) -> tuple[str, str, str]:
+    """Return the units of value, rate and force of a coordinate."""
+    words = ("angle", "angular speed", "moment") if is_angle else ("length", "speed", "force")
+    value, rate, force = (unit_words(system.units, word) for word in words)
+    return value, rate, force

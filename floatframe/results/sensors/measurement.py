@@ -1,0 +1,57 @@
+"""What a sensor measured: named columns over time, each with its unit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.units import Units
+
+__all__ = ["Measurement", "unit_words", "vector_columns"]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Columns over time by name, such as x, y, z, size."""
+
+    sensor: str
+    t: Array  #: (n_t,) [s]
+    columns: Mapping[str, Array]  #: each (n_t,)
+    units: Mapping[str, str]  #: of each column, in the symbols of the system
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
+        object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """Names of the columns for tables: sensor, column, unit."""
+        return tuple(f"{self.sensor} {name} [{self.units[name]}]".replace("  ", " ") for name in self.columns)
+
+
+def vector_columns(values: Array, unit: str, *, prefix: str = "") -> tuple[dict[str, Array], dict[str, str]]:
+    """Return the columns x, y, z and size of a vector over time, (n_t, 3), and their units."""
+    columns = {f"{prefix}{axis}": values[:, k] for k, axis in enumerate("xyz")}
+    columns[f"{prefix}size"] = np.linalg.norm(values, axis=1)
+    return columns, dict.fromkeys(columns, unit)
+
+
+def unit_words(units: Units, what: str) -> str:
+    """Return the unit of a quantity: "length", "speed", "acceleration", "force", "moment", "power", "stress", ..."""
+    m, s, F = units.length_symbol, units.time_symbol, units.force_symbol
+    return {
+        "length": m,
+        "speed": f"{m}/{s}",
+        "acceleration": f"{m}/{s}²",
+        "angle": "rad",
+        "angular speed": f"rad/{s}",
+        "force": F,
+        "moment": f"{F} {m}",
+        "energy": f"{F} {m}",
+        "momentum": f"{units.mass_symbol} {m}/{s}",
+        "angular momentum": f"{units.mass_symbol} {m}²/{s}",
+        "stress": units.stress_symbol,
+        "modal": f"{units.mass_symbol}^(1/2) {m}",
+    }[what]

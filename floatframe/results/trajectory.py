@@ -1,0 +1,178 @@
+"""A computed motion: what is read from a results file or returned by `integrate`."""
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.units import Units, unit_system
+from fe_models.foundation.words import nearest
+from floatframe.errors import ResultsError
+from floatframe.results.results_file import ArraySource, BodyEntry, Head, open_results, validity_text
+from floatframe.results.validity import ValidityNote, notes_from_json
+from floatframe.state import State
+
+__all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_results"]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """Motion of one body: its frame B and its modal coordinates."""
+
+    t: Array  #: (n_t,) [s]
+    r: Array  #: position of the frame origin, ground axes, (n_t, 3) [m]
+    p: Array  #: Euler parameters (w, x, y, z) of R_GB, (n_t, 4)
+    q: Array  #: modal coordinates, (n_t, n_q)
+    v: Array  #: velocity of the frame origin, ground axes, (n_t, 3) [m/s]
+    omega_B: Array  # noqa: N815  #: angular velocity, body axes, (n_t, 3) [rad/s]
+    q_dot: Array  #: (n_t, n_q)
+    v_dot: Array  #: acceleration of the frame origin, ground axes, (n_t, 3) [m/s²]
+    omega_B_dot: Array  # noqa: N815  #: (n_t, 3) [rad/s²]
+    q_ddot: Array  #: (n_t, n_q)
+
+
+@dataclass(frozen=True, eq=False)
+class Energies:
+    """Energies of the whole system, each (n_t,) [J]."""
+
+    kinetic: Array
+    strain: Array
+    gravity: Array  #: zero for all mass at the ground origin
+    springs: Array
+    work: Array  #: done by point forces since the start
+    dissipated: Array  #: by dampers and modal damping since the start
+
+    @property
+    def total(self) -> Array:
+        """Kinetic and potential energy, (n_t,)."""
+        return self.kinetic + self.strain + self.gravity + self.springs
+
+    @property
+    def balance(self) -> Array:
+        """Total minus work plus dissipated, (n_t,): constant but for the error of the integrator."""
+        return self.total - self.work + self.dissipated
+
+
+@dataclass(frozen=True, eq=False)
+class Reaction:
+    """Force and moment that a joint or spring exerts on its marker A, ground axes."""
+
+    force: Array  #: (n_t, 3) [N]
+    moment: Array  #: (n_t, 3) [N m]; zero where there is none
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """How far a joint is from being closed, each (n_t,)."""
+
+    distance: Array  #: [m]
+    angle: Array  #: [rad]
+    distance_rate: Array  #: [m/s]
+    angle_rate: Array  #: [rad/s]
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A motion, in memory or (read when asked for) on disk."""
+
+    head: Head
+    source: ArraySource
+    is_complete: bool  #: False for a run that was interrupted
+    path: Path | None = None  #: results file, or None for a motion in memory
+    validity: tuple[ValidityNote, ...] = ()  #: bodies that left the range of their linear frame
+
+    @cached_property
+    def t(self) -> Array:
+        """Output times, (n_t,) [s]."""
+        return self.source.read("t")
+
+    @property
+    def units(self) -> Units:
+        """Unit system of all numbers."""
+        return unit_system(self.head.units)
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the bodies."""
+        return tuple(body.name for body in self.head.bodies)
+
+    @property
+    def connection_names(self) -> tuple[str, ...]:
+        """Names of the joints, then of the spring-dampers."""
+        return self.head.joints + self.head.springs
+
+    def entry(self, name: str) -> tuple[int, BodyEntry]:
+        """Return number and entry of a body; `ResultsError` with the choices if there is none."""
+        for i, body in enumerate(self.head.bodies):
+            if body.name == name:
+                return i, body
+        raise ResultsError(f"trajectory: no body {name!r}{nearest(name, self.body_names)}")
+
+    def body(self, name: str) -> BodyMotion:
+        """Return the motion of a body."""
+        i, entry = self.entry(name)
+        n, u0 = entry.n_q, entry.u0
+        u, u_dot = self.source.read("u"), self.source.read("u_dot")
+        return BodyMotion(
+            t=self.t,
+            r=self.source.read("position")[:, i],
+            p=self.source.read("euler_parameters")[:, i],
+            q=self.source.read("q")[:, entry.q0 : entry.q0 + n],
+            v=u[:, u0 : u0 + 3],
+            omega_B=u[:, u0 + 3 : u0 + 6],
+            q_dot=u[:, u0 + 6 : u0 + 6 + n],
+            v_dot=u_dot[:, u0 : u0 + 3],
+            omega_B_dot=u_dot[:, u0 + 3 : u0 + 6],
+            q_ddot=u_dot[:, u0 + 6 : u0 + 6 + n],
+        )
+
+    def state(self, i_time: int) -> State:
+        """Return the state at an output time, such as one to begin another motion from; -1: the last."""
+        arrays = [self.source.read(name)[i_time] for name in ("position", "euler_parameters", "q", "u")]
+        return State(*arrays)
+
+    def reaction(self, name: str) -> Reaction:
+        """Return what a joint or spring-damper exerts on its marker A."""
+        if name not in self.connection_names:
+            raise ResultsError(f"trajectory: no joint or spring {name!r}{nearest(name, self.connection_names)}")
+        c = self.connection_names.index(name)
+        w = self.source.read("w")[:, self.head.w0[c] : self.head.w0[c + 1]]
+        moment = w[:, 3:6] if w.shape[1] >= 6 else np.zeros((len(w), 3))
+        return Reaction(w[:, :3], moment)
+
+    def drift(self, name: str) -> Drift:
+        """Return how far a joint is from being closed."""
+        if name not in self.head.joints:
+            raise ResultsError(f"trajectory: no joint {name!r}{nearest(name, self.head.joints)}")
+        return Drift(*self.source.read("drift")[:, self.head.joints.index(name)].T)
+
+    @cached_property
+    def energies(self) -> Energies:
+        """Energies over time."""
+        d = self.source.read("diagnostics")
+        return Energies(d[:, 0], d[:, 1], d[:, 2], d[:, 3], d[:, 10], d[:, 11])
+
+    @property
+    def linear_momentum(self) -> Array:
+        """Ground axes, (n_t, 3) [kg m/s]."""
+        return self.source.read("diagnostics")[:, 4:7]
+
+    @property
+    def angular_momentum(self) -> Array:
+        """About the ground origin, ground axes, (n_t, 3) [kg m²/s]."""
+        return self.source.read("diagnostics")[:, 7:10]
+
+
+def read_results(path: str | os.PathLike[str]) -> Trajectory:
+    """Return the trajectory in a results file, or what a killed run left of it (then `is_complete` is False).
+
+    Raises
+    ------
+    ResultsError
+        If there is nothing, or the file is of another kind, a newer version or damaged.
+    """
+    head, source, is_complete = open_results(path)
+    return Trajectory(head, source, is_complete, Path(path), notes_from_json(validity_text(Path(path))))

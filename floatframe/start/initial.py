@@ -1,0 +1,318 @@
+"""Consistent initial conditions: assembled positions, compatible velocities, accelerations and reactions.
+
+All three solve the same system with the mass matrix M of the bodies and the rows G of the joints (P, V as in
+joints/rows.py; unknown reactions w, their lines GAUGE and SPRING included):
+
+    (1) positions       W dx - Jᵀ w = 0,       G dx = -g           W = M + s K; Newton until g = 0
+    (2) velocities      W du - Jᵀ w = 0,       G du = -G u
+    (3) accelerations   M u_dot - Jᵀ w = f,    G u_dot = -d(G)/dt u
+
+W adds the stiffness, scaled, to the mass, so that (1) and (2) move bodies rather than deform them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.rigid_body import euler_parameters_from_user
+from floatframe.checked_values import array_of_shape
+from floatframe.compiling.callbacks import raise_errors_of
+from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.errors import ModelError
+from floatframe.joints.rows import HELD, HELD_DISTANCES, HELD_VELOCITIES
+from floatframe.kernels.model import STIFFNESS, Model, Work, new_work
+from floatframe.start.constraint_words import conflict_of_drives, open_joints
+from floatframe.start.freedoms import Mobility, constraint_mobility, scaled_constraints
+from floatframe.start.newton_equations import (
+    displaced,
+    highest_frequency,
+    in_ground_axes,
+    linearized,
+    modal_matrix,
+    set_iterate,
+    solve,
+    with_mass_for_all,
+    with_modal_weight,
+)
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = [
+    "ConsistentState",
+    "acceleration_rates",
+    "consistent_state",
+    "mobility",
+    "solve_accelerations",
+    "velocity_correction",
+]
+
+ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
+MOST_ITERATIONS = 30
+FRICTION_COEFFICIENT = 5  #: column of `Model.joint_forces`
+NEAR_BY = 1e-3  #: rad, and part of the size of the system: a small way from a position
+REDUNDANT = 1e-10  #: smallest eigenvalue of G M⁻¹ Gᵀ, scaled to a unit diagonal, of independent constraints
+
+
+def mobility(system: System) -> Mobility:
+    """Return the mobility of a system as placed, its joints closed first.
+
+    Raises
+    ------
+    ModelError
+        If the joints cannot be closed from the given positions.
+    """
+    compiled = compiled_system(system)
+    work = new_work(compiled.model)
+    return constraint_mobility(compiled, work, assembled(compiled, work, compiled.placed))
+
+
+@dataclass(frozen=True, eq=False)
+class ConsistentState:
+    """A state that fulfils the joints, with the accelerations and reactions that go with it."""
+
+    state: State
+    u_dot: Array  #: (n_u,)
+    w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
+
+
+def consistent_state(system: System, state: State | None = None, *, t: float = 0.0) -> ConsistentState:
+    """Return a consistent state near a given one, or near the bodies as placed, for prescribed motions at time t.
+
+    Raises
+    ------
+    ModelError
+        If the joints cannot be closed from these positions, or some constraints repeat others.
+    """
+    compiled = compiled_system(system)
+    state = compiled.placed if state is None else checked(compiled, state)
+    work = new_work(compiled.model)
+    work.time[0] = t
+    state = assembled(compiled, work, state)
+    require_independent_constraints(compiled, work, state)
+    state = with_compatible_velocities(compiled, work, state)
+    return ConsistentState(state, *solve_accelerations(compiled, work, state))
+
+
+def checked(compiled: CompiledSystem, state: State) -> State:
+    """Return a state given by the user; `ModelError` if it is not one of this system."""
+    p = np.empty_like(compiled.placed.p)
+    for name in ("r", "p", "q", "u"):
+        value = array_of_shape(f"state: {name}", getattr(state, name), getattr(compiled.placed, name).shape)
+        if name == "p":
+            for i, parameters in enumerate(value):
+                p[i] = euler_parameters_from_user(f"state: p of body {compiled.body_names[i]!r}", parameters)
+    return State(state.r, p, state.q, state.u)
+
+
+def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
+    """(1): return the state with all joints closed."""
+    model = compiled.model
+    holds = np.isin(model.row_kind, HELD) & ~np.isin(model.row_kind, HELD_VELOCITIES)
+    if not holds.any():
+        return state
+    scale = np.where(np.isin(model.row_kind, HELD_DISTANCES), compiled.length, 1.0)
+    for _ in range(MOST_ITERATIONS):
+        set_iterate(work, state, w=start_unknowns(model))
+        parts = linearized(model, work, 1.0, 0.0, 0.0)
+        raise_errors_of(compiled.callbacks)
+        error = np.where(holds, work.g, 0.0)
+        if np.abs(error / scale).max() <= ASSEMBLED:
+            return state
+        try:
+            y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.u)), -error)
+        except RuntimeError:
+            break
+        if not np.isfinite(y).all():
+            break
+        state = displaced(model, state, in_ground_axes(model, state, y))
+    if np.abs(error / scale).max() <= 1e-9:
+        return state
+    conflict = conflict_of_drives(compiled, work, state)
+    if conflict:
+        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+    reach = ", and that the drives stay within reach" if (model.row_motion[holds] >= 0).any() else ""
+    raise ModelError(
+        f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the bodies "
+        f"nearer to their joints, or check lengths and axes{reach}"
+    )
+
+
+def require_independent_constraints(compiled: CompiledSystem, work: Work, state: State) -> None:
+    """Raise `ModelError` naming the joints if some constraints repeat others, unless these are to share their load."""
+    model = compiled.model
+    holds = np.isin(model.row_kind, HELD)
+    if not holds.any() or model.row_soft.any():
+        return
+    rows, _ = scaled_constraints(model, work, state)
+    if not rows.any(axis=1).all():
+        raise ModelError("a joint acts on the ground alone")
+    values, vectors = np.linalg.eigh(rows @ rows.T)
+    n_redundant = int((values < REDUNDANT).sum())
+    if n_redundant == 0:
+        return
+    conflict = conflict_of_drives(compiled, work, state)
+    if conflict:
+        raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
+    share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
+    owner = np.repeat(np.arange(len(model.c_size)), model.c_size)[holds]
+    involved = [name for c, name in enumerate(compiled.connection_names) if share[owner == c].sum() > 1e-6]
+    if is_singular_position(compiled, work, state, n_redundant):
+        raise ModelError(
+            f"a singular position: {n_redundant} of {int(holds.sum())} constraints repeat others here, but not a "
+            f"little way along the motion (see joints {', '.join(repr(name) for name in involved)}), so that it could "
+            "go on in more than one way; begin in another position"
+        )
+    counts = constraint_mobility(compiled, work, state).redundant
+    told = ", ".join(f"{count} of joint {name!r}" for name, count in counts.items())
+    raise ModelError(
+        f"{n_redundant} of {int(holds.sum())} constraints repeat others, so that reactions are not "
+        f"unique: see joints {', '.join(repr(name) for name in involved)} (in order, {told} repeat those before); "
+        "replace one by a joint that holds less (a fixed joint by a revolute, a revolute by a spherical one), or let "
+        'them share the load: redundant = "minimum-norm"'
+    )
+
+
+def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_redundant: int) -> bool:
+    """Whether fewer constraints repeat others a thousandth of a radian along the motions that the joints allow."""
+    model = compiled.model
+    holds = np.isin(model.row_kind, HELD)
+    set_iterate(work, state)
+    G = linearized(model, work, 1.0, 0.0, 0.0).G.toarray()[holds]
+    modal = np.ones(G.shape[1], dtype=bool)
+    for u0 in model.u0[:-1]:
+        modal[u0 : u0 + 6] = False
+        G[:, u0 + 3 : u0 + 6] /= compiled.length
+    _, values, right = np.linalg.svd(G[:, ~modal])
+    allowed = right[int((values > REDUNDANT * values.max(initial=0.0)).sum()) :]
+    if not len(allowed):
+        return False
+    y = np.zeros(G.shape[1])
+    y[~modal] = NEAR_BY * np.random.default_rng(0).normal(size=len(allowed)) @ allowed
+    for u0 in model.u0[:-1]:
+        y[u0 : u0 + 3] *= compiled.length
+    try:
+        near = assembled(compiled, work, displaced(model, state, in_ground_axes(model, state, y)))
+    except ModelError:
+        return False
+    rows, _ = scaled_constraints(model, work, near)
+    return int((np.linalg.eigvalsh(rows @ rows.T) < REDUNDANT).sum()) < n_redundant
+
+
+def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: State) -> State:
+    """(2): return the state with velocities that keep the joints closed."""
+    from floatframe.kernels.entry import rates_of_constraints
+
+    model = compiled.model
+    if len(work.w) == 0:
+        return state
+    set_iterate(work, state, w=start_unknowns(model))
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    rate, _ = rates_of_constraints(model, work)
+    if not np.any(rate):
+        return state
+    y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.u)), -rate)
+    return State(state.r, state.p, state.q, state.u + in_ground_axes(model, state, y))
+
+
+def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> tuple[Array, Array]:
+    """(3): return u_dot, (n_u,), and w, (n_w,), at a state."""
+    from floatframe.kernels.entry import rates_of_constraints
+
+    model = compiled.model
+    w = start_unknowns(model)
+    for _ in range(MOST_ITERATIONS):
+        set_iterate(work, state, w=w)
+        parts = linearized(model, work, 1.0, 0.0, 0.0)
+        _, bias = rates_of_constraints(model, work)
+        raise_errors_of(compiled.callbacks)
+        rows = -np.where(np.isin(model.row_kind, HELD), bias, work.g)
+        y, change = solve(with_mass_for_all(model, parts.H), parts, -work.residual, rows)
+        w = w + change
+        raise_errors_of(compiled.callbacks)
+        # friction by the normal force is not linear in the reactions, nor are users' forces in their states
+        is_linear = not has_normal_friction(model) and not len(model.state_row)
+        if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
+            break
+    return in_ground_axes(model, state, y), w
+
+
+def start_unknowns(model: Model) -> Array:
+    """Return the unknowns of connections before anything is known: the states of user forces at their start, (n_w,)."""
+    w = np.zeros(int(model.c_w0[-1]))
+    w[model.state_row] = model.state_start
+    return w
+
+
+def has_normal_friction(model: Model) -> bool:
+    """Whether some friction depends on the force in its joint."""
+    return bool((model.joint_forces[:, FRICTION_COEFFICIENT] > 0).any())
+
+
+def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float = 0.0) -> Array:
+    """Return d(u_dot)/dt at a consistent state, (n_u,), by a difference along the motion.
+
+    The step is a thousandth of the shortest time in the system, so that its error is 1e-6 of the fastest rate. The
+    difference is central, but forward in time where motions are prescribed, since they may begin at t.
+    """
+    model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
+    work = new_work(model)
+    turning = max((float(np.linalg.norm(state.u[k + 3 : k + 6])) for k in model.u0[:-1]), default=0.0)
+    falling = max(float(np.linalg.norm(u_dot[k : k + 3])) / compiled.length for k in model.u0[:-1])
+    swinging = max(float(np.linalg.norm(u_dot[k + 3 : k + 6])) for k in model.u0[:-1])
+    fastest = max(highest_frequency(model), turning, np.sqrt(falling), np.sqrt(swinging), fastest_motion(model))
+    if fastest == 0.0:
+        return np.zeros_like(u_dot)
+    s = 1e-3 / fastest
+
+    def u_dot_after(step: float) -> Array:
+        moved = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
+        work.time[0] = t + step
+        return solve_accelerations(compiled, work, State(moved.r, moved.p, moved.q, state.u + step * u_dot))[0]
+
+    if len(model.piece_t):
+        return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
+    return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)
+
+
+def fastest_motion(model: Model) -> float:
+    """Return the highest rate of prescribed motions: of their sines, or one over the shortest piece [1/s]."""
+    fastest = float(np.abs(model.piece[:, 7]).max(initial=0.0))
+    for first, last in zip(model.piece0[:-1], model.piece0[1:], strict=True):
+        lengths = np.diff(model.piece_t[first:last])
+        fastest = max(fastest, 1 / float(lengths.min()) if len(lengths) else 1.0)
+    return fastest
+
+
+def velocity_correction(
+    compiled: CompiledSystem, state: State, after: State, h: float, beta: float, t: float = 0.0
+) -> Array:
+    """Return the change of u, (n_u,), with which a step of size h from `state` at t closes the joints open in `after`.
+
+    G du = -g(after)/h, with the weights of one step, M + beta h² K.
+    """
+    model = compiled.model
+    work = new_work(model)
+    holds = np.isin(model.row_kind, HELD) & ~np.isin(model.row_kind, HELD_VELOCITIES)
+    if not holds.any():
+        return np.zeros(len(work.u))
+    w = start_unknowns(model)
+    if len(model.p_row):  # angles of couplers and user forces are those next to where their rates lead
+        work.time[0] = t
+        set_iterate(work, state, w=w)
+        linearized(model, work, 1.0, 0.0, 0.0)
+        w[model.p_row] = -work.g[model.p_row] - h * work.g[model.p_row + 1]
+    work.time[0] = t + h
+    set_iterate(work, after, w=w)
+    linearized(model, work, 1.0, 0.0, 0.0)
+    gap = np.where(holds, work.g, 0.0)
+    work.time[0] = t
+    set_iterate(work, state, w=start_unknowns(model))
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    H = []
+    for i, block in enumerate(parts.H):
+        block = block.copy()
+        block[6:, 6:] += beta * h**2 * modal_matrix(model, i, STIFFNESS)
+        H.append(block)
+    y, _ = solve(tuple(H), parts, np.zeros(len(work.u)), -gap / h)
+    return in_ground_axes(model, state, y)

@@ -1,0 +1,186 @@
+"""The linearised equations at one iterate, and their solution; for everything that is done once per motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from fe_models.foundation.arrays import Array
+from floatframe.kernels.model import MASS, STIFFNESS, Model, Work
+from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.state import State
+
+__all__ = [
+    "Linearized",
+    "displaced",
+    "highest_frequency",
+    "in_ground_axes",
+    "linearized",
+    "modal_diagonals",
+    "modal_matrix",
+    "set_iterate",
+    "solve",
+    "with_mass_for_all",
+    "with_modal_weight",
+]
+
+STIFF = 1e3  #: the stiffness in W is scaled so that the softest mode weighs this much more than its mass
+MASSLESS = 10.0  #: a mode without mass gets one that puts it at this multiple of the highest frequency
+
+
+@dataclass(frozen=True, eq=False)
+class Linearized:
+    """Matrices of the system at an iterate, unknowns in body axes (dx, dtheta, dq)."""
+
+    H: tuple[Array, ...]  #: of each body, (6 + n, 6 + n)
+    J: sp.csr_array  #: wrenches to bodies: forces = J.T @ w, (n_w, n_u)
+    G: sp.csr_array  #: rows by unknowns, (n_w, n_u)
+    V: sp.csr_array  #: rows by wrenches, (n_w, n_w)
+
+
+def set_iterate(work: Work, state: State, u_dot: Array | None = None, w: Array | None = None) -> None:
+    """Write a state into the working arrays; accelerations and wrenches zero if not given."""
+    work.r[:] = state.r
+    for i, p in enumerate(state.p):
+        work.R[i] = rotation_matrix(p)
+    work.q[:] = state.q
+    work.u[:] = state.u
+    work.u_dot[:] = 0.0 if u_dot is None else u_dot
+    work.w[:] = 0.0 if w is None else w
+    work.theta[:] = 0.0
+
+
+def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> Linearized:
+    """Evaluate at the iterate in `work` and return copies of all matrices."""
+    from floatframe.kernels.entry import evaluate_and_linearize
+
+    evaluate_and_linearize(model, work, c_m, c_d, c_k)
+    H = []
+    for i in range(len(model.kind)):
+        n = 6 + int(model.n_q[i])
+        H.append(work.H[model.h0[i] : model.h0[i + 1]].reshape(n, n).copy())
+    n_w, n_u = len(work.w), len(work.u)
+    J_parts: list[tuple[Array, int, int]] = []
+    G_parts: list[tuple[Array, int, int]] = []
+    for m in model.ends:
+        i, c, o = int(model.m_body[m]), int(model.m_connection[m]), int(model.m_x0[m])
+        n, size = 6 + int(model.n_q[i]), int(model.c_size[c])
+        R4 = np.kron(np.eye(4), work.R[i])
+        column = work.J_column[6 * o : 6 * (o + n)].reshape(6, n)
+        row = work.J_row[12 * o : 12 * (o + n)].reshape(12, n)
+        w0, u0 = int(model.c_w0[c]), int(model.u0[i])
+        carried = model.m_sign[m] * (R4[:6, :6] @ column)
+        for part, place in ((0, int(model.m_force[m])), (3, int(model.m_moment[m]))):
+            if place >= 0:
+                J_parts.append((carried[part : part + 3], w0 + place, u0))
+        G_parts.append((work.P[m, :size] @ R4 @ row, w0, u0))
+    blocks = [work.V[c, :size, :size].copy() for c, size in enumerate(model.c_size)]
+    V = sp.csr_array(sp.block_diag(blocks)) if blocks else sp.csr_array((0, 0))
+    return Linearized(tuple(H), summed(J_parts, (n_w, n_u)), summed(G_parts, (n_w, n_u)), V)
+
+
+def summed(parts: list[tuple[Array, int, int]], shape: tuple[int, int]) -> sp.csr_array:
+    """Return the sparse sum of dense blocks, each with its first row and column."""
+    rows = [np.repeat(np.arange(first, first + len(block)), block.shape[1]) for block, first, _ in parts]
+    columns = [np.tile(np.arange(first, first + block.shape[1]), len(block)) for block, _, first in parts]
+    values = [block.ravel() for block, _, _ in parts]
+    if not parts:
+        return sp.csr_array(shape)
+    place = (np.concatenate(rows), np.concatenate(columns))
+    return sp.csr_array(sp.coo_array((np.concatenate(values), place), shape=shape))
+
+
+def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -> tuple[Array, Array]:
+    """Solve H y - Jᵀ w = forces, G y + V w = rows; return y, (n_u,), and w, (n_w,)."""
+    top = sp.block_diag(H)
+    if len(rows) == 0:
+        return splu(sp.csc_array(top)).solve(forces), np.zeros(0)
+    matrix = sp.csc_array(sp.block_array([[top, -parts.J.T], [parts.G, parts.V]]))
+    solution = splu(matrix).solve(np.concatenate([forces, rows]))
+    return solution[: len(forces)], solution[len(forces) :]
+
+
+def modal_diagonals(model: Model, i: int, which: int) -> Array:
+    """Return the diagonal of M*, K* or D* of a body, (n_q,)."""
+    n, t = int(model.n_q[i]), model.kind[i]
+    if n == 0:
+        return np.zeros(0)
+    start = model.block0[t, which]
+    step = 1 if model.is_diagonal[t, which - MASS] else n + 1
+    return model.blocks[start : start + n * step : step][:n]
+
+
+def modal_matrix(model: Model, i: int, which: int) -> Array:
+    """Return M*, K* or D* of a body, (n_q, n_q)."""
+    n, t = int(model.n_q[i]), model.kind[i]
+    if n == 0:
+        return np.zeros((0, 0))
+    start = model.block0[t, which]
+    if model.is_diagonal[t, which - MASS]:
+        return np.diag(model.blocks[start : start + n])
+    return model.blocks[start : start + n * n].reshape(n, n)
+
+
+def highest_frequency(model: Model) -> float:
+    """Return the largest sqrt(K_kk/M_kk) of all modes with mass [rad/s]; 0 without modes."""
+    highest = 0.0
+    for i in range(len(model.kind)):
+        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+        with_mass = M > 0
+        if with_mass.any():
+            highest = max(highest, float(np.sqrt(np.max(np.maximum(K[with_mass], 0) / M[with_mass]))))
+    return highest
+
+
+def with_modal_weight(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Return mass matrices with the modal stiffness added, scaled (W of the module docstring)."""
+    weighted = []
+    for i, block in enumerate(H):
+        block = block.copy()
+        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+        elastic = (M > 0) & (K > 0)
+        softest = np.min(K[elastic] / M[elastic]) if elastic.any() else (K.max() if K.size and K.max() > 0 else 1.0)
+        block[6:, 6:] += STIFF / softest * modal_matrix(model, i, STIFFNESS)
+        weighted.append(block)
+    return tuple(weighted)
+
+
+def with_mass_for_all(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Return mass matrices in which modes without mass have a small one, so that they can be accelerated."""
+    omega = MASSLESS * highest_frequency(model)
+    complete = []
+    for i, block in enumerate(H):
+        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+        if (M <= 0).any():
+            scale = omega**2 if omega > 0 else max(float(K.max()), 1.0)
+            block = block + np.diag(np.concatenate([np.zeros(6), np.where(M <= 0, np.maximum(K, 0) / scale, 0.0)]))
+        complete.append(block)
+    return tuple(complete)
+
+
+def displaced(model: Model, state: State, x: Array) -> State:
+    """Return the state displaced by x = (dr in ground axes, rotation vector in body axes, dq) per body, (n_u,)."""
+    r, p, q = state.r.copy(), state.p.copy(), state.q.copy()
+    for i in range(len(model.kind)):
+        u0, u1 = model.u0[i], model.u0[i + 1]
+        r[i] += x[u0 : u0 + 3]
+        p[i] = product(p[i], euler_parameters_of_rotation_vector(x[u0 + 3 : u0 + 6]))
+        q[model.q0[i] : model.q0[i + 1]] += x[u0 + 6 : u1]
+    return State(r, p, q, state.u)
+
+
+def product(p: Array, s: Array) -> Array:
+    """Return the Hamilton product p * s of Euler parameters, of length one, (4,)."""
+    w = p[0] * s[0] - p[1:] @ s[1:]
+    result = np.array([w, *(p[0] * s[1:] + s[0] * p[1:] + np.cross(p[1:], s[1:]))])
+    return result / np.linalg.norm(result)
+
+
+def in_ground_axes(model: Model, state: State, y: Array) -> Array:
+    """Return body unknowns with their translation turned from body to ground axes, (n_u,)."""
+    x = y.copy()
+    for i, p in enumerate(state.p):
+        u0 = model.u0[i]
+        x[u0 : u0 + 3] = rotation_matrix(p) @ y[u0 : u0 + 3]
+    return x

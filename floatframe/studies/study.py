@@ -1,0 +1,230 @@
+"""Parameter studies from a file: every point in a process of its own, its failure a row like any other.
+
+study = read_study("crank_study.toml")
+table = run_study(study)                     # rows: values of the parameters, numbers asked for, or why not
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cms.errors import CmsError
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
+from floatframe.analyses.equilibrium import static_equilibrium
+from floatframe.analyses.inverse_dynamics import inverse_dynamics
+from floatframe.analyses.kinematics import kinematics
+from floatframe.analyses.linearization import linearize
+from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.sweep import sweep
+from floatframe.analyses.system_modes import SystemModes, system_modes
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import FloatframeError, ModelError
+from floatframe.motion.integration import integrate
+from floatframe.results.sensors import measured, sensor_of
+from floatframe.results.trajectory import Trajectory
+from floatframe.studies.study_file import TAKES, Output, Study
+from floatframe.system import System
+from floatframe.system_file.run_section import RunOptions, required_run
+
+__all__ = ["StudyRow", "StudyTable", "run_study"]
+
+OF_MODES = {"frequency": "Hz", "damping": "-", "real": "1/s", "imaginary": "rad/s"}
+
+
+@dataclass(frozen=True)
+class StudyRow:
+    """One point: values of the parameters, and what came out."""
+
+    values: tuple[Any, ...]
+    outputs: tuple[float, ...]  #: NaN where the point failed
+    units: tuple[str, ...]
+    error: str = ""  #: why it failed
+
+
+@dataclass(frozen=True)
+class StudyTable:
+    """All points of a study in their order."""
+
+    study: Study
+    rows: tuple[StudyRow, ...]
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the outputs, from the first point that has them."""
+        return next((row.units for row in self.rows if not row.error), ("",) * len(self.study.outputs))
+
+    @property
+    def n_failed(self) -> int:
+        """Points without result."""
+        return sum(bool(row.error) for row in self.rows)
+
+    def column(self, name: str) -> Array:
+        """Return the numbers of an output at all points, (n_points,), NaN where a point failed."""
+        names = [output.name for output in self.study.outputs]
+        if name not in names:
+            raise ModelError(f"study: no output {name!r}{nearest(name, names)}")
+        return np.array([row.outputs[names.index(name)] for row in self.rows])
+
+
+def run_study(
+    study: Study, *, processes: int | None = None, progress: Callable[[int, int], None] | None = None
+) -> StudyTable:
+    """Compute all points of a study in parallel processes.
+
+    Parameters
+    ----------
+    study
+        As `read_study` returns it.
+    processes
+        How many at once; default: as the study says, or one a processor.
+    progress
+        Called with the numbers of points done and of all.
+
+    Raises
+    ------
+    ModelError, SystemFileError
+        Before any work, if the system as it stands in its file is not valid, a parameter names no key of it, or an
+        output nothing that it measures.
+    """
+    points = list(study.points())
+    check(study, points[0])
+    rows = sweep(
+        StudyPoint(study), points, processes=processes if processes is not None else study.processes, progress=progress
+    )
+    return StudyTable(study, tuple(rows))
+
+
+def check(study: Study, point: tuple[Any, ...]) -> None:
+    """Raise if the system, a key path or an output is not there; before the long work, in this process."""
+    from floatframe.system_file.read_system import read_system
+
+    plain, run = read_system(study.system)
+    if study.analysis in MOTIONS:
+        required_run(run, study.system)
+    try:
+        system, _ = read_system(study.system, study.changes(point))
+    except (FloatframeError, CmsError) as error:
+        read_system_keys(study)
+        if "unknown key" in str(error):
+            raise
+        system = plain  # the values of this point are impossible: that is a row
+    if study.analysis != "eig":
+        placed = snapshot(system, compiled_system(system).placed)
+        for output in study.outputs:
+            taken(output, system, placed)
+    else:
+        for output in study.outputs:
+            mode_and_part(output)
+
+
+def read_system_keys(study: Study) -> None:
+    """Raise `SystemFileError` if a key path leads nowhere."""
+    from pathlib import Path
+
+    from fe_models.foundation.toml_file import read_toml
+    from floatframe.errors import SystemFileError
+    from floatframe.system_file.changed_content import changed
+
+    content = read_toml(Path(study.system), SystemFileError)
+    for parameter in study.parameters:
+        changed(content, {parameter.path: parameter.values[0]}, study.system, SystemFileError)
+
+
+@dataclass(frozen=True)
+class StudyPoint:
+    """The function that computes a point; it can be sent to another process."""
+
+    study: Study
+
+    def __call__(self, point: tuple[Any, ...]) -> StudyRow:
+        """Return the row of a point; what goes wrong with it is its error."""
+        from floatframe.system_file.read_system import read_system
+
+        try:
+            system, given = read_system(self.study.system, self.study.changes(point))
+            if self.study.analysis == "eig":
+                modes = system_modes(linearize(system))
+                found = [taken_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
+            else:
+                motion = self.motion(system, given)
+                found = [taken(output, system, motion) for output in self.study.outputs]
+        except (FloatframeError, CmsError) as error:
+            n = len(self.study.outputs)
+            return StudyRow(point, (float("nan"),) * n, ("",) * n, str(error))
+        return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found))
+
+    def motion(self, system: System, given: RunOptions | None) -> Trajectory:
+        """Return the motion of the analysis; an equilibrium as one of one time."""
+        if self.study.analysis == "static":
+            return equilibrium_of(system)
+        return MOTIONS[self.study.analysis](system, required_run(given, self.study.system))
+
+
+def driven_times(run: RunOptions) -> Array:
+    """Return the output times of a run."""
+    return np.linspace(0.0, run.t_end, max(1, round(run.t_end / (run.h * run.output_every))) + 1)
+
+
+def motion_of_run(system: System, run: RunOptions) -> Trajectory:
+    """Return the integrated motion."""
+    return integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every)
+
+
+def equilibrium_of(system: System) -> Trajectory:
+    """Return the equilibrium at rest, a motion of one time."""
+    rest = static_equilibrium(system)
+    return snapshot(system, rest.state, rest.u_dot, rest.w)
+
+
+MOTIONS: dict[str, Callable[[System, RunOptions], Trajectory]] = {
+    "run": motion_of_run,
+    "kinematics": lambda system, run: kinematics(system, driven_times(run)),
+    "inverse": lambda system, run: inverse_dynamics(system, driven_times(run)).motion,
+}
+
+
+def taken(output: Output, system: System, motion: Trajectory) -> tuple[float, str]:
+    """Return the number of an output, and its unit; `ModelError` with the choices if there is no such column."""
+    coordinates = [f"{joint.name}.{name}" for joint in system.joints for name in joint.coordinates]
+    sensors = [*(sensor.name for sensor in system.sensors), *coordinates]
+    fitting = [name for name in sensors if output.of == name or output.of.startswith(name + " ")]
+    if not fitting:
+        raise ModelError(f"output {output.name!r}: of = {output.of!r}: no such sensor{nearest(output.of, sensors)}")
+    name = max(fitting, key=len)
+    measurement = measured(system, motion, [sensor_of(system, name)])[name]
+    column = output.of[len(name) + 1 :]
+    columns = list(measurement.columns)
+    if not column and len(columns) == 1:
+        column = columns[0]
+    if column not in columns:
+        hint = nearest(column, columns) if column else f"; expected one of its columns: {', '.join(columns)}"
+        raise ModelError(f"output {output.name!r}: of = {output.of!r}: sensor {name!r} has no column {column!r}{hint}")
+    return float(TAKES[output.take](measurement.columns[column])), measurement.units[column]
+
+
+def taken_of_modes(output: Output, modes: SystemModes, per_second: float) -> tuple[float, str]:
+    """Return the number of an output of the modes about the equilibrium, and its unit."""
+    part, k = mode_and_part(output)
+    if k > len(modes.eigenvalues):
+        raise ModelError(f"output {output.name!r}: of = {output.of!r}: the system has {len(modes.eigenvalues)} modes")
+    values = {
+        "frequency": modes.frequencies * per_second,
+        "damping": modes.damping_ratios,
+        "real": modes.eigenvalues.real * per_second,
+        "imaginary": modes.eigenvalues.imag * per_second,
+    }
+    return float(values[part][k - 1]), OF_MODES[part]
+
+
+def mode_and_part(output: Output) -> tuple[str, int]:
+    """Return what of which mode an output is; `ModelError` if it says neither."""
+    part, _, number = output.of.partition(" ")
+    if part not in OF_MODES or not number.isdigit() or int(number) < 1:
+        raise ModelError(
+            f"output {output.name!r}: of = {output.of!r}: expected one of {', '.join(OF_MODES)} and the number of a "
+            'mode, such as "frequency 1"'
+        )
+    return part, int(number)

@@ -1,0 +1,1 @@
+"""The system file: its tables, and the system it describes."""

@@ -1,0 +1,34 @@
+"""Tables of the system file for events: [events.NAME]."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from fe_models.foundation.toml_file import Table, choice
+from floatframe.motion.events import DIRECTIONS, Event
+
+__all__ = ["EventSection"]
+
+
+class EventSection(Table):
+    """[events.NAME]: what a run does when a measured value passes a level."""
+
+    watch: str = Field(description='the name of a sensor, or "joint.coordinate"')
+    column: str = Field("", description="a column of the sensor; default: its first")
+    level: float = Field(0.0, description="a number, the value that is passed")
+    direction: choice("direction", lambda: tuple(DIRECTIONS)) = Field(  # type: ignore[valid-type]
+        "both", description=f"one of {', '.join(DIRECTIONS)}"
+    )
+    stop: bool = Field(False, description="true: the run ends there")
+    switch_on: list[str] = Field([], description="names of forces")
+    switch_off: list[str] = Field([], description="names of forces")
+    tolerance: Annotated[float, Field(gt=0)] = Field(
+        1e-9, description="a number above 0, of the time in parts of the step"
+    )
+
+    def event(self, name: str) -> Event:
+        """Return the event of that name."""
+        return Event(
+            name, self.watch, self.level, self.direction, self.column, self.stop, tuple(self.switch_on),
+            tuple(self.switch_off), self.tolerance,
+        )  # fmt: skip

@@ -1,0 +1,142 @@
+"""The system file: what `floatframe run` reads (docs/system_file.md).
+
+    system, run = read_system("swing.toml")
+    trajectory = integrate(system, run.integrator, run.t_end, run.h, output="swing.h5", output_every=run.output_every,
+                           progress=callback)          # callback(Progress(t, t_end, n_steps, n_total, n_iterations))
+    trajectory = read_results("swing.h5")
+
+All of them raise `FloatframeError`, whose text is one message for the user.
+"""
+
+import logging
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cms.errors import CmsError
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.toml_file import Table, Vector3, choice, read_toml, validated
+from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
+from fe_models.foundation.words import nearest
+from floatframe.bodies.ground import GROUND
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import FloatframeError, SystemFileError
+from floatframe.forces import (
+    Force,
+    Gravity,
+)
+from floatframe.motion.events import require_events
+from floatframe.system import REDUNDANT, System
+from floatframe.system_file.bodies import BodySection, body_of
+from floatframe.system_file.changed_content import changed
+from floatframe.system_file.channel_section import InputSection, OutputSection
+from floatframe.system_file.event_section import EventSection
+from floatframe.system_file.forces import ForceSection, force_of
+from floatframe.system_file.joints import CouplerSection, JointSection, coupler_of, joint_of
+from floatframe.system_file.keys import Name
+from floatframe.system_file.run_section import RunOptions, RunSection
+from floatframe.system_file.sensor_section import SensorSection
+from floatframe.system_file.unit_hints import unit_hints
+
+__all__ = ["RunOptions", "read_system"]
+
+log = logging.getLogger(__name__)
+
+
+class SystemSection(Table):
+    """[system]: name, units, gravity."""
+
+    name: Name | None = Field(None, description="the name of the system, text; default: the name of the file")
+    units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
+        description=f"the unit system of all numbers, one of {', '.join(UNIT_SYSTEMS)}"
+    )
+    gravity: Vector3 = Field((0.0, 0.0, 0.0), description="the acceleration of free fall, [x, y, z]")
+    redundant: choice("way with redundant constraints", lambda: REDUNDANT) = Field(  # type: ignore[valid-type]
+        "refuse", description=f"one of {', '.join(REDUNDANT)}"
+    )
+
+
+class SystemFile(Table):
+    """A system and its run."""
+
+    system: SystemSection = Field(description="a table [system] with units and gravity")
+    bodies: dict[str, BodySection] = Field(description="tables [bodies.NAME]")
+    joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")
+    couplers: dict[str, CouplerSection] = Field({}, description="tables [couplers.NAME]")
+    forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
+    sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
+    inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
+    outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
+    events: dict[str, EventSection] = Field({}, description="tables [events.NAME]")
+    run: RunSection | None = Field(None, description="a table [run] with t_end and h")
+
+    @model_validator(mode="after")
+    def _names_bodies(self) -> "SystemFile":
+        choices = [GROUND.name, *self.bodies]
+        terms = {f"{name}.terms": term for name, coupler in self.couplers.items() for term in coupler.terms}
+        coordinates = {
+            f"{name}.coordinates.{key}": section
+            for name, force in self.forces.items()
+            for key, section in (force.coordinates or {}).items()
+        }
+        for kind, sections in (("joints", self.joints), ("forces", self.forces), ("sensors", self.sensors),
+                               ("couplers", terms), ("forces", coordinates),
+                               ("inputs", self.inputs), ("outputs", self.outputs)):  # fmt: skip
+            for name, section in sections.items():
+                for key in ("body", "body_a", "body_b", "relative_to"):
+                    body = getattr(section, key, None)
+                    if body is not None and body not in choices:
+                        hint = nearest(body, choices)
+                        raise ValueError(f'{kind}.{name}.{key} = "{body}": there is no such body{hint}')
+        return self
+
+
+def read_system(
+    path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None
+) -> tuple[System, RunOptions | None]:
+    """Read and check a system file and the modal files it names; return the system, and its run if it has [run].
+
+    Parameters
+    ----------
+    path
+        The file.
+    changes
+        Values that take the place of those in the file, by key path: {"bodies.rod.mass": 2.0}.
+
+    Raises
+    ------
+    SystemFileError
+        With every problem: key path, value, what was expected, choices and the nearest name.
+    """
+    path = Path(path)
+    content = changed(read_toml(path, SystemFileError), changes or {}, str(path), SystemFileError)
+    data = validated(SystemFile, content, path, SystemFileError, context=path.parent)
+    files: dict[Any, ReducedBody] = {}
+    try:
+        units = unit_system(data.system.units)
+        bodies = [body_of(name, section, files, units) for name, section in data.bodies.items()]
+        joints = [joint_of(name, section) for name, section in data.joints.items()]
+        couplers = [coupler_of(name, section) for name, section in data.couplers.items()]
+        forces: list[Force] = [force_of(name, section) for name, section in data.forces.items()]
+        if any(data.system.gravity):
+            forces.insert(0, Gravity(np.array(data.system.gravity)))
+        name = data.system.name or path.stem
+        sensors = [section.sensor(key) for key, section in data.sensors.items()]
+        system = System(
+            bodies, joints, forces, units, name, data.system.redundant, couplers, sensors=sensors,
+            inputs=[section.channel(key) for key, section in data.inputs.items()],
+            outputs=[section.output(key) for key, section in data.outputs.items()],
+            events=[section.event(key) for key, section in data.events.items()],
+            source=str(path.resolve()),
+        )  # fmt: skip
+        _ = compiled_system(system)  # markers and interfaces are looked up here
+        require_events(system)
+        for hint in unit_hints(system):
+            log.warning("%s: %s", path, hint)
+    except (FloatframeError, CmsError) as error:
+        raise SystemFileError(f"{path}: {error}") from error
+    return system, None if data.run is None else data.run.options()

@@ -1,0 +1,98 @@
+"""The table [run] of a system file: which integrator computes the motion, and how."""
+
+import os
+from dataclasses import dataclass
+from inspect import signature
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from fe_models.foundation.toml_file import Table, choice
+from fe_models.foundation.words import nearest
+from floatframe.errors import SystemFileError
+from floatframe.integrators import INTEGRATORS
+from floatframe.integrators.carry import Integrator
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+
+__all__ = ["RunOptions", "RunSection", "required_run"]
+
+NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme")
+
+
+def keys_of(scheme: str) -> tuple[str, ...]:
+    """Return the keys that the method of that name takes, those of generalized-alpha where it is a case of it."""
+    names = [name for name in signature(INTEGRATORS[scheme]).parameters if name not in ("options", "parameters")]
+    if "options" in signature(INTEGRATORS[scheme]).parameters:
+        names += [name for name in signature(GeneralizedAlpha).parameters if name not in ("rho_inf", "parameters")]
+    return tuple(names)
+
+
+class RunSection(Table):
+    """[run]: how the motion is computed."""
+
+    t_end: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the end time")
+    h: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the step size")
+    output_every: Annotated[int, Field(ge=1)] = Field(
+        1, description="a whole number above 0: results are written after every so many steps"
+    )
+    scheme: choice("scheme", lambda: tuple(INTEGRATORS)) = Field(  # type: ignore[valid-type]
+        "generalized-alpha", description=f"one of {', '.join(INTEGRATORS)}"
+    )
+    rho_inf: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None, description="a number between 0 and 1, the spectral radius at infinite frequency"
+    )
+    alpha: Annotated[float, Field(ge=-1 / 3, le=0)] | None = Field(
+        None, description="a number between -1/3 and 0, numerical damping of the scheme hht"
+    )
+    beta: Annotated[float, Field(gt=0)] | None = Field(None, description="a number above 0, of the scheme newmark")
+    gamma: Annotated[float, Field(ge=0.5)] | None = Field(None, description="a number, 1/2 or more, of newmark")
+    rtol: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="a number between 0 and 1, the relative tolerance of the scheme ida"
+    )
+    atol: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="a number between 0 and 1, the absolute tolerance of the scheme ida"
+    )
+    tolerance: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="a number between 0 and 1, the tolerance of Newton's method"
+    )
+    max_iterations: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="a whole number above 0, the most iterations of Newton's method in a step"
+    )
+    error_tolerance: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="a number above 0, the error of a step over the size of the system; none: fixed steps"
+    )
+    h_min: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="a number above 0, the least step to which one that fails is divided"
+    )
+
+    @model_validator(mode="after")
+    def _fits_the_scheme(self) -> "RunSection":
+        allowed = keys_of(self.scheme)
+        for key in type(self).model_fields:
+            if key not in NOT_OF_A_METHOD and getattr(self, key) is not None and key not in allowed:
+                raise ValueError(f"the scheme {self.scheme} has no key {key}{nearest(key, allowed)}")
+        return self
+
+    def options(self) -> "RunOptions":
+        """Return what the table asks for."""
+        parameters: dict[str, Any] = {
+            key: getattr(self, key) for key in keys_of(self.scheme) if getattr(self, key, None) is not None
+        }
+        return RunOptions(self.t_end, self.h, self.output_every, INTEGRATORS[self.scheme](**parameters))
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What the table [run] asks for."""
+
+    t_end: float
+    h: float
+    output_every: int
+    integrator: Integrator
+
+
+def required_run(run: RunOptions | None, path: str | os.PathLike[str]) -> RunOptions:
+    """Return the run of a system file; `SystemFileError` if it has none."""
+    if run is None:
+        raise SystemFileError(f"{path}: run: missing; expected a table [run] with t_end and h, for a motion over time")
+    return run

@@ -1,0 +1,53 @@
+import sys
+from pathlib import Path
+
+import pytest
+
+from cms.cli import demo
+from cms.errors import JobError
+from cms.jobs.job import read_job
+
+
+def test_the_inputs_are_put_there_twice_without_complaint_and_the_job_is_a_good_one(tmp_path):
+    folder = tmp_path / "new" / "demo"
+    demo.put_inputs(folder)
+    demo.put_inputs(folder)
+    job = read_job(folder / "rod.toml")
+    assert job.body.mesh == folder / "rod.msh"
+    assert set(job.interfaces) == {"big_end", "small_end"}
+
+
+@pytest.mark.parametrize("name", demo.JOBS)
+def test_a_job_that_the_user_has_changed_is_not_overwritten(name, tmp_path):
+    demo.put_inputs(tmp_path)
+    (tmp_path / name).write_text("# mine")
+    (tmp_path / "rod.msh").unlink()
+    with pytest.raises(JobError, match=rf"{name}: is there already, with other contents.*cms demo FOLDER"):
+        demo.put_inputs(tmp_path)
+    assert (tmp_path / name).read_text() == "# mine"
+    assert not (tmp_path / "rod.msh").exists()
+
+
+def test_an_error_on_the_way_ends_the_process_that_compiles(monkeypatch):
+    started = []
+    popen = demo.subprocess.Popen
+    command = [sys.executable, "-c", "import time; time.sleep(600)"]
+    monkeypatch.setattr(demo.subprocess, "Popen", lambda _, **k: started.append(popen(command, **k)) or started[0])
+
+    def fail():
+        with demo.kernels_compiled_beside():
+            raise JobError("no")
+
+    with pytest.raises(JobError, match="no"):
+        fail()
+    assert started[0].returncode is not None
+
+
+def test_the_compiling_process_compiles(monkeypatch, tmp_path):
+    from floatframe.cli import compile_kernels
+
+    steps = []
+    monkeypatch.setattr(compile_kernels, "integrate", lambda *a: steps.append(a))
+    compile_kernels.main()
+    assert len(steps) == 1
+    assert Path(compile_kernels.__file__).name == "compile_kernels.py"

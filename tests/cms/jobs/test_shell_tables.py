@@ -1,0 +1,217 @@
+import meshio
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from cms.cli.split import SplitRequest, split_job
+from cms.errors import JobError
+from cms.jobs.body_of_job import job_body
+from cms.jobs.job import read_job
+from cms.jobs.reduce_job import reduce_job
+from cms.jobs.shell_tables import ShellSection
+from fe_models.errors import FeModelsError
+from tests.root import ROOT
+
+DOCUMENT = ROOT / "docs" / "job_file.md"
+
+TRAY = """
+[body]
+mesh = "tray.msh"
+units = "m-kg-s"
+
+[materials.steel]
+young = 2e11
+poisson = 0.3
+density = 8000
+
+[materials.tin]
+young = 7e10
+poisson = 0.3
+density = 2700
+
+[shells.floor]
+thickness = 0.01
+cells = "floor"
+material = "steel"
+offset = 0.005
+
+[shells.wall]
+thickness = 0.02
+cells = ["wall"]
+material = "tin"
+added_mass = 10
+
+[sections.rib]
+shape = "rectangle"
+width = 0.01
+height = 0.04
+lines = "rib"
+material = "steel"
+
+[masses.bob]
+node = "corner"
+mass = 2.0
+
+[interfaces.hinge]
+kind = "rigid"
+nodes = "hinge"
+
+[interfaces.top]
+kind = "distributing"
+box = {lo = [0, 0, 0.7], hi = [2, 2, 2]}
+
+[load_cases.blow]
+kind = "pressure"
+faces = "floor"
+pressure = 100.0
+
+[reduction]
+n_modes = 4
+frame = "nodal"
+at = "hinge"
+"""
+
+
+@pytest.fixture
+def job_file(tmp_path):
+    """A floor of quads, a wall of triangles, a rib across the floor."""
+    n = 4
+    index = np.arange((2 * n + 1) * (n + 1)).reshape(2 * n + 1, n + 1)
+    s, y = np.meshgrid(np.linspace(0, 2, 2 * n + 1), np.linspace(0, 1, n + 1), indexing="ij")
+    points = np.stack([np.minimum(s, 1), y, np.maximum(s - 1, 0)], axis=-1).reshape(-1, 3)
+    quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1)
+    wall = quads[n:].reshape(-1, 4)
+    triangles = np.concatenate([wall[:, [0, 1, 2]], wall[:, [0, 2, 3]]])
+    blocks = [
+        ("quad", quads[:n].reshape(-1, 4), 1),
+        ("triangle", triangles, 2),
+        ("line", np.stack([index[:n, 2], index[1 : n + 1, 2]], axis=1), 3),
+        ("line", np.stack([index[0, :-1], index[0, 1:]], axis=1), 4),
+        ("vertex", index[:1, :1], 5),
+    ]
+    meshio.write(
+        tmp_path / "tray.msh",
+        meshio.Mesh(
+            points,
+            [(kind, cells) for kind, cells, _ in blocks],
+            cell_data={
+                "gmsh:physical": [np.full(len(cells), tag) for _, cells, tag in blocks],
+                "gmsh:geometrical": [np.full(len(cells), tag) for _, cells, tag in blocks],
+            },
+            field_data={
+                name: np.array([tag, dim])
+                for name, tag, dim in [
+                    ("floor", 1, 2),
+                    ("wall", 2, 2),
+                    ("rib", 3, 1),
+                    ("hinge", 4, 1),
+                    ("corner", 5, 0),
+                ]
+            },
+        ),
+        file_format="gmsh22",
+        binary=False,
+    )
+
+    def write(text):
+        path = tmp_path / "tray.toml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_a_job_makes_the_shell_with_its_ribs_masses_interfaces_and_loads(job_file):
+    job = read_job(job_file(TRAY))
+    body = job_body(job)
+    reports = []
+    reduced = reduce_job(job, on_report=reports.append)
+    floor, wall, rib = 8000 * 0.01, 2700 * 0.02 + 10, 8000 * 0.01 * 0.04
+    assert_allclose(reduced.moments.m, floor + wall + rib + 2.0, rtol=1e-12)
+    assert [interface.name for interface in body.interfaces] == ["hinge", "top"]
+    assert_allclose(body.interfaces[1].reference, [1, 0.5, 0.875])
+    assert_allclose(reduced.load_cases[0].force, [0, 0, -100.0], rtol=0, atol=1e-9)
+    assert reduced.stress is not None
+    assert reduced.geometric is not None
+    assert reports[0].n_lines == 4
+    assert reduced.provenance["cells triangle"] == "32"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("thickness = 0.01\n", "", "shells.floor.thickness: missing"),
+        ("thickness = 0.01", "thickness = 0", "shells.floor.thickness = 0: expected a number above 0"),
+        (
+            'material = "tin"',
+            'material = "tim"',
+            'shells.wall.material = "tim": there is no such material; did you mean',
+        ),
+        ('material = "steel"\noffset', "offset", "shells.floor.material: missing; there are 2 materials"),
+        ('cells = "floor"\n', "", 'shells.floor: cells = "all", but there are 2 tables'),
+        ('lines = "rib"\n', "", "sections.rib.lines: missing"),
+        ('units = "m-kg-s"', 'units = "m-kg-s"\nplane = "xy"', "body.plane: belongs to beams alone"),
+        (
+            "[masses.bob]",
+            '[ties.bob]\nkind = "rigid"\nfaces = "wall"\nnode = "corner"\n[masses.bob]',
+            "ties: belong to",
+        ),
+    ],
+)
+def test_a_bad_job_of_shells_is_refused(job_file, old, new, words):
+    assert old in TRAY
+    with pytest.raises(JobError) as caught:
+        read_job(job_file(TRAY.replace(old, new, 1)))
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('cells = "floor"', 'cells = "flor"', "no group of triangles or quads 'flor'; did you mean 'floor'"),
+        ('lines = "rib"', 'lines = "ribs"', "no group of lines 'ribs'; did you mean 'rib'"),
+        ('faces = "floor"', 'faces = "hinge"', "no group of cells 'hinge' ('hinge' is a node set)"),
+    ],
+)
+def test_a_job_that_does_not_fit_its_mesh_is_refused(job_file, old, new, words):
+    with pytest.raises((JobError, FeModelsError)) as caught:
+        job_body(read_job(job_file(TRAY.replace(old, new, 1))))
+    assert words in str(caught.value)
+
+
+def test_quads_warped_beyond_the_limit_are_refused_unless_they_are_accepted(job_file, tmp_path):
+    path = job_file(TRAY)
+    text = (tmp_path / "tray.msh").read_text()
+    head, nodes = text.split("$Nodes\n")
+    lines = nodes.split("\n")
+    number, x, y, _ = lines[1].split()
+    lines[1] = f"{number} {x} {y} 0.2"  # a corner of the floor lifted
+    (tmp_path / "tray.msh").write_text(head + "$Nodes\n" + "\n".join(lines))
+    with pytest.raises(FeModelsError, match=r"1 quad cells are warped beyond 20 degrees.*split them into triangles"):
+        job_body(read_job(path))
+    job_body(read_job(job_file(TRAY.replace("[materials.steel]", 'accept = "warped"\n\n[materials.steel]', 1))))
+
+
+def test_a_surface_mesh_without_thickness_is_refused(job_file):
+    solid = TRAY[: TRAY.index("[materials.tin]")] + "[reduction]\nn_modes = 1\n"
+    with pytest.raises(FeModelsError, match=r"expected solid cells .* a shell needs its thickness \(tables \[shells"):
+        job_body(read_job(job_file(solid)))
+
+
+def test_every_key_of_shells_is_documented():
+    text = DOCUMENT.read_text(encoding="utf-8")
+    for key in ShellSection.model_fields:
+        assert f"`{key}`" in text, key
+
+
+def test_a_shell_in_parts_has_all_its_mass_and_load(job_file):
+    path = job_file(TRAY)
+    parts = [read_job(file) for file in split_job(SplitRequest(path, at=(0.6,), axis=(1, 0, 0)))[:-1]]
+    assert [set(part.shells) for part in parts] == [{"floor"}, {"floor", "wall"}]
+    assert [set(part.materials) for part in parts] == [{"steel"}, {"steel", "tin"}]
+    assert [set(part.interfaces) for part in parts] == [{"hinge", "cut_1"}, {"top", "cut_1"}]
+    assert [set(part.masses) for part in parts] == [{"bob"}, set()]
+    whole, *reduced = (reduce_job(job) for job in (read_job(path), *parts))
+    assert_allclose(sum(part.moments.m for part in reduced), whole.moments.m, rtol=1e-12)
+    forces = [part.frame.axes @ part.load_case("blow").force for part in (whole, *reduced)]
+    assert_allclose(forces[1] + forces[2], forces[0], rtol=0, atol=1e-9 * np.abs(forces[0]).max())

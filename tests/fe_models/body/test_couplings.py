@@ -1,0 +1,115 @@
+import numpy as np
+import pytest
+import scipy.sparse.linalg as spla
+from numpy.testing import assert_allclose, assert_array_equal
+
+from cms.errors import BodyError
+from cms.families.rigid_modes import geometric_rigid_modes
+from fe_models.body.couplings import couple, mean_motion
+from fe_models.body.fe_body import MULTIPLIER, Interface
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from tests.bodies import bar, box_mesh, with_interfaces
+
+ROUNDOFF = 1e-12
+
+
+def end_faces(kinds, weights=None):
+    body = bar(nx=4, kind="hexahedron")
+    return with_interfaces(
+        body,
+        *(
+            Interface(face.name, kind, face.nodes, face.reference + np.array([0.01, 0.002, -0.003]), weights=weights)
+            for face, kind in zip(body.interfaces, kinds, strict=True)
+        ),
+    )
+
+
+@pytest.mark.parametrize("kinds", [("rigid", "rigid"), ("rigid", "distributing"), ("nodes", "distributing")])
+def test_rigid_modes_of_a_coupled_body_are_its_uncoupled_ones(kinds):
+    body = end_faces(kinds)
+    coupled = couple(body)
+    Psi = geometric_rigid_modes(coupled)
+    assert_allclose(coupled.mesh_displacement(Psi), geometric_rigid_modes(body), rtol=0, atol=ROUNDOFF)
+    assert_allclose(coupled.K @ Psi, 0, rtol=0, atol=ROUNDOFF * abs(coupled.K).max())
+    assert_allclose(
+        Psi.T @ (coupled.M @ Psi),
+        geometric_rigid_modes(body).T @ (body.M @ geometric_rigid_modes(body)),
+        rtol=0,
+        atol=ROUNDOFF * body.M.sum(),
+    )
+
+
+def test_rigid_coupling_is_the_congruence_with_its_recovery_matrix():
+    body = end_faces(("rigid", "rigid"))
+    coupled = couple(body)
+    T = coupled.recovery.matrix
+    for name in ("K", "M"):
+        expected = (T.T @ getattr(body, name) @ T).toarray()
+        assert_allclose(getattr(coupled, name).toarray(), expected, rtol=0, atol=ROUNDOFF * np.abs(expected).max())
+
+
+def test_distributing_reference_follows_the_weighted_mean_translation_and_moves_nothing_else():
+    """A unit force on the reference node acts on the members as their weights, and its motion is their mean."""
+    weights = np.array([1.0, 2.0, 3.0, 4.0])
+    body = end_faces(("rigid", "distributing"), weights)
+    coupled = couple(body)
+    left, right = coupled.interfaces
+    free = np.setdiff1d(np.arange(coupled.n_dof), left.dofs)
+    force = np.zeros(coupled.n_dof)
+    force[right.dofs[1]] = 1.0
+    u = np.zeros(coupled.n_dof)
+    u[free] = spla.spsolve(coupled.K[free][:, free].tocsc(), force[free])
+    members = body.nodes[right.nodes]
+    mesh = coupled.mesh_displacement(u[:, None])[:, 0]
+    at_members = mesh.reshape(-1, 3)[right.nodes]
+    # its motion: least squares written out as a sum over members
+    d, theta = u[right.dofs[:3]], u[right.dofs[3:]]
+    residual = at_members - d - np.cross(theta, members - right.reference)
+    assert_allclose(weights @ residual, 0, rtol=0, atol=1e-10 * np.abs(u).max())
+    moment = weights @ np.cross(members - right.reference, residual)
+    assert_allclose(moment, 0, rtol=0, atol=1e-10 * np.abs(u).max())
+    # its force: statically equivalent to the unit force at the reference point
+    nodal = (body.K @ mesh).reshape(-1, 3)[right.nodes]
+    assert_allclose(nodal.sum(axis=0), [0, 1, 0], rtol=0, atol=1e-8)
+    assert_allclose(np.cross(members - right.reference, nodal).sum(axis=0), 0, rtol=0, atol=1e-8)
+
+
+def test_mean_motion_reproduces_rigid_motion_for_any_weights():
+    rng = np.random.default_rng(3)
+    points, weights, reference = rng.normal(size=(7, 3)), rng.uniform(0, 1, 7), rng.normal(size=3)
+    A = mean_motion(points, weights, reference)
+    motion = rigid_motion_of_points(points, reference).reshape(-1, 6)
+    assert_allclose(A @ motion, np.eye(6), rtol=0, atol=1e-12)
+
+
+def test_multipliers_have_no_mass_and_their_own_component():
+    coupled = couple(end_faces(("distributing", "rigid")))
+    is_multiplier = coupled.dofs[:, 1] == MULTIPLIER
+    assert is_multiplier.sum() == 6
+    assert np.abs(coupled.M[:, np.flatnonzero(is_multiplier)]).max() == 0
+    assert not is_multiplier[coupled.b].any()
+
+
+def test_boundary_is_the_reference_dofs_or_all_member_dofs():
+    coupled = couple(end_faces(("nodes", "rigid")))
+    nodes, rigid = coupled.interfaces
+    assert_array_equal(coupled.dofs[nodes.dofs, 0], np.repeat(nodes.nodes, 3))
+    assert_array_equal(coupled.dofs[rigid.dofs], np.stack([np.full(6, len(coupled.nodes) - 1), np.arange(6)], axis=1))
+
+
+@pytest.mark.parametrize("kind", ["rigid", "distributing"])
+@pytest.mark.parametrize("n_members", [1, 2, 3])
+def test_members_on_one_line_are_refused(kind, n_members):
+    mesh = box_mesh(4, 1, 1, kind="hexahedron")
+    on_edge = np.flatnonzero((mesh.nodes[:, 1] == 0) & (mesh.nodes[:, 2] == 0))[:n_members]
+    body = with_interfaces(bar(nx=4, kind="hexahedron"), Interface("edge", kind, on_edge, np.zeros(3)))
+    with pytest.raises(BodyError, match=r"'edge'.*not on one line, got " + str(n_members)):
+        couple(body)
+
+
+def test_overlapping_interfaces_are_refused_by_name():
+    body = bar(nx=4, kind="hexahedron")
+    left = body.interfaces[0]
+    twin = Interface("twin", "nodes", left.nodes[:2], left.reference)
+    with pytest.raises(BodyError, match="'left' and 'twin' share 2 nodes"):
+        couple(with_interfaces(body, left, twin))

@@ -1,0 +1,332 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+from cms.modal_file.file import write
+from floatframe.cli.app import app
+from floatframe.cli.record import run_record
+from floatframe.pictures.animation import bodies_of
+from floatframe.results.energy_balance import balance_defect, energy_scale
+from floatframe.results.trajectory import read_results
+from tests.root import ROOT
+from tests.synthetic import synthetic_reduced_body
+
+PROGRAM = [sys.executable, "-c", "from floatframe.cli import main; main()"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+
+RIGID = """
+[system]
+units = "m-kg-s"
+gravity = [0, 0, -9.81]
+
+[bodies.stick]
+mass = 2.0
+inertia = [[0.01, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]
+position = [0.5, 0, 0]
+
+[joints.pin]
+type = "revolute"
+body_a = "ground"
+body_b = "stick"
+marker_b = [-0.5, 0, 0]
+axis = [0, 1, 0]
+
+[run]
+t_end = 0.5
+h = 1e-3
+"""
+
+FLEXIBLE = """
+[system]
+units = "mm-t-s"
+
+[bodies.part]
+file = "part.h5"
+omega_B = [0, 0, 3]
+
+[run]
+t_end = 0.01
+h = 1e-4
+"""
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    (tmp_path / "swing.toml").write_text(RIGID)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory) -> Path:
+    """The results of the rigid pendulum, computed by the command."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "swing.toml").write_text(RIGID)
+    result = run("run", folder / "swing.toml")
+    assert result.exit_code == 0, result.output
+    return folder / "swing.h5"
+
+
+def heed_interrupts():
+    """A process started in the background of a shell ignores SIGINT, and its children after it; ours must not."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() if p.is_file() else b"" for p in sorted(folder.iterdir())}
+
+
+def assert_refused(result, *words):
+    """Exit code 2, one message on standard error with these words, no traceback."""
+    assert result.exit_code == 2, result.output
+    assert result.stderr.startswith("error: ")
+    assert result.stderr.count("error: ") == 1
+    assert "Traceback" not in result.output
+    for word in words:
+        assert word in result.stderr
+
+
+def test_run_computes_the_motion_that_the_file_describes(results):
+    """The stick falls about the pin: energy gives its speed at the last position."""
+    trajectory = read_results(results)
+    assert trajectory.is_complete
+    motion = trajectory.body("stick")
+    height = motion.r[-1, 2]
+    inertia_about_pin = 0.2 + 2.0 * 0.5**2
+    omega = np.linalg.norm(motion.omega_B[-1])
+    assert_allclose(0.5 * inertia_about_pin * omega**2, -2.0 * 9.81 * height, rtol=1e-4)
+    assert sorted(p.name for p in results.parent.iterdir()) == ["swing.h5", "swing.toml"]
+
+
+def test_run_prints_steps_balance_and_drift(folder):
+    result = run("run", folder / "swing.toml", "-o", folder / "out.h5")
+    assert result.exit_code == 0, result.output
+    for word in ("500", "Newton iterations", "wall time", "energy defect", "kinetic", "pin", "wrote"):
+        assert word in result.stdout
+    assert sorted(contents(folder)) == ["out.h5", "swing.toml"]
+
+
+def test_a_flexible_body_runs_from_its_modal_file(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE)
+    result = run("run", folder / "spin.toml")
+    assert result.exit_code == 0, result.output
+    record = run_record(read_results(folder / "spin.h5"))
+    assert record["bodies"][0]["n_modes"] == 5
+    assert len(record["bodies"][0]["digest"]) == 64
+
+
+def test_info_shows_the_run(results):
+    result = run("info", results)
+    assert result.exit_code == 0, result.output
+    for word in ("swing", "m-kg-s", "stick", "GeneralizedAlpha", "rho_inf = 0.8", "energy defect", "pin"):
+        assert word in result.stdout
+    record = json.loads(run("info", results, "--json").stdout)
+    assert record["n_steps"] == 500
+    assert record["t_last"] == 0.5
+    assert record["energy_defect"] < 1e-4
+    assert record["drift"]["pin"]["distance"] < 1e-9
+
+
+@pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_plot_draws_a_picture(results, tmp_path, suffix, magic):
+    result = run("plot", results, "-o", tmp_path / f"swing.{suffix}")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / f"swing.{suffix}").read_bytes().startswith(magic)
+    assert sorted(contents(tmp_path)) == [f"swing.{suffix}"]
+
+
+def test_plot_goes_without_the_modal_files_and_says_so(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE)
+    assert run("run", folder / "spin.toml").exit_code == 0
+    assert "note" not in run("plot", folder / "spin.h5").stderr
+    (folder / "part.h5").unlink()
+    result = run("plot", folder / "spin.h5")
+    assert result.exit_code == 0
+    assert result.stderr.startswith("note: elastic displacement is left out")
+
+
+def test_plot_refuses_other_kinds_of_files(results, tmp_path):
+    assert_refused(run("plot", results, "-o", tmp_path / "swing.jpg"), ".png, .svg or .pdf")
+    assert_refused(run("plot", results, "-o", results), "this is the input")
+    assert contents(tmp_path) == {}
+
+
+def test_animate_draws_a_film(results, tmp_path):
+    result = run("animate", results, "-o", tmp_path / "swing.gif", "--speed", "100")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "swing.gif").read_bytes().startswith(b"GIF8")
+    assert sorted(contents(tmp_path)) == ["swing.gif"]
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    (["-o", "swing.avi"], ".gif or .mp4"),
+    (["-o", "nowhere/swing.gif"], "does not exist"),
+    (["--speed", "-1"], "speed"),
+    (["--fps", "0"], "fps"),
+])  # fmt: skip
+def test_animate_refuses_what_it_cannot_draw(results, tmp_path, monkeypatch, options, words):
+    (tmp_path / "swing.h5").write_bytes(results.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert_refused(run("animate", "swing.h5", *options), words)
+    assert sorted(contents(tmp_path)) == ["swing.h5"]
+
+
+def test_animate_refuses_a_modal_file_that_has_changed(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE)
+    assert run("run", folder / "spin.toml").exit_code == 0
+    write(synthetic_reduced_body(seed=1), folder / "part.h5")
+    before = contents(folder)
+    assert_refused(run("animate", folder / "spin.h5"), "part.h5", "has changed")
+    (folder / "part.h5").unlink()
+    assert_refused(run("animate", folder / "spin.h5"), "part.h5", "no such file")
+    assert sorted(contents(folder)) == sorted(set(before) - {"part.h5"})
+
+
+def test_the_energy_defect_is_the_balance_over_the_energy_that_moves(results):
+    trajectory = read_results(results)
+    energies = trajectory.energies
+    total = energies.kinetic + energies.gravity
+    assert_allclose(balance_defect(trajectory), total - total[0], rtol=0, atol=1e-13 * energy_scale(trajectory))
+    assert_allclose(energy_scale(trajectory), max(energies.kinetic.max(), np.ptp(energies.gravity)), rtol=1e-14)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('units = "m-kg-s"', 'units = "m-kg"', ["system.units", "did you mean 'm-kg-s'?"]),
+    ("mass = 2.0", "mass = -2.0", ["bodies.stick.mass = -2.0: expected a number above 0"]),
+    ("mass = 2.0", "mass = nan", ["bodies.stick.mass = nan"]),
+    ("mass = 2.0", "maas = 2.0", ["bodies.stick.maas: unknown key; did you mean 'mass'?"]),
+    ('type = "revolute"', 'type = "revolut"', ["joints.pin.type", "did you mean 'revolute'?"]),
+    ('body_b = "stick"', 'body_b = "stik"', ["joints.pin.body_b", "did you mean 'stick'?"]),
+    ("h = 1e-3", "h = 0", ["run.h = 0: expected a number above 0"]),
+    ("h = 1e-3", "", ["run.h: missing"]),
+    ("[run]", "[rum]", ["rum: unknown key; did you mean 'run'?"]),
+    ("mass = 2.0\n", 'file = "part.h5"\n', ["bodies.stick.file", "no such file"]),
+    ("[run]", "[run", ["not valid TOML"]),
+])  # fmt: skip
+def test_a_bad_system_file_ends_in_one_message_and_leaves_nothing(folder, old, new, words):
+    assert RIGID.count(old) == 1
+    (folder / "swing.toml").write_text(RIGID.replace(old, new))
+    before = contents(folder)
+    assert_refused(run("run", folder / "swing.toml"), *words)
+    assert contents(folder) == before
+
+
+def test_a_damaged_modal_file_is_refused(folder):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    damaged = (folder / "part.h5").read_bytes()
+    (folder / "part.h5").write_bytes(damaged[:-100])
+    (folder / "spin.toml").write_text(FLEXIBLE)
+    before = contents(folder)
+    assert_refused(run("run", folder / "spin.toml"), "part.h5", "truncated")
+    (folder / "part.h5").write_bytes(damaged[:4000] + bytes([damaged[4000] ^ 8]) + damaged[4001:])
+    assert_refused(run("run", folder / "spin.toml"), "part.h5", "altered")
+    assert sorted(contents(folder)) == sorted(before)
+
+
+def test_bodies_in_other_units_are_converted_with_a_note(folder, caplog):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "spin.toml").write_text(FLEXIBLE.replace("mm-t-s", "m-kg-s"))
+    result = run("run", folder / "spin.toml", "-o", folder / "spin.h5")
+    assert result.exit_code == 0
+    assert "part.h5 is in units mm-t-s: converted to those of the system, m-kg-s" in caplog.text
+    part = bodies_of(read_results(folder / "spin.h5"))["part"]
+    assert_allclose(part.nodes, synthetic_reduced_body().nodes / 1000, rtol=1e-14)
+
+
+def test_the_output_is_checked_before_the_work(folder):
+    for output, words in [("nowhere/out.h5", "does not exist"), ("swing.toml", "this is the input"), (".", "folder")]:
+        assert_refused(run("run", folder / "swing.toml", "-o", folder / output), words)
+    assert sorted(contents(folder)) == ["swing.toml"]
+
+
+@pytest.mark.parametrize("command", ["info", "plot", "animate"])
+def test_a_file_that_holds_no_results_is_refused(folder, command, results):
+    write(synthetic_reduced_body(), folder / "part.h5")
+    (folder / "text.h5").write_text("no results")
+    (folder / "short.h5").write_bytes(results.read_bytes()[:3000])
+    for name in ("part.h5", "text.h5", "short.h5", "missing.h5"):
+        before = contents(folder)
+        assert_refused(run(command, folder / name), name)
+        assert contents(folder) == before
+
+
+def test_an_interrupted_run_can_be_read_and_leaves_the_old_results(folder, results):
+    """`results` comes first, so that the kernels are compiled and the run gets to its steps at once."""
+    (folder / "swing.h5").write_bytes(b"the old results")
+    (folder / "swing.toml").write_text(RIGID.replace("t_end = 0.5", "t_end = 1e5"))
+    with subprocess.Popen(
+        [*PROGRAM, "run", "swing.toml"],
+        cwd=folder,
+        env=ENVIRONMENT,
+        preexec_fn=heed_interrupts,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        try:
+            segments = folder / "swing.h5.segments"
+            deadline = time.monotonic() + 120
+            while not (segments / "000001.h5").is_file() and process.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.1)  # the first segment holds the start, the second one steps
+            process.send_signal(signal.SIGINT)
+            _, error = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 130, error
+    assert error.startswith("error: interrupted")
+    assert "Traceback" not in error
+    assert (folder / "swing.h5").read_bytes() == b"the old results"
+    result = run("info", segments)
+    assert result.exit_code == 0, result.output
+    assert "did not reach its end" in result.stdout
+
+
+def test_help_names_the_commands_and_loads_nothing_heavy():
+    script = PROGRAM[2].replace("main()", "\ntry: main()\nfinally: import sys; print(sorted(sys.modules))")
+    result = subprocess.run([sys.executable, "-c", script, "--help"], env=ENVIRONMENT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    for command in ("run", "info", "plot", "animate"):
+        assert command in result.stdout
+    loaded = result.stdout[result.stdout.rindex("[") :]
+    for heavy in ("numpy", "scipy", "h5py", "pydantic", "pyvista", "numba", "matplotlib"):
+        assert f"'{heavy}'" not in loaded
+
+
+def test_version():
+    assert run("--version").stdout.startswith("floatframe ")
+
+
+def test_info_tells_the_mobility_of_a_system_file(tmp_path):
+    """A stick on two hinges of one line: six freedoms less five, and five constraints that repeat others."""
+    again = RIGID.replace("[run]", RIGID[RIGID.index("[joints.pin]") : RIGID.index("[run]")] + "[run]")
+    again = again.replace("[joints.pin]", "[joints.first]", 1)
+    path = tmp_path / "stick.toml"
+    path.write_text(again)
+    result = CliRunner().invoke(app, ["info", str(path), "--json"])
+    assert result.exit_code == 0, result.output
+    record = json.loads(result.stdout)
+    assert (record["gruebler"], record["mobility"]) == (-4, 1)
+    assert record["redundant_by_joint"] == {"pin": 5}
+    assert "constraints that repeat others   5 of pin" in CliRunner().invoke(app, ["info", str(path)]).stdout
+
+
+def test_resume_asks_for_the_system_file_where_it_gets_the_results(results):
+    result = run("resume", results)
+    assert result.exit_code == 2
+    assert "expected the system file (TOML) of the run, got its results" in " ".join(result.output.split())
+    assert "resume swing.toml -o" in " ".join(result.output.split())

@@ -1,0 +1,126 @@
+"""How Python hands arrays to the kernels."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
+
+from floatframe.compiling.system import compiled_system
+from floatframe.kernels.compiler.block import Block, make_block
+from floatframe.kernels.compiler.compilation import entry, inner
+from floatframe.kernels.compiler.structure import Structure, table_of
+from floatframe.kernels.entry import no_memory, prepare, run
+from floatframe.kernels.model import Memory, Model, Rows, Work, new_rows, new_work
+from tests.floatframe.kernels.test_tangent import system_with_everything
+
+MODEL = compiled_system(system_with_everything()).model
+
+
+@pytest.mark.parametrize(
+    ("kind", "data"),
+    [(Model, MODEL), (Work, new_work(MODEL)), (Memory, no_memory()), (Rows, new_rows(MODEL, 3))],
+    ids=["Model", "Work", "Memory", "Rows"],
+)
+def test_arrays_are_what_the_kernels_take_them_for(kind, data):
+    """Number, dimensions and order of every array; its address and shape where the kernels look for them."""
+    fields, table = Structure(kind).fields, table_of(data)
+    for name, array in data._asdict().items():
+        block, place = fields[name]
+        assert array.flags.c_contiguous, name
+        assert array.dtype == (np.int64 if str(block.dtype) == "int64" else np.float64), name
+        assert array.ndim == block.ndim, name
+        assert table[place] == array.ctypes.data, name
+        assert tuple(table[place + 1 : place + 1 + array.ndim]) == array.shape, name
+
+
+@intrinsic
+def as_block(_, array):
+    """Return an array as kernels see it."""
+
+    def generate(context, builder, signature, arguments):
+        value = make_array(array)(context, builder, arguments[0])
+        shape = [builder.extract_value(value.shape, k) for k in range(array.ndim)]
+        return make_block(context, builder, signature.return_type, value.data, shape)
+
+    return Block(array.dtype, array.ndim)(array), generate
+
+
+def test_there_is_one_compilation_for_all_systems():
+    prepare()
+    assert not prepare()
+    assert len(run.signatures) == 1
+
+
+def test_kernels_come_from_the_cache_in_the_next_process():
+    prepare()
+    code = "from floatframe.kernels.entry import prepare; print(prepare())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
+@pytest.mark.long
+def test_a_first_compilation_takes_less_than_20_s_of_processor_time(tmp_path):
+    code = "import time; from floatframe.kernels.entry import prepare; assert prepare(); print(time.process_time())"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    run = [sys.executable, "-c", code]
+    done = subprocess.run(run, capture_output=True, text=True, check=True, env=environment)
+    assert float(done.stdout) < 20.0
+
+
+def test_an_error_in_a_kernel_names_the_line():
+    @entry
+    def broken(x):
+        return x[0] + "text"
+
+    with pytest.raises(TypingError, match=r"test_kernels.py.*, line \d+"):
+        broken(np.zeros(1))
+
+
+def test_kernels_calculate_as_python_does():
+    """Loops, branches, parts, tuples, changes of variables: all that lowering and passes of kernels touch."""
+
+    def plain(A, q):
+        n, m = A.shape
+        total, low, high = 0.0, A[0, 0], A[0, 0]
+        for i in range(n):
+            row = A[i]
+            part = row[1:]
+            x = row[0]
+            if x < 0.0:
+                x = -2.0 * x
+            elif x == 0.0:
+                x = 1.0
+            c = (x, x * x, 3.0)
+            for j in range(part.size):
+                total += part[j] * c[j % 3]
+                low, high = min(low, part[j]), max(high, part[j])
+            k = 0
+            while k < m and A[i, k] < 1.0:
+                k += 1
+            q[i] = k / m + 7 // (k + 1)
+        flat = A.reshape(n * m)
+        q[n] = flat[n * m - 1] ** 2 + (total if total > 0.0 else -total) + c[1]
+        q[n + 1 :] = low - high
+        return total, k
+
+    lean = inner(plain)
+
+    @entry
+    def compiled(A, q, B, p):
+        total, k = lean(as_block(A), as_block(q))
+        again, _ = lean(as_block(B), as_block(p))
+        return total, k, again
+
+    rng = np.random.default_rng(3)
+    A, B = rng.normal(size=(4, 5)), rng.normal(size=(3, 4))
+    q, p, q_, p_ = (np.zeros(8) for _ in range(4))
+    total, k, again = compiled(A, q, B, p)
+    total_, k_ = plain(A, q_)
+    again_, _ = plain(B, p_)
+    assert k == k_
+    np.testing.assert_allclose([total, again, *q, *p], [total_, again_, *q_, *p_], rtol=1e-14, atol=0)

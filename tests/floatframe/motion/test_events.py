@@ -1,0 +1,172 @@
+"""Events: times against closed forms, stop and switch, restart, and mistakes in them."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import floatframe.motion.integration as integration
+from floatframe import (
+    GROUND,
+    Bushing,
+    EnergyMomentum,
+    Event,
+    GeneralizedAlpha,
+    Gravity,
+    JointForce,
+    Marker,
+    ModelError,
+    PointForce,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    SpringDamper,
+    System,
+    integrate,
+    resume,
+    trapezoidal,
+)
+from floatframe.results.sensors import PlaceSensor
+from tests.floatframe.motion import test_restart
+
+G = 9.81
+
+
+def falling(*events, forces=()):
+    """Return a block on a vertical guide, let go at rest; the coordinate is its height."""
+    block = RigidBody("block", 2.0, np.eye(3))
+    guide = PrismaticJoint("guide", Marker(GROUND), Marker("block"), axis=(0, 0, 1))
+    sensors = [PlaceSensor("place", Marker("block"), "position")]
+    return System([block], [guide], [Gravity((0, 0, -G)), *forces], sensors=sensors, events=events)
+
+
+@pytest.mark.parametrize("watch", [{"watch": "guide.distance"}, {"watch": "place", "column": "z"}])
+@pytest.mark.parametrize("method", [trapezoidal(), EnergyMomentum()], ids=["trapezoidal", "energy-momentum"])
+def test_stop_is_found_where_it_is(method, watch):
+    """Under constant acceleration both schemes are exact: h = 0.7 m after sqrt(2 h/g)."""
+    motion = integrate(falling(Event("down", level=-0.7, stop=True, **watch)), method, 1.0, 0.1)
+    t = np.sqrt(2 * 0.7 / G)
+    (event,) = motion.head.summary["events"]
+    assert event["name"] == "down"
+    assert_allclose(event["t"], t, rtol=0, atol=1e-9)
+    assert_allclose(motion.t[-1], event["t"], rtol=0, atol=0)
+    assert_allclose(motion.t[:-1], 0.1 * np.arange(4), rtol=0, atol=1e-15)
+    assert_allclose(motion.body("block").r[-1], [0, 0, -0.7], rtol=0, atol=1e-8)
+    assert motion.is_complete
+
+
+def test_directions_are_told_apart():
+    """Thrown up at 3 m/s: 0.3 m is passed on the way up and on the way down."""
+    throw = RigidBody("block", 2.0, np.eye(3), velocity=(0, 0, 3.0))
+    t = (3.0 + np.array([-1, 1]) * np.sqrt(9 - 2 * G * 0.3)) / G
+    for direction, expected in (("rising", t[:1]), ("falling", t[1:]), ("both", t)):
+        plain = falling(Event("mark", "guide.distance", 0.3, direction, switch_on=("none",)),
+                        forces=[PointForce("none", Marker("block"), (0, 0, 1e-12))])  # fmt: skip
+        system = System([throw], plain.joints, plain.forces, sensors=plain.sensors, events=plain.events)
+        found = [event["t"] for event in integrate(system, trapezoidal(), 0.6, 0.05).head.summary["events"]]
+        assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def test_a_force_is_switched_on_and_off_and_output_times_stay():
+    """A lift of 3 g from -0.5 m: it stops falling at -0.75 m, rises through -0.5 m, where the lift is taken off."""
+    lift = PointForce("lift", Marker("block"), (0, 0, 3 * 2.0 * G))
+    events = [
+        Event("catch", "guide.distance", -0.5, "falling", switch_on=("lift",)),
+        Event("release", "guide.distance", -0.5, "rising", switch_off=("lift",)),
+    ]
+    motion = integrate(falling(*events, forces=[lift]), trapezoidal(), 1.2, 0.04)
+    t_1 = np.sqrt(2 * 0.5 / G)
+    speed = G * t_1
+    t_2 = t_1 + speed / G  # down and up again at 2 g
+    first, second = motion.head.summary["events"][:2]
+    assert_allclose((first["t"], second["t"]), (t_1, t_2), rtol=0, atol=1e-8)
+    assert_allclose(motion.t, 0.04 * np.arange(31), rtol=0, atol=1e-15)
+    late = motion.t - t_2
+    during = (late > 0) & (late < 0.4)
+    assert_allclose(motion.body("block").r[during, 2], -0.5 + speed * late[during] - G / 2 * late[during] ** 2,
+                    rtol=0, atol=1e-8)  # fmt: skip
+    balance = motion.energies.balance
+    assert_allclose(balance, balance[0], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["bushing", "spring-damper", "joint-force"])
+def test_each_kind_that_pulls_back_lets_go(kind):
+    """A body on a stiffness k falls from rest to x = -0.1 with v² = 2 g |x| - k x²/m, then freely."""
+    k, m, x = 40.0, 2.0, -0.1
+    force = {
+        "bushing": Bushing("hold", Marker(GROUND), Marker("block"), stiffness=[0, 0, k, 0, 0, 0]),
+        "spring-damper": SpringDamper(
+            "hold", Marker(GROUND, position=(0, 0, 5)), Marker("block"), stiffness=k, damping=0.0, free_length=5.0
+        ),
+        "joint-force": JointForce("hold", "guide", "distance", stiffness=k),
+    }[kind]
+    events = [Event("let go", "guide.distance", x, "falling", switch_off=("hold",))]
+    motion = integrate(falling(*events, forces=[force]), trapezoidal(), 0.4, 1e-3)
+    (event,) = motion.head.summary["events"]
+    late = motion.t >= event["t"]
+    v = -np.sqrt(2 * G * -x - k * x**2 / m)
+    s = motion.t[late] - event["t"]
+    assert_allclose(motion.body("block").r[late, 2], x + v * s - G / 2 * s**2, rtol=0, atol=1e-6)
+    energies = motion.energies
+    assert_allclose(energies.springs[late], 0, rtol=0, atol=0)
+    assert_allclose(energies.work[late], -k * x**2 / 2, rtol=1e-6)  # what the spring took with it
+    assert np.ptp(energies.balance) < 1e-5 * k * x**2 / 2
+
+
+def test_angles_are_followed_beyond_a_full_turn():
+    """A wheel at 5 rad/s stops after two turns and a quarter, not where its angle jumps by 2 pi."""
+    wheel = RigidBody("wheel", 1.0, np.eye(3), omega_B=(0, 0, 5.0))
+    hinge = RevoluteJoint("hinge", Marker(GROUND), Marker("wheel"), axis=(0, 0, 1))
+    system = System([wheel], [hinge], events=[Event("turned", "hinge.angle", 4.5 * np.pi, stop=True)])
+    motion = integrate(system, GeneralizedAlpha(0.8), 10.0, 0.1)
+    assert_allclose(motion.t[-1], 4.5 * np.pi / 5.0, rtol=0, atol=1e-7)
+
+
+def driven_back_and_forth():
+    """Return an oscillator that a motor pushes whenever it is below the middle."""
+    spring = JointForce("spring", "guide", "distance", stiffness=200.0)
+    kick = JointForce("kick", "guide", "distance", preload=30.0)
+    events = [
+        Event("below", "guide.distance", -0.1, "falling", switch_on=("kick",)),
+        Event("above", "guide.distance", -0.1, "rising", switch_off=("kick",)),
+    ]
+    return falling(*events, forces=[spring, kick])
+
+
+def test_resumed_run_with_events_is_the_uninterrupted_one_bit_for_bit(tmp_path, monkeypatch):
+    monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
+    method = GeneralizedAlpha(0.8, error_tolerance=1e-5)
+    whole = integrate(driven_back_and_forth(), method, 3.0, 0.01)
+
+    def stop(progress):
+        if progress.t > 2.3:
+            raise test_restart.StopHereError
+
+    with pytest.raises(test_restart.StopHereError):
+        integrate(driven_back_and_forth(), method, 3.0, 0.01, output=tmp_path / "run.h5", progress=stop)
+    again = resume(driven_back_and_forth(), tmp_path / "run.h5")
+    test_restart.assert_same(again, whole)
+    assert len(whole.head.summary["events"]) > 6
+    assert again.head.summary["events"] == whole.head.summary["events"]
+
+
+def test_a_run_with_events_that_do_not_happen_is_the_one_without():
+    plain = integrate(falling(), GeneralizedAlpha(0.8), 0.5, 0.01)
+    watched = integrate(falling(Event("never", "guide.distance", 5.0, stop=True)), GeneralizedAlpha(0.8), 0.5, 0.01)
+    assert watched.head.summary["events"] == []
+    assert_array_equal(watched.body("block").r, plain.body("block").r)
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        (lambda: Event("e", "guide.distanse", stop=True), "no sensor or joint coordinate 'guide.distanse'"),
+        (lambda: Event("e", "guide.distance", switch_off=("gravty",)), "no force 'gravty'"),
+        (lambda: Event("e", "guide.distance"), "an event without consequence"),
+        (lambda: Event("e", "guide.distance", direction="up", stop=True), "expected one of rising, falling, both"),
+        (lambda: Event("e", "place", column="w", stop=True), "column: expected one of x, y, z"),
+        (lambda: Event("e", "place", level=np.nan, stop=True), "level"),
+    ],
+)
+def test_mistakes_in_events_are_answered(event, words):
+    with pytest.raises(ModelError, match=words):
+        integrate(falling(event()), trapezoidal(), 0.2, 0.1)

@@ -1,0 +1,89 @@
+"""Films of system modes: what moves in them is the mode, about the equilibrium."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+from floatframe import (
+    GROUND,
+    FlexibleBody,
+    Gravity,
+    Marker,
+    ModelError,
+    ResultsError,
+    RevoluteJoint,
+    RigidBody,
+    SphericalJoint,
+    System,
+    linearize,
+    system_modes,
+)
+from floatframe.cli.app import app
+from floatframe.pictures.body_colors import VON_MISES
+from floatframe.pictures.mode_film import mode_scene
+from tests.floatframe.cli.test_analyses import PENDULUM
+from tests.synthetic import synthetic_reduced_body
+
+QUARTERS = np.exp(0.5j * np.pi * np.arange(4))
+
+
+def test_pendulum_swings_about_its_hinge_to_both_sides_of_where_it_hangs():
+    rod = RigidBody("rod", 2.0, np.diag([1e-3, 0.2, 0.2]), center_of_mass=(0.5, 0, 0))
+    hinge = RevoluteJoint("hinge", GROUND, Marker("rod"), axis=(0, 0, 1))
+    system = System([rod], [hinge], [Gravity((0, -9.81, 0))])
+    linear = linearize(system)
+    scene = mode_scene(system, linear.equilibrium, system_modes(linear), 1, QUARTERS)
+    box, ghost = scene.surfaces
+    centers = box.nodes.mean(axis=1)
+    assert_allclose(np.linalg.norm(centers, axis=1), 0.5, rtol=1e-12)  # it turns about the hinge
+    assert_allclose(centers[[1, 3]], [[0, -0.5, 0]] * 2, rtol=0, atol=1e-9)
+    assert_allclose(centers[0] * [-1, 1, 1], centers[2], rtol=0, atol=1e-9)
+    assert 0.01 < abs(centers[0, 0]) < 0.3
+    assert_allclose(ghost.nodes.mean(axis=0), [0, -0.5, 0], rtol=0, atol=1e-9)
+    assert_allclose(box.scalars.max(), 1, rtol=1e-12)
+    assert_allclose(box.scalars[1], 0, rtol=0, atol=1e-9)
+    # the displacement of a point grows with its distance from the hinge
+    distance = np.linalg.norm(box.nodes[1][:, :2], axis=1)
+    assert_allclose(box.scalars[0], distance / distance.max(), rtol=1e-6)
+    assert "0.5958 Hz" in scene.title
+    assert "rod 100 %" in scene.captions[0]
+
+
+def test_flexible_body_moves_by_frame_and_modes_together():
+    reduced = synthetic_reduced_body()
+    pin = SphericalJoint("pin", GROUND, Marker("part", reduced.interfaces[0].name))
+    system = System([FlexibleBody("part", reduced)], [pin], units=reduced.units)
+    linear = linearize(system)
+    modes = system_modes(linear)
+    number = len(modes.eigenvalues)
+    scene = mode_scene(system, linear.equilibrium, modes, number, QUARTERS)
+    nodes = scene.surfaces[0].nodes
+    rest = nodes[1]
+    assert_allclose(nodes[0] - rest, -(nodes[2] - rest), rtol=0, atol=0.05 * np.abs(nodes[0] - rest).max())
+    moved = np.linalg.norm(nodes[0] - rest, axis=1)
+    assert_allclose(scene.surfaces[0].scalars[0], moved / moved.max(), rtol=0, atol=0.02)
+    with pytest.raises(ModelError, match=f"expected 1 to {number}"):
+        mode_scene(system, linear.equilibrium, modes, number + 1, QUARTERS)
+    if reduced.stress is None:
+        with pytest.raises(ResultsError, match="holds no stress modes"):
+            mode_scene(system, linear.equilibrium, modes, 1, QUARTERS, color=VON_MISES)
+
+
+def test_eig_draws_modes_into_films_and_pictures(tmp_path, monkeypatch):
+    monkeypatch.setattr("floatframe.pictures.mode_film.N_FRAMES", 3)
+    path = tmp_path / "pendulum.toml"
+    path.write_text(PENDULUM)
+
+    def eig(*words, code=0):
+        result = CliRunner().invoke(app, ["eig", str(path), *(str(word) for word in words)])
+        assert result.exit_code == code, result.output
+        return " ".join(result.output.split())
+
+    assert "pendulum.mode1.gif" in eig("--animate", 1)
+    assert (tmp_path / "pendulum.mode1.gif").read_bytes().startswith(b"GIF8")
+    eig("-a", 1, "-o", tmp_path / "one.png")
+    assert (tmp_path / "one.png").read_bytes().startswith(b"\x89PNG")
+    assert "expected 1 to 1, the modes" in eig("-a", 4, code=2)
+    assert "expected --animate with the number of one mode" in eig("-o", tmp_path / "x.gif", code=2)
+    assert "did you mean 'von-mises'" in eig("-a", 1, "--color", "von-mise", code=2)

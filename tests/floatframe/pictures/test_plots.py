@@ -1,0 +1,53 @@
+"""Plots show what the trajectory holds."""
+
+import matplotlib as mpl
+import pytest
+from numpy.testing import assert_array_equal
+
+from floatframe import GeneralizedAlpha, integrate
+from floatframe.pictures import plots
+from tests.floatframe.results.test_results_file import SYSTEM
+
+mpl.use("Agg")
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return integrate(SYSTEM, GeneralizedAlpha(), 0.05, 1e-3)
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    import matplotlib.pyplot as plt
+
+    yield
+    plt.close("all")
+
+
+def test_energies_are_drawn_over_time_and_zero_ones_left_out(motion):
+    ax = plots.plot_energies(motion)
+    labels = [line.get_label() for line in ax.get_lines()]
+    assert labels == ["kinetic", "strain", "gravity", "total"]
+    assert_array_equal(ax.get_lines()[3].get_ydata(), motion.energies.total)
+    assert ax.get_xlabel() == "time [s]"
+    assert ax.get_ylabel() == "energy [N m]"
+
+
+def test_positions_and_modal_coordinates_are_drawn_into_given_axes(motion):
+    ax = plots.plot_positions(motion, "bob")
+    assert_array_equal(ax.get_lines()[2].get_ydata(), motion.body("bob").r[:, 2])
+    n = len(ax.get_lines())
+    assert plots.plot_modal_coordinates(motion, "rod", ax, modes=(1,)) is ax
+    assert_array_equal(ax.get_lines()[n].get_ydata(), motion.body("rod").q[:, 1])
+
+
+@pytest.mark.parametrize("plot", [plots.plot_drift, plots.plot_energy_balance, plots.plot_momentum])
+def test_every_plot_of_the_whole_motion_has_lines_and_labels(motion, plot):
+    ax = plot(motion)
+    assert ax.get_lines()
+    assert ax.get_ylabel()
+
+
+def test_reaction_is_drawn_by_component(motion):
+    ax = plots.plot_reaction(motion, "link")
+    assert_array_equal(ax.get_lines()[0].get_ydata(), motion.reaction("link").force[:, 0])

@@ -1,0 +1,342 @@
+"""Sensors against differences of what they measure, and sums over the modes; in the file, the table and the plot."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+from cms.modal_file.file import write
+from cms.reduced_body.stress import von_mises
+from floatframe import (
+    GROUND,
+    FlexibleBody,
+    GeneralizedAlpha,
+    Gravity,
+    Marker,
+    ModelError,
+    RevoluteJoint,
+    RigidBody,
+    SphericalJoint,
+    SpringDamper,
+    System,
+    integrate,
+    joint_coordinate,
+    read_results,
+)
+from floatframe.cli.app import app
+from floatframe.pictures.body_colors import VON_MISES
+from floatframe.results.place_motion import interface_motion, largest_von_mises, point_motion
+from floatframe.results.sensors import (
+    AngleSensor,
+    CoordinateSensor,
+    DisplacementSensor,
+    ElongationSensor,
+    EnergySensor,
+    ModeSensor,
+    MomentumSensor,
+    PlaceSensor,
+    ReactionSensor,
+    StrainGauge,
+    StressSensor,
+    VonMisesSensor,
+    measured,
+    sensor_of,
+)
+from floatframe.rotations import rotation_matrix
+from floatframe.system_file.read_system import read_system
+from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
+from tests.synthetic import synthetic_reduced_body
+
+H = 5e-4
+RNG = np.random.default_rng(4)
+REDUCED = replace(reduced_body(random_point_masses(3, 5), stiffness(3), name="rod"), stress=RNG.normal(size=(40, 6, 3)))
+TIP, ARM_TIP = Marker("rod", "end_a"), Marker("arm", position=(0.5, 0.1, 0))
+
+
+def swing_system(*sensors):
+    rod = FlexibleBody("rod", REDUCED, omega_B=(0.3, 1, 3))
+    arm = RigidBody("arm", 0.5, 0.1 * np.eye(3), position=REDUCED.interface("end_a").position, omega_B=(2.0, 0, -1.0))
+    joints = [
+        SphericalJoint("pin", GROUND, Marker("rod", "end_b")),
+        RevoluteJoint("knee", TIP, Marker("arm"), axis=(0, 1, 0)),
+    ]
+    spring = SpringDamper("stay", Marker(GROUND, position=(0, 0, 3)), ARM_TIP, 5.0, 0.1, 1.0)
+    return System([rod, arm], joints, [Gravity((0, 0, -9.81)), spring], sensors=sensors)
+
+
+@pytest.fixture(scope="module")
+def swing():
+    return integrate(swing_system(), GeneralizedAlpha(0.8), 0.3, H)
+
+
+def vector(system, motion, sensor):
+    columns = sensor.measure(system, motion).columns
+    return np.stack([columns[axis] for axis in "xyz"], axis=1)
+
+
+def rate(values):
+    return (values[2:] - values[:-2]) / (2 * H)
+
+
+@pytest.mark.parametrize(("place", "other"), [(ARM_TIP, TIP), (Marker("rod", "end_b"), ARM_TIP), (ARM_TIP, None)])
+def test_velocity_and_acceleration_are_the_rates_of_what_the_other_marker_sees(swing, place, other):
+    system = swing_system()
+    position, velocity, acceleration = (
+        vector(system, swing, PlaceSensor("s", place, quantity, other))
+        for quantity in ("position", "velocity", "acceleration")
+    )
+    assert_allclose(rate(position), velocity[1:-1], rtol=0, atol=1e-4 * np.abs(velocity).max())
+    assert_allclose(rate(velocity), acceleration[1:-1], rtol=0, atol=1e-3 * np.abs(acceleration).max())
+
+
+def test_rotation_and_angular_velocity_are_those_of_the_axes(swing):
+    system = swing_system()
+    sensor = PlaceSensor("s", ARM_TIP, "angular-velocity", TIP)
+    a, b = interface_motion(swing, "rod", REDUCED, "end_a"), point_motion(swing, "arm", (0, 0, 0))
+    axes = np.einsum("tba,tbc->tac", a.axes, b.axes)
+    spin = np.einsum("tab,tcb->tac", rate(axes), axes[1:-1])
+    found = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+    omega = vector(system, swing, sensor)
+    assert_allclose(found, omega[1:-1], rtol=0, atol=1e-4 * np.abs(omega).max())
+    turned = vector(system, swing, replace(sensor, quantity="rotation-vector"))
+    assert_allclose(
+        turned[:, 1], -vector(system, swing, PlaceSensor("s", TIP, "rotation-vector", ARM_TIP))[:, 1], atol=1e-12
+    )
+    angle = AngleSensor("a", TIP, Marker("arm"), axis=(0, 1, 0)).measure(system, swing).columns["angle"]
+    hinge = CoordinateSensor("h", "knee", "angle").measure(system, swing).columns["value"]
+    assert_allclose(np.diff(angle), np.diff(hinge), rtol=0, atol=1e-6)
+    assert np.ptp(hinge) > 0.1
+
+
+def test_displacement_of_interface_and_of_the_node_nearest_to_a_position(swing):
+    system = swing_system()
+    q = swing.body("rod").q
+    at_interface = vector(system, swing, DisplacementSensor("d", TIP))
+    assert_allclose(at_interface, q @ REDUCED.interface("end_a").Psi[:3].T, rtol=1e-14)
+    node = 7
+    near = REDUCED.nodes[node] + 1e-3
+    assert_allclose(
+        vector(system, swing, DisplacementSensor("d", Marker("rod", position=near))), q @ REDUCED.Phi[node].T
+    )
+    motion = swing.body("rod")
+    exact = [r + rotation_matrix(p) @ (REDUCED.nodes[node] + REDUCED.Phi[node] @ x)
+             for r, p, x in zip(motion.r, motion.p, motion.q, strict=True)]  # fmt: skip
+    assert_allclose(
+        vector(system, swing, PlaceSensor("p", Marker("rod", position=near))), exact, rtol=1e-12, atol=1e-13
+    )
+
+
+def test_stress_strain_and_their_largest(swing):
+    system = swing_system()
+    q, node = swing.body("rod").q, 11
+    position = REDUCED.nodes[node]
+    columns = StressSensor("s", "rod", position=position).measure(system, swing).columns
+    stress = np.einsum("cq,tq->tc", REDUCED.stress[node], q)
+    for k, name in enumerate(("xx", "yy", "zz", "yz", "xz", "xy")):
+        assert_allclose(columns[name], stress[:, k], rtol=0, atol=1e-14 * np.abs(stress).max())
+    assert_allclose(columns["von Mises"], von_mises(stress), rtol=1e-12)
+    d, E, nu = np.array([0.6, 0.0, 0.8]), 210.0, 0.3
+    tensor = stress[:, [[0, 5, 4], [5, 1, 3], [4, 3, 2]]]
+    strain = (1 + nu) / E * tensor - nu / E * np.trace(tensor, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    gauge = StrainGauge("g", "rod", 5 * d, E, nu, position=position).measure(system, swing).columns["strain"]
+    assert_allclose(gauge, np.einsum("a,tab,b->t", d, strain, d), rtol=0, atol=1e-14 * np.abs(strain).max())
+    largest = VonMisesSensor("v", "rod").measure(system, swing).columns
+    size, where = largest_von_mises(swing, "rod", REDUCED)
+    assert_allclose(largest["largest"], size)
+    assert_allclose(largest["node"], REDUCED.node_ids[where])
+    assert_allclose(VON_MISES.values(REDUCED, q).max(axis=1), size, rtol=1e-12)
+
+
+def test_elongation_is_the_change_of_the_distance(swing):
+    system, q = swing_system(), swing.body("rod").q
+    a, b = REDUCED.nodes[3], REDUCED.nodes[20]
+    found = ElongationSensor("e", "rod", a, b).measure(system, swing).columns["strain"]
+    length = np.linalg.norm(b - a + q @ (REDUCED.Phi[20] - REDUCED.Phi[3]).T, axis=1)
+    assert_allclose(found, length / np.linalg.norm(b - a) - 1, rtol=0, atol=1e-14)
+    assert np.abs(found).max() > 1e-3
+    with pytest.raises(ModelError, match="nearest to one node"):
+        ElongationSensor("e", "rod", a, a).measure(system, swing)
+
+
+def test_reactions_energies_momenta_and_modes_are_those_of_the_motion(swing):
+    system = swing_system()
+    motion = swing.reaction("knee")
+    columns = ReactionSensor("r", "knee").measure(system, swing).columns
+    assert_allclose(columns["force x"], motion.force[:, 0])
+    assert_allclose(columns["moment size"], np.linalg.norm(motion.moment, axis=1))
+    turned = ReactionSensor("r", "knee", "marker").measure(system, swing).columns
+    assert_allclose(turned["force size"], columns["force size"], rtol=1e-12)
+    # a hinge carries no moment about its axis, in the axes of the marker
+    assert np.abs(turned["moment y"]).max() < 1e-9 * turned["moment size"].max()
+    assert np.abs(columns["moment y"]).max() > 1e-2 * columns["moment size"].max()
+    tension = ReactionSensor("t", "stay", "marker").measure(system, swing).columns
+    assert_allclose(tension["force size"], np.linalg.norm(swing.reaction("stay").force, axis=1))
+    energies = EnergySensor("e").measure(system, swing)
+    assert_allclose(energies.columns["total"], swing.energies.total)
+    assert energies.units["total"] == "N m"
+    momentum = MomentumSensor("m").measure(system, swing).columns
+    assert_allclose(momentum["angular z"], swing.angular_momentum[:, 2])
+    mode = ModeSensor("q2", "rod", 2).measure(system, swing).columns
+    assert_allclose(mode["q_dot"], swing.body("rod").q_dot[:, 1])
+
+
+@pytest.mark.parametrize(
+    ("sensor", "words"),
+    [
+        (PlaceSensor("tip", Marker("rodd", "end_a")), "sensor 'tip': marker: no body 'rodd'; did you mean 'rod'"),
+        (PlaceSensor("tip", Marker("rod", "end_x")), "has no interface 'end_x'; did you mean"),
+        (StressSensor("s", "arm", position=(0, 0, 0)), "sensor 's': no flexible body 'arm'"),
+        (StressSensor("s", "rod", point="top"), "body 'rod' has no stress point 'top'"),
+        (DisplacementSensor("d", Marker("arm")), "body 'arm' is not flexible"),
+        (ReactionSensor("r", "kneee"), "no joint or spring 'kneee'; did you mean 'knee'"),
+        (ModeSensor("m", "rod", 9), "mode: expected 1 to 3, got 9"),
+    ],
+)
+def test_what_a_sensor_cannot_find_is_named(swing, sensor, words):
+    with pytest.raises(ModelError, match=words):
+        measured(swing_system(sensor), swing)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: PlaceSensor("s", TIP, "speed"), "quantity: expected one of position, velocity"),
+        (lambda: StressSensor("s", "rod"), "either a position or a stress point"),
+        (lambda: StrainGauge("s", "rod", (0, 0, 0), 1.0, 0.3, position=(0, 0, 0)), "direction: expected a direction"),
+        (lambda: StrainGauge("s", "rod", (1, 0, 0), 0.0, 0.3, position=(0, 0, 0)), "young: expected a number > 0"),
+        (lambda: ReactionSensor("s", "pin", "body"), "axes: expected one of ground, marker"),
+        (lambda: swing_system(EnergySensor("e"), EnergySensor("e")), "'e' is used twice"),
+        (
+            lambda: sensor_of(swing_system(EnergySensor("all")), "al"),
+            "no sensor or joint coordinate 'al'; did you mean 'all'",
+        ),
+    ],
+)
+def test_impossible_sensors_are_refused(make, words):
+    with pytest.raises(ModelError, match=words):
+        make()
+
+
+def test_motion_of_another_system_is_refused(swing):
+    with pytest.raises(ModelError, match="give the system that was run"):
+        measured(System([RigidBody("other", 1.0, np.eye(3))]), swing)
+
+
+SPIN = """
+[system]
+units = "mm-t-s"
+
+[bodies.part]
+file = "part.h5"
+omega_B = [0, 0, 3]
+
+[joints.hinge]
+type = "revolute"
+body_a = "ground"
+body_b = "part"
+marker_b = "{}"
+axis = [0, 0, 1]
+
+[sensors.tip]
+type = "velocity"
+body = "part"
+marker = "{}"
+
+[sensors."largest stress"]
+type = "von-mises"
+body = "part"
+
+[sensors.energy]
+type = "energy"
+
+[sensors.load]
+type = "reaction"
+of = "hinge"
+axes = "marker"
+
+[run]
+t_end = 0.01
+h = 1e-4
+"""
+BODY = synthetic_reduced_body()
+BODY = replace(BODY, stress=RNG.normal(size=(len(BODY.nodes), 6, BODY.n_q)))
+TEXT = SPIN.format(BODY.interfaces[0].name, BODY.interfaces[-1].name)
+
+
+@pytest.fixture
+def spin(tmp_path):
+    write(BODY, tmp_path / "part.h5")
+    path = tmp_path / "spin.toml"
+    path.write_text(TEXT)
+    return path
+
+
+def run(*words, code=0):
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    assert result.exit_code == code, result.output
+    return result.stdout if code == 0 else " ".join(result.stderr.split())
+
+
+def test_sensors_of_the_file_are_in_table_plot_and_record(spin):
+    text = run("run", spin)
+    assert "largest stress largest" in text
+    results = spin.with_suffix(".h5")
+    record = json.loads(run("info", results, "--json"))["sensors"]
+    system, _ = read_system(spin)
+    motion = read_results(results)
+    tip = measured(system, motion)["tip"]
+    assert record["tip size"]["unit"] == "mm/s"
+    assert_allclose(record["tip size"]["greatest"], tip.columns["size"].max(), rtol=1e-15)
+    run("export", results)
+    with open(spin.with_suffix(".csv"), newline="") as file:
+        names, *rows = csv.reader(file)
+    table = dict(zip(names, np.array(rows, dtype=float).T, strict=True))
+    assert_allclose(table["tip x [mm/s]"], tip.columns["x"], rtol=0, atol=0)
+    rate = joint_coordinate(system, motion, "hinge", "angle").rate
+    assert_allclose(table["hinge.angle rate [rad/s]"], rate, rtol=0, atol=0)
+    assert "largest stress largest [MPa]" in names
+    run("plot", results)
+    run("plot", results, "-s", "tip", "-s", "hinge.angle", "-o", spin.with_name("two.png"))
+    assert spin.with_name("two.png").read_bytes().startswith(b"\x89PNG")
+    assert "did you mean 'hinge.angle'" in run("plot", results, "-s", "hinge.angel", code=2)
+
+
+def test_results_whose_system_file_has_gone_or_changed_are_still_shown(spin, caplog):
+    run("run", spin)
+    results = spin.with_suffix(".h5")
+    spin.write_text(TEXT.replace("[sensors.tip]", '[sensors.more]\ntype = "momentum"\n\n[sensors.tip]'))
+    assert "more linear size" in run("info", results)
+    assert "has changed since the run" in caplog.text
+    spin.write_text(TEXT.replace("hinge]", "axle]").replace('"hinge"', '"axle"'))
+    result = CliRunner().invoke(app, ["info", str(results)])
+    assert result.exit_code == 0
+    assert "note: sensors are left out" in result.stderr
+    spin.unlink()
+    assert "Sensors" not in run("info", results)
+    assert "system file of the run is gone" in run("plot", results, "-s", "tip", code=2)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('type = "velocity"', 'type = "velocty"', "did you mean 'velocity'"),
+    ('type = "velocity"\nbody = "part"', 'type = "velocity"\nbody = "prt"', "sensors.tip.body = "),
+    ('type = "von-mises"\n', 'type = "von-mises"\nmode = 3\n', "a sensor of type von-mises has no key mode"),
+    ('of = "hinge"\n', "", "of: missing; expected the name of a joint or spring-damper"),
+    ('axes = "marker"', 'axes = "body"', "unknown kind of axes; choices: ground, marker"),
+    ('type = "von-mises"', 'type = "stress"', "expected either position or point"),
+])  # fmt: skip
+def test_mistakes_in_sensors_are_answered_with_key_and_choices(spin, old, new, words):
+    assert TEXT.count(old) == 1
+    spin.write_text(TEXT.replace(old, new))
+    assert words in run("run", spin, code=2)
+
+
+def test_film_is_coloured_by_stress_on_request(spin):
+    run("run", spin)
+    results = spin.with_suffix(".h5")
+    run("animate", results, "--color", "von-mises", "--fps", "1", "--speed", "0.003", "-o", spin.with_name("film.gif"))
+    assert spin.with_name("film.gif").read_bytes().startswith(b"GIF8")
+    assert "did you mean 'von-mises'" in run("animate", results, "--color", "von-mieses", code=2)
