@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
-from floatframe.compiling.system import compiled_system
 
 if TYPE_CHECKING:
     from floatframe.analyses import Equilibrium, LinearSystem, SystemModes
@@ -39,6 +38,7 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
     Example: floatframe static crane.toml
     """
     from floatframe.analyses import linearize, static_equilibrium, system_modes
+    from floatframe.compiling.system import compiled_system
     from floatframe.errors import ModelError
 
     model = read(system)
@@ -280,6 +280,7 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
     """Return an equilibrium in plain types: places of the bodies, reactions in ground axes."""
     import numpy as np
 
+    from floatframe.compiling.system import compiled_system
     from floatframe.rotations import rotation_log, rotation_matrix
 
     model, names = compiled_system(system).model, compiled_system(system).connection_names
