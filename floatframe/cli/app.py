@@ -109,12 +109,15 @@ def load_kernels(clock: "Stages") -> None:
     """Load the compiled code; say so while it is compiled, which happens once after an installation."""
     began = time.perf_counter()
     with clock("compiled code (made at first use)"):
+        from floatframe.kernels.compiler.choice import words
         from floatframe.kernels.entry import prepare
 
         is_new = prepare()
     if is_new:
         seconds = time.perf_counter() - began
-        typer.echo(f"note: compiled the code of the motion in {seconds:.0f} s; later runs find it ready", err=True)
+        typer.echo(
+            f"note: compiled the code of the motion in {seconds:.0f} s ({words()}); later runs find it ready", err=True
+        )
 
 
 def print_run(trajectory: "Trajectory") -> None:

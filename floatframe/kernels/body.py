@@ -16,7 +16,7 @@ them as they are written here. One pass over S_ab (9 n² numbers), one over 4C (
 the cost.
 """
 
-from floatframe.kernels.compiler.compilation import inner, view
+from floatframe.kernels.compiler.compilation import loops, view
 from floatframe.kernels.dense import add_products
 from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.kernels.rotation import cross
@@ -31,7 +31,7 @@ def block(model, i, which, size):
     return model.blocks[start : start + size]
 
 
-@inner
+@loops
 def modal_term(model, i, which, x, out):
     """Add M x, K x or D x of body i to out, (n_q,)."""
     n = model.n_q[i]
@@ -48,7 +48,7 @@ def modal_term(model, i, which, x, out):
             out[k] += total
 
 
-@inner
+@loops
 def first_moments(model, work, i):
     """Write s(q) and 1C(q) = ds/dq into `work`, and K_t q_dot, K_r q_dot of a stiffened body."""
     t, n, q0, u0 = model.kind[i], model.n_q[i], model.q0[i], model.u0[i]
@@ -79,7 +79,7 @@ def first_moments(model, work, i):
         s[a] += 0.5 * total
 
 
-@inner
+@loops
 def sum_over_modes(columns, n, x):
     """Return Σ columns[a, k] x_k as three numbers."""
     s0, s1, s2 = 0.0, 0.0, 0.0
@@ -90,7 +90,7 @@ def sum_over_modes(columns, n, x):
     return s0, s1, s2
 
 
-@inner
+@loops
 def body_forces(model, work, i):
     """Write the left sides of (1) to (3) of body i into `work.residual`, and s, 1C, W, Y, J, D_q_dot into `work`."""
     t, n, u0, q0 = model.kind[i], model.n_q[i], model.u0[i], model.q0[i]
@@ -206,7 +206,7 @@ def body_forces(model, work, i):
     res[5] = x2 + y2 + t2 + J[2, 0] * e0 + J[2, 1] * e1 + J[2, 2] * e2
 
 
-@inner
+@loops
 def products(model, i, q, qd, W, Y):
     """Write W_ab = S_ab q and Y = 4C q_dot."""
     n = model.n_q[i]
@@ -220,7 +220,7 @@ def products(model, i, q, qd, W, Y):
     add_products(A, qd, Y)
 
 
-@inner
+@loops
 def body_mass_product(model, work, i, v, out):
     """Write generalised momenta M u of body i into out, (6 + n_q,), for v, (6 + n_q,), with v_GO in body axes.
 
@@ -255,7 +255,7 @@ def body_mass_product(model, work, i, v, out):
         modal_term(model, i, MASS, v[6:], out[6:])
 
 
-@inner
+@loops
 def put_tilde(H, row, column, factor, x, y, z):
     """Add factor * tilde((x, y, z)) to H at (row, column)."""
     H[row, column + 1] -= factor * z
@@ -266,7 +266,7 @@ def put_tilde(H, row, column, factor, x, y, z):
     H[row + 2, column + 1] += factor * x
 
 
-@inner
+@loops
 def put_tilde_product(H, row, column, factor, a0, a1, a2, b0, b1, b2):
     """Add factor * tilde(a) tilde(b) = factor * (b aᵀ - (a·b) 1) to H at (row, column)."""
     a, b = (a0, a1, a2), (b0, b1, b2)
@@ -277,7 +277,7 @@ def put_tilde_product(H, row, column, factor, a0, a1, a2, b0, b1, b2):
         H[row + i, column + i] -= factor * dot
 
 
-@inner
+@loops
 def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """Write the derivative of (1) to (3) into H, (6 + n, 6 + n), with weights of mass, damping, stiffness parts.
 
@@ -321,14 +321,14 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     modal_tangent(model, work, i, c_m, c_d, c_k, H, turn)
 
 
-@inner
+@loops
 def rate_tensor(c3, W, n, k, a, b):
     """Return 3C_k - W_k of component (a, b): D_k without its trace."""
     o = (3 * a + b) * n + k
     return c3[o] - W[o]
 
 
-@inner
+@loops
 def tensor_products(c3, W, n, k, x0, x1, x2):
     """Return D_k x and D_kᵀ x, six numbers."""
     trace = W[k] + W[4 * n + k] + W[8 * n + k]
@@ -351,7 +351,7 @@ def tensor_products(c3, W, n, k, x0, x1, x2):
     )
 
 
-@inner
+@loops
 def put_column(H, row, column, x0, x1, x2):
     """Write three numbers down a column of H."""
     H[row, column] = x0
@@ -359,7 +359,7 @@ def put_column(H, row, column, x0, x1, x2):
     H[row + 2, column] = x2
 
 
-@inner
+@loops
 def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """Write the rows and columns of the modes; see `body_tangent`."""
     n, q0, u0 = model.n_q[i], model.q0[i], model.u0[i]
@@ -413,7 +413,7 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     modal_block(model, i, STIFFNESS, c_k, H)
 
 
-@inner
+@loops
 def modal_columns(model, work, i, c_d, c_k, H):
     """Add what needs products over 4C and S_ab: the modal block, and the rest of (2) by q.
 
@@ -464,7 +464,7 @@ def modal_columns(model, work, i, c_d, c_k, H):
             H[3 + r, 6 + j] += c_k * total
 
 
-@inner
+@loops
 def stiffened_columns(model, work, i, c_d, c_k, H):
     """Add what K_t gives beyond s(q) and 1C(q), and the derivatives of q_dotᵀK_t q_dot, q_dotᵀK_r q_dot."""
     n, q0, u0 = model.n_q[i], model.q0[i], model.u0[i]
@@ -488,7 +488,7 @@ def stiffened_columns(model, work, i, c_d, c_k, H):
             H[3 + a, 6 + j] += 2 * c_d * turn_dot[a * n + j]
 
 
-@inner
+@loops
 def modal_block(model, i, which, factor, H):
     """Add factor * M, K or D to the modal block of H."""
     n = model.n_q[i]

@@ -1,11 +1,11 @@
 """Small dense matrices: LU factorisation with partial pivoting, and solves. Row-major, in place."""
 
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import matrix_loops
 
 __all__ = ["add_products", "lu_factor", "lu_solve", "lu_solve_columns"]
 
 
-@inner
+@matrix_loops
 def add_products(A, x, out):
     """Add Σ_k A[k, j] x_k to out_j, A flat with rows as long as out; four rows at once."""
     n, width = x.shape[0], out.shape[0]
@@ -22,7 +22,7 @@ def add_products(A, x, out):
             out[j] += row[j] * y
 
 
-@inner
+@matrix_loops
 def lu_factor(A, pivot):
     """Overwrite A, (n, n), with its factors; rows are compared after scaling by their largest number.
 
@@ -55,7 +55,7 @@ def lu_factor(A, pivot):
     return True
 
 
-@inner
+@matrix_loops
 def lu_solve(A, pivot, b):
     """Overwrite b, (n,), with A⁻¹ b."""
     n = A.shape[0]
@@ -75,7 +75,7 @@ def lu_solve(A, pivot, b):
         b[i] = total / A[i, i]
 
 
-@inner
+@matrix_loops
 def lu_solve_columns(A, pivot, B):
     """Overwrite B, (n, m), with A⁻¹ B."""
     n, m = B.shape

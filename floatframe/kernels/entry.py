@@ -3,14 +3,17 @@
 One entry, since numba compiles and links everything below an entry once more for each of them.
 """
 
+import logging
+import time
 from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels import source_digest
+from floatframe.kernels.compiler.choice import is_lean, words
 from floatframe.kernels.compiler.compilation import entry
+from floatframe.kernels.compiler.sources import source_digest
 from floatframe.kernels.compiler.structure import as_memory, as_model, as_rows, as_work, table_of
 from floatframe.kernels.connections.connection import constraint_rates
 from floatframe.kernels.diagnostics import power
@@ -28,6 +31,8 @@ __all__ = [
     "prepare",
     "rates_of_constraints",
 ]
+
+log = logging.getLogger(__name__)
 
 LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE = range(5)
 
@@ -94,7 +99,7 @@ def make_entry(digest):
         return entry(run, cache=False)
 
 
-run = make_entry(source_digest())
+run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 
 TABLE = types.Array(types.int64, 1, "C")
 SIGNATURE = (
@@ -124,6 +129,11 @@ def call(
     what: int, model: Model, work: Work, memory: Memory, rows: Rows, numbers: Array, integers: IntArray, out: Array
 ) -> Outcome:
     """Run the entry; all arrays live until it returns."""
+    if not run.signatures:
+        began = time.perf_counter()
+        if prepare():
+            level = logging.INFO if is_lean else logging.WARNING  # what is not as usual is said
+            log.log(level, "compiled the code of the motion in %.0f s, once: %s", time.perf_counter() - began, words())
     tables = [table_of(data) for data in (model, work, memory, rows)]
     return Outcome(*run(what, *tables, numbers, integers, out))
 

@@ -1,1 +1,1 @@
-"""How kernels are compiled: the lean pipeline, its passes and its lowering."""
+"""How kernels are compiled: the decorators, the lean pipeline with its passes and lowering, plain numba instead."""

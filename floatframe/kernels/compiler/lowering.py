@@ -6,7 +6,7 @@ Kernels own no memory and raise no errors, so that here
 (2) a variable with one assignment is a value wherever that assignment comes first, not a place on the stack;
 (3) a call of another kernel is a call, without tests of its status;
 (4) operations on two integers or two reals, and indices of arrays, are written without a search for their meaning;
-(5) loops are unrolled and made of vector instructions only where they run over modes or matrices.
+(5) loops are unrolled and made of vector instructions only in functions that are decorated so (`loops`).
 """
 
 import operator
@@ -23,7 +23,6 @@ from floatframe.kernels.compiler.block import Block, get_item
 
 __all__ = ["KernelContext", "KernelLower"]
 
-LONG_LOOPS = {"body", "dense"}  # modules (5)
 NO_WRAP = ("nsw",)  # integers of kernels do not overflow
 OPERATIONS = {
     (operator.add, types.float64, types.float64): lambda builder, x, y: builder.fadd(x, y),
@@ -65,11 +64,8 @@ class KernelLower(Lower):
     def setup_function(self, fndesc):
         """Begin a function (5)."""
         super().setup_function(fndesc)
-        module = fndesc.modname.rpartition(".")[2]
-        if module not in LONG_LOOPS:
-            self.function.attributes.add("optsize")
-        elif module == "dense":
-            self.function.attributes.add("noinline")
+        for attribute in self.library.attributes:
+            self.function.attributes.add(attribute)
 
     def incref(self, typ, val):
         """Count nothing (1)."""

@@ -15,7 +15,7 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, reg
 from numba.np.arrayobj import make_array
 
 from fe_models.foundation.arrays import IntArray
-from floatframe.kernels.compiler.block import Block, make_block
+from floatframe.kernels.compiler.compilation import array_type, array_value
 from floatframe.kernels.model import Memory, Model, Rows, Work
 
 __all__ = ["as_memory", "as_model", "as_rows", "as_work", "table_of"]
@@ -43,7 +43,7 @@ class Structure(types.Type):
         for name, annotation in kind.__annotations__.items():
             number = types.int64 if "int" in str(annotation).lower() else types.float64
             n = n_dimensions.get(name, 1)
-            self.fields[name] = (Block(number, n), place)
+            self.fields[name] = (array_type(number, n), place)
             place += 1 + n
         super().__init__(f"Structure({kind.__name__})")
 
@@ -73,7 +73,7 @@ def get_field(context, builder, structure, pointer, name):
         word.set_metadata("invariant.load", builder.module.add_metadata([]))
         words.append(word)
     data = builder.inttoptr(words[0], context.get_data_type(kind.dtype).as_pointer())
-    return make_block(context, builder, kind, data, words[1:])
+    return array_value(context, builder, kind, data, words[1:])
 
 
 def converter(kind):

@@ -1,0 +1,45 @@
+"""Which compiler makes the kernels: the lean one with a numba that it knows, else plain numba.
+
+The lean compiler (kernels/compiler/lean.py) replaces inner parts of numba, which change from one version to the next.
+Plain numba makes the same kernels with any version the project supports: it compiles several times as long, once, and
+a step takes somewhat longer (docs/multibody.md has the figures).
+"""
+
+import os
+
+import numba
+
+from floatframe.errors import FloatframeError
+
+__all__ = ["KNOWN_VERSIONS", "VARIABLE", "is_lean", "words"]
+
+KNOWN_VERSIONS = ("0.68",)  #: of numba, whose inner parts the lean compiler fits
+VARIABLE = "FLOATFRAME_COMPILER"  #: environment variable that asks for one of `CHOICES`
+CHOICES = ("lean", "plain")
+
+installed = ".".join(numba.__version__.split(".")[:2])
+
+
+def chosen() -> str:
+    """Return the compiler to use; `FloatframeError` if the one that is asked for does not exist or cannot serve."""
+    asked = os.environ.get(VARIABLE, "")
+    if asked not in ("", *CHOICES):
+        raise FloatframeError(f"environment variable {VARIABLE}: expected one of {', '.join(CHOICES)}, got {asked!r}")
+    if asked == "lean" and installed not in KNOWN_VERSIONS:
+        raise FloatframeError(
+            f"environment variable {VARIABLE}: the lean compiler knows numba {', '.join(KNOWN_VERSIONS)}, but "
+            f"{numba.__version__} is installed; leave the variable out to compile with plain numba"
+        )
+    return asked or ("lean" if installed in KNOWN_VERSIONS else "plain")
+
+
+is_lean = chosen() == "lean"
+
+
+def words() -> str:
+    """Return how the kernels are compiled, in one line for the user."""
+    if is_lean:
+        return f"lean, with numba {numba.__version__}"
+    asked = f"asked for by {VARIABLE}"
+    why = asked if os.environ.get(VARIABLE) else f"the faster lean way knows numba {', '.join(KNOWN_VERSIONS)}"
+    return f"plain, with numba {numba.__version__} ({why})"
