@@ -1,4 +1,4 @@
-"""A reduced body in another body frame, from what it holds itself: the finite element model is not needed (THEORY §4).
+"""A reduced body in another body frame, from what it holds itself, without the finite element model (theory.md §4).
 
 The motion r = c + Phi q is seen from another frame as phi'_k = phi_k - d_k - theta_k × c: the same deformation without
 the rigid-body motion C = [d; theta] that the new condition takes off. With Z the modes afresh, phi'' = phi' Z; then the
@@ -46,8 +46,9 @@ def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None
     """Return the same reduced body in another body frame, its modes diagonalised afresh.
 
     Free-free frequencies, stiffness, damping and loads are those of the same body; the motion is the same but for
-    second order in q (THEORY §4). The damping matrix is carried as it is, D'' = Zᵀ D Z, so that a deformation loses the
-    same energy in both frames; it is diagonal no more in general. Quadratic modes need the elements and are left out.
+    second order in q (theory.md §4). The damping matrix is carried as it is, D'' = Zᵀ D Z, so that a deformation loses
+    the same energy in both frames; it is diagonal no more in general. Quadratic modes need the elements and are left
+    out.
 
     Parameters
     ----------

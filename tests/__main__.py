@@ -1,6 +1,6 @@
 """Every check of the project in one command: `python -m tests` (`--long` adds the studies of minutes).
 
-Lint, types, tests, notebooks, in this order; each prints its own report, the first failure ends the run.
+Lint, types, tests, notebooks, documentation, in this order; each prints its own report, the first failure ends the run.
 """
 
 import os
@@ -19,6 +19,7 @@ def main() -> int:
         "types": ["mypy"],
         "tests": ["pytest", "-q", *markers, "tests"],
         "notebooks": ["pytest", "-q", "--nbmake", "--nbmake-timeout=300", "-o", "filterwarnings=", "notebooks"],
+        "documentation": ["sphinx", "-W", "--keep-going", "-q", "-b", "html", "docs", "build/site"],
     }
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
     for name, command in checks.items():

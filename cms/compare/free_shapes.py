@@ -32,7 +32,7 @@ class Subset:
 def independent_subset(T: Array) -> tuple[Array, IntArray, float]:
     """Orthonormal basis of columns T by pivoted QR at unit length, the redundant ones, and the condition of the rest.
 
-    The tolerance is that of the finishing step (THEORY §3).
+    The tolerance is that of the finishing step (docs/theory.md §3).
     """
     length = np.linalg.norm(T, axis=0)
     unit = T / np.where(length > 0, length, 1.0)

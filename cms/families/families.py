@@ -1,4 +1,4 @@
-"""All mode families of one body from one factorisation of its interior stiffness (THEORY §2)."""
+"""All mode families of one body from one factorisation of its interior stiffness (docs/theory.md §2)."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -39,8 +39,8 @@ class Families:
     >>> with Families(body) as families:                                   # doctest: +SKIP
     ...     sets = [rubin(body, n_modes=k, families=families) for k in range(20)]
 
-    Held dofs h: the boundary dofs, and interior ones where those leave a rigid-body motion free (THEORY §1). With them
-    held the interior stiffness K_II is factorised, once; static and vibration modes for every boundary condition
+    Held dofs h: the boundary dofs, and interior ones where those leave a rigid-body motion free (theory.md §1). With
+    them held the interior stiffness K_II is factorised, once; static and vibration modes for every boundary condition
     follow by the condensed stiffness S of h.
     """
 

@@ -1,4 +1,4 @@
-"""The body with all boundary dofs held: its interior stiffness, factorised once, serves many columns (DESIGN 3)."""
+"""The body with all boundary dofs held: its interior stiffness, factorised once, serves many columns."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The inverse of K under any boundary conditions of the interfaces, from one factorisation of K_II (THEORY §2).
+"""The inverse of K under any boundary conditions of the interfaces, from one factorisation of K_II (docs/theory.md §2).
 
 Whatever is fixed, free, sprung or loaded at the interfaces changes only the boundary: the condensed stiffness
 S = K_BB - K_BI K_II⁻¹ K_IB, which is small and dense. Rigid-body motions that stay free are projected out, so that the

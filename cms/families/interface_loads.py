@@ -1,4 +1,4 @@
-"""Mass and stiffness of the neighbours of a body, as they load its interfaces (Benfield-Hruda, THEORY §3)."""
+"""Mass and stiffness of the neighbours of a body, as they load its interfaces (Benfield-Hruda, docs/theory.md §3)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

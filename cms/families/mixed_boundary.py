@@ -1,4 +1,4 @@
-"""Mixed boundary conditions: interface dofs that stay free while the others of the boundary are held (THEORY §3)."""
+"""Mixed boundary conditions: interface dofs that stay free while the others of the boundary are held (theory.md §3)."""
 
 from collections.abc import Mapping, Sequence
 

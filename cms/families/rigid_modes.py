@@ -1,4 +1,4 @@
-"""Rigid-body modes of a free body by three routes that must span the same space (THEORY §2)."""
+"""Rigid-body modes of a free body by three routes that must span the same space (docs/theory.md §2)."""
 
 import numpy as np
 import scipy.linalg as la
@@ -46,7 +46,7 @@ def geometric_rigid_modes(body: FEBody, *, origin: Array | None = None) -> Array
 
 
 def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
-    """Choose six of the candidate dofs that just prevent rigid-body motion (the set R of THEORY §1).
+    """Choose six of the candidate dofs that just prevent rigid-body motion (the set R of docs/theory.md §1).
 
     Pivoted QR of the rigid-body modes restricted to the candidates, rotations scaled by the body length.
 

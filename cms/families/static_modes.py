@@ -1,4 +1,4 @@
-"""Static modes of a body by its boundary dofs (THEORY §2)."""
+"""Static modes of a body by its boundary dofs (docs/theory.md §2)."""
 
 import numpy as np
 

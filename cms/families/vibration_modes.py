@@ -1,4 +1,4 @@
-"""Vibration modes of a body under the boundary conditions of the classical mode sets (THEORY §2)."""
+"""Vibration modes of a body under the boundary conditions of the classical mode sets (docs/theory.md §2)."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Geometric stiffness of a straight beam without a mesh: section forces by equilibrium, integrals along x (THEORY §7).
+"""Geometric stiffness of a straight beam without a mesh: section forces by equilibrium, integrals (theory.md §7).
 
 n(x), m(x) are what the part beyond x exerts on the part before it: the loads beyond x, those per mass, those on
 stations and the reaction of the support. They work on the second order of the strains of a section, n·e_x besides on

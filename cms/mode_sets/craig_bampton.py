@@ -57,7 +57,7 @@ def craig_bampton(
 
     References
     ----------
-    .. [1] THEORY §2-3.
+    .. [1] docs/theory.md §2-3.
     """
     with families_of(body, families) as families:
         require_interfaces("craig_bampton", body)

@@ -1,4 +1,4 @@
-"""Reduced pencils (M, K) of mode sets, to compare reductions that no floating frame can take (THEORY §3)."""
+"""Reduced pencils (M, K) of mode sets, to compare reductions that no floating frame can take (docs/theory.md §3)."""
 
 from dataclasses import dataclass
 

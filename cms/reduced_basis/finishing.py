@@ -1,4 +1,4 @@
-"""The finishing step every mode set passes: rank, body frame, M-orthonormal shapes (THEORY §3)."""
+"""The finishing step every mode set passes: rank, body frame, M-orthonormal shapes (docs/theory.md §3)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Body reference frames: the condition that tells elastic displacement from rigid-body motion (THEORY §4).
+"""Body reference frames: the condition that tells elastic displacement from rigid-body motion (docs/theory.md §4).
 
 A frame is a condition Wᵀ u = 0 of six rows. Columns v become v - Psi_R (Wᵀ Psi_R)⁻¹ Wᵀ v: the same deformation, seen
 from the frame. K is blind to it, M is not.

@@ -1,4 +1,4 @@
-"""Independent columns of a mode set in the norm of W = K + omega_1² M, and the redundant ones (THEORY §3).
+"""Independent columns of a mode set in the norm of W = K + omega_1² M, and the redundant ones (docs/theory.md §3).
 
 A Gram matrix squares the condition of the columns, so a column whose pivot is small in its Gram matrix is not judged
 there: its remainder is formed, measured, and judged itself. This is a pivoted QR in blocks.
@@ -16,7 +16,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Columns", "gram", "independent_columns"]
 
-RANK_TOLERANCE = 1e-10  #: remainder of a unit column below which it is redundant (THEORY §3)
+RANK_TOLERANCE = 1e-10  #: remainder of a unit column below which it is redundant (docs/theory.md §3)
 ROUNDING_MARGIN = 30.0  #: times the rounding noise of a column in the W-norm, where that is more
 TRUSTED_PIVOT = 1e-4  #: remainder above which a pivoted Cholesky of the Gram matrix decides by itself
 

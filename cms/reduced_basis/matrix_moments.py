@@ -1,4 +1,4 @@
-"""Canonical moments of a body that came as bare matrices, by acceleration fields (THEORY §5).
+"""Canonical moments of a body that came as bare matrices, by acceleration fields (docs/theory.md §5).
 
 A linear field u = E c has the nodal values (E c, rotation ½ curl). With nodal inertia the rotation rows ½ … below make
 the products exact where that inertia is isotropic; elsewhere the result is labelled approximate.

@@ -1,4 +1,4 @@
-"""Sums over the nodes of a body, weighted by the volume each stands for: the norm of a Buckens frame (THEORY §4)."""
+"""Sums over the nodes of a body, weighted by the volume each stands for: the norm of a Buckens frame (theory.md §4)."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Reduced geometric stiffness of a body for unit loads: what a linear floating frame leaves out (THEORY §7)."""
+"""Reduced geometric stiffness of a body for unit loads: what a linear floating frame leaves out (docs/theory.md §7)."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -17,7 +17,7 @@ SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omeg
 class GeometricStiffness:
     """K_j,kl = [Phi.T K_geo(sigma_j) Phi]_kl of unit loads f_j, sigma_j the stress of the static response to f_j.
 
-    All in the frame B of the reduced body, over its modes q, with one support for all loads (THEORY §7); a tensile
+    All in the frame B of the reduced body, over its modes q, with one support for all loads (theory.md §7); a tensile
     stress makes K_j positive. Half the quadratic form, 1/2 qᵀ K_j q, is minus the work of f_j on the displacement of
     second order.
     """

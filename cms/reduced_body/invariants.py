@@ -1,4 +1,4 @@
-"""Inertia invariants of a body with deformation modes, all from seven canonical moments (THEORY §5)."""
+"""Inertia invariants of a body with deformation modes, all from seven canonical moments (docs/theory.md §5)."""
 
 from dataclasses import dataclass
 from functools import cached_property

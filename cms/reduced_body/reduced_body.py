@@ -71,7 +71,7 @@ class ReducedInterface:
 
 @dataclass(frozen=True, eq=False)
 class ReducedBody:
-    """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (THEORY §3-5).
+    """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (docs/theory.md §3-5).
 
     Units of q follow from Phi.T M Phi = 1: sqrt(kg) m; Phi q is a length.
     """

@@ -1,4 +1,4 @@
-"""Centrifugal loads of steady rotation, one for each product of two angular velocities (THEORY §7)."""
+"""Centrifugal loads of steady rotation, one for each product of two angular velocities (docs/theory.md §7)."""
 
 import numpy as np
 

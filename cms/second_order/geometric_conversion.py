@@ -1,4 +1,4 @@
-"""The geometric stiffness of a reduced body in another body frame, from what it holds itself (THEORY §7).
+"""The geometric stiffness of a reduced body in another body frame, from what it holds itself (docs/theory.md §7).
 
 A load is a load per mass A c + b and a wrench at each interface. With its reaction it is in balance; the stress of a
 balanced load does not depend on the support: its matrix is the same combination of the matrices of the old unit loads.

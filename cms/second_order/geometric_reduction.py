@@ -1,4 +1,4 @@
-"""Geometric stiffness of a reduced body from its elements: a static solution and a matrix per unit load (THEORY §7).
+"""Geometric stiffness of a reduced body from its elements: a static solution and a matrix per unit load (theory.md §7).
 
 (1) unit loads f_j, balanced by the support of the frame: P f_j (`cms.second_order.unit_loads`)
 (2) static states u_j = G_R P f_j, by the factorisation that gave the modes; only their stress counts

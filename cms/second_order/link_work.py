@@ -1,4 +1,4 @@
-"""Second order of rigid links: what follows a rotation off its axis moves to second order too (THEORY §7).
+"""Second order of rigid links: what follows a rotation off its axis moves to second order too (docs/theory.md §7).
 
 A recovery u_mesh = T u has the lever of every follower in its columns of rotations: u_s = u + B theta with B = -a~. As
 a rotation vector, theta also moves it by ½ theta × (B theta). Forces on followers work on that.

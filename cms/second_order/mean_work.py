@@ -1,4 +1,4 @@
-"""Second order of a mean motion: what a distributing interface leaves out when its members turn (THEORY §7).
+"""Second order of a mean motion: what a distributing interface leaves out when its members turn (docs/theory.md §7).
 
 The mean motion of members is the rigid motion nearest to theirs in least squares with weights w. With x from their
 weighted centre and v their displacement, Σ w (x + v) × (R x) = 0. In first order J theta = Σ w x × v with

@@ -2,8 +2,8 @@
 
     r = c + Phi q + ½ Σ q_k q_l g_kl
 
-The geometric stiffness of a unit force at a node is minus its displacement of second order, K_kl = -e·g_kl (THEORY §7):
-g is had node by node from the same static solutions and the same pass over the elements, and it is the field whose
+The geometric stiffness of a unit force at a node is minus its displacement of second order, K_kl = -e·g_kl (theory.md
+§7): g is had node by node from the same static solutions and the same pass over the elements, and it is the field whose
 inertia the geometric stiffness of the other unit loads carries. So the two are one, and never counted twice.
 """
 

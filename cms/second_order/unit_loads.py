@@ -1,4 +1,4 @@
-"""Unit loads of a body and their balance: what the geometric stiffness of a floating frame is made for (THEORY §7).
+"""Unit loads of a body and their balance: what the geometric stiffness of a floating frame is made for (theory.md §7).
 
 Per mass, about the origin of the frame B and along its axes: -e_a of the acceleration of its origin, -e_a × c of the
 angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] of the products of angular velocities; then a unit force

@@ -1,4 +1,4 @@
-"""Static states of the unit loads of a body: what its geometric stiffness needs of the factorisation (THEORY §7)."""
+"""Static states of the unit loads of a body: what its geometric stiffness needs of the factorisation (theory.md §7)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Factorise a large symmetric matrix once, solve for many columns (DESIGN 3)."""
+"""Factorise a large symmetric matrix once, solve for many columns."""
 
 from dataclasses import dataclass
 

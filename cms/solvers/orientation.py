@@ -1,4 +1,4 @@
-"""One fixed basis among many equal ones: signs of modes, and directions within multiple frequencies (DESIGN 12)."""
+"""One fixed basis among many equal ones: signs of modes, and directions within multiple frequencies."""
 
 import numpy as np
 

@@ -1,1 +1,1 @@
-"""Straight three-dimensional Timoshenko beams: sections, elements, bodies (THEORY §5, docs/beams.md)."""
+"""Straight three-dimensional Timoshenko beams: sections, elements, bodies (docs/theory.md §5, docs/beams.md)."""

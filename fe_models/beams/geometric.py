@@ -1,4 +1,4 @@
-"""Geometric stiffness of straight Timoshenko beams, of point masses and of springs (THEORY §7).
+"""Geometric stiffness of straight Timoshenko beams, of point masses and of springs (docs/theory.md §7).
 
 Sections turn by rotation vectors, R = exp(theta~) = 1 + theta~ + ½ theta~² + …, and keep their shape. With r' = e + u'
 the strains of a section are Gamma = Rᵀ r' - e and kappa, the axial vector of Rᵀ R'; to second order

@@ -56,7 +56,7 @@ class BeamModel:
         return 6 * self.n_nodes + 3 * len(self.skin.points)
 
     def mass_gram(self, u: Array) -> Array:
-        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], exact over the cross-sections (THEORY §5).
+        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], exact over the cross-sections (docs/theory.md §5).
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Couplings: interfaces of many nodes become boundary dofs, an FEBody becomes an FEBody (THEORY §1).
+"""Couplings: interfaces of many nodes become boundary dofs, an FEBody becomes an FEBody (docs/theory.md §1).
 
 A rigid interface (RBE2) eliminates its member dofs: u_members = T u_reference. A distributing interface (RBE3)
 keeps them: the reference node follows the weighted mean motion, u_reference = A u_members, by six Lagrange

@@ -37,7 +37,7 @@ class ElementModel(Protocol):
         """Whether `nodal_stress` can be asked for; bare matrices and pure frames of beams do not know it."""
 
     def mass_gram(self, u: Array) -> Array:
-        """Integrals over mass ∫ a aᵀ of a = [1, c, u_x, u_y, u_z] (THEORY §5).
+        """Integrals over mass ∫ a aᵀ of a = [1, c, u_x, u_y, u_z] (docs/theory.md §5).
 
         Parameters
         ----------
@@ -97,7 +97,7 @@ class ElementModel(Protocol):
         """
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Return Phiᵀ K_geo(sigma_j) Phi of static states u_j, (k, n, n), symmetric, linear in the state (THEORY §7).
+        """Return Phiᵀ K_geo(sigma_j) Phi of static states u_j, (k, n, n), symmetric, linear in them (theory.md §7).
 
         K_geo is the second derivative of the potential energy by the displacements at fixed stress: solids
         ∫ sigma_ab u_c,a u_c,b. Elements with rotations take them as rotation vectors, and add the work of what acts off

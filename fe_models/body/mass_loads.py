@@ -1,4 +1,4 @@
-"""Loads per mass that are linear in the position: weight and d'Alembert loads of rigid-body motion (THEORY §7)."""
+"""Loads per mass that are linear in the position: weight and d'Alembert loads of rigid-body motion (theory.md §7)."""
 
 from dataclasses import dataclass
 

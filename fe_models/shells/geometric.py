@@ -1,4 +1,4 @@
-"""Geometric stiffness of flat shells (THEORY §7).
+"""Geometric stiffness of flat shells (docs/theory.md §7).
 
 A point at the distance z from the middle surface moves by u + z psi + ½ z theta × (theta × n), psi = theta × n, theta a
 rotation vector. The second order of its Green strain is worked on by the stress, whose resultants are N = ∫ sigma,

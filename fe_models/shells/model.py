@@ -38,7 +38,7 @@ class ShellModel:
         return 6 * self.n_nodes + 3 * len(self.skin.points)
 
     def mass_gram(self, u: Array) -> Array:
-        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], exact through the thickness (THEORY §5).
+        """Return ∫ a aᵀ over mass, a = [1, c, u_x, u_y, u_z], exact through the thickness (docs/theory.md §5).
 
         Parameters
         ----------

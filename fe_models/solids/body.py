@@ -140,7 +140,7 @@ def solid_body(
 
 
 def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
-    """Return Aᵀ M_s A with A = [1, X, u_x, u_y, u_z] (THEORY §5), (4 + 3 k, 4 + 3 k).
+    """Return Aᵀ M_s A with A = [1, X, u_x, u_y, u_z] (docs/theory.md §5), (4 + 3 k, 4 + 3 k).
 
     Parameters
     ----------

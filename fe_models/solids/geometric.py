@@ -1,4 +1,4 @@
-"""Geometric stiffness of solid elements: Phiᵀ K_geo(sigma_j) Phi for many states j in one pass (THEORY §7).
+"""Geometric stiffness of solid elements: Phiᵀ K_geo(sigma_j) Phi for many states j in one pass (docs/theory.md §7).
 
 K_geo(sigma)_kl = ∫ sigma_ab Σ_c phi_k,c,a phi_l,c,b is linear in the stress. The products of gradients of a pair of
 columns do not depend on the state, so they are formed once at every point; a matrix product with the stress of all

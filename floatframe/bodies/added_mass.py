@@ -1,7 +1,7 @@
 """Small parts fixed to interfaces of a reduced body: their mass and inertia become part of the body.
 
 A part turns and moves with its interface: a particle at rho from the interface node has the position c = p + rho and
-the shape phi = Psi_t + Psi_r × rho, so that every moment of the body grows by sums over particles (THEORY §5). An
+the shape phi = Psi_t + Psi_r × rho, so that every moment of the body grows by sums over particles (theory.md §5). An
 inertia is carried by six particles on its principal axes. Against a rigid body fixed to the interface nothing is left
 out but the terms of second order in the elastic rotation, and none at all for a mass in the interface node.
 

@@ -38,7 +38,7 @@ class FlexibleBody:
     q: Array = field(default_factory=lambda: np.zeros(0))  #: modal coordinates at the start, (n_q,); empty: undeformed
     q_dot: Array = field(default_factory=lambda: np.zeros(0))  #: their rates, (n_q,); empty: zero
     source: str = ""  #: path of the modal file, for the record and the animation
-    #: whether the geometric stiffness counts: loads stiffen or soften the body (THEORY §7); "auto": if it is there
+    #: whether the geometric stiffness counts: loads stiffen or soften the body (theory.md §7); "auto": if it is there
     stiffening: bool | Literal["auto"] = "auto"
 
     def __post_init__(self) -> None:

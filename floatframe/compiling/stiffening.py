@@ -1,4 +1,4 @@
-"""Geometric stiffness in the arrays of the kernels, and in the motion of an interface (THEORY §7).
+"""Geometric stiffness in the arrays of the kernels, and in the motion of an interface (docs/theory.md §7).
 
 The kinetic energy of a body changes by
 

@@ -5,7 +5,7 @@ direction E = R exp(Psi_r q) e = R eps of a marker,
 
     dx = d + theta_G × l + R_m Psi_sigma dq,        dE = theta_G × (E_0 + E_1)/2 + R_m (psi × (eps_0 + eps_1)/2)
 
-where sigma(q) and th(q) are of degree two in q at most (a stiffened body bends its interfaces, THEORY §7), so that
+where sigma(q) and th(q) are of degree two in q at most (a stiffened body bends its interfaces, theory.md §7), so that
 their changes are Psi_sigma dq and Psi_r dq with the derivatives at the mean of q, and psi = Gamma Psi_r dq is the
 Cayley vector of the elastic rotation. A force F with work F·dx acts by F, l × F and Psi_sigmaᵀ R_mᵀ F; a load G with
 work G·dE by the torque E_mean × G and (Gamma Psi_r)ᵀ (eps_mean × R_mᵀ G).

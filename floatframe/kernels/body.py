@@ -1,4 +1,4 @@
-"""Equations of motion of one body, complete in the deformation (THEORY §6, §7), and their tangent.
+"""Equations of motion of one body, complete in the deformation (docs/theory.md §6-7), and their tangent.
 
 Components in body axes; a: acceleration of the frame origin minus gravity, alpha: angular acceleration. From
 W_ab = S_ab q, 1C(q) = 1C + K_t q, s = S + 1C q + 1/2 qᵀ K_t q (K_t, K_r: zero unless stiffened):

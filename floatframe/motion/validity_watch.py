@@ -1,8 +1,8 @@
 """Watches a motion row by row, whether every flexible body stays in the range of its linear frame.
 
-The stiffness of a body under its loads is K + Σ lambda_j K_j, with the amplitudes lambda of the unit loads (THEORY §7):
-acceleration of the frame origin minus gravity, angular acceleration, products of the angular velocity, wrenches on the
-interfaces, all in body axes. In units of K its change is A = Σ lambda_j K^(-1/2) K_j K^(-1/2): the loads are
+The stiffness of a body under its loads is K + Σ lambda_j K_j, with the amplitudes lambda of the unit loads (theory.md
+§7): acceleration of the frame origin minus gravity, angular acceleration, products of the angular velocity, wrenches on
+the interfaces, all in body axes. In units of K its change is A = Σ lambda_j K^(-1/2) K_j K^(-1/2): the loads are
 -min(eig A) of those that buckle the body, and a linear frame is wrong in stiffness by max |eig A|.
 
 The eigenvalues are found once per batch of rows, where Σ |lambda_j| |K_j| is largest, and only if that bound is above

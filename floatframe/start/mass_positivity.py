@@ -1,8 +1,8 @@
 """Whether the mass matrices of stiffened bodies are positive definite at a state.
 
-The kinetic energy of a stiffened body is cut off after the second order of the deformation (THEORY §7), so that it can
-become negative where a linear one cannot: far deflections, or shapes that nearly are a rigid rotation, as the high ones
-of a frame that is clamped to a place where the body is hinged.
+The kinetic energy of a stiffened body is cut off after the second order of the deformation (theory.md §7), so that it
+can become negative where a linear one cannot: far deflections, or shapes that nearly are a rigid rotation, as the high
+ones of a frame that is clamped to a place where the body is hinged.
 """
 
 import numpy as np

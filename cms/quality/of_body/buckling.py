@@ -1,4 +1,4 @@
-"""Buckling of a reduced body under its unit loads: where K + amplitude K_geo loses its stiffness (THEORY §7)."""
+"""Buckling of a reduced body under its unit loads: where K + amplitude K_geo loses its stiffness (theory.md §7)."""
 
 from dataclasses import dataclass
 

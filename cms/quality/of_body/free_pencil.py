@@ -26,7 +26,7 @@ class FreePencil:
 
 
 def free_pencil(reduced: ReducedBody) -> FreePencil:
-    """Return the pencil of THEORY §6 at rest.
+    """Return the pencil of docs/theory.md §6 at rest.
 
     M = [m 1, -S~, 1C; S~, J(0), 2C; 1Cᵀ, 2Cᵀ, M*], K = diag(0, K*), D = diag(0, D*).
     """

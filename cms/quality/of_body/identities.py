@@ -1,4 +1,4 @@
-"""Identities that the moments, matrices and modes of one reduced body satisfy (THEORY §4-5)."""
+"""Identities that the moments, matrices and modes of one reduced body satisfy (docs/theory.md §4-5)."""
 
 import numpy as np
 

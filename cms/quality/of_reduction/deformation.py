@@ -1,4 +1,4 @@
-"""Deformation error of a mode set along a reference motion (THEORY §8).
+"""Deformation error of a mode set along a reference motion (docs/theory.md §8).
 
     eps(t) = min_x |u_ref(t) - [Psi_R Phi] x|_W / max_t min_y |u_ref(t) - Psi_R y|_W
 

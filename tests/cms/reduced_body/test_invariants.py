@@ -1,4 +1,4 @@
-"""Every invariant against direct sums over point masses, and the identities of THEORY §5."""
+"""Every invariant against direct sums over point masses, and the identities of docs/theory.md §5."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The same part reduced in two body frames: the motion is the same to first order in the deformation (THEORY §4)."""
+"""The same part reduced in two body frames: the motion is the same to first order in the deformation (theory.md §4)."""
 
 from dataclasses import replace
 
