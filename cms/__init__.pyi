@@ -39,6 +39,8 @@ from .mode_sets import user_basis as user_basis
 from .mode_sets.characteristic_modes import with_characteristic_modes as with_characteristic_modes
 from .mode_sets.extra_columns import with_centrifugal as with_centrifugal
 from .mode_sets.extra_columns import with_load_cases as with_load_cases
+from .mode_sets.mesh_field import CoupledField as CoupledField
+from .mode_sets.mesh_field import coupled_field as coupled_field
 from .quality.body_check import check_body as check_body
 from .quality.of_body.buckling import critical_loads as critical_loads
 from .quality.record import QualityRecord as QualityRecord

@@ -207,15 +207,13 @@ def modes_of(reduced: ReducedBody, M: Array) -> tuple[Array, np.ndarray]:
     omega2_1 = (2 * np.pi * reduced.free_frequencies.min()) ** 2 if len(reduced.free_frequencies) else 0.0
     if not omega2_1 > 0:
         omega2_1 = float((stiffness[mass > 0] / mass[mass > 0]).min(initial=np.inf))
-    scale = 1 / np.sqrt(stiffness + omega2_1 * mass)
-    S = np.outer(scale, scale)
-    Z, is_massive, n_rigid = elastic_eigenvectors(reduced.K * S, M * S, omega2_1)
-    if n_rigid or not np.isfinite(Z).all():
+    try:
+        return elastic_eigenvectors(reduced.K, M, omega2_1)
+    except np.linalg.LinAlgError as error:
         raise BodyError(
-            f"reduced body {reduced.name!r}: {n_rigid} of its {reduced.n_q} shapes are rigid-body motions; a body "
-            "frame carries none"
-        )
-    return scale[:, None] * Z, is_massive
+            f"reduced body {reduced.name!r}: among its {reduced.n_q} shapes there is rigid-body motion ({error}); a "
+            "body frame carries none"
+        ) from error
 
 
 def omega2_of(reduced: ReducedBody, Z: Array) -> Array:

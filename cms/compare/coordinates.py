@@ -80,6 +80,7 @@ class ReferenceBasis:
             # nearly dependent columns lose their orthogonality to the reference when they are brought to unit length
             basis, _ = independent_columns(self._without_reference(basis), self.body, self.omega2)
             basis = self._without_reference(basis)
+        if basis.X.shape[1]:  # a small body may have no dof that the reference does not span
             G = self._inner(basis, basis)
             basis = basis @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
         T_V = self._inner(basis, V)

@@ -8,8 +8,9 @@ import scipy.linalg as la
 from cms.compare.coordinates import Coordinates
 from cms.errors import ModeSetError
 from cms.quality.of_reduction.free_basis import FreeBasis
-from cms.reduced_basis.finishing import RIGID_ENERGY, elastic_eigenvectors
+from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_basis.independent import RANK_TOLERANCE
+from cms.reduced_basis.rigid_content import elastic_directions
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["Subset", "independent_subset", "judged_subset"]
@@ -47,8 +48,8 @@ def judged_subset(c: Coordinates, T: Array, labels: tuple[str, ...], rigid: Arra
     """Solve the free-free problem of the span of columns T and the rigid-body modes.
 
     (1) independent columns U of T
-    (2) rigid-body part off: U <- (1 - N Nᵀ M) U, N M-orthonormal rigid-body modes
-    (3) K z = omega² M z over U without its null space, by the solver of the finishing step
+    (2) directions of U that hold no rigid-body motion, their rigid-body part off: U <- (1 - N Nᵀ M) U d
+    (3) K z = omega² M z over U, by the solver of the finishing step
 
     Parameters
     ----------
@@ -67,11 +68,15 @@ def judged_subset(c: Coordinates, T: Array, labels: tuple[str, ...], rigid: Arra
         If nothing elastic is left.
     """
     U, redundant, condition = independent_subset(T)  # (1)
-    U = U - rigid @ (rigid.T @ (c.M @ U))  # (2)
-    if not (np.linalg.norm(U, axis=0) ** 2 > RIGID_ENERGY).any():
+    motions = rigid * np.sqrt(omega2_1)  # of unit length: the norm of the coordinates is that of K + omega_1² M
+    in_span = U.T @ motions
+    rest = motions - U @ in_span
+    U = U @ elastic_directions(in_span, rest.T @ rest)  # (2)
+    U = U - rigid @ (rigid.T @ (c.M @ U))
+    if not U.shape[1]:
         raise ModeSetError(f"its {T.shape[1]} columns hold only rigid-body motion; add modes")
     G_K, G_M = U.T @ c.K @ U, U.T @ c.M @ U
-    Z, has_mass, _ = elastic_eigenvectors((G_K + G_K.T) / 2, (G_M + G_M.T) / 2, omega2_1)  # (3)
+    Z, has_mass = elastic_eigenvectors((G_K + G_K.T) / 2, (G_M + G_M.T) / 2, omega2_1)  # (3)
     is_massive = np.asarray(has_mass, dtype=bool)
     Phi = U @ Z
     omega2 = np.einsum("nk,nl,lk->k", Phi, c.K, Phi, optimize=True)

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from cms.errors import BodyError
 from fe_models.body.fe_body import FEBody
-from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = [
@@ -35,14 +35,7 @@ def geometric_rigid_modes(body: FEBody, *, origin: Array | None = None) -> Array
     Array
         (n_dof, 6); columns d_x d_y d_z [-] and theta_x theta_y theta_z [m].
     """
-    motion = rigid_motion_of_points(body.nodes, np.zeros(3) if origin is None else origin)
-    node, component = body.dofs.T
-    Psi_R = np.zeros((body.n_dof, 6))
-    is_translation = (component >= 0) & (component < 3)
-    is_rotation = component >= 3
-    Psi_R[is_translation] = motion[node[is_translation], component[is_translation]]
-    Psi_R[is_rotation, component[is_rotation]] = 1.0
-    return Psi_R
+    return rigid_motion_of_dofs(body.nodes, body.dofs, np.zeros(3) if origin is None else origin)
 
 
 def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:

@@ -11,6 +11,7 @@ from cms.families.static_modes import COMPONENTS
 from cms.mode_sets import MODE_SETS
 from cms.mode_sets.axis_functions import AXIS_FUNCTIONS
 from cms.mode_sets.extra_columns import EXTRA_COLUMNS
+from cms.mode_sets.given_columns import OVER
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
 from fe_models.foundation.words import nearest
@@ -30,7 +31,7 @@ MEASURE_NAMES = ("frequency", "frf")  #: of `cms.compare.mode_selection`, whose 
 SET_OPTIONS = (
     "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
     "load_cases", "damping_ratio", "n_rich", "functions", "n_axial", "n_bending", "n_torsion", "axis", "point",
-    "poisson", "columns",
+    "poisson", "columns", "columns_over",
 )  # fmt: skip
 #: keys that belong to some mode sets
 AUTO = "auto"  #: instead of a number of modes: as few as meet error over band
@@ -210,6 +211,9 @@ class ReductionSection(Table):
         None, description="a number between -1 and 0.5, Poisson's ratio"
     )
     columns: Path | None = Field(None, description="the path of a .npy or .npz file of columns, relative to the job")
+    columns_over: choice("dofs", lambda: OVER) | None = Field(  # type: ignore[valid-type]
+        None, description='"coupled" or "mesh": which dofs the rows of the columns are'
+    )
     extra: Extras | None = Field(None, description=f"a list of extra columns, of {', '.join(EXTRA_COLUMNS)}")
     interface_modes: Count | None = Field(
         None, description="a whole number, 0 or more, of modes of each all-node interface"

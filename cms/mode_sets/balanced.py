@@ -151,7 +151,7 @@ def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichB
         Columns(V, SymmetricProduct(body.K) @ V, SymmetricProduct(body.M) @ V, np.eye(V.shape[1])), body, omega2_1
     )
     G_K = gram(Q.X, Q.KX)
-    Z, is_massive, _ = elastic_eigenvectors(G_K, gram(Q.X, Q.MX), omega2_1)
+    Z, is_massive = elastic_eigenvectors(G_K, gram(Q.X, Q.MX), omega2_1)
     Z = Z[:, is_massive]
     return RichBasis(combine(Q.X, Z), np.einsum("kq,kl,lq->q", Z, G_K, Z))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cms.errors import ModeSetError
 from cms.mode_set import ModeSet
-from cms.mode_sets.mesh_field import coupled_field
+from cms.mode_sets.given_columns import coupled_columns, tell_frequencies
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 
@@ -24,6 +24,7 @@ def user_basis(
     body: FEBody,
     *,
     columns: Array | str | os.PathLike[str] | None = None,
+    columns_over: str | None = None,
     labels: Sequence[str] | None = None,
     frequencies: Array | None = None,
     families: "Families | None" = None,
@@ -36,9 +37,12 @@ def user_basis(
         A coupled body.
     columns
         Displacement columns over the dofs of the coupled body (n_dof, k), or over those of its mesh (n_mesh_dof, k),
-        which are then brought to the coupled body (`mesh_field`: rigid interfaces take the nearest rigid motion,
+        which are then brought to the coupled body (`cms.coupled_field`: rigid interfaces take the nearest rigid motion,
         and how near that is stands in the options of the set). Or a file: .npy with the array, .npz with `columns` and,
         if need be, `labels` and `frequencies`.
+    columns_over
+        "coupled" or "mesh": which dofs the rows are. Needed where both have as many, as their order differs even so;
+        else the number of rows tells.
     labels
         One per column; "user 1", "user 2", … by default, or those of the file.
     frequencies
@@ -49,7 +53,8 @@ def user_basis(
     Raises
     ------
     ModeSetError
-        If the file cannot be read, or shape, labels or numbers do not fit the body.
+        If the file cannot be read, shape, labels or numbers do not fit the body, the rows may be those of the coupled
+        body and of its mesh alike and nothing says which, or they are told to be one and look like the other.
     """
     body.require_coupled()
     if columns is None:
@@ -64,18 +69,10 @@ def user_basis(
     if V.dtype.kind not in "fiu":
         raise ModeSetError(f"{where}: columns: expected real numbers, got {V.dtype}")
     V = V.astype(np.float64)
-    n_mesh = body.n_dof if body.recovery is None else body.recovery.matrix.shape[0]
-    if V.ndim != 2 or len(V) not in (body.n_dof, n_mesh) or V.shape[1] == 0:
-        mesh = "" if n_mesh == body.n_dof else f" or ({n_mesh}, k) over the dofs of the mesh"
-        raise ModeSetError(f"{where}: columns: expected ({body.n_dof}, k) over the coupled dofs{mesh}, got {V.shape}")
     if not np.isfinite(V).all():
         raise ModeSetError(f"{where}: columns: expected finite numbers, got NaN or infinite ones")
-    if len(V) != body.n_dof:
-        field = coupled_field(body, V)
-        V = field.columns
-        options |= {
-            f"motion of interface {name} that is not rigid": f"{part:.3g}" for name, part in field.departure.items()
-        }
+    V, told = coupled_columns(where, body, V, columns_over)
+    options |= told
     k = V.shape[1]
     labels = tuple(f"user {j + 1}" for j in range(k)) if labels is None else tuple(str(label) for label in labels)
     frequencies = np.full(k, np.nan) if frequencies is None else np.asarray(frequencies, dtype=float)
@@ -83,6 +80,7 @@ def user_basis(
         raise ModeSetError(
             f"{where}: {k} columns need as many labels and frequencies, got {len(labels)} and {frequencies.shape}"
         )
+    tell_frequencies(where, body, V, frequencies)
     return ModeSet("user-basis", V, labels, frequencies, options, ("user",) * k)
 
 

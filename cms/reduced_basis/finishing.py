@@ -10,6 +10,7 @@ from cms.families.fixed_interface import moving_nodes
 from cms.mode_set import ModeSet
 from cms.reduced_basis.frames import FrameCondition
 from cms.reduced_basis.independent import Columns, gram, independent_columns
+from cms.reduced_basis.rigid_content import elastic_directions, orthonormal_motions
 from cms.reduced_body.source_columns import SourceColumns, source_columns
 from cms.solvers.orientation import orientation
 from cms.solvers.sparse_product import SymmetricProduct
@@ -19,9 +20,9 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["FinishedBasis", "finish"]
 
-RIGID_ENERGY = 1e-6  #: squared W-length of a unit column after its rigid part is taken off, if nothing else is in it
 MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which it is static
-ZERO_ENERGY = 1e-8  #: omega² in units of omega_1², below which a shape costs no energy
+ZERO_ENERGY = 1e3  #: strain energy of a shape in units of the rounding of its terms, below which it costs none
+INDEPENDENT = 1e-14  #: least eigenvalue of a pencil's norm, scaled to a unit diagonal
 ORTHONORMAL_DEFECT = 1e-9  #: largest defect of Phi.T M Phi - 1 that is accepted
 
 
@@ -43,7 +44,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
 
     (1) W-orthonormal columns Q of the set, W = K + omega_1² M; the redundant ones are dropped and named
     (2) Q' = Q - Psi_R C: rigid part taken off by the frame; Qᵀ K Q stays
-    (3) the null space of Q'ᵀ W Q' is the rigid-body content: out
+    (3) the rigid-body motions that lie in the span of Q are taken out of it (`elastic_directions`)
     (4) K z = omega² M z over what is left; Phi = Q' z
 
     Raises
@@ -61,17 +62,22 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
     Q, redundant = independent_columns(columns, body, omega2_1)  # (1)
     del columns
     G_K = gram(Q.X, Q.KX)
-    free_omega2 = free_elastic(Q, G_K, condition, omega2_1)
 
     C = condition.rigid_part(Q.X)  # (2)
     Q_frame = Q.X - condition.Psi_R @ C
     G_M = gram(Q_frame, Q.MX - condition.M_Psi_R @ C)
 
-    Z, is_massive, n_rigid = elastic_eigenvectors(G_K, G_M, omega2_1)  # (3), (4)
-    if Z.shape[1] == 0:
+    elastic = elastic_part(body, Q, condition, omega2_1)  # (3)
+    if elastic.shape[1] == 0:
         raise ModeSetError(f"{where}: its {V.shape[1]} columns hold only rigid-body motion; add modes or interfaces")
+    free_omega2 = free_elastic(Q, G_K, elastic, condition, omega2_1)
+    try:
+        Y, is_massive = elastic_eigenvectors(within(G_K, elastic), within(G_M, elastic), omega2_1)  # (4)
+    except np.linalg.LinAlgError as error:
+        raise ModeSetError(f"{where}: its columns are too ill-conditioned in this frame: {error}") from error
+    Z = elastic @ Y
     omega2 = np.einsum("kq,kl,lq->q", Z, G_K, Z)
-    is_free = is_massive & (omega2 < ZERO_ENERGY * omega2_1)
+    is_free = is_massive & (omega2 < ZERO_ENERGY * rounding_of_energy(body, Q_frame @ Z))
     if is_free.any():
         moving = moving_nodes(body, np.arange(body.n_dof), Q_frame @ Z[:, is_free])
         raise BodyError(
@@ -94,7 +100,7 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         K=np.diag(omega2),
         columns=source_columns(modes.labels, modes.groups, A, K_V @ A),
         dropped=tuple(modes.labels[k] for k in redundant),
-        n_rigid=n_rigid,
+        n_rigid=elastic.shape[0] - elastic.shape[1],
         free_omega2=free_omega2,
     )
 
@@ -114,35 +120,66 @@ def first_elastic(where: str, columns: Columns, condition: FrameCondition) -> fl
     return float((stiffness[is_elastic] / elastic_mass[is_elastic]).min())
 
 
-def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array, Array, int]:
-    """Solve K z = omega² M z without its common null space (rigid-body motion).
+def elastic_part(body: FEBody, Q: Columns, condition: FrameCondition, omega2_1: float) -> Array:
+    """Return the directions of W-orthonormal columns that hold no rigid-body motion, (k, k - n_rigid)."""
+    S = orthonormal_motions(condition.Psi_R.T @ condition.M_Psi_R, omega2_1)
+    C = omega2_1 * (Q.X.T @ (condition.M_Psi_R @ S))
+    E = condition.Psi_R @ S - combine(Q.X, C)
+    return elastic_directions(C, E.T @ (body.K @ E) + omega2_1 * (E.T @ (body.M @ E)))
+
+
+def within(G: Array, directions: Array) -> Array:
+    """Return a Gram matrix in given directions, dᵀ G d, symmetric."""
+    H = directions.T @ G @ directions
+    return (H + H.T) / 2
+
+
+def rounding_of_energy(body: FEBody, u: Array) -> Array:
+    """Size of the rounding in the strain energy of each column: eps times the sum of |K_kk| u_k², (k,)."""
+    return np.finfo(float).eps * np.einsum("n,nk,nk->k", np.abs(body.K.diagonal()), u, u)
+
+
+def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array, Array]:
+    """Solve K z = omega² M z for a pencil without common null space: one without rigid-body motion.
+
+    (1) basis in which W = K + omega_1² M is the identity, coordinates first scaled to a unit diagonal of W
+    (2) an eigenvalue mu of M there gives omega² = (1 - omega_1² mu) / mu
+    (3) once more in nearly diagonal form: relative accuracy also for the stiff end of the spectrum
 
     Returns
     -------
     Z
-        Coefficients by ascending omega², M-normalised (W-normalised where there is no mass), (k, n_q).
+        Coefficients by ascending omega², M-normalised (W-normalised where there is no mass), (k, k).
     is_massive
-        (n_q,) bool.
-    n_rigid
-        Dimension of the common null space.
+        (k,) bool.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If some direction has neither stiffness nor mass.
     """
-    energy, directions = la.eigh(G_K + omega2_1 * G_M)
-    is_elastic = energy > RIGID_ENERGY * energy.max(initial=0.0)
-    basis = directions[:, is_elastic] / np.sqrt(energy[is_elastic])
-    # K + omega_1² M = 1 in this basis, so an eigenvalue mu of M gives omega² = (1 - omega_1² mu) / mu
-    mu, Y = la.eigh(basis.T @ G_M @ basis)
+    W = G_K + omega2_1 * G_M
+    size = np.sqrt(np.maximum(np.diag(W), 0.0))
+    if not (size > 0).all():
+        raise np.linalg.LinAlgError("a direction has neither stiffness nor mass")
+    energy, directions = la.eigh(W / np.outer(size, size))  # (1)
+    if len(energy) and energy[0] <= INDEPENDENT * energy[-1]:
+        raise np.linalg.LinAlgError(
+            f"a direction has {energy[0] / energy[-1]:.1e} of the energy of others, which is rounding"
+        )
+    basis = directions / np.sqrt(energy) / size[:, None]
+    mu, Y = la.eigh(basis.T @ G_M @ basis)  # (2)
     mu, Z = mu[::-1], (basis @ Y)[:, ::-1]
     is_massive = mu * omega2_1 > MASSLESS
     Z[:, is_massive] /= np.sqrt(mu[is_massive])
-    # once more in nearly diagonal form: relative accuracy also for the stiff end of the spectrum
     massive = Z[:, is_massive]
-    if massive.shape[1]:
+    if massive.shape[1]:  # (3)
         _, Y = la.eigh(massive.T @ G_K @ massive, massive.T @ G_M @ massive)
         Z[:, is_massive] = massive @ Y
-    return Z, is_massive, int((~is_elastic).sum())
+    return Z, is_massive
 
 
-def free_elastic(Q: Columns, G_K: Array, condition: FrameCondition, omega2_1: float) -> Array:
+def free_elastic(Q: Columns, G_K: Array, elastic: Array, condition: FrameCondition, omega2_1: float) -> Array:
     """Squared elastic frequencies of the unsupported reduced body, ascending [1/s²]: its pencil in mean axes.
 
     The mean-axis mass QᵀMQ - Yᵀ (Psi_RᵀMPsi_R)⁻¹ Y, Y = Psi_RᵀMQ, from Gram matrices alone.
@@ -153,5 +190,6 @@ def free_elastic(Q: Columns, G_K: Array, condition: FrameCondition, omega2_1: fl
     if not scale.all() or np.linalg.cond(rigid_mass / np.outer(scale, scale)) > 1e12:
         return np.zeros(0)  # a body without inertia about some axis has no mean axes
     G_M = gram(Q.X, Q.MX) - Y.T @ np.linalg.solve(rigid_mass, Y)
-    Z, is_massive, _ = elastic_eigenvectors(G_K, (G_M + G_M.T) / 2, omega2_1)
-    return np.sort(np.einsum("kq,kl,lq->q", Z, G_K, Z)[is_massive])
+    A_K = within(G_K, elastic)
+    Z, is_massive = elastic_eigenvectors(A_K, within(G_M, elastic), omega2_1)
+    return np.sort(np.einsum("kq,kl,lq->q", Z, A_K, Z)[is_massive])

@@ -67,7 +67,7 @@ def independent_columns(columns: Columns, body: FEBody, omega2: float) -> tuple[
     Returns
     -------
     basis
-        W-orthonormal columns; T says how they are made.
+        W-orthonormal columns, T says how they are made; none where all columns are zero or rounding.
     redundant
         Indices of columns whose remainder against the others is below the tolerance, ascending.
     """
@@ -101,7 +101,8 @@ def independent_columns(columns: Columns, body: FEBody, omega2: float) -> tuple[
         redundant += list(index[left[~is_kept]])
         index, tolerance, remainder = index[left[is_kept]], tolerance[left[is_kept]], remainder[is_kept]
         rest, size = rest[np.flatnonzero(is_kept)], size[is_kept]
-    assert basis is not None  # at least one column has a length
+    if basis is None:  # nothing but rounding: no column is longer than its own noise
+        basis = columns[np.zeros(0, np.int64)]
     return basis, np.sort(np.asarray(redundant, dtype=np.int64))
 
 

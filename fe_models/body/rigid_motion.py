@@ -1,10 +1,10 @@
-"""Motion of points that follow a rigid body."""
+"""Motion of points and dofs that follow a rigid body."""
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["rigid_motion_of_points"]
+__all__ = ["rigid_motion_of_dofs", "rigid_motion_of_points"]
 
 
 def rigid_motion_of_points(points: Array, origin: Array) -> Array:
@@ -19,3 +19,25 @@ def rigid_motion_of_points(points: Array, origin: Array) -> Array:
     motion[:, 0, 4], motion[:, 2, 4] = z, -x
     motion[:, 0, 5], motion[:, 1, 5] = -y, x
     return motion
+
+
+def rigid_motion_of_dofs(nodes: Array, dofs: IntArray, origin: Array) -> Array:
+    """Values of dofs under the six unit rigid-body motions about the origin, (n_dof, 6).
+
+    Columns d_x d_y d_z [-] and theta_x theta_y theta_z [m]; rows of rotations are the rotation, of multipliers zero.
+
+    Parameters
+    ----------
+    nodes
+        (n_nodes, 3) [m].
+    dofs
+        (node, component) of every dof, component 0-2 translation, 3-5 rotation, below 0 multiplier, (n_dof, 2).
+    """
+    motion = rigid_motion_of_points(nodes, origin)
+    node, component = dofs.T
+    Psi_R = np.zeros((len(dofs), 6))
+    is_translation = (component >= 0) & (component < 3)
+    is_rotation = component >= 3
+    Psi_R[is_translation] = motion[node[is_translation], component[is_translation]]
+    Psi_R[is_rotation, component[is_rotation]] = 1.0
+    return Psi_R

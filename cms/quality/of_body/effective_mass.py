@@ -53,7 +53,7 @@ def effective_mass(reduced: ReducedBody, at: str) -> EffectiveMass:
     pencil, rows = free_pencil(reduced), port_rows(reduced, at)
     T = np.vstack([-np.linalg.solve(rows[:, :6], rows[:, 6:]), np.eye(reduced.n_q)])  # (1)
     M = T.T @ pencil.M @ T
-    Z, is_massive, _ = elastic_eigenvectors(reduced.K, (M + M.T) / 2, stiffness_scale(reduced))  # (2)
+    Z, is_massive = elastic_eigenvectors(reduced.K, (M + M.T) / 2, stiffness_scale(reduced))  # (2)
     Z = Z[:, is_massive]
     omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
     order = np.argsort(omega2)
@@ -81,7 +81,10 @@ def check_driven_mass(reduced: ReducedBody) -> QualityRecord:
     held = [interface.name for interface in reduced.interfaces if can_be_held(reduced, interface.name)]
     if not held:
         return information("driven-mass", "the body has no interface that could be driven")
-    found = [effective_mass(reduced, name) for name in held]
+    try:
+        found = [effective_mass(reduced, name) for name in held]
+    except np.linalg.LinAlgError as error:  # moments that no body has: other records say which
+        return information("driven-mass", f"the moments of the file give no modes with an interface held: {error}")
     largest = max(found, key=lambda one: one.remainder[:3].max())
     remainder = largest.remainder
     axis = int(np.argmax(remainder[:3]))

@@ -9,7 +9,9 @@ from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, frozen
 
-__all__ = ["FreePencil", "free_elastic_modes", "free_pencil", "port_rows"]
+__all__ = ["FreePencil", "free_elastic_modes", "free_pencil", "has_inertia", "port_rows"]
+
+NO_INERTIA = 1e-12  #: least eigenvalue of the scaled rigid mass matrix, below which there is no inertia about an axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +63,23 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
     Raises
     ------
     numpy.linalg.LinAlgError
-        If the body has no inertia about some axis.
+        If the body has no inertia about some axis, or a mode neither stiffness nor mass.
     """
     pencil = free_pencil(reduced)
     M_rr, M_rq = pencil.M[:6, :6], pencil.M[:6, 6:]
     T = np.vstack([-np.linalg.solve(M_rr, M_rq), np.eye(reduced.n_q)])
     G_M = T.T @ pencil.M @ T
-    Z, is_massive, _ = elastic_eigenvectors(reduced.K, (G_M + G_M.T) / 2, stiffness_scale(reduced))
+    Z, is_massive = elastic_eigenvectors(reduced.K, (G_M + G_M.T) / 2, stiffness_scale(reduced))
     omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
     order = np.lexsort((omega2, np.logical_not(is_massive)))
     return omega2[order], T @ Z[:, order], is_massive[order]
+
+
+def has_inertia(reduced: ReducedBody) -> bool:
+    """Whether the rigid body has mass and a moment of inertia about every axis, by its scaled mass matrix."""
+    M_rr = free_pencil(reduced).M[:6, :6]
+    size = np.sqrt(np.maximum(np.diag(M_rr), 0.0))
+    return bool((size > 0).all() and np.linalg.eigvalsh(M_rr / np.outer(size, size))[0] > NO_INERTIA)
 
 
 def stiffness_scale(reduced: ReducedBody) -> float:

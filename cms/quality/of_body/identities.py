@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cms.quality.of_body.free_pencil import free_elastic_modes
+from cms.quality.of_body.free_pencil import free_elastic_modes, has_inertia
 from cms.quality.record import QualityRecord, information, judge
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
@@ -80,10 +80,12 @@ def check_free_frequencies(reduced: ReducedBody) -> QualityRecord:
     They couple 1C, 2C, S, R and m with K and M, so a wrong sign in one of them shows.
     """
     stored = np.asarray(reduced.free_frequencies)
+    if not has_inertia(reduced):
+        return information("free-frequencies", "the body has no inertia about some axis, so no free-free frequencies")
     try:
         omega2, _, is_massive = free_elastic_modes(reduced)
-    except np.linalg.LinAlgError:
-        return information("free-frequencies", "the body has no inertia about some axis, so no free-free frequencies")
+    except np.linalg.LinAlgError as none:
+        return judge("free-frequencies", np.inf, f"moments and stiffness have no free-free modes: {none}")
     own = np.sqrt(np.maximum(omega2[is_massive], 0.0)) / (2 * np.pi)
     if not len(stored):
         return information("free-frequencies", "the file holds no free-free frequencies to compare with")

@@ -63,7 +63,7 @@ def held_mass(reference: FullReference, basis: FreeBasis) -> HeldMass:
     stiffness = np.concatenate([np.zeros(basis.N.shape[1]), basis.omega2])
     G_K, G_M = V.T @ (stiffness[:, None] * V), V.T @ (mass[:, None] * V)
     if V.shape[1]:
-        Z, is_massive, _ = elastic_eigenvectors((G_K + G_K.T) / 2, (G_M + G_M.T) / 2, float(basis.omega2[0]))  # (2)
+        Z, is_massive = elastic_eigenvectors((G_K + G_K.T) / 2, (G_M + G_M.T) / 2, float(basis.omega2[0]))  # (2)
         Z = Z[:, is_massive]
     else:
         Z = np.zeros((0, 0))

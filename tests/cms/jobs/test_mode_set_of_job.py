@@ -73,6 +73,10 @@ def test_a_job_takes_columns_from_a_file(body, tmp_path):
     np.savez(tmp_path / "basis.npz", columns=modes.columns, labels=modes.labels)
     asked = ReductionSection.model_validate({"set": "user-basis", "columns": "basis.npz"}, context=tmp_path)
     same(job_mode_set(body, asked), modes)
+    keys = {"set": "user-basis", "columns": "basis.npz", "columns_over": "coupled"}
+    same(job_mode_set(body, ReductionSection.model_validate(keys, context=tmp_path)), modes)
+    with pytest.raises(ValueError, match="unknown dofs; did you mean 'mesh'"):
+        ReductionSection.model_validate(keys | {"columns_over": "mash"}, context=tmp_path)
 
 
 def test_a_job_chooses_the_number_of_modes(body):

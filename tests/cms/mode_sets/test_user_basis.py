@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.linalg as la
 from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import ModeSetError
@@ -11,7 +12,8 @@ from cms.mode_sets.mesh_field import coupled_field
 from cms.mode_sets.user_basis import user_basis
 from cms.reduction import reduce
 from fe_models.body.couplings import couple
-from tests.bodies import bar
+from fe_models.body.fe_body import Interface
+from tests.bodies import bar, beam, with_interfaces
 
 ROUNDOFF = 1e-12
 
@@ -118,3 +120,76 @@ def test_files_that_hold_something_else_are_refused(body, tmp_path):
     ):
         with pytest.raises(ModeSetError, match=text):
             user_basis(body, columns=tmp_path / name)
+
+
+# As many dofs of the mesh as of the coupled body ---------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def pinned():
+    """A beam held by single nodes: six dofs become six, at another place."""
+    free = beam(10)
+    ends = [Interface(name, "rigid", np.array([node]), free.nodes[node]) for name, node in (("a", 0), ("b", 10))]
+    return with_interfaces(free, *ends)
+
+
+@pytest.fixture(scope="module")
+def free_modes(pinned):
+    """Free modes over the dofs of the mesh, rigid ones first, and their frequencies."""
+    omega2, V = la.eigh(pinned.K.toarray(), pinned.M.toarray())
+    return V[:, :16], np.sqrt(omega2[6:16]) / (2 * np.pi)
+
+
+def test_rows_that_may_be_those_of_mesh_or_coupled_body_must_be_told(pinned, free_modes):
+    body = couple(pinned)
+    V, frequencies = free_modes
+    assert len(V) == body.n_dof
+    with pytest.raises(ModeSetError, match=r'66 rows may be .* columns_over = "coupled" or columns_over = "mesh"'):
+        user_basis(body, columns=V)
+    reduced = reduce(body, user_basis(body, columns=V, columns_over="mesh"))
+    assert_allclose(reduced.free_frequencies, frequencies, rtol=1e-9)
+    coupled = coupled_field(body, V).columns
+    assert not np.allclose(coupled, V)
+    reduced = reduce(body, user_basis(body, columns=coupled, columns_over="coupled"))
+    assert_allclose(reduced.free_frequencies, frequencies, rtol=1e-9)
+
+
+def test_rows_that_look_like_the_other_dofs_are_refused(pinned, free_modes):
+    body = couple(pinned)
+    V, _ = free_modes
+    with pytest.raises(ModeSetError, match=r'columns_over = "coupled": read so.*say columns_over = "mesh"'):
+        user_basis(body, columns=V, columns_over="coupled")
+    with pytest.raises(ModeSetError, match=r'columns_over = "mesh": read so.*say columns_over = "coupled"'):
+        user_basis(body, columns=coupled_field(body, V).columns, columns_over="mesh")
+    # columns that do not tell either way are taken as they are said to be
+    assert user_basis(body, columns=np.eye(66), columns_over="coupled").columns.shape == (66, 66)
+
+
+def test_what_is_told_of_the_rows_is_checked(body, modes):
+    with pytest.raises(ModeSetError, match="columns_over = 'mash': unknown; did you mean 'mesh'"):
+        user_basis(body, columns=modes.columns, columns_over="mash")
+    with pytest.raises(ModeSetError, match=r"expected \(48, k\) over the dofs of the mesh, got \(54, 16\)"):
+        user_basis(body, columns=modes.columns, columns_over="mesh")
+
+
+def test_an_uncoupled_mesh_is_its_own_body(pinned, free_modes):
+    """Without rigid or distributing interfaces there is one order of dofs only."""
+    body = couple(beam(10))
+    V, frequencies = free_modes
+    for over in (None, "mesh", "coupled"):
+        reduced = reduce(body, user_basis(body, columns=V, columns_over=over))
+        assert_allclose(reduced.free_frequencies, frequencies, rtol=1e-9)
+
+
+def test_what_a_rigid_interface_leaves_out_and_false_frequencies_are_told(body, pinned, free_modes, caplog):
+    stretch = np.zeros((body.recovery.matrix.shape[0], 1))
+    stretch[1::3, 0] = body.nodes[: len(stretch) // 3, 1] - 0.025
+    user_basis(body, columns=stretch)
+    assert "100 % of the motion of rigid interface 'left'" in caplog.text
+    caplog.clear()
+    V, frequencies = free_modes
+    stated = np.r_[np.full(6, np.nan), frequencies]
+    user_basis(couple(pinned), columns=V, columns_over="mesh", frequencies=stated)
+    assert not caplog.text
+    user_basis(couple(pinned), columns=V, columns_over="mesh", frequencies=1e3 * stated)
+    assert "is said to vibrate at" in caplog.text
