@@ -1,8 +1,16 @@
 """Rotations: Euler parameters, rotation vectors, matrices, and the Jacobians of the exponential map.
 
 One convention: R_GB maps components, v_G = R_GB @ v_B; p = (w, x, y, z) are its unit Euler parameters (Hamilton
-product); a rotation vector theta turns B by |theta| about theta; omega_B is the angular velocity in body axes, so
-that R_dot = R tilde(omega_B).
+product); a rotation vector theta turns B by t = |theta| about theta; omega_B is the angular velocity in body axes, so
+that R_dot = R tilde(omega_B). With S = tilde(theta)
+
+    exp(theta) = 1 + s S + a S²,   left Jacobian L = 1 + a S + b S²,   right Jacobian T = Lᵀ = 1 - a S + b S²
+
+    s = sin t / t,   a = (1 - cos t)/t²,   b = (t - sin t)/t³,   da = (da/dt)/t,   db = (db/dt)/t
+
+below t = 1/2 by their series (the next term is under 1e-17). Vectors lie along the last axis of stacks of any shape;
+what has no branch but that of the series takes complex numbers too. The kernels have the same formulas for one vector,
+compiled, in kernels/rotation.py; a test holds both to each other.
 """
 
 import numpy as np
@@ -10,34 +18,60 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 
 __all__ = [
+    "cross",
+    "dot",
     "euler_parameter_rates",
     "euler_parameters",
     "euler_parameters_of_rotation_vector",
+    "left_jacobian",
+    "quotients",
     "right_jacobian",
     "rotation_exp",
     "rotation_log",
     "rotation_matrix",
+    "spin_rate",
     "tilde",
+    "turned",
 ]
 
-SERIES_BELOW = 1e-2  #: rotation angle [rad] below which the trigonometric quotients come from their series
+SERIES_BELOW = 0.25  #: of the squared angle
+TERMS = 10
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return a × b along the last axis."""
+    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
+    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
+
+
+def dot(a: Array, b: Array) -> Array:
+    """Return a · b along the last axis, without conjugation."""
+    return (a * b).sum(axis=-1)
+
+
+def turned(R: Array, a: Array) -> Array:
+    """Return R a for stacks of matrices and vectors."""
+    return (R @ a[..., None])[..., 0]
 
 
 def tilde(a: Array) -> Array:
-    """Return the matrix of a cross product, (3, 3): tilde(a) @ b = a × b."""
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+    """Return the matrix of a cross product, (..., 3, 3): tilde(a) @ b = a × b."""
+    a = np.asarray(a)
+    S = np.zeros((*a.shape, 3), np.result_type(a, float))
+    S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = a[..., 0], a[..., 1], a[..., 2]
+    return S - np.swapaxes(S, -1, -2)
 
 
 def rotation_matrix(p: Array) -> Array:
-    """R_GB, (3, 3), of the Euler parameters p = (w, x, y, z), (4,): v_G = R_GB @ v_B."""
-    w, x, y, z = np.asarray(p, dtype=float)
-    return np.array(
-        [
-            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-        ]
-    )
+    """R_GB, (..., 3, 3), of the Euler parameters p = (w, x, y, z), (..., 4): v_G = R_GB @ v_B."""
+    w, x, y, z = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
+    rows = [
+        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def euler_parameters(R: Array) -> Array:
@@ -63,10 +97,14 @@ def euler_parameters(R: Array) -> Array:
 
 
 def euler_parameters_of_rotation_vector(theta: Array) -> Array:
-    """Return p = (cos(|theta|/2), sin(|theta|/2) theta/|theta|), (4,), of a rotation vector, (3,) [rad]."""
-    theta = np.asarray(theta, dtype=float)
-    angle = np.linalg.norm(theta)
-    return np.array([np.cos(angle / 2), *(0.5 * np.sinc(angle / (2 * np.pi)) * theta)])
+    """Return p = (cos(|theta|/2), sin(|theta|/2) theta/|theta|), (..., 4), of a rotation vector, (..., 3) [rad].
+
+    For complex numbers too.
+    """
+    theta = np.asarray(theta)
+    x = 0.25 * dot(theta, theta)
+    s, a, _ = quotients(x)
+    return np.concatenate([(1 - a * x)[..., None], 0.5 * s[..., None] * theta], axis=-1)
 
 
 def euler_parameter_rates(p: Array, omega_B: Array) -> Array:
@@ -75,12 +113,91 @@ def euler_parameter_rates(p: Array, omega_B: Array) -> Array:
     return 0.5 * np.array([-(v @ omega_B), *(w * np.asarray(omega_B) + np.cross(v, omega_B))])
 
 
-def rotation_exp(theta: Array) -> Array:
-    """Return the rotation matrix of a rotation vector, (3, 3): 1 + sin(t)/t tilde + (1 - cos t)/t² tilde²."""
-    theta = np.asarray(theta, dtype=float)
+def series(x: Array, first: int) -> Array:
+    """Return Σ (-x)^k / (2 k + first)!."""
+    total, term = np.zeros_like(x), np.ones_like(x)
+    for k in range(1, first + 1):
+        term = term / k
+    for k in range(TERMS):
+        total = total + term
+        term = -term * x / ((2 * k + first + 1) * (2 * k + first + 2))
+    return total
+
+
+def series_of_rate(x: Array, first: int) -> Array:
+    """Return twice the derivative of `series` by x: (d/dt)/t of it, Σ -2 (k + 1) (-x)^k / (2 k + 2 + first)!."""
+    total, term = np.zeros_like(x), -2 * np.ones_like(x)
+    for k in range(1, first + 3):
+        term = term / k
+    for k in range(TERMS):
+        total = total + (k + 1) * term
+        term = -term * x / ((2 * k + first + 3) * (2 * k + first + 4))
+    return total
+
+
+def quotients(x: Array) -> tuple[Array, Array, Array]:
+    """Return s, a, b of the square x of an angle."""
+    x = np.asarray(x) * 1.0
+    is_small = np.abs(x) < SERIES_BELOW
+    if np.all(is_small):
+        return series(x, 1), series(x, 2), series(x, 3)
+    t = np.sqrt(np.where(is_small, 1.0, x))
+    return (
+        np.where(is_small, series(x, 1), np.sin(t) / t),
+        np.where(is_small, series(x, 2), (1 - np.cos(t)) / t**2),
+        np.where(is_small, series(x, 3), (t - np.sin(t)) / t**3),
+    )
+
+
+def rates_of_quotients(x: Array) -> tuple[Array, Array]:
+    """Return da, db of the square x of an angle."""
+    x = np.asarray(x) * 1.0
+    is_small = np.abs(x) < SERIES_BELOW
+    t = np.sqrt(np.where(is_small, 1.0, x))
+    sine, versine = np.sin(t), 1 - np.cos(t)
+    return (
+        np.where(is_small, series_of_rate(x, 2), (t * sine - 2 * versine) / t**4),
+        np.where(is_small, series_of_rate(x, 3), (t * versine - 3 * (t - sine)) / t**5),
+    )
+
+
+def polynomial(theta: Array, first: Array, second: Array) -> Array:
+    """Return 1 + first S + second S², (..., 3, 3)."""
     S = tilde(theta)
-    t = np.linalg.norm(theta)
-    return np.eye(3) + np.sinc(t / np.pi) * S + 0.5 * np.sinc(t / (2 * np.pi)) ** 2 * (S @ S)
+    return np.eye(3) + first[..., None, None] * S + second[..., None, None] * (S @ S)
+
+
+def rotation_exp(theta: Array) -> Array:
+    """Return the rotation matrix of a rotation vector, (..., 3, 3) for (..., 3); complex numbers too."""
+    theta = np.asarray(theta)
+    s, a, _ = quotients(dot(theta, theta))
+    return polynomial(theta, s, a)
+
+
+def left_jacobian(theta: Array) -> Array:
+    """Return L(theta), (..., 3, 3): d exp(theta) exp(theta)ᵀ = tilde(L dtheta); complex numbers too."""
+    theta = np.asarray(theta)
+    _, a, b = quotients(dot(theta, theta))
+    return polynomial(theta, a, b)
+
+
+def right_jacobian(theta: Array) -> Array:
+    """Return T(theta) = L(theta)ᵀ = L(-theta), (..., 3, 3): exp(theta)ᵀ d exp(theta) = tilde(T dtheta)."""
+    return left_jacobian(-np.asarray(theta))
+
+
+def spin_rate(theta: Array, rate: Array, second: Array) -> Array:
+    """Return the rate of the angular velocity L(theta) rate of exp(theta), (..., 3), seen from where it begins.
+
+    L second + (theta · rate) (da theta × rate + db theta × (theta × rate)) + b rate × (theta × rate).
+    """
+    theta = np.asarray(theta)
+    x = dot(theta, theta)
+    _, _, b = quotients(x)
+    da, db = rates_of_quotients(x)
+    turn = cross(theta, rate)
+    along = da[..., None] * turn + db[..., None] * cross(theta, turn)
+    return turned(left_jacobian(theta), second) + dot(theta, rate)[..., None] * along + b[..., None] * cross(rate, turn)
 
 
 def rotation_log(R: Array) -> Array:
@@ -90,16 +207,3 @@ def rotation_log(R: Array) -> Array:
     if sine == 0.0:
         return np.zeros(3)
     return 2 * np.arctan2(sine, p[0]) * p[1:] / sine
-
-
-def right_jacobian(theta: Array) -> Array:
-    """Return T(theta), (3, 3): exp(theta)ᵀ d exp(theta) = tilde(T dtheta); T = 1 - a tilde + b tilde².
-
-    a = (1 - cos t)/t², b = (t - sin t)/t³. The left Jacobian is T(theta)ᵀ = T(-theta).
-    """
-    theta = np.asarray(theta, dtype=float)
-    t = np.linalg.norm(theta)
-    S = tilde(theta)
-    a = 0.5 * np.sinc(t / (2 * np.pi)) ** 2
-    b = 1 / 6 - t**2 / 120 + t**4 / 5040 if t < SERIES_BELOW else (t - np.sin(t)) / t**3
-    return np.eye(3) - a * S + b * (S @ S)

@@ -24,7 +24,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem
 from floatframe.errors import ConvergenceError
-from floatframe.joints.rows import HELD, HELD_DISTANCES
+from floatframe.joints.rows import is_held, is_held_length
 from floatframe.kernels.model import Work
 from floatframe.start.constraint_words import open_joints
 from floatframe.start.initial import has_normal_friction
@@ -74,7 +74,7 @@ def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) 
     state = State(state.r, state.p, state.q, np.zeros_like(state.u))
     set_iterate(work, state)
     rate, _ = rates_of_constraints(model, work)
-    holds = np.isin(model.row_kind, HELD)
+    holds = is_held(model.row_kind)
     y, _ = equations.solved(np.zeros(int(rigid.sum())), np.where(holds, -rate, 0.0))
     u = np.zeros_like(state.u)
     u[rigid] = y
@@ -175,8 +175,8 @@ def closed(
 ) -> tuple[State, RigidEquations, int]:
     """(1): return the state with joints closed and drives followed, the equations at it, the iterations it took."""
     model = compiled.model
-    holds = np.isin(model.row_kind, HELD)
-    scale = np.where(np.isin(model.row_kind, HELD_DISTANCES), compiled.length, 1.0)
+    holds = is_held(model.row_kind)
+    scale = np.where(is_held_length(model.row_kind), compiled.length, 1.0)
     error = np.zeros(len(work.w))
     best = np.inf
     for n in range(MOST_ITERATIONS):

@@ -19,7 +19,7 @@ from floatframe.analyses.system_matrices import held_rows, turning_matrices
 from floatframe.checked_values import array_of_shape
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.joints.rows import HELD_VELOCITIES
+from floatframe.joints.rows import is_held_velocity
 from floatframe.kernels.model import Work, new_work
 from floatframe.rotations import rotation_matrix
 from floatframe.start.initial import assembled, checked, require_independent_constraints
@@ -109,7 +109,7 @@ def steady_rotation(
     center = array_of_shape("steady_rotation: center", center, (3,))
     compiled = compiled_system(system)
     model = compiled.model
-    rolling = [name for name, row in zip(compiled.owners, model.row_kind, strict=True) if row in HELD_VELOCITIES]
+    rolling = [name for name, rolls in zip(compiled.owners, is_held_velocity(model.row_kind), strict=True) if rolls]
     if rolling:
         raise ModelError(
             f"joint {rolling[0]!r} rolls without slip: equilibria and linearisations do not know held velocities; "

@@ -6,8 +6,8 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.marker_jacobian import marker_jacobian
 from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import CompiledSystem
-from floatframe.joints import ScrewJoint, SlidingJoint
-from floatframe.joints.rows import DISTANCE, GAUGE_B, SLIDE, TURN, TURN_B
+from floatframe.joints import SlidingJoint
+from floatframe.joints.rows import RelativePlace
 from floatframe.kernels.model import Work
 from floatframe.rotations import tilde
 from floatframe.state import State
@@ -39,30 +39,19 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
             n_lines += 1
             continue
         (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q) for end in ends)
-        described = [row for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate]
-        if not described:
+        coordinates = [row.coordinate for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate is not None]
+        if not coordinates:
             continue
         (r_a, A_a), (r_b, A_b) = (marker_pose(end, state, n_q) for end in ends)
-        d = r_b - r_a
+        place = RelativePlace(A_a, A_b, r_b - r_a)
         J = np.zeros((2, 6, int(model.u0[-1])))  # of A and B: translation and rotation in ground axes
         for k, end in enumerate(ends):
             if end.body >= 0:
                 J[k][:, int(model.u0[end.body]) : int(model.u0[end.body + 1])] = marker_jacobian(compiled, work, end)
-        slip = J[1, :3] - J[0, :3] + tilde(d) @ J[0, 3:]  # v_B - v_A - omega_A × d
-        turn = J[1, 3:] - J[0, 3:]
-        for row in described:
-            is_angle = row.kind == TURN or (row.kind not in (SLIDE, DISTANCE) and bool(np.any(row.z)))
-            if row.kind == DISTANCE:
-                value = d / np.linalg.norm(d) @ slip
-            elif isinstance(joint, ScrewJoint):
-                value = A_a @ joint.axis @ (slip if row.coordinate == "distance" else turn)
-            elif row.kind in (GAUGE_B, TURN_B):
-                value = A_b @ (row.y if row.kind == GAUGE_B else np.cross(row.x, row.z)) @ turn
-            elif is_angle:
-                value = A_a @ (np.cross(row.x, row.z) if row.kind == TURN else row.x) @ turn
-            else:
-                value = A_a @ row.x @ slip
-            rows[f"{joint.name}.{row.coordinate}"] = np.asarray(value)
+        slip = J[1, :3] - J[0, :3] + tilde(place.d) @ J[0, 3:]  # v_B - v_A - omega_A × d
+        turning = J[1, 3:] - J[0, 3:]
+        for own in coordinates:
+            rows[f"{joint.name}.{own.name}"] = np.asarray(own.direction(place) @ own.moves(slip, turning))
     return rows
 
 

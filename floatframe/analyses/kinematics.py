@@ -17,7 +17,7 @@ from floatframe.analyses.joint_rates import driven_coordinates
 from floatframe.analyses.snapshot import observed_state
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.joints.rows import HELD_VELOCITIES
+from floatframe.joints.rows import is_held_velocity
 from floatframe.kernels.model import Rows, Work, new_work
 from floatframe.motion.integration import head_of, joint_rows
 from floatframe.results.results_file import MemorySource, ResultsWriter
@@ -132,7 +132,7 @@ def kinematics(
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:
     """Return the motion at the first time; `ModelError` unless the drives decide all of it."""
     compiled = compiled_system(system)
-    rolling = np.flatnonzero(np.isin(compiled.model.row_kind, HELD_VELOCITIES))
+    rolling = np.flatnonzero(is_held_velocity(compiled.model.row_kind))
     if len(rolling):
         raise ModelError(
             f"kinematics: joint {compiled.owners[rolling[0]]!r} rolls: it holds velocities, and where that leads "

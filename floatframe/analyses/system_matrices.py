@@ -21,7 +21,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
-from floatframe.joints.rows import HELD
+from floatframe.joints.rows import is_held
 from floatframe.kernels.model import Model, Work
 from floatframe.rotations import tilde
 from floatframe.start.newton_equations import linearized
@@ -41,7 +41,7 @@ class Tangents:
 
 def held_rows(model: Model) -> np.ndarray:
     """Return which rows hold a distance or an angle, (n_w,) bool; the others say what a wrench is."""
-    return np.isin(model.row_kind, HELD)
+    return is_held(model.row_kind)
 
 
 def tangents(model: Model, work: Work) -> Tangents:

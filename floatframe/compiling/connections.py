@@ -11,7 +11,7 @@ from floatframe.compiling.markers import MarkerData, find_marker, joint_markers,
 from floatframe.errors import ModelError
 from floatframe.forces import JointForce, SpringDamper
 from floatframe.joints import Joint
-from floatframe.joints.rows import FORCE, HELD_VELOCITIES, MOMENT, NO_MOMENT, SPRING, Row
+from floatframe.joints.rows import FORCE, MOMENT, NO_MOMENT, SPRING, VELOCITY, Row, kind_of
 from floatframe.kernels.model import JOINT
 from floatframe.kernels.model import SPRING as SPRING_LAW
 from floatframe.state import State
@@ -88,7 +88,7 @@ def add_joint(system: System, made: Connections, joint: Joint) -> None:
         End(a, 1.0, moment=MOMENT if joint.size >= MOMENT + 3 else NO_MOMENT),
         End(b, -1.0, moment=joint.moment_b),
     )
-    rolls = any(row.kind in HELD_VELOCITIES for row in rows)
+    rolls = any(kind_of(row.kind).holds == VELOCITY for row in rows)
     made.add(joint.name, JOINT, ends, rows, has_rates=bool(forces) or rolls)
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest
 from floatframe.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate
 from floatframe.compiling.bodies import integers, offsets
@@ -19,23 +18,7 @@ from floatframe.forces import UserForce
 from floatframe.functions.expressions import Tape, compile_expression
 from floatframe.joints.axis_frame import axis_in_b, turning_frame
 from floatframe.joints.coordinate_coupler import CoordinateCoupler
-from floatframe.joints.rows import (
-    COUPLE,
-    DISTANCE,
-    FORCE,
-    GAUGE_B,
-    NO_MOMENT,
-    PART,
-    PUSH,
-    SCREW,
-    SLIDE,
-    SPAN,
-    TURN,
-    TURN_B,
-    TWIST,
-    TWIST_B,
-    Row,
-)
+from floatframe.joints.rows import COUPLE, NO_MOMENT, PART, PUSH, SPAN, TWIST, RelativePlace, Row, RowCoordinate
 from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.system import System
 
@@ -53,17 +36,18 @@ class Port:
 
     a: MarkerData
     b: MarkerData
-    row: Row  #: of the kind PUSH, TWIST, TWIST_B or SPAN
+    coordinate: RowCoordinate
 
     @property
-    def is_angle(self) -> bool:
-        """Whether it is an angle."""
-        return self.row.kind in (TWIST, TWIST_B)
+    def row(self) -> Row:
+        """The row of its value."""
+        own = self.coordinate
+        return Row(own.kind, own.x, own.y, z=own.z)
 
     @property
     def has_arm(self) -> bool:
         """Whether a force along it has a moment about the point of A that anything feels."""
-        return self.row.kind == PUSH and self.a.body >= 0
+        return self.coordinate.kind == PUSH and self.a.body >= 0
 
 
 @dataclass
@@ -184,7 +168,7 @@ def add_ports(
                 arm = len(rows)
                 rows += [Row(PART)] * 3
         starts.append((value, force, arm))
-        if port.is_angle:
+        if port.coordinate.is_angle:
             ends += [End(port.a, 1.0, NO_MOMENT, force), End(port.b, -1.0, NO_MOMENT, force)]
         else:
             ends += [End(port.a, 1.0, force, arm), End(port.b, -1.0, force)]
@@ -212,14 +196,14 @@ def find_port(system: System, where: str, coordinate: Coordinate, made: Connecti
         raise ModelError(f"{where}: expected markers on two bodies, got both on one")
     (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
     if isinstance(coordinate, AxialDistance):
-        return Port(a, b, Row(PUSH, coordinate.axis))
+        return Port(a, b, RowCoordinate("", PUSH, coordinate.axis))
     if isinstance(coordinate, AxialAngle):
         axis_b = axis_in_b(coordinate.axis, None, A_a, A_b)
         x, z, y = turning_frame(coordinate.axis, axis_b, A_a, A_b)
-        return Port(a, b, Row(TWIST, x, y, z=z))
+        return Port(a, b, RowCoordinate("", TWIST, x, y, z))
     if np.linalg.norm(r_b - r_a) == 0:
         raise ModelError(f"{where}: its markers coincide as placed, so that their line has no direction; move one")
-    return Port(a, b, Row(SPAN))
+    return Port(a, b, RowCoordinate("", SPAN))
 
 
 def joint_port(system: System, where: str, wanted: JointCoordinate, made: Connections) -> Port:
@@ -235,36 +219,14 @@ def joint_port(system: System, where: str, wanted: JointCoordinate, made: Connec
         )
     a, b = joint_markers(system, joint, made.placed)
     (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
-    row = next(row for row in joint.rows(A_a, A_b, r_b - r_a) if row.coordinate == wanted.coordinate)
-    if row.kind == DISTANCE:
-        return Port(a, b, Row(SPAN))
-    if row.kind == SCREW:
-        if wanted.coordinate == "distance":
-            return Port(a, b, Row(PUSH, np.cross(row.x, row.z)))
-        return Port(a, b, Row(TWIST, row.x, row.y, z=row.z))
-    if row.kind == GAUGE_B:
-        return Port(a, b, Row(TWIST_B, np.cross(row.z, row.y), row.x, z=row.z))
-    if row.kind == TURN_B:
-        return Port(a, b, Row(TWIST_B, row.x, row.y, z=row.z))
-    if row.kind == SLIDE or (row.kind != TURN and row.part == FORCE and not np.any(row.z)):
-        return Port(a, b, Row(PUSH, row.x))
-    x = row.x if row.kind == TURN else np.cross(row.z, row.x)
-    return Port(a, b, Row(TWIST, x, row.y, z=row.z))
+    for row in joint.rows(A_a, A_b, r_b - r_a):
+        if row.coordinate is not None and row.coordinate.name == wanted.coordinate:
+            return Port(a, b, row.coordinate)
+    raise ModelError(f"{where}: coordinate {wanted.coordinate!r} of joint {joint.name!r} follows a deformed line and "
+                     "cannot be coupled or take a user force; take an axial distance between two markers")  # fmt: skip
 
 
 def port_value(port: Port, made: Connections) -> float:
     """Return the value of a port as placed; angles between -pi and pi."""
     (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (port.a, port.b))
-    row = port.row
-    if row.kind == SPAN:
-        return float(np.linalg.norm(r_b - r_a))
-    if row.kind == PUSH:
-        return float(A_a @ row.x @ (r_b - r_a))
-    if row.kind == TWIST_B:
-        return -turned(A_b, A_a, row.x, row.z, row.y)
-    return turned(A_a, A_b, row.x, row.z, row.y)
-
-
-def turned(A: Array, B: Array, x: Array, z: Array, y: Array) -> float:
-    """Return the angle of the direction y of B from z of A towards -x of A."""
-    return float(np.arctan2(-(A @ x) @ (B @ y), (A @ z) @ (B @ y)))
+    return float(port.coordinate.value(RelativePlace(A_a, A_b, r_b - r_a)))

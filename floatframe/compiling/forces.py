@@ -17,7 +17,7 @@ from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad, JointForce
 from floatframe.functions.time_functions import N_COEFFICIENTS, TimeFunction
 from floatframe.joints import Joint
-from floatframe.joints.rows import GAUGE, GAUGE_B, HELD, Row, loaded_row
+from floatframe.joints.rows import Row, kind_of, loaded_row
 from floatframe.system import System
 
 __all__ = ["Functions", "body_load_arrays", "joint_force_arrays", "with_forces"]
@@ -50,8 +50,8 @@ def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce])
     result = list(rows)
     for force in forces:
         where = f"force {force.name!r}"
-        choices = [row.coordinate for row in rows if row.coordinate and row.kind in (GAUGE, GAUGE_B)]
-        prescribed = [row.coordinate for row in rows if row.coordinate and row.kind in HELD]
+        choices = [row.coordinate_name for row in rows if row.coordinate and kind_of(row.kind).is_free]
+        prescribed = [row.coordinate_name for row in rows if row.coordinate and kind_of(row.kind).holds]
         if force.coordinate in prescribed:
             raise ModelError(f"{where}: the coordinate {force.coordinate!r} of joint {joint.name!r} is prescribed")
         if force.coordinate not in choices:
@@ -59,7 +59,7 @@ def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce])
                 f"{where}: joint {joint.name!r} has no coordinate {force.coordinate!r} that can take a force"
                 f"{nearest(force.coordinate, choices)}"
             )
-        k = [row.coordinate for row in rows].index(force.coordinate)
+        k = [row.coordinate_name for row in rows].index(force.coordinate)
         result[k] = loaded_row(rows[k])
     return result
 
@@ -72,7 +72,7 @@ def joint_force_arrays(system: System, rows: Sequence[Row], owner: Sequence[str]
         if force.joint not in names:
             raise ModelError(f"force {force.name!r}: no joint {force.joint!r}{nearest(force.joint, names)}")
     of_row = [
-        [f for f in forces if row.coordinate and (f.joint, f.coordinate) == (name, row.coordinate)]
+        [f for f in forces if row.coordinate and (f.joint, f.coordinate) == (name, row.coordinate.name)]
         for row, name in zip(rows, owner, strict=True)
     ]
     ordered = [force for group in of_row for force in group]

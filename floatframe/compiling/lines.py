@@ -7,6 +7,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.marker_shape import MarkerShape
 from floatframe.bodies.markers import Marker, body_name
 from floatframe.compiling.bodies import integers, offsets, stacked
 from floatframe.compiling.connections import Connections, End
@@ -56,11 +57,11 @@ def add_sliding(system: System, made: Connections, lines: Lines, joint: SlidingJ
     if not isinstance(system.body(name), FlexibleBody):
         raise ModelError(f"{where}: body {name!r} is not flexible; take a prismatic joint or a point on a line")
     stations = [find_marker(system, f"{where}: line", Marker(name, station)) for station in joint.stations]
-    s, triad = line_triad(where, np.array([m.position for m in stations]), joint.normal)
+    s, triad = line_triad(where, np.array([m.shape.position for m in stations]), joint.normal)
     _, A_b = marker_pose(b, made.placed, made.n_q)
     A_line = rotation_matrix(made.placed.p[first.body]) @ triad
-    assert first.psi is not None
-    sliding = replace(stations[0], triad=triad, psi=np.array(first.psi), bend=None)
+    assert first.shape.psi is not None
+    sliding = replace(first, shape=MarkerShape(stations[0].shape.position, triad, np.array(first.shape.psi)))
     rows = joint.rows(A_line, A_b, np.zeros(3))
     ends = (
         End(sliding, 1.0, moment=MOMENT if joint.is_aligned else NO_MOMENT),

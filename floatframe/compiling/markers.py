@@ -8,12 +8,12 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.ground import GROUND
+from floatframe.bodies.marker_shape import MarkerShape, interface_shape
 from floatframe.bodies.markers import Marker, body_name
 from floatframe.compiling.bodies import body_n_q, integers, offsets
-from floatframe.compiling.stiffening import bending_of
 from floatframe.errors import ModelError
 from floatframe.joints import Joint
-from floatframe.rotations import rotation_exp, rotation_matrix
+from floatframe.rotations import rotation_matrix
 from floatframe.state import State
 from floatframe.system import System
 
@@ -36,10 +36,7 @@ class MarkerData:
     """A marker found in its body."""
 
     body: int  #: index, -1 for the ground
-    position: Array  #: undeformed, body frame, (3,)
-    triad: Array  #: undeformed axes as columns, body frame, (3, 3)
-    psi: Array | None = None  #: (6, n_q)
-    bend: Array | None = None  #: K_P of a stiffened body, (6, n_q, n_q)
+    shape: MarkerShape
 
 
 def n_q_of(system: System) -> IntArray:
@@ -71,7 +68,7 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
                 f"{marker.interface!r}; give a position"
             )
         position = np.zeros(3) if marker.position is None else marker.position
-        return MarkerData(index, position, triad)
+        return MarkerData(index, MarkerShape(position, triad))
     choices = [interface.name for interface in body.reduced.interfaces]
     if marker.interface is None or marker.position is not None:
         raise ModelError(
@@ -83,9 +80,8 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
             f"{where}: flexible body {body.name!r} has no interface {marker.interface!r}"
             f"{nearest(marker.interface, choices)}"
         )
-    interface = body.reduced.interface(marker.interface)
-    bend = bending_of(body.reduced, marker.interface) if body.is_stiffened else None
-    return MarkerData(index, interface.position, interface.triad @ triad, interface.Psi, bend)
+    shape = interface_shape(body.reduced, marker.interface, is_stiffened=body.is_stiffened)
+    return MarkerData(index, replace(shape, triad=shape.triad @ triad))
 
 
 def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerData, MarkerData]:
@@ -113,7 +109,7 @@ def marker_as_placed(system: System, where: str, name: str, other: MarkerData, p
     """Return the marker of a body at the place of another marker, with the axes of the body."""
     r_P, _ = marker_pose(other, placed, n_q_of(system))
     marker = marker_with_pose(system, where, name, (r_P, np.eye(3)), placed)
-    return replace(marker, triad=np.eye(3))
+    return replace(marker, shape=replace(marker.shape, triad=np.eye(3)))
 
 
 def marker_with_pose(system: System, where: str, name: str, pose: tuple[Array, Array], placed: State) -> MarkerData:
@@ -121,7 +117,7 @@ def marker_with_pose(system: System, where: str, name: str, pose: tuple[Array, A
     index = find_body(system, where, name)
     r_P, A_P = pose
     if index < 0:
-        return MarkerData(index, r_P, A_P)
+        return MarkerData(index, MarkerShape(r_P, A_P))
     body = system.bodies[index]
     if isinstance(body, FlexibleBody):
         choices = ", ".join(interface.name for interface in body.reduced.interfaces)
@@ -129,26 +125,21 @@ def marker_with_pose(system: System, where: str, name: str, pose: tuple[Array, A
             f"{where}: a flexible body can be held at an interface only; give a Marker on {name!r}, one of: {choices}"
         )
     R = rotation_matrix(placed.p[index])
-    return MarkerData(index, R.T @ (r_P - placed.r[index]), R.T @ A_P)
+    return MarkerData(index, MarkerShape(R.T @ (r_P - placed.r[index]), R.T @ A_P))
 
 
 def marker_pose(marker: MarkerData, state: State, n_q: IntArray) -> tuple[Array, Array]:
     """Return position (3,) and axes (3, 3) of a marker in ground axes."""
-    if marker.body < 0:
-        return marker.position, marker.triad
-    R = rotation_matrix(state.p[marker.body])
-    position, triad = marker.position, marker.triad
-    if marker.psi is not None:
-        q0 = offsets(n_q)
-        q = state.q[q0[marker.body] : q0[marker.body + 1]]
-        d = marker.psi @ q
-        if marker.bend is not None:
-            d = d - 0.5 * marker.bend @ q @ q
-        position, triad = position + d[:3], rotation_exp(d[3:]) @ triad
-    return state.r[marker.body] + R @ position, R @ triad
+    i = marker.body
+    if i < 0:
+        return marker.shape.position, marker.shape.triad
+    q0 = offsets(n_q)
+    rho, axes = marker.shape.pose(state.q[q0[i] : q0[i + 1]])
+    R = rotation_matrix(state.p[i])
+    return state.r[i] + R @ rho, R @ axes
 
 
-def marker_shapes(markers: list[MarkerData]) -> tuple[IntArray, Array]:
+def marker_shapes(markers: list[MarkerShape]) -> tuple[IntArray, Array]:
     """Return where the shapes of each marker begin (-1 for none), and the shapes, flat."""
     start, parts, n = [], [], 0
     for marker in markers:
@@ -159,7 +150,7 @@ def marker_shapes(markers: list[MarkerData]) -> tuple[IntArray, Array]:
     return integers(start), np.concatenate([*parts, np.zeros(0)])
 
 
-def marker_bending(markers: list[MarkerData]) -> tuple[IntArray, Array]:
+def marker_bending(markers: list[MarkerShape]) -> tuple[IntArray, Array]:
     """Return where K_P [l, 6, k] of each marker begins (-1 for none), and all of them, flat; one interface has one."""
     start, known, parts, n = [], {}, [], 0
     for marker in markers:

@@ -1,4 +1,4 @@
-"""Geometric stiffness in the arrays of the kernels, and in the motion of an interface (docs/theory.md §7).
+"""Geometric stiffness in the arrays of the kernels (docs/theory.md §7).
 
 The kinetic energy of a body changes by
 
@@ -19,10 +19,9 @@ at no cost in the time loop: delta_ab Σ_c S_cc - S_ab changes by -K_ab - 1/2 ti
 import numpy as np
 
 from cms.reduced_body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
-from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 
-__all__ = ["interface_deformation", "interface_deformation_rates", "spin_tensor", "stiffened_shape_moments"]
+__all__ = ["spin_tensor", "stiffened_shape_moments"]
 
 
 def spin_tensor(geometric: GeometricStiffness) -> Array:
@@ -45,34 +44,3 @@ def stiffened_shape_moments(S_kl: Array, geometric: GeometricStiffness) -> Array
         S[c, b] += 0.5 * K_r[a]  # tilde(x)_cb = x_a, tilde(x)_bc = -x_a
         S[b, c] -= 0.5 * K_r[a]
     return np.asarray(S)
-
-
-def interface_deformation(reduced: ReducedBody, name: str, q: Array, *, is_stiffened: bool) -> Array:
-    """Return displacement and rotation vector of an interface in B, Psi q - 1/2 qᵀ K_P q, (..., 6) for q (..., n_q)."""
-    interface = reduced.interface(name)
-    d = q @ np.asarray(interface.Psi).T
-    if is_stiffened:
-        d = d - 0.5 * np.einsum("...k,akl,...l->...a", q, bending_of(reduced, name), q)
-    return np.asarray(d)
-
-
-def interface_deformation_rates(
-    reduced: ReducedBody, name: str, q: Array, q_dot: Array, q_ddot: Array, *, is_stiffened: bool
-) -> tuple[Array, Array]:
-    """Return first and second rate of `interface_deformation`, each (..., 6)."""
-    Psi = np.asarray(reduced.interface(name).Psi)
-    rate, second = q_dot @ Psi.T, q_ddot @ Psi.T
-    if is_stiffened:
-        K = bending_of(reduced, name)
-        rate = rate - np.einsum("...k,akl,...l->...a", q, K, q_dot)
-        second = second - np.einsum("...k,akl,...l->...a", q, K, q_ddot)
-        second = second - np.einsum("...k,akl,...l->...a", q_dot, K, q_dot)
-    return np.asarray(rate), np.asarray(second)
-
-
-def bending_of(reduced: ReducedBody, name: str) -> Array:
-    """Return K_P of an interface, (6, n_q, n_q); zero where the body has none."""
-    if reduced.geometric is None:
-        return np.zeros((6, reduced.n_q, reduced.n_q))
-    place = [interface.name for interface in reduced.interfaces].index(name)
-    return np.asarray(reduced.geometric.interfaces[place])

@@ -24,7 +24,7 @@ from floatframe.compiling.markers import (
 from floatframe.compiling.mass_checks import require_inertia
 from floatframe.compiling.pair_forces import add_pair_laws
 from floatframe.forces import Gravity, PointForce, SpringDamper
-from floatframe.joints.rows import DOT, POINT, SLIDE, Row
+from floatframe.joints.rows import Row, kind_of
 from floatframe.joints.sliding import SlidingJoint
 from floatframe.kernels.model import Model
 from floatframe.rotations import euler_parameters
@@ -118,8 +118,9 @@ def compile_system(system: System) -> CompiledSystem:
     ends = [m for group in ends_of for m in group]
     m_x0 = np.zeros(len(markers), np.int64)
     m_x0[ends] = np.cumsum([0] + [6 + int(n_q[markers[m].body]) for m in ends])[:-1]
-    psi0, psi = marker_shapes(markers)
-    bend0, bend = marker_bending(markers)
+    shapes = [marker.shape for marker in markers]
+    psi0, psi = marker_shapes(shapes)
+    bend0, bend = marker_bending(shapes)
     connection_of_marker = integers(made.connection_of)
     model = Model(
         kind=kind,
@@ -130,8 +131,8 @@ def compile_system(system: System) -> CompiledSystem:
         **model_types,
         gravity=gravity,
         m_body=integers([m.body for m in markers]),
-        m_position=stacked([m.position for m in markers], (3,)),
-        m_triad=stacked([m.triad for m in markers], (3, 3)),
+        m_position=stacked([shape.position for shape in shapes], (3,)),
+        m_triad=stacked([shape.triad for shape in shapes], (3, 3)),
         m_psi0=psi0,
         psi=psi,
         m_bend0=bend0,
@@ -184,7 +185,7 @@ def compile_system(system: System) -> CompiledSystem:
         callbacks=tuple(networks.callbacks),
         owners=tuple(made.owner),
         placed=placed,
-        coordinates=tuple(row.coordinate for row in rows),
+        coordinates=tuple(row.coordinate_name for row in rows),
         length=length,
     )
 
@@ -198,10 +199,9 @@ def row_softness(system: System, rows: list[Row], mass: Array, length: float) ->
     if system.redundant == "minimum-norm":
         m = float(mass.mean())
         for k, row in enumerate(rows):
-            if row.kind in (POINT, SLIDE) and row.motion is None:
-                soft[k] = SOFT / m
-            elif row.kind == DOT:
-                soft[k] = SOFT / (m * length**2)
+            kind = kind_of(row.kind)
+            if kind.can_yield and row.motion is None:
+                soft[k] = SOFT / m if kind.is_length else SOFT / (m * length**2)
     return soft
 
 
@@ -226,7 +226,7 @@ def place(system: System) -> State:
 
 def system_length(markers: list[MarkerData], placed: State, n_q: IntArray, model: Model) -> float:
     """Return the largest arm of a marker or radius of gyration in a body, or the size of the system; 1 if all are 0."""
-    arms = [float(np.linalg.norm(marker.position)) for marker in markers if marker.body >= 0]
+    arms = [float(np.linalg.norm(marker.shape.position)) for marker in markers if marker.body >= 0]
     radii = np.sqrt(np.maximum(np.trace(model.J0, axis1=1, axis2=2), 0.0) / (2 * model.mass))
     points = [marker_pose(marker, placed, n_q)[0] for marker in markers] + list(placed.r)
     return max([*arms, float(radii.max()), float(np.linalg.norm(np.ptp(np.array(points), axis=0)))]) or 1.0

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.discrete.rotation import cayley, cayley_parameters, cross, dot, turned
+from floatframe.discrete.rotation import cayley, cayley_parameters
 from floatframe.errors import ModelError
 from floatframe.kernels.model import C1, C2, C3, DAMPING, K_TRANSLATION, MASS, S_AB, STIFFNESS, Model
-from floatframe.rotations import rotation_matrix, tilde
+from floatframe.rotations import cross, dot, rotation_matrix, tilde, turned
 from floatframe.start.newton_equations import modal_matrix
 from floatframe.state import State
 

@@ -13,9 +13,9 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.discrete.functions import value_of
 from floatframe.discrete.markers import Load, MarkerStep
-from floatframe.discrete.rotation import dot
-from floatframe.joints.rows import DISTANCE, DOT, HELD_DISTANCES, POINT, SCREW, SLIDE, TURN
+from floatframe.joints.rows import DISTANCE, DOT, POINT, SCREW, SLIDE, TURN, kind_of
 from floatframe.kernels.model import Model
+from floatframe.rotations import dot
 
 __all__ = [
     "Loads",
@@ -91,7 +91,7 @@ def add_reaction(model: Model, k: int, pair: Pair, loads: Loads, span: Span, f: 
     """Add the loads of row k with multiplier f, (...,): their work is f times the change of the row."""
     a, b = pair
     kind, x, y = int(model.row_kind[k]), model.row_x[k], model.row_y[k]
-    if kind in HELD_DISTANCES:
+    if kind_of(kind).is_length:
         direction = reaction_direction(model, k, pair, span)
         if kind in (SLIDE, SCREW):
             a.add_direction(loads[0], slide_axis(model, k), f[..., None] * (b.x_mean - a.x_mean))

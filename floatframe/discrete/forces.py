@@ -14,9 +14,9 @@ from floatframe.discrete.bodies import BodyStep, CentralBody
 from floatframe.discrete.constraints import Loads, Pair, Span, angle_change, angle_loads, end_angle, slip_change
 from floatframe.discrete.functions import along_imaginary, value_of
 from floatframe.discrete.markers import Load, MarkerStep
-from floatframe.discrete.rotation import cross, dot, turned
-from floatframe.joints.rows import PUSH, TWIST
+from floatframe.joints.rows import kind_of
 from floatframe.kernels.model import Model
+from floatframe.rotations import cross, dot, turned
 
 __all__ = ["Given", "body_load", "coordinate_load", "point_load", "spring_load"]
 
@@ -98,13 +98,12 @@ def body_load(model: Model, k: int, body: CentralBody, step: BodyStep, load: Loa
 
 def coordinate_load(model: Model, k: int, pair: Pair, loads: Loads, span: Span, normal: Array) -> Given:
     """Add the forces along the coordinate of row k (PUSH or TWIST); normal: force in the joint across its axis."""
-    is_angle = int(model.row_kind[k]) == TWIST
+    is_angle = kind_of(model.row_kind[k]).is_angle
     if is_angle:
         change = angle_change(model, k, pair)
         end = end_angle(model, k, pair)
         begin = end - change if has_two_ends(pair) else end
     else:
-        assert int(model.row_kind[k]) == PUSH
         change, E, d = slip_change(model, k, pair)
         x = model.row_x[k]
         begin = dot(pair[0].ends(x)[0], pair[1].x_0 - pair[0].x_0)

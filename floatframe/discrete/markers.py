@@ -18,9 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.discrete.bodies import BodyStep, CentralBody, bent
-from floatframe.discrete.rotation import cross, dot, exponential, left_jacobian, relative_cayley, turned
+from floatframe.bodies.marker_shape import MarkerShape
+from floatframe.discrete.bodies import BodyStep, CentralBody
+from floatframe.discrete.rotation import relative_cayley
 from floatframe.kernels.model import Model
+from floatframe.rotations import cross, dot, left_jacobian, rotation_exp, turned
 
 __all__ = ["BodyMarker", "Load", "MarkerStep", "body_marker", "marker_step"]
 
@@ -33,39 +35,39 @@ class BodyMarker:
 
     body: int
     constants: CentralBody | None
-    place: Array  #: undeformed, from the frame origin, (3,)
-    Psi: Array  #: displacement and rotation, undeformed, (6, n)
-    bend: Array | None  #: K_P [l, a, k], (n, 6 n): Psi(q) = Psi - K_P q; None: zero
-    triad: Array  #: (3, 3)
+    shape: MarkerShape  #: from the frame origin
 
     @property
     def turns(self) -> bool:
         """Whether it turns in its body."""
-        return bool(np.any(self.Psi[3:])) or self.bend is not None
+        psi, bend = self.shape.psi, self.shape.bend
+        return psi is not None and (bool(np.any(psi[3:])) or bend is not None)
 
     def shapes(self, q: Array) -> tuple[Array, Array]:
         """Return Psi_sigma(q) and Psi_r(q), (..., 3, n)."""
         assert self.constants is not None
-        Psi = self.Psi if self.bend is None else self.Psi - bent(self.bend, q, 6)
+        Psi = self.shape.shapes(q)
         return Psi[..., :3, :] - self.constants.shapes(q), Psi[..., 3:, :]
 
     def deformation(self, q: Array) -> tuple[Array, Array]:
         """Return sigma(q), from the centre of mass, and th(q), (..., 3)."""
         assert self.constants is not None
-        Psi = self.Psi if self.bend is None else self.Psi - 0.5 * bent(self.bend, q, 6)
-        return self.place + turned(Psi[..., :3, :], q) - self.constants.center(q), turned(Psi[..., 3:, :], q)
+        d = self.shape.deformation(q)
+        return self.shape.position + d[..., :3] - self.constants.center(q), d[..., 3:]
 
 
 def body_marker(model: Model, bodies: tuple[CentralBody, ...], m: int) -> BodyMarker:
     """Return the constants of marker m of a model."""
     i = int(model.m_body[m])
     if i < 0:
-        return BodyMarker(-1, None, model.m_position[m], np.zeros((6, 0)), None, model.m_triad[m])
+        return BodyMarker(-1, None, MarkerShape(model.m_position[m], model.m_triad[m]))
     body, first, bend0 = bodies[i], int(model.m_psi0[m]), int(model.m_bend0[m])
     n = body.n
-    Psi = model.psi[first : first + 6 * n].reshape(6, n) if first >= 0 else np.zeros((6, n))
-    bend = model.bend[bend0 : bend0 + 6 * n * n].reshape(n, 6 * n) if bend0 >= 0 else None
-    return BodyMarker(i, body, model.m_position[m], Psi, bend, model.m_triad[m])
+    psi = model.psi[first : first + 6 * n].reshape(6, n) if first >= 0 else None
+    bend = model.bend[bend0 : bend0 + 6 * n * n].reshape(n, 6, n) if bend0 >= 0 else None  # [l, a, k]
+    if bend is not None:
+        bend = np.ascontiguousarray(np.moveaxis(bend, 0, 2))
+    return BodyMarker(i, body, MarkerShape(model.m_position[m], model.m_triad[m], psi, bend))
 
 
 class Load:
@@ -105,7 +107,7 @@ class MarkerStep:
 
     def ends(self, e: Array) -> tuple[Array, Array]:
         """Return the direction e of the marker, ground axes, at both ends."""
-        e = self.marker.triad @ e
+        e = self.marker.shape.triad @ e
         if self.step is None:
             return e, e
         return turned(self.step.R_0, self.rotation_0 @ e), turned(self.step.R_1, self.rotation_1 @ e)
@@ -129,7 +131,7 @@ class MarkerStep:
 
     def eps_mean(self, e: Array) -> Array:
         """Return the mean of direction e in the body."""
-        return 0.5 * (self.rotation_0 + self.rotation_1) @ (self.marker.triad @ e)
+        return 0.5 * (self.rotation_0 + self.rotation_1) @ (self.marker.shape.triad @ e)
 
     def add_force(self, load: Load | None, F: Array) -> None:
         """Add a force at the marker, with work F·dx."""
@@ -167,7 +169,7 @@ class MarkerStep:
 def marker_step(marker: BodyMarker, step: BodyStep | None) -> MarkerStep:
     """Return a marker over a step of its body."""
     if step is None:
-        zero, none, place = np.zeros(3), np.zeros((3, 0)), marker.place
+        zero, none, place = np.zeros(3), np.zeros((3, 0)), marker.shape.position
         return MarkerStep(marker, None, place, place, zero, zero, np.eye(3), np.eye(3), None, None, none, none)
     (sigma_0, th_0), (sigma_1, th_1) = marker.deformation(step.q_0), marker.deformation(step.q_1)
     Psi_sigma, Psi_r = marker.shapes(0.5 * (step.q_0 + step.q_1))
@@ -177,7 +179,7 @@ def marker_step(marker: BodyMarker, step: BodyStep | None) -> MarkerStep:
     rotation_0 = rotation_1 = np.eye(3)
     Gamma = dpsi = None
     if marker.turns:
-        rotation_0, rotation_1 = exponential(th_0), exponential(th_1)
+        rotation_0, rotation_1 = rotation_exp(th_0), rotation_exp(th_1)
         Gamma = mean_jacobian(th_0, th_1)
         dpsi = turned(Gamma, turned(Psi_r, step.dq))
     return MarkerStep(

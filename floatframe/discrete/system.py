@@ -10,35 +10,17 @@ from floatframe.discrete.bodies import BodyStep, CentralBody, central_bodies
 from floatframe.discrete.constraints import Loads, Pair, Span, add_reaction, constraint_value, reaction_direction
 from floatframe.discrete.forces import Given, body_load, coordinate_load, point_load, spring_load
 from floatframe.discrete.markers import BodyMarker, Load, body_marker, marker_step
-from floatframe.discrete.rotation import dot
 from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad, Gravity, JointForce, PointForce, SpringDamper
-from floatframe.joints.rows import (
-    ARM,
-    DISTANCE,
-    DOT,
-    GAUGE,
-    GAUGE_B,
-    HELD,
-    HELD_DISTANCES,
-    POINT,
-    PUSH,
-    ROD,
-    SCREW,
-    SLIDE,
-    SPRING,
-    THREAD,
-    TURN,
-    TWIST,
-)
+from floatframe.joints.rows import PUSH, is_held_length, kind_of
 from floatframe.kernels.model import JOINT, Model
 from floatframe.kernels.model import SPRING as SPRING_LAW
+from floatframe.rotations import dot
 from floatframe.system import System
 
 __all__ = ["Connection", "DiscreteSystem", "discrete_system"]
 
 KNOWN_FORCES = (BodyLoad, Gravity, JointForce, PointForce, SpringDamper)
-ROWS = (ARM, DISTANCE, DOT, GAUGE, GAUGE_B, POINT, PUSH, ROD, SCREW, SLIDE, SPRING, THREAD, TURN, TWIST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +83,7 @@ def normal_force(model: Model, k: int, connection: Connection, pair: Pair, f: Ar
     a, _ = pair
     F = np.zeros((*f.shape[:-1], 3), f.dtype)
     for j, row in enumerate(connection.held):
-        if int(model.row_kind[row]) in HELD_DISTANCES:
+        if is_held_length(model.row_kind[row]):
             F = F + f[..., j, None] * reaction_direction(model, row, pair, span)
     axis = model.row_x[k] if int(model.row_kind[k]) == PUSH else np.cross(model.row_x[k], model.row_z[k])
     E_0, E_1 = a.ends(axis)
@@ -131,14 +113,14 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
         if max(model.m_line[model.c_a[c]], model.m_line[model.c_b[c]]) >= 0:
             words = "slides along a deformed line, which is not known to it"
             raise ModelError(f"{scheme}: {name!r} {words}; use generalized-alpha")
-        if not np.isin(model.row_kind[model.c_w0[c] : model.c_w0[c + 1]], ROWS).all():
+        if not all(kind_of(k).in_steps for k in model.row_kind[model.c_w0[c] : model.c_w0[c + 1]]):
             raise ModelError(f"{scheme}: joint {name!r} is of a kind that is not known to it; use generalized-alpha")
     bodies = central_bodies(model, compiled.body_names, scheme)
     connections, n_held = [], 0
     for c in range(len(model.c_size)):
         rows = range(int(model.c_w0[c]), int(model.c_w0[c + 1]))
-        held = tuple(k for k in rows if model.row_kind[k] in HELD)
-        loaded = tuple(k for k in rows if model.row_kind[k] in (PUSH, TWIST))
+        held = tuple(k for k in rows if kind_of(model.row_kind[k]).holds)
+        loaded = tuple(k for k in rows if kind_of(model.row_kind[k]).is_loaded)
         a, b = (body_marker(model, bodies, int(m)) for m in (model.c_a[c], model.c_b[c]))
         connections.append(Connection(c, a, b, held, loaded, n_held))
         n_held += len(held)

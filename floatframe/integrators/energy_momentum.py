@@ -9,10 +9,10 @@ from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, step_of
 from floatframe.discrete.constraints import Span
 from floatframe.discrete.newton import solve_step, work_of
-from floatframe.discrete.rotation import cross, turned
 from floatframe.discrete.system import DiscreteSystem
 from floatframe.errors import ModelError
 from floatframe.integrators.discrete_run import DiscreteScheme, StepResult, check_options
+from floatframe.rotations import cross, turned
 
 __all__ = ["EnergyDecaying", "EnergyMomentum"]
 

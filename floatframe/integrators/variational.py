@@ -9,11 +9,11 @@ from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, sti
 from floatframe.discrete.constraints import Span, add_reaction, rate_in_time
 from floatframe.discrete.markers import Load
 from floatframe.discrete.newton import Solution, StepError, pair_of, solve_step, work_of
-from floatframe.discrete.rotation import cross, dot, turned
 from floatframe.discrete.system import DiscreteSystem
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry
 from floatframe.integrators.discrete_run import DiscreteScheme, StepResult, check_options
+from floatframe.rotations import cross, dot, turned
 from floatframe.state import State
 from floatframe.system import System
 

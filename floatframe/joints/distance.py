@@ -11,7 +11,7 @@ from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import checked_motions
-from floatframe.joints.rows import DISTANCE, NO_MOMENT, ROD, Row
+from floatframe.joints.rows import DISTANCE, NO_MOMENT, ROD, SPAN, Row, RowCoordinate
 
 __all__ = ["DistanceJoint"]
 
@@ -47,5 +47,6 @@ class DistanceJoint:
                 f"joint {self.name!r}: its points coincide as placed, so that the rod has no direction; move one, or "
                 "use a spherical joint"
             )
-        held = Row(DISTANCE, c=distance, motion=self.motions.get("distance"), coordinate="distance")
+        own = RowCoordinate("distance", SPAN)
+        held = Row(DISTANCE, c=distance, motion=self.motions.get("distance"), coordinate=own)
         return (*(Row(ROD, axis) for axis in np.eye(3)), held)

@@ -11,7 +11,20 @@ from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
-from floatframe.joints.rows import DOT, MOMENT_B, SCREW, SLIDE, THREAD, TURN, Row, arm_rows
+from floatframe.joints.rows import (
+    DOT,
+    FORCE,
+    MOMENT_B,
+    PUSH,
+    SCREW,
+    SLIDE,
+    THREAD,
+    TURN,
+    TWIST,
+    Row,
+    RowCoordinate,
+    arm_rows,
+)
 
 __all__ = ["ScrewJoint"]
 
@@ -51,13 +64,15 @@ class ScrewJoint:
         slope = self.lead / (2 * np.pi)
         if len(self.motions) > 1:
             raise ModelError(f"joint {self.name!r}: motions: expected angle or distance, which follows it, got both")
-        other = "angle" if "distance" in self.motions else "distance"  # it follows the one of the last row
+        angle = RowCoordinate("angle", TWIST, x, y, z, parts=((MOMENT_B, 1.0), (FORCE, slope)))
+        distance = RowCoordinate("distance", PUSH, self.axis, parts=((FORCE, 1.0), (MOMENT_B, 1 / slope)))
+        other = angle if "distance" in self.motions else distance  # it follows the one of the last row
         if "distance" in self.motions:
-            drive = Row(SLIDE, self.axis, motion=self.motions["distance"], coordinate="distance")
+            drive = Row(SLIDE, self.axis, motion=self.motions["distance"], coordinate=distance)
         elif "angle" in self.motions:
-            drive = Row(TURN, x, y, z=z, motion=self.motions["angle"], coordinate="angle")
+            drive = Row(TURN, x, y, z=z, motion=self.motions["angle"], coordinate=angle)
         else:
-            drive = Row(THREAD, self.axis, y, c=slope, z=z, coordinate="angle")
+            drive = Row(THREAD, self.axis, y, c=slope, z=z, coordinate=angle)
         return (
             *arm_rows(),
             *(Row(SLIDE, n) for n in normals_of(self.axis)),

@@ -1,9 +1,6 @@
 """What is measured on a motion: place, velocity and acceleration of an interface or point, angles, stress.
 
-With rho = c + Psi_t q (and the part of second order of a stiffened body), all in body axes, and R = R_GB:
-
-    position      r + R rho                         acceleration  v_dot + R (alpha × rho + omega × (omega × rho)
-    velocity      v + R (omega × rho + rho_dot)                          + 2 omega × rho_dot + rho_ddot)
+The kinematics of a marker are in bodies/marker_shape.py.
 """
 
 from dataclasses import dataclass
@@ -13,11 +10,18 @@ import numpy as np
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.reduced_body.stress import von_mises
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.compiling.stiffening import interface_deformation, interface_deformation_rates
+from floatframe.bodies.marker_shape import (
+    BodyFrameMotion,
+    MarkerShape,
+    MotionInBody,
+    interface_shape,
+    marker_motion,
+    motion_in_body,
+)
 from floatframe.errors import ResultsError
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.trajectory import BodyMotion, Trajectory
-from floatframe.rotations import right_jacobian, rotation_exp, rotation_matrix
+from floatframe.rotations import rotation_matrix
 
 __all__ = [
     "PlaceMotion",
@@ -27,6 +31,8 @@ __all__ = [
     "node_motion",
     "point_motion",
     "rotation_angle",
+    "shape_motion",
+    "still_place",
     "stress_modes",
 ]
 
@@ -55,19 +61,21 @@ def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, in
         If there is no such interface.
     """
     require_same_modes(trajectory, body, reduced)
-    place = reduced.interface(interface)
-    motion = trajectory.body(body)
     is_stiffened = trajectory.entry(body)[1].is_stiffened
-    d = interface_deformation(reduced, interface, motion.q, is_stiffened=is_stiffened)
-    d_dot, d_ddot = interface_deformation_rates(
-        reduced, interface, motion.q, motion.q_dot, motion.q_ddot, is_stiffened=is_stiffened
-    )
-    triples = list(zip(d[:, 3:], d_dot[:, 3:], d_ddot[:, 3:], strict=True))
-    turned = np.array([rotation_exp(theta) for theta, _, _ in triples])
-    spin = np.array([spin_of(theta, rate) for theta, rate, _ in triples])
-    spin_dot = np.array([spin_rate_of(*three) for three in triples])
-    rho = place.position + d[:, :3]
-    return _moved(motion, rho, d_dot[:, :3], d_ddot[:, :3], turned @ place.triad, spin, spin_dot)
+    return shape_motion(trajectory, body, interface_shape(reduced, interface, is_stiffened=is_stiffened))
+
+
+def shape_motion(trajectory: Trajectory, body: str, shape: MarkerShape) -> PlaceMotion:
+    """Return the motion of a marker of a body; `ResultsError` if there is no such body."""
+    motion = trajectory.body(body)
+    return place_of(motion, motion_in_body(shape, motion.q, motion.q_dot, motion.q_ddot))
+
+
+def still_place(t: Array, shape: MarkerShape) -> PlaceMotion:
+    """Return the motion of a marker on the ground: none."""
+    still = np.zeros((len(t), 3))
+    axes = np.broadcast_to(shape.triad, (len(t), 3, 3))
+    return PlaceMotion(t, still + shape.position, still, still, axes, still)
 
 
 def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: int) -> PlaceMotion:
@@ -82,56 +90,26 @@ def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: i
     if not 0 <= node < len(reduced.nodes):
         raise ResultsError(f"body {body!r}: node: expected 0 to {len(reduced.nodes) - 1}, got {node}")
     motion, shape = trajectory.body(body), reduced.Phi[node]
-    n_t, zero = len(motion.t), np.zeros((len(motion.t), 3))
+    zero = np.zeros((len(motion.t), 3))
     local = reduced.nodes[node] + motion.q @ shape.T
-    axes = np.broadcast_to(np.eye(3), (n_t, 3, 3))
-    return _moved(motion, local, motion.q_dot @ shape.T, motion.q_ddot @ shape.T, axes, zero, zero)
-
-
-def spin_of(theta: Array, rate: Array) -> Array:
-    """Return the angular velocity of exp(theta) as seen from the body, (3,)."""
-    return np.asarray(right_jacobian(theta).T @ rate)
-
-
-def spin_rate_of(theta: Array, rate: Array, rate2: Array) -> Array:
-    """Return the rate of `spin_of`, (3,): its change along the rate by a central difference, and by the second rate."""
-    size = float(np.linalg.norm(rate))
-    result = spin_of(theta, rate2)
-    if size > 0:
-        s = 1e-5 / size
-        result = result + (spin_of(theta + s * rate, rate) - spin_of(theta - s * rate, rate)) / (2 * s)
-    return np.asarray(result)
+    axes = np.broadcast_to(np.eye(3), (len(motion.t), 3, 3))
+    own = MotionInBody(local, motion.q_dot @ shape.T, motion.q_ddot @ shape.T, axes, zero, zero)
+    return place_of(motion, own)
 
 
 def point_motion(trajectory: Trajectory, body: str, point: Array | tuple[float, float, float]) -> PlaceMotion:
     """Return the motion of a point that is fixed in the frame of a body, with the axes of the frame."""
     motion = trajectory.body(body)
-    n_t = len(motion.t)
-    rho = np.broadcast_to(np.asarray(point, dtype=float), (n_t, 3))
-    zero = np.zeros((n_t, 3))
-    return _moved(motion, rho, zero, zero, np.broadcast_to(np.eye(3), (n_t, 3, 3)), zero, zero)
+    shape = MarkerShape(np.asarray(point, dtype=float), np.eye(3))
+    return place_of(motion, motion_in_body(shape, motion.q, motion.q_dot, motion.q_ddot))
 
 
-def _moved(
-    motion: BodyMotion, rho: Array, rho_dot: Array, rho_ddot: Array, axes: Array, spin: Array, spin_dot: Array
-) -> PlaceMotion:
-    R = np.array([rotation_matrix(p) for p in motion.p]).reshape(-1, 3, 3)
-    omega, alpha = motion.omega_B, motion.omega_B_dot
-    arm = np.cross(omega, rho)
-    relative = np.cross(alpha, rho) + np.cross(omega, arm) + 2 * np.cross(omega, rho_dot) + rho_ddot
-
-    def in_ground(values: Array) -> Array:
-        return np.asarray(np.einsum("tab,tb->ta", R, values))
-
-    return PlaceMotion(
-        motion.t,
-        position=motion.r + in_ground(rho),
-        velocity=motion.v + in_ground(arm + rho_dot),
-        acceleration=motion.v_dot + in_ground(relative),
-        axes=R @ axes,
-        omega=in_ground(omega + spin),
-        alpha=in_ground(alpha + np.cross(omega, spin) + spin_dot),
+def place_of(motion: BodyMotion, own: MotionInBody) -> PlaceMotion:
+    """Return the motion of a place, from its motion in its body."""
+    body = BodyFrameMotion(
+        motion.r, rotation_matrix(motion.p), motion.v, motion.omega_B, motion.v_dot, motion.omega_B_dot
     )
+    return PlaceMotion(motion.t, **marker_motion(body, own)._asdict())
 
 
 def rotation_angle(a: PlaceMotion, b: PlaceMotion, axis: Array | tuple[float, float, float]) -> Array:

@@ -4,10 +4,10 @@ import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.compiling.stiffening import interface_deformation
+from floatframe.bodies.marker_shape import interface_shape
 from floatframe.errors import ResultsError
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import rotation_matrix
+from floatframe.rotations import rotation_matrix, turned
 
 __all__ = [
     "elastic_displacements",
@@ -64,7 +64,7 @@ def interface_positions(trajectory: Trajectory, body_name: str, reduced: Reduced
     require_same_modes(trajectory, body_name, reduced)
     motion = trajectory.body(body_name)
     d = elastic_displacements(trajectory, body_name, reduced, interface)
-    return at_points(motion.r, motion.p, reduced.interface(interface).position + d)
+    return motion.r + turned(rotation_matrix(motion.p), reduced.interface(interface).position + d)
 
 
 def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: ReducedBody, interface: str) -> Array:
@@ -75,16 +75,10 @@ def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: Reduc
     require_same_modes(trajectory, body_name, reduced)
     _, entry = trajectory.entry(body_name)
     q = trajectory.body(body_name).q
-    return interface_deformation(reduced, interface, q, is_stiffened=entry.is_stiffened)[:, :3]
+    return interface_shape(reduced, interface, is_stiffened=entry.is_stiffened).deformation(q)[:, :3]
 
 
 def point_positions(trajectory: Trajectory, body_name: str, point: Array) -> Array:
     """Return positions of a point that is fixed in the frame of a body, ground axes, (n_t, 3) [m]."""
     motion = trajectory.body(body_name)
-    return at_points(motion.r, motion.p, np.broadcast_to(np.asarray(point, dtype=float), motion.r.shape))
-
-
-def at_points(r: Array, p: Array, local: Array) -> Array:
-    """Return r + R local for each time, (n_t, 3)."""
-    w, v = p[:, :1], p[:, 1:]
-    return r + local + 2 * np.cross(v, np.cross(v, local) + w * local)
+    return motion.r + rotation_matrix(motion.p) @ np.asarray(point, dtype=float)

@@ -6,12 +6,12 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.marker_shape import interface_shape
 from floatframe.bodies.markers import body_name
-from floatframe.compiling.stiffening import interface_deformation, interface_deformation_rates
 from floatframe.joints.sliding import SlidingJoint, line_triad
 from floatframe.results.place_motion import PlaceMotion
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import right_jacobian, rotation_matrix
+from floatframe.rotations import cross, dot, left_jacobian, rotation_matrix, turned
 from floatframe.system import System
 
 __all__ = ["SlidingPlace", "sliding_place"]
@@ -38,16 +38,12 @@ def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, e
     points = np.array([reduced.interface(station).position for station in joint.stations])
     places, triad = line_triad(f"joint {joint.name!r}", points, joint.normal)
     e = triad[:, 0]
-    deformed = [interface_deformation(reduced, i, motion.q, is_stiffened=body.is_stiffened) for i in joint.stations]
-    rates = [
-        interface_deformation_rates(reduced, i, motion.q, motion.q_dot, motion.q_ddot, is_stiffened=body.is_stiffened)[
-            0
-        ]
-        for i in joint.stations
-    ]
-    R = np.array([rotation_matrix(p) for p in motion.p])
-    x = np.einsum("tba,tb->ta", R, end.position - motion.r)
-    v = np.einsum("tba,tb->ta", R, end.velocity - motion.v) - np.cross(motion.omega_B, x)
+    shapes = [interface_shape(reduced, i, is_stiffened=body.is_stiffened) for i in joint.stations]
+    deformed = [shape.deformation(motion.q) for shape in shapes]
+    rates = [shape.rates(motion.q, motion.q_dot, motion.q_ddot)[0] for shape in shapes]
+    R = rotation_matrix(motion.p)
+    x = turned(np.swapaxes(R, 1, 2), end.position - motion.r)
+    v = turned(np.swapaxes(R, 1, 2), end.velocity - motion.v) - cross(motion.omega_B, x)
     line = Line(places, e, np.array(deformed), np.array(rates))
     s = (x - points[0]) @ e
     for _ in range(MOST):
@@ -61,9 +57,9 @@ def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, e
     t = e + line.displacement(s, 1)
     size = np.linalg.norm(t, axis=1)
     rate = dot(t, v - line.displacement(s, 0, of_rates=True)) / size**2
-    tangent = np.einsum("tab,tb->ta", R, t / size[:, None])
+    tangent = turned(R, t / size[:, None])
     angle, by_s = line.rotation(s)
-    turning = np.einsum("tab,tbc,tc->ta", R, np.array([right_jacobian(theta).T for theta in angle]), by_s)
+    turning = turned(R @ left_jacobian(angle), by_s)
     return SlidingPlace(s, rate, tangent, turning / size[:, None])
 
 
@@ -110,8 +106,3 @@ class Line:
         twist, inside = first + w * (second - first), (along >= 0) & (along <= h)
         value = np.cross(self.e, self.displacement(s, 1)) + twist[:, None] * self.e
         return value, np.cross(self.e, self.displacement(s, 2)) + (inside * (second - first) / h)[:, None] * self.e
-
-
-def dot(x: Array, y: Array) -> Array:
-    """Return the products of two vectors at each time, (n_t,)."""
-    return np.asarray((x * y).sum(axis=1))

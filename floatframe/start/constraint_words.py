@@ -4,7 +4,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem
-from floatframe.joints.rows import HELD, HELD_DISTANCES
+from floatframe.joints.rows import is_held, is_held_length
 from floatframe.kernels.model import Work
 from floatframe.start.freedoms import scaled_constraints
 from floatframe.state import State
@@ -22,8 +22,8 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
     for c, name in enumerate(compiled.connection_names):
         rows = slice(int(model.c_w0[c]), int(model.c_w0[c + 1]))
         kind = model.row_kind[rows]
-        g = np.where(np.isin(kind, HELD), error[rows], 0.0)
-        is_distance = np.isin(kind, HELD_DISTANCES)
+        g = np.where(is_held(kind), error[rows], 0.0)
+        is_distance = is_held_length(kind)
         gap, angle = np.linalg.norm(g[is_distance]), np.linalg.norm(g[~is_distance])
         kind_of_it = "joint" if name in compiled.joint_names else "coupler"
         words.append((gap / compiled.length + angle, f"{kind_of_it} {name!r} is open by {gap:.4g} and {angle:.4g} rad"))
@@ -44,7 +44,7 @@ def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> st
     A drive is taken back where its row is spanned by those of the joints and of the drives before it.
     """
     model = compiled.model
-    holds = np.flatnonzero(np.isin(model.row_kind, HELD))
+    holds = np.flatnonzero(is_held(model.row_kind))
     drives = np.flatnonzero(model.row_motion[holds] >= 0)
     if not len(drives):
         return ""

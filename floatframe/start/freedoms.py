@@ -12,7 +12,7 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem
-from floatframe.joints.rows import HELD
+from floatframe.joints.rows import is_held
 from floatframe.kernels.model import Model, Work
 from floatframe.start.newton_equations import linearized, set_iterate, with_mass_for_all
 from floatframe.state import State
@@ -52,7 +52,7 @@ class Mobility:
 def constraint_mobility(compiled: CompiledSystem, work: Work, state: State) -> Mobility:
     """Return the mobility at a state in which the joints are closed."""
     model = compiled.model
-    holds = np.isin(model.row_kind, HELD)
+    holds = is_held(model.row_kind)
     owner = np.repeat(np.arange(len(model.c_size)), model.c_size)[holds]
     with_modes, rigid = scaled_constraints(model, work, state)
     repeated, repeated_rigid = dependent_rows(with_modes), dependent_rows(rigid)
@@ -75,7 +75,7 @@ def scaled_constraints(model: Model, work: Work, state: State) -> tuple[Array, A
     """Return G L⁻ᵀ with M = L Lᵀ, rows of length one: with the modes and for rigid bodies, dense."""
     set_iterate(work, state)
     parts = linearized(model, work, 1.0, 0.0, 0.0)
-    G = parts.G.toarray()[np.isin(model.row_kind, HELD)]
+    G = parts.G.toarray()[is_held(model.row_kind)]
     scaled, rigid = np.zeros_like(G), np.zeros((len(G), 6 * len(model.kind)))
     for i, H in enumerate(with_mass_for_all(model, parts.H)):
         u = slice(int(model.u0[i]), int(model.u0[i + 1]))

@@ -20,7 +20,7 @@ from floatframe.checked_values import array_of_shape
 from floatframe.compiling.callbacks import raise_errors_of
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
-from floatframe.joints.rows import HELD, HELD_DISTANCES, HELD_VELOCITIES
+from floatframe.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.kernels.model import STIFFNESS, Model, Work, new_work
 from floatframe.start.constraint_words import conflict_of_drives, open_joints
 from floatframe.start.freedoms import Mobility, constraint_mobility, scaled_constraints
@@ -108,10 +108,10 @@ def checked(compiled: CompiledSystem, state: State) -> State:
 def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
     """(1): return the state with all joints closed."""
     model = compiled.model
-    holds = np.isin(model.row_kind, HELD) & ~np.isin(model.row_kind, HELD_VELOCITIES)
+    holds = is_held_position(model.row_kind)
     if not holds.any():
         return state
-    scale = np.where(np.isin(model.row_kind, HELD_DISTANCES), compiled.length, 1.0)
+    scale = np.where(is_held_length(model.row_kind), compiled.length, 1.0)
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, state, w=start_unknowns(model))
         parts = linearized(model, work, 1.0, 0.0, 0.0)
@@ -141,7 +141,7 @@ def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
 def require_independent_constraints(compiled: CompiledSystem, work: Work, state: State) -> None:
     """Raise `ModelError` naming the joints if some constraints repeat others, unless these are to share their load."""
     model = compiled.model
-    holds = np.isin(model.row_kind, HELD)
+    holds = is_held(model.row_kind)
     if not holds.any() or model.row_soft.any():
         return
     rows, _ = scaled_constraints(model, work, state)
@@ -176,7 +176,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, state:
 def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_redundant: int) -> bool:
     """Whether fewer constraints repeat others a thousandth of a radian along the motions that the joints allow."""
     model = compiled.model
-    holds = np.isin(model.row_kind, HELD)
+    holds = is_held(model.row_kind)
     set_iterate(work, state)
     G = linearized(model, work, 1.0, 0.0, 0.0).G.toarray()[holds]
     modal = np.ones(G.shape[1], dtype=bool)
@@ -226,7 +226,7 @@ def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> t
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         _, bias = rates_of_constraints(model, work)
         raise_errors_of(compiled.callbacks)
-        rows = -np.where(np.isin(model.row_kind, HELD), bias, work.g)
+        rows = -np.where(is_held(model.row_kind), bias, work.g)
         y, change = solve(with_mass_for_all(model, parts.H), parts, -work.residual, rows)
         w = w + change
         raise_errors_of(compiled.callbacks)
@@ -293,7 +293,7 @@ def velocity_correction(
     """
     model = compiled.model
     work = new_work(model)
-    holds = np.isin(model.row_kind, HELD) & ~np.isin(model.row_kind, HELD_VELOCITIES)
+    holds = is_held_position(model.row_kind)
     if not holds.any():
         return np.zeros(len(work.u))
     w = start_unknowns(model)

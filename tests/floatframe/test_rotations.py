@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from floatframe.kernels import rotation as kernels
@@ -11,10 +11,12 @@ from floatframe.rotations import (
     euler_parameter_rates,
     euler_parameters,
     euler_parameters_of_rotation_vector,
+    left_jacobian,
     right_jacobian,
     rotation_exp,
     rotation_log,
     rotation_matrix,
+    spin_rate,
     tilde,
 )
 
@@ -96,3 +98,19 @@ def test_compiled_rotations_are_the_plain_ones_on_both_sides_of_the_switch(theta
         right = (right_jacobian(theta + step) - right_jacobian(theta - step)) @ v / (2 * s)
         assert_allclose(out[3][:, k], left, rtol=0, atol=1e-8)
         assert_allclose(out[4][:, k], right, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("theta", VECTORS)
+def test_rate_of_the_spin_is_its_derivative_by_a_complex_step(theta):
+    rng = np.random.default_rng(2)
+    rate, second, s = rng.normal(size=3), rng.normal(size=3), 1e-30
+    along = left_jacobian(theta + 1j * s * rate) @ (rate + 1j * s * second)
+    assert_allclose(spin_rate(theta, rate, second), np.imag(along) / s, rtol=0, atol=1e-13)
+
+
+def test_stacks_of_rotations_are_what_their_entries_are():
+    theta = np.array(VECTORS)
+    for function in (rotation_exp, left_jacobian, right_jacobian, tilde, euler_parameters_of_rotation_vector):
+        assert_array_equal(function(theta), np.array([function(each) for each in theta]))
+    p = euler_parameters_of_rotation_vector(theta)
+    assert_array_equal(rotation_matrix(p), np.array([rotation_matrix(each) for each in p]))

@@ -2,14 +2,12 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
-from floatframe.joints.rows import TWIST, TWIST_B
+from floatframe.joints.rows import kind_of
 from floatframe.results.coordinate_elements import coupler_motion, user_force_motion
 from floatframe.results.sensors.measurement import Measurement, unit_words
 from floatframe.results.trajectory import Trajectory
@@ -72,7 +70,7 @@ def angles_of(system: System, k: int) -> list[bool]:
     """Return which coordinates of coupler or user force number k are angles."""
     model = compiled_system(system).model
     rows = model.p_row[model.port0[k] : model.port0[k + 1]]
-    return [bool(is_angle) for is_angle in np.isin(model.row_kind[rows], (TWIST, TWIST_B))]
+    return [kind_of(code).is_angle for code in model.row_kind[rows]]
 
 
 def port_units(system: System, is_angle: bool) -> tuple[str, str, str]:

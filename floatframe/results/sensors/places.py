@@ -13,7 +13,6 @@ from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.markers import Marker, body_name
 from floatframe.checked_values import unit_vector
 from floatframe.compiling.markers import find_marker
-from floatframe.compiling.stiffening import interface_deformation
 from floatframe.errors import ModelError
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.place_motion import PlaceMotion, node_motion, rotation_angle
@@ -161,16 +160,9 @@ class DisplacementSensor:
             find_marker(system, f"sensor {self.name!r}: marker", self.marker)  # names an unknown body
             raise ModelError(f"sensor {self.name!r}: body {name!r} is not flexible; it has no elastic displacement")
         if self.marker.position is not None:
-            shape = body.reduced.Phi[nearest_node(body, self.marker.position)]
+            moved = trajectory.body(name).q @ body.reduced.Phi[nearest_node(body, self.marker.position)].T
         else:
-            find_marker(system, f"sensor {self.name!r}: marker", self.marker)  # names an unknown interface
-            shape = None
-        q = trajectory.body(name).q
-        if shape is None:
-            assert self.marker.interface is not None  # a marker on a flexible body has one
-            is_stiffened = trajectory.entry(name)[1].is_stiffened
-            moved = interface_deformation(body.reduced, self.marker.interface, q, is_stiffened=is_stiffened)[:, :3]
-        else:
-            moved = q @ shape.T
+            end = find_marker(system, f"sensor {self.name!r}: marker", self.marker)
+            moved = end.shape.deformation(trajectory.body(name).q)[:, :3]
         columns, units = vector_columns(moved, system.units.length_symbol)
         return Measurement(self.name, trajectory.t, columns, units)

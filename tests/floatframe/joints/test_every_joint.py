@@ -32,7 +32,7 @@ from floatframe import (
 )
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import harmonic, polynomial_of_time
-from floatframe.joints.rows import HELD, HELD_VELOCITIES
+from floatframe.joints.rows import is_held, is_held_velocity
 from floatframe.kernels.entry import evaluate_and_linearize, rates_of_constraints
 from floatframe.kernels.model import new_work
 from floatframe.results.joint_coordinates import joint_coordinate, joint_coordinates
@@ -105,9 +105,9 @@ def held(system, state, t):
     work.time[0] = t
     set_iterate(work, state)
     evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
-    rows = np.isin(model.row_kind, HELD)
+    rows = is_held(model.row_kind)
     rate, bias = (part[rows] for part in rates_of_constraints(model, work))
-    is_velocity = np.isin(model.row_kind[rows], HELD_VELOCITIES)
+    is_velocity = is_held_velocity(model.row_kind[rows])
     return work.g[rows].copy(), np.where(is_velocity, bias, rate), np.where(is_velocity, np.nan, bias)
 
 

@@ -1,0 +1,171 @@
+"""A marker in its body: its place, how it moves with the modes, and its motion with the body. The one place for both.
+
+With q the coordinates of the body and, of a stiffened body, K_P of second order (docs/theory.md §7), all in body axes:
+
+    Psi(q) = Psi - K_P q                      derivative of displacement and rotation vector by q, (6, n)
+    (d, theta) = 1/2 (Psi + Psi(q)) q         rho = c + d,  axes = exp(theta) triad
+    rates      Psi(q) q_dot                   second rates  Psi(q) q_ddot - (K_P q_dot) q_dot
+    spin       nu = L(theta) theta_dot        L the left Jacobian of the rotation vector, nu_dot as in rotations.py
+
+and with position r, matrix R = R_GB and velocities v (ground axes), omega (body axes) of its body:
+
+    position      r + R rho                         acceleration   v_dot + R (alpha × rho + omega × (omega × rho)
+    velocity      v + R (omega × rho + rho_dot)                    + 2 omega × rho_dot + rho_ddot)
+    axes          R exp(theta) triad                angular velocity  R (omega + nu)
+    angular acceleration  R (alpha + omega × nu + nu_dot)
+
+For stacks: vectors along the last axis; what is taken at q alone takes complex q too. The time loop has the same
+formulas compiled, in kernels/marker.py; a test holds both to each other.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from floatframe.rotations import cross, left_jacobian, rotation_exp, spin_rate, tilde, turned
+
+__all__ = [
+    "BodyFrameMotion",
+    "MarkerMotion",
+    "MarkerShape",
+    "MotionInBody",
+    "bending_of",
+    "interface_shape",
+    "marker_motion",
+    "motion_in_body",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerShape:
+    """A marker in its body."""
+
+    position: Array  #: undeformed, body frame, (3,)
+    triad: Array  #: undeformed axes as columns, body frame, (3, 3)
+    psi: Array | None = None  #: displacement and rotation by q, undeformed, (6, n); None: it does not move
+    bend: Array | None = None  #: K_P of a stiffened body, symmetric in the modes, (6, n, n); None: zero
+
+    def shapes(self, q: Array) -> Array:
+        """Return Psi(q), (..., 6, n)."""
+        if self.psi is None:
+            return np.zeros((6, q.shape[-1]))
+        return self.psi if self.bend is None else self.psi - bent(self.bend, q)
+
+    def deformation(self, q: Array) -> Array:
+        """Return displacement and rotation vector, (..., 6)."""
+        if self.psi is None:
+            return np.zeros((*q.shape[:-1], 6))
+        return turned(self.psi if self.bend is None else self.psi - 0.5 * bent(self.bend, q), q)
+
+    def rates(self, q: Array, q_dot: Array, q_ddot: Array) -> tuple[Array, Array]:
+        """Return first and second rate of `deformation`, (..., 6) each."""
+        shapes = self.shapes(q)
+        second = turned(shapes, q_ddot)
+        if self.bend is not None:
+            second = second - turned(bent(self.bend, q_dot), q_dot)
+        return turned(shapes, q_dot), second
+
+    def pose(self, q: Array) -> tuple[Array, Array]:
+        """Return rho, (..., 3), and axes, (..., 3, 3), in the body."""
+        if self.psi is None:
+            return self.position, self.triad
+        d = self.deformation(q)
+        return self.position + d[..., :3], rotation_exp(d[..., 3:]) @ self.triad
+
+    def jacobian(self, q: Array) -> Array:
+        """Return translation and rotation by the small motions (dx, dtheta, dq) of the body, (6, 6 + n), for q (n,)."""
+        d = self.deformation(q)
+        J = np.zeros((6, 6 + len(q)))
+        J[:3, :3] = J[3:, 3:6] = np.eye(3)
+        J[:3, 3:6] = -tilde(self.position + d[:3])
+        if self.psi is not None:
+            shapes = self.shapes(q)
+            J[:3, 6:] = shapes[:3]
+            J[3:, 6:] = left_jacobian(d[3:]) @ shapes[3:]
+        return J
+
+
+def bent(K: Array, x: Array) -> Array:
+    """Return Σ_l K [a, k, l] x_l, (..., 6, n)."""
+    n = K.shape[-1]
+    return (x @ K.reshape(6 * n, n).T).reshape(*x.shape[:-1], 6, n)
+
+
+def bending_of(reduced: ReducedBody, name: str) -> Array:
+    """Return K_P of an interface, (6, n_q, n_q); zero where the body has none."""
+    if reduced.geometric is None:
+        return np.zeros((6, reduced.n_q, reduced.n_q))
+    place = [interface.name for interface in reduced.interfaces].index(name)
+    return np.asarray(reduced.geometric.interfaces[place])
+
+
+def interface_shape(reduced: ReducedBody, name: str, *, is_stiffened: bool) -> MarkerShape:
+    """Return the marker at an interface, with its axes; `BodyError` if there is no such interface."""
+    interface = reduced.interface(name)
+    bend = bending_of(reduced, name) if is_stiffened else None
+    return MarkerShape(interface.position, interface.triad, np.asarray(interface.Psi), bend)
+
+
+class MotionInBody(NamedTuple):
+    """Motion of a marker as its body sees it, body axes."""
+
+    rho: Array  #: from the frame origin, (..., 3)
+    rho_dot: Array
+    rho_ddot: Array
+    axes: Array  #: columns, (..., 3, 3)
+    spin: Array  #: angular velocity, (..., 3)
+    spin_dot: Array
+
+
+def motion_in_body(shape: MarkerShape, q: Array, q_dot: Array, q_ddot: Array) -> MotionInBody:
+    """Return the motion of a marker in its body, for stacks (..., n)."""
+    rho, axes = shape.pose(q)
+    rate, second = shape.rates(q, q_dot, q_ddot)
+    zero = np.zeros((*q.shape[:-1], 3))
+    if shape.psi is None:
+        return MotionInBody(rho + zero, zero, zero, np.broadcast_to(axes, (*q.shape[:-1], 3, 3)), zero, zero)
+    theta = shape.deformation(q)[..., 3:]
+    spin = turned(left_jacobian(theta), rate[..., 3:])
+    return MotionInBody(
+        rho, rate[..., :3], second[..., :3], axes, spin, spin_rate(theta, rate[..., 3:], second[..., 3:])
+    )
+
+
+class BodyFrameMotion(NamedTuple):
+    """Motion of a body frame."""
+
+    r: Array  #: ground axes, (..., 3)
+    R: Array  #: R_GB, (..., 3, 3)
+    v: Array  #: ground axes, (..., 3)
+    omega: Array  #: body axes, (..., 3)
+    v_dot: Array  #: ground axes, (..., 3)
+    alpha: Array  #: rate of omega, body axes, (..., 3)
+
+
+class MarkerMotion(NamedTuple):
+    """Motion of a marker, ground axes."""
+
+    position: Array  #: (..., 3)
+    velocity: Array
+    acceleration: Array
+    axes: Array  #: columns, (..., 3, 3)
+    omega: Array  #: angular velocity, (..., 3)
+    alpha: Array  #: angular acceleration, (..., 3)
+
+
+def marker_motion(body: BodyFrameMotion, own: MotionInBody) -> MarkerMotion:
+    """Return the motion of a marker whose motion in its body is known."""
+    R, omega, alpha = body.R, body.omega, body.alpha
+    arm = cross(omega, own.rho)
+    relative = cross(alpha, own.rho) + cross(omega, arm) + 2 * cross(omega, own.rho_dot) + own.rho_ddot
+    return MarkerMotion(
+        position=body.r + turned(R, own.rho),
+        velocity=body.v + turned(R, arm + own.rho_dot),
+        acceleration=body.v_dot + turned(R, relative),
+        axes=R @ own.axes,
+        omega=turned(R, omega + own.spin),
+        alpha=turned(R, alpha + cross(omega, own.spin) + own.spin_dot),
+    )

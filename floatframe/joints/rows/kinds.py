@@ -1,0 +1,165 @@
+"""What each kind of row of a joint means: one record, which everything that is not a formula of it asks.
+
+A joint between markers A and B has as unknown a wrench in ground axes: the force F on A (and its opposite on B), the
+moment M on A, the moment N whose opposite acts on B. It has as many rows as unknowns, so that no row of a body depends
+on another body and bodies can be eliminated one by one with the exact tangent. With E = A_A x, Z = A_A z, D = A_B y,
+Y = A_B u, d = r_B - r_A and f(t) the prescribed motion of a row (constant c without):
+
+    held      POINT x      r_A - r_B = 0, along x in ground axes       closes a point
+              DOT x y      E · D = c                                   closes an angle
+              TURN x z y   (E cos f + Z sin f) · D = 0                 turns D to the angle f(t) from Z towards -E
+              SLIDE x      E · d = f                                   distance along an axis of A
+              DISTANCE     |d| = f                                     distance of the points
+              SCREW x z y  E · d = c th                                th the angle of D from Z, about the axis E
+              TURN_B       TURN with A and B exchanged and -f          turns about an axis of B
+              RIM_HEIGHT   Z · (d + rho) = 0                           a disc touches the plane normal to Z of A
+              ROLL x       E · (velocity of the rim at the contact) = 0   held as a velocity: it rolls
+    wrench    GAUGE x      E · part = 0                                none along what is free, part one of F, M, N
+              PUSH x       E · F + Q = 0                               force Q(s, s_dot, F, t) along a free distance
+              TWIST x z y  axis · part + Q = 0                         torque Q(th, th_dot, F, t) about a free angle
+              GAUGE_B y    D · part = 0                                the same about an axis of B
+              THREAD x     E · (N + c F) = 0                           of a screw
+              ARM x        M - N - d × F = 0, along x in ground axes   forces on A and B balance about one point
+              ROD x        F - mu d = 0, along x in ground axes        force along the line of the points
+              TWIST_B      TWIST about an axis of B
+              RIM x        N - rho × F = 0, along x in ground axes     the force acts at the rim of a disc on B
+
+Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/connections/deformed_line.py.
+
+rho leads from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
+kernels/connections/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is
+COUPLE; SPAN is the distance of two points as a coordinate.
+
+Joints whose points coincide need one moment (N = M), the others take the force at the point of B and have ARM rows.
+
+A kind is its entry in `ROW_KINDS`, and its formulas in the kernels (kernels/connections/row_formulas.py). Who wants to
+know whether a row holds something, what its unit is or how its coordinate is measured, looks here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fe_models.foundation.arrays import IntArray
+
+__all__ = [
+    "ARM",
+    "COUPLE",
+    "DISTANCE",
+    "DOT",
+    "FORCE",
+    "GAUGE",
+    "GAUGE_B",
+    "LINE",
+    "LINE_FREE",
+    "LINE_TURN",
+    "MOMENT",
+    "MOMENT_B",
+    "NOTHING",
+    "NO_MOMENT",
+    "PART",
+    "POINT",
+    "POSITION",
+    "PUSH",
+    "RIM",
+    "RIM_HEIGHT",
+    "ROD",
+    "ROLL",
+    "ROW_KINDS",
+    "SCREW",
+    "SLIDE",
+    "SPAN",
+    "SPRING",
+    "THREAD",
+    "TURN",
+    "TURN_B",
+    "TWIST",
+    "TWIST_B",
+    "VELOCITY",
+    "RowKind",
+    "is_held",
+    "is_held_length",
+    "is_held_position",
+    "is_held_velocity",
+    "kind_of",
+]
+
+#: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
+POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
+RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B, LINE, LINE_TURN, LINE_FREE = range(14, 25)
+NOTHING, POSITION, VELOCITY = range(3)  #: what a row holds
+FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
+NO_MOMENT = -1  #: in place of a part: nothing acts there
+
+
+@dataclass(frozen=True)
+class RowKind:
+    """What a kind of row means."""
+
+    code: int  #: in the kernels
+    name: str  #: what it does, in words
+    holds: int = NOTHING  #: NOTHING (it says what the wrench is), POSITION or VELOCITY
+    is_length: bool = False  #: what it holds is in the unit of length (VELOCITY: of length over time), else an angle
+    is_angle: bool = False  #: what it measures as a coordinate is an angle
+    can_yield: bool = False  #: redundant ones share their load where the system asks for it
+    is_loaded: bool = False  #: it carries forces along a coordinate
+    is_free: bool = False  #: it leaves a coordinate free, along which a force may act
+    in_steps: bool = False  #: the schemes of discrete steps know it
+
+
+ROW_KINDS = (
+    RowKind(POINT, "closes a point", POSITION, is_length=True, can_yield=True, in_steps=True),
+    RowKind(DOT, "closes an angle", POSITION, can_yield=True, in_steps=True),
+    RowKind(GAUGE, "no force along what is free", is_free=True, in_steps=True),
+    RowKind(SPRING, "force of a spring-damper", in_steps=True),
+    RowKind(TURN, "turns about an axis of A", POSITION, in_steps=True),
+    RowKind(SLIDE, "distance along an axis of A", POSITION, is_length=True, can_yield=True, in_steps=True),
+    RowKind(DISTANCE, "distance of the points", POSITION, is_length=True, in_steps=True),
+    RowKind(SCREW, "distance follows the angle", POSITION, is_length=True, in_steps=True),
+    RowKind(GAUGE_B, "no moment about an axis of B", is_free=True, in_steps=True),
+    RowKind(THREAD, "no work of moment and force of a screw", in_steps=True),
+    RowKind(ARM, "wrenches on A and B balance", in_steps=True),
+    RowKind(ROD, "force along the line of the points", in_steps=True),
+    RowKind(PUSH, "force along a free distance", is_loaded=True, in_steps=True),
+    RowKind(TWIST, "torque about a free angle", is_angle=True, is_loaded=True, in_steps=True),
+    RowKind(RIM_HEIGHT, "a disc touches a plane", POSITION, is_length=True),
+    RowKind(ROLL, "the rim does not slip", VELOCITY, is_length=True),
+    RowKind(RIM, "the force acts at the rim"),
+    RowKind(COUPLE, "coordinates are coupled", POSITION),
+    RowKind(PART, "part of a force element"),
+    RowKind(SPAN, "distance of two points as a coordinate"),
+    RowKind(TURN_B, "turns about an axis of B", POSITION),
+    RowKind(TWIST_B, "torque about an axis of B", is_angle=True, is_loaded=True),
+    RowKind(LINE, "stays on a deformed line", POSITION, is_length=True),
+    RowKind(LINE_TURN, "keeps its direction to a deformed line", POSITION),
+    RowKind(LINE_FREE, "no force along a deformed line"),
+)
+
+HOLDS = np.array([kind.holds for kind in ROW_KINDS])
+IS_LENGTH = np.array([kind.is_length for kind in ROW_KINDS])
+
+
+def kind_of(code: int) -> RowKind:
+    """Return the record of a kind."""
+    return ROW_KINDS[int(code)]
+
+
+def is_held(codes: IntArray) -> NDArray[np.bool_]:
+    """Return which rows hold something, positions or velocities, by their codes, (n,)."""
+    return HOLDS[codes] != NOTHING
+
+
+def is_held_position(codes: IntArray) -> NDArray[np.bool_]:
+    """Return which rows hold a position, by their codes, (n,)."""
+    return HOLDS[codes] == POSITION
+
+
+def is_held_velocity(codes: IntArray) -> NDArray[np.bool_]:
+    """Return which rows hold a velocity and no position, by their codes, (n,)."""
+    return HOLDS[codes] == VELOCITY
+
+
+def is_held_length(codes: IntArray) -> NDArray[np.bool_]:
+    """Return which rows hold a position in the unit of length, by their codes, (n,)."""
+    return (HOLDS[codes] == POSITION) & IS_LENGTH[codes]
