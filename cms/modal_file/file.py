@@ -7,12 +7,14 @@ from cms.errors import CmsError, ModalFileError
 from cms.modal_file.content import FORMAT, body_of, content_of, require_same_invariants
 from cms.modal_file.entries import in_units
 from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.seal import Kind
 from fe_models.foundation.sealed_hdf5 import read_sealed, write_sealed
 from fe_models.foundation.units import Units, unit_system
 
 __all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
 
 VERSION = 2  #: of the format; a reader refuses greater ones, and reads all that are less
+KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 
 
 def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
@@ -45,7 +47,7 @@ def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> R
         If the unit system is unknown.
     """
     wanted = unit_system(units) if isinstance(units, str) else units
-    content = read_sealed(path, format=FORMAT, version=VERSION)
+    content = read_sealed(path, KIND)
     try:
         body = body_of(content)
         require_same_invariants(content, body.moments)
@@ -76,4 +78,4 @@ def convert_units(reduced: ReducedBody, units: Units | str) -> ReducedBody:
 
 def digest(path: str | os.PathLike[str]) -> str:
     """Return the digest of a modal file: equal for equal contents (sha256, 64 hexadecimal digits)."""
-    return str(read_sealed(path, format=FORMAT, version=VERSION).attributes["/"]["digest"])
+    return str(read_sealed(path, KIND).attributes["/"]["digest"])

@@ -1,12 +1,18 @@
-"""Paths: words about a missing file, and files that are replaced whole or not at all."""
+"""Paths: words about a missing file, and files that are replaced whole or not at all; devices and pipes never are."""
 
 import os
+import re
 import secrets
+import stat
+import sys
 from pathlib import Path
 
 from fe_models.foundation.words import nearest
 
-__all__ = ["near_file", "replace_file"]
+__all__ = ["is_stream", "near_file", "replace_file", "same_file", "sync_folder"]
+
+OWN_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,6})")
+STANDARD = {"/dev/stdout": 1, "/dev/stderr": 2}
 
 
 def near_file(path: Path) -> str:
@@ -17,14 +23,44 @@ def near_file(path: Path) -> str:
     return hint.split("? ")[0] + "?" if "did you mean" in hint else ""
 
 
+def own_descriptor(path: Path) -> int | None:
+    """Return the open file of this process that a path such as /dev/stdout means, None if it means another file."""
+    text = os.path.abspath(path)
+    found = OWN_DESCRIPTOR.fullmatch(text)
+    return int(found[1]) if found else STANDARD.get(text)
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a path is written to as it stands, and never replaced: a device, a pipe, a socket, /dev/stdout."""
+    if own_descriptor(path) is not None:
+        return True
+    try:
+        mode = path.stat().st_mode  # through links
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def same_file(path: Path, other: Path) -> bool:
+    """Whether two paths are one file, through links too, or would be one if they were there."""
+    if path.exists() and other.exists():
+        return path.samefile(other)
+    return path.resolve() == other.resolve()
+
+
 def replace_file(path: Path, *parts: bytes) -> None:
     """Write the parts beside `path`, make them durable, and give them its name in one step.
+
+    A device or a pipe gets the bytes instead, and stays what it is.
 
     Raises
     ------
     OSError
         If that fails; a file that was there is unchanged, and nothing is left beside it.
     """
+    if is_stream(path):
+        write_stream(path, *parts)
+        return
     path = path.resolve()  # through a link, so that the link stays one
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
@@ -39,6 +75,17 @@ def replace_file(path: Path, *parts: bytes) -> None:
         part.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def write_stream(path: Path, *parts: bytes) -> None:
+    """Write the parts to a device or a pipe, or after what was written to standard output before."""
+    own = own_descriptor(path)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    descriptor = os.open(path, os.O_WRONLY) if own is None else os.dup(own)
+    with open(descriptor, "wb") as file:
+        for data in parts:
+            file.write(data)
 
 
 def sync_folder(folder: Path) -> None:

@@ -6,7 +6,10 @@ from difflib import get_close_matches
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["nearest", "node_list"]
+__all__ = ["nearest", "node_list", "quoted"]
+
+LONGEST = 80  #: characters of a name or value in a message
+MOST_CHOICES = 40  #: names in a message
 
 
 def nearest(name: str, choices: Iterable[str]) -> str:
@@ -14,11 +17,28 @@ def nearest(name: str, choices: Iterable[str]) -> str:
     names = sorted(str(choice) for choice in choices)
     if not names:
         return "; there are no choices"
-    close = get_close_matches(str(name), names, n=1)
-    hint = f"; did you mean {close[0]!r}?" if close else ";"
-    return f"{hint} choices: {', '.join(names)}"
+    short = [choice for choice in names if len(choice) <= 2 * LONGEST]  # comparing takes the square of the length
+    close = get_close_matches(str(name)[: 2 * LONGEST], short, n=1)
+    hint = f"; did you mean {quoted(close[0])}?" if close else ";"
+    shown = [shortened(choice) for choice in names[:MOST_CHOICES]]
+    more = f" and {len(names) - MOST_CHOICES} more" if len(names) > MOST_CHOICES else ""
+    return f"{hint} choices: {', '.join(shown)}{more}"
+
+
+def shortened(text: str) -> str:
+    """Return a text, cut where it is longer than a line of a message should be."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 
 def node_list(nodes: Iterable[int], positions: NDArray[np.float64]) -> str:
     """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message."""
     return ", ".join(f"node {n} at ({', '.join(f'{x:.6g}' for x in positions[n])})" for n in nodes)
+
+
+def quoted(value: object) -> str:
+    """Return a value of the user as it is shown in a message: in quotes where it is text, at most 80 characters."""
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # nested too deeply, or a whole number of thousands of digits
+        return f"<{type(value).__name__}>"
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...{text[-1]}"

@@ -6,6 +6,7 @@ size to choose, and times may be as far apart as the next position can be found 
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +20,10 @@ from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.joints.rows import is_held_velocity
 from floatframe.kernels.model import Rows, Work, new_work
-from floatframe.motion.integration import head_of, joint_rows
-from floatframe.results.results_file import MemorySource, ResultsWriter
+from floatframe.motion.integration import files_of, head_of, joint_rows
+from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.results.writer import ResultsPlace, ResultsWriter
 from floatframe.start.constraint_words import conflict_of_drives
 from floatframe.start.freedoms import constraint_mobility
 from floatframe.start.initial import assembled, checked
@@ -91,42 +93,44 @@ def kinematics(
     guard = SingularityGuard(compiled, now)
     spacing = float(t[-1] - t[0]) / (len(t) - 1)
     head = head_of(system, Kinematics(name), float(t[0]), float(t[-1]), spacing, 1)  # type: ignore[arg-type]
-    writer = None if output is None else ResultsWriter(output, head)
-    kept: list[Rows] = []
-    power, done = np.zeros((2, 2)), np.zeros(2)  # powers at the last two times, work up to now
-    try:
-        for k, time in enumerate(t):
-            if k:
-                now = moved_on(compiled, work, now, float(time), elasticity, guard)
-            rows, power[1] = observed_state(compiled, work, now.state, now.u_dot, now.w, now.t)
-            if k:
-                done = done + (time - t[k - 1]) / 2 * (power[0] + power[1])
-            power[0] = power[1]
-            rows.diagnostics[0, 10:12] = done
+    with ExitStack() as held:  # the place of the results, until the end of the work
+        place = None if output is None else held.enter_context(ResultsPlace(output, inputs=files_of(system)))
+        writer = None if place is None else ResultsWriter(place, head)
+        kept: list[Rows] = []
+        power, done = np.zeros((2, 2)), np.zeros(2)  # powers at the last two times, work up to now
+        try:
+            for k, time in enumerate(t):
+                if k:
+                    now = moved_on(compiled, work, now, float(time), elasticity, guard)
+                rows, power[1] = observed_state(compiled, work, now.state, now.u_dot, now.w, now.t)
+                if k:
+                    done = done + (time - t[k - 1]) / 2 * (power[0] + power[1])
+                power[0] = power[1]
+                rows.diagnostics[0, 10:12] = done
+                if writer is None:
+                    kept.append(rows)
+                else:
+                    writer.append(rows)
+                    if (k + 1) % ROWS_KEPT == 0:
+                        writer.close_segment()
+                if progress is not None:
+                    progress(k + 1, len(t))
+        except ConvergenceError as error:
             if writer is None:
-                kept.append(rows)
+                error.trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False)
             else:
-                writer.append(rows)
-                if (k + 1) % ROWS_KEPT == 0:
-                    writer.close_segment()
-            if progress is not None:
-                progress(k + 1, len(t))
-    except ConvergenceError as error:
+                writer.close_segment()
+                error.trajectory = read_results(writer.folder)
+                error.args = (f"{error}; the motion so far is in {str(writer.folder)!r}",)
+            raise
+        except BaseException:
+            if writer is not None:
+                writer.close_segment()
+            raise
         if writer is None:
-            error.trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False)
-        else:
-            writer.close_segment()
-            error.trajectory = read_results(writer.folder)
-            error.args = (f"{error}; the motion so far is in {str(writer.folder)!r}",)
-        raise
-    except BaseException:
-        if writer is not None:
-            writer.close_segment()
-        raise
-    if writer is None:
-        return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=True)
-    writer.finish()
-    return read_results(writer.path)
+            return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=True)
+        writer.finish()
+        return read_results(writer.path)
 
 
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:

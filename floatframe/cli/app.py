@@ -85,7 +85,7 @@ def resume_command(
 
 def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], Trajectory]") -> None:
     """Run a motion with a progress bar; print what it is, or where the part of it is that an interruption left."""
-    from floatframe.results.results_file import SEGMENTS
+    from floatframe.results.results_file import segments_folder
 
     try:
         with stages(remaining=True) as clock:
@@ -97,7 +97,7 @@ def compute(name: str, path: Path, run: "Callable[[Callable[[Progress], None]], 
 
                 trajectory = run(on_progress)
     except KeyboardInterrupt:
-        segments = Path(f"{path}{SEGMENTS}")
+        segments = segments_folder(path.resolve())
         kept = f"the motion so far is in {segments}, which plot, animate and info can read; floatframe resume goes on"
         print_error(f"interrupted; {kept if segments.is_dir() else 'nothing was written'}")
         raise typer.Exit(INTERRUPTED) from None

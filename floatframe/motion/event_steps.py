@@ -13,9 +13,11 @@ from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator
 from floatframe.kernels.model import Rows, Work, new_work
 from floatframe.motion.events import events_of, off_at_start, require_events, with_forces_off
-from floatframe.results.results_file import Head, MemorySource, arrays_of
+from floatframe.results.head import Head
+from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import sensor_of
 from floatframe.results.trajectory import Trajectory
+from floatframe.results.writer import arrays_of
 from floatframe.system import System
 
 __all__ = ["EventWatch"]

@@ -4,10 +4,10 @@ import logging
 import os
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.metadata import PackageNotFoundError, version
 from math import ceil
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,18 +25,11 @@ from floatframe.motion.event_steps import EventWatch
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.motion.step_advice import step_advice
 from floatframe.motion.validity_watch import ValidityWatch
-from floatframe.results.results_file import (
-    SEGMENTS,
-    BodyEntry,
-    Head,
-    MemorySource,
-    ResultsWriter,
-    arrays_of,
-    last_restart,
-    validity_text,
-)
+from floatframe.results.head import BodyEntry, Head
+from floatframe.results.results_file import MemorySource, validity_text
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
+from floatframe.results.writer import ResultsPlace, ResultsWriter, arrays_of, last_restart
 from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.state import State
 from floatframe.system import System
@@ -47,6 +40,8 @@ log = logging.getLogger(__name__)
 
 BATCH_STEPS = 200  #: steps per call of the compiled loop
 SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
+TIMES = ("t_start", "t_end", "h", "output_every")  #: of the run, in the head
+MOST_STEPS = 1e12  #: of a run: months of computing
 
 
 @dataclass(frozen=True)
@@ -123,7 +118,7 @@ def integrate(
         raise ModelError(
             f"integrate: expected output_every and batch_steps of at least 1, got {output_every} and {batch_steps}"
         )
-    n_total = max(1, ceil((t_end - t_start) / h * (1 - 1e-12) - 1e-9))
+    n_total = number_of_steps(t_start, t_end, h)
     step = (t_end - t_start) / n_total
     if abs(step - h) > 1e-9 * h:
         log.info("h = %g does not divide the time from %g to %g: h = %.9g is used", h, t_start, t_end, step)
@@ -133,17 +128,36 @@ def integrate(
     head = head_of(system, integrator, t_start, t_end, step, output_every)
     watch = EventWatch(system, head) if system.events else None
     begun = system if watch is None else watch.system
-    carry = integrator.start(begun, t_start, state)
-    work = new_work(compiled_system(begun).model)
-    carry, rows = integrator.observe(begun, t_start, carry, work)
-    if watch is not None:
-        watch.begin(rows)
-    writer = None if output is None else ResultsWriter(output, head)
-    run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=watch)
-    run.keep(rows)
-    if writer is not None:
-        writer.close_segment(run.record(carry, 0))
-    return run.advance(carry, 0, batch_steps, progress)
+    with ExitStack() as held:  # the place of the results, from before the work until its end
+        place = None if output is None else held.enter_context(ResultsPlace(output, inputs=files_of(system)))
+        carry = integrator.start(begun, t_start, state)
+        work = new_work(compiled_system(begun).model)
+        carry, rows = integrator.observe(begun, t_start, carry, work)
+        if watch is not None:
+            watch.begin(rows)
+        writer = None if place is None else ResultsWriter(place, head)
+        run = Run(system, integrator, head, t_start, t_end, step, n_total, output_every, writer, events=watch)
+        run.keep(rows)
+        if writer is not None:
+            writer.close_segment(run.record(carry, 0))
+        return run.advance(carry, 0, batch_steps, progress)
+
+
+def number_of_steps(t_start: float, t_end: float, h: float) -> int:
+    """Return how many steps lead from t_start to t_end; `ModelError` if no computer would take them."""
+    wanted = (t_end - t_start) / h
+    if not wanted <= MOST_STEPS:
+        raise ModelError(
+            f"integrate: from t = {t_start:g} to {t_end:g} with h = {h:g} these are {wanted:.1e} steps, expected up to "
+            f"{MOST_STEPS:.0e}; take t_end nearer, or a greater h"
+        )
+    return max(1, ceil(wanted * (1 - 1e-12) - 1e-9))
+
+
+def files_of(system: System) -> list[str]:
+    """Return the files that a system was read from."""
+    sources = [body.source for body in system.bodies if isinstance(body, FlexibleBody)]
+    return [source for source in (system.source, *sources) if source]
 
 
 def resume(
@@ -170,33 +184,33 @@ def resume(
     ConvergenceError
         If a step fails.
     """
-    head, record = last_restart(output)
-    run = dict(head.run)
-    kind = CLASSES.get(str(run["integrator"]))
-    if kind is None or any(part.name not in run for part in fields(kind)):
-        raise ResultsError(f"{output}: the interrupted run is of another version of this program; run it anew")
-    integrator = kind(**{part.name: run[part.name] for part in fields(kind)})
-    if run.get("digest") != system_digest(system, integrator):
-        raise ResultsError(
-            f"{output}: the interrupted run was of another system than {system.name!r}, or it has changed since; "
-            "resume it with the files it was begun with, or run it anew"
-        )
-    if record is None:
-        raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
-    carry, n_done = carry_of_record(record, system)
-    watch = EventWatch(system, head) if system.events else None
-    if watch is not None:
-        watch.restore(record)
-    path = Path(output)
-    writer = ResultsWriter(path.with_name(path.name.removesuffix(SEGMENTS)), head, goes_on=True)
-    n_total = round((run["t_end"] - run["t_start"]) / run["h"])
-    again = Run(
-        system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer,
-        notes=notes_from_json(validity_text(writer.path)),
-        seconds_before=float(record.get("seconds", 0.0)),
-        events=watch,
-    )  # fmt: skip
-    return again.advance(carry, n_done, BATCH_STEPS, progress)
+    with ResultsPlace(output, inputs=files_of(system), is_begun=True) as place:
+        head, record = last_restart(place.folder)
+        run = dict(head.run)
+        kind = CLASSES.get(str(run.get("integrator")))
+        if kind is None or any(name not in run for name in (*TIMES, *(part.name for part in fields(kind)))):
+            raise ResultsError(f"{output}: the interrupted run is of another version of this program; run it anew")
+        integrator = kind(**{part.name: run[part.name] for part in fields(kind)})
+        if run.get("digest") != system_digest(system, integrator):
+            raise ResultsError(
+                f"{output}: the interrupted run was of another system than {system.name!r}, or it has changed since; "
+                "resume it with the files it was begun with, or run it anew"
+            )
+        if record is None:
+            raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
+        carry, n_done = carry_of_record(record, system)
+        watch = EventWatch(system, head) if system.events else None
+        if watch is not None:
+            watch.restore(record)
+        writer = ResultsWriter(place, head, goes_on=True)
+        n_total = round((run["t_end"] - run["t_start"]) / run["h"])
+        again = Run(
+            system, integrator, head, run["t_start"], run["t_end"], run["h"], n_total, run["output_every"], writer,
+            notes=notes_from_json(validity_text(place.folder)),
+            seconds_before=float(record.get("seconds", 0.0)),
+            events=watch,
+        )  # fmt: skip
+        return again.advance(carry, n_done, BATCH_STEPS, progress)
 
 
 @dataclass

@@ -39,9 +39,12 @@ def restart_record(carry: Carry, n_done: int) -> dict[str, Array]:
 
 def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry, int]:
     """Return the memory of the integrator and the number of steps done; `ResultsError` if it is of another system."""
-    placed = compiled_system(system).placed
-    for name in STATE:
-        if name not in record or record[name].shape != getattr(placed, name).shape:
+    placed, model = compiled_system(system).placed, compiled_system(system).model
+    shapes = {name: getattr(placed, name).shape for name in STATE}
+    shapes |= {"u_dot": placed.u.shape, "a": placed.u.shape, "w": (int(model.c_w0[-1]),), "work": (2,), "power": (2,)}
+    shapes |= dict.fromkeys((*STEPS, *COUNTS, "n_done"), ())
+    for name, shape in shapes.items():
+        if name not in record or record[name].shape != shape:
             raise ResultsError("restart: the record is of a system with other bodies; resume the system that was run")
     values: dict[str, Any] = {name: np.asarray(record[name], dtype=float) for name in ARRAYS}
     values |= {name: float(record[name]) for name in STEPS} | {name: int(record[name]) for name in COUNTS}

@@ -11,7 +11,8 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest
 from floatframe.errors import ResultsError
-from floatframe.results.results_file import ArraySource, BodyEntry, Head, open_results, validity_text
+from floatframe.results.head import BodyEntry, Head
+from floatframe.results.results_file import ArraySource, open_results, validity_text
 from floatframe.results.validity import ValidityNote, notes_from_json
 from floatframe.state import State
 
@@ -175,4 +176,8 @@ def read_results(path: str | os.PathLike[str]) -> Trajectory:
         If there is nothing, or the file is of another kind, a newer version or damaged.
     """
     head, source, is_complete = open_results(path)
-    return Trajectory(head, source, is_complete, Path(path), notes_from_json(validity_text(Path(path))))
+    try:
+        notes = notes_from_json(validity_text(Path(path)))
+    except ValueError as error:
+        raise ResultsError(f"{path}: attribute 'validity': {error}; the file is damaged") from error
+    return Trajectory(head, source, is_complete, Path(path), notes)

@@ -2,7 +2,8 @@
 
 import json
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 __all__ = ["LINEAR", "STIFFENED", "Limits", "ValidityNote", "notes_from_json", "notes_to_json"]
 
@@ -73,5 +74,22 @@ def notes_to_json(notes: Iterable[ValidityNote]) -> str:
 
 
 def notes_from_json(text: str) -> tuple[ValidityNote, ...]:
-    """Return the notes of a text."""
-    return tuple(ValidityNote(**note) for note in json.loads(text))
+    """Return the notes of a text.
+
+    Raises
+    ------
+    ValueError
+        If it is not one of `notes_to_json`.
+    """
+    kinds: dict[str, Any] = {part.name: part.type for part in fields(ValidityNote)}
+    try:
+        notes = json.loads(text)
+        for note in notes:
+            if set(note) != set(kinds) or note["kind"] not in KINDS:
+                raise ValueError
+            if any(not isinstance(value, float | int if kinds[name] is float else kinds[name])
+                   for name, value in note.items()):  # fmt: skip
+                raise ValueError
+        return tuple(ValidityNote(**note) for note in notes)
+    except (TypeError, ValueError, RecursionError):
+        raise ValueError("expected the notes on the range of linear frames as JSON text") from None

@@ -80,7 +80,10 @@ def test_a_file_of_version_1_is_read_as_it_was_written():
     new = synthetic_reduced_body(n_q=2, n_nodes=10)
     bare = replace(new, columns=None, nodal_sums=None, load_cases=(), stress=None, point_stress=None,
                    frame=replace(new.frame, dofs=np.zeros((0, 2), int)))  # fmt: skip
-    assert differences(bare, old) == []
+    for made, read_ in zip(bare.interfaces, old.interfaces, strict=True):  # by a QR, whose last bits differ by machine
+        np.testing.assert_allclose(read_.triad, made.triad, rtol=0, atol=1e-15)
+    same = [replace(each, triad=other.triad) for each, other in zip(bare.interfaces, old.interfaces, strict=True)]
+    assert differences(replace(bare, interfaces=same), old) == []
 
 
 def bar_in(units):

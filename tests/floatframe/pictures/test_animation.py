@@ -12,7 +12,8 @@ from floatframe.errors import ResultsError
 from floatframe.pictures.animation import animate, bodies_of, motion_scene, trail
 from floatframe.pictures.film_times import film_times, round_below, speed_words, time_words
 from floatframe.pictures.stage import box_of, ground_grid, view_axes
-from floatframe.results.results_file import BodyEntry, Head, MemorySource
+from floatframe.results.head import BodyEntry, Head
+from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from tests.synthetic import synthetic_reduced_body

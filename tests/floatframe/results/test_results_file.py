@@ -1,15 +1,20 @@
 """Results on disk: what a run, a stopped run and a killed run leave."""
 
+import json
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fe_models.foundation.hdf5_file import Manifest, as_attribute, write_sealed_file
 from floatframe import (
     GROUND,
     ConvergenceError,
@@ -26,6 +31,7 @@ from floatframe import (
     read_results,
 )
 from floatframe.results.recovery import interface_positions, nodal_positions, point_positions
+from floatframe.results.results_file import KIND
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
 METHOD = GeneralizedAlpha()
@@ -153,7 +159,7 @@ def test_files_of_another_kind_are_refused(tmp_path):
     with pytest.raises(ResultsError, match="no such file"):
         read_results(path)
     path.write_bytes(b"\x89HDF nothing")
-    with pytest.raises(ResultsError, match="damaged or of another kind"):
+    with pytest.raises(ResultsError, match="not a results-file: expected an HDF5 file"):
         read_results(path)
     with h5py.File(path, "w") as file:
         file.attrs["format"] = "modal-file"
@@ -161,18 +167,193 @@ def test_files_of_another_kind_are_refused(tmp_path):
         read_results(path)
 
 
-def test_a_newer_version_is_refused_and_so_is_a_misshapen_file(tmp_path):
-    path = tmp_path / "run.h5"
+def rewritten(path, change):
+    """Write a results file anew with its seal, after a change of what it says."""
+
+    def fill(file):
+        with h5py.File(path, "r") as old:
+            values = {name: item[()] for name, item in old.items()}
+            attributes = {name: as_attribute(value) for name, value in old.attrs.items() if name != "digest"}
+        change(values, attributes)
+        manifest = Manifest(file)
+        for name, value in values.items():
+            manifest.dataset(f"/{name}", value, {})
+        manifest.attributes("/", attributes)
+        manifest.close()
+
+    write_sealed_file(path, replace(KIND, version=2), fill, part=path.with_name("part"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    path = tmp_path_factory.mktemp("short") / "run.h5"
     integrate(SYSTEM, METHOD, 0.01, 1e-3, output=path)
-    with h5py.File(path, "r+") as file:
-        file.attrs["version"] = 99
-    with pytest.raises(ResultsError, match="results format 99"):
+    return path
+
+
+@pytest.fixture
+def path(short, tmp_path):
+    return Path(shutil.copy(short, tmp_path / "run.h5"))
+
+
+def test_a_newer_version_is_refused_by_its_number(path):
+    with pytest.raises(ResultsError, match="format version 99, this program reads versions up to 2"):
+        read_results(rewritten(path, lambda values, attributes: attributes.update(version=99)))
+    path.write_bytes(b"floatframe results-file 12\nbytes 9\nof a kind that does not exist yet")
+    with pytest.raises(ResultsError, match="format version 12"):
         read_results(path)
-    with h5py.File(path, "r+") as file:
-        file.attrs["version"] = 1
+
+
+def test_no_damaged_byte_is_read(path):
+    """Two hundred files with one to four bytes changed, cut off, or with a hole; the same numbers or one message."""
+    whole, rng = path.read_bytes(), np.random.default_rng(0)
+    for k in range(200):
+        data = bytearray(whole)
+        if k % 4 == 0:
+            del data[int(rng.integers(len(data))) :]
+        elif k % 4 == 1:
+            first = int(rng.integers(len(data)))
+            data[first : first + 64] = bytes(len(data[first : first + 64]))
+        else:
+            for place in rng.integers(len(data), size=k % 4):
+                data[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(data)
+        if bytes(data) != whole:
+            with pytest.raises(ResultsError):
+                read_results(path)
+
+
+HEADS = {  # what is changed in the head -> what the message names
+    "system": (lambda head: head.update(system=3), "system: expected text"),
+    "missing": (lambda head: head.pop("bodies"), "expected an object with"),
+    "unknown": (lambda head: head.update(more=1), "expected an object with"),
+    "units": (lambda head: head.update(units="mm"), "units: expected one of"),
+    "n_q": (lambda head: head["bodies"][0].update(n_q=10**9), "bodies.1..q0"),
+    "negative": (lambda head: head["bodies"][1].update(n_q=-1), "n_q: expected 0 or more"),
+    "kind": (lambda head: head["bodies"][0].update(n_q="3"), "expected a whole number"),
+    "name": (lambda head: head["bodies"][1].update(name="rod"), "a name of its own"),
+    "w0": (lambda head: head.update(w0=[0, 9, 6]), "w0: expected"),
+    "joints": (lambda head: head.update(joints=[1, 2]), "joints: expected a list of names"),
+    "run": (lambda head: head["run"].update(h=float("nan")), "run.h: expected a finite number"),
+    "gravity": (lambda head: head["run"].update(gravity=["g"]), "run.gravity"),
+    "summary": (lambda head: head.update(summary={"n_steps": "many"}), "summary.n_steps"),
+    "events": (lambda head: head.update(summary={"events": [{"name": "stop"}]}), r"summary.events.0..t"),
+}
+
+
+@pytest.mark.parametrize("case", HEADS)
+def test_a_head_that_does_not_fit_is_refused_even_when_sealed(path, case):
+    change, words = HEADS[case]
+
+    def changed(values, attributes):
+        head = json.loads(attributes["head"])
+        change(head)
+        attributes["head"] = json.dumps(head)
+
+    with pytest.raises(ResultsError, match=words):
+        read_results(rewritten(path, changed))
+
+
+@pytest.mark.parametrize("text", ["", "[", "null", "[[" * 10**5, '"' + "x" * 10**5 + '"', "1" + "0" * 5000])
+def test_a_head_that_is_no_object_is_refused_in_one_short_message(path, text):
+    for name in ("head", "validity"):
+        with pytest.raises(ResultsError) as error:
+            read_results(rewritten(path, lambda values, attributes, name=name: attributes.update({name: text or " "})))
+        assert len(str(error.value)) < 500
+
+
+def test_misshapen_and_missing_datasets_are_refused(path):
+    for change in (
+        lambda values, attributes: values.pop("q"),
+        lambda values, attributes: values.update(q=values["q"][:, :1]),
+        lambda values, attributes: values.update(u=values["u"][1:]),
+        lambda values, attributes: values.update(t=np.arange(len(values["t"]))),
+        lambda values, attributes: values.update(t=values["t"][::-1]),
+        lambda values, attributes: values.update(t=values["t"] * np.nan),
+    ):
+        whole = path.read_bytes()
+        with pytest.raises(ResultsError, match=r"misshapen|ascend"):
+            read_results(rewritten(path, change))
+        path.write_bytes(whole)
+
+
+def repacked(path, change=lambda file: None):
+    """Return a copy without seal, as an HDF5 tool writes it, in which something may be changed."""
+    copy = path.with_name("repacked.h5")
+    with h5py.File(path, "r") as old, h5py.File(copy, "w") as new:
+        for name in old:
+            old.copy(name, new)
+        for name, value in old.attrs.items():
+            new.attrs.create(name, value, dtype=old.attrs.get_id(name).dtype)
+        change(new)
+    return copy
+
+
+def test_a_repacked_file_is_read_and_its_changes_are_seen_by_the_digest(path):
+    assert_same_motion(read_results(path), read_results(repacked(path)))
+
+    def one_number(file):
+        file["q"][3, 0] += 1e-12
+
+    def renamed(file):
+        file.move("u", "v")
+
+    def other_head(file):
+        file.attrs["head"] = as_attribute(file.attrs["head"]).replace("bob", "box")
+
+    for change, words in ((one_number, "sha256"), (renamed, "digest"), (other_head, "digest")):
+        with pytest.raises(ResultsError, match=words):
+            read_results(repacked(path, change))
+
+
+def test_numbers_that_lie_elsewhere_or_nowhere_are_refused(path, tmp_path):
+    """External links, soft links, virtual and external datasets; a shape of which the file holds nothing."""
+    with h5py.File(tmp_path / "other.h5", "w") as other:
+        other["q"] = np.zeros((11, 3))
+    n_t = len(read_results(path).t)
+
+    def external_link(file):
         del file["q"]
-    with pytest.raises(ResultsError, match="'q' is missing"):
-        read_results(path)
+        file["q"] = h5py.ExternalLink("other.h5", "/q")
+
+    def soft_link(file):
+        del file["q"]
+        file["q"] = h5py.SoftLink("/u")
+
+    def virtual(file):
+        del file["q"]
+        layout = h5py.VirtualLayout((n_t, 3), "f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "q", (11, 3))
+        file.create_virtual_dataset("q", layout)
+
+    def external(file):
+        del file["q"]
+        file.create_dataset("q", (n_t, 3), "f8", external=[(str(tmp_path / "q.bin"), 0, n_t * 24)])
+
+    def empty(file):
+        del file["q"]
+        file.create_dataset("q", (10**9, 3), "f8")
+
+    def cycle(file):
+        file["again"] = file["/"]
+
+    for change, words in ((external_link, "link to elsewhere"), (soft_link, "link to elsewhere"),
+                          (virtual, "another file"), (external, "another file"), (empty, "of which the file holds 0"),
+                          (cycle, "two names")):  # fmt: skip
+        with pytest.raises(ResultsError, match=words):
+            read_results(repacked(path, change))
+
+
+def test_a_file_of_version_1_is_read_and_said_to_have_no_checksum(path, caplog):
+    old = path.with_name("old.h5")
+    with h5py.File(path, "r") as new, h5py.File(old, "w") as file:
+        for name in new:
+            file[name] = new[name][...]
+        file.attrs["format"], file.attrs["version"], file.attrs["is_complete"] = "floatframe-results", 1, True
+        file.attrs["head"] = new.attrs["head"]
+    assert_same_motion(read_results(path), read_results(old))
+    assert [record.message for record in caplog.records if "no checksum" in record.message]
 
 
 def test_a_folder_that_is_not_there_is_refused_before_the_run(tmp_path):

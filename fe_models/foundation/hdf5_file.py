@@ -1,0 +1,368 @@
+"""HDF5 files that are written whole or not at all, under a seal, and read without trust.
+
+Writing: HDF5 writes through `Storage`, which keeps the first failure of the disk to itself: the library never meets a
+full disk, on which it can crash, and the caller gets the plain OSError. Reading: only what lies in the file itself and
+is as large as it says is taken (`own_items`): no links to other files, no virtual or external datasets, no shapes
+that the bytes of the file cannot fill.
+"""
+
+import hashlib
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from fe_models.foundation.paths import sync_folder
+from fe_models.foundation.seal import SEAL_SIZE, Kind, altered, reason, seal_of
+
+__all__ = [
+    "DIGEST",
+    "SHA256",
+    "Attribute",
+    "Manifest",
+    "as_attribute",
+    "described",
+    "digest_of_lines",
+    "opened",
+    "own_items",
+    "require_digest",
+    "write_sealed_file",
+]
+
+DIGEST = "digest"  #: name of the root attribute
+SHA256 = "sha256"  #: name of the attribute of a dataset
+MOST_COMPRESSED = 1032  #: the most that deflate can make of a byte, where a tool has repacked a file
+BLOCK_VALUES = 1 << 20  #: values that are hashed at once
+Attribute = str | int | float
+
+
+# Writing -------------------------------------------------------------------------------------------------------------
+
+
+class Storage:
+    """An open file as HDF5 takes it; after a write has failed it takes everything and keeps nothing."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+        self.position = 0
+        self.failure: OSError | None = None
+
+    def guarded(self, action: Callable[[], Any]) -> None:
+        """Run an action of the disk unless one has failed already."""
+        if self.failure is None:
+            try:
+                action()
+            except OSError as error:
+                self.failure = error
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Move to a position."""
+        origin = {os.SEEK_SET: 0, os.SEEK_CUR: self.position}.get(whence)
+        self.position = offset + (self.file.seek(0, os.SEEK_END) if origin is None else origin)
+        return self.position
+
+    def tell(self) -> int:
+        """Return the position."""
+        return self.position
+
+    def write(self, data: Any) -> int:
+        """Write bytes at the position."""
+
+        def put() -> None:
+            self.file.seek(self.position)
+            self.file.write(data)
+
+        self.guarded(put)
+        self.position += len(data)
+        return len(data)
+
+    def readinto(self, buffer: Any) -> int:
+        """Read bytes from the position."""
+        self.file.seek(self.position)
+        n = self.file.readinto(buffer)  # type: ignore[attr-defined]
+        self.position += n
+        return int(n)
+
+    def read(self, n: int = -1) -> bytes:
+        """Return bytes from the position."""
+        self.file.seek(self.position)
+        data = self.file.read(n)
+        self.position += len(data)
+        return data
+
+    def truncate(self, size: int) -> int:
+        """Give the file a size."""
+        self.guarded(lambda: self.file.truncate(size))
+        return size
+
+    def flush(self) -> None:
+        """Write what is kept back."""
+        self.guarded(self.file.flush)
+
+
+def write_sealed_file(path: Path, kind: Kind, fill: Callable[[Any], None], *, part: Path) -> None:
+    """Write an HDF5 file under the name `part`, seal it, make it durable, and give it its own name in one step.
+
+    Parameters
+    ----------
+    path, part
+        Its name, and the one it has while it is written; a file that was there under the second is overwritten.
+    kind
+        What the seal says.
+    fill
+        Writes the content into the open `h5py.File`.
+
+    Raises
+    ------
+    OSError
+        If the disk does not take it; a file that was there is unchanged.
+    """
+    import h5py
+
+    try:
+        with open(part, "w+b", buffering=0) as raw:
+            storage = Storage(raw)
+            try:
+                with h5py.File(storage, "w", userblock_size=SEAL_SIZE, libver=("v108", "v108")) as file:
+                    fill(file)
+            finally:
+                if storage.failure is not None:
+                    raise storage.failure
+            seal = seal_of(raw, kind)
+            raw.seek(0)
+            raw.write(seal)
+            os.fsync(raw.fileno())
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+class Manifest:
+    """Writes attributes and datasets into a file, and at the end the digest over all of them.
+
+    The digest, an attribute of the root, is the sha256 over paths, types, shapes and sha256 of all contents: it does
+    not depend on how HDF5 lays them out, so it survives repacking and tells whether two files say the same.
+    """
+
+    def __init__(self, file: Any) -> None:
+        self.file = file
+        self.lines: list[str] = []
+
+    def attributes(self, path: str, values: Mapping[str, Attribute]) -> None:
+        """Write the attributes of a group, which is made where it is missing."""
+        item = self.file.require_group(path)
+        self.lines += [put_attribute(item, path, name, value) for name, value in values.items()]
+
+    def dataset(self, path: str, values: Any, attributes: Mapping[str, Attribute]) -> None:
+        """Write a dataset with its attributes and its sha256."""
+        stored, kind, sha256, line = described(path, values)
+        item = self.file.create_dataset(path, data=stored, dtype=kind, track_times=False)
+        self.lines += [put_attribute(item, path, name, value) for name, value in attributes.items()]
+        put_attribute(item, path, SHA256, sha256)
+        self.lines.append(line)
+
+    def rows(
+        self, path: str, shape: tuple[int, ...], parts: Iterable[Any], attributes: Mapping[str, Attribute]
+    ) -> None:
+        """Write a float64 dataset of that shape from parts of its rows, which are not held together.
+
+        Raises
+        ------
+        ValueError
+            If the parts do not fill it.
+        """
+        item = self.file.create_dataset(path, shape=shape, dtype="<f8", track_times=False)
+        digest, first = hashlib.sha256(), 0
+        for part in parts:
+            block = np.ascontiguousarray(part, dtype="<f8")
+            digest.update(block.tobytes())
+            if block.size:
+                item[first : first + len(block)] = block
+            first += len(block)
+        if first != shape[0]:
+            raise ValueError(f"{path}: expected {shape[0]} rows, got {first}")
+        self.lines += [put_attribute(item, path, name, value) for name, value in attributes.items()]
+        put_attribute(item, path, SHA256, digest.hexdigest())
+        self.lines.append(line_of(path, "float64", shape, digest.hexdigest()))
+
+    def close(self) -> None:
+        """Write the digest."""
+        put_attribute(self.file, "/", DIGEST, digest_of_lines(self.lines))
+
+
+def described(path: str, values: Any) -> tuple[Any, Any, str, str]:
+    """Return the values as stored, their HDF5 type, their sha256, and their line of the manifest.
+
+    The line is path, kind, shape and sha256 with tabs between; the sha256 is that of the little-endian values in C
+    order, or of the UTF-8 bytes of each string followed by a zero byte.
+
+    Raises
+    ------
+    ValueError
+        If a text holds a zero byte, or what UTF-8 cannot hold.
+    """
+    import h5py
+
+    if isinstance(values, str | tuple):
+        words = [values] if isinstance(values, str) else list(values)
+        try:
+            encoded = [word.encode("utf-8") for word in words]
+        except UnicodeEncodeError:
+            encoded = [b"\0"]
+        if any(b"\0" in word for word in encoded):
+            raise ValueError(f"{path}: expected text that UTF-8 can hold, without zero bytes, got {values!r}")
+        kind = h5py.string_dtype("utf-8", max(1, *(len(word) for word in encoded), 1))
+        stored = np.array(encoded, dtype=kind) if isinstance(values, tuple) else np.array(encoded[0], dtype=kind)
+        name, data = "utf8", b"".join(word + b"\0" for word in encoded)
+    else:
+        array = np.asarray(values)
+        name = "int64" if array.dtype.kind in "iu" else "float64"
+        kind = np.dtype("<i8" if name == "int64" else "<f8")
+        stored = np.ascontiguousarray(array, dtype=kind).reshape(array.shape)
+        data = stored.tobytes()
+    sha256 = hashlib.sha256(data).hexdigest()
+    return stored, kind, sha256, line_of(path, name, stored.shape, sha256)
+
+
+def line_of(path: str, name: str, shape: tuple[int, ...], sha256: str) -> str:
+    """Return a line of the manifest."""
+    return f"{path}\t{name}\t{','.join(str(n) for n in shape)}\t{sha256}\n"
+
+
+def put_attribute(item: Any, path: str, name: str, value: Attribute) -> str:
+    """Write one attribute and return its line of the manifest."""
+    stored, kind, _, line = described(f"{path}@{name}", value)
+    item.attrs.create(name, stored, dtype=kind)
+    return line
+
+
+def digest_of_lines(lines: list[str]) -> str:
+    """Return the sha256 of the lines in ascending order of their bytes."""
+    return hashlib.sha256(b"".join(sorted(line.encode("utf-8") for line in lines))).hexdigest()
+
+
+# Reading -------------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def opened(path: Path, kind: Kind, *, has_seal: bool) -> Iterator[Any]:
+    """Open the HDF5 part of a file whose seal was looked at, and tell every fault of it as one of the file.
+
+    Raises
+    ------
+    Exception
+        The error of the kind, if it is no HDF5 file, lost its seal, or cannot be read.
+    """
+    import h5py
+
+    if not h5py.is_hdf5(path):
+        raise kind.error(
+            f"{path}: not a {kind.format}: expected an HDF5 file, got something else; a file of this kind is written "
+            f"by {kind.writer}"
+        )
+    try:
+        with h5py.File(path, "r") as file:
+            if file.userblock_size and not has_seal:  # only a repacked file may lack one, and then has no block
+                raise altered(path, kind, "its seal is damaged")
+            yield file
+    except kind.error:
+        raise
+    except Exception as error:  # HDF5 reports a damaged structure as OSError, KeyError, RuntimeError, ValueError...
+        raise altered(path, kind, f"HDF5 cannot read it ({reason(error)})") from error
+
+
+def own_items(file: Any, path: Path, kind: Kind) -> dict[str, Any]:
+    """Return the groups and datasets of a file by their paths, all of which lie in the file itself.
+
+    Raises
+    ------
+    Exception
+        The error of the kind, if there is a link to elsewhere, an object of another sort, a virtual or external
+        dataset, or a shape that the bytes of the file cannot fill.
+    """
+    import h5py
+
+    items: dict[str, Any] = {"/": file["/"]}
+    waiting, known = ["/"], {h5py.h5o.get_info(file.id).addr}
+    while waiting:
+        group = waiting.pop()
+        for name in items[group]:
+            where = f"{group.rstrip('/')}/{name}"
+            if not isinstance(items[group].get(name, getlink=True), h5py.HardLink):
+                raise altered(path, kind, f"{where[:80]!r} is a link to elsewhere")
+            item = items[where] = items[group][name]
+            address = h5py.h5o.get_info(item.id).addr
+            if address in known:
+                raise altered(path, kind, f"{where[:80]!r} has two names")
+            known.add(address)
+            if isinstance(item, h5py.Dataset):
+                require_stored(item, where, path, kind)
+            elif isinstance(item, h5py.Group):
+                waiting.append(where)
+            else:
+                raise altered(path, kind, f"{where[:80]!r} is neither a group nor a dataset")
+    return items
+
+
+def require_stored(item: Any, where: str, path: Path, kind: Kind) -> None:
+    """Raise unless the values of a dataset are in the file, before memory is taken for them."""
+    import h5py
+
+    plan = item.id.get_create_plist()
+    if plan.get_layout() == h5py.h5d.VIRTUAL or plan.get_external_count():
+        raise altered(path, kind, f"the values of {where[:80]!r} lie in another file")
+    if item.shape is None:
+        raise altered(path, kind, f"{where[:80]!r} holds no values")
+    size = float(np.prod([float(n) for n in item.shape])) * item.dtype.itemsize
+    stored = item.id.get_storage_size() * (MOST_COMPRESSED if plan.get_nfilters() else 1)
+    if size > stored:
+        shape = " x ".join(str(n) for n in item.shape)
+        raise altered(path, kind, f"{where[:80]!r} says {shape} values, of which the file holds {stored} bytes")
+
+
+def require_digest(items: Mapping[str, Any], path: Path, kind: Kind) -> None:
+    """Raise unless all attributes and datasets are those that were written; values are read a part at a time."""
+    import h5py
+
+    lines = []
+    for where, item in items.items():
+        attributes = {name: as_attribute(item.attrs[name]) for name in item.attrs}
+        is_dataset = isinstance(item, h5py.Dataset)
+        expected = attributes.pop(SHA256 if is_dataset else DIGEST, None) if is_dataset or where == "/" else None
+        lines += [described(f"{where}@{name}", value)[3] for name, value in attributes.items()]
+        if is_dataset:
+            sha256 = sha256_of(item)
+            if sha256 != expected:
+                raise altered(path, kind, f"dataset {where} does not have its sha256")
+            lines.append(line_of(where, "int64" if item.dtype.kind in "iu" else "float64", item.shape, sha256))
+        elif where == "/":
+            digest = expected
+    if digest_of_lines(lines) != digest:
+        raise altered(
+            path, kind, "its contents do not have its digest (an attribute or a name was changed, or one is missing)"
+        )
+
+
+def sha256_of(item: Any) -> str:
+    """Return the sha256 of the numbers of a dataset, which is read a part at a time."""
+    digest = hashlib.sha256()
+    kind = "<i8" if item.dtype.kind in "iu" else "<f8"
+    if not item.shape:
+        return hashlib.sha256(np.asarray(item[()], dtype=kind).tobytes()).hexdigest()
+    each = max(1, int(np.prod(item.shape[1:])))
+    step = max(1, BLOCK_VALUES // each)
+    for first in range(0, item.shape[0] if item.size else 0, step):
+        digest.update(np.ascontiguousarray(item[first : first + step], dtype=kind).tobytes())
+    return digest.hexdigest()
+
+
+def as_attribute(value: Any) -> Any:
+    """Return an attribute as str, int or float; None stays None, anything else is left as it is."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8")
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,116 @@
+"""The seal of a file: 512 bytes of text before its HDF5 part that tell every change of a byte behind them.
+
+HDF5 readers skip these bytes (its "user block"). They hold the length of the file and the sha256 of all that follows,
+which are compared before HDF5 touches the file: HDF5 may hang, crash or take all memory on damaged structures.
+"""
+
+import hashlib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from fe_models.foundation.paths import near_file
+
+__all__ = ["SEAL_SIZE", "Kind", "altered", "check_seal", "newer", "reason", "seal_of", "truncated"]
+
+SEAL_SIZE = 512  #: bytes of the seal; the smallest user block that HDF5 knows
+BLOCK = 1 << 20  #: bytes that are hashed at once
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of sealed file, and how its faults are told."""
+
+    format: str  #: its name in the seal and in messages, one word
+    version: int  #: of the format; a reader refuses greater ones
+    error: type[Exception]  #: what is raised; its text is meant for the user
+    writer: str  #: what writes such files, in words
+
+
+def seal_of(file: IO[bytes], kind: Kind) -> bytes:
+    """Return the seal of an open file that has 512 bytes of room before its HDF5 part."""
+    file.seek(SEAL_SIZE)
+    digest, n_bytes = hashlib.sha256(), SEAL_SIZE
+    while block := file.read(BLOCK):
+        digest.update(block)
+        n_bytes += len(block)
+    return seal_text(kind.format, kind.version, n_bytes, digest.hexdigest())
+
+
+def seal_text(format: str, version: int, n_bytes: int, sha256: str) -> bytes:
+    """Return the seal, 512 bytes of ASCII: four lines, filled up with spaces."""
+    text = (
+        f"floatframe {format} {version}\n"
+        f"bytes {n_bytes}\n"
+        f"sha256 {sha256}\n"
+        f"HDF5 begins at byte {SEAL_SIZE}; sha256 is that of all bytes from there to the end.\n"
+    )
+    return text.encode("ascii").ljust(SEAL_SIZE - 1) + b"\n"
+
+
+def check_seal(path: Path, kind: Kind) -> bool:
+    """Compare the seal with the file and raise if it is broken; return False if there is none that could be broken.
+
+    Raises
+    ------
+    Exception
+        The error of the kind, if the file is missing, of a newer version, truncated or altered.
+    """
+    try:
+        if path.exists() and not path.is_file():  # a pipe would wait, a device may have no end
+            what = "a folder" if path.is_dir() else "a device or a pipe"
+            raise kind.error(f"{path}: cannot be read: expected a {kind.format}, got {what}")
+        with open(path, "rb") as file:
+            head = file.read(SEAL_SIZE)
+            sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+            n_bytes = file.tell()
+    except FileNotFoundError:
+        raise kind.error(f"{path}: no such file{near_file(path)}") from None
+    except OSError as error:
+        raise kind.error(f"{path}: cannot be read: {reason(error)}") from error
+    magic = f"floatframe {kind.format} ".encode("ascii")
+    if not head.startswith(magic):
+        if head and magic.startswith(head):
+            raise truncated(path, kind, f"at least {SEAL_SIZE} bytes", n_bytes)
+        return False  # of another kind, repacked, or with a damaged seal: the HDF5 part tells
+    stated = re.match(rb"(\d{1,9})\nbytes (\d{1,18})\n", head[len(magic) :])
+    if stated and int(stated[1]) > kind.version:
+        raise newer(path, kind, int(stated[1]))
+    if len(head) < SEAL_SIZE:
+        raise truncated(path, kind, f"at least {SEAL_SIZE} bytes", n_bytes)
+    if stated is None:
+        raise altered(path, kind, "its seal cannot be read")
+    if n_bytes < int(stated[2]):
+        raise truncated(path, kind, f"{int(stated[2])} bytes", n_bytes)
+    if head != seal_text(kind.format, int(stated[1]), n_bytes, sha256):
+        raise altered(path, kind, "its bytes do not have the sha256 of its seal")
+    return True
+
+
+def truncated(path: Path, kind: Kind, expected: str, n_bytes: int) -> Exception:
+    """Return the error of a file that is too short."""
+    return kind.error(
+        f"{path}: this {kind.format} is truncated: expected {expected}, got {n_bytes}; copy it again or write it again"
+    )
+
+
+def altered(path: Path, kind: Kind, detail: str) -> Exception:
+    """Return the error of a file that is not as it was written."""
+    return kind.error(
+        f"{path}: this {kind.format} was altered since it was written: {detail}; copy it again or write it again"
+    )
+
+
+def newer(path: Path, kind: Kind, got: int) -> Exception:
+    """Return the error of a file from a later version of this program."""
+    return kind.error(
+        f"{path}: this {kind.format} has format version {got}, this program reads versions up to {kind.version}; "
+        "update the program (pip install -U floatframe)"
+    )
+
+
+def reason(error: BaseException) -> str:
+    """Return the first line of an error's own words."""
+    text = str(getattr(error, "strerror", None) or error or type(error).__name__)
+    return text.splitlines()[0][:200]

@@ -1,0 +1,157 @@
+"""The head of a results file: what it says besides numbers, as JSON text, and checked when it is read."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+from fe_models.foundation.units import UNIT_SYSTEMS
+from fe_models.foundation.words import quoted
+
+__all__ = ["BodyEntry", "Head", "head_of_text", "text_of_head"]
+
+NUMBERS_OF_RUN = ("t_start", "t_end", "h")
+
+
+@dataclass(frozen=True)
+class BodyEntry:
+    """Where the columns of a body are."""
+
+    name: str
+    n_q: int
+    q0: int  #: first column in q
+    u0: int  #: first column in u
+    source: str = ""  #: path of the modal file; "" for rigid bodies and bodies made in memory
+    digest: str = ""  #: of that file
+    is_stiffened: bool = False  #: whether its geometric stiffness counts
+
+
+@dataclass(frozen=True)
+class Head:
+    """What a results file says besides numbers."""
+
+    system: str
+    units: str  #: name of the unit system
+    bodies: tuple[BodyEntry, ...]
+    joints: tuple[str, ...]
+    springs: tuple[str, ...]
+    w0: tuple[int, ...]  #: first column in w of each connection (joints, then springs), and the end
+    run: Mapping[str, Any]  #: integrator and its parameters, h, t_end, version
+    #: of a run that has ended: n_steps, n_rejected, n_iterations (of Newton's method), wall_time [s]
+    summary: Mapping[str, Any] = field(default_factory=dict)
+
+
+def text_of_head(head: Head) -> str:
+    """Return the head as JSON."""
+    return json.dumps(asdict(head))
+
+
+def head_of_text(text: Any) -> Head:
+    """Return the head of a JSON text.
+
+    Raises
+    ------
+    ValueError
+        If it is no head, or does not fit together; the text names the key.
+    """
+    try:
+        data = json.loads(text)
+    except (TypeError, ValueError, RecursionError):
+        raise ValueError("head: expected JSON text") from None
+    known = [part.name for part in fields(Head)]
+    require(isinstance(data, dict) and set(data) <= set(known) and set(known) - set(data) <= {"summary"},
+            "head", f"an object with {', '.join(known)}", data)  # fmt: skip
+    for name in ("system", "units"):
+        require(isinstance(data[name], str), name, "text", data[name])
+    require(data["units"] in UNIT_SYSTEMS, "units", f"one of {', '.join(UNIT_SYSTEMS)}", data["units"])
+    for name in ("joints", "springs"):
+        require(is_list(data[name], str), name, "a list of names", data[name])
+    require(is_list(data["bodies"], dict) and data["bodies"], "bodies", "a list of objects", data["bodies"])
+    bodies = entries_of(data["bodies"])
+    n_connections, w0 = len(data["joints"]) + len(data["springs"]), data["w0"]
+    require(is_list(w0, int) and len(w0) == n_connections + 1 and w0[0] == 0 and w0 == sorted(w0),
+            "w0", f"{n_connections + 1} whole numbers that ascend from 0", w0)  # fmt: skip
+    summary = data.get("summary", {})
+    require(isinstance(summary, dict), "summary", "an object", summary)
+    check_run(data["run"])
+    check_summary(summary)
+    return Head(data["system"], data["units"], bodies, tuple(data["joints"]), tuple(data["springs"]), tuple(w0),
+                data["run"], summary)  # fmt: skip
+
+
+def entries_of(tables: list[dict[str, Any]]) -> tuple[BodyEntry, ...]:
+    """Return the bodies, whose columns must follow each other."""
+    kinds = {part.name: part.type for part in fields(BodyEntry)}
+    entries: list[BodyEntry] = []
+    q0 = u0 = 0
+    for k, table in enumerate(tables):
+        where = f"bodies[{k}]"
+        require(set(table) <= set(kinds) and {"name", "n_q", "q0", "u0"} <= set(table),
+                where, f"an object with {', '.join(kinds)}", table)  # fmt: skip
+        for name, value in table.items():
+            kind = kinds[name]
+            assert isinstance(kind, type)
+            expected = {str: "text", int: "a whole number"}.get(kind, "true or false")
+            require(type(value) is kind, f"{where}.{name}", expected, value)
+        for name, first in (("q0", q0), ("u0", u0)):
+            require(table[name] == first, f"{where}.{name}", f"{first}, after the body before", table[name])
+        require(table["n_q"] >= 0, f"{where}.n_q", "0 or more", table["n_q"])
+        is_new = table["name"] not in [entry.name for entry in entries]
+        require(is_new, f"{where}.name", "a name of its own", table["name"])
+        entries.append(BodyEntry(**table))
+        q0, u0 = q0 + table["n_q"], u0 + 6 + table["n_q"]
+    return tuple(entries)
+
+
+def check_run(run: Any) -> None:
+    """Raise unless the table of the run has the kinds of values that are used."""
+    require(isinstance(run, dict), "run", "an object", run)
+    for name in NUMBERS_OF_RUN:
+        if name in run:
+            require(is_number(run[name]), f"run.{name}", "a finite number", run[name])
+    for name in ("integrator", "system_file", "system_file_digest", "digest", "floatframe"):
+        require(isinstance(run.get(name, ""), str), f"run.{name}", "text", run.get(name))
+    every = run.get("output_every", 1)
+    require(type(every) is int and every >= 1, "run.output_every", "a whole number above 0", every)
+    gravity = run.get("gravity", [0, 0, 0])
+    require(is_list(gravity, int | float) and len(gravity) == 3 and all(map(is_number, gravity)),
+            "run.gravity", "three numbers", gravity)  # fmt: skip
+    tolerance = run.get("error_tolerance")
+    require(tolerance is None or is_number(tolerance), "run.error_tolerance", "a number", tolerance)
+
+
+def check_summary(summary: Mapping[str, Any]) -> None:
+    """Raise unless the summary of a run has the kinds of values that are used."""
+    for name in ("n_steps", "n_rejected", "n_iterations"):
+        value = summary.get(name, 0)
+        require(type(value) is int and value >= 0, f"summary.{name}", "a whole number", value)
+    require(is_number(summary.get("wall_time", 0.0)), "summary.wall_time", "a number", summary.get("wall_time"))
+    events = summary.get("events", [])
+    require(is_list(events, dict), "summary.events", "a list of objects", events)
+    for k, event in enumerate(events):
+        where = f"summary.events[{k}]"
+        require(isinstance(event.get("name"), str), f"{where}.name", "text", event.get("name"))
+        require(is_number(event.get("t")), f"{where}.t", "a number", event.get("t"))
+        require(isinstance(event.get("stop"), bool), f"{where}.stop", "true or false", event.get("stop"))
+        for name in ("switch_on", "switch_off"):
+            require(is_list(event.get(name), str), f"{where}.{name}", "a list of names", event.get(name))
+
+
+def is_list(value: Any, kind: Any) -> bool:
+    """Whether a value is a list of items of a kind."""
+    return isinstance(value, list) and all(isinstance(x, kind) and not isinstance(x, bool) for x in value)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number that fits a float."""
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def require(holds: Any, where: str, expected: str, got: Any) -> None:
+    """Raise `ValueError` naming a key of the head unless a condition holds."""
+    if not holds:
+        raise ValueError(f"head: {where}: expected {expected}, got {quoted(got)}")

@@ -1,0 +1,279 @@
+"""Results as they are written: closed segments while a motion is computed, one file when it is done.
+
+A run that writes to swing.h5 first fills the folder swing.h5.segments with head.h5 and 000000.h5, 000001.h5, ...:
+each is written under a temporary name and moved into place, so that a killed run leaves every closed segment readable.
+At the end the segments are copied into one file, which is moved to swing.h5, and the folder is removed. The folder is
+locked as long as the run lasts.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.hdf5_file import Manifest, write_sealed_file
+from fe_models.foundation.locks import FileLock, LockedError
+from fe_models.foundation.paths import is_stream, same_file
+from fe_models.foundation.seal import reason
+from floatframe.errors import ResultsError
+from floatframe.kernels.model import Rows
+from floatframe.results.head import Head, text_of_head
+from floatframe.results.results_file import (
+    DATASETS,
+    FORMAT,
+    KIND,
+    RESTART,
+    SEGMENTS,
+    VALIDITY,
+    VERSION,
+    FileSource,
+    checked,
+    open_segments,
+    row_shapes,
+    segment_paths,
+    segments_folder,
+)
+
+__all__ = ["ResultsPlace", "ResultsWriter", "arrays_of", "last_restart"]
+
+UNFINISHED = ".unfinished"  #: added to the name of a file being written
+LOCK = "lock"  #: file in the folder of segments
+
+
+class ResultsPlace(AbstractContextManager["ResultsPlace"]):
+    """Where a run writes its results, which is its own as long as the run lasts.
+
+    Parameters
+    ----------
+    path
+        The results file, or its folder of segments.
+    inputs
+        Files the run is made from, which it must not overwrite.
+    is_begun
+        Whether the folder of segments has to be there, of a run that is to go on.
+
+    Raises
+    ------
+    ResultsError
+        If it cannot be written there, or another run writes there now.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike[str], *, inputs: Sequence[str | os.PathLike[str]] = (), is_begun: bool = False
+    ) -> None:
+        given = Path(path)
+        self.path = given.with_name(given.name.removesuffix(SEGMENTS))
+        where = f"results file {str(self.path)!r}"
+        if self.path.is_dir():
+            raise ResultsError(f"{where}: expected a file name, got a folder")
+        if is_stream(self.path):
+            raise ResultsError(f"{where}: expected a file name, got a device or a pipe; a run writes its file in parts")
+        if not self.path.parent.is_dir():
+            raise ResultsError(f"{where}: no such folder {str(self.path.parent)!r}; make it")
+        for source in inputs:
+            if same_file(self.path, Path(source)):
+                raise ResultsError(f"{where}: this is an input of the run; choose another name")
+        self.path = self.path.resolve()  # through a link, so that the link stays one
+        self.folder = segments_folder(self.path)
+        if is_begun and not self.folder.is_dir():
+            state = "the run is complete" if self.path.is_file() else "no run to this name was begun"
+            raise ResultsError(f"{given}: nothing to resume: there is no folder {str(self.folder)!r}; {state}")
+        self.lock = self.locked(where)
+
+    def locked(self, where: str) -> FileLock:
+        """Take the lock of the folder, which is made where it is missing."""
+        try:
+            while True:
+                self.folder.mkdir(exist_ok=True)
+                try:
+                    return FileLock(self.folder / LOCK)
+                except FileNotFoundError:  # a run that ended just now has removed the folder
+                    continue
+        except LockedError as holder:
+            raise ResultsError(
+                f"{where}: another run writes to it now ({holder}); wait for its end, end it, or choose another name"
+            ) from None
+        except OSError as error:
+            raise ResultsError(f"{where}: cannot be written: {reason(error)}") from error
+
+    def clear(self) -> None:
+        """Remove the files of a run from the folder, but for the lock."""
+        for path in (*self.folder.glob(f"*{UNFINISHED}"), *self.folder.glob("[0-9]*.h5"), self.folder / "head.h5"):
+            path.unlink(missing_ok=True)
+
+    def remove(self) -> None:
+        """Remove the folder; what is not of a run stays in it."""
+        self.clear()
+        self.lock.path.unlink(missing_ok=True)
+        try:
+            self.folder.rmdir()
+        except OSError:  # another run has begun there, or somebody keeps files in it
+            pass
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Give the place back: an empty folder goes, segments stay."""
+        if self.lock.is_held() and not (self.folder / "head.h5").exists():
+            self.remove()
+        self.lock.release()
+
+
+class ResultsWriter:
+    """Writes the rows of a run in closed segments, and joins them at the end.
+
+    Raises
+    ------
+    ResultsError
+        If the folder or a file cannot be written.
+    """
+
+    def __init__(self, place: ResultsPlace, head: Head, *, goes_on: bool = False) -> None:
+        """Begin with an empty folder of segments, or go on after the last restart record of the one that is there."""
+        self.place = place
+        self.path, self.folder = place.path, place.folder
+        self.head = head
+        self.n_segments = 0
+        self.n_rows = 0  #: in closed segments
+        self.open_rows: list[Rows] = []
+        self.validity = "[]"  #: notes on the range of the linear frames, see floatframe/validity.py
+        self.guarded(self.go_on if goes_on else self.begin)
+
+    def begin(self) -> None:
+        """Leave nothing in the folder of segments but the head."""
+        self.place.clear()
+        self.write_file(self.folder / "head.h5", lambda file: self.write_head(file, is_complete=False))
+
+    def go_on(self) -> None:
+        """Take away what comes after the last restart record: it will be computed again."""
+        for path in self.folder.glob(f"*{UNFINISHED}"):
+            path.unlink()
+        paths = segment_paths(self.folder)
+        while paths and not has_restart(paths[-1]):
+            paths.pop().unlink()
+        self.n_segments = len(paths)
+        self.n_rows = sum(rows_in(path) for path in paths)
+
+    def guarded(self, action: Callable[[], None]) -> None:
+        """Run an action; say in words why it cannot write."""
+        try:
+            action()
+        except OSError as error:
+            kept = f"; closed segments stay in {str(self.folder)!r}" if self.n_segments else ""
+            raise ResultsError(f"results file {str(self.path)!r}: cannot be written: {reason(error)}{kept}") from error
+
+    def write_file(self, path: Path, fill: Callable[[h5py.File], None]) -> None:
+        """Write a file under a temporary name and move it into place."""
+        write_sealed_file(path, KIND, fill, part=path.with_name(path.name + UNFINISHED))
+
+    def write_head(self, file: h5py.File, *, is_complete: bool) -> None:
+        """Write a file of the head alone."""
+        manifest = Manifest(file)
+        manifest.attributes("/", self.attributes(is_complete=is_complete))
+        manifest.close()
+
+    def attributes(self, *, is_complete: bool) -> dict[str, str | int]:
+        """Return the root attributes of a results file."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "is_complete": int(is_complete),
+            "head": text_of_head(self.head),
+            VALIDITY: self.validity,
+        }
+
+    def append(self, rows: Rows) -> None:
+        """Take rows into the open segment."""
+        if len(rows.t):
+            self.open_rows.append(rows)
+
+    def close_segment(self, restart: Mapping[str, Array] | None = None) -> None:
+        """Write the open segment, if it holds anything, with a record from which the run can go on."""
+        if not self.open_rows:
+            return
+        arrays = arrays_of(self.open_rows)
+        arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+
+        def fill(file: h5py.File) -> None:
+            manifest = Manifest(file)
+            manifest.attributes("/", {"format": FORMAT, "version": VERSION, VALIDITY: self.validity})
+            for name, array in arrays.items():
+                manifest.dataset(f"/{name}", array, {})
+            for name, array in (restart or {}).items():
+                manifest.dataset(f"/{RESTART}/{name}", array, {})
+            manifest.close()
+
+        self.guarded(lambda: self.write_file(self.folder / f"{self.n_segments:06d}.h5", fill))
+        self.n_segments += 1
+        self.n_rows += len(arrays["t"])
+        self.open_rows = []
+
+    def finish(self, summary: Mapping[str, Any] | None = None) -> None:
+        """Join the segments into the results file, with the summary of the run, and remove them."""
+        self.close_segment()
+        _, source = open_segments(self.folder)
+        if len(source.paths) != self.n_segments or sum(map(rows_in, source.paths)) != self.n_rows:
+            raise ResultsError(
+                f"{self.folder}: expected {self.n_segments} segments with {self.n_rows} rows, got {len(source.paths)} "
+                "others: the folder was changed while the run lasted; run it anew"
+            )
+        self.head = replace(self.head, summary=summary or {})
+
+        def fill(file: h5py.File) -> None:
+            manifest = Manifest(file)
+            for name, shape in row_shapes(self.head).items():
+                manifest.rows(f"/{name}", (self.n_rows, *shape), parts_of(source, name), {"is": DATASETS[name][1]})
+            manifest.attributes("/", self.attributes(is_complete=True))
+            manifest.close()
+
+        self.guarded(lambda: self.write_file(self.path, fill))
+        self.place.remove()
+
+
+def arrays_of(parts: list[Rows]) -> dict[str, Array]:
+    """Return the datasets of consecutive rows."""
+    return {name: np.concatenate([getattr(rows, field) for rows in parts]) for name, (field, _) in DATASETS.items()}
+
+
+def parts_of(source: FileSource, name: str) -> Iterator[Array]:
+    """Yield a dataset of consecutive segments, a segment at a time."""
+    for path in source.paths:
+        with h5py.File(path, "r") as segment:
+            yield segment[name][...]
+
+
+def rows_in(path: Path) -> int:
+    """Return the number of rows of a segment."""
+    with h5py.File(path, "r") as file:
+        return len(file["t"])
+
+
+def has_restart(path: Path) -> bool:
+    """Whether a run can go on after this segment."""
+    with h5py.File(path, "r") as file:
+        return RESTART in file
+
+
+def last_restart(folder: Path) -> tuple[Head, dict[str, Array] | None]:
+    """Return the head of an interrupted run and its last restart record, None if it came to none.
+
+    Raises
+    ------
+    ResultsError
+        If the segments are damaged, or of another kind.
+    """
+    head, source = open_segments(folder)
+    for segment in reversed(source.paths):
+        with checked(segment, tell_age=False) as (_, items):
+            prefix = f"/{RESTART}/"
+            record = {name.removeprefix(prefix): item[...] for name, item in items.items() if name.startswith(prefix)}
+        if record:
+            return head, record
+    return head, None
