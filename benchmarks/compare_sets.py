@@ -60,7 +60,7 @@ def run(names, size):
         stamp("factorise")
         for name in names:
             options = {"loads": loads} if name == "benfield-hruda" else {}
-            modes = cms.MODE_SETS[name](body, n_modes=N_MODES, families=families, **options)
+            modes = cms.MODE_SETS[name](families, n_modes=N_MODES, **options)
             stamp(f"{name} modes")
             cms.reduce(body, modes, stress=False)
             stamp(f"{name} reduce")

@@ -39,9 +39,9 @@ def main():
     body = cms.couple(fe_models.solid_body(mesh, steel, name="rod", units=cms.unit_system("mm-t-s"), interfaces=ends))
     clock("mesh to coupled body")
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=N_MODES, families=families)
+        modes = cms.craig_bampton(families, n_modes=N_MODES)
         clock("mode set")
-        reduced = cms.reduce(body, modes, families=families)
+        reduced = cms.reduce(families, modes)
         clock("reduce")
         line = clock.total()
         from cms.reduced_basis.finishing import finish
@@ -50,7 +50,7 @@ def main():
         Phi = finish(body, modes, condition).Phi
         clock("(shapes again, not counted)")
         before = clock.total()
-        reduced_geometric_stiffness(body, Phi, condition, families=families)
+        reduced_geometric_stiffness(families, Phi, condition)
         clock("geometric stiffness")
         added = [b - a for a, b in zip(before, clock.total(), strict=True)]
     print(f"{body.n_dof} dofs, {reduced.n_q} modes, {12 + 6 * len(body.interfaces)} unit loads")

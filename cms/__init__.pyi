@@ -14,6 +14,7 @@ from .fe_names import Units as Units
 from .fe_names import couple as couple
 from .fe_names import unit_system as unit_system
 from .frame_conversion import convert_frame as convert_frame
+from .jobs.reduce_job import reduce_job as reduce_job
 from .meshless_beams.assumed_beam import beam_from_assumed_modes as beam_from_assumed_modes
 from .modal_file.file import convert_units as convert_units
 from .modal_file.file import read as read
@@ -60,3 +61,4 @@ from .reduced_body.reduced_body import ReducedInterface as ReducedInterface
 from .reduction import reduce as reduce
 from .second_order.centrifugal import centrifugal_loads as centrifugal_loads
 from .second_order.unit_states import unit_states as unit_states
+from .solvers.mode_count import ModeCount as ModeCount

@@ -9,6 +9,7 @@ import numpy as np
 from cms.errors import BodyError, ModeSetError
 from cms.families.families import Families
 from cms.families.rigid_modes import geometric_rigid_modes
+from cms.families.sharing import body_of
 from cms.mode_set import ModeSet
 from cms.reduced_basis.damping import Damping, modal_damping
 from cms.reduced_basis.finishing import FinishedBasis, finish
@@ -31,23 +32,21 @@ __all__ = ["reduce"]
 
 
 def reduce(
-    body: FEBody,
+    source: FEBody | Families,
     modes: ModeSet,
     *,
     frame: Frame | None = None,
     damping: Damping | None = None,
     stress: bool = True,
-    geometric: bool = False,
+    geometric: bool | UnitStates = False,
     quadratic: bool = False,
-    families: Families | None = None,
-    states: UnitStates | None = None,
 ) -> ReducedBody:
     """Reduce a body to the span of a mode set.
 
     Parameters
     ----------
-    body
-        A coupled body.
+    source
+        A coupled body, or the `Families` that made `modes`: the geometric stiffness then takes their factorisation.
     modes
         A mode set of that body.
     frame
@@ -59,16 +58,11 @@ def reduce(
     geometric
         Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`), with which a multibody
         system stiffens the body by its spin, accelerations and interface loads. It costs the static solution of 12 +
-        6 n_interfaces loads and one pass over the elements.
+        6 n_interfaces loads and one pass over the elements. Or the static states of the unit loads in this frame
+        (`unit_states`), so that no factorisation is needed any more.
     quadratic
         Whether to add quadratic modes, the displacement of second order of every kept node (`quadratic_modes`),
         with the geometric stiffness that is their inertia. For slender bodies: three static solutions a kept node.
-    families
-        The families that made `modes`, so that the geometric stiffness takes their factorisation; it makes its own by
-        default.
-    states
-        The static states of the unit loads in this frame (`unit_states`), so that the geometric stiffness needs no
-        factorisation any more.
 
     Raises
     ------
@@ -78,8 +72,9 @@ def reduce(
         If the body is a mechanism, the frame cannot be attached, or geometric stiffness is asked of a body without an
         element model.
     """
-    geometric = geometric or quadratic
-    if geometric:
+    body = body_of(source)
+    states = geometric if isinstance(geometric, UnitStates) else None
+    if geometric or quadratic:
         require_geometric_stiffness(body)
     if modes.columns.shape[0] != body.n_dof:
         raise ModeSetError(
@@ -88,10 +83,10 @@ def reduce(
         )
     frame = frame or TisserandFrame()
     condition = frame_condition(body, frame)
-    if geometric and states is None:
-        states = states_of(body, condition, families)
     if states is not None:
         require_states_of(body, condition.frame, states)
+    elif geometric or quadratic:
+        states = states_of(source, condition)
     finished = finish(body, modes, condition)
     kept = kept_nodes(body)
     axes, origin = condition.frame.axes, condition.frame.origin
@@ -125,7 +120,7 @@ def reduce(
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
         geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
-        quadratic=quadratic_modes(body, finished.Phi, condition, kept, families=families) if quadratic else None,
+        quadratic=quadratic_modes(source, finished.Phi, condition, kept) if quadratic else None,
     )
 
 

@@ -54,9 +54,9 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
             body = coupled_body(job, uncoupled)
         with Families(body) as families:
             with clock(f"mode set {job.reduction.set}"):
-                modes = job_mode_set(body, job.reduction, families=families)
+                modes = job_mode_set(families, job.reduction)
             top = usable_band(modes, reduced) if band is None else band
-            with clock("compare"), FullReference(body, band=top, families=families) as reference:
+            with clock("compare"), FullReference(families, band=top) as reference:
                 return check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled)
 
 

@@ -1,24 +1,17 @@
 """`cms info`: what is in a modal file, as tables or as JSON."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cms.cli.console import print_table, say, vector_words
+import typer
+
+from cms.cli.arguments import ModalFile
+from cms.cli.console import guarded, print_table, say, vector_words
 
 if TYPE_CHECKING:
     from cms.reduced_body.reduced_body import ReducedBody
 
-from typing import TYPE_CHECKING, Annotated
-
-import typer
-
-from cms.cli.console import guarded
-
-if TYPE_CHECKING:
-    pass
-from cms.cli.arguments import ModalFile
-
-__all__ = ["info_record", "print_body"]
+__all__ = ["info_command", "info_record", "print_body"]
 
 
 def info_record(file: Path, units: str | None = None) -> str:

@@ -1,26 +1,20 @@
 """`cms reduce`: a job becomes a modal file."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cms.cli.console import print_table, say, stages
+import typer
+
+from cms.cli.arguments import Output
+from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.info import print_body
 
 if TYPE_CHECKING:
     from cms.jobs.job import Job
     from cms.reduced_body.reduced_body import ReducedBody
     from fe_models.foundation.stages import Stages
-from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from cms.cli.console import guarded, output_path
-from cms.cli.info import print_body
-
-if TYPE_CHECKING:
-    pass
-from cms.cli.arguments import Output
-
-__all__ = ["reduce_and_write"]
+__all__ = ["reduce_and_write", "reduce_command"]
 
 
 def reduce_and_write(job: "Job", path: Path) -> "ReducedBody":

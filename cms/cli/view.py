@@ -1,17 +1,14 @@
 """`cms view`: pictures and films of modes on the real surface."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from cms.cli.arguments import ModalFile
 from cms.cli.console import guarded, output_path, say, stages
 
-if TYPE_CHECKING:
-    pass
-from cms.cli.arguments import ModalFile
-
-__all__ = []
+__all__ = ["view_command"]
 
 
 @guarded

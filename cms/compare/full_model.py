@@ -19,6 +19,7 @@ from cms.quality.reference.port_model import PortModel
 from cms.quality.reference.ports import Ports
 from cms.quality.reference.reference_response import reference_response
 from cms.quality.reference.transient import Snapshots, transient
+from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.paths import replace_file
@@ -133,7 +134,7 @@ def solve_full_model(
         if n_first <= n_most // 4:  # a larger part of all modes is not worth a search beforehand
             families.free_modes(n_modes=n_first)
         band = float(families.free_modes(n_modes=min(n_modes, n_most)).frequencies[-1]) * (1 + 1e-9)
-    modes = families.free_modes(cutoff=MODES_BEYOND * band)
+    modes = families.free_modes(ModeCount(cutoff=MODES_BEYOND * band))
     n_band = int((modes.frequencies <= band).sum())
     if n_band == 0:
         first = families.free_modes(n_modes=1).frequencies[0] / body.units.time

@@ -14,9 +14,9 @@ from cms.compare.free_shapes import judged_subset
 from cms.compare.subsets import SUBSETS
 from cms.errors import ModeSetError
 from cms.families.families import Families
+from cms.families.sharing import families_of
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
-from cms.mode_sets.selection import families_of
 from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.of_reduction.frf import DAMPING, LOWEST, compare_responses, frequency_grid
 from cms.quality.reference.full_reference import FullReference
@@ -57,7 +57,7 @@ class Selection:
 
 
 def select_modes(
-    body: FEBody,
+    body: FEBody | Families,
     *,
     set: str = "craig-bampton",
     error: float,
@@ -66,7 +66,6 @@ def select_modes(
     options: Mapping[str, Any] | None = None,
     added: Callable[[ModeSet], ModeSet] | None = None,
     most: int = MOST,
-    families: Families | None = None,
 ) -> Selection:
     """Find the fewest modes with which a set meets an error over a band.
 
@@ -78,7 +77,7 @@ def select_modes(
     Parameters
     ----------
     body
-        A coupled body with at least one interface.
+        A coupled body with at least one interface, or its `Families`.
     set
         Name in `MODE_SETS` of a set with a number of modes.
     error
@@ -95,8 +94,6 @@ def select_modes(
         What is done to the set before it is judged, such as `with_load_cases`.
     most
         Number of modes at which the search gives up.
-    families
-        Mode families to share; made and freed here by default.
 
     Raises
     ------
@@ -107,10 +104,10 @@ def select_modes(
     _check(set, error, band, measure)
     options = dict(options or {})
     with ExitStack() as stack:
-        families = stack.enter_context(families_of(body, families))
-        reference = stack.enter_context(FullReference(body, band=band[1], families=families))
+        families = stack.enter_context(families_of(body))
+        reference = stack.enter_context(FullReference(families, band=band[1]))
         judge = MEASURES[measure](reference, band)
-        make = _Maker(set, body, families, options, added, most)
+        make = _Maker(set, families, options, added, most)
         search = _by_subspaces if set in SUBSETS and added is None else _by_bisection
         tried: dict[int, Trial] = {}
         for trial in search(make, judge, reference, error):
@@ -195,20 +192,20 @@ class _Maker:
     """Makes the set with a number of modes."""
 
     name: str
-    body: FEBody
     families: Families
     options: Mapping[str, Any]
     added: Callable[[ModeSet], ModeSet] | None
     most: int
 
     def __call__(self, n_modes: int) -> ModeSet:
-        modes = MODE_SETS[self.name](self.body, n_modes=n_modes, **self.options, families=self.families)
+        modes = MODE_SETS[self.name](self.families, n_modes=n_modes, **self.options)
         return modes if self.added is None else self.added(modes)
 
     @property
     def n_most(self) -> int:
         """Number of modes above which no set can be made."""
-        return min(self.most, max(0, self.body.n_dof - len(self.body.b) - 1))
+        body = self.families.body
+        return min(self.most, max(0, body.n_dof - len(body.b) - 1))
 
 
 def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: float) -> Iterator[Trial]:
@@ -218,7 +215,7 @@ def _by_subspaces(make: _Maker, judge: _Judge, reference: FullReference, error: 
     while True:
         modes = make(n)
         c = basis.coordinates(modes.columns)
-        at_b = np.asarray(modes.columns[make.body.b])
+        at_b = np.asarray(modes.columns[make.families.body.b])
         for k in range(first, n + 1):
             C, labels = SUBSETS[make.name](modes, at_b, k)
             try:

@@ -66,7 +66,7 @@ def judged_points(
 
     def made(n_modes: int) -> ModeSet:
         counted = {"n_modes": n_modes} if "n_modes" in takes else {}
-        return make(body, **counted, **options, families=families)
+        return make(families, **counted, **options)
 
     def judge(n_modes: int, c: Coordinates, T: Array, labels: tuple[str, ...], groups: Sequence[str]) -> None:
         rigid = c.reference[:, reference.full.parts["rigid"]]

@@ -24,6 +24,7 @@ from cms.families.static_modes import (
 )
 from cms.families.vibration_modes import elastic_modes, fixed_interface_modes, no_modes
 from cms.solvers.eigen import EigenResult
+from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
@@ -37,7 +38,7 @@ class Families:
     """The mode families of a body, each computed once, when first asked for; a context manager that frees the factor.
 
     >>> with Families(body) as families:                                   # doctest: +SKIP
-    ...     sets = [rubin(body, n_modes=k, families=families) for k in range(20)]
+    ...     sets = [rubin(families, n_modes=k) for k in range(20)]
 
     Held dofs h: the boundary dofs, and interior ones where those leave a rigid-body motion free (theory.md §1). With
     them held the interior stiffness K_II is factorised, once; static and vibration modes for every boundary condition
@@ -176,38 +177,23 @@ class Families:
 
     # -- vibration families ----------------------------------------------------------------------------------------
 
-    def fixed_modes(
-        self, *, n_modes: int | None = None, cutoff: float | None = None, verify: bool = False
-    ) -> EigenResult:
+    def fixed_modes(self, n_modes: int | ModeCount) -> EigenResult:
         """Vibration modes with B held, over all dofs; without the rigid-body motions B may leave free."""
         if len(self.h) > len(self.body.b):
             directions = np.eye(len(self.h))[:, len(self.body.b) :]
-            return self.elastic_modes(BoundaryConditions(directions), n_modes=n_modes, cutoff=cutoff, verify=verify)
-        return self._cached(
-            b"fixed", n_modes, cutoff, verify, lambda **asked: fixed_interface_modes(self.fixed, **asked)
-        )
+            return self.elastic_modes(BoundaryConditions(directions), n_modes)
+        return self._cached(b"fixed", mode_count(n_modes), lambda wanted: fixed_interface_modes(self.fixed, wanted))
 
-    def free_modes(
-        self, *, n_modes: int | None = None, cutoff: float | None = None, verify: bool = False
-    ) -> EigenResult:
+    def free_modes(self, n_modes: int | ModeCount) -> EigenResult:
         """Elastic vibration modes of the free body, over all dofs."""
-        return self._cached(b"free", n_modes, cutoff, verify, lambda **asked: elastic_modes(self.free, **asked))
+        return self._cached(b"free", mode_count(n_modes), lambda wanted: elastic_modes(self.free, wanted))
 
-    def elastic_modes(
-        self,
-        conditions: BoundaryConditions,
-        *,
-        n_modes: int | None = None,
-        cutoff: float | None = None,
-        verify: bool = False,
-    ) -> EigenResult:
+    def elastic_modes(self, conditions: BoundaryConditions, n_modes: int | ModeCount) -> EigenResult:
         """Elastic vibration modes under these conditions of the held dofs, over all dofs."""
         return self._cached(
             conditions.key,
-            n_modes,
-            cutoff,
-            verify,
-            lambda **asked: elastic_modes(self.flexibility_under(conditions), **asked),
+            mode_count(n_modes),
+            lambda wanted: elastic_modes(self.flexibility_under(conditions), wanted),
         )
 
     def flexibility_under(self, conditions: BoundaryConditions) -> Flexibility:
@@ -253,18 +239,16 @@ class Families:
     def _cached(
         self,
         key: bytes,
-        n_modes: int | None,
-        cutoff: float | None,
-        verify: bool,
-        compute: Callable[..., EigenResult],
+        wanted: ModeCount,
+        compute: Callable[[ModeCount], EigenResult],
     ) -> EigenResult:
-        if n_modes == 0:
+        if wanted.n == 0:
             return no_modes(self.body.n_dof)
         for found in self._modes.get(key, []):
-            if (part := found.part(n_modes, cutoff, verify)) is not None:
+            if (part := found.part(wanted)) is not None:
                 return part
-        modes = compute(n_modes=n_modes, cutoff=cutoff, verify=verify)
-        self._modes[key] = [_Found(modes, cutoff)]
+        modes = compute(wanted)
+        self._modes[key] = [_Found(modes, wanted.cutoff)]
         return modes
 
 
@@ -275,12 +259,12 @@ class _Found:
     modes: EigenResult
     cutoff: float | None
 
-    def part(self, n_modes: int | None, cutoff: float | None, verify: bool) -> EigenResult | None:
-        frequencies = self.modes.frequencies
-        if verify and not self.modes.is_proven:
+    def part(self, wanted: ModeCount) -> EigenResult | None:
+        frequencies, cutoff = self.modes.frequencies, wanted.cutoff
+        if wanted.verify and not self.modes.is_proven:
             return None
-        if n_modes is not None:
-            return _first(self.modes, n_modes) if n_modes <= len(frequencies) else None
+        if wanted.n is not None:
+            return _first(self.modes, wanted.n) if wanted.n <= len(frequencies) else None
         known = max(self.cutoff or 0.0, frequencies[-1] * (1 - 1e-9) if len(frequencies) else 0.0)
         if cutoff is None or cutoff > known:
             return None

@@ -8,58 +8,45 @@ from cms.errors import EigenError
 from cms.families.fixed_interface import FixedInterfaceBody
 from cms.families.flexibility import Flexibility
 from cms.solvers.eigen import EigenResult, counting_shift, eigenmodes
+from cms.solvers.mode_count import ModeCount
 from cms.solvers.shift_inverted import Wanted
 from fe_models.foundation.arrays import Array
 
 __all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
 
 
-def fixed_interface_modes(
-    fixed: FixedInterfaceBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-) -> EigenResult:
+def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> EigenResult:
     """Vibration modes with all boundary dofs held: K_II phi = omega² M_II phi, phi over all dofs (n_dof, k)."""
-    modes = eigenmodes(
-        fixed.K_ii, fixed.M_ii, n_modes=n_modes, cutoff=cutoff, factorization=fixed.factorization, verify=verify
-    )
+    modes = eigenmodes(fixed.K_ii, fixed.M_ii, wanted, factorization=fixed.factorization)
     Phi = np.zeros((fixed.body.n_dof, modes.Phi.shape[1]))
     Phi[fixed.i] = modes.Phi
     return replace(modes, Phi=Phi)
 
 
-def elastic_modes(
-    flexibility: Flexibility,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-) -> EigenResult:
+def elastic_modes(flexibility: Flexibility, wanted: ModeCount) -> EigenResult:
     """Elastic vibration modes of a body under any boundary conditions of its interfaces, phi over all dofs (n_dof, k).
 
     Free modes are those of a free boundary, loaded modes those of K + K_load, M + M_load, mixed ones hold some boundary
     dofs. Rigid-body motions the conditions leave free are known beforehand, so they are not among them.
     """
-    modes = eigenmodes(flexibility.K, flexibility.M, n_modes=n_modes, cutoff=cutoff, factorization=flexibility)
-    if verify:
-        modes = _proven(flexibility, modes, cutoff)
+    modes = eigenmodes(flexibility.K, flexibility.M, replace(wanted, verify=False), factorization=flexibility)
+    if wanted.verify:
+        modes = _proven(flexibility, modes, wanted)
     return replace(modes, Phi=flexibility.expand(modes.Phi))
 
 
-def _proven(flexibility: Flexibility, modes: EigenResult, cutoff: float | None) -> EigenResult:
+def _proven(flexibility: Flexibility, modes: EigenResult, asked: ModeCount) -> EigenResult:
     """Return the modes once their number agrees with the inertia, which counts them boundary and interior apart.
 
     The proof of `eigenmodes` factorises K - sigma M as a whole. At the reference node of a distributing interface that
     has neither mass nor stiffness, only multipliers, and its pivots there are zero.
     """
     k = len(modes.omega2)
-    wanted = Wanted(k, None) if cutoff is None else Wanted(None, (2 * np.pi * cutoff) ** 2)
+    wanted = Wanted(k, None) if asked.cutoff is None else Wanted.of(asked)
     last, sigma = counting_shift(modes.omega2, k, wanted, 0.0)
     for n_extra in (4, 12, 36):  # a gap to count in lies beyond the modes that were asked for
         try:
-            more = eigenmodes(flexibility.K, flexibility.M, n_modes=k + n_extra, factorization=flexibility)
+            more = eigenmodes(flexibility.K, flexibility.M, k + n_extra, factorization=flexibility)
         except EigenError:  # there are no more modes
             break
         last, sigma = counting_shift(more.omega2, k, wanted, 0.0)

@@ -6,63 +6,67 @@ import numpy as np
 
 from cms.families.families import Families
 from cms.families.interface_loads import InterfaceLoad, condensed_load
+from cms.families.sharing import families_of
 from cms.jobs.reduction_table import AUTO, LoadSection, NeighbourSection, ReductionSection, mode_set_options
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
 from cms.mode_sets.characteristic_modes import with_characteristic_modes
 from cms.mode_sets.extra_columns import EXTRA_COLUMNS
-from cms.mode_sets.selection import families_of
+from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 
 __all__ = ["job_mode_set"]
 
+COUNT_KEYS = ("n_modes", "cutoff", "verify")  #: how many modes
 
-def job_mode_set(body: FEBody, reduction: ReductionSection, *, families: Families | None = None) -> ModeSet:
+
+def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSet:
     """Make the mode set of the table [reduction] for a coupled body.
 
     Parameters
     ----------
-    families
-        The families of the body, to share them with other sets.
+    body
+        A coupled body, or its `Families`.
+    reduction
+        The table.
 
     Raises
     ------
     CmsError, FeModelsError
         If the set cannot be made with these options, or a neighbour cannot be read.
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body = families.body
         options = set_options(body, reduction)
 
         def added(modes: ModeSet) -> ModeSet:
-            return with_additions(body, modes, reduction, families)
+            return with_additions(families, modes, reduction)
 
         if reduction.n_modes != AUTO:
-            return added(MODE_SETS[reduction.set](body, **options, families=families))
+            return added(MODE_SETS[reduction.set](families, **options))
         from cms.compare.mode_selection import select_modes
 
         has_additions = reduction.extra or reduction.interface_modes is not None or reduction.interface_cutoff
         return select_modes(
-            body,
+            families,
             set=reduction.set,
             error=reduction.error or 0.0,
             band=reduction.band or (0.0, 0.0),
             measure=reduction.measure or "frequency",
             options=options,
             added=added if has_additions else None,
-            families=families,
         ).modes
 
 
-def with_additions(body: FEBody, modes: ModeSet, reduction: ReductionSection, families: Families) -> ModeSet:
+def with_additions(families: Families, modes: ModeSet, reduction: ReductionSection) -> ModeSet:
     """Reduce all-node interfaces to their characteristic modes and add extra columns, as the job asks for."""
     if reduction.interface_modes is not None or reduction.interface_cutoff is not None:
-        cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * body.units.time
-        modes = with_characteristic_modes(
-            modes, body, n_modes=reduction.interface_modes, cutoff=cutoff, together=bool(reduction.interfaces_together)
-        )
+        cutoff = None if reduction.interface_cutoff is None else reduction.interface_cutoff * families.body.units.time
+        wanted = ModeCount(reduction.interface_modes, cutoff)
+        modes = with_characteristic_modes(modes, families.body, wanted, together=bool(reduction.interfaces_together))
     for name in reduction.extra or ():
-        modes = EXTRA_COLUMNS[name](modes, body, families=families)
+        modes = EXTRA_COLUMNS[name](modes, families)
     return modes
 
 
@@ -73,11 +77,9 @@ def set_options(body: FEBody, reduction: ReductionSection) -> dict[str, Any]:
     is_auto = reduction.n_modes == AUTO
     for key in mode_set_options(reduction.set):
         value = getattr(reduction, key)
-        if value is None or (is_auto and key in ("n_modes", "band")):
+        if value is None or key in COUNT_KEYS or (is_auto and key == "band"):
             continue
-        if key == "cutoff":
-            options[key] = value * time
-        elif key in ("shifts", "band"):
+        if key in ("shifts", "band"):
             options[key] = tuple(x * time for x in value)
         elif key == "loads":
             made = [load_of(name, section) for name, section in value.items()]
@@ -86,6 +88,11 @@ def set_options(body: FEBody, reduction: ReductionSection) -> dict[str, Any]:
             options["loads"] = [*options.get("loads", []), *(neighbour_load(body, section) for section in value)]
         else:
             options[key] = value
+    if not is_auto and (reduction.n_modes is not None or reduction.cutoff is not None):
+        number = None if reduction.n_modes is None else int(reduction.n_modes)
+        cutoff = None if reduction.cutoff is None else reduction.cutoff * time
+        is_plain = cutoff is None and not reduction.verify
+        options["n_modes"] = number if is_plain else ModeCount(number, cutoff, bool(reduction.verify))
     return options
 
 

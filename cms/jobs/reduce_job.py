@@ -1,10 +1,11 @@
 """The whole line of a reduction job: mesh or matrices, interfaces, mode set, reduced body."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cms.jobs.body_of_job import job_body
-from cms.jobs.job import Job
+from cms.jobs.job import Job, read_job
 from cms.jobs.parts_of_job import frame_of
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.fe_body import FEBody
@@ -18,14 +19,14 @@ __all__ = ["reduce_job"]
 
 
 def reduce_job(
-    job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None
+    job: Job | Path | str, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None
 ) -> ReducedBody:
     """Run a job up to the reduced body.
 
     Parameters
     ----------
     job
-        A checked job.
+        A job file, or a job that was read.
     stages
         Takes the time of each stage and shows its progress; none by default.
     on_report
@@ -34,11 +35,17 @@ def reduce_job(
     Raises
     ------
     CmsError, FeModelsError
-        If the mesh, a material, an interface or the mode set does not do.
+        If the job, the mesh, a material, an interface or the mode set does not do.
+
+    Examples
+    --------
+    >>> body = cms.reduce_job("rod.toml")                                          # doctest: +SKIP
+    >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
     """
     from cms.reduction import reduce
     from cms.second_order.unit_states import require_geometric_stiffness
 
+    job = job if isinstance(job, Job) else read_job(Path(job))
     stages = stages or Stages()
     coupled = job_body(job, stages, on_report=on_report)
     if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
@@ -52,7 +59,7 @@ def reduce_job(
             damping=None if job.damping is None else job.damping.damping,
             stress=job.reduction.stress is not False,
             quadratic=bool(job.reduction.quadratic_modes),
-            states=states,
+            geometric=False if states is None else states,
         )
 
 
@@ -70,8 +77,8 @@ def modes_and_states(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSe
         wanted = has_geometric_stiffness(coupled)
     with Families(coupled) as families:
         with stages(f"mode set {job.reduction.set}"):
-            modes = job_mode_set(coupled, job.reduction, families=families)
+            modes = job_mode_set(families, job.reduction)
         if not wanted and not job.reduction.quadratic_modes:
             return modes, None
         with stages("static states"):
-            return modes, unit_states(coupled, frame=frame_of(job), families=families)
+            return modes, unit_states(families, frame=frame_of(job))

@@ -12,6 +12,7 @@ from cms.mode_sets import MODE_SETS
 from cms.mode_sets.axis_functions import AXIS_FUNCTIONS
 from cms.mode_sets.extra_columns import EXTRA_COLUMNS
 from cms.mode_sets.given_columns import OVER
+from cms.solvers.mode_count import ModeCount
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
 from fe_models.foundation.words import nearest
@@ -287,8 +288,12 @@ class ReductionSection(Table):
 
 def mode_set_options(name: str) -> tuple[str, ...]:
     """Return the options of a mode set that a job can give."""
-    takes = inspect.signature(MODE_SETS[name]).parameters
-    return tuple(key for key in SET_OPTIONS if key in takes or (key == "neighbours" and "loads" in takes))
+    takes = set(signature := inspect.signature(MODE_SETS[name]).parameters)
+    if "n_modes" in takes and signature["n_modes"].annotation == int | ModeCount:
+        takes |= {"cutoff", "verify"}
+    if "loads" in takes:
+        takes |= {"neighbours"}
+    return tuple(key for key in SET_OPTIONS if key in takes)
 
 
 def named_interfaces(reduction: ReductionSection) -> Mapping[str, str]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from cms.errors import ModeSetError
 from cms.families.rigid_modes import geometric_rigid_modes
+from cms.families.sharing import body_of
 from cms.families.static_modes import COMPONENTS
 from cms.mode_set import ModeSet
 from cms.mode_sets.axis_functions import AXIS_FUNCTIONS, AxisFunctions, axis_functions
@@ -25,7 +26,7 @@ SLENDER_RATIO = 1e-6  #: part by which the least two principal moments of inerti
 
 
 def assumed_modes(
-    body: FEBody,
+    body: "FEBody | Families",
     *,
     n_modes: int | None = None,
     n_axial: int | None = None,
@@ -35,7 +36,6 @@ def assumed_modes(
     axis: Sequence[float] | None = None,
     point: Sequence[float] | None = None,
     poisson: float | None = None,
-    families: "Families | None" = None,
 ) -> ModeSet:
     """Assumed-mode set of a slender body: [Psi_R, axial, bending about both section axes, torsion].
 
@@ -55,7 +55,7 @@ def assumed_modes(
     Parameters
     ----------
     body
-        A coupled body.
+        A coupled body, or its `Families`, which many sets share.
     n_modes
         Functions for each of the four motions where it has no number of its own.
     n_axial, n_bending, n_torsion
@@ -67,8 +67,6 @@ def assumed_modes(
         centre of mass.
     poisson
         Poisson's ratio nu of one material; None: free contraction columns.
-    families
-        Not used; here so that all mode sets are called alike.
 
     Raises
     ------
@@ -80,6 +78,7 @@ def assumed_modes(
     .. [1] The field and its contraction solve the equations of a prismatic bar in tension and in pure bending exactly
        (Saint-Venant), see docs/theory.md.
     """
+    body = body_of(body)
     body.require_coupled()
     if functions not in AXIS_FUNCTIONS:
         raise ModeSetError(f"assumed_modes: unknown functions {functions!r}{nearest(functions, AXIS_FUNCTIONS)}")

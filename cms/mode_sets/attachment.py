@@ -4,22 +4,20 @@ import numpy as np
 
 from cms.families.families import Families
 from cms.families.flexibility import BoundaryConditions
+from cms.families.sharing import families_of
 from cms.families.static_modes import boundary_groups, boundary_labels
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import boundary_block, mode_set, rigid_block, static_block, vibration_block
-from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+from cms.mode_sets.selection import checked_modes, require_interfaces
+from cms.solvers.mode_count import ModeCount, mode_count
 from fe_models.body.fe_body import FEBody
 
 __all__ = ["attachment", "unrestrained_attachment"]
 
 
 def attachment(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ModeSet:
     """Attachment mode set: [Psi_R, Psi_A, modes with R held].
 
@@ -29,34 +27,28 @@ def attachment(
     Parameters
     ----------
     body
-        A coupled body with at least one interface.
+        A coupled body with at least one interface, or its `Families`, which many sets share.
     n_modes
-        Number of modes with R held; 0 spans the constraint modes.
-    cutoff
-        Instead of a number: all of them up to this frequency [Hz, or 1/time unit of the body].
-    verify
-        Prove by the inertia of a factorisation that no mode was missed.
-    families
-        The families of this body, to share them; made and freed here by default.
+        Number of modes with R held; 0 spans the constraint modes; a `ModeCount` says up to which frequency instead,
+        and whether to prove that none was missed.
 
     Raises
     ------
     ModeSetError
-        If not exactly one of `n_modes` and `cutoff` is given, or no mode lies below the cutoff.
+        If no mode lies below the cutoff.
     BodyError
         If the body is held to the ground, or has no inertia in some rigid-body motion.
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
         require_interfaces("attachment", body)
         conditions = BoundaryConditions(np.eye(len(families.h))[:, families.free.e])
         modes = checked_modes(
             "attachment",
             "determinate-interface",
-            lambda **asked: families.elastic_modes(conditions, **asked),
+            lambda asked: families.elastic_modes(conditions, asked),
             body,
-            n_modes=n_modes,
-            cutoff=cutoff,
-            verify=verify,
+            wanted,
         )
         labels = np.array(boundary_labels(body, "attachment"), dtype=object)[families.free.e]
         groups = np.array(boundary_groups(body, "attachment"), dtype=object)[families.free.e]
@@ -66,39 +58,34 @@ def attachment(
             vibration_block("determinate-interface", modes),
         ]
         held = ", ".join(label.removeprefix("held ") for label in held_words(families))
-        return mode_set("attachment", families, blocks, modes=modes, cutoff=cutoff, options={"held": held})
+        return mode_set("attachment", families, blocks, modes=modes, wanted=wanted, options={"held": held})
 
 
 def unrestrained_attachment(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ModeSet:
     """Unrestrained attachment mode set: [Psi_R, Psi_U, free modes]; spans Rubin's set.
 
     Psi_U: unit force on each boundary dof of the free body, in balance with its rigid-body acceleration. Parameters and
     errors are those of `attachment`, with the elastic modes of the free body.
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
         require_interfaces("unrestrained_attachment", body)
         modes = checked_modes(
             "unrestrained_attachment",
             "elastic free",
             families.free_modes,
             body,
-            n_modes=n_modes,
-            cutoff=cutoff,
-            verify=verify,
+            wanted,
         )
         blocks = [
             rigid_block(families),
             boundary_block(body, families.Psi_U, "unrestrained attachment"),
             vibration_block("free", modes),
         ]
-        return mode_set("unrestrained-attachment", families, blocks, modes=modes, cutoff=cutoff)
+        return mode_set("unrestrained-attachment", families, blocks, modes=modes, wanted=wanted)
 
 
 def held_words(families: Families) -> list[str]:

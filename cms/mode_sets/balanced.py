@@ -7,10 +7,11 @@ import numpy as np
 from cms.errors import ModeSetError
 from cms.families.families import Families
 from cms.families.receptance import boundary_scale
+from cms.families.sharing import body_of, families_of
 from cms.mode_set import ModeSet
 from cms.mode_sets.balancing import balance
 from cms.mode_sets.blocks import mode_set, rigid_block, static_block
-from cms.mode_sets.selection import families_of, require_interfaces
+from cms.mode_sets.selection import require_interfaces
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_basis.independent import Columns, gram, independent_columns
 from cms.solvers.sparse_product import SymmetricProduct
@@ -29,13 +30,12 @@ REPORTED = 12  #: singular values in the options of the set; all of them are in 
 
 
 def balanced_truncation(
-    body: FEBody,
+    body: FEBody | Families,
     *,
     n_modes: int | None = None,
     tolerance: float | None = None,
     damping_ratio: float = 0.01,
     n_rich: int | None = None,
-    families: Families | None = None,
 ) -> ModeSet:
     """Balanced truncation of the elastic part of the free body: [Psi_R, balanced directions].
 
@@ -55,7 +55,7 @@ def balanced_truncation(
     Parameters
     ----------
     body
-        A coupled body with at least one interface.
+        A coupled body with at least one interface, or its `Families`, which many sets share.
     n_modes
         Number of balanced directions.
     tolerance
@@ -64,8 +64,6 @@ def balanced_truncation(
         Modal damping that is added for the balancing alone, of critical; 1 % by default.
     n_rich
         Free modes of the rich basis; by default 3 n_modes, but 60 at least, and three fifths of all at most.
-    families
-        Mode families to share; made and freed here by default.
 
     Raises
     ------
@@ -85,9 +83,10 @@ def balanced_truncation(
         raise ModeSetError(f"balanced_truncation: damping_ratio = {damping_ratio}; expected 0 or more (0.01 is 1 %)")
     if n_rich is not None and n_rich < 1:
         raise ModeSetError(f"balanced_truncation: n_rich = {n_rich}; expected 1 or more")
+    source, body = body, body_of(body)
     body.require_coupled()
     require_interfaces("balanced_truncation", body)
-    with families_of(body, families) as families:
+    with families_of(source) as families:
         rich = rich_basis(families, n_rich, max(FEWEST_RICH, RICH_FACTOR * (n_modes or 0)))
         n = len(rich.omega2)
         if n_modes is not None and n_modes > n:

@@ -9,6 +9,7 @@ from cms.families.families import Families
 from cms.families.static_modes import boundary_groups, boundary_labels
 from cms.mode_set import ModeSet
 from cms.solvers.eigen import EigenResult
+from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 
@@ -81,7 +82,7 @@ def mode_set(
     blocks: Sequence[Block],
     *,
     modes: EigenResult | None = None,
-    cutoff: float | None = None,
+    wanted: ModeCount | None = None,
     options: Mapping[str, str] | None = None,
 ) -> ModeSet:
     """Put blocks side by side, and record what was asked for and which solver ran."""
@@ -90,8 +91,8 @@ def mode_set(
         recorded |= {"n_modes": str(len(modes.frequencies))}
         if len(modes.frequencies):
             recorded |= {"verified": str(modes.is_proven), "eigensolver": modes.method}
-    if cutoff is not None:
-        recorded["cutoff"] = repr(float(cutoff))
+    if wanted is not None and wanted.cutoff is not None:
+        recorded["cutoff"] = repr(float(wanted.cutoff))
     return ModeSet(
         name,
         np.hstack([block.columns for block in blocks]) if len(blocks) > 1 else blocks[0].columns,

@@ -9,6 +9,7 @@ from cms.errors import ModeSetError
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.mode_set import ModeSet
 from cms.reduced_basis.independent import gram
+from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody, Interface
@@ -22,9 +23,8 @@ DEPENDENT = 1e-9  #: part of a rigid-body motion of an interface, below which it
 def with_characteristic_modes(
     modes: ModeSet,
     body: FEBody,
+    n_modes: int | ModeCount,
     *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
     together: bool = False,
 ) -> ModeSet:
     """Replace the constraint modes of every all-node interface by characteristic constraint modes [1]_.
@@ -42,8 +42,7 @@ def with_characteristic_modes(
         The body the set was made from.
     n_modes
         Deforming modes for each interface, or for all of them if `together`; more than there are keeps all.
-    cutoff
-        Instead of a number: all of them up to this frequency [Hz, or 1/time unit of the body].
+        A `ModeCount` says up to which frequency instead.
     together
         One pencil for all all-node interfaces instead of one each; the rigid-body motions of each are kept all the
         same.
@@ -51,21 +50,14 @@ def with_characteristic_modes(
     Raises
     ------
     ModeSetError
-        If not exactly one of n_modes and cutoff is given, the body has no interface of kind "nodes" with more than
+        If the body has no interface of kind "nodes" with more than
         rigid motion, or the set has no constraint modes of it.
 
     References
     ----------
     .. [1] The reduction is a projection within the span of the constraint modes: docs/theory.md.
     """
-    if (n_modes is None) == (cutoff is None):
-        raise ModeSetError(
-            f"with_characteristic_modes: expected either n_modes or cutoff, got n_modes = {n_modes}, cutoff = {cutoff}"
-        )
-    if n_modes is not None and n_modes < 0:
-        raise ModeSetError(f"with_characteristic_modes: n_modes = {n_modes}; expected 0 or more")
-    if cutoff is not None and not cutoff > 0:
-        raise ModeSetError(f"with_characteristic_modes: cutoff = {cutoff}; expected a frequency above 0")
+    wanted = mode_count(n_modes)
     Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
     parts = [
         _Part((interface.name,), _columns_of(modes, interface), _rigid_motions(body, interface, Psi_R))
@@ -83,7 +75,7 @@ def with_characteristic_modes(
     columns, labels, groups = [modes.columns[:, kept]], [modes.labels[k] for k in kept], [modes.groups[k] for k in kept]
     options, data = dict(modes.options), dict(modes.data)
     for part in parts:
-        Z, frequencies = _characteristic(body, modes.columns[:, part.columns], part, n_modes, cutoff)
+        Z, frequencies = _characteristic(body, modes.columns[:, part.columns], part, wanted)
         n_r, n_z, name = part.R.shape[1], Z.shape[1], " + ".join(part.names)
         columns.append(combine(modes.columns[:, part.columns], np.hstack([part.R, Z])))
         labels += [f"interface {name} rigid {k + 1}" for k in range(n_r)]
@@ -143,19 +135,17 @@ def _side_by_side(parts: list[_Part]) -> _Part:
     )
 
 
-def _characteristic(
-    body: FEBody, Psi_C: Array, part: _Part, n_modes: int | None, cutoff: float | None
-) -> tuple[Array, Array]:
+def _characteristic(body: FEBody, Psi_C: Array, part: _Part, wanted: ModeCount) -> tuple[Array, Array]:
     """Lowest deforming modes of the constraint modes and their frequencies: (1) to (3)."""
     K_c, M_c = (gram(Psi_C, SymmetricProduct(A) @ Psi_C) for A in (body.K, body.M))
     n, n_r = part.R.shape
     Q, _ = la.qr(M_c @ part.R)
     X = Q[:, n_r:]  # Rᵀ M_c X = 0
     n_most = n - n_r
-    if n_most == 0 or n_modes == 0:
+    if n_most == 0 or wanted.n == 0:
         return np.zeros((n, 0)), np.zeros(0)
-    subset = None if n_modes is None or n_modes >= n_most else (0, n_modes - 1)
+    subset = None if wanted.n is None or wanted.n >= n_most else (0, wanted.n - 1)
     omega2, Y = la.eigh(X.T @ K_c @ X, X.T @ M_c @ X, subset_by_index=subset)
     frequencies = np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi)
-    count = len(frequencies) if cutoff is None else int((frequencies <= cutoff).sum())
+    count = len(frequencies) if wanted.cutoff is None else int((frequencies <= wanted.cutoff).sum())
     return X @ Y[:, :count], frequencies[:count]

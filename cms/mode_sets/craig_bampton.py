@@ -7,23 +7,22 @@ import numpy as np
 from cms.families.families import Families
 from cms.families.flexibility import BoundaryConditions
 from cms.families.mixed_boundary import free_directions
+from cms.families.sharing import families_of
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import Block, constraint_block, inertia_relief_block, mode_set, vibration_block
-from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+from cms.mode_sets.selection import checked_modes, require_interfaces
 from cms.solvers.eigen import EigenResult
+from cms.solvers.mode_count import ModeCount, mode_count
 from fe_models.body.fe_body import FEBody
 
 __all__ = ["craig_bampton", "craig_bampton_ir", "guyan"]
 
 
 def craig_bampton(
-    body: FEBody,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
     *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
     free: Mapping[str, Sequence[str]] | None = None,
-    families: Families | None = None,
 ) -> ModeSet:
     """Craig-Bampton mode set: [Psi_C, fixed-interface modes] [1]_.
 
@@ -34,23 +33,18 @@ def craig_bampton(
     Parameters
     ----------
     body
-        A coupled body with at least one interface.
+        A coupled body with at least one interface, or its `Families`, which many sets share.
     n_modes
-        Number of fixed-interface modes; 0 gives Guyan-Irons.
-    cutoff
-        Instead of a number: all fixed-interface modes up to this frequency [Hz, or 1/time unit of the body].
-    verify
-        Prove by the inertia of a factorisation that no mode was missed.
+        Number of fixed-interface modes; 0 gives Guyan-Irons; a `ModeCount` says up to which frequency instead,
+        and whether to prove that none was missed.
     free
         Mixed boundary conditions: interface -> components along its axes that step (2) leaves free, such as
         {"pin": ["rz"]} for a bearing; they keep their constraint modes.
-    families
-        The families of this body, to share them with other mode sets; made and freed here by default.
 
     Raises
     ------
     ModeSetError
-        If not exactly one of `n_modes` and `cutoff` is given, there are fewer interior dofs than modes, or no mode lies
+        If there are fewer interior dofs than modes, or no mode lies
         below the cutoff.
     BodyError
         If the body is a mechanism when its interfaces are held.
@@ -59,21 +53,19 @@ def craig_bampton(
     ----------
     .. [1] docs/theory.md §2-3.
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
         require_interfaces("craig_bampton", body)
-        block, modes = _held_modes("craig_bampton", families, n_modes, cutoff, verify, free or {})
+        block, modes = _held_modes("craig_bampton", families, wanted, free or {})
         blocks = [constraint_block(families), block]
-        return mode_set("craig-bampton", families, blocks, modes=modes, cutoff=cutoff, options=_free_words(free))
+        return mode_set("craig-bampton", families, blocks, modes=modes, wanted=wanted, options=_free_words(free))
 
 
 def craig_bampton_ir(
-    body: FEBody,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
     *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
     free: Mapping[str, Sequence[str]] | None = None,
-    families: Families | None = None,
 ) -> ModeSet:
     """Craig-Bampton with inertia relief: [Psi_C, Psi_H, fixed-interface modes].
 
@@ -81,16 +73,18 @@ def craig_bampton_ir(
     gravity and for every static interface load of the accelerated body, whatever the number of modes. Parameters and
     errors are those of `craig_bampton`.
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
         require_interfaces("craig_bampton_ir", body)
-        block, modes = _held_modes("craig_bampton_ir", families, n_modes, cutoff, verify, free or {})
+        block, modes = _held_modes("craig_bampton_ir", families, wanted, free or {})
         blocks = [constraint_block(families), inertia_relief_block(families), block]
-        return mode_set("craig-bampton-ir", families, blocks, modes=modes, cutoff=cutoff, options=_free_words(free))
+        return mode_set("craig-bampton-ir", families, blocks, modes=modes, wanted=wanted, options=_free_words(free))
 
 
-def guyan(body: FEBody, *, families: Families | None = None) -> ModeSet:
+def guyan(body: FEBody | Families, *, families: Families | None = None) -> ModeSet:
     """Guyan-Irons static condensation: constraint modes only (Craig-Bampton with n_modes = 0)."""
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body = families.body
         require_interfaces("guyan", body)
         return mode_set("guyan", families, [constraint_block(families)])
 
@@ -98,18 +92,14 @@ def guyan(body: FEBody, *, families: Families | None = None) -> ModeSet:
 def _held_modes(
     name: str,
     families: Families,
-    n_modes: int | None,
-    cutoff: float | None,
-    verify: bool,
+    wanted: ModeCount,
     free: Mapping[str, Sequence[str]],
 ) -> tuple[Block, EigenResult]:
     """Return the modes with B held, or with all of B held but its free dofs (zero on B again by Psi_C)."""
     body = families.body
     directions = free_directions(body, free)
     if not directions.shape[1]:
-        modes = checked_modes(
-            name, "fixed-interface", families.fixed_modes, body, n_modes=n_modes, cutoff=cutoff, verify=verify
-        )
+        modes = checked_modes(name, "fixed-interface", families.fixed_modes, body, wanted)
         if len(families.h) == len(body.b):
             return vibration_block("fixed-interface", modes), modes
         return vibration_block("fixed-interface", modes, families.without_boundary(modes.Phi)), modes
@@ -120,11 +110,9 @@ def _held_modes(
     modes = checked_modes(
         name,
         "mixed-interface",
-        lambda **asked: families.elastic_modes(BoundaryConditions(Z), **asked),
+        lambda asked: families.elastic_modes(BoundaryConditions(Z), asked),
         body,
-        n_modes=n_modes,
-        cutoff=cutoff,
-        verify=verify,
+        wanted,
     )
     return vibration_block("mixed-interface", modes, families.without_boundary(modes.Phi)), modes
 

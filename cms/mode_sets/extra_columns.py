@@ -7,8 +7,8 @@ import numpy as np
 
 from cms.errors import ModeSetError
 from cms.families.families import Families
+from cms.families.sharing import body_of, families_of
 from cms.mode_set import ModeSet
-from cms.mode_sets.selection import families_of
 from cms.second_order.centrifugal import CENTRIFUGAL, centrifugal_loads
 from cms.solvers.sparse_product import SymmetricProduct
 from fe_models.body.fe_body import FEBody
@@ -22,9 +22,7 @@ IN_THE_SPAN = 1e-6  #: part of a response, in the energy norm, below which the s
 ROUNDING = 1e-13  #: energy, of that of the dofs one by one, below which a column is rigid-body motion
 
 
-def with_load_cases(
-    modes: ModeSet, body: FEBody, *, names: Sequence[str] | None = None, families: Families | None = None
-) -> ModeSet:
+def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[str] | None = None) -> ModeSet:
     """Add the static responses to the load cases of a body to a mode set.
 
     (1) held: K_II⁻¹ f_I, all boundary dofs held; exact under the load in a supported body
@@ -38,17 +36,16 @@ def with_load_cases(
     modes
         A mode set of this body.
     body
-        A coupled body with load cases.
+        A coupled body with load cases, or its `Families`.
     names
         Of the load cases; all but the centrifugal ones by default.
-    families
-        Mode families to share; made and freed here by default.
 
     Raises
     ------
     ModeSetError
         If there are no load cases, or none of that name.
     """
+    source, body = body, body_of(body)
     cases = [case for case in body.load_cases if case.kind != CENTRIFUGAL]
     if not cases:
         raise ModeSetError(
@@ -63,10 +60,10 @@ def with_load_cases(
                     f"with_load_cases: body {body.name!r}: no load case {name!r}{nearest(name, by_name)}"
                 )
         cases = [by_name[name] for name in names]
-    return _with_responses(modes, body, cases, "load case", families)
+    return _with_responses(modes, source, cases, "load case")
 
 
-def with_centrifugal(modes: ModeSet, body: FEBody, *, families: Families | None = None) -> ModeSet:
+def with_centrifugal(modes: ModeSet, body: FEBody | Families) -> ModeSet:
     """Add the static responses to the six centrifugal fields of steady rotation to a mode set.
 
     As `with_load_cases`, with the loads of `centrifugal_loads`. A rigid interface eliminates members whose centrifugal
@@ -80,6 +77,7 @@ def with_centrifugal(modes: ModeSet, body: FEBody, *, families: Families | None 
     ModeSetError
         If the body has rigid interfaces and no centrifugal loads.
     """
+    source, body = body, body_of(body)
     cases: Sequence[LoadCase] = [case for case in body.load_cases if case.kind == CENTRIFUGAL]
     if not cases:
         T = None if body.recovery is None else body.recovery.matrix
@@ -89,15 +87,14 @@ def with_centrifugal(modes: ModeSet, body: FEBody, *, families: Families | None 
                 "cannot be told from the coupled mass; add centrifugal_loads(body) to its load cases before coupling"
             )
         cases = centrifugal_loads(body)
-    return _with_responses(modes, body, cases, "", families)
+    return _with_responses(modes, source, cases, "")
 
 
 EXTRA_COLUMNS: dict[str, Callable[..., ModeSet]] = {"load-cases": with_load_cases, "centrifugal": with_centrifugal}
 
 
-def _with_responses(
-    modes: ModeSet, body: FEBody, cases: Sequence[LoadCase], family: str, families: Families | None
-) -> ModeSet:
+def _with_responses(modes: ModeSet, source: FEBody | Families, cases: Sequence[LoadCase], family: str) -> ModeSet:
+    body = body_of(source)
     if modes.columns.shape[0] != body.n_dof:
         raise ModeSetError(
             f"extra columns: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body {body.name!r} "
@@ -106,7 +103,7 @@ def _with_responses(
     F = load_columns(cases, body.n_dof)
     names = [f"{family} {case.name}".strip() for case in cases]
     columns, labels, groups, known = modes.columns, [*modes.labels], [*modes.groups], []
-    with families_of(body, families) as families:
+    with families_of(source) as families:
         held = np.zeros_like(F)
         held[families.fixed.i] = families.fixed.factorization.solve(F[families.fixed.i])  # (1)
         for support, responses in (("held", held), ("accelerating", families.flexibility(F))):  # (2)

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.families.families import Families
+from cms.families.sharing import families_of
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import (
     Block,
@@ -16,8 +17,9 @@ from cms.mode_sets.blocks import (
     rigid_block,
     vibration_block,
 )
-from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+from cms.mode_sets.selection import checked_modes, require_interfaces
 from cms.solvers.eigen import EigenResult
+from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
@@ -28,48 +30,36 @@ DEPENDENT = 1e-12  #: eigenvalue of the scaled residual flexibility against its 
 
 
 def normal_modes(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ModeSet:
     """Normal modes alone: [Psi_R, free modes]; exact frequencies of the free body, poor under interface loads.
 
     Parameters
     ----------
     body
-        A coupled body; it may have no interface.
+        A coupled body; it may have no interface, or its `Families`, which many sets share.
     n_modes
-        Number of elastic free modes.
-    cutoff
-        Instead of a number: all of them up to this frequency [Hz, or 1/time unit of the body].
-    verify
-        Prove by the inertia of a factorisation that no mode was missed.
-    families
-        The families of this body, to share them; made and freed here by default.
+        Number of elastic free modes; a `ModeCount` says up to which frequency instead,
+        and whether to prove that none was missed.
 
     Raises
     ------
     ModeSetError
-        If not exactly one of `n_modes` and `cutoff` is given, or no mode lies below the cutoff.
+        If no mode lies below the cutoff.
     BodyError
         If the body is held to the ground, or has no inertia in some rigid-body motion.
     """
-    with families_of(body, families) as families:
-        modes = _free_modes("normal_modes", families, n_modes, cutoff, verify)
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
+        modes = _free_modes("normal_modes", families, wanted)
         blocks = [rigid_block(families), vibration_block("free", modes)]
-        return mode_set("normal", families, blocks, modes=modes, cutoff=cutoff)
+        return mode_set("normal", families, blocks, modes=modes, wanted=wanted)
 
 
 def rubin(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ModeSet:
     """Rubin mode set: [Psi_R, free modes, residual attachment modes].
 
@@ -79,54 +69,43 @@ def rubin(
     Statically complete, and exact to omega² about zero frequency at the interfaces. Parameters and errors are those of
     `normal_modes`, but the body needs an interface; n_modes = 0 gives [Psi_R, Psi_U].
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
         require_interfaces("rubin", body)
-        modes = _free_modes("rubin", families, n_modes, cutoff, verify)
+        modes = _free_modes("rubin", families, wanted)
         blocks = [rigid_block(families), vibration_block("free", modes), _residual_block(families, modes)]
-        return mode_set("rubin", families, blocks, modes=modes, cutoff=cutoff)
+        return mode_set("rubin", families, blocks, modes=modes, wanted=wanted)
 
 
 def macneal(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ModeSet:
     """Span of MacNeal's set, that of `rubin`: his reduction differs in the pencil alone, which lacks residual inertia.
 
     A floating frame needs the inertia of every shape, so here it is kept; `reduced_pencil.macneal_pencil` has the
     pencil itself, to compare. Parameters and errors are those of `rubin`.
     """
-    modes = rubin(body, n_modes=n_modes, cutoff=cutoff, verify=verify, families=families)
+    modes = rubin(body, n_modes)
     return replace(modes, name="macneal", options={**modes.options, "span": "of rubin, with residual inertia"})
 
 
 def dual_craig_bampton(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ModeSet:
     """Span of the dual Craig-Bampton set, that of `rubin`: it differs in its unknowns, which are interface forces.
 
     A floating frame needs displacements; `reduced_pencil.dual_craig_bampton_pencil` has the pencil itself, to
     compare. Parameters and errors are those of `rubin`.
     """
-    modes = rubin(body, n_modes=n_modes, cutoff=cutoff, verify=verify, families=families)
+    modes = rubin(body, n_modes)
     return replace(modes, name="dual-craig-bampton", options={**modes.options, "span": "of rubin, in displacements"})
 
 
 def craig_chang(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ModeSet:
     """Craig-Chang mode set: Rubin's span in physical interface coordinates.
 
@@ -139,9 +118,10 @@ def craig_chang(
     Where modes are kept in so great a number that G_d is singular, its pseudo-inverse loses nothing: a force without
     residual displacement at the interfaces has none anywhere. Parameters and errors are those of `rubin`.
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
         require_interfaces("craig_chang", body)
-        modes = _free_modes("craig_chang", families, n_modes, cutoff, verify)
+        modes = _free_modes("craig_chang", families, wanted)
         residual, b = families.residual_attachment(modes), body.b
         interface = combine(residual, _pseudo_inverse(residual[b]))
         rigid, free = rigid_block(families), vibration_block("free", modes)
@@ -150,37 +130,32 @@ def craig_chang(
             replace(rigid, columns=rigid.columns - combine(interface, rigid.columns[b])),
             replace(free, columns=free.columns - combine(interface, free.columns[b])),
         ]
-        return mode_set("craig-chang", families, blocks, modes=modes, cutoff=cutoff)
+        return mode_set("craig-chang", families, blocks, modes=modes, wanted=wanted)
 
 
 def herting(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ModeSet:
     """Herting mode set: [Psi_C, Psi_H, phi - Psi_C phi_B] with phi the free modes.
 
     Statically complete as Craig-Bampton with inertia relief, with the exact modes of the free body besides. Parameters
     and errors are those of `rubin`.
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
         require_interfaces("herting", body)
-        modes = _free_modes("herting", families, n_modes, cutoff, verify)
+        modes = _free_modes("herting", families, wanted)
         blocks = [
             constraint_block(families),
             inertia_relief_block(families),
             vibration_block("free", modes, families.without_boundary(modes.Phi)),
         ]
-        return mode_set("herting", families, blocks, modes=modes, cutoff=cutoff)
+        return mode_set("herting", families, blocks, modes=modes, wanted=wanted)
 
 
-def _free_modes(name: str, families: Families, n_modes: int | None, cutoff: float | None, verify: bool) -> EigenResult:
-    return checked_modes(
-        name, "elastic free", families.free_modes, families.body, n_modes=n_modes, cutoff=cutoff, verify=verify
-    )
+def _free_modes(name: str, families: Families, wanted: ModeCount) -> EigenResult:
+    return checked_modes(name, "elastic free", families.free_modes, families.body, wanted)
 
 
 def _residual_block(families: Families, modes: EigenResult) -> Block:

@@ -12,9 +12,10 @@ from scipy.linalg.lapack import dpstrf
 from cms.errors import FactorizationError, ModeSetError
 from cms.families.families import Families
 from cms.families.receptance import boundary_scale, largest_error, receptance_of_pencil
+from cms.families.sharing import body_of, families_of
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import mode_set, rigid_block, static_block
-from cms.mode_sets.selection import families_of, require_interfaces
+from cms.mode_sets.selection import require_interfaces
 from cms.reduced_basis.independent import Columns, gram
 from cms.second_order.centrifugal import CENTRIFUGAL
 from cms.solvers.factorization import factorize
@@ -31,7 +32,7 @@ BAND_POINTS = 60  #: frequencies of a band at which it is compared
 
 
 def krylov(
-    body: FEBody,
+    body: FEBody | Families,
     *,
     n_modes: int | None = None,
     n_blocks: int | None = None,
@@ -39,7 +40,6 @@ def krylov(
     tolerance: float | None = None,
     band: tuple[float, float] | None = None,
     load_cases: bool = True,
-    families: Families | None = None,
 ) -> ModeSet:
     """Krylov mode set: [Psi_R, blocks of moments] of the loads F = [unit loads on the boundary dofs, load cases].
 
@@ -56,7 +56,7 @@ def krylov(
     Parameters
     ----------
     body
-        A coupled body with at least one interface.
+        A coupled body with at least one interface, or its `Families`, which many sets share.
     n_modes
         Columns beyond the first block of every shift; 0 gives the static set [Psi_R, Psi_U] where the shift is 0.
     n_blocks
@@ -71,8 +71,6 @@ def krylov(
         Frequencies (from, to) over which the error is estimated [Hz].
     load_cases
         Whether the body's load cases are among the loads; centrifugal ones never are, their response is static.
-    families
-        Mode families to share; made and freed here by default.
 
     Raises
     ------
@@ -81,12 +79,13 @@ def krylov(
         natural frequency.
     """
     _check(n_modes, n_blocks, shifts, tolerance, band)
+    source, body = body, body_of(body)
     body.require_coupled()
     require_interfaces("krylov", body)
     cases = [case for case in body.load_cases if load_cases and case.kind != CENTRIFUGAL]
     F_extra = np.array([case.f for case in cases]).T if cases else np.zeros((body.n_dof, 0))
     with ExitStack() as stack:
-        families = stack.enter_context(families_of(body, families))
+        families = stack.enter_context(families_of(source))
         expansions = [
             _static_expansion(families, F_extra) if shift == 0 else _shifted_expansion(body, shift, F_extra, stack)
             for shift in dict.fromkeys(map(float, shifts))

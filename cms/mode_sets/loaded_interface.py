@@ -9,22 +9,21 @@ from cms.errors import ModeSetError
 from cms.families.families import Families
 from cms.families.flexibility import BoundaryConditions
 from cms.families.interface_loads import InterfaceLoad, boundary_load
+from cms.families.sharing import families_of
 from cms.mode_set import ModeSet
 from cms.mode_sets.blocks import constraint_block, mode_set, vibration_block
-from cms.mode_sets.selection import checked_modes, families_of, require_interfaces
+from cms.mode_sets.selection import checked_modes, require_interfaces
+from cms.solvers.mode_count import ModeCount, mode_count
 from fe_models.body.fe_body import FEBody
 
 __all__ = ["benfield_hruda"]
 
 
 def benfield_hruda(
-    body: FEBody,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
     *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    verify: bool = False,
     loads: Sequence[InterfaceLoad] = (),
-    families: Families | None = None,
 ) -> ModeSet:
     """Benfield-Hruda mode set: [Psi_C, phi - Psi_C phi_B], phi the loaded-interface modes.
 
@@ -37,27 +36,23 @@ def benfield_hruda(
     Parameters
     ----------
     body
-        A coupled body with at least one interface.
+        A coupled body with at least one interface, or its `Families`, which many sets share.
     n_modes
-        Number of elastic loaded-interface modes.
-    cutoff
-        Instead of a number: all of them up to this frequency [Hz, or 1/time unit of the body].
-    verify
-        Prove by the inertia of a factorisation that no mode was missed.
+        Number of elastic loaded-interface modes; a `ModeCount` says up to which frequency instead,
+        and whether to prove that none was missed.
     loads
         Mass and stiffness per interface (`point_load`, `InterfaceLoad`), or of neighbours across interfaces
         (`condensed_load`).
-    families
-        The families of this body, to share them; made and freed here by default.
 
     Raises
     ------
     ModeSetError
-        If there is no load, not exactly one of `n_modes` and `cutoff`, or no mode below the cutoff.
+        If there is no load, or no mode below the cutoff.
     BodyError
         If a load names an unknown interface or is not a mass or stiffness.
     """
-    with families_of(body, families) as families:
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
         require_interfaces("benfield_hruda", body)
         if not loads:
             names = ", ".join(interface.name for interface in body.interfaces)
@@ -75,11 +70,9 @@ def benfield_hruda(
         modes = checked_modes(
             "benfield_hruda",
             "loaded-interface",
-            lambda **asked: families.elastic_modes(conditions, **asked),
+            lambda asked: families.elastic_modes(conditions, asked),
             body,
-            n_modes=n_modes,
-            cutoff=cutoff,
-            verify=verify,
+            wanted,
         )
         blocks = [
             constraint_block(families),
@@ -87,5 +80,5 @@ def benfield_hruda(
         ]
         loaded = ", ".join(dict.fromkeys(name for load in loads for name in load.interfaces))
         return mode_set(
-            "benfield-hruda", families, blocks, modes=modes, cutoff=cutoff, options={"loaded interfaces": loaded}
+            "benfield-hruda", families, blocks, modes=modes, wanted=wanted, options={"loaded interfaces": loaded}
         )

@@ -7,11 +7,12 @@ import scipy.linalg as la
 
 from cms.errors import ModeSetError
 from cms.families.families import Families
+from cms.families.sharing import families_of
 from cms.families.static_modes import boundary_labels
 from cms.mode_set import ModeSet
 from cms.mode_sets.free_interface import rubin
-from cms.mode_sets.selection import families_of
 from cms.reduced_basis.independent import gram
+from cms.solvers.mode_count import ModeCount, mode_count
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 
@@ -63,11 +64,8 @@ def pencil_of_modes(body: FEBody, modes: ModeSet) -> ReducedPencil:
 
 
 def macneal_pencil(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ReducedPencil:
     """MacNeal's reduction: Rubin's columns without the inertia of the residual attachment modes.
 
@@ -80,8 +78,9 @@ def macneal_pencil(
     n_modes, cutoff, families
         As for `rubin`.
     """
-    with families_of(body, families) as families:
-        return _macneal_pencil(families, rubin(body, n_modes=n_modes, cutoff=cutoff, families=families))
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
+        return _macneal_pencil(families, rubin(families, wanted))
 
 
 def _macneal_pencil(families: Families, modes: ModeSet) -> ReducedPencil:
@@ -101,11 +100,8 @@ def _macneal_pencil(families: Families, modes: ModeSet) -> ReducedPencil:
 
 
 def dual_craig_bampton_pencil(
-    body: FEBody,
-    *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
-    families: Families | None = None,
+    body: FEBody | Families,
+    n_modes: int | ModeCount,
 ) -> ReducedPencil:
     """Dual Craig-Bampton reduction: interface forces f as unknowns, so that bodies are assembled by equal forces.
 
@@ -120,8 +116,9 @@ def dual_craig_bampton_pencil(
     n_modes, cutoff, families
         As for `rubin`.
     """
-    with families_of(body, families) as families:
-        modes = rubin(body, n_modes=n_modes, cutoff=cutoff, families=families)
+    with families_of(body) as families:
+        body, wanted = families.body, mode_count(n_modes)
+        modes = rubin(families, wanted)
         macneal = _macneal_pencil(families, modes)
         n_b, n = len(body.b), len(macneal.labels)
         force = slice(n - n_b, n)

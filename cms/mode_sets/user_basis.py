@@ -9,6 +9,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from cms.errors import ModeSetError
+from cms.families.sharing import body_of
 from cms.mode_set import ModeSet
 from cms.mode_sets.given_columns import coupled_columns, tell_frequencies
 from fe_models.body.fe_body import FEBody
@@ -21,20 +22,19 @@ __all__ = ["user_basis"]
 
 
 def user_basis(
-    body: FEBody,
+    body: "FEBody | Families",
     *,
     columns: Array | str | os.PathLike[str] | None = None,
     columns_over: str | None = None,
     labels: Sequence[str] | None = None,
     frequencies: Array | None = None,
-    families: "Families | None" = None,
 ) -> ModeSet:
     """Take given columns as a mode set.
 
     Parameters
     ----------
     body
-        A coupled body.
+        A coupled body, or its `Families`, which many sets share.
     columns
         Displacement columns over the dofs of the coupled body (n_dof, k), or over those of its mesh (n_mesh_dof, k),
         which are then brought to the coupled body (`cms.coupled_field`: rigid interfaces take the nearest rigid motion,
@@ -47,8 +47,6 @@ def user_basis(
         One per column; "user 1", "user 2", … by default, or those of the file.
     frequencies
         Of vibration columns, NaN for static ones, (k,) [Hz]; all NaN by default, or those of the file.
-    families
-        Not used; here so that all mode sets are called alike.
 
     Raises
     ------
@@ -56,6 +54,7 @@ def user_basis(
         If the file cannot be read, shape, labels or numbers do not fit the body, the rows may be those of the coupled
         body and of its mesh alike and nothing says which, or they are told to be one and look like the other.
     """
+    body = body_of(body)
     body.require_coupled()
     if columns is None:
         raise ModeSetError(f"user_basis: body {body.name!r}: columns: missing; give an array, or a .npy or .npz file")

@@ -10,6 +10,7 @@
 import numpy as np
 
 from cms.families.families import Families
+from cms.families.sharing import body_of
 from cms.reduced_basis.frames import FrameCondition
 from cms.reduced_basis.node_motion import is_mean, reference_motion, translation_rows
 from cms.reduced_body.geometric_stiffness import GeometricStiffness
@@ -25,30 +26,24 @@ __all__ = ["elastic_part", "reduced_geometric_stiffness", "stiffness_of_states"]
 LOADS_AT_ONCE = 60  #: whose displacements over the mesh are held at once
 
 
-def reduced_geometric_stiffness(
-    body: FEBody, Phi: Array, condition: FrameCondition, *, families: Families | None = None
-) -> GeometricStiffness:
+def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: FrameCondition) -> GeometricStiffness:
     """Return the geometric stiffness of shapes for all unit loads of a body frame.
 
     Parameters
     ----------
     body
-        A coupled body with an element model.
+        A coupled body with an element model, or its `Families`.
     Phi
         Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
     condition
         The frame; it is the support of all loads.
-    families
-        The families of this body, whose factorisation is taken; made and freed here by default.
 
     Raises
     ------
     BodyError
         If the body has no element model that knows its geometric stiffness.
-    ModeSetError
-        If the families are those of another body.
     """
-    return stiffness_of_states(body, Phi, states_of(body, condition, families))
+    return stiffness_of_states(body_of(body), Phi, states_of(body, condition))
 
 
 def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> GeometricStiffness:

@@ -11,6 +11,7 @@ import numpy as np
 
 from cms.errors import BodyError
 from cms.families.families import Families
+from cms.families.sharing import body_of, families_of
 from cms.reduced_basis.frames import FrameCondition
 from cms.reduced_basis.node_motion import translation_rows
 from cms.second_order.geometric_reduction import distributing_part, elastic_part
@@ -27,29 +28,26 @@ NODES_AT_ONCE = 60  #: three static solutions each
 MOST_NUMBERS = 2.5e7  #: of the field, 200 MB
 
 
-def quadratic_modes(
-    body: FEBody, Phi: Array, condition: FrameCondition, nodes: IntArray, *, families: Families | None = None
-) -> Array:
+def quadratic_modes(source: FEBody | Families, Phi: Array, condition: FrameCondition, nodes: IntArray) -> Array:
     """Return g of some nodes in the frame B, (n_nodes, 3, n_q, n_q), symmetric in the modes [m per q²].
 
     Parameters
     ----------
-    body
-        A coupled body with an element model.
+    source
+        A coupled body with an element model, or its `Families`.
     Phi
         Shapes over its dofs that satisfy the condition of the frame, (n_dof, n_q).
     condition
         The frame.
     nodes
         Indices of nodes, (n_nodes,). Each costs three static solutions.
-    families
-        The families of this body, whose factorisation is taken; made and freed here by default.
 
     Raises
     ------
     BodyError
         If the elements do not know their geometric stiffness, or the field would be too large.
     """
+    body = body_of(source)
     require_geometric_stiffness(body)
     n = Phi.shape[1]
     if 3 * len(nodes) * n * n > MOST_NUMBERS:
@@ -58,13 +56,11 @@ def quadratic_modes(
             f"numbers, expected {MOST_NUMBERS:.2g} at most; they are meant for slender bodies with few nodes and modes"
             ": model it by beams, or leave them out: interfaces have their second order from the geometric stiffness"
         )
-    if families is None:
-        with Families(body) as own:
-            return quadratic_modes(body, Phi, condition, nodes, families=own)
     g = np.empty((len(nodes), 3, n, n))
-    for begin in range(0, len(nodes), NODES_AT_ONCE):
-        part = slice(begin, begin + NODES_AT_ONCE)
-        g[part] = -unit_force_stiffness(body, Phi, condition, nodes[part], families)
+    with families_of(source) as families:
+        for begin in range(0, len(nodes), NODES_AT_ONCE):
+            part = slice(begin, begin + NODES_AT_ONCE)
+            g[part] = -unit_force_stiffness(body, Phi, condition, nodes[part], families)
     return g
 
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from cms.errors import BodyError, ModeSetError
+from cms.errors import BodyError
 from cms.families.families import Families
+from cms.families.sharing import body_of, families_of
 from cms.reduced_basis.frames import Frame, FrameCondition, TisserandFrame, frame_condition
 from cms.second_order.unit_loads import balanced, unit_loads
 from cms.solvers.tall import combine
@@ -29,8 +30,8 @@ class UnitStates:
     u: Array  #: their responses, up to a rigid motion, (n_dof, n_loaded)
 
 
-def unit_states(body: FEBody, *, frame: Frame | None = None, families: Families | None = None) -> UnitStates:
-    """Return the static states of the unit loads of a body in a frame, for `reduce(..., states=...)`.
+def unit_states(body: FEBody | Families, *, frame: Frame | None = None) -> UnitStates:
+    """Return the static states of the unit loads of a body in a frame, for `reduce(..., geometric=states)`.
 
     Made while the factorisation of the mode set is there, they let it be freed before the reduction, which then needs
     the memory for itself: that matters from some hundred thousand dofs on.
@@ -38,37 +39,28 @@ def unit_states(body: FEBody, *, frame: Frame | None = None, families: Families 
     Parameters
     ----------
     body
-        A coupled body with an element model.
+        A coupled body with an element model, or its `Families`.
     frame
         Body reference frame of the reduction; Tisserand (mean axis) by default.
-    families
-        The families of this body, whose factorisation is taken; made and freed here by default.
 
     Raises
     ------
     BodyError
         If the body has no element model that knows its geometric stiffness, or the frame cannot be attached.
-    ModeSetError
-        If the families are those of another body.
     """
-    require_geometric_stiffness(body)
-    return states_of(body, frame_condition(body, frame or TisserandFrame()), families)
+    require_geometric_stiffness(body_of(body))
+    return states_of(body, frame_condition(body_of(body), frame or TisserandFrame()))
 
 
-def states_of(body: FEBody, condition: FrameCondition, families: Families | None) -> UnitStates:
+def states_of(source: FEBody | Families, condition: FrameCondition) -> UnitStates:
     """Return the static states for a frame made ready."""
+    body = body_of(source)
     require_geometric_stiffness(body)
-    if families is None:
-        with Families(body) as own:
-            return states_of(body, condition, own)
-    if families.body is not body:
-        raise ModeSetError(
-            f"families: made for body {families.body.name!r}, but the geometric stiffness is asked of another one, "
-            f"{body.name!r}; make Families of the very body"
-        )
-    loads = balanced(body, unit_loads(body, condition.frame), condition)
-    loaded = np.flatnonzero(~loads.is_zero)
-    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, static_states(families, loads.F[:, loaded]))
+    with families_of(source) as families:
+        loads = balanced(body, unit_loads(body, condition.frame), condition)
+        loaded = np.flatnonzero(~loads.is_zero)
+        u = static_states(families, loads.F[:, loaded])
+    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, u)
 
 
 def has_geometric_stiffness(body: FEBody) -> bool:

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from cms.errors import EigenError
 from cms.solvers.factorization import Factorization, factorize
 from cms.solvers.inverse import Inverse
+from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.mode_search import DenseSearch, KrylovSearch
 from cms.solvers.orientation import orientation
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
@@ -50,13 +51,11 @@ class EigenResult:
 def eigenmodes(
     K: sp.csc_array,
     M: sp.csc_array,
+    n_modes: int | ModeCount,
     *,
-    n_modes: int | None = None,
-    cutoff: float | None = None,
     factorization: Inverse | None = None,
     shift: float | None = None,
     tolerance: float = 1e-5,
-    verify: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> EigenResult:
     """Lowest vibration modes of a sparse symmetric pencil.
@@ -74,9 +73,7 @@ def eigenmodes(
     M
         Mass, (n, n), semidefinite: massless dofs and multipliers have none.
     n_modes
-        Number of modes.
-    cutoff
-        Instead of a number: all modes up to this frequency [Hz].
+        Number of modes, or a `ModeCount`: all modes up to a frequency [Hz]; proof that none was missed.
     factorization
         Of K - shift M if it exists already; made and freed here by default.
     shift
@@ -85,9 +82,6 @@ def eigenmodes(
     tolerance
         Largest residual |x - (omega² - sigma) S x|_M of a unit x: a bound of the relative error of omega² - sigma,
         whose actual error goes with its square.
-    verify
-        Prove by the inertia of one more factorisation, just above the last mode, that none was missed. It holds a
-        second factor in memory.
     progress
         Called with the numbers of modes found and wanted (0 as long as that is not known).
 
@@ -103,9 +97,10 @@ def eigenmodes(
     n = K.shape[0]
     if K.shape != (n, n) or M.shape != (n, n):
         raise EigenError(f"eigenmodes: expected K and M of one square shape, got {K.shape} and {M.shape}")
-    wanted = Wanted(n_modes, None if cutoff is None else (2 * np.pi * cutoff) ** 2)
+    asked = mode_count(n_modes)
+    wanted = Wanted.of(asked)
     if wanted.count is not None and wanted.count > n:
-        raise EigenError(f"eigenmodes: n_modes = {n_modes}, but there are {n} dofs; choose n_modes <= {n}")
+        raise EigenError(f"eigenmodes: {asked.words}, but there are {n} dofs; choose n_modes <= {n}")
     if not TIGHTEST <= tolerance <= LOOSEST:
         raise EigenError(f"eigenmodes: tolerance = {tolerance:g}; expected {TIGHTEST:g} to {LOOSEST:g}")
     is_large_part = wanted.count is not None and 3 * wanted.count > n
@@ -122,7 +117,7 @@ def eigenmodes(
         operator = ShiftInverted(M, shift, factorization, tolerance, progress)
         search = (DenseSearch if is_dense else KrylovSearch)(operator, wanted)
         modes = search.modes(wanted)
-        if verify:
+        if asked.verify:
             modes = _proven_modes(K, M, search, modes, wanted)
         k = wanted.count if wanted.omega2 is None else int((modes.omega2[: modes.n_wanted] <= wanted.omega2).sum())
         residuals, method = modes.residuals, search.description
@@ -134,7 +129,9 @@ def eigenmodes(
     omega2 = omega2[:k]
     _require_match(K, M, Phi, omega2, shift, tolerance)
     method = f"{method}; shift {shift:.6g}, tolerance {tolerance:g}, {n_solves} columns solved by {solver}"
-    return EigenResult(omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=verify)
+    return EigenResult(
+        omega2, np.sqrt(omega2) / (2 * np.pi), Phi, residuals[:k], n_solves, method, is_proven=asked.verify
+    )
 
 
 def frequency_scale(K: sp.csc_array, M: sp.csc_array) -> float:

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from cms.errors import EigenError
 from cms.solvers.inverse import Inverse
+from cms.solvers.mode_count import ModeCount
 from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine, inner
 from fe_models.foundation.arrays import Array
@@ -26,12 +27,13 @@ class Wanted:
     omega2: float | None
 
     def __post_init__(self) -> None:
-        if (self.count is None) == (self.omega2 is None):
-            raise EigenError("eigenmodes: expected either n_modes or cutoff, got both or none of them")
         if self.count is not None and self.count < 1:
             raise EigenError(f"eigenmodes: n_modes = {self.count}; expected at least 1")
-        if self.omega2 is not None and not 0 < self.omega2 < np.inf:
-            raise EigenError("eigenmodes: cutoff: expected a finite frequency above 0")
+
+    @classmethod
+    def of(cls, wanted: ModeCount) -> "Wanted":
+        """Return a count of modes in the quantities of the pencil."""
+        return cls(wanted.n, None if wanted.cutoff is None else (2 * np.pi * wanted.cutoff) ** 2)
 
 
 class ShiftInverted:

@@ -6,12 +6,14 @@ from functools import cached_property
 import numpy as np
 
 from cms.families.families import Families
+from cms.families.sharing import body_of, families_of
 from cms.mode_set import ModeSet
 from cms.quality.errors import QualityError
 from cms.quality.reference.ports import Ports
 from cms.quality.reference.reference_response import ReferenceResponse, reference_response
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.solvers.eigen import EigenResult
+from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 
@@ -28,28 +30,27 @@ class FullReference:
     ...     records = [check_reduction(body, modes, reduced, reference=reference) for modes, reduced in pairs]
     """
 
-    def __init__(self, body: FEBody, *, band: float, families: Families | None = None) -> None:
+    def __init__(self, source: FEBody | Families, *, band: float) -> None:
         """Prepare the reference; nothing is computed yet.
 
         Parameters
         ----------
+        source
+            A coupled body, or its `Families`, whose factorisation is then shared.
         band
             Highest frequency of interest [Hz].
-        families
-            Mode families of the body, to share their factorisation; made and freed here by default.
 
         Raises
         ------
         QualityError
-            If the band is not a frequency above 0, or the families are of another body.
+            If the band is not a frequency above 0.
         """
+        body = body_of(source)
         if not (np.isfinite(band) and band > 0):
             raise QualityError(f"reference of body {body.name!r}: band = {band}; expected a frequency above 0 [Hz]")
-        if families is not None and families.body is not body:
-            raise QualityError(f"reference of body {body.name!r}: the families are those of another body")
         self.body, self.band = body, float(band)
         self._stack = ExitStack()
-        self.families = families if families is not None else self._stack.enter_context(Families(body))
+        self.families = self._stack.enter_context(families_of(source))
 
     def __enter__(self) -> "FullReference":
         return self
@@ -64,7 +65,7 @@ class FullReference:
     @cached_property
     def modes(self) -> EigenResult:
         """Elastic free modes up to somewhat beyond the band, at least one."""
-        found = self.families.free_modes(cutoff=MODES_BEYOND * self.band * self.body.units.time)
+        found = self.families.free_modes(ModeCount(cutoff=MODES_BEYOND * self.band * self.body.units.time))
         return found if len(found.omega2) else self.families.free_modes(n_modes=1)
 
     @property

@@ -18,6 +18,7 @@ from cms.quality.errors import QualityError
 from cms.quality.of_reduction.free_basis import FreeBasis, ritz_basis
 from cms.quality.reference.port_model import PortModel
 from cms.quality.reference.ports import Ports
+from cms.solvers.mode_count import ModeCount
 from cms.solvers.sparse_product import SymmetricProduct
 
 __all__ = ["RESPONSE_TOLERANCE", "ReferenceResponse", "reference_response"]
@@ -54,7 +55,7 @@ def reference_response(families: Families, ports: Ports, band: float) -> Referen
     body = families.body
     M, K = SymmetricProduct(body.M), SymmetricProduct(body.K)
     F = ports.loads()
-    modes = families.free_modes(cutoff=MODES_BEYOND * band)  # (1)
+    modes = families.free_modes(ModeCount(cutoff=MODES_BEYOND * band))  # (1)
     static = families.flexibility(F)  # (2)
     X = np.hstack([modes.Phi, static, families.flexibility(M @ static)])
     N = families.free.N

@@ -19,6 +19,7 @@ from cms.families.rigid_modes import geometric_rigid_modes
 from cms.quality.errors import QualityError
 from cms.quality.of_reduction.free_basis import FreeBasis, ritz_basis
 from cms.quality.reference.ports import Ports
+from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
 
@@ -171,10 +172,10 @@ def transient_basis(families: Families, F: Array, cutoff: float, held: Sequence[
         is_free = ~np.isin(families.h, stays)
         conditions = BoundaryConditions(np.eye(len(families.h))[:, is_free])
         flexibility = families.flexibility_under(conditions)
-        modes = families.elastic_modes(conditions, cutoff=cutoff)
+        modes = families.elastic_modes(conditions, n_modes=ModeCount(cutoff=cutoff))
     else:
         flexibility = families.free
-        modes = families.free_modes(cutoff=cutoff)
+        modes = families.free_modes(ModeCount(cutoff=cutoff))
     T = flexibility.T
 
     def solve(f: Array) -> Array:

@@ -13,6 +13,7 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
+import cms
 from cms.cli.app import app
 from cms.cli.record import body_record, central_inertia
 from cms.frame_conversion import convert_frame
@@ -324,7 +325,7 @@ def test_central_inertia_is_that_of_the_point_masses():
 
 
 def test_the_record_gives_the_centre_of_mass_in_mesh_coordinates(folder):
-    body = reduce_job(read_job(folder / "bar.toml"))
+    body = cms.reduce_job(folder / "bar.toml")
     assert_allclose(body_record(body)["center_of_mass"]["mesh"], [50, 5, 5], rtol=1e-12)
     assert_allclose(body_record(body)["center_of_mass"]["B"], [50, 0, 0], rtol=0, atol=1e-9)
 

@@ -113,8 +113,8 @@ def test_malformed_numbers_of_modes_are_refused_with_the_form_that_is_expected(t
 def test_the_subset_of_the_largest_set_is_the_set_with_fewer_modes(name, body):
     options = LOADED.get(name, {})
     with Families(body) as families:
-        most = cms.MODE_SETS[name](body, n_modes=9, **options, families=families)
-        fewer = cms.MODE_SETS[name](body, n_modes=4, **options, families=families)
+        most = cms.MODE_SETS[name](families, n_modes=9, **options)
+        fewer = cms.MODE_SETS[name](families, n_modes=4, **options)
         C, labels = SUBSETS[name](most, most.columns[body.b], 4)
     assert labels == fewer.labels
     scale = np.abs(fewer.columns).max(axis=0)
@@ -130,8 +130,8 @@ def test_records_are_those_of_the_reduced_body_itself(name, body, motion, compar
     k = 0 if name == "guyan" else 2
     counted = {} if name == "guyan" else {"n_modes": COUNTS[k]}
     band = comparison.full.band_hz
-    with Families(body) as families, FullReference(body, band=band, families=families) as reference:
-        modes = cms.MODE_SETS[name](body, **counted, **LOADED.get(name, {}), families=families)
+    with Families(body) as families, FullReference(families, band=band) as reference:
+        modes = cms.MODE_SETS[name](families, **counted, **LOADED.get(name, {}))
         reduced = cms.reduce(body, modes)
         records = {r.name: r for r in check_reduction(body, modes, reduced, reference=reference, snapshots=motion)}
         grid = comparison.full.response_hz

@@ -30,11 +30,8 @@ SLACK = 1e-7  #: rounding of the static states times the condition of the change
 def made():
     body = cms.couple(uneven_bar())
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=5, families=families)
-        return {
-            name: cms.reduce(body, modes, frame=frame, geometric=True, families=families)
-            for name, frame in FRAMES.items()
-        }
+        modes = cms.craig_bampton(families, n_modes=5)
+        return {name: cms.reduce(families, modes, frame=frame, geometric=True) for name, frame in FRAMES.items()}
 
 
 @pytest.mark.parametrize("target", ["tisserand", "tisserand turned", "nodal left", "nodal right", "nodal right turned"])

@@ -69,7 +69,7 @@ def test_a_rigid_rotation_turns_the_loads(name, frame):
         phi = families.flexibility(phi)  # smooth shapes
         phi /= np.abs(phi).max()
         columns = np.hstack([geometric_rigid_modes(body), phi])
-        found = reduced_geometric_stiffness(body, columns, condition, families=families)
+        found = reduced_geometric_stiffness(families, columns, condition)
     K = np.concatenate(
         [found.translation, found.rotation, found.spin, found.interfaces.reshape(-1, *found.spin.shape[1:])]
     )
@@ -120,8 +120,8 @@ def test_a_column_buckles_at_the_load_of_euler(make):
     body = cms.couple(make())
     EI = STEEL.E * 0.05 * 0.04**3 / 12
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=12, families=families)
-        reduced = cms.reduce(body, modes, frame=NodalFrame(at="left"), geometric=True, families=families)
+        modes = cms.craig_bampton(families, n_modes=12)
+        reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     push = critical(reduced.K, reduced.geometric.interfaces[1, 0])
     shear = 1 + np.pi**2 * EI / 4 / (STEEL.E / 2.6 * 0.05 * 0.04 * 5 / 6)  # Engesser: 1/P = 1/P_Euler + 1/(G A_s)
     assert_allclose(push, np.pi**2 * EI / 4 / shear, rtol=4e-3)
@@ -161,8 +161,8 @@ def test_a_narrow_cantilever_tips_over_at_the_load_of_prandtl():
     EI, GJ = STEEL.E * min(properties.Iy, properties.Iz), STEEL.mu * properties.J
     stiff = int(np.argmax([properties.Iz, properties.Iy]))  # 0: strong for forces along y
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=30, families=families)
-        reduced = cms.reduce(body, modes, frame=NodalFrame(at="left"), geometric=True, families=families)
+        modes = cms.craig_bampton(families, n_modes=30)
+        reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     K_geo = reduced.geometric.interfaces[1, 1 + stiff]
     assert_allclose(critical(reduced.K, K_geo), 4.0126 * np.sqrt(EI * GJ) / L**2, rtol=5e-3)
 
@@ -172,8 +172,8 @@ def test_a_bent_cantilever_becomes_shorter(make):
     """A tip load bends it by w; its tip comes nearer by ∫ ½ w'² = 3/5 w²/L, which is ½ qᵀ K q of the unit force x."""
     body = cms.couple(make())
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=8, families=families)
-        reduced = cms.reduce(body, modes, frame=NodalFrame(at="left"), geometric=True, families=families)
+        modes = cms.craig_bampton(families, n_modes=8)
+        reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     Psi = reduced.interface("right").Psi
     q = Psi[2] / np.diag(reduced.K)  # of a unit force along z
     shortening = q @ reduced.geometric.interfaces[1, 0] @ q / 2
@@ -215,8 +215,8 @@ def test_a_spinning_cantilever_has_the_flap_frequencies_of_the_rotating_beam(spe
     EI, rho_A = STEEL.E * 0.004**4 / 12, STEEL.rho * 0.004**2
     unit = np.sqrt(EI / rho_A) / L**2
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=20, families=families)
-        reduced = cms.reduce(body, modes, frame=NodalFrame(at="left"), geometric=True, families=families)
+        modes = cms.craig_bampton(families, n_modes=20)
+        reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     Omega = speed * unit
     geometric = reduced.geometric
     K = reduced.K + Omega**2 * (geometric.spin[2] - radius * L * geometric.translation[0])
@@ -237,8 +237,8 @@ def test_a_spinning_cantilever_of_solids_has_the_flap_frequency_of_the_rotating_
     body = cms.couple(bar(20, 1, 1, width=h, height=h, kind=kind, material=material))
     unit = np.sqrt(STEEL.E * h**2 / 12 / STEEL.rho)
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=10, families=families)
-        reduced = cms.reduce(body, modes, frame=NodalFrame(at="left"), geometric=True, families=families)
+        modes = cms.craig_bampton(families, n_modes=10)
+        reduced = cms.reduce(families, modes, frame=NodalFrame(at="left"), geometric=True)
     Omega = 6.0 * unit
     found = []
     for K_geo in (0.0, Omega**2 * (reduced.geometric.spin[2] - reduced.moments.C5[:, :, 2, 2])):
@@ -254,8 +254,8 @@ def test_solids_and_beams_agree():
     for body in (bar(16, 1, 1, width=0.02, height=0.02), bar_of_beams(16, section=Rectangle(0.02, 0.02))):
         body = cms.couple(body)
         with cms.Families(body) as families:
-            modes = cms.normal_modes(body, n_modes=4, families=families)
-            reduced = cms.reduce(body, modes, geometric=True, families=families)
+            modes = cms.normal_modes(families, n_modes=4)
+            reduced = cms.reduce(families, modes, geometric=True)
         g = reduced.geometric
         values.append([np.linalg.eigvalsh(K) for K in (*g.spin[:3], g.interfaces[1, 0] - g.interfaces[0, 0])])
     for solid, beams in zip(*values, strict=True):
@@ -277,7 +277,7 @@ def test_the_support_does_not_matter_to_loads_in_balance():
     matrices = []
     with cms.Families(body) as families:
         for frame in (TisserandFrame(), NodalFrame("left"), NodalFrame("right"), BuckensFrame()):
-            g = reduced_geometric_stiffness(body, Phi, frame_condition(body, frame), families=families)
+            g = reduced_geometric_stiffness(families, Phi, frame_condition(body, frame))
             matrices.append(g.interfaces[1, 0] - g.interfaces[0, 0])
     for K in matrices[1:]:
         assert_allclose(K, matrices[0], rtol=0, atol=1e-8 * np.abs(matrices[0]).max())
@@ -290,7 +290,7 @@ def test_turned_axes_turn_the_matrices():
     axes = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # new x along y
     with cms.Families(body) as families:
         old, new = (
-            reduced_geometric_stiffness(body, Phi, frame_condition(body, frame), families=families)
+            reduced_geometric_stiffness(families, Phi, frame_condition(body, frame))
             for frame in (NodalFrame("left"), NodalFrame("left", axes=axes))
         )
     scale = np.abs(old.spin).max()
@@ -326,23 +326,14 @@ def test_states_made_before_serve_when_the_factorisation_is_gone():
     body = cms.couple(bar(3, 1, 1))
     frame = NodalFrame("left")
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=2, families=families)
-        expected = cms.reduce(body, modes, frame=frame, geometric=True, families=families).geometric
-        states = cms.second_order.unit_states(body, frame=frame, families=families)
-    found = cms.reduce(body, modes, frame=frame, states=states).geometric
+        modes = cms.craig_bampton(families, n_modes=2)
+        expected = cms.reduce(families, modes, frame=frame, geometric=True).geometric
+        states = cms.unit_states(families, frame=frame)
+    found = cms.reduce(body, modes, frame=frame, geometric=states).geometric
     for name in ("translation", "rotation", "spin", "interfaces"):
         assert_array_equal(getattr(found, name), getattr(expected, name))
     with pytest.raises(ModeSetError, match="'bar' in a nodal frame, expected 'bar' in a tisserand frame"):
-        cms.reduce(body, modes, states=states)
-
-
-def test_families_of_another_body_are_refused():
-    body = cms.couple(bar(2, 1, 1))
-    with (
-        cms.Families(cms.couple(bar(2, 1, 1))) as other,
-        pytest.raises(ModeSetError, match="make Families of the"),
-    ):
-        cms.reduce(body, cms.guyan(body), geometric=True, families=other)
+        cms.reduce(body, modes, geometric=states)
 
 
 def test_bare_matrices_are_refused():

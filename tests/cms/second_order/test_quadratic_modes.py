@@ -38,7 +38,7 @@ def test_a_deformed_body_that_turns_is_a_deformed_body_that_is_turned(name, fram
         phi = families.flexibility(phi)
         phi /= np.abs(phi).max()
         turns = geometric_rigid_modes(body)[:, 3:]
-        g = quadratic_modes(body, np.hstack([turns, phi]), condition, nodes, families=families)
+        g = quadratic_modes(families, np.hstack([turns, phi]), condition, nodes)
     axes, points = condition.frame.axes, body.nodes[nodes]
     on_mesh = np.einsum("ab,nbkl->nakl", axes, g)
     moved = body.translations(phi)[nodes][..., 0]

@@ -22,11 +22,8 @@ def bars():
     """A slender bar on its left end, and the free one."""
     body = cms.couple(bar_of_beams(16, section=SECTION))
     with cms.Families(body) as families:
-        modes = cms.craig_bampton(body, n_modes=12, families=families)
-        return [
-            cms.reduce(body, modes, frame=frame, geometric=True, families=families)
-            for frame in (NodalFrame("left"), None)
-        ]
+        modes = cms.craig_bampton(families, n_modes=12)
+        return [cms.reduce(families, modes, frame=frame, geometric=True) for frame in (NodalFrame("left"), None)]
 
 
 def by_name(reduced):

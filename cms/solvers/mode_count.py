@@ -1,0 +1,56 @@
+"""How many vibration modes: a number, or all up to a frequency; proven to be all of them, or not."""
+
+import math
+import operator
+from dataclasses import dataclass
+
+from cms.errors import ModeSetError
+
+__all__ = ["ModeCount", "mode_count"]
+
+
+@dataclass(frozen=True)
+class ModeCount:
+    """How many vibration modes are wanted: the lowest n, or all up to a cutoff.
+
+    Wherever a function takes `n_modes`, a number means that many of the lowest modes; this type says the rest:
+
+    >>> ModeCount(cutoff=5000.0, verify=True)
+    ModeCount(n=None, cutoff=5000.0, verify=True)
+
+    Raises
+    ------
+    ModeSetError
+        If not exactly one of `n` and `cutoff` is given, or it is no such number.
+    """
+
+    n: int | None = None  #: number of modes, 0 or more
+    cutoff: float | None = None  #: instead of a number: all modes up to this frequency [Hz, or 1/time unit of the body]
+    verify: bool = False  #: prove by the inertia of a factorisation that no mode was missed
+
+    def __post_init__(self) -> None:
+        if (self.n is None) == (self.cutoff is None):
+            raise ModeSetError(
+                f"n_modes: expected either a number or a cutoff, got n = {self.n}, cutoff = {self.cutoff}"
+            )
+        if self.n is not None:
+            try:
+                object.__setattr__(self, "n", operator.index(self.n))
+            except TypeError:
+                raise ModeSetError(
+                    f"n_modes = {self.n!r}: expected a whole number, or ModeCount(cutoff=...) for a frequency"
+                ) from None
+            if self.n < 0:
+                raise ModeSetError(f"n_modes = {self.n}: expected 0 or more")
+        if self.cutoff is not None and not 0 < self.cutoff < math.inf:
+            raise ModeSetError(f"n_modes: cutoff = {self.cutoff}: expected a finite frequency above 0")
+
+    @property
+    def words(self) -> str:
+        """The count in words, for messages and records."""
+        return f"n_modes = {self.n}" if self.cutoff is None else f"cutoff = {self.cutoff:g}"
+
+
+def mode_count(n_modes: "int | ModeCount") -> ModeCount:
+    """Return what is wanted as a `ModeCount`."""
+    return n_modes if isinstance(n_modes, ModeCount) else ModeCount(n_modes)
