@@ -1,4 +1,4 @@
-"""Rigid-body motion in the span of columns, found by the rigid-body vectors themselves (THEORY §3).
+"""Rigid-body motion in the span of columns, found by the rigid-body vectors themselves (docs/theory.md §3).
 
 No ratio of energies decides: the slowest elastic shape may be as slow as it likes beside the stiffest one.
 """
