@@ -63,9 +63,9 @@ from .meshes.split import Split as Split
 from .meshes.split import split_mesh as split_mesh
 from .meshes.unused_nodes import drop_unused_nodes as drop_unused_nodes
 from .planar import planar as planar
-from .reports.mesh_report import Finding as Finding
 from .reports.mesh_report import MeshReport as MeshReport
 from .reports.mesh_report import report_mesh as report_mesh
+from .reports.report import Finding as Finding
 from .reports.shell_report import ShellReport as ShellReport
 from .reports.shell_report import report_shell as report_shell
 from .shells.body import shell_body as shell_body

@@ -10,9 +10,9 @@ from cms.cli.console import output_path, print_table, say
 from cms.quality.errors import QualityError
 from cms.quality.of_reduction.frf import POINTS, compare_responses, frequency_grid
 from cms.quality.reference.port_model import FrequencyResponse, file_response
-from cms.quality.reference.ports import COMPONENTS
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest
 
 __all__ = ["FrfRequest", "parse_band", "parse_component", "run_frf"]
@@ -41,7 +41,7 @@ def run_frf(request: FrfRequest) -> None:
     from cms.modal_file.file import read
 
     frequencies = parse_band(request.band)
-    pairs = tuple(parse_component(text) for text in request.components or COMPONENTS[:3])
+    pairs = tuple(parse_component(text) for text in request.components or MOTION_COMPONENTS[:3])
     paths = [checked_output(path, request) for path in request.outputs]
     reduced = read(request.file)
     for name in (request.excited, request.answering):
@@ -83,13 +83,13 @@ def parse_band(text: str) -> Array:
 
 
 def parse_component(text: str) -> tuple[int, int]:
-    """Return the motion and the force of "uz" (force along the same) or "uz/ry", indices into `COMPONENTS`."""
+    """Return the motion and the force of "uz" (force along the same) or "uz/ry", indices into `MOTION_COMPONENTS`."""
     motion, _, force = text.partition("/")
     force = force or motion
     for word in (motion, force):
-        if word not in COMPONENTS:
-            raise QualityError(f"--component {text!r}: {word!r} is no component{nearest(word, COMPONENTS)}")
-    return COMPONENTS.index(motion), COMPONENTS.index(force)
+        if word not in MOTION_COMPONENTS:
+            raise QualityError(f"--component {text!r}: {word!r} is no component{nearest(word, MOTION_COMPONENTS)}")
+    return MOTION_COMPONENTS.index(motion), MOTION_COMPONENTS.index(force)
 
 
 def checked_output(path: Path, request: FrfRequest) -> Path:
@@ -168,7 +168,7 @@ def shown(response: FrequencyResponse, is_inertance: bool) -> np.ndarray:
 def pair_words(motion: int, force: int) -> str:
     """Return 'uz/fz', 'rz/mz', 'ux/my'."""
     names = ("fx", "fy", "fz", "mx", "my", "mz")
-    return f"{COMPONENTS[motion]}/{names[force]}"
+    return f"{MOTION_COMPONENTS[motion]}/{names[force]}"
 
 
 def response_unit(reduced: ReducedBody, motion: int, force: int, request: FrfRequest) -> str:

@@ -12,7 +12,6 @@ from cms.families.fixed_interface import FixedInterfaceBody, fix_interfaces
 from cms.families.flexibility import BoundaryConditions, CondensedBody, Flexibility
 from cms.families.rigid_modes import determinate_partition, independent_rigid_modes
 from cms.families.static_modes import (
-    COMPONENTS,
     attachment_modes,
     boundary_groups,
     boundary_labels,
@@ -28,6 +27,7 @@ from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.components import MOTION_COMPONENTS
 
 __all__ = ["Families"]
 
@@ -211,14 +211,14 @@ class Families:
 
     def rigid_labels(self, family: str) -> tuple[str, ...]:
         """Return one label per rigid-body mode, such as 'rigid-body rx'."""
-        return tuple(f"{family} {COMPONENTS[k]}" for k in self._rigid[1])
+        return tuple(f"{family} {MOTION_COMPONENTS[k]}" for k in self._rigid[1])
 
     def held_labels(self, family: str) -> tuple[str, ...]:
         """Return one label per held dof."""
         extra = self.body.dofs[self._partition[1]]
         return (
             *boundary_labels(self.body, family),
-            *(f"{family} node {node} {COMPONENTS[component]}" for node, component in extra),
+            *(f"{family} node {node} {MOTION_COMPONENTS[component]}" for node, component in extra),
         )
 
     def held_groups(self, family: str) -> tuple[str, ...]:

@@ -6,9 +6,9 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.errors import BodyError
-from cms.families.static_modes import COMPONENTS
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest
 
 __all__ = ["free_directions"]
@@ -50,9 +50,9 @@ def free_directions(body: FEBody, free: Mapping[str, Sequence[str]]) -> Array:
 def _directions(body: FEBody, interface: Interface, component: str) -> Array:
     """Return this component at every node of the interface, over its dofs, (n_dofs, n_nodes)."""
     where = f"body {body.name!r}: free dofs of interface {interface.name!r}"
-    if component not in COMPONENTS:
-        raise BodyError(f"{where}: unknown component {component!r}{nearest(component, COMPONENTS)}")
-    axis = la.block_diag(interface.triad, interface.triad)[:, COMPONENTS.index(component)]
+    if component not in MOTION_COMPONENTS:
+        raise BodyError(f"{where}: unknown component {component!r}{nearest(component, MOTION_COMPONENTS)}")
+    axis = la.block_diag(interface.triad, interface.triad)[:, MOTION_COMPONENTS.index(component)]
     node, local = body.dofs[np.asarray(interface.dofs)].T
     nodes = list(dict.fromkeys(node.tolist()))
     directions = np.zeros((len(node), len(nodes)))

@@ -8,6 +8,7 @@ from cms.solvers.eigen import EigenResult
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
 
 __all__ = [
     "attachment_modes",
@@ -20,7 +21,6 @@ __all__ = [
     "unrestrained_attachment_modes",
 ]
 
-COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 STIFF = 1e-14  #: compliance over the largest one (rotations times the body length squared), below which it is rounding
 STILL = 1e-24  #: the same of the energy of a response to inertia loads, where both factors are rounding
 BLOCK = 60  #: right-hand sides solved at once; wider blocks gain nothing measurable and cost memory
@@ -156,7 +156,7 @@ def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:
         for dof in interface.dofs if interface.dofs is not None else ():
             node, component = body.dofs[dof]
             at_node = f" node {node}" if interface.kind == "nodes" and len(interface.nodes) > 1 else ""
-            labels.append(f"{family} {interface.name}{at_node} {COMPONENTS[component]}")
+            labels.append(f"{family} {interface.name}{at_node} {MOTION_COMPONENTS[component]}")
     return tuple(labels)
 
 

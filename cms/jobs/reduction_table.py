@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
-from cms.families.static_modes import COMPONENTS
 from cms.mode_sets import MODE_SETS
 from cms.mode_sets.axis_functions import AXIS_FUNCTIONS
 from cms.mode_sets.extra_columns import EXTRA_COLUMNS
 from cms.mode_sets.given_columns import OVER
 from cms.solvers.mode_count import ModeCount
+from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
 from fe_models.foundation.words import nearest
@@ -47,10 +47,10 @@ def components(value: Any) -> tuple[str, ...]:
     """Return one component or a list of components of an interface."""
     words = [value] if isinstance(value, str) else value
     if not isinstance(words, list | tuple) or not words or len(set(map(str, words))) < len(words):
-        raise ValueError(f"expected a list of components, each once, of {', '.join(COMPONENTS)}")
+        raise ValueError(f"expected a list of components, each once, of {', '.join(MOTION_COMPONENTS)}")
     for word in words:
-        if word not in COMPONENTS:
-            raise ValueError(f"unknown component {word!r}{nearest(str(word), COMPONENTS)}")
+        if word not in MOTION_COMPONENTS:
+            raise ValueError(f"unknown component {word!r}{nearest(str(word), MOTION_COMPONENTS)}")
     return tuple(words)
 
 

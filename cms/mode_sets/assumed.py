@@ -8,12 +8,12 @@ import numpy as np
 from cms.errors import ModeSetError
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.families.sharing import body_of
-from cms.families.static_modes import COMPONENTS
 from cms.mode_set import ModeSet
 from cms.mode_sets.axis_functions import AXIS_FUNCTIONS, AxisFunctions, axis_functions
 from cms.mode_sets.mesh_field import coupled_field
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def assumed_modes(
     return ModeSet(
         "assumed-modes",
         np.hstack([Psi_R, field.columns[:, kept]]),
-        (*(f"rigid-body {name}" for name in COMPONENTS), *(labels[k] for k in kept)),
+        (*(f"rigid-body {name}" for name in MOTION_COMPONENTS), *(labels[k] for k in kept)),
         np.full(n_rigid + len(kept), np.nan),
         {
             "functions": functions,

@@ -8,11 +8,10 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fe_models.beams.attachments import RigidLink, Spring
-from fe_models.errors import MeshError
 from fe_models.foundation.units import Units
 from fe_models.material import Material
 from fe_models.meshes.line_mesh import LineMesh
-from fe_models.reports.mesh_report import Finding
+from fe_models.reports.report import Finding, Report
 from fe_models.reports.unit_check import implausible_units
 
 __all__ = ["FrameReport", "report_frame"]
@@ -21,7 +20,7 @@ COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bou
 
 
 @dataclass(frozen=True, eq=False)
-class FrameReport:
+class FrameReport(Report):
     """Numbers of a mesh of lines and findings about it."""
 
     source: str
@@ -32,22 +31,15 @@ class FrameReport:
     n_parts: int  #: parts that no line, link or spring joins
     findings: tuple[Finding, ...]
 
-    def raise_for_errors(self, *, accept: Iterable[str] = ()) -> None:
-        """Raise `MeshError` with all errors but those of the accepted kinds."""
-        errors = [finding for finding in self.findings if finding.is_error and finding.kind not in set(accept)]
-        if errors:
-            raise MeshError(f"mesh {self.source}: " + "; ".join(finding.text for finding in errors))
-
-    def rows(self) -> list[tuple[str, str]]:
-        """Return label and value of each number, in words, for a table."""
-        rows = [
+    def numbers(self) -> list[tuple[str, str]]:
+        """Return label and value of each number, in words."""
+        return [
             ("file", self.source),
             ("nodes", str(self.n_nodes)),
             ("lines", str(self.n_lines)),
             ("length of all lines", f"{self.length:.6g} {self.units.length_symbol}"),
             ("connected parts", str(self.n_parts)),
         ]
-        return rows + [("error" if f.is_error else "warning", f.text) for f in self.findings]
 
 
 def report_frame(

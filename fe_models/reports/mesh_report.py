@@ -1,6 +1,6 @@
 """The mesh report: what a mesh is and what is wrong with it, in numbers, before any solve."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -16,23 +16,15 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.unused_nodes import used_nodes
+from fe_models.reports.report import Finding, Report
 from fe_models.reports.unit_check import implausible_units
 
-__all__ = ["CellGeometry", "Finding", "MeshReport", "cell_geometry", "report_mesh"]
+__all__ = ["CellGeometry", "MeshReport", "cell_geometry", "report_mesh"]
 
 COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
 FLAT = 1e-9  #: volume over the cube of the size of a cell, below which it is degenerate
 ROUNDING = 1e-12  #: Jacobian over its mean, below which it counts as zero
 _CHUNK = 20_000  #: cells at a time, so that a million dofs need 100 MB
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something wrong with a mesh."""
-
-    kind: str  #: "inverted", "degenerate", "parts", "overlap", "transition", "units"; others only warn
-    is_error: bool
-    text: str  #: what, where, what to do
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +39,7 @@ class CellGeometry:
 
 
 @dataclass(frozen=True, eq=False)
-class MeshReport:
+class MeshReport(Report):
     """Numbers of a mesh and findings about it."""
 
     source: str
@@ -68,24 +60,8 @@ class MeshReport:
     distorted: Mapping[str, IntArray]  #: type -> rows of cells with a Jacobian <= 0 at a node only
     findings: tuple[Finding, ...]
 
-    @property
-    def errors(self) -> tuple[Finding, ...]:
-        """Findings that make the mesh unfit."""
-        return tuple(finding for finding in self.findings if finding.is_error)
-
-    @property
-    def warnings(self) -> tuple[Finding, ...]:
-        """Findings to know about."""
-        return tuple(finding for finding in self.findings if not finding.is_error)
-
-    def raise_for_errors(self, *, accept: Iterable[str] = ()) -> None:
-        """Raise `MeshError` with all errors but those of the accepted kinds."""
-        errors = [finding for finding in self.errors if finding.kind not in set(accept)]
-        if errors:
-            raise MeshError(f"mesh {self.source}: " + "; ".join(finding.text for finding in errors))
-
-    def rows(self) -> list[tuple[str, str]]:
-        """Return label and value of each number, in words, for a table."""
+    def numbers(self) -> list[tuple[str, str]]:
+        """Return label and value of each number, in words."""
         length, mass = self.units.length_symbol, self.units.mass_symbol
         cells = ", ".join(f"{count} {kind}" for kind, count in self.n_cells.items())
         rows = [
@@ -102,14 +78,7 @@ class MeshReport:
         rows.append(("connected parts", str(self.n_parts)))
         if self.n_coincident:
             rows.append(("coincident nodes", str(self.n_coincident)))
-        for finding in self.findings:
-            rows.append(("error" if finding.is_error else "warning", finding.text))
         return rows
-
-    def lines(self) -> list[str]:
-        """Return the rows as lines of text."""
-        width = max(len(label) for label, _ in self.rows())
-        return [f"{label:<{width}}  {value}" for label, value in self.rows()]
 
 
 def report_mesh(

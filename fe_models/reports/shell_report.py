@@ -8,11 +8,10 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fe_models.beams.attachments import RigidLink, Spring
-from fe_models.errors import MeshError
 from fe_models.foundation.units import Units
 from fe_models.material import Material
 from fe_models.meshes.shell_mesh import ShellMesh
-from fe_models.reports.mesh_report import Finding
+from fe_models.reports.report import Finding, Report
 from fe_models.reports.unit_check import implausible_units
 from fe_models.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.shells.skin import cell_edges
@@ -25,7 +24,7 @@ ASPECT_NOTED = 20.0  #: longest over shortest side from which a warning is given
 
 
 @dataclass(frozen=True, eq=False)
-class ShellReport:
+class ShellReport(Report):
     """Numbers of a mesh of shells and findings about it."""
 
     source: str
@@ -39,16 +38,10 @@ class ShellReport:
     n_free_edges: int  #: edges of one cell only
     findings: tuple[Finding, ...]
 
-    def raise_for_errors(self, *, accept: Iterable[str] = ()) -> None:
-        """Raise `MeshError` with all errors but those of the accepted kinds."""
-        errors = [finding for finding in self.findings if finding.is_error and finding.kind not in set(accept)]
-        if errors:
-            raise MeshError(f"mesh {self.source}: " + "; ".join(finding.text for finding in errors))
-
-    def rows(self) -> list[tuple[str, str]]:
-        """Return label and value of each number, in words, for a table."""
+    def numbers(self) -> list[tuple[str, str]]:
+        """Return label and value of each number, in words."""
         length = self.units.length_symbol
-        rows = [
+        return [
             ("file", self.source),
             ("nodes", str(self.n_nodes)),
             *[(f"cells {kind}", str(count)) for kind, count in self.n_cells.items()],
@@ -58,7 +51,6 @@ class ShellReport:
             ("free edges", str(self.n_free_edges)),
             ("connected parts", str(self.n_parts)),
         ]
-        return rows + [("error" if f.is_error else "warning", f.text) for f in self.findings]
 
 
 def report_shell(

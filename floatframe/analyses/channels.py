@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.words import nearest
 from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.analyses.marker_jacobian import marker_jacobian
@@ -33,7 +34,6 @@ __all__ = [
 
 QUANTITIES = ("translation", "rotation")
 RATES = ("displacement", "velocity", "acceleration")
-COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +84,10 @@ class StressChannel:
     def __post_init__(self) -> None:
         where = f"channel {self.name!r}"
         object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
-        if self.component not in COMPONENTS:
-            raise ModelError(f"{where}: component: expected one of {', '.join(COMPONENTS)}, got {self.component!r}")
+        if self.component not in STRESS_COMPONENTS:
+            raise ModelError(
+                f"{where}: component: expected one of {', '.join(STRESS_COMPONENTS)}, got {self.component!r}"
+            )
 
 
 AnyChannel = Channel | CoordinateChannel | StressChannel
@@ -150,7 +152,9 @@ def stress_row(system: System, compiled: CompiledSystem, channel: StressChannel)
     row = np.zeros(int(compiled.model.u0[-1]))
     i = compiled.body_names.index(channel.body)
     modes = modes_at(body, channel.name, channel.position, None)
-    row[int(compiled.model.u0[i]) + 6 : int(compiled.model.u0[i + 1])] = modes[COMPONENTS.index(channel.component)]
+    row[int(compiled.model.u0[i]) + 6 : int(compiled.model.u0[i + 1])] = modes[
+        STRESS_COMPONENTS.index(channel.component)
+    ]
     return row
 
 

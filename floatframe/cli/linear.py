@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["register"]
 
-COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 Inputs = Annotated[
     list[str],
@@ -163,13 +163,13 @@ def channel_of(system: "System", text: str) -> "AnyChannel":
         return CoordinateChannel(text, joint, coordinate)
     place, _, component = text.rpartition(":")
     body, _, interface = place.partition("/")
-    if not body or component not in COMPONENTS:
+    if not body or component not in DIRECTIONS:
         hint = nearest(text, [*named, *coordinates]) if "/" not in text and ":" not in text else ""
         raise ModelError(
             f"channel {text!r}: expected a name of [inputs] or [outputs], joint.coordinate, or "
-            f"body/interface:component (interfaces only of flexible bodies) with one of {', '.join(COMPONENTS)}{hint}"
+            f"body/interface:component (interfaces only of flexible bodies) with one of {', '.join(DIRECTIONS)}{hint}"
         )
-    index = COMPONENTS.index(component)
+    index = DIRECTIONS.index(component)
     kind = "translation" if index < 3 else "rotation"
     return Channel(text, Marker(body, interface or None), np.eye(3)[index % 3], kind)
 

@@ -3,9 +3,9 @@
 import numpy as np
 from pydantic import Field, model_validator
 
+from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.toml_file import Table, Vector3, choice
 from floatframe.analyses.channels import (
-    COMPONENTS,
     QUANTITIES,
     RATES,
     AnyChannel,
@@ -72,8 +72,8 @@ class OutputSection(InputSection):
     measure: choice("measure", lambda: RATES) = Field(  # type: ignore[valid-type]
         "displacement", description=f"one of {', '.join(RATES)}"
     )
-    component: choice("stress component", lambda: COMPONENTS) | None = Field(  # type: ignore[valid-type]
-        None, description=f"one of {', '.join(COMPONENTS)}: the output is a stress"
+    component: choice("stress component", lambda: STRESS_COMPONENTS) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(STRESS_COMPONENTS)}: the output is a stress"
     )
     position: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the nearest node is taken")
 

@@ -8,11 +8,11 @@ from cms.quality.record import QualityRecord, information, judge
 from cms.reduced_body.reduced_body import ReducedBody, ReducedInterface
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
 
 __all__ = ["check_interface_motions", "check_rigid_interfaces", "missing_motions"]
 
 MISSING = 1e-7  #: singular value of the scaled interface motions over the largest, below which one is missing
-COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
 def check_rigid_interfaces(reduced: ReducedBody) -> QualityRecord:
@@ -84,4 +84,4 @@ def provided_rows(interface: ReducedInterface) -> Array:
 
 def motion_labels(reduced: ReducedBody) -> tuple[str, ...]:
     """Return one label per motion: 'big_end ux' to 'small_end rz'."""
-    return tuple(f"{interface.name} {component}" for interface in reduced.interfaces for component in COMPONENTS)
+    return tuple(f"{interface.name} {component}" for interface in reduced.interfaces for component in MOTION_COMPONENTS)

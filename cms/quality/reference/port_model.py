@@ -6,9 +6,9 @@ import numpy as np
 
 from cms.quality.errors import QualityError
 from cms.quality.of_body.free_pencil import free_elastic_modes, free_pencil, port_rows
-from cms.quality.reference.ports import COMPONENTS
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest
 
 __all__ = ["FrequencyResponse", "PortModel", "file_response", "modal_response", "port_model"]
@@ -126,7 +126,7 @@ def modal_response(
     gain = 1 / (model.omega2 + dynamic)
     H = (model.modes[None] * gain[:, None, :]) @ model.modes.T
     H = H - (model.rigid @ model.rigid.T)[None] / (omega**2)[:, :, None]
-    labels = tuple(f"{name} {component}" for name in model.names for component in COMPONENTS)
+    labels = tuple(f"{name} {component}" for name in model.names for component in MOTION_COMPONENTS)
     words = f"{100 * damping:.3g} % in every free-free mode" if damping else "no damping"
     return FrequencyResponse(np.asarray(frequencies, dtype=float), H, labels, labels, words, time)
 
@@ -154,7 +154,7 @@ def file_response(reduced: ReducedBody, frequencies: Array, *, damping: float | 
         w = omega[first : first + step, None, None]
         A = pencil.K + 1j * w * pencil.D - w**2 * pencil.M
         H[first : first + step] = rows @ np.linalg.solve(A, np.broadcast_to(rows.T, (len(w), *rows.T.shape)))
-    labels = tuple(f"{i.name} {component}" for i in reduced.interfaces for component in COMPONENTS)
+    labels = tuple(f"{i.name} {component}" for i in reduced.interfaces for component in MOTION_COMPONENTS)
     words = "the damping of the file" if reduced.D.any() else "no damping"
     return FrequencyResponse(np.asarray(frequencies, dtype=float), H, labels, labels, words, time)
 

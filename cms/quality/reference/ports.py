@@ -11,10 +11,10 @@ from cms.reduced_basis.node_motion import interface_node_motion
 from fe_models.body.couplings import mean_motion
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import MOTION_COMPONENTS
 
-__all__ = ["COMPONENTS", "Ports"]
+__all__ = ["Ports"]
 
-COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 COLLINEAR = 1e-6  #: spread of nodes across their line over that along it, below which they carry no rotation
 
 
@@ -44,7 +44,7 @@ class Ports:
     @property
     def labels(self) -> tuple[str, ...]:
         """One per motion: 'big_end ux' to 'small_end rz'."""
-        return tuple(f"{name} {component}" for name in self.names for component in COMPONENTS)
+        return tuple(f"{name} {component}" for name in self.names for component in MOTION_COMPONENTS)
 
     def loads(self) -> Array:
         """Unit forces and moments on the ports as columns over the dofs, (n_dof, 6 n_ports)."""

@@ -7,6 +7,7 @@ import numpy as np
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.reduced_body.stress import von_mises
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.words import nearest
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.checked_values import array_of_shape, number, unit_vector
@@ -19,8 +20,6 @@ from floatframe.results.trajectory import Trajectory
 from floatframe.system import System
 
 __all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor"]
-
-COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
 
 
 def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
@@ -67,7 +66,7 @@ class StressSensor:
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
         stress = trajectory.body(self.body).q @ modes_at(body, self.name, self.position, self.point).T
-        columns = {component: stress[:, k] for k, component in enumerate(COMPONENTS)}
+        columns = {component: stress[:, k] for k, component in enumerate(STRESS_COMPONENTS)}
         columns["von Mises"] = von_mises(stress)
         return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, system.units.stress_symbol))
 

@@ -1,0 +1,55 @@
+"""What every report of a mesh has: its findings, and the judgement whether the mesh is fit."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from fe_models.errors import MeshError
+
+__all__ = ["Finding", "Report"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something wrong with a mesh."""
+
+    kind: str  #: "inverted", "degenerate", "parts", "overlap", "transition", "units"; others only warn
+    is_error: bool
+    text: str  #: what, where, what to do
+
+
+class Report(ABC):
+    """Numbers of a mesh and findings about it."""
+
+    source: str  #: the file, or what made the mesh
+    findings: tuple[Finding, ...]
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Findings that make the mesh unfit."""
+        return tuple(finding for finding in self.findings if finding.is_error)
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """Findings to know about."""
+        return tuple(finding for finding in self.findings if not finding.is_error)
+
+    def raise_for_errors(self, *, accept: Iterable[str] = ()) -> None:
+        """Raise `MeshError` with all errors but those of the accepted kinds."""
+        accepted = set(accept)
+        errors = [finding.text for finding in self.errors if finding.kind not in accepted]
+        if errors:
+            raise MeshError(f"mesh {self.source}: " + "; ".join(errors))
+
+    @abstractmethod
+    def numbers(self) -> list[tuple[str, str]]:
+        """Return label and value of each number, in words."""
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return label and value of each number and each finding, in words, for a table."""
+        return self.numbers() + [("error" if f.is_error else "warning", f.text) for f in self.findings]
+
+    def lines(self) -> list[str]:
+        """Return the rows as lines of text."""
+        width = max(len(label) for label, _ in self.rows())
+        return [f"{label:<{width}}  {value}" for label, value in self.rows()]
