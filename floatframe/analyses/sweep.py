@@ -1,10 +1,10 @@
 """Parameter sweeps: one function at many values, in parallel processes."""
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from collections.abc import Callable, Iterable
 from typing import TypeVar
+
+from fe_models.foundation.processes import map_in_processes
 
 __all__ = ["sweep"]
 
@@ -17,6 +17,7 @@ def sweep(
     values: Iterable[Value],
     *,
     processes: int | None = None,
+    failed: Callable[[Value, Exception], Result] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Result]:
     """Return study(value) for every value, in the order of the values.
@@ -30,29 +31,31 @@ def sweep(
         What to call it with.
     processes
         How many at once; by default one per processor. 1: in this process, where `study` may be any callable.
+    failed
+        What stands in the place of a value whose call failed, made from the value and the error; then no value can
+        lose the others, not even one whose process is killed. None: the first error is raised.
     progress
         Called with the numbers of values done and of all values.
 
     Raises
     ------
     Exception
-        What `study` raised, for the first value in order that did.
+        Without `failed`: what `study` raised, for the first value in order that did.
+    ProcessError
+        If `study` cannot be sent to other processes, or none can be started.
     """
     values = list(values)
     n = min(len(values), processes or os.cpu_count() or 1)
+    if n > 1:
+        return map_in_processes(study, values, n, failed=failed, progress=progress)
     results: list[Result] = []
-    if n <= 1:
-        for value in values:
+    for value in values:
+        try:
             results.append(study(value))
-            _tell(progress, len(results), values)
-        return results
-    with ProcessPoolExecutor(n, mp_context=get_context("spawn")) as pool:
-        for result in pool.map(study, values):
-            results.append(result)
-            _tell(progress, len(results), values)
+        except Exception as error:
+            if failed is None:
+                raise
+            results.append(failed(value, error))
+        if progress is not None:
+            progress(len(results), len(values))
     return results
-
-
-def _tell(progress: Callable[[int, int], None] | None, done: int, values: Sequence[object]) -> None:
-    if progress is not None:
-        progress(done, len(values))

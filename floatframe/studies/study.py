@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from cms.errors import CmsError
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.words import nearest
 from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.inverse_dynamics import inverse_dynamics
@@ -21,7 +21,7 @@ from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.sweep import sweep
 from floatframe.analyses.system_modes import SystemModes, system_modes
 from floatframe.compiling.system import compiled_system
-from floatframe.errors import FloatframeError, ModelError
+from floatframe.errors import ModelError
 from floatframe.motion.integration import integrate
 from floatframe.results.sensors import measured, sensor_of
 from floatframe.results.trajectory import Trajectory
@@ -91,9 +91,11 @@ def run_study(
     """
     points = list(study.points())
     check(study, points[0])
+    compute = StudyPoint(study)
     rows = sweep(
-        StudyPoint(study), points, processes=processes if processes is not None else study.processes, progress=progress
-    )
+        compute, points, processes=processes if processes is not None else study.processes, failed=compute.failed,
+        progress=progress,
+    )  # fmt: skip
     return StudyTable(study, tuple(rows))
 
 
@@ -106,18 +108,21 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
         required_run(run, study.system)
     try:
         system, _ = read_system(study.system, study.changes(point))
-    except (FloatframeError, CmsError) as error:
+    except ReportedError as error:
         read_system_keys(study)
         if "unknown key" in str(error):
             raise
         system = plain  # the values of this point are impossible: that is a row
-    if study.analysis != "eig":
-        placed = snapshot(system, compiled_system(system).placed)
-        for output in study.outputs:
-            taken(output, system, placed)
-    else:
+    if study.analysis == "eig":
         for output in study.outputs:
             mode_and_part(output)
+        return
+    try:
+        placed = snapshot(system, compiled_system(system).placed)
+    except Exception:  # what this point brings about is a row, if the file without it does better
+        system, placed = plain, snapshot(plain, compiled_system(plain).placed)
+    for output in study.outputs:
+        taken(output, system, placed)
 
 
 def read_system_keys(study: Study) -> None:
@@ -140,21 +145,23 @@ class StudyPoint:
     study: Study
 
     def __call__(self, point: tuple[Any, ...]) -> StudyRow:
-        """Return the row of a point; what goes wrong with it is its error."""
+        """Return the row of a point."""
         from floatframe.system_file.read_system import read_system
 
-        try:
-            system, given = read_system(self.study.system, self.study.changes(point))
-            if self.study.analysis == "eig":
-                modes = system_modes(linearize(system))
-                found = [taken_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
-            else:
-                motion = self.motion(system, given)
-                found = [taken(output, system, motion) for output in self.study.outputs]
-        except (FloatframeError, CmsError) as error:
-            n = len(self.study.outputs)
-            return StudyRow(point, (float("nan"),) * n, ("",) * n, str(error))
+        system, given = read_system(self.study.system, self.study.changes(point))
+        if self.study.analysis == "eig":
+            modes = system_modes(linearize(system))
+            found = [taken_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
+        else:
+            motion = self.motion(system, given)
+            found = [taken(output, system, motion) for output in self.study.outputs]
         return StudyRow(point, tuple(value for value, _ in found), tuple(unit for _, unit in found))
+
+    def failed(self, point: tuple[Any, ...], error: Exception) -> StudyRow:
+        """Return the row of a point that went wrong, whatever it was: its error in words."""
+        words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
+        n = len(self.study.outputs)
+        return StudyRow(point, (float("nan"),) * n, ("",) * n, " ".join(words.split()) or type(error).__name__)
 
     def motion(self, system: System, given: RunOptions | None) -> Trajectory:
         """Return the motion of the analysis; an equilibrium as one of one time."""

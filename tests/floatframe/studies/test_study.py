@@ -112,6 +112,21 @@ take = "mean"
     assert_allclose(float(first[4]), float(first[3]), rtol=0.05)  # the mean rate over one second
 
 
+def test_what_nobody_foresaw_is_a_row_too(folder, monkeypatch):
+    def fails_once(system):
+        if system.bodies[0].mass == 2.0:
+            raise RuntimeError("a fault\nof the program")
+        return found(system)
+
+    import floatframe.studies.study as study
+
+    found = study.linearize
+    monkeypatch.setattr(study, "linearize", fails_once)
+    table = run_study(read_study(folder / "study.toml"), processes=1)
+    assert [row.error for row in table.rows] == ["", "RuntimeError: a fault of the program", ""] * 2
+    assert_allclose(table.column("swing")[[0, 2]], [swing_of(1, 9.81), swing_of(4, 9.81)], rtol=1e-6)
+
+
 def test_equilibria_and_driven_motions_can_be_varied_too(folder):
     text = STUDY.replace('"eig"', '"static"').replace('"frequency 1"', '"hinge.angle value"')
     (folder / "study.toml").write_text(text)

@@ -1,0 +1,129 @@
+"""Work in processes beside: one bad value never takes the others along, and no process outlives the one that asks."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from fe_models.foundation.processes import ProcessError, map_in_processes
+from tests.root import ROOT
+
+
+class UnpicklableError(Exception):
+    """Cannot be made again from its arguments."""
+
+    def __init__(self, one, other):
+        super().__init__(one + other)
+
+
+def answer(value):
+    """Square a number, or end in one of the bad ways."""
+    if value == "killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if value == "segfault":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if value == "exit":
+        sys.exit(3)
+    if value == "hard exit":
+        os._exit(4)
+    if value == "raise":
+        raise KeyError("a bad one")
+    if value == "unpicklable error":
+        raise UnpicklableError("un", "sendable")
+    if value == "unpicklable result":
+        return lambda: None
+    if value == "memory":
+        raise MemoryError
+    return value * value
+
+
+BAD = {
+    "killed": "killed by SIGKILL; the system may have run out of memory",
+    "segfault": "killed by SIGSEGV",
+    "exit": "SystemExit: 3",
+    "hard exit": "exit code 4",
+    "raise": "a bad one",
+    "unpicklable error": "UnpicklableError: unsendable",
+    "unpicklable result": "lambda",
+    "memory": "",
+}
+
+
+def row(value, error):
+    return value, f"{error}"
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_one_bad_value_never_loses_the_others(n):
+    values, seen = [1, "killed", 2, *BAD, 3, "segfault", 4, 5], []
+    found = map_in_processes(answer, values, n, failed=row, progress=lambda *told: seen.append(told))
+    for value, got in zip(values, found, strict=True):
+        if isinstance(value, int):
+            assert got == value * value
+        else:
+            assert got[0] == value
+            assert BAD[value] in got[1]
+    assert seen[-1] == (len(values), len(values))
+
+
+def test_without_a_place_for_failures_the_first_error_in_order_is_raised():
+    with pytest.raises(KeyError, match="a bad one"):
+        map_in_processes(answer, [1, "raise", 2, "killed"], 2)
+    with pytest.raises(ProcessError, match="SIGKILL"):
+        map_in_processes(answer, ["killed"] * 3, 2)
+
+
+def test_a_function_that_cannot_be_sent_is_refused_before_any_work():
+    with pytest.raises(ProcessError, match="top level of a module"):
+        map_in_processes(lambda value: value, [1, 2], 2)
+
+
+def note_and_sleep(folder, value):
+    (folder / f"{os.getpid()}.pid").write_text("")
+    time.sleep(100)
+
+
+SLEEPS = """
+    import sys
+    from functools import partial
+    from pathlib import Path
+    from fe_models.foundation.processes import map_in_processes
+    from tests.fe_models.foundation.test_processes import note_and_sleep
+    if __name__ == "__main__":
+        map_in_processes(partial(note_and_sleep, Path(sys.argv[1])), [1, 2], 2)
+"""
+
+
+def is_running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL", "SIGINT"])
+def test_workers_end_with_the_process_that_started_them(tmp_path, name):
+    assert partial(note_and_sleep, tmp_path)  # what the script sends
+    script = tmp_path / "script.py"
+    script.write_text(textwrap.dedent(SLEEPS))
+    with subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path)], env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as process:  # fmt: skip
+        deadline = time.monotonic() + 60
+        while len(list(tmp_path.glob("*.pid"))) < 2 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        pids = [int(path.stem) for path in tmp_path.glob("*.pid")]
+        assert len(pids) == 2
+        process.send_signal(signal.Signals[name])
+        process.wait(30)
+        while any(map(is_running, pids)) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not any(map(is_running, pids))
