@@ -1,6 +1,8 @@
 """Benchmarks of shells: errors of both elements on refined meshes, and the cost of a large one.
 
 python -m benchmarks.shells            # errors in % on 8, 16 and 32 cells a side
+python -m benchmarks.shells --choices  # what the drilling stiffness, the parabolic sides and the size of cells bring
+python -m benchmarks.shells --stiffeners # ribs against strips of shells in their place
 python -m benchmarks.shells --cost 128 # time and memory of a plate of 128 x 128 quads: 99 846 dofs
 """
 
@@ -15,6 +17,7 @@ import fe_models as fm
 from fe_models.beams.torsion import rectangle_torsion_constant
 from fe_models.shells import elements
 from tests.fe_models.shells import test_benchmarks as cases
+from tests.fe_models.shells import test_stiffeners as ribs
 from tests.fe_models.small_shells import KINDS, SI, STEEL, frequencies, of_nodes, plate, solved
 
 
@@ -141,14 +144,36 @@ def choices():
         print(f"{kind:9s}" + "".join(f"{torsion(kind, n):8.3f}" for n in (4, 8, 16)))
 
 
+def stiffeners():
+    """Print errors in % of the first six frequencies of ribbed plates against those with strips of shells."""
+    upright, beside = (0.0, 0.0, ribs.HEIGHT), (0.0, -0.06, 0.0)
+    bar = fm.BeamProperty(fm.Rectangle(0.06, 0.008), STEEL, offset=(-0.03, 0.0))
+    cases = {
+        "one rib": ((("x", 0.3),), upright, ribs.WIDTH, ribs.rib()),
+        "four ribs that cross": ((("x", 0.15), ("x", 0.45), ("y", 0.3), ("y", 0.7)), upright, ribs.WIDTH, ribs.rib()),
+        "bar beside an edge": ((("x", 0.0),), beside, 0.008, bar),
+    }
+    for name, (places, across, t, section) in cases.items():
+        exact = ribs.free_frequencies(ribs.with_strips(*ribs.ribbed_plate("quad", 40, places), across, t, 12), 6)
+        print(f"{name}: {', '.join(f'{f:.2f}' for f in exact)} Hz with strips")
+        for kind in ribs.KINDS:
+            for n in (10, 20, 40):
+                found = ribs.free_frequencies(ribs.with_beams(*ribs.ribbed_plate(kind, n, places), section), 6)
+                print(f"  {kind:9s} {2 * n:3d} cells " + " ".join(f"{100 * e:6.2f}" for e in found / exact - 1))
+
+
 def main():
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cost", type=int, metavar="N")
     parser.add_argument("--choices", action="store_true")
+    parser.add_argument("--stiffeners", action="store_true")
     options = parser.parse_args()
     if options.choices:
         choices()
+        return
+    if options.stiffeners:
+        stiffeners()
         return
     if options.cost:
         cost(options.cost)

@@ -20,6 +20,7 @@ from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.elements import ShellCells, shell_cells
 from fe_models.shells.model import ShellModel
 from fe_models.shells.quality import WARP_LIMIT, cell_quality
+from fe_models.shells.section_rotations import rotations_of_sections
 from fe_models.shells.shell_property import ShellProperty, assign_shell_properties
 from fe_models.shells.skin import ShellSkin, make_shell_skin
 from fe_models.shells.stiffeners import element_model_of, with_frame
@@ -102,8 +103,9 @@ def shell_body(
         node_volumes=_node_volumes(n_nodes, groups, skin),
         provenance=_provenance(mesh, used, of_cell),
     )
-    frame = _frame(mesh, stiffeners, tuple(point_masses), tuple(springs), name, units)
-    is_used = _used_nodes(mesh, frame[1] if frame else np.zeros(0, np.int64), tuple(links))
+    interfaces, masses, springs, links = tuple(interfaces), tuple(point_masses), tuple(springs), tuple(links)
+    frame = _frame(mesh, stiffeners, masses, springs, name, units)
+    is_used = _used_nodes(mesh, frame[1] if frame else np.zeros(0, np.int64), links)
     if not is_used.all():
         loose = np.flatnonzero(~is_used)
         raise ShellError(
@@ -111,8 +113,12 @@ def shell_body(
             "make the stiffness singular; remove them"
         )
     if frame is not None:
-        body = with_frame(body, model, frame[0], element_model_of(frame[0].element_model), frame[1])
-    return link_rigidly(replace(body, interfaces=tuple(interfaces)), links)
+        held = [np.asarray(item.nodes) for item in interfaces]
+        held += [np.array([item.node, *item.followers]) for item in links]
+        held += [np.array([item.node for item in masses] + [node for spring in springs for node in spring.nodes])]
+        turns = rotations_of_sections(model, element_model_of(frame[0].element_model), frame[1], np.concatenate(held))
+        body = with_frame(body, model, *frame, turns)
+    return link_rigidly(replace(body, interfaces=interfaces), links)
 
 
 def _frame(

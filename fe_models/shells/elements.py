@@ -51,10 +51,10 @@ class ShellCells:
         """Return strain operators in local axes over the dofs of the nodes, points of `STRAIN_DEGREE`."""
         planes = self.planes[rows]
         G = self.E[rows] / (2 * (1 + self.nu[rows]))
+        ratio = self.t[rows] ** 2 / (6 * SHEAR_FACTOR * (1 - self.nu[rows]))  # D / (kappa G t)
         if self.kind == "quad":
-            local = quad_strains(planes.xy, plane_elasticity(self.E[rows], self.nu[rows]), DRILLING * G)
+            local = quad_strains(planes.xy, plane_elasticity(self.E[rows], self.nu[rows]), DRILLING * G, ratio)
         else:
-            ratio = self.t[rows] ** 2 / (6 * SHEAR_FACTOR * (1 - self.nu[rows]))  # D / (kappa G t)
             local = triangle_strains(planes.xy, self.nu[rows], ratio)
         return FlatStrains(_times_blocks(local.B, planes), local.weights)
 

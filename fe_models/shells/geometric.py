@@ -9,8 +9,8 @@ M = ∫ z sigma, Q; ∫ z² sigma = N t²/12. Over the middle surface, a and b a
 
 and the loads work on the second order of the rotation, on the normal and on the levers between nodes and middle surface
 (`mass_loads.rotation_work`), to which the nodal forces of the cell itself belong as well. The drilling stress of
-quads, which vanishes with the mesh, is left out. The mean of Q is that of the nodal forces, Σ f_z x / area: so that the
-cell turns as a whole under the forces it has (triangles carry most of Q by the change of M along their sides).
+quads, which vanishes with the mesh, is left out. Q is the one that holds the nodal forces across the cell: these
+elements carry most of it by the change of M along their sides, where the strain of their middle does not show it.
 """
 
 from functools import cache
@@ -68,12 +68,21 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
 
 
 def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weights: Array) -> Array:
-    """What the mean of weighted Q, (m, p, 2, k), lacks of Σ f_z x / area, spread over the points."""
+    """What weighted Q, (m, p, 2, k), lacks to hold the nodal forces across the cell: the gradient of Σ c_i N_i.
+
+    ∫ (Q + ∇ Σ c_j N_j)·∇N_i = f_z,i  at every corner i; the constant in c is free and zero.
+    """
     planes = cells.planes[rows]
     n, c, k = len(planes.R), planes.xy.shape[1], forces.shape[2]
+    shape = flat_shape(cells.kind, flat_quadrature(cells.kind, STRAIN_DEGREE[cells.kind])[0])
+    J, det = jacobians(shape.gradients, planes.xy)
+    dN = np.einsum("npak,pck->npca", inverse_2x2(J, det), shape.gradients)
     across = np.einsum("na,ncaj->ncj", planes.R[:, :, 2], forces.reshape(n, c, 6, k)[:, :, :3])
-    missing = np.einsum("nca,ncj->naj", planes.xy, across) - Q.sum(axis=1)
-    return np.asarray((weights / weights.sum(axis=1, keepdims=True))[:, :, None, None] * missing[:, None])
+    missing = across - np.einsum("npca,npaj->ncj", dN, Q)
+    laplacian = np.einsum("npca,npda,np->ncd", dN, dN, weights)
+    laplacian += laplacian.trace(axis1=1, axis2=2)[:, None, None] / c  # the constant: neither needed nor singular
+    gradient = np.einsum("npca,ncj->npaj", dN, np.linalg.solve(laplacian, missing))
+    return np.asarray(weights[:, :, None, None] * gradient)
 
 
 def _contracted(fields: Array, W: Array) -> Array:

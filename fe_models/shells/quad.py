@@ -1,10 +1,12 @@
-r"""The four-node element: MITC4 plate, bilinear membrane with incompatible modes, drilling rotation.
+r"""The four-node element: discrete Kirchhoff-Mindlin plate (DKMQ), membrane with incompatible modes, drilling rotation.
 
 Rotation of the normal: beta_x = theta_y, beta_y = -theta_x, in-plane displacement u + z beta.
 
-Shear (MITC4): the covariant shear strains w,xi + x,xi · beta of the bilinear fields are taken where they are free of
-locking, in the middles of the sides eta = ∓1 for xi and xi = ±1 for eta, and interpolated linearly between these
-[1]_. Bending strains are those of the bilinear rotations.
+Plate [1]_: the rotation along each side is quadratic and its shear strain constant, as in the triangle
+(`fe_models.shells.strains.plate_sides`); inside, the rotation is bilinear plus the sides' part, and the covariant
+shear strains are linear between those of opposite sides. Quads and triangles so have one rotation on a side they
+share: a plate of both passes the patch test of constant twist, which quads with straight sides (MITC4) beside these
+triangles do not.
 
 Membrane: the displacement is u = Σ N_i u_i + (1 - xi²) a_1 + (1 - eta²) a_2 with internal vectors a; their gradients
 are taken with the Jacobian at the centre, scaled by its determinant, so that their mean is zero and constant strain
@@ -13,21 +15,19 @@ gamma G t ∫ (½ (v,x - u,y) - theta_z)² (Hughes and Brezzi), which a rigid ro
 modes take part in the rotation, pure in-plane bending of rectangles stays exact at any gamma. The internal vectors are
 condensed, so that strains are a linear function of the nodal dofs alone.
 
-.. [1] Bathe & Dvorkin (1985), Int. J. Numer. Meth. Engng 21, 367-383.
+.. [1] Katili (1993), Int. J. Numer. Meth. Engng 36, 1885-1908.
 """
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.shells.shapes import flat_quadrature, flat_shape
-from fe_models.shells.strains import N_STRAINS, FlatStrains, inverse_2x2, jacobians
+from fe_models.shells.strains import N_STRAINS, FlatStrains, PlateSides, inverse_2x2, jacobians, plate_sides
 
 __all__ = ["quad_strains"]
 
-SIDE_MIDDLES = np.array([(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)])
 
-
-def quad_strains(xy: Array, C: Array, drilling: Array) -> FlatStrains:
+def quad_strains(xy: Array, C: Array, drilling: Array, shear_ratio: Array) -> FlatStrains:
     """Return the strain operators at 2 × 2 Gauss points.
 
     Parameters
@@ -38,6 +38,8 @@ def quad_strains(xy: Array, C: Array, drilling: Array) -> FlatStrains:
         Plane stress elasticity, (n, 3, 3) [Pa].
     drilling
         Stiffness gamma G of the drilling rotation, (n,) [Pa].
+    shear_ratio
+        Bending over shear stiffness, D/(kappa G t), (n,) [m²].
     """
     n = len(xy)
     points, w = flat_quadrature("quad", 3)
@@ -53,26 +55,23 @@ def quad_strains(xy: Array, C: Array, drilling: Array) -> FlatStrains:
     B[:, :, 8, :, 5] = -shape.values
     B[:, :, 3, :, 4], B[:, :, 4, :, 3] = dN[..., 0], -dN[..., 1]
     B[:, :, 5, :, 4], B[:, :, 5, :, 3] = dN[..., 1], -dN[..., 0]
-    B[:, :, 6:8] = _shear(xy, points, inverse)
+    sides = plate_sides(xy, shape.sides, shear_ratio)
+    B[:, :, 3:6][..., 2:5] += sides.curvature(np.einsum("npak,pck->npca", inverse, shape.side_gradients))
+    B[:, :, 6:8][..., 2:5] = _shear(xy, points, inverse, sides)
     operators: Array = B.reshape(n, len(points), N_STRAINS, 24)
     rows = [0, 1, 2, 8]
     operators[:, :, rows] += _condensed_modes(xy, points, det, weights, C, drilling, operators[:, :, rows])
     return FlatStrains(operators, weights)
 
 
-def _shear(xy: Array, points: Array, inverse: Array) -> Array:
-    """Shear strain operators of MITC4, (n, p, 2, 4, 6)."""
-    middle = flat_shape("quad", SIDE_MIDDLES)
-    J, _ = jacobians(middle.gradients, xy)
-    sampled = np.zeros((len(xy), 4, 4, 6))  # covariant shear along the side in its middle
-    for k, along in enumerate((0, 1, 0, 1)):
-        sampled[:, k, :, 2] = middle.gradients[k, :, along]
-        sampled[:, k, :, 4] = J[:, k, along, 0, None] * middle.values[k]
-        sampled[:, k, :, 3] = -J[:, k, along, 1, None] * middle.values[k]
+def _shear(xy: Array, points: Array, inverse: Array, sides: PlateSides) -> Array:
+    """Shear strain operators over w, theta_x, theta_y, (n, p, 2, 4, 3)."""
+    # along xi on the sides 12 and 34, along eta on 23 and 41; covariant: times half of the length
+    covariant_sides = sides.shear * (sides.length / 2 * np.array([1.0, 1.0, -1.0, -1.0]))[:, :, None, None]
     xi, eta = points.T
-    covariant = np.zeros((len(xy), len(points), 2, 4, 6))
-    covariant[:, :, 0] = _between(sampled[:, 0], sampled[:, 2], eta)
-    covariant[:, :, 1] = _between(sampled[:, 3], sampled[:, 1], xi)
+    covariant = np.zeros((len(xy), len(points), 2, 4, 3))
+    covariant[:, :, 0] = _between(covariant_sides[:, 0], covariant_sides[:, 2], eta)
+    covariant[:, :, 1] = _between(covariant_sides[:, 3], covariant_sides[:, 1], xi)
     return np.einsum("npak,npkcd->npacd", inverse, covariant)
 
 

@@ -1,4 +1,4 @@
-"""Beams on a shell: one body of both, which share nodes."""
+"""Beams on a shell: one body of both, whose nodes move together but for the rotations of sections of their own."""
 
 from dataclasses import dataclass, replace
 
@@ -8,26 +8,27 @@ import scipy.sparse as sp
 from fe_models.beams.model import BeamModel
 from fe_models.body.fe_body import ElementModel, FEBody, Recovery
 from fe_models.body.mass_loads import MassLoads
-from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.shells.model import ShellModel
+from fe_models.shells.section_rotations import SectionRotations
 
-__all__ = ["StiffenedModel", "with_frame"]
+__all__ = ["StiffenedModel", "element_model_of", "with_frame"]
 
 
 @dataclass(frozen=True, eq=False)
 class StiffenedModel:
-    """Shell and frame that share nodes (`fe_models.body.fe_body.ElementModel`).
+    """A shell and a frame on it (`fe_models.body.fe_body.ElementModel`).
 
-    Dofs: six per node of the shell, three per skin point of the shell, three per skin point of the frame.
+    Dofs of the mesh: those of the shell (six per node, three per skin point), then those of the frame (the same).
+    Each node of the frame stands at one of the shell. Where its section turns by itself, the rotation theta_b of the
+    section is that of the node, theta_s, followed by one about axes that turn with the node: to second order the
+    rotation vector gains ½ theta_s × theta_b, on which the moment works that the section takes from the node.
     """
 
     shell: ShellModel
     frame: BeamModel
     nodes: IntArray  #: of the shell, for each node of the frame, (n_frame_nodes,)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "nodes", frozen_int(self.nodes))
 
     @property
     def has_nodal_stress(self) -> bool:
@@ -37,24 +38,17 @@ class StiffenedModel:
     @property
     def n_mesh_dof(self) -> int:
         """Dofs of the mesh."""
-        return self.shell.n_mesh_dof + 3 * len(self.frame.skin.points)
-
-    @property
-    def frame_rows(self) -> IntArray:
-        """Dofs of the mesh that are those of the frame, (n_frame_mesh_dof,)."""
-        of_nodes = (6 * self.nodes[:, None] + np.arange(6)).ravel()
-        return np.concatenate([of_nodes, np.arange(self.shell.n_mesh_dof, self.n_mesh_dof)])
+        return self.shell.n_mesh_dof + self.frame.n_mesh_dof
 
     def mass_gram(self, u: Array) -> Array:
         """Return the sum of both, (4 + 3 k, 4 + 3 k)."""
-        self._require_rows("mass_gram", u)
-        return self.shell.mass_gram(u[: self.shell.n_mesh_dof]) + self.frame.mass_gram(u[self.frame_rows])
+        of_shell, of_frame = self._parts("mass_gram", u)
+        return self.shell.mass_gram(of_shell) + self.frame.mass_gram(of_frame)
 
     def nodal_stress(self, u: Array, *, nodes: IntArray | None = None) -> Array:
-        """Return the stress of the shell at its nodes and skin, then that of the frame at its skin."""
-        self._require_rows("nodal_stress", u)
-        of_frame = self.frame.nodal_stress(u[self.frame_rows])[len(self.nodes) :]
-        return np.concatenate([self.shell.nodal_stress(u[: self.shell.n_mesh_dof], nodes=nodes), of_frame])
+        """Return the stress of the shell at its nodes and skin, then that of the frame at its own."""
+        of_shell, of_frame = self._parts("nodal_stress", u)
+        return np.concatenate([self.shell.nodal_stress(of_shell, nodes=nodes), self.frame.nodal_stress(of_frame)])
 
     @property
     def has_geometric_stiffness(self) -> bool:
@@ -63,80 +57,93 @@ class StiffenedModel:
 
     def mass_forces(self, loads: MassLoads) -> Array:
         """Return the consistent forces of loads per mass on both, (n_mesh_dof, k)."""
-        return self._joined(self.shell.mass_forces(loads), self.frame.mass_forces(loads))
+        return np.concatenate([self.shell.mass_forces(loads), self.frame.mass_forces(loads)])
 
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return K u of both, (n_mesh_dof, k) [N, N m], at all nodes."""
-        self._require_rows("internal_forces", u)
-        of_shell = self.shell.internal_forces(u[: self.shell.n_mesh_dof])
-        return self._joined(of_shell, self.frame.internal_forces(u[self.frame_rows]))
+        of_shell, of_frame = self._parts("internal_forces", u)
+        return np.concatenate([self.shell.internal_forces(of_shell), self.frame.internal_forces(of_frame)])
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
-        """Return the sum of both, (k, n, n)."""
-        self._require_rows("geometric_stiffness", u)
-        n, rows = self.shell.n_mesh_dof, self.frame_rows
-        return self.shell.geometric_stiffness(u[:n], loads, Phi[:n]) + self.frame.geometric_stiffness(
-            u[rows], loads, Phi[rows]
+        """Return the sum of both and of the sections that turn by themselves, (k, n, n)."""
+        u_shell, u_frame = self._parts("geometric_stiffness", u)
+        on_shell, on_frame = self._parts("geometric_stiffness", Phi)
+        forces = self.frame.internal_forces(u_frame) - self.frame.mass_forces(loads)
+        moments = forces[: 6 * len(self.nodes)].reshape(len(self.nodes), 6, -1)[:, 3:]
+        return (
+            self.shell.geometric_stiffness(u_shell, loads, on_shell)
+            + self.frame.geometric_stiffness(u_frame, loads, on_frame)
+            + self._of_own_rotations(moments, on_shell, on_frame)
         )
 
-    def _joined(self, of_shell: Array, of_frame: Array) -> Array:
-        forces = np.zeros((self.n_mesh_dof, of_shell.shape[1]))
-        forces[: self.shell.n_mesh_dof] = of_shell
-        forces[self.frame_rows] += of_frame
-        return forces
+    def _of_own_rotations(self, moments: Array, on_shell: Array, on_frame: Array) -> Array:
+        """Second derivative of ½ m·(theta_s × theta_b) of all sections, (k, n, n), of moments m, (n_frame, 3, k)."""
+        n = len(self.nodes)
+        theta_b = on_frame[: 6 * n].reshape(n, 6, -1)[:, 3:]
+        theta_s = on_shell[: 6 * self.shell.n_nodes].reshape(self.shell.n_nodes, 6, -1)[self.nodes, 3:]
+        is_own = np.abs(theta_b - theta_s).max(axis=(1, 2), initial=0.0) > 0
+        m, s, b = moments[is_own], theta_s[is_own], theta_b[is_own]
+        K = np.zeros((m.shape[2], s.shape[2], s.shape[2]))
+        for a in range(3):
+            i, j = (a + 1) % 3, (a + 2) % 3
+            K += np.einsum("nk,np,nq->kpq", m[:, a], s[:, i], b[:, j], optimize=True)
+            K -= np.einsum("nk,np,nq->kpq", m[:, a], s[:, j], b[:, i], optimize=True)
+        return np.asarray((K + K.transpose(0, 2, 1)) / 2)
 
-    def _require_rows(self, where: str, u: Array) -> None:
+    def _parts(self, where: str, u: Array) -> tuple[Array, Array]:
+        """Rows of the shell and of the frame."""
         if np.ndim(u) != 2 or np.shape(u)[0] != self.n_mesh_dof:
             raise BodyError(f"{where}: u: expected columns over {self.n_mesh_dof} dofs, got {np.shape(u)}")
+        u = np.asarray(u)
+        return u[: self.shell.n_mesh_dof], u[self.shell.n_mesh_dof :]
 
 
-def with_frame(shell: FEBody, model: ShellModel, frame: FEBody, frame_model: BeamModel, nodes: IntArray) -> FEBody:
+def with_frame(shell: FEBody, model: ShellModel, frame: FEBody, nodes: IntArray, turns: SectionRotations) -> FEBody:
     """Add a frame to a shell.
 
     Parameters
     ----------
     shell, model
         The shell, its dofs six per node, and its element model.
-    frame, frame_model
-        The frame, its dofs six per node, and its element model.
+    frame
+        The frame, its dofs six per node.
     nodes
         Node of the shell for each node of the frame, (n_frame_nodes,).
+    turns
+        How the nodes of the frame follow those of the shell.
 
     Returns
     -------
     FEBody
-        Its nodes are those of the shell and its skin, then the skin of the frame.
+        Its nodes are those of the shell and its skin, then those of the frame, each at the place of one of the shell,
+        and its skin. Its dofs are those of the shell, then the own rotations of sections, at nodes of the frame.
     """
     if shell.recovery is None or frame.recovery is None:
         raise BodyError("with_frame: expected bodies with a skin")
-    n_frame_nodes = len(nodes)
-    dofs = (6 * nodes[:, None] + np.arange(6)).ravel()
-    place = sp.csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), shape=(len(dofs), shell.n_dof))
+    n_own, n_shell = len(turns.own), len(shell.nodes)
 
-    def placed(matrix: sp.csc_array) -> sp.csc_array:
-        return sp.csc_array(place.T @ matrix @ place)
+    def both(of_shell: sp.csc_array, of_frame: sp.csc_array) -> sp.csc_array:
+        padded = sp.block_diag([of_shell, sp.csc_array((n_own, n_own))], format="csc")
+        return sp.csc_array(padded + turns.place.T @ of_frame @ turns.place)
 
-    number = np.concatenate([nodes, len(shell.nodes) + np.arange(len(frame.nodes) - n_frame_nodes)])
-    skin_rows = sp.csr_array(frame.recovery.matrix)[6 * n_frame_nodes :]
-    skin_dofs = frame.recovery.dofs[6 * n_frame_nodes :]
-    moved = np.stack([number[skin_dofs[:, 0]], skin_dofs[:, 1]], axis=1)
-    n_new = len(frame.nodes) - n_frame_nodes
-    volumes = np.concatenate([np.asarray(shell.node_volumes), np.zeros(n_new)])
-    if frame.node_volumes is not None:
-        np.add.at(volumes, number, frame.node_volumes)
+    no_damping = sp.csc_array((shell.n_dof, shell.n_dof))
+    shift = np.array([n_shell, 0])
+    volumes = np.zeros(len(frame.nodes)) if frame.node_volumes is None else np.asarray(frame.node_volumes)
+    widened = sp.hstack([shell.recovery.matrix, sp.csr_array((shell.recovery.matrix.shape[0], n_own))])
     return replace(
         shell,
-        M=shell.M + placed(frame.M),
-        K=shell.K + placed(frame.K),
-        D=None if frame.D is None else placed(frame.D),
-        nodes=np.concatenate([shell.nodes, frame.nodes[n_frame_nodes:]]),
-        surface=np.concatenate([shell.surface, number[frame.surface]]),
-        element_model=StiffenedModel(model, frame_model, nodes),
+        M=both(shell.M, frame.M),
+        K=both(shell.K, frame.K),
+        D=None if frame.D is None else both(no_damping, frame.D),
+        nodes=np.concatenate([shell.nodes, frame.nodes]),
+        dofs=np.concatenate([shell.dofs, turns.own + shift]),
+        surface=np.concatenate([shell.surface, n_shell + frame.surface]),
+        element_model=StiffenedModel(model, element_model_of(frame.element_model), nodes),
         recovery=Recovery(
-            sp.vstack([shell.recovery.matrix, skin_rows @ place], format="csr"),
-            np.concatenate([shell.recovery.dofs, moved]),
+            sp.vstack([widened, frame.recovery.matrix @ turns.place], format="csr"),
+            np.concatenate([shell.recovery.dofs, frame.recovery.dofs + shift]),
         ),
-        node_volumes=volumes,
+        node_volumes=np.concatenate([np.asarray(shell.node_volumes), volumes]),
         provenance={**shell.provenance, **{f"stiffeners: {key}": value for key, value in frame.provenance.items()}},
     )
 

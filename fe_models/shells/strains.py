@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["N_STRAINS", "FlatStrains", "inverse_2x2", "jacobians", "plane_elasticity"]
+__all__ = ["N_STRAINS", "FlatStrains", "PlateSides", "inverse_2x2", "jacobians", "plane_elasticity", "plate_sides"]
 
 N_STRAINS = 9  #: eps_x eps_y gamma_xy, kappa_x kappa_y kappa_xy, gamma_xz gamma_yz, drilling
 
@@ -40,3 +40,56 @@ def inverse_2x2(J: Array, det: Array) -> Array:
     inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1], J[..., 0, 0]
     inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1], -J[..., 1, 0]
     return inverse / det[..., None, None]
+
+
+@dataclass(frozen=True, eq=False)
+class PlateSides:
+    """Rotation and shear along the sides of plate elements, over w, theta_x, theta_y of the corners."""
+
+    length: Array  #: (n, n_sides) [m]
+    along: Array  #: unit vectors from the first to the second corner, (n, n_sides, 2)
+    bulge: Array  #: Delta, of the rotation beta_s in the middle over the mean of the ends, (n, n_sides, c, 3)
+    shear: Array  #: gamma of the sides, (n, n_sides, c, 3)
+
+    def curvature(self, gradients: Array) -> Array:
+        """Return what the bulges add to kappa_x kappa_y kappa_xy, (n, p, 3, c, 3).
+
+        Parameters
+        ----------
+        gradients
+            Of the functions of the sides (1 in the middle of a side, 0 on the others), by x, y, (n, p, n_sides, 2).
+        """
+        c, s = np.moveaxis(self.along, -1, 0)
+        by_x, by_y = gradients[..., 0], gradients[..., 1]
+        factors = np.stack([c[:, None] * by_x, s[:, None] * by_y, c[:, None] * by_y + s[:, None] * by_x], axis=2)
+        return np.einsum("npas,nscd->npacd", factors, self.bulge)
+
+
+def plate_sides(xy: Array, sides: IntArray, shear_ratio: Array) -> PlateSides:
+    """Return rotation and shear along the sides of plate elements (DKMT, DKMQ).
+
+    (1) the rotation is quadratic, beta_s = linear + 4 s/L (1 - s/L) Delta
+    (2) equilibrium of the side, Q = M,s, gives its constant shear strain gamma = -(2/3) phi Delta with
+        phi = 12 D/(kappa G t L²)
+    (3) ∫ (w,s + beta_s - gamma) ds = 0 gives Delta = -3/2/(1 + phi) [(w_j - w_i)/L + (beta_si + beta_sj)/2]
+
+    Parameters
+    ----------
+    xy
+        Corners in the plane, (n, c, 2) [m].
+    sides
+        First and second corner of each, (n_sides, 2).
+    shear_ratio
+        Bending over shear stiffness, D/(kappa G t), (n,) [m²].
+    """
+    n, c = xy.shape[:2]
+    d = xy[:, sides[:, 1]] - xy[:, sides[:, 0]]
+    L = np.linalg.norm(d, axis=2)
+    along = d / L[..., None]
+    phi = 12 * shear_ratio[:, None] / L**2
+    bulge = np.zeros((n, len(sides), c, 3))
+    for k, (i, j) in enumerate(sides):
+        for corner, sign in ((i, -1.0), (j, 1.0)):
+            bulge[:, k, corner] = np.stack([sign / L[:, k], -along[:, k, 1] / 2, along[:, k, 0] / 2], axis=1)
+    bulge *= (-1.5 / (1 + phi))[:, :, None, None]
+    return PlateSides(L, along, bulge, (-2 / 3 * phi)[:, :, None, None] * bulge)

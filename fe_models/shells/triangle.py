@@ -1,10 +1,8 @@
 r"""The three-node element: discrete Kirchhoff-Mindlin plate (DKMT), optimal membrane with drilling (ANDES).
 
-Plate [1]_: the rotation along each side is quadratic, beta_s = linear + 4 s/L (1 - s/L) Δ; equilibrium of the side,
-Q = M,s, gives its constant shear strain gamma = -(2/3) phi Δ with phi = 12 D/(kappa G t L²), and
-∫ (w,s + beta_s - gamma) ds = 0 gives Δ = -3/2/(1 + phi) [(w_j - w_i)/L + (beta_si + beta_sj)/2]. So thin triangles are
-those of the discrete Kirchhoff theory and thick ones deform in shear; nothing locks. The shear field inside is linear
-with constant tangential strain on every side.
+Plate [1]_: the rotation along each side is quadratic and its shear strain constant
+(`fe_models.shells.strains.plate_sides`). So thin triangles are those of the discrete Kirchhoff theory and thick ones
+deform in shear; nothing locks. The shear field inside is linear with constant tangential strain on every side.
 
 Membrane [2]_: a constant part with L lumped from linear side displacements and the drilling rotations (alpha_b = 3/2),
 and a part linear in the hierarchical drilling rotations theta~ = theta - theta_0, theta_0 the rotation of the linear
@@ -20,11 +18,11 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.shells.shapes import flat_quadrature, flat_shape
-from fe_models.shells.strains import N_STRAINS, FlatStrains
+from fe_models.shells.strains import N_STRAINS, FlatStrains, plate_sides
 
 __all__ = ["triangle_strains"]
 
-SIDES = ((0, 1), (1, 2), (2, 0))
+SIDES = ((0, 1), (1, 2), (2, 0))  #: of the membrane
 #: natural strains at the corners from theta~, before scaling by 2 A/(3 l²) of the sides 21, 32, 13
 CORNER_STRAINS = np.array(
     [
@@ -103,27 +101,10 @@ def _plate(xy: Array, area: Array, shear_ratio: Array, points: Array) -> Array:
     B[:, :, 2, :, 2] = slope[:, None, :, 1]
     B[:, :, 1, :, 1] = -slope[:, None, :, 1]
     B[:, :, 2, :, 1] = -slope[:, None, :, 0]
-    shear = np.zeros((n, 3, 3, 3))  # tangential shear strain of each side
-    along = np.zeros((n, 3, 2))
-    for k, (i, j) in enumerate(SIDES):
-        d = xy[:, j] - xy[:, i]
-        L = np.linalg.norm(d, axis=1)
-        c, s = (d / L[:, None]).T
-        along[:, k] = np.stack([c, s], axis=1)
-        phi = 12 * shear_ratio / L**2
-        bulge = np.zeros((n, 3, 3))  # Δ of the side over the dofs
-        for corner, sign in ((i, -1.0), (j, 1.0)):
-            bulge[:, corner, 0] = sign / L
-            bulge[:, corner, 1] = -s / 2
-            bulge[:, corner, 2] = c / 2
-        bulge *= (-1.5 / (1 + phi))[:, None, None]
-        slope_E = 4 * (
-            shape.values[:, i, None] * slope[:, None, j] + shape.values[:, j, None] * slope[:, None, i]
-        )  # (n, p, 2)
-        B[:, :, 0] += np.einsum("n,np,ncd->npcd", c, slope_E[..., 0], bulge)
-        B[:, :, 1] += np.einsum("n,np,ncd->npcd", s, slope_E[..., 1], bulge)
-        B[:, :, 2] += np.einsum("np,ncd->npcd", c[:, None] * slope_E[..., 1] + s[:, None] * slope_E[..., 0], bulge)
-        shear[:, k] = (-2 / 3 * phi)[:, None, None] * bulge
+    sides = plate_sides(xy, shape.sides, shear_ratio)
+    by_xy = slope[:, 1:]  # the reference coordinates are the functions of the second and third corner
+    B[:, :, :3] += sides.curvature(np.einsum("pks,nsa->npka", shape.side_gradients, by_xy))
+    along, shear = sides.along, sides.shear
     for corner, (k, m) in enumerate(((0, 2), (1, 0), (2, 1))):  # the sides that meet at it
         here = np.linalg.solve(along[:, [k, m]], shear[:, [k, m]].reshape(n, 2, 9)).reshape(n, 2, 3, 3)
         B[:, :, 3:] += shape.values[None, :, corner, None, None, None] * here[:, None]

@@ -93,7 +93,7 @@ def test_frequencies_of_a_hinged_plate_converge_at_second_order_or_better(kind, 
     if t == 1.0:
         assert_allclose(exact, [45.897, 109.44, 109.44, 167.89], rtol=2.5e-3)
     errors = []
-    for n in (8, 16, 32):
+    for n in (10, 20, 40):
         mesh = fm.flat_plate(10.0, 10.0, n, n, kind=kind)
         errors.append(np.abs(frequencies(plate(kind, n, t=t), hinged(mesh), 4) / exact - 1).max())
     assert errors[2] < 0.0025
@@ -153,16 +153,19 @@ def pinched_cylinder(kind, n):
 @pytest.mark.parametrize("kind", KINDS)
 def test_scordelis_lo_roof(kind):
     """0.3024 is MacNeal and Harder's target; deep shell theory with shear gives 0.3006."""
-    assert_allclose([scordelis_lo(kind, n) / 0.3024 for n in (4, 8, 16)], 1.0, rtol=0.015)
+    assert_allclose([scordelis_lo(kind, n) / 0.3024 for n in (8, 16)], 1.0, rtol=0.007)
 
 
-@pytest.mark.parametrize(("kind", "coarse"), [("quad", 0.75), ("triangle", 0.89)])
+@pytest.mark.parametrize(("kind", "coarse"), [("quad", 0.95), ("triangle", 0.89)])
 def test_pinched_cylinder_with_diaphragms(kind, coarse):
-    """1.8248e-5 is the series of Lindberg, Olson and Cowper without shear deformation, which adds about 1 %."""
+    """1.8248e-5 is the series of Lindberg, Olson and Cowper without shear deformation, which adds more than 1 %.
+
+    Triangles come from below (1.0101, 1.0119 with 32 and 64 cells a side), quads from above (1.0187, 1.0152).
+    """
     ratio = [pinched_cylinder(kind, n) / 1.8248e-5 for n in (8, 16, 32)]
-    assert ratio[0] > coarse
-    assert ratio[0] < ratio[1] < ratio[2]
-    assert_allclose(ratio[2], 1.0, rtol=0.012)
+    assert coarse < ratio[0] < 1.0
+    assert abs(ratio[2] - 1.013) < abs(ratio[1] - 1.013)
+    assert_allclose(ratio[2], 1.013, rtol=0.006)
 
 
 @pytest.mark.parametrize(("kind", "limit"), [("quad", 0.006), ("triangle", 0.006)])

@@ -1,0 +1,180 @@
+r"""Rotations of a stiffener's sections that are not those of the wall it sits on.
+
+A wall holds a beam along a line: the displacement of the line, and the rotation about it, are those of both. The other
+rotations of a section follow the axis of the beam instead. Where the wall twists by theta_x', the shear centre of a
+section with the lever r across the line moves by theta_x × r, so that its axis turns against the wall's line by
+theta_x' e_x × (e_x × r) = -theta_x' r; about the normal n the wall has, in the end, no rotation of its own but the mean
+½ (v,x - u,y) of two slopes, while the axis of a beam turns by v,x alone. A section that had to turn with the node would
+shear by that difference, with a stiffness of torsion GA r² in the place of GJ; a coarse mesh hides it, since the
+drilling rotation of large cells is soft, and a finer one does not.
+
+So a section turns by itself about the normal, and about its lever where that leaves the normal; the rest of its
+rotation is that of the node:
+
+    theta_b = theta_s + A (A_C)⁻¹ (phi - theta_s,C)
+
+A, (3, k): orthonormal axes, across all lines at the node; C: k components in which they are independent; phi: the
+section's own rotation about these mesh axes, so that rigid motion has phi = theta_C.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from fe_models.beams.model import BeamModel
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.shells.model import ShellModel
+from fe_models.shells.skin import cell_edges
+
+__all__ = ["SectionRotations", "own_axes", "rotations_of_sections"]
+
+SMOOTH = np.cos(np.deg2rad(40.0))  #: of the angle between normals at a node, from which its wall is folded
+ALONG = 0.1  #: share of the lines at a node that point along an axis, above which no section turns about it
+APART = 0.1  #: sine of the angle between two axes below which they count as one
+ON_LINE = 1e-6  #: lever over the length of the line, below which a section lies on it
+
+
+@dataclass(frozen=True, eq=False)
+class SectionRotations:
+    """How the nodes of a frame follow those of a shell, and the dofs that are their own."""
+
+    place: sp.csr_array  #: dofs of the frame from those of the shell, then the own ones, (6 n_frame, 6 n_shell + n_own)
+    own: IntArray  #: (node of the frame, component 3-5) of the own dofs, (n_own, 2)
+
+
+def section_rotations(axes: list[Array], nodes: IntArray, n_shell: int) -> SectionRotations:
+    """Return the way from the dofs of the shell to those of a frame on it.
+
+    Parameters
+    ----------
+    axes
+        Own axes at each node of the frame, (3, k) with k from 0 to 2; see `own_axes`.
+    nodes
+        Node of the shell for each node of the frame, (n_frame,).
+    n_shell
+        Nodes of the shell.
+    """
+    n_frame = len(nodes)
+    own: list[tuple[int, int]] = []
+    rows, columns, values = (
+        [np.arange(6 * n_frame)],
+        [(6 * nodes[:, None] + np.arange(6)).ravel()],
+        [np.ones(6 * n_frame)],
+    )
+    for node, A in enumerate(axes):
+        k = A.shape[1]
+        if not k:
+            continue
+        C = np.sort(la.qr(A.T, mode="r", pivoting=True)[1][:k])
+        tie = np.linalg.solve(A[C].T, A.T).T  # A (A_C)⁻¹, (3, k)
+        about = np.repeat(6 * node + 3 + np.arange(3), k)
+        rows += [about, about]
+        columns += [np.tile(6 * nodes[node] + 3 + C, 3), np.tile(6 * n_shell + len(own) + np.arange(k), 3)]
+        values += [-tie.ravel(), tie.ravel()]
+        own += [(node, 3 + int(c)) for c in C]
+    place = sp.csr_array(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+        shape=(6 * n_frame, 6 * n_shell + len(own)),
+    )
+    place.sum_duplicates()
+    place.eliminate_zeros()
+    return SectionRotations(place, np.array(own, dtype=np.int64).reshape(-1, 2))
+
+
+def own_axes(
+    lines: IntArray, directions: Array, levers: Array, normals: Array, is_held: NDArray[np.bool_]
+) -> list[Array]:
+    """Return the axes about which the sections at each node turn by themselves, orthonormal, (3, k), k = 0..2.
+
+    (1) free: across the lines at the node, so that the wall hands them its twist
+    (2) wished for: the normal of a smooth wall; the levers of lines that go on beyond the node (where one ends, its
+        moments shall reach the wall)
+    (3) the span of what is wished for in what is free
+
+    Parameters
+    ----------
+    lines
+        Nodes of the frame at the ends of each line, (n_lines, 2).
+    directions
+        Unit vectors along the lines, (n_lines, 3).
+    levers
+        From the line to the shear centre at both ends, in lengths of the line, (n_lines, 2, 3).
+    normals
+        Of the wall at each node, (n_frame, 3); NaN where it is folded.
+    is_held
+        Nodes whose sections turn with the node in all axes, (n_frame,).
+    """
+    n = len(normals)
+    at_node: list[list[tuple[int, int]]] = [[] for _ in range(n)]
+    for line, ends in enumerate(lines.tolist()):
+        for end, node in enumerate(ends):
+            at_node[node].append((line, end))
+    none, axes = np.zeros((3, 0)), []
+    for node, found in enumerate(at_node):
+        if is_held[node] or not found:
+            axes.append(none)
+            continue
+        t = directions[[line for line, _ in found]]
+        share, vectors = np.linalg.eigh(t.T @ t / len(found))
+        free = vectors[:, share < ALONG]  # (1)
+        wished = [] if np.isnan(normals[node]).any() else [normals[node]]  # (2)
+        if len(found) > 1:
+            r = np.array([levers[line, end] for line, end in found])
+            away = np.sqrt((r**2).sum(axis=1))
+            wished += list(r[away > ON_LINE] / away[away > ON_LINE, None])
+        if not wished or not free.shape[1]:
+            axes.append(none)
+            continue
+        U, size, _ = np.linalg.svd(free.T @ np.stack(wished, axis=1), full_matrices=False)  # (3)
+        axes.append(free @ U[:, size > APART])
+    return axes
+
+
+def rotations_of_sections(model: ShellModel, beams: BeamModel, nodes: IntArray, held: IntArray) -> SectionRotations:
+    """Return how sections turn on the shell: with it at nodes where something else holds them, or a line leaves it.
+
+    Parameters
+    ----------
+    model, beams
+        The shell and the frame on it.
+    nodes
+        Of the shell, for each node of the frame, (n_frame_nodes,).
+    held
+        Nodes of the shell where something else is attached, (n_held,).
+    """
+    lines = beams.dofs[:, ::6] // 6
+    is_held = np.isin(nodes, held)
+    is_held[lines[~_along_cells(model, nodes[lines])]] = True
+    vectors = beams.nodes[lines[:, 1]] - beams.nodes[lines[:, 0]]
+    length = np.linalg.norm(vectors, axis=1)[:, None]
+    center = np.array([section.shear_center for section in beams.sections]).reshape(-1, 2)[beams.of_line]
+    levers = beams.geometry.levers + np.einsum("nab,nb->na", beams.geometry.R[:, :, 1:], center)[:, None]
+    across = levers - np.einsum("nea,na->ne", levers, vectors / length)[..., None] * (vectors / length)[:, None]
+    axes = own_axes(lines, vectors / length, across / length[:, None], _normals(model, nodes), is_held)
+    return section_rotations(axes, nodes, model.n_nodes)
+
+
+def _along_cells(model: ShellModel, lines: IntArray) -> NDArray[np.bool_]:
+    """Return which pairs of nodes are an edge of a cell, (n_lines,)."""
+    ends = np.sort(np.concatenate([cell_edges(tuple(group.cells for group in model.groups)).nodes, lines]), axis=1)
+    number = ends @ [model.n_nodes, 1]
+    return np.isin(number[len(number) - len(lines) :], number[: len(number) - len(lines)])
+
+
+def _normals(model: ShellModel, nodes: IntArray) -> Array:
+    """Return the normal of the wall at some nodes, of either sign, (n, 3); NaN where walls meet at a fold."""
+    spread = np.zeros((model.n_nodes, 3, 3))
+    for group in model.groups:
+        n = group.planes.R[:, :, 2]
+        each = group.areas()[:, None, None] * n[:, :, None] * n[:, None, :]
+        np.add.at(spread, group.cells, each[:, None])
+    mean = np.linalg.eigh(spread)[1][:, :, 2]
+    least = np.ones(model.n_nodes)
+    for group in model.groups:
+        along = np.abs(np.einsum("nca,na->nc", mean[group.cells], group.planes.R[:, :, 2]))
+        np.minimum.at(least, group.cells, along)
+    mean[least < SMOOTH] = np.nan
+    return np.asarray(mean[nodes])
