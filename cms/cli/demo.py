@@ -1,4 +1,4 @@
-"""`cms demo`: the whole line on the shipped connecting rod, step by step as a user would type it."""
+"""`cms demo`: the whole line on a shipped rod that bends in a fast crank, step by step as a user would type it."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ from cms.errors import JobError
 
 __all__ = ["run_demo"]
 
-JOBS = ("rod.toml", "swing.toml")  #: shipped beside this file
+JOBS = ("rod.toml", "crank.toml")  #: shipped beside this file
 MODE = 3
 
 
@@ -34,7 +34,7 @@ def run_demo(folder: Path) -> None:
     with kernels_compiled_beside() as wait_for_kernels:
         run_steps(folder, wait_for_kernels)
     list_files(folder)
-    say(f"{time.perf_counter() - began:.0f} s; change rod.toml or swing.toml and run the commands above in {folder}")
+    say(f"{time.perf_counter() - began:.0f} s; change rod.toml or crank.toml and run the commands above in {folder}")
 
 
 def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
@@ -54,9 +54,9 @@ def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
     step(folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
     view_command(modal, MODE, folder / f"m{MODE}.png", folder / f"m{MODE}.gif")
     wait_for_kernels()
-    run_floatframe(folder, "run swing.toml -o swing.h5")
-    run_floatframe(folder, "plot swing.h5 -o swing.png")
-    run_floatframe(folder, "animate swing.h5 -o swing.mp4")
+    run_floatframe(folder, "run crank.toml -o crank.h5")
+    run_floatframe(folder, "plot crank.h5 -o crank.png")
+    run_floatframe(folder, "animate crank.h5 -o crank.mp4")
 
 
 def run_floatframe(folder: Path, words: str) -> None:
@@ -91,10 +91,10 @@ def list_files(folder: Path) -> None:
         "rod.json": "what is in it",
         f"m{MODE}.png": f"mode {MODE}, picture",
         f"m{MODE}.gif": f"mode {MODE}, film",
-        "swing.toml": "the system: the rod on a pin, let go",
-        "swing.h5": "its motion",
-        "swing.png": "its plots",
-        "swing.mp4": "its film",
+        "crank.toml": "the system: the rod between crank and slider",
+        "crank.h5": "its motion",
+        "crank.png": "its plots",
+        "crank.mp4": "its film",
     }
     typer.echo()
     rows = [(str(folder / name), f"{(folder / name).stat().st_size / 1e6:.2f}", words) for name, words in made.items()]
@@ -142,7 +142,7 @@ def put_inputs(folder: Path) -> None:
             )
     for name, content in jobs.items():
         replace_file(folder / name, content)
-    replace_file(folder / "rod.msh", shipped_mesh("connecting_rod").read_bytes())
+    replace_file(folder / "rod.msh", shipped_mesh("slender_rod").read_bytes())
 
 
 def step(folder: Path, command: str) -> None:

@@ -7,7 +7,8 @@ from fe_models.parts.errors import PartError
 
 __all__ = ["SHIPPED_MESHES", "shipped_mesh"]
 
-SHIPPED_MESHES = {"connecting_rod": "connecting_rod.msh"}  #: name -> file; default dimensions, in mm
+#: name -> file, in mm: the default dimensions of `ConnectingRod`, and `SLENDER_ROD` in elements of 7 mm
+SHIPPED_MESHES = {"connecting_rod": "connecting_rod.msh", "slender_rod": "slender_rod.msh"}
 
 
 def shipped_mesh(name: str) -> Path:

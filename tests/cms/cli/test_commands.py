@@ -342,7 +342,7 @@ def test_the_demo_runs_the_whole_line_and_lists_its_files(tmp_path, monkeypatch)
     result = run("demo")
     assert result.exit_code == 0, result.output
     files = contents(tmp_path / "demo")
-    for name in ("rod.h5", "m3.png", "m3.gif", "swing.h5", "swing.png", "swing.mp4"):
+    for name in ("rod.h5", "m3.png", "m3.gif", "crank.h5", "crank.png", "crank.mp4"):
         assert name in files
         assert name in result.stdout
     for command in ("cms reduce", "cms info", "cms view", "floatframe run", "floatframe plot", "floatframe animate"):

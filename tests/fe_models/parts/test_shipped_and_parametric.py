@@ -8,6 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.parts import (
+    SHIPPED_MESHES,
+    SLENDER_ROD,
     Bracket,
     ConnectingRod,
     MeshingError,
@@ -74,8 +76,9 @@ def volume(points, tetra):
     return jacobians(points, tetra).sum() / 24
 
 
-def test_shipped_rod_has_its_groups_and_no_inverted_element():
-    path = shipped_mesh("connecting_rod")
+@pytest.mark.parametrize("name", SHIPPED_MESHES)
+def test_shipped_rods_have_their_groups_and_no_inverted_element(name):
+    path = shipped_mesh(name)
     points, tetra, groups = read(path)
     assert set(groups) == {"rod", "big_end", "small_end"}
     assert path.stat().st_size < 1e6
@@ -95,9 +98,12 @@ def test_shipped_rod_bores_are_round_with_curved_mid_side_nodes(end, x):
     )
 
 
-def test_shipped_rod_is_the_default_rod(gmsh, tmp_path):
-    part = mesh_connecting_rod(path=tmp_path / "rod.msh")  # another gmsh may mesh it a little otherwise
-    points, tetra, groups = read(shipped_mesh("connecting_rod"))
+@pytest.mark.parametrize(
+    ("name", "rod", "size"), [("connecting_rod", ConnectingRod(), 5.5), ("slender_rod", SLENDER_ROD, 7.0)]
+)
+def test_shipped_rods_are_those_of_their_dimensions(gmsh, tmp_path, name, rod, size):
+    part = mesh_connecting_rod(rod, size=size, path=tmp_path / "rod.msh")  # another gmsh may mesh it a little otherwise
+    points, tetra, groups = read(shipped_mesh(name))
     assert_allclose(volume(points, tetra), part.volume, rtol=2e-4, atol=0)
     own_points, _, own_groups = read(part.path)
     for bound in (np.min, np.max):
@@ -251,5 +257,5 @@ def test_a_missing_mesher_is_told_with_the_way_to_get_it(error, words, monkeypat
 
 
 def test_an_unknown_shipped_mesh_is_refused_with_the_choices():
-    with pytest.raises(PartError, match="choices: connecting_rod"):
+    with pytest.raises(PartError, match="choices: connecting_rod, slender_rod"):
         shipped_mesh("conrod")
