@@ -1,0 +1,36 @@
+"""Where everything is required, a test that skips has failed; only tests of other programs may skip, visibly.
+
+FLOATFRAME_REQUIRE_ALL=1 (set by .ci/run) says that everything is required.
+"""
+
+import os
+
+import pytest
+
+REQUIRES_ALL = os.environ.get("FLOATFRAME_REQUIRE_ALL") == "1"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    report = yield
+    if (
+        REQUIRES_ALL
+        and report.skipped
+        and not hasattr(report, "wasxfail")
+        and item.get_closest_marker("external") is None
+    ):
+        fail(report)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector):
+    report = yield
+    if REQUIRES_ALL and report.skipped and "external" not in collector.path.parts:
+        fail(report)
+    return report
+
+
+def fail(report):
+    reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+    report.outcome, report.longrepr = "failed", f"{reason}: nothing may skip here (FLOATFRAME_REQUIRE_ALL=1)"

@@ -1,0 +1,63 @@
+"""The groups of tests: every test is in one, nothing skips where everything is required, and budgets are told."""
+
+import os
+import re
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+from tests.__main__ import GROUPS, Group, main, run
+from tests.root import ROOT
+
+
+def test_every_marker_of_the_project_is_a_group():
+    import tomllib
+
+    markers = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]["markers"]
+    assert {marker.split(":")[0] for marker in markers} == set(GROUPS) - {"ci"}
+
+
+def test_an_unknown_group_is_refused_with_the_choices(capsys):
+    assert main(["--slow"]) == 2
+    assert "expected one of --ci, --long, --external, --campaign" in capsys.readouterr().out
+
+
+def test_the_first_check_that_fails_ends_a_group_with_its_exit_code(capfd, monkeypatch):
+    monkeypatch.setitem(sys.modules, "tests.nothing", None)
+    assert run(Group((("bad", "no_such_module"), ("next", "this")), 1.0)) != 0
+    printed = capfd.readouterr().out
+    assert "== bad failed with exit code" in printed
+    assert "== next" not in printed
+
+
+FILES = {
+    "plain": """
+        import pytest
+        def test_it(): pytest.skip("no such thing here")
+    """,
+    "module": """
+        import pytest
+        pytest.importorskip("no_such_library")
+        def test_it(): pass
+    """,
+    "external": """
+        import pytest
+        @pytest.mark.external
+        def test_it(): pytest.skip("no such program here")
+    """,
+}
+
+
+@pytest.mark.parametrize(("name", "counts"), [("plain", "1 failed"), ("module", "1 error"), ("external", "1 skipped")])
+def test_nothing_skips_where_everything_is_required(tmp_path, name, counts):
+    (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    external: other programs\n")
+    (tmp_path / f"test_{name}.py").write_text(textwrap.dedent(FILES[name]))
+    for required, expected in (("1", counts), ("0", "1 skipped")):
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "."], cwd=tmp_path, capture_output=True,
+            text=True, env=os.environ | {"FLOATFRAME_REQUIRE_ALL": required}, check=False,
+        )  # fmt: skip
+        assert re.search(expected, done.stdout.splitlines()[-1]), done.stdout
