@@ -115,3 +115,4 @@ from .state import State as State
 from .studies.study import run_study as run_study
 from .studies.study_file import read_study as read_study
 from .system import System as System
+from .system_file.read_system import read_system as read_system

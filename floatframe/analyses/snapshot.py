@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.kernels.model import Memory, Rows, Work, new_work
 from floatframe.motion.integration import head_of, joint_rows
@@ -22,9 +23,32 @@ class Snapshot:
 
 
 def snapshot(
-    system: System, state: State, u_dot: Array | None = None, w: Array | None = None, *, t: float = 0.0
+    system: System,
+    state: State | Equilibrium,
+    u_dot: Array | None = None,
+    w: Array | None = None,
+    *,
+    t: float = 0.0,
 ) -> Trajectory:
-    """Return a state, with accelerations and wrenches (zero by default), as a trajectory of one time."""
+    """Return one state as a trajectory of one time, so that sensors, exports and pictures of motions serve for it.
+
+    Parameters
+    ----------
+    system
+        The system.
+    state
+        A state, or an equilibrium with its accelerations and wrenches.
+    u_dot
+        Accelerations, (n_u,), in the order of `State.u`; default: those of the equilibrium, zero for a state.
+    w
+        Wrenches of the connections on their markers A, ground axes, (n_w,); default likewise.
+    t
+        The time of all functions of time [s].
+    """
+    if isinstance(state, Equilibrium):
+        u_dot = state.u_dot if u_dot is None else u_dot
+        w = state.w if w is None else w
+        state = state.state
     model = compiled_system(system).model
     u_dot = np.zeros(int(model.u0[-1])) if u_dot is None else u_dot
     w = np.zeros(int(model.c_w0[-1])) if w is None else w

@@ -82,6 +82,12 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
                 for r in record["reactions"]
             ],
         )
+    if record["sensors"]:
+        print_table(
+            "Sensors",
+            ("", "unit", "value>"),
+            [(name, column["unit"], f"{column['value']:.6g}") for name, column in record["sensors"].items()],
+        )
     say(f"{'stable' if is_stable else 'unstable: the least push makes it leave'}; forces out of balance by "
         f"{record['residual']:.1e} of those at work, {record['n_iterations']} iterations")  # fmt: skip
 
@@ -277,10 +283,12 @@ def speed_range(text: str) -> Any:
 
 
 def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
-    """Return an equilibrium in plain types: places of the bodies, reactions in ground axes."""
+    """Return an equilibrium in plain types: places of the bodies, reactions in ground axes, what sensors measure."""
     import numpy as np
 
+    from floatframe.analyses.snapshot import snapshot
     from floatframe.compiling.system import compiled_system
+    from floatframe.results.sensors import measured
     from floatframe.rotations import rotation_log, rotation_matrix
 
     model, names = compiled_system(system).model, compiled_system(system).connection_names
@@ -307,6 +315,11 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
         "units": system.units.name,
         "bodies": bodies,
         "reactions": reactions,
+        "sensors": {
+            f"{found.sensor} {name}": {"unit": found.units[name], "value": float(values[0])}
+            for found in measured(system, snapshot(system, rest)).values()
+            for name, values in found.columns.items()
+        },
         "residual": rest.residual,
         "n_iterations": rest.n_iterations,
     }

@@ -149,7 +149,7 @@ def print_run(trajectory: "Trajectory") -> None:
     for event in summary.get("events", ()):
         done = ["run stopped"] * event["stop"] + [f"{name} on" for name in event["switch_on"]]
         done += [f"{name} off" for name in event["switch_off"]]
-        rows.append(("event", f"{event['name']} at {event['t']:.9g} {second}: {', '.join(done)}"))
+        rows.append(("event", f"{event['name']} at {event['t']:.9g} {second}: {', '.join(done) or 'recorded'}"))
     if "wall_time" in summary:
         rows.append(("wall time", f"{summary['wall_time']:.2f} s"))
     rows.append(("energy defect", f"{record['energy_defect']:.2e} of {record['energy_scale']:.6g} {energy}"))

@@ -3,8 +3,9 @@
 The kernels know this one form; whatever the user gives (a table, a formula, a callable) is brought into it here.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import factorial
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -18,6 +19,7 @@ __all__ = [
     "constant",
     "cycloidal_spin_up",
     "harmonic",
+    "piecewise",
     "polynomial_of_time",
     "sampled",
     "smooth_step",
@@ -47,13 +49,36 @@ class TimeFunction:
         object.__setattr__(self, "begins", frozen(begins))
         object.__setattr__(self, "pieces", frozen(pieces))
 
+    def jumps(self, order: int) -> tuple[Array, Array]:
+        """Return the times where the value (order 0), rate or second rate jumps, and by how much: each (n,).
+
+        A jump is above 1e-9 of the sizes of the numbers it lies between.
+        """
+        length = np.diff(self.begins)
+        before = np.array([at_piece(c, x, order) for c, x in zip(self.pieces[:-1], length, strict=True)])
+        after = np.array([at_piece(c, 0.0, order) for c in self.pieces[1:]])
+        sizes = [piece_size(c, x, order) for c, x in zip(self.pieces[:-1], length, strict=True)]
+        sizes = np.maximum(sizes, [piece_size(c, 0.0, order) for c in self.pieces[1:]])
+        is_jump = np.abs(after - before) > 1e-9 * sizes
+        return self.begins[1:][is_jump], (after - before)[is_jump]
+
     def __call__(self, t: float, order: int = 0) -> float:
         """Return the value at t, or its first or second derivative."""
         k = max(int(np.searchsorted(self.begins, t, side="right")) - 1, 0)
-        x, c = t - self.begins[k], self.pieces[k]
-        amplitude, omega, phase = c[6:]
-        smooth = polynomial.polyval(x, polynomial.polyder(c[:6], order) if order else c[:6])
-        return float(smooth + amplitude * omega**order * np.sin(omega * x + phase + order * np.pi / 2))
+        return at_piece(self.pieces[k], t - self.begins[k], order)
+
+
+def at_piece(c: Array, x: float, order: int = 0) -> float:
+    """Return the value of a piece, or its derivative, at a time x from its beginning."""
+    amplitude, omega, phase = c[6:]
+    smooth = polynomial.polyval(x, polynomial.polyder(c[:6], order) if order else c[:6])
+    return float(smooth + amplitude * omega**order * np.sin(omega * x + phase + order * np.pi / 2))
+
+
+def piece_size(c: Array, x: float, order: int) -> float:
+    """Return the sum of the sizes of the terms of `at_piece`, the scale of its rounding errors."""
+    terms = np.abs(polynomial.polyder(c[:6], order) if order else c[:6])
+    return float(polynomial.polyval(abs(x), terms) + abs(c[6]) * abs(c[7]) ** order * (1 + abs(c[7] * x)))
 
 
 def one_piece(coefficients: list[float], sine: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> TimeFunction:
@@ -110,6 +135,47 @@ def cycloidal_spin_up(omega: float, duration: float) -> TimeFunction:
     pieces[1] = [-s, 0, omega / (2 * T), 0, 0, 0, s, 2 * np.pi / T, np.pi / 2]
     pieces[2, :2] = [omega * T / 2, omega]
     return TimeFunction(np.array([-1.0, 0.0, T]), pieces)
+
+
+def piecewise(t: Sequence[float], pieces: Sequence[TimeFunction]) -> TimeFunction:
+    """Return a function made of others: piece k from t[k] on, as a function of the time since then.
+
+    The first piece holds before t[0] too, the last without end. Values may jump where pieces meet (forces); a
+    prescribed motion must not, and is refused where value or rate does.
+    """
+    begins = [number("piecewise: t", each) for each in t]
+    if not begins or len(begins) != len(pieces) or (np.diff(begins) <= 0).any():
+        raise ModelError(
+            f"piecewise: expected rising times and as many functions, got {len(begins)} times and {len(pieces)} "
+            "functions" + ("; the times do not rise" if (np.diff(begins) <= 0).any() else "")
+        )
+    times, rows = [], []
+    for k, (begin, function) in enumerate(zip(begins, pieces, strict=True)):
+        length = begins[k + 1] - begin if k + 1 < len(begins) else np.inf
+        if k == 0:
+            inside = function.begins < length
+            times += list(begin + function.begins[inside])
+            rows += list(function.pieces[inside])
+            if not inside.any():  # only its first piece, which holds before it begins
+                times.append(begin)
+                rows.append(moved_piece(function.pieces[0], -function.begins[0]))
+            continue
+        first = max(int(np.searchsorted(function.begins, 0.0, side="right")) - 1, 0)
+        times.append(begin)
+        rows.append(moved_piece(function.pieces[first], -function.begins[first]))
+        for later in range(first + 1, len(function.begins)):
+            if 0.0 < function.begins[later] < length:
+                times.append(begin + function.begins[later])
+                rows.append(function.pieces[later])
+    return TimeFunction(np.array(times), np.array(rows))
+
+
+def moved_piece(c: Array, x: float) -> Array:
+    """Return the coefficients of a piece about a time x after its beginning."""
+    row = np.array(c)
+    row[:6] = [at_piece(np.concatenate([c[:6], np.zeros(3)]), x, k) / factorial(k) for k in range(6)]
+    row[8] = c[8] + c[7] * x
+    return row
 
 
 def table(t: Array, values: Array) -> TimeFunction:

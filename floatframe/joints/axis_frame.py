@@ -61,4 +61,11 @@ def checked_motions(joint: Any) -> None:
                 f"{where}: {name}: expected a function of functions.time_functions or a number, got {motion!r}; a "
                 "Python function can be sampled with floatframe.functions.time_functions.sampled"
             )
+        for order, what in enumerate(("value", "rate")):
+            times, sizes = motions[name].jumps(order)
+            if len(times):
+                raise ModelError(
+                    f"{where}: {name}: the {what} jumps by {sizes[0]:.6g} at t = {times[0]:.6g}, which no body can "
+                    "follow; let its pieces meet"
+                )
     object.__setattr__(joint, "motions", motions)

@@ -12,7 +12,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator
 from floatframe.kernels.model import Rows, Work, new_work
-from floatframe.motion.events import events_of, off_at_start, require_events, with_forces_off
+from floatframe.motion.events import Event, events_of, off_at_start, require_events, with_forces_off
 from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import sensor_of
@@ -37,6 +37,7 @@ class EventWatch:
     values: Array = field(init=False)  #: of the events at the last time, angles without jumps, (n_events,)
     row: Rows | None = field(init=False, default=None)  #: results at the last time
     happened: list[dict[str, Any]] = field(default_factory=list)
+    recorded: list[Rows] = field(default_factory=list)  #: results at events since they were last taken
     has_stopped: bool = False
 
     def __post_init__(self) -> None:
@@ -63,6 +64,9 @@ class EventWatch:
         motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
         columns = []
         for event in events_of(self.full):
+            if event.at is not None:
+                columns.append(motion.t)
+                continue
             found = sensor_of(self.full, event.watch).measure(self.full, motion).columns
             name = event.column or next(iter(found))
             if name not in found:
@@ -90,26 +94,42 @@ class EventWatch:
             if failure is not None:
                 return begin, row, work, failure
             values = self.values_after(row)
-            passed = [
-                j
-                for j, event in enumerate(events_of(self.full))
-                if event.happens(float(self.values[j]), float(values[j]))
-            ]
-            if not passed:
+            events = events_of(self.full)
+            passed = [j for j, e in enumerate(events) if e.happens(float(self.values[j]), float(values[j]))]
+            trial = new_work(compiled_system(self.system).model) if passed else work  # leaves the factors of the run
+            found = sorted(
+                (self.locate(integrator, begin, work if events[j].is_active else trial, t, size, j, values[j]), j)
+                for j in passed
+            )
+            acting = next(((part, j) for part, j in found if events[j].is_active), None)
+            last = 1.0 if acting is None else acting[0]
+            noted = [(part, j) for part, j in found if not events[j].is_active and part <= last]
+            for part, j in noted:
+                failure = self.note(integrator, begin, trial, t, size, part, j)
+                if failure is not None:
+                    return begin, row, work, failure
+            if acting is None:
                 self.values, self.row = values, row
                 return carry, row, work, None
-            part, j = min((self.locate(integrator, begin, work, t, size, j, float(values[j])), j) for j in passed)
-            event = events_of(self.full)[j]
+            part, j = acting
+            event = events[j]
             if part < 1.0:
                 carry, row, _, failure = integrator.advance(
                     self.system, begin, work, t0=t, h=part * size, first=0, n_steps=1, every=1
                 )
                 if failure is not None:
                     return begin, row, work, failure
-            t = t + part * size
-            self.values, self.row = self.values_after(row), row
-            self.happened.append({"name": event.name, "t": t, "stop": event.stop, "switch_on": list(event.switch_on),
-                                  "switch_off": list(event.switch_off)})  # fmt: skip
+            t = t + part * size if event.at is None else event.at
+            row = row._replace(t=np.array([t]))
+            reached = self.values_after(row)
+            for i in (j, *(i for _, i in noted)):  # has passed its level, whatever rounding says
+                level = events[i].level_passed
+                if (reached[i] - level) * (self.values[i] - level) > 0.0:
+                    reached[i] = level
+            self.values, self.row = reached, row
+            self.add(event, t)
+            if event.record and not event.stop:
+                self.recorded.append(row)
             if event.stop:
                 self.has_stopped = True
                 return carry, row, work, None
@@ -132,11 +152,36 @@ class EventWatch:
         words = f"{MOST_IN_A_STEP} events happened in one step: {', '.join(e['name'] for e in self.happened[-3:])}, ..."
         return carry, row, work, Failure(words, np.inf)
 
+    def add(self, event: Event, t: float) -> None:
+        """Take an event into what has happened."""
+        self.happened.append({"name": event.name, "t": t, "stop": event.stop, "switch_on": list(event.switch_on),
+                              "switch_off": list(event.switch_off)})  # fmt: skip
+
+    def note(
+        self, integrator: Integrator, begin: Carry, trial: Work, t: float, size: float, part: float, j: int
+    ) -> Failure | None:
+        """Record the results at an event that does not change the motion, by a step to it that leads no further."""
+        event = events_of(self.full)[j]
+        _, row, _, failure = integrator.advance(
+            self.system, begin, trial, t0=t, h=part * size, first=0, n_steps=1, every=1
+        )
+        if failure is None:
+            self.add(event, t + part * size if event.at is None else event.at)
+            self.recorded.append(row if event.at is None else row._replace(t=np.array([event.at])))
+        return failure
+
+    def taken(self) -> list[Rows]:
+        """Return the results recorded at events since the last call."""
+        rows, self.recorded = self.recorded, []
+        return rows
+
     def locate(
         self, integrator: Integrator, begin: Carry, work: Work, t: float, size: float, j: int, last: float
     ) -> float:
         """Return the part of a step after which event j has just happened."""
         event = events_of(self.full)[j]
+        if event.at is not None:
+            return (event.at - t) / size
         sign = np.sign(last - event.level) or -np.sign(self.values[j] - event.level)
 
         def beyond(part: float) -> float:

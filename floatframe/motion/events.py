@@ -1,7 +1,9 @@
-"""Events: what a run does when a sensor or joint coordinate passes a level.
+"""Events: what a run does when a sensor or joint coordinate passes a level, or at a time.
 
 Event("caught", "hinge.angle", level=np.pi / 2, direction="rising", stop=True)
 Event("release", "drop", column="y", level=0.2, direction="falling", switch_off=("rope",))
+Event("brake", at=1.5, switch_on=("brake",))
+Event("crossing", "place", column="x", record=True)
 """
 
 from collections.abc import Sequence
@@ -18,7 +20,15 @@ from floatframe.functions.time_functions import constant
 from floatframe.results.sensors import sensor_of
 from floatframe.system import System
 
-__all__ = ["DIRECTIONS", "Event", "events_of", "off_at_start", "require_events", "with_forces_off"]
+__all__ = [
+    "DIRECTIONS",
+    "Event",
+    "events_of",
+    "off_at_start",
+    "require_events",
+    "require_times_of_events",
+    "with_forces_off",
+]
 
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
 
@@ -48,13 +58,15 @@ SILENT: dict[type, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Event:
-    """What happens when a measured value passes a level; the time is found to `tolerance` by steps of other sizes.
+    """What happens when a measured value passes a level, or at a time.
 
-    A force is off at the start if the first event that names it switches it on.
+    The time where a value passes its level is found to `tolerance` by steps of other sizes. A force is off at the
+    start if the first event that names it switches it on. An event that only records does not change the motion, bit
+    for bit.
     """
 
     name: str
-    watch: str  #: name of a sensor of the system, or "joint.coordinate"
+    watch: str = ""  #: name of a sensor of the system, or "joint.coordinate"; "": the event has a time
     level: float = 0.0  #: in the unit of what is watched
     direction: str = "both"  #: "rising", "falling" or "both"
     column: str = ""  #: of the sensor, such as "x" or "rate"; "": its first
@@ -62,6 +74,18 @@ class Event:
     switch_on: tuple[str, ...] = ()  #: names of forces
     switch_off: tuple[str, ...] = ()
     tolerance: float = 1e-9  #: of the time, in parts of the step
+    at: float | None = None  #: instead of `watch`: the time of the event, after the start of the run [s]
+    record: bool = False  #: keep the results at this time, besides those of the output times
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the motion is another one after it."""
+        return self.stop or bool(self.switch_on) or bool(self.switch_off)
+
+    @property
+    def level_passed(self) -> float:
+        """The level of what is watched, or the time."""
+        return self.level if self.at is None else self.at
 
     def __post_init__(self) -> None:
         where = f"event {self.name!r}"
@@ -74,11 +98,24 @@ class Event:
             raise ModelError(
                 f"{where}: direction: expected one of {', '.join(DIRECTIONS)}, got {self.direction!r}{hint}"
             )
-        if not (self.stop or self.switch_on or self.switch_off):
-            raise ModelError(f"{where}: expected stop, switch_on or switch_off, got an event without consequence")
+        if bool(self.watch) == (self.at is not None):
+            given = "both" if self.watch else "neither"
+            raise ModelError(
+                f"{where}: expected either watch (a sensor or joint coordinate) or at (a time), got {given}"
+            )
+        if self.at is not None:
+            object.__setattr__(self, "at", number(f"{where}: at", self.at))
+            if self.column or self.level != 0.0 or self.direction != "both":
+                raise ModelError(f"{where}: an event at a time has no column, level or direction; they belong to watch")
+        if not (self.is_active or self.record):
+            raise ModelError(
+                f"{where}: expected stop, switch_on, switch_off or record, got an event without consequence"
+            )
 
     def happens(self, before: float, after: float) -> bool:
-        """Whether the value passes the level from one value to the next."""
+        """Whether the value (for an event at a time: the time) passes the level from one value to the next."""
+        if self.at is not None:
+            return before < self.at <= after
         a, b = before - self.level, after - self.level
         rises, falls = a < 0 <= b, a > 0 >= b
         return {1: rises, -1: falls, 0: rises or falls}[DIRECTIONS[self.direction]]
@@ -89,10 +126,11 @@ def require_events(system: System) -> None:
     forces = {getattr(force, "name", ""): force for force in system.forces}
     for event in events_of(system):
         where = f"event {event.name!r}"
-        try:
-            sensor_of(system, event.watch)
-        except ModelError as error:
-            raise ModelError(f"{where}: watch: {error}") from error
+        if event.watch:
+            try:
+                sensor_of(system, event.watch)
+            except ModelError as error:
+                raise ModelError(f"{where}: watch: {error}") from error
         for name in (*event.switch_on, *event.switch_off):
             if name not in forces or not name:
                 choices = [key for key in forces if key]
@@ -104,6 +142,14 @@ def require_events(system: System) -> None:
 def events_of(system: System) -> tuple[Event, ...]:
     """Return the events that a system carries: it knows their names only."""
     return cast(tuple[Event, ...], system.events)
+
+
+def require_times_of_events(system: System, t_start: float) -> None:
+    """Raise `ModelError` if an event would happen before the run."""
+    for event in events_of(system):
+        if event.at is not None and event.at <= t_start:
+            words = f"expected a time after the start of the run, {t_start:g}, got {event.at:g}"
+            raise ModelError(f"event {event.name!r}: at: {words}")
 
 
 def off_at_start(events: Sequence[Event]) -> frozenset[str]:

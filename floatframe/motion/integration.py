@@ -22,11 +22,13 @@ from floatframe.integrators import CLASSES
 from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.model import Rows, new_work
 from floatframe.motion.event_steps import EventWatch
+from floatframe.motion.events import require_times_of_events
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.motion.step_advice import step_advice
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import MemorySource, validity_text
+from floatframe.results.sensors import measured
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.results.writer import ResultsPlace, ResultsWriter, arrays_of, last_restart
@@ -127,12 +129,14 @@ def integrate(
         log.warning("system %r: %s", system.name, advice.words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
     watch = EventWatch(system, head) if system.events else None
+    require_times_of_events(system, t_start)
     begun = system if watch is None else watch.system
     with ExitStack() as held:  # the place of the results, from before the work until its end
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=files_of(system)))
         carry = integrator.start(begun, t_start, state)
         work = new_work(compiled_system(begun).model)
         carry, rows = integrator.observe(begun, t_start, carry, work)
+        require_sensors(system, head, rows)
         if watch is not None:
             watch.begin(rows)
         writer = None if place is None else ResultsWriter(place, head)
@@ -158,6 +162,12 @@ def files_of(system: System) -> list[str]:
     """Return the files that a system was read from."""
     sources = [body.source for body in system.bodies if isinstance(body, FlexibleBody)]
     return [source for source in (system.source, *sources) if source]
+
+
+def require_sensors(system: System, head: Head, rows: Rows) -> None:
+    """Raise `ModelError` or `ResultsError` before the run if a sensor of the system cannot measure its start."""
+    if system.sensors:
+        measured(system, Trajectory(head, MemorySource(joint_rows(system, [rows])), is_complete=False))
 
 
 def resume(
@@ -297,6 +307,8 @@ class Run:
                     )
                     n_good = int(failure is None)
                     has_stopped = self.events.has_stopped
+                    for recorded in self.events.taken():
+                        self.keep(recorded)
                     if failure is None and (has_stopped or (n_done + 1) % self.output_every == 0):
                         self.keep(rows)
                 n_done += n_good

@@ -21,7 +21,7 @@ from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.system import Body
-from floatframe.system_file.keys import Count, Name, Parameters4, Positive
+from floatframe.system_file.keys import Count, Name, Numbers, Parameters4, Positive
 
 __all__ = ["BodySection", "body_of"]
 
@@ -30,7 +30,8 @@ log = logging.getLogger(__name__)
 RIGID_KEYS = ("inertia_axes", "inertia_about", "positive_products")
 
 
-FLEXIBLE_KEYS = ("modes", "without_modes", "is_rigid")
+MODE_KEYS = ("modes", "without_modes", "is_rigid")
+FLEXIBLE_KEYS = (*MODE_KEYS, "q", "q_dot")
 
 
 class MassSection(Table):
@@ -64,6 +65,8 @@ class BodySection(Table):
     euler_parameters: Parameters4 | None = Field(None, description="Euler parameters of length 1, [w, x, y, z]")
     velocity: Vector3 = Field((0.0, 0.0, 0.0), description="the velocity of the body (mesh) origin, [x, y, z]")
     omega_B: Vector3 = Field((0.0, 0.0, 0.0), description="the angular velocity in body (mesh) axes, [x, y, z]")  # noqa: N815
+    q: Numbers | None = Field(None, description="a list of numbers, the modal coordinates at the start, one a mode")
+    q_dot: Numbers | None = Field(None, description="a list of numbers, the rates of the modal coordinates")
     stiffening: bool | None = Field(None, description="true or false: whether geometric stiffness of the file counts")
 
     @field_validator("file", mode="before")
@@ -92,8 +95,8 @@ class BodySection(Table):
         for key in others:
             if getattr(self, key) is not None:
                 raise ValueError(f"{key}: a {'flexible' if self.file else 'rigid'} body has no such key; remove it")
-        if sum(getattr(self, key) is not None for key in FLEXIBLE_KEYS) > 1:
-            raise ValueError(f"expected one of {', '.join(FLEXIBLE_KEYS)}, got several")
+        if sum(getattr(self, key) is not None for key in MODE_KEYS) > 1:
+            raise ValueError(f"expected one of {', '.join(MODE_KEYS)}, got several")
         for part in self.masses:
             wrong = ("interface", "offset") if self.file is None else ("position",)
             for key in wrong:
@@ -132,8 +135,16 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
         if reduced.units != units:
             log.warning("%s is in units %s: converted to those of the system, %s", section.file, reduced.units.name,
                         units.name)  # fmt: skip
+    reduced = changed_body(section, files)
+    for key in ("q", "q_dot"):
+        values = getattr(section, key)
+        if values is not None and len(values) != reduced.n_q:
+            raise ModelError(
+                f"bodies.{name}.{key}: expected {reduced.n_q} numbers, one for each mode of the body, got {len(values)}"
+            )
+        motion[key] = np.array(values or ())
     motion["stiffening"] = "auto" if section.stiffening is None else section.stiffening
-    return FlexibleBody(name, changed_body(section, files), source=str(section.file.resolve()), **motion)
+    return FlexibleBody(name, reduced, source=str(section.file.resolve()), **motion)
 
 
 def rigid_mass(section: BodySection) -> MassProperties:
@@ -158,7 +169,7 @@ def rigid_mass(section: BodySection) -> MassProperties:
 
 def changed_body(section: BodySection, files: dict[Any, ReducedBody]) -> ReducedBody:
     """Return the reduced body with the modes and parts asked for; instances with the same ones share it."""
-    chosen = [getattr(section, name) for name in FLEXIBLE_KEYS]
+    chosen = [getattr(section, name) for name in MODE_KEYS]
     key = (section.file, repr(chosen), repr(section.masses))
     if key not in files:
         body = files[section.file]

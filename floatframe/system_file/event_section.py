@@ -11,9 +11,10 @@ __all__ = ["EventSection"]
 
 
 class EventSection(Table):
-    """[events.NAME]: what a run does when a measured value passes a level."""
+    """[events.NAME]: what a run does when a measured value passes a level, or at a time."""
 
-    watch: str = Field(description='the name of a sensor, or "joint.coordinate"')
+    watch: str = Field("", description='the name of a sensor, or "joint.coordinate"')
+    at: float | None = Field(None, description="instead of watch, a number, the time of the event")
     column: str = Field("", description="a column of the sensor; default: its first")
     level: float = Field(0.0, description="a number, the value that is passed")
     direction: choice("direction", lambda: tuple(DIRECTIONS)) = Field(  # type: ignore[valid-type]
@@ -22,13 +23,11 @@ class EventSection(Table):
     stop: bool = Field(False, description="true: the run ends there")
     switch_on: list[str] = Field([], description="names of forces")
     switch_off: list[str] = Field([], description="names of forces")
+    record: bool = Field(False, description="true: the results at this time are kept")
     tolerance: Annotated[float, Field(gt=0)] = Field(
         1e-9, description="a number above 0, of the time in parts of the step"
     )
 
     def event(self, name: str) -> Event:
         """Return the event of that name."""
-        return Event(
-            name, self.watch, self.level, self.direction, self.column, self.stop, tuple(self.switch_on),
-            tuple(self.switch_off), self.tolerance,
-        )  # fmt: skip
+        return Event(name, **{key: getattr(self, key) for key in type(self).model_fields})

@@ -7,7 +7,17 @@ from pydantic import BeforeValidator, Field, StringConstraints
 
 from fe_models.foundation.toml_file import numbers
 
-__all__ = ["Count", "Name", "NotNegative", "NotNegativeOrSix", "NumberOrSix", "Parameters4", "Positive"]
+__all__ = [
+    "Count",
+    "Name",
+    "NotNegative",
+    "NotNegativeOrSix",
+    "Number",
+    "NumberOrSix",
+    "Numbers",
+    "Parameters4",
+    "Positive",
+]
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 
@@ -57,3 +67,14 @@ NotNegativeOrSix = Annotated[float | list, BeforeValidator(not_negative_or_six)]
 
 
 Parameters4 = Annotated[tuple[float, float, float, float], BeforeValidator(four_numbers)]
+
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def list_of_numbers(value: Any) -> Any:
+    """Return a list of the file as a tuple, which then is checked."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+Numbers = Annotated[tuple[Number, ...], BeforeValidator(list_of_numbers)]

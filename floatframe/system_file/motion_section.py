@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 from inspect import signature
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from fe_models.foundation.toml_file import Table, choice
 from fe_models.foundation.words import nearest
@@ -14,10 +14,12 @@ from floatframe.functions.time_functions import (
     constant,
     cycloidal_spin_up,
     harmonic,
+    piecewise,
     polynomial_of_time,
     smooth_step,
     table,
 )
+from floatframe.system_file.keys import Number, Numbers
 
 __all__ = ["TIME_FUNCTIONS", "MotionSection"]
 
@@ -28,18 +30,8 @@ TIME_FUNCTIONS: dict[str, Callable[..., TimeFunction]] = {
     "smooth-step": smooth_step,
     "cycloidal-spin-up": cycloidal_spin_up,
     "table": table,
+    "piecewise": piecewise,
 }
-
-Number = Annotated[float, Field(allow_inf_nan=False)]
-
-
-def list_of_numbers(value: Any) -> Any:
-    """Return a list of the file as a tuple, which then is checked."""
-    return tuple(value) if isinstance(value, list) else value
-
-
-Numbers = Annotated[tuple[Number, ...], BeforeValidator(list_of_numbers)]
-
 
 class MotionSection(Table):
     """A function of time by its type; the other keys are the parameters of that type."""
@@ -58,8 +50,11 @@ class MotionSection(Table):
     first: Number | None = Field(None, description="a number, the value before the step")
     last: Number | None = Field(None, description="a number, the value after the step")
     duration: Number | None = Field(None, description="a number above 0, the duration of the spin-up")
-    t: Numbers | None = Field(None, description="a list of rising times")
+    t: Numbers | None = Field(None, description="a list of rising times; piecewise: where each piece begins")
     values: Numbers | None = Field(None, description="a list of values, one for each time")
+    pieces: list["MotionSection"] | None = Field(
+        None, description="a list of tables, a function of the time since its beginning for each time of t"
+    )
 
     @model_validator(mode="after")
     def _fits_the_type(self) -> "MotionSection":
@@ -79,5 +74,7 @@ class MotionSection(Table):
     def function(self) -> TimeFunction:
         """Return the function of the table."""
         make = TIME_FUNCTIONS[self.type]
-        given = {key: getattr(self, key) for key in signature(make).parameters}
+        given: dict[str, Any] = {key: getattr(self, key) for key in signature(make).parameters}
+        if self.pieces is not None:
+            given["pieces"] = [piece.function() for piece in self.pieces]
         return make(**{key: value for key, value in given.items() if value is not None})

@@ -10,6 +10,7 @@ from floatframe.functions.time_functions import (
     constant,
     cycloidal_spin_up,
     harmonic,
+    piecewise,
     polynomial_of_time,
     sampled,
     smooth_step,
@@ -87,3 +88,38 @@ def test_kernels_know_the_same_function(name):
 def test_impossible_functions_are_refused(make, words):
     with pytest.raises(ModelError, match=words):
         make()
+
+
+PARTS = [FUNCTIONS[name] for name in ("harmonic", "smooth step", "polynomial", "cycloid", "table")]
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_a_piecewise_function_is_each_of_its_parts_in_the_time_since_it_began(order):
+    begins = [0.5, 1.2, 1.6, 2.3, 4.0]
+    whole = piecewise(begins, PARTS)
+    for t in np.random.default_rng(2).uniform(-1, 6, 200):
+        k = max(int(np.searchsorted(begins, t, side="right")) - 1, 0)
+        assert_allclose(whole(t, order), PARTS[k](t - begins[k], order), rtol=0, atol=1e-11)
+
+
+def test_jumps_are_found_where_they_are():
+    ramp = piecewise([0.0, 1.0, 3.0], [polynomial_of_time([0.0, 2.0]), constant(2.0), constant(5.0)])
+    assert [list(x) for x in ramp.jumps(0)] == [[3.0], [3.0]]
+    assert [list(x) for x in ramp.jumps(1)] == [[1.0], [-2.0]]
+    for function in FUNCTIONS.values():
+        assert not len(function.jumps(0)[0])
+        assert not len(function.jumps(1)[0])
+
+
+@pytest.mark.parametrize(("t", "n"), [([0.0, 1.0], 1), ([], 0), ([1.0, 1.0], 2), ([0.0, np.inf], 2)])
+def test_pieces_without_their_times_are_refused(t, n):
+    with pytest.raises(ModelError, match="piecewise: "):
+        piecewise(t, [constant(1.0)] * n)
+
+
+def test_a_motion_that_jumps_is_refused():
+    jump = piecewise([0.0, 1.0], [constant(0.0), constant(0.1)])
+    kink = piecewise([0.0, 1.0], [constant(0.0), polynomial_of_time([0.0, 2.0])])
+    for motion, words in ((jump, "the value jumps by 0.1 at t = 1"), (kink, "the rate jumps by 2 at t = 1")):
+        with pytest.raises(ModelError, match=f"joint 'guide': motions: distance: {words}"):
+            PrismaticJoint("guide", GROUND, Marker("block"), axis=(1, 0, 0), motions={"distance": motion})

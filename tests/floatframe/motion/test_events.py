@@ -170,3 +170,91 @@ def test_a_run_with_events_that_do_not_happen_is_the_one_without():
 def test_mistakes_in_events_are_answered(event, words):
     with pytest.raises(ModelError, match=words):
         integrate(falling(event()), trapezoidal(), 0.2, 0.1)
+
+
+def test_an_event_at_a_time_switches_there_exactly():
+    """A push of 6 N on 2 kg from t = 0.333 on: x = 3/2 (t - 0.333)², which both schemes follow exactly."""
+    push = PointForce("push", Marker("block"), (6.0, 0, 0))
+    body = RigidBody("block", 2.0, np.eye(3))
+    events = [Event("go", at=0.333, switch_on=("push",)), Event("end", at=0.777, stop=True)]
+    motion = integrate(System([body], (), [push], events=events), trapezoidal(), 1.0, 0.1)
+    assert [(e["name"], e["t"]) for e in motion.head.summary["events"]] == [("go", 0.333), ("end", 0.777)]
+    assert motion.t[-1] == 0.777
+    expected = 1.5 * np.maximum(motion.t - 0.333, 0.0) ** 2
+    assert_allclose(motion.body("block").r[:, 0], expected, rtol=0, atol=1e-12)
+
+
+def test_an_event_that_records_keeps_the_results_there_and_leaves_the_motion_as_it_is():
+    """Height -g t²/2 = -0.3 and t = 0.25, between the outputs; all other results are those without it, bit for bit."""
+    events = (Event("height", "guide.distance", level=-0.3, record=True), Event("time", at=0.25, record=True))
+    plain = integrate(falling(), GeneralizedAlpha(), 0.5, 0.02, output_every=5)
+    motion = integrate(falling(*events), GeneralizedAlpha(), 0.5, 0.02, output_every=5)
+    t = np.sqrt(2 * 0.3 / G)
+    assert_allclose([e["t"] for e in motion.head.summary["events"]], [t, 0.25], rtol=0, atol=1e-6)
+    is_extra = ~np.isin(motion.t, plain.t)
+    assert_allclose(motion.t[is_extra], [t, 0.25], rtol=0, atol=1e-6)
+    assert motion.t[is_extra][1] == 0.25
+    assert_allclose(motion.body("block").r[is_extra, 2], [-0.3, -0.5 * G * 0.25**2], rtol=0, atol=1e-6)
+    assert np.all(np.diff(motion.t) > 0)
+    for name in ("t", "position", "u", "w"):
+        assert_array_equal(motion.source.read(name)[~is_extra], plain.source.read(name))
+
+
+def test_a_record_and_a_stop_at_one_level_happen_once_each():
+    watch, level = "guide.distance", -0.7
+    events = Event("note", watch, level=level, record=True), Event("halt", watch, level=level, stop=True)
+    motion = integrate(falling(*events), trapezoidal(), 1.0, 0.1)
+    assert [e["name"] for e in motion.head.summary["events"]] == ["note", "halt"]
+
+
+def test_an_event_goes_on_after_a_resumption(tmp_path, monkeypatch):
+    """Killed between two events at times: the rest of the run is the one that was never interrupted."""
+    push = PointForce("push", Marker("block"), (6.0, 0, 0))
+    events = [Event("go", at=0.15, switch_on=("push",)), Event("mark", at=0.35, record=True)]
+    system = System([RigidBody("block", 2.0, np.eye(3))], (), [push], events=events)
+    whole = integrate(system, trapezoidal(), 0.5, 1e-3)
+    monkeypatch.setattr(integration, "SEGMENT_SECONDS", 0.0)
+
+    class KilledError(Exception):
+        pass
+
+    def kill(progress):
+        if progress.n_steps >= 250:
+            raise KilledError
+
+    path = tmp_path / "out.h5"
+    with pytest.raises(KilledError):
+        integrate(system, trapezoidal(), 0.5, 1e-3, output=path, progress=kill)
+    again = resume(system, path)
+    assert_array_equal(again.t, whole.t)
+    assert_array_equal(again.source.read("position"), whole.source.read("position"))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"stop": True}, "expected either watch .* or at .*, got neither"),
+        ({"watch": "guide.distance", "at": 1.0, "stop": True}, "got both"),
+        ({"at": 1.0}, "expected stop, switch_on, switch_off or record"),
+        ({"at": 1.0, "level": 2.0, "stop": True}, "no column, level or direction"),
+        ({"at": float("nan"), "stop": True}, "event 'e': at"),
+    ],
+)
+def test_events_that_make_no_sense_are_refused(options, words):
+    with pytest.raises(ModelError, match=words):
+        Event("e", **options)
+
+
+def test_an_event_before_the_start_is_refused():
+    with pytest.raises(ModelError, match="event 'e': at: expected a time after the start of the run"):
+        integrate(falling(Event("e", at=0.5, stop=True)), trapezoidal(), 1.0, 0.1, t_start=0.5)
+
+
+def test_sensors_are_checked_before_the_run():
+    """A wrong one ends nothing after hours of computing: not one step is taken."""
+    system = falling()
+    wrong = System(system.bodies, system.joints, system.forces, sensors=[PlaceSensor("s", Marker("block", "tip"))])
+    done = []
+    with pytest.raises(ModelError, match="sensor 's': marker: body 'block' is not flexible"):
+        integrate(wrong, trapezoidal(), 1.0, 0.1, progress=done.append)
+    assert not done
