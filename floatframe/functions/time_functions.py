@@ -58,8 +58,8 @@ class TimeFunction:
         before = np.array([at_piece(c, x, order) for c, x in zip(self.pieces[:-1], length, strict=True)])
         after = np.array([at_piece(c, 0.0, order) for c in self.pieces[1:]])
         sizes = [piece_size(c, x, order) for c, x in zip(self.pieces[:-1], length, strict=True)]
-        sizes = np.maximum(sizes, [piece_size(c, 0.0, order) for c in self.pieces[1:]])
-        is_jump = np.abs(after - before) > 1e-9 * sizes
+        scale = np.maximum(sizes, [piece_size(c, 0.0, order) for c in self.pieces[1:]])
+        is_jump = np.abs(after - before) > 1e-9 * scale
         return self.begins[1:][is_jump], (after - before)[is_jump]
 
     def __call__(self, t: float, order: int = 0) -> float:

@@ -29,6 +29,7 @@ from floatframe.analyses import (
     campbell,
     linearize,
     root_locus,
+    snapshot,
     static_equilibrium,
     steady_rotation,
     sweep,
@@ -446,3 +447,13 @@ def test_sweep_keeps_the_order_in_this_process_and_in_others():
     assert sweep(lambda x: x + 1, [3, 1, 2], processes=1, progress=lambda *k: seen.append(k)) == [4, 2, 3]
     assert seen == [(1, 3), (2, 3), (3, 3)]
     assert sweep(square, range(5), processes=2) == [0, 1, 4, 9, 16]
+
+
+def test_a_snapshot_of_an_equilibrium_measures_what_holds_it():
+    """The hinge carries the weight; with a state alone nothing is known of what holds it."""
+    system = pendulum()
+    rest = static_equilibrium(system)
+    still = snapshot(system, rest)
+    assert_allclose(still.reaction(system.joints[0].name).force[0], rest.w[:3], rtol=0, atol=0)
+    assert_allclose(still.body("rod").r[0], rest.state.r[0], rtol=0, atol=0)
+    assert_allclose(snapshot(system, rest.state).reaction(system.joints[0].name).force, 0, rtol=0, atol=0)

@@ -54,6 +54,34 @@ def test_static_tells_where_the_rod_hangs_and_what_holds_it(pendulum):
     assert "stable" in invoke("static", pendulum)
 
 
+def test_static_prints_the_sensors_at_the_equilibrium(pendulum):
+    """The rod hangs: its end, at twice the centre of mass, is 1 below the hinge; the angle is -90 degrees."""
+    text = PENDULUM + """
+[sensors.end]
+type = "position"
+body = "rod"
+marker = [1.0, 0, 0]
+
+[sensors.angle]
+type = "coordinate"
+joint = "hinge"
+coordinate = "angle"
+
+[sensors.held]
+type = "reaction"
+of = "hinge"
+"""
+    pendulum.write_text(text)
+    sensors = json.loads(invoke("static", pendulum, "--json"))["sensors"]
+    assert_allclose([sensors[f"end {c}"]["value"] for c in "xyz"], [0, -1, 0], rtol=0, atol=1e-8)
+    assert_allclose(abs(sensors["angle value"]["value"]), np.pi / 2, rtol=0, atol=1e-8)
+    assert_allclose(sensors["held force y"]["value"], -2 * 9.81, rtol=0, atol=1e-7)
+    assert sensors["end y"]["unit"] == "m"
+    said = invoke("static", pendulum)
+    assert "Sensors" in said
+    assert "held force y" in said
+
+
 def test_eig_tells_the_frequency_of_the_textbook(pendulum):
     record = json.loads(invoke("eig", pendulum, "--json"))
     assert_allclose(record["modes"][0]["frequency_hz"], np.sqrt(1.5 * 9.81) / (2 * np.pi), rtol=1e-8)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
+import floatframe
 from floatframe import (
     Event,
     FixedJoint,
@@ -228,6 +229,32 @@ def test_prescribed_motions_come_from_tables(tmp_path):
     assert_allclose(motion.body("nut").r[-1, 2], 0.2 * angle / (2 * np.pi), rtol=0, atol=1e-9)
 
 
+def test_pieces_come_from_tables(tmp_path):
+    path = tmp_path / "screw.toml"
+    pieces = """type = "piecewise"
+t = [0.0, 0.5, 2.0]
+pieces = [
+    { type = "constant", value = 0.5 },
+    { type = "polynomial", coefficients = [0.5, 0.0, 4.0] },
+    { type = "polynomial", coefficients = [9.5, 12.0] },
+]
+"""
+    old = DRIVEN[DRIVEN.index('type = "cycloidal') : DRIVEN.index("[joints.rod]")]
+    path.write_text(DRIVEN.replace(old, pieces + "\n"))
+    motion = read_system(path)[0].joints[0].motions["angle"]
+    assert_allclose([motion(t) for t in (-1.0, 0.4, 1.5, 3.0)], [0.5, 0.5, 4.5, 21.5], rtol=1e-14, atol=0)
+    for old, new, words in (
+        ("[0.5, 0.0, 4.0]", "[0.6, 0.0, 4.0]", "joint 'thread': motions: angle: the value jumps by 0.1 at t = 0.5"),
+        ("t = [0.0, 0.5, 2.0]", "t = [0.0, 0.5]", "piecewise: expected rising times and as many functions"),
+        ("t = [0.0, 0.5, 2.0]", "t = [0.0, 0.5, 0.2]", "the times do not rise"),
+        ("value = 0.5", "valeu = 0.5", "pieces.*valeu.*did you mean .value"),
+    ):
+        assert old in path.read_text()
+        (tmp_path / "wrong.toml").write_text(path.read_text().replace(old, new))
+        with pytest.raises(SystemFileError, match=words):
+            read_system(tmp_path / "wrong.toml")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -328,3 +355,31 @@ def test_file_holds_events(write):
                             ("falling", "fallling", "events.low.direction")):  # fmt: skip
         with pytest.raises(SystemFileError, match=words):
             read_system(write(("[run]", text.replace(old, new))))
+
+
+def test_file_holds_events_at_times_and_events_that_record(write):
+    text = '[events.go]\nat = 0.25\nswitch_on = ["spring"]\n[events.low]\nwatch = "pin.angle"\nrecord = true\n\n[run]'
+    system, _ = read_system(write(("[run]", text)))
+    assert system.events == (Event("go", at=0.25, switch_on=("spring",)), Event("low", "pin.angle", record=True))
+    with pytest.raises(SystemFileError, match=r"event 'go': expected either watch .* got both"):
+        read_system(write(("[run]", text.replace("at = 0.25", 'at = 0.25\nwatch = "pin.angle"'))))
+
+
+def test_modal_coordinates_at_the_start_stand_in_the_file(write):
+    """And the motion begins with them: a joint takes the body as a whole."""
+    where = 'file = "rod.h5"'
+    system, _ = read_system(write((where, f"{where}\nq = [0.01, -0.02, 0.005]\nq_dot = [0.1, 0, 0]")))
+    rod = system.bodies[0]
+    assert_array_equal(rod.q, [0.01, -0.02, 0.005])
+    assert_array_equal(rod.q_dot, [0.1, 0, 0])
+    for keys, words in (("q = [0.01]", r"bodies\.rod\.q: expected 3 numbers, one for each mode of the body, got 1"),
+                        ('q = ["a", 0, 0]', r"bodies\.rod\.q"),
+                        ("modes = [0, 2]\nq_dot = [0, 0, 1]", r"bodies\.rod\.q_dot: expected 2 numbers")):  # fmt: skip
+        with pytest.raises(SystemFileError, match=words):
+            read_system(write((where, f"{where}\n{keys}")))
+    with pytest.raises(SystemFileError, match="q: a rigid body has no such key"):
+        read_system(write(("mass = 2.0", "mass = 2.0\nq = [0.0]")))
+
+
+def test_read_system_is_public():
+    assert floatframe.read_system is read_system
