@@ -16,7 +16,7 @@ from floatframe.checked_values import array_of_shape, unit_vector
 from floatframe.compiling.markers import find_marker
 from floatframe.compiling.system import CompiledSystem
 from floatframe.errors import ModelError
-from floatframe.kernels.model import Work
+from floatframe.kernels.work import Work
 from floatframe.results.sensors.stresses import flexible_body, modes_at
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
@@ -112,7 +112,7 @@ def channel_rows(system: System, compiled: CompiledSystem, work: Work, channels:
     ModelError
         With the nearest name, if a channel is at a place or joint that does not exist.
     """
-    rows = np.zeros((len(channels), int(compiled.model.u0[-1])))
+    rows = np.zeros((len(channels), int(compiled.model.bodies.u0[-1])))
     for row, channel in zip(rows, channels, strict=True):
         if isinstance(channel, Channel):
             for sign, marker in ((1.0, channel.marker), (-1.0, channel.relative_to)):
@@ -127,10 +127,10 @@ def channel_rows(system: System, compiled: CompiledSystem, work: Work, channels:
 
 def marker_row(system: System, compiled: CompiledSystem, work: Work, channel: Channel, marker: Marker) -> Array:
     """Return the row of one marker of a channel, (n_u,)."""
-    row = np.zeros(int(compiled.model.u0[-1]))
+    row = np.zeros(int(compiled.model.bodies.u0[-1]))
     data = find_marker(system, f"channel {channel.name!r}: marker", marker)
     if data.body >= 0:
-        u = slice(int(compiled.model.u0[data.body]), int(compiled.model.u0[data.body + 1]))
+        u = slice(int(compiled.model.bodies.u0[data.body]), int(compiled.model.bodies.u0[data.body + 1]))
         first = 0 if channel.quantity == "translation" else 3
         row[u] = channel.direction @ marker_jacobian(compiled, work, data)[first : first + 3]
     return row
@@ -138,7 +138,7 @@ def marker_row(system: System, compiled: CompiledSystem, work: Work, channel: Ch
 
 def coordinate_row(system: System, compiled: CompiledSystem, work: Work, channel: CoordinateChannel) -> Array:
     """Return the row of a joint coordinate, (n_u,)."""
-    state = State(work.r, np.array([euler_parameters(R) for R in work.R]), work.q, work.u)
+    state = State(work.state.r, np.array([euler_parameters(R) for R in work.state.R]), work.state.q, work.state.u)
     rows = coordinate_rows(system, compiled, work, state)
     name = f"{channel.joint}.{channel.coordinate}"
     if name not in rows:
@@ -149,10 +149,10 @@ def coordinate_row(system: System, compiled: CompiledSystem, work: Work, channel
 def stress_row(system: System, compiled: CompiledSystem, channel: StressChannel) -> Array:
     """Return the row of a stress component, (n_u,)."""
     body = flexible_body(system, f"channel {channel.name}", channel.body)
-    row = np.zeros(int(compiled.model.u0[-1]))
+    row = np.zeros(int(compiled.model.bodies.u0[-1]))
     i = compiled.body_names.index(channel.body)
     modes = modes_at(body, channel.name, channel.position, None)
-    row[int(compiled.model.u0[i]) + 6 : int(compiled.model.u0[i + 1])] = modes[
+    row[int(compiled.model.bodies.u0[i]) + 6 : int(compiled.model.bodies.u0[i + 1])] = modes[
         STRESS_COMPONENTS.index(channel.component)
     ]
     return row

@@ -9,7 +9,7 @@ from floatframe.analyses.joint_rates import coordinate_rows, driven_coordinates
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError
 from floatframe.joints.rows import is_held
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.start.freedoms import dependent_rows, unit_rows
 from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
@@ -29,10 +29,10 @@ def free_coordinates(system: System, state: State, *, t: float = 0.0) -> tuple[s
     """
     compiled = compiled_system(system)
     work = new_work(compiled.model)
-    work.time[0] = t
+    work.state.time[...] = t
     set_iterate(work, state)
     rigid = rigid_columns(compiled)
-    G = rigid_equations(compiled, work).G[is_held(compiled.model.row_kind)]
+    G = rigid_equations(compiled, work).G[is_held(compiled.model.rows.kind)]
     G = scaled_rows(compiled, G)
     _, values, right = la.svd(G) if len(G) else (0, np.zeros(0), np.eye(int(rigid.sum())))
     motions = right[int((values > FREE).sum()) :]
@@ -94,7 +94,7 @@ class SingularityGuard:
             return
         is_met = not is_square or values[-1] <= SINGULAR
         where = f"at t = {now.t:g}" if is_met else f"between t = {last_t:g} and {now.t:g}"
-        holds = np.flatnonzero(is_held(self.compiled.model.row_kind))[self.kept]
+        holds = np.flatnonzero(is_held(self.compiled.model.rows.kind))[self.kept]
         owner = [self.compiled.owners[k] for k in holds]
         share = left[:, -1] ** 2
         names = dict.fromkeys(owner)

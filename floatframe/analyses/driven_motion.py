@@ -25,7 +25,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem
 from floatframe.errors import ConvergenceError
 from floatframe.joints.rows import is_held, is_held_length
-from floatframe.kernels.model import Work
+from floatframe.kernels.work import Work
 from floatframe.start.constraint_words import open_joints
 from floatframe.start.initial import has_normal_friction
 from floatframe.start.newton_equations import displaced, in_ground_axes, linearized, set_iterate, solve
@@ -57,8 +57,8 @@ Elasticity = Callable[[CompiledSystem, Work, State, float], Instant]  #: (compil
 def rigid_columns(compiled: CompiledSystem) -> np.ndarray:
     """Return which unknowns are motions of body frames, (n_u,) bool; the others are modes."""
     model = compiled.model
-    rigid = np.zeros(int(model.u0[-1]), dtype=bool)
-    for u0 in model.u0[:-1]:
+    rigid = np.zeros(int(model.bodies.u0[-1]), dtype=bool)
+    for u0 in model.bodies.u0[:-1]:
         rigid[u0 : u0 + 6] = True
     return rigid
 
@@ -68,25 +68,25 @@ def frozen_bodies(compiled: CompiledSystem, work: Work, state: State, t: float) 
     from floatframe.kernels.entry import rates_of_constraints
 
     model, rigid = compiled.model, rigid_columns(compiled)
-    work.time[0] = t
+    work.state.time[...] = t
     state, equations, n = closed(compiled, work, state, rigid, t)
     # velocities: the rate at rest is that of the drives
     state = State(state.r, state.p, state.q, np.zeros_like(state.u))
     set_iterate(work, state)
     rate, _ = rates_of_constraints(model, work)
-    holds = is_held(model.row_kind)
+    holds = is_held(model.rows.kind)
     y, _ = equations.solved(np.zeros(int(rigid.sum())), np.where(holds, -rate, 0.0))
     u = np.zeros_like(state.u)
     u[rigid] = y
     state = State(state.r, state.p, state.q, in_ground_axes(model, state, u))
     # accelerations and wrenches; friction by the normal force is not linear in them
-    w = np.zeros(len(work.w))
+    w = np.zeros(len(work.state.w))
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, state, w=w)
         equations = rigid_equations(compiled, work)
-        residual = work.residual.copy()
+        residual = work.bodies.residual.copy()
         _, bias = rates_of_constraints(model, work)
-        y, change = equations.solved(-residual[rigid], np.where(holds, -bias, -work.g))
+        y, change = equations.solved(-residual[rigid], np.where(holds, -bias, -work.connections.g))
         w = w + change
         if not has_normal_friction(model) or np.abs(change).max() <= 1e-11 * np.abs(w).max():
             break
@@ -105,7 +105,7 @@ def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: f
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, now.state, now.u_dot, now.w)
         parts = linearized(model, work, 0.0, 0.0, 1.0)
-        y, _ = solve(parts.H, parts, -work.residual.copy(), -work.g.copy())
+        y, _ = solve(parts.H, parts, -work.bodies.residual.copy(), -work.connections.g.copy())
         moved = displaced(model, now.state, in_ground_axes(model, now.state, y))
         q = moved.q
         now = frozen_bodies(compiled, work, State(moved.r, moved.p, q, now.state.u), t)
@@ -147,26 +147,28 @@ def rigid_equations(compiled: CompiledSystem, work: Work) -> RigidEquations:
 
     model = compiled.model
     evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
-    n_w, n_u = len(work.w), 6 * len(model.kind)
+    n_w, n_u = len(work.state.w), 6 * len(model.bodies.kind)
     M, J, G, V = np.zeros((n_u, n_u)), np.zeros((n_w, n_u)), np.zeros((n_w, n_u)), np.zeros((n_w, n_w))
-    for i in range(len(model.kind)):
-        n = 6 + int(model.n_q[i])
-        M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = work.H[model.h0[i] : model.h0[i + 1]].reshape(n, n)[:6, :6]
-    for m in model.ends:
-        i, c, o = int(model.m_body[m]), int(model.m_connection[m]), int(model.m_x0[m])
-        n, size, w0 = 6 + int(model.n_q[i]), int(model.c_size[c]), int(model.c_w0[c])
-        R = work.R[i]
-        column = work.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)[:, :, :6]
-        row = work.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)[:, :, :6]
+    for i in range(len(model.bodies.kind)):
+        n = 6 + int(model.bodies.n_q[i])
+        M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape(
+            n, n
+        )[:6, :6]
+    for m in model.bodies.ends:
+        i, c, o = int(model.markers.body[m]), int(model.markers.connection[m]), int(model.markers.x0[m])
+        n, size, w0 = 6 + int(model.bodies.n_q[i]), int(model.connections.size[c]), int(model.connections.w0[c])
+        R = work.state.R[i]
+        column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(2, 3, n)[:, :, :6]
+        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(4, 3, n)[:, :, :6]
         u = slice(6 * i, 6 * i + 6)
-        carried = model.m_sign[m] * (R @ column)
-        for part, place in ((0, int(model.m_force[m])), (1, int(model.m_moment[m]))):
+        carried = model.markers.sign[m] * (R @ column)
+        for part, place in ((0, int(model.markers.force[m])), (1, int(model.markers.moment[m]))):
             if place >= 0:
                 J[w0 + place : w0 + place + 3, u] += carried[part]
-        G[w0 : w0 + size, u] += work.P[m, :size] @ (R @ row).reshape(12, 6)
-    for c, size in enumerate(model.c_size):
-        w = slice(int(model.c_w0[c]), int(model.c_w0[c]) + int(size))
-        V[w, w] = work.V[c, :size, :size]
+        G[w0 : w0 + size, u] += work.connections.P[m, :size] @ (R @ row).reshape(12, 6)
+    for c, size in enumerate(model.connections.size):
+        w = slice(int(model.connections.w0[c]), int(model.connections.w0[c]) + int(size))
+        V[w, w] = work.connections.V[c, :size, :size]
     return RigidEquations(M, J, G, V)
 
 
@@ -175,14 +177,14 @@ def closed(
 ) -> tuple[State, RigidEquations, int]:
     """(1): return the state with joints closed and drives followed, the equations at it, the iterations it took."""
     model = compiled.model
-    holds = is_held(model.row_kind)
-    scale = np.where(is_held_length(model.row_kind), compiled.length, 1.0)
-    error = np.zeros(len(work.w))
+    holds = is_held(model.rows.kind)
+    scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)
+    error = np.zeros(len(work.state.w))
     best = np.inf
     for n in range(MOST_ITERATIONS):
         set_iterate(work, state)
         equations = rigid_equations(compiled, work)
-        error = np.where(holds, work.g, 0.0)
+        error = np.where(holds, work.connections.g, 0.0)
         size = float(np.abs(error / scale).max(initial=0.0))
         if size <= CLOSED or (size <= ACCEPTED and size > 0.3 * best):
             return state, equations, n

@@ -20,7 +20,7 @@ from floatframe.checked_values import array_of_shape
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.joints.rows import is_held_velocity
-from floatframe.kernels.model import Work, new_work
+from floatframe.kernels.work import Work, new_work
 from floatframe.rotations import rotation_matrix
 from floatframe.start.initial import assembled, checked, require_independent_constraints
 from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
@@ -109,7 +109,7 @@ def steady_rotation(
     center = array_of_shape("steady_rotation: center", center, (3,))
     compiled = compiled_system(system)
     model = compiled.model
-    rolling = [name for name, rolls in zip(compiled.owners, is_held_velocity(model.row_kind), strict=True) if rolls]
+    rolling = [name for name, rolls in zip(compiled.owners, is_held_velocity(model.rows.kind), strict=True) if rolls]
     if rolling:
         raise ModelError(
             f"joint {rolling[0]!r} rolls without slip: equilibria and linearisations do not know held velocities; "
@@ -119,13 +119,13 @@ def steady_rotation(
     state = assembled(compiled, work, compiled.placed if state is None else checked(compiled, state))
     require_independent_constraints(compiled, work, state)
     holds = held_rows(model)
-    w, tau, last = np.zeros(len(work.w)), 0.0, np.inf
+    w, tau, last = np.zeros(len(work.state.w)), 0.0, np.inf
     for iteration in range(max_iterations + 1):
         state, u_dot = turning(compiled, state, omega, center)
         set_iterate(work, state, u_dot, w)
         parts, K = _tangent(compiled, work)
         W = with_modal_weight(model, linearized(model, work, 1.0, 0.0, 0.0).H)
-        forces, gaps = work.residual.copy(), work.g.copy()
+        forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
         size = _size(W, forces)
         scale_of_forces = _forces_at_work(compiled, work, parts, W)
         if not np.isfinite(size + scale_of_forces):  # a stiffened body beyond the second order
@@ -169,7 +169,7 @@ def steady_rotation(
 def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array) -> tuple[State, Array]:
     """Return the state with the velocities of a rotation of all bodies about an axis, and the accelerations, (n_u,)."""
     u, u_dot = np.zeros_like(state.u), np.zeros_like(state.u)
-    for i, u0 in enumerate(compiled.model.u0[:-1]):
+    for i, u0 in enumerate(compiled.model.bodies.u0[:-1]):
         v = np.cross(omega, state.r[i] - center)
         u[u0 : u0 + 3] = v
         u[u0 + 3 : u0 + 6] = rotation_matrix(state.p[i]).T @ omega
@@ -181,14 +181,14 @@ def _tangent(compiled: CompiledSystem, work: Work) -> tuple[Linearized, tuple[Ar
     """Return rows and wrenches, and of each body the derivative of the residual along the steady rotations."""
     model = compiled.model
     parts = linearized(model, work, 0.0, 0.0, 1.0)
-    if not work.u.any():
+    if not work.state.u.any():
         return parts, parts.H
     Omega, Omega_t = turning_matrices(model, work)
     by_both = linearized(model, work, 0.0, 1.0, 1.0)
     mass = linearized(model, work, 1.0, 0.0, 0.0).H
     K = []
     for i, k in enumerate(parts.H):
-        u = slice(int(model.u0[i]), int(model.u0[i + 1]))
+        u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
         K.append(k + (by_both.H[i] - k) @ Omega[u, u] + mass[i] @ Omega_t[u, u] @ Omega[u, u])
     G = parts.G + (by_both.G - parts.G) @ sp.csr_array(Omega)
     return Linearized(parts.H, parts.J, sp.csr_array(G), parts.V), tuple(K)
@@ -206,17 +206,17 @@ def _size(W: tuple[Array, ...], forces: Array) -> float:
 
 def _forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: tuple[Array, ...]) -> float:
     """Return the length of the forces of joints, springs and weight, in the norm of the residual."""
-    reactions = _size(W, parts.J.T @ work.w) if len(work.w) else 0.0
-    return max(reactions, _size(W, work.residual + (parts.J.T @ work.w if len(work.w) else 0.0)))
+    reactions = _size(W, parts.J.T @ work.state.w) if len(work.state.w) else 0.0
+    return max(reactions, _size(W, work.bodies.residual + (parts.J.T @ work.state.w if len(work.state.w) else 0.0)))
 
 
 def _rounding(compiled: CompiledSystem, parts: Linearized, state: State) -> Array:
     """Return what the rounding of positions alone leaves of the rows, (n_w,): much where a spring is stiff."""
     reach = np.ones(len(state.u))
-    for i, u0 in enumerate(compiled.model.u0[:-1]):
+    for i, u0 in enumerate(compiled.model.bodies.u0[:-1]):
         reach[u0 : u0 + 3] = compiled.length + np.abs(state.r[i]).max()
-        q = slice(int(compiled.model.q0[i]), int(compiled.model.q0[i + 1]))
-        reach[u0 + 6 : compiled.model.u0[i + 1]] = np.abs(state.q[q])
+        q = slice(int(compiled.model.bodies.q0[i]), int(compiled.model.bodies.q0[i + 1]))
+        reach[u0 + 6 : compiled.model.bodies.u0[i + 1]] = np.abs(state.q[q])
     return np.asarray(ROUNDING * (abs(parts.G) @ reach))
 
 
@@ -227,7 +227,7 @@ def _total_mass(W: tuple[Array, ...]) -> float:
 def _largest_motion(compiled: CompiledSystem, y: Array) -> float:
     """Return the largest translation, relative to the size of the system, or rotation of a body."""
     largest = 0.0
-    for u0 in compiled.model.u0[:-1]:
+    for u0 in compiled.model.bodies.u0[:-1]:
         largest = max(
             largest,
             float(np.linalg.norm(y[u0 : u0 + 3])) / compiled.length,
@@ -237,7 +237,7 @@ def _largest_motion(compiled: CompiledSystem, y: Array) -> float:
 
 
 def _worst_body(compiled: CompiledSystem, W: tuple[Array, ...], forces: Array) -> str:
-    u0 = compiled.model.u0
+    u0 = compiled.model.bodies.u0
     sizes = [_size((block,), forces[u0[i] : u0[i + 1]]) for i, block in enumerate(W)]
     return compiled.body_names[int(np.argmax(sizes))]
 
@@ -246,13 +246,13 @@ def _require_rotation(compiled: CompiledSystem, work: Work, omega: Array) -> Non
     """Raise `ModelError` naming the joint that the rotation would open."""
     from floatframe.kernels.entry import rates_of_constraints
 
-    if not omega.any() or not len(work.w):
+    if not omega.any() or not len(work.state.w):
         return
     rate, _ = rates_of_constraints(compiled.model, work)
     speed = float(np.linalg.norm(omega)) * max(compiled.length, 1.0)
     worst = int(np.argmax(np.abs(rate)))
     if abs(rate[worst]) > 1e-6 * speed:
-        joint = int(np.searchsorted(compiled.model.c_w0, worst, side="right")) - 1
+        joint = int(np.searchsorted(compiled.model.connections.w0, worst, side="right")) - 1
         raise ModelError(
             f"steady_rotation: joint {compiled.joint_names[joint]!r} does not allow a rotation with omega = "
             f"{omega.tolist()}; give the axis of the joint, and its place as center"

@@ -8,7 +8,7 @@ from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose,
 from floatframe.compiling.system import CompiledSystem
 from floatframe.joints import SlidingJoint
 from floatframe.joints.rows import RelativePlace
-from floatframe.kernels.model import Work
+from floatframe.kernels.work import Work
 from floatframe.rotations import tilde
 from floatframe.state import State
 from floatframe.system import System
@@ -44,10 +44,12 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
             continue
         (r_a, A_a), (r_b, A_b) = (marker_pose(end, state, n_q) for end in ends)
         place = RelativePlace(A_a, A_b, r_b - r_a)
-        J = np.zeros((2, 6, int(model.u0[-1])))  # of A and B: translation and rotation in ground axes
+        J = np.zeros((2, 6, int(model.bodies.u0[-1])))  # of A and B: translation and rotation in ground axes
         for k, end in enumerate(ends):
             if end.body >= 0:
-                J[k][:, int(model.u0[end.body]) : int(model.u0[end.body + 1])] = marker_jacobian(compiled, work, end)
+                J[k][:, int(model.bodies.u0[end.body]) : int(model.bodies.u0[end.body + 1])] = marker_jacobian(
+                    compiled, work, end
+                )
         slip = J[1, :3] - J[0, :3] + tilde(place.d) @ J[0, 3:]  # v_B - v_A - omega_A × d
         turning = J[1, 3:] - J[0, 3:]
         for own in coordinates:
@@ -57,16 +59,16 @@ def coordinate_rows(system: System, compiled: CompiledSystem, work: Work, state:
 
 def sliding_row(compiled: CompiledSystem, work: Work, k: int, marker_b: MarkerData) -> Array:
     """Return the row of the rate along deformed line k: n·(v_B - v_A)/|r'|, A fixed in the line, (n_u,)."""
-    model, line = compiled.model, work.line[k]
-    m = int(model.line_marker[k])
-    i = int(model.m_body[m])
-    n, first = int(model.n_q[i]), int(model.m_psi0[m])
-    n_0, slope = line[4:7], line[2]  # see kernels/connections/deformed_line.py
-    row = np.zeros(int(model.u0[-1]))
-    psi = work.psi[first : first + 3 * n].reshape(3, n)
-    of_a = work.R[i] @ np.hstack([np.eye(3), -tilde(work.rho[m]), psi])
-    row[int(model.u0[i]) : int(model.u0[i + 1])] -= n_0 @ of_a / slope
+    model = compiled.model
+    m = int(model.lines.marker[k])
+    i = int(model.markers.body[m])
+    n, first = int(model.bodies.n_q[i]), int(model.markers.psi0[m])
+    n_0, slope = work.lines.n_0[k], work.lines.slope[k]
+    row = np.zeros(int(model.bodies.u0[-1]))
+    psi = work.markers.psi[first : first + 3 * n].reshape(3, n)
+    of_a = work.state.R[i] @ np.hstack([np.eye(3), -tilde(work.markers.rho[m]), psi])
+    row[int(model.bodies.u0[i]) : int(model.bodies.u0[i + 1])] -= n_0 @ of_a / slope
     if marker_b.body >= 0:
         of_b = marker_jacobian(compiled, work, marker_b)[:3]
-        row[int(model.u0[marker_b.body]) : int(model.u0[marker_b.body + 1])] += n_0 @ of_b / slope
+        row[int(model.bodies.u0[marker_b.body]) : int(model.bodies.u0[marker_b.body + 1])] += n_0 @ of_b / slope
     return row

@@ -19,7 +19,8 @@ from floatframe.analyses.snapshot import observed_state
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.joints.rows import is_held_velocity
-from floatframe.kernels.model import Rows, Work, new_work
+from floatframe.kernels.memory import Rows
+from floatframe.kernels.work import Work, new_work
 from floatframe.motion.integration import files_of, head_of, joint_rows
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory, read_results
@@ -87,7 +88,7 @@ def kinematics(
     name = next((key for key, value in ELASTICITY.items() if value is elasticity), "user")
     compiled = compiled_system(system)
     work = new_work(compiled.model)
-    work.time[0] = t[0]
+    work.state.time[...] = t[0]
     state = compiled.placed if state is None else checked(compiled, state)
     now = first_instant(system, work, state, float(t[0]), elasticity)
     guard = SingularityGuard(compiled, now)
@@ -136,7 +137,7 @@ def kinematics(
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:
     """Return the motion at the first time; `ModelError` unless the drives decide all of it."""
     compiled = compiled_system(system)
-    rolling = np.flatnonzero(is_held_velocity(compiled.model.row_kind))
+    rolling = np.flatnonzero(is_held_velocity(compiled.model.rows.kind))
     if len(rolling):
         raise ModelError(
             f"kinematics: joint {compiled.owners[rolling[0]]!r} rolls: it holds velocities, and where that leads "
@@ -155,7 +156,7 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
             f"{'its motion' if len(free) == 1 else 'their motions'}, or integrate the motion instead"
         )
     counted = constraint_mobility(compiled, work, state)
-    if counted.n_redundant_rigid and not compiled.model.row_soft.any():
+    if counted.n_redundant_rigid and not compiled.model.rows.soft.any():
         told = (
             ", ".join(f"{count} of joint {name!r}" for name, count in counted.redundant.items()) or "with rigid bodies"
         )
@@ -176,7 +177,7 @@ def moved_on(
     while done < 1.0:
         rest = t - now.t
         x = rest * now.state.u + 0.5 * rest**2 * now.u_dot
-        turn = max(float(np.linalg.norm(x[u0 + 3 : u0 + 6])) for u0 in model.u0[:-1])
+        turn = max(float(np.linalg.norm(x[u0 + 3 : u0 + 6])) for u0 in model.bodies.u0[:-1])
         part = min(1.0, LARGEST_TURN / turn) if turn > 0 else 1.0
         h = rest * part
         after = t if part == 1.0 else now.t + h

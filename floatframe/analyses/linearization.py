@@ -22,7 +22,7 @@ from floatframe.analyses.system_matrices import tangents, turning_matrices
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.system import System
 
@@ -175,7 +175,7 @@ def linearize(
     set_iterate(work, about.state, about.u_dot, about.w)
     parts = tangents(model, work)
     Omega, Omega_t = turning_matrices(model, work)
-    N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.u0[:-1]])
+    N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.bodies.u0[:-1]])
     if N.shape[1] == 0:
         raise ModelError(f"system {system.name!r}: its joints and drives allow no motion; nothing can be linearised")
     return LinearSystem(

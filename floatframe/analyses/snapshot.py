@@ -7,7 +7,8 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.compiling.system import CompiledSystem, compiled_system
-from floatframe.kernels.model import Memory, Rows, Work, new_work
+from floatframe.kernels.memory import Rows, memory_at
+from floatframe.kernels.work import Work, new_work
 from floatframe.motion.integration import head_of, joint_rows
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
@@ -50,8 +51,8 @@ def snapshot(
         w = state.w if w is None else w
         state = state.state
     model = compiled_system(system).model
-    u_dot = np.zeros(int(model.u0[-1])) if u_dot is None else u_dot
-    w = np.zeros(int(model.c_w0[-1])) if w is None else w
+    u_dot = np.zeros(int(model.bodies.u0[-1])) if u_dot is None else u_dot
+    w = np.zeros(int(model.connections.w0[-1])) if w is None else w
     rows, _ = observed_state(compiled_system(system), new_work(model), state, u_dot, w, t)
     head = head_of(system, Snapshot(), t, t, 1.0, 1)  # type: ignore[arg-type]
     return Trajectory(head, MemorySource(joint_rows(system, [rows])), is_complete=True)
@@ -63,10 +64,7 @@ def observed_state(
     """Return the row of results of a state and the power of loads and dampers at it, (2,)."""
     from floatframe.kernels.entry import observe_state
 
-    work.time[0] = t
-    memory = Memory(
-        state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), np.array(u_dot), np.array(u_dot), np.array(w),
-        np.zeros(2), np.zeros(2), np.zeros(4),
-    )  # fmt: skip
+    work.state.time[...] = t
+    memory = memory_at(state, u_dot, w)
     rows = observe_state(compiled.model, work, memory, t)
-    return rows, memory.power.copy()
+    return rows, np.array([memory.power_given, memory.power_taken])

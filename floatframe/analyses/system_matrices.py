@@ -22,7 +22,8 @@ import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from floatframe.joints.rows import is_held
-from floatframe.kernels.model import Model, Work
+from floatframe.kernels.model import Model
+from floatframe.kernels.work import Work
 from floatframe.rotations import tilde
 from floatframe.start.newton_equations import linearized
 
@@ -41,7 +42,7 @@ class Tangents:
 
 def held_rows(model: Model) -> np.ndarray:
     """Return which rows hold a distance or an angle, (n_w,) bool; the others say what a wrench is."""
-    return is_held(model.row_kind)
+    return is_held(model.rows.kind)
 
 
 def tangents(model: Model, work: Work) -> Tangents:
@@ -64,10 +65,10 @@ def tangents(model: Model, work: Work) -> Tangents:
 
 def turning_matrices(model: Model, work: Work) -> tuple[Array, Array]:
     """Return Omega and Omega' for the angular velocities in `work`, each (n_u, n_u)."""
-    n_u = int(model.u0[-1])
+    n_u = int(model.bodies.u0[-1])
     Omega, Omega_t = np.zeros((n_u, n_u)), np.zeros((n_u, n_u))
-    for u0 in model.u0[:-1]:
-        omega = tilde(work.u[u0 + 3 : u0 + 6])
+    for u0 in model.bodies.u0[:-1]:
+        omega = tilde(work.state.u[u0 + 3 : u0 + 6])
         Omega[u0 : u0 + 3, u0 : u0 + 3] = omega
         Omega[u0 + 3 : u0 + 6, u0 + 3 : u0 + 6] = omega
         Omega_t[u0 : u0 + 3, u0 : u0 + 3] = omega

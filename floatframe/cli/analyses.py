@@ -294,7 +294,7 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
     model, names = compiled_system(system).model, compiled_system(system).connection_names
     bodies = []
     for i, name in enumerate(compiled_system(system).body_names):
-        q = rest.state.q[model.q0[i] : model.q0[i + 1]]
+        q = rest.state.q[model.bodies.q0[i] : model.bodies.q0[i + 1]]
         bodies.append(
             {
                 "name": name,
@@ -306,7 +306,7 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
         )
     reactions = []
     for c, name in enumerate(names):
-        w = rest.w[model.c_w0[c] : model.c_w0[c + 1]]
+        w = rest.w[model.connections.w0[c] : model.connections.w0[c + 1]]
         reactions.append(
             {"name": name, "force": w[:3].tolist(), "moment": (w[3:6] if len(w) >= 6 else np.zeros(3)).tolist()}
         )

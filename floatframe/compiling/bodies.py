@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -11,10 +10,11 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.compiling.stiffening import stiffened_shape_moments
-from floatframe.kernels.model import N_BLOCKS
+from floatframe.kernels.model import N_BLOCKS, BodyTypes
+from floatframe.kernels.records import filled, flat
 from floatframe.system import Body
 
-__all__ = ["body_n_q", "body_types", "integers", "offsets", "stacked", "type_arrays"]
+__all__ = ["body_n_q", "body_types", "integers", "offsets", "type_arrays"]
 
 
 def integers(values: list[int]) -> IntArray:
@@ -25,11 +25,6 @@ def integers(values: list[int]) -> IntArray:
 def offsets(sizes: IntArray) -> IntArray:
     """Return where each of consecutive parts begins, and the end, (n + 1,)."""
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-
-
-def stacked(arrays: list, shape: tuple[int, ...]) -> Array:
-    """Return arrays of one shape as one, (n, *shape), writeable so that the kernels see one type."""
-    return np.array(arrays, dtype=float).reshape(len(arrays), *shape)
 
 
 def body_n_q(body: Body) -> int:
@@ -56,8 +51,8 @@ def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], I
     return types, integers(kind)
 
 
-def type_arrays(types: list[RigidBody | ReducedBody]) -> dict[str, Any]:
-    """Return the constant arrays of the types of bodies."""
+def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
+    """Return what the types of bodies hold."""
     blocks: list[Array] = []
     block0 = np.zeros((len(types), N_BLOCKS), np.int64)
     is_diagonal = np.ones((len(types), 3), np.int64)
@@ -97,14 +92,15 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> dict[str, Any]:
         ]
         for k, part in enumerate(parts):
             block0[t, k] = n
-            blocks.append(np.ascontiguousarray(part, dtype=float).ravel())
+            blocks.append(part)
             n += part.size
-    return {
-        "mass": np.array(mass, dtype=float),
-        "S": stacked(S, (3,)),
-        "J0": stacked(J0, (3, 3)),
-        "blocks": np.concatenate([*blocks, np.zeros(0)]),
-        "block0": block0,
-        "is_diagonal": is_diagonal,
-        "is_stiffened": is_stiffened,
-    }
+    return filled(
+        BodyTypes(),
+        mass=mass,
+        S=S,
+        J0=J0,
+        blocks=flat(blocks),
+        block0=block0,
+        is_diagonal=is_diagonal,
+        is_stiffened=is_stiffened,
+    )

@@ -92,15 +92,15 @@ def add_joint(system: System, made: Connections, joint: Joint) -> None:
     made.add(joint.name, JOINT, ends, rows, has_rates=bool(forces) or rolls)
 
 
-def add_spring(system: System, made: Connections, spring: SpringDamper) -> list[float]:
-    """Add a spring-damper; return its row of `Model.springs`."""
+def add_spring(system: System, made: Connections, spring: SpringDamper) -> float:
+    """Add a spring-damper; return its free length."""
     where = f"force {spring.name!r}"
     a = find_marker(system, f"{where}: marker_a", spring.marker_a)
     b = find_marker(system, f"{where}: marker_b", spring.marker_b)
     free_length = spring_length(where, spring, a, b, made.placed, made.n_q)
     rows = [Row(SPRING, axis) for axis in np.eye(3)]
     made.add(spring.name, SPRING_LAW, (End(a, 1.0), End(b, -1.0)), rows, has_rates=True)
-    return [spring.stiffness, spring.damping, free_length, spring.preload]
+    return free_length
 
 
 def spring_length(

@@ -1,4 +1,4 @@
-"""Couplers and user forces as flat arrays: ports on the markers of joints or of their own, and what couples them."""
+"""Couplers and user forces as the kernels see them: ports on markers, and what couples them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,15 +19,12 @@ from floatframe.functions.expressions import Tape, compile_expression
 from floatframe.joints.axis_frame import axis_in_b, turning_frame
 from floatframe.joints.coordinate_coupler import CoordinateCoupler
 from floatframe.joints.rows import COUPLE, NO_MOMENT, PART, PUSH, SPAN, TWIST, RelativePlace, Row, RowCoordinate
+from floatframe.kernels import model
 from floatframe.kernels.model import COUPLER, USER_FORCE
+from floatframe.kernels.records import filled, of_items
 from floatframe.system import System
 
 __all__ = ["Networks", "Port", "add_networks", "find_port", "port_value"]
-
-INTEGERS = (
-    "p_a", "p_b", "p_row", "p_force", "p_arm", "p_core", "core",
-    "user_forces", "user_states", "user_address", "user_tape0", "state0", "state_row",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,36 +53,30 @@ class Networks:
 
     names: tuple[str, ...] = ()
     port0: list[int] = field(default_factory=lambda: [0])
-    p_a: list[int] = field(default_factory=list)
-    p_b: list[int] = field(default_factory=list)
-    p_row: list[int] = field(default_factory=list)
-    p_force: list[int] = field(default_factory=list)
-    p_arm: list[int] = field(default_factory=list)
-    p_factor: list[float] = field(default_factory=list)
-    p_core: list[int] = field(default_factory=list)
     core: list[int] = field(default_factory=list)
-    user_forces: list[int] = field(default_factory=list)
-    user_states: list[int] = field(default_factory=list)
-    user_address: list[int] = field(default_factory=list)
-    user_tape0: list[int] = field(default_factory=list)
+    ports: list[dict[str, float]] = field(default_factory=list)
+    users: list[dict[str, int]] = field(default_factory=list)
     state0: list[int] = field(default_factory=lambda: [0])
-    state_row: list[int] = field(default_factory=list)
-    state_start: list[float] = field(default_factory=list)
+    states: list[dict[str, float]] = field(default_factory=list)
     tapes: list[Tape] = field(default_factory=list)
     callbacks: list[Callback] = field(default_factory=list)
 
-    def arrays(self) -> dict[str, Any]:
-        """Return the arrays of the model."""
+    def records(self) -> dict[str, Any]:
+        """Return the parts of the model."""
+        tapes = self.tapes
         return {
-            "port0": integers(self.port0),
-            **{name: integers(getattr(self, name)) for name in INTEGERS},
-            "p_factor": np.array(self.p_factor, dtype=float),
-            "state_start": np.array(self.state_start, dtype=float),
-            "tape0": offsets(integers([len(tape.op) for tape in self.tapes])),
-            "tape_op": integers([op for tape in self.tapes for op in tape.op]),
-            "tape_a": integers([a for tape in self.tapes for a in tape.a]),
-            "tape_b": integers([b for tape in self.tapes for b in tape.b]),
-            "tape_c": np.array([c for tape in self.tapes for c in tape.c], dtype=float),
+            "networks": filled(model.Networks(), port0=self.port0, core=self.core),
+            "ports": of_items(model.Ports(), self.ports),
+            "users": of_items(model.Users(), self.users, state0=self.state0),
+            "states": of_items(model.States(), self.states),
+            "tapes": filled(
+                model.Tapes(),
+                operation0=offsets(integers([len(tape.op) for tape in tapes])),
+                op=[op for tape in tapes for op in tape.op],
+                a=[a for tape in tapes for a in tape.a],
+                b=[b for tape in tapes for b in tape.b],
+                c=[c for tape in tapes for c in tape.c],
+            ),
         }
 
 
@@ -121,18 +112,20 @@ def add_user_force(
     rows = [Row(PART)] * (len(acting) + 3 * len(force.states))
     has_force = [name in acting for name in names]
     first = add_ports(made, networks, force.name, USER_FORCE, ports, [1.0] * len(ports), has_force, rows)
-    networks.p_core[-len(ports) :] = [first + acting.index(name) if name in acting else first for name in names]
-    networks.user_forces.append(len(acting))
-    networks.user_states.append(len(force.states))
-    networks.user_tape0.append(len(networks.tapes))
-    networks.state_row += [first + len(acting) + 3 * k for k in range(len(force.states))]
-    networks.state0.append(len(networks.state_row))
-    networks.state_start += list(force.states.values())
+    for port, name in zip(networks.ports[-len(ports) :], names, strict=True):
+        port["core"] = first + acting.index(name) if name in acting else first
+    starts = enumerate(force.states.values())
+    networks.states += [{"row": first + len(acting) + 3 * k, "start": start} for k, start in starts]
+    networks.state0.append(len(networks.states))
+    address = 0
     if force.function is not None:
         networks.callbacks.append(callback_of(force, len(ports)))
-        networks.user_address.append(networks.callbacks[-1].address)
+        address = networks.callbacks[-1].address
+    networks.users.append(
+        {"n_forces": len(acting), "n_states": len(force.states), "address": address, "tape0": len(networks.tapes)}
+    )
+    if force.function is not None:
         return
-    networks.user_address.append(0)
     assert isinstance(force.forces, Mapping)  # checked by the force
     numbers = {name: functions.index(function) for name, function in force.functions.items()}
     texts = [(f"forces: {name}", text) for name, text in force.forces.items()]
@@ -174,14 +167,18 @@ def add_ports(
             ends += [End(port.a, 1.0, force, arm), End(port.b, -1.0, force)]
     marker, w0 = made.add(name, law, ends, [*rows, *core], has_rates=True)
     for k, (value, force, arm) in enumerate(starts):
-        networks.p_a.append(marker + 2 * k)
-        networks.p_b.append(marker + 2 * k + 1)
-        networks.p_row.append(w0 + value)
-        networks.p_force.append(w0 + force if force >= 0 else -1)
-        networks.p_arm.append(w0 + arm if arm >= 0 else -1)
-        networks.p_factor.append(factors[k])
-        networks.p_core.append(w0 + len(rows))
-    networks.port0.append(len(networks.p_a))
+        networks.ports.append(
+            {
+                "a": marker + 2 * k,
+                "b": marker + 2 * k + 1,
+                "row": w0 + value,
+                "force": w0 + force if force >= 0 else -1,
+                "arm": w0 + arm if arm >= 0 else -1,
+                "factor": factors[k],
+                "core": w0 + len(rows),
+            }
+        )
+    networks.port0.append(len(networks.ports))
     networks.core.append(w0 + len(rows))
     return w0 + len(rows)
 

@@ -1,29 +1,10 @@
 """Order and fill of the block elimination of connections that share bodies; done once per system."""
 
-from typing import NamedTuple
-
-import numpy as np
-
 from fe_models.foundation.arrays import IntArray
+from floatframe.kernels.model import Elimination
+from floatframe.kernels.records import filled
 
-__all__ = ["Elimination", "plan_elimination"]
-
-
-class Elimination(NamedTuple):
-    """Where the blocks of the connection matrix are stored and in which order they are eliminated."""
-
-    order: IntArray
-    s_diagonal: IntArray
-    s_size: IntArray
-    pair_row: IntArray
-    pair_column: IntArray
-    pair_block: IntArray
-    after0: IntArray
-    after: IntArray
-    after_lower: IntArray
-    after_upper: IntArray
-    update0: IntArray
-    update: IntArray
+__all__ = ["plan_elimination"]
 
 
 def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connection_of: IntArray) -> Elimination:
@@ -84,20 +65,18 @@ def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connecti
         after0.append(len(after))
         update0.append(len(update))
 
-    def integers(values: list[int]) -> IntArray:
-        return np.array(values, dtype=np.int64)
-
-    return Elimination(
-        order=integers(order),
-        s_diagonal=integers(diagonal),
-        s_size=integers([n_store]),
-        pair_row=integers([a for a, _ in pairs]),
-        pair_column=integers([b for _, b in pairs]),
-        pair_block=integers(pair_block),
-        after0=integers(after0),
-        after=integers(after),
-        after_lower=integers(lower),
-        after_upper=integers(upper),
-        update0=integers(update0),
-        update=integers(update),
+    return filled(
+        Elimination(),
+        order=order,
+        diagonal=diagonal,
+        n_store=n_store,
+        pair_row=[a for a, _ in pairs],
+        pair_column=[b for _, b in pairs],
+        pair_block=pair_block,
+        after0=after0,
+        after=after,
+        after_lower=lower,
+        after_upper=upper,
+        update0=update0,
+        update=update,
     )

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -11,16 +10,19 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.markers import body_name
-from floatframe.compiling.bodies import integers, offsets, stacked
+from floatframe.compiling.bodies import integers, offsets
 from floatframe.compiling.markers import find_body
 from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad, JointForce
-from floatframe.functions.time_functions import N_COEFFICIENTS, TimeFunction
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints import Joint
 from floatframe.joints.rows import Row, kind_of, loaded_row
+from floatframe.kernels.model import BodyLoads, JointForces
+from floatframe.kernels.model import Functions as FunctionPieces
+from floatframe.kernels.records import filled, flat
 from floatframe.system import System
 
-__all__ = ["Functions", "body_load_arrays", "joint_force_arrays", "with_forces"]
+__all__ = ["Functions", "body_loads", "joint_forces", "with_forces"]
 
 
 @dataclass
@@ -36,13 +38,14 @@ class Functions:
         self.known.append(function)
         return len(self.known) - 1
 
-    def arrays(self) -> dict[str, Any]:
+    def record(self) -> FunctionPieces:
         """Return the pieces of all, one function after another."""
-        return {
-            "piece0": offsets(integers([len(function.begins) for function in self.known])),
-            "piece_t": np.concatenate([*(function.begins for function in self.known), np.zeros(0)]),
-            "piece": np.concatenate([*(function.pieces for function in self.known), np.zeros((0, N_COEFFICIENTS))]),
-        }
+        return filled(
+            FunctionPieces(),
+            piece0=offsets(integers([len(function.begins) for function in self.known])),
+            begin=flat([function.begins for function in self.known]),
+            piece=flat([function.pieces for function in self.known]),
+        )
 
 
 def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce]) -> list[Row]:
@@ -64,8 +67,13 @@ def with_forces(joint: Joint, rows: Sequence[Row], forces: Sequence[JointForce])
     return result
 
 
-def joint_force_arrays(system: System, rows: Sequence[Row], owner: Sequence[str], functions: Functions) -> dict:
-    """Return the forces along coordinates, sorted by row; owner: name of the joint of each row."""
+def joint_forces(
+    system: System, rows: Sequence[Row], owner: Sequence[str], functions: Functions
+) -> tuple[JointForces, list[int]]:
+    """Return the forces along coordinates, sorted by row, and where those of each row begin, and the end.
+
+    owner: name of the joint of each row.
+    """
     forces = [force for force in system.forces if isinstance(force, JointForce)]
     names = [joint.name for joint in system.joints]
     for force in forces:
@@ -76,21 +84,22 @@ def joint_force_arrays(system: System, rows: Sequence[Row], owner: Sequence[str]
         for row, name in zip(rows, owner, strict=True)
     ]
     ordered = [force for group in of_row for force in group]
-    ends = np.cumsum([0] + [len(group) for group in of_row])
-    numbers = [
-        [f.stiffness, f.free, f.damping, f.preload, f.friction, f.friction_coefficient, f.friction_speed]
-        for f in ordered
-    ]
-    return {
-        "row_force0": integers(list(ends[:-1])),
-        "row_force1": integers(list(ends[1:])),
-        "joint_forces": stacked(numbers, (7,)),
-        "joint_force_motor": integers([functions.index(force.motor) for force in ordered]),
-        "joint_force_table": integers([functions.index(force.characteristic) for force in ordered]),
-    }
+    record = filled(
+        JointForces(),
+        stiffness=[force.stiffness for force in ordered],
+        free=[force.free for force in ordered],
+        damping=[force.damping for force in ordered],
+        preload=[force.preload for force in ordered],
+        friction=[force.friction for force in ordered],
+        coefficient=[force.friction_coefficient for force in ordered],
+        speed=[force.friction_speed for force in ordered],
+        motor=[functions.index(force.motor) for force in ordered],
+        table=[functions.index(force.characteristic) for force in ordered],
+    )
+    return record, [0, *np.cumsum([len(group) for group in of_row], dtype=int)]
 
 
-def body_load_arrays(system: System, functions: Functions) -> dict[str, Any]:
+def body_loads(system: System, functions: Functions) -> BodyLoads:
     """Return the load cases that act on bodies; `ModelError` if a body or a load case is not there."""
     loads = [force for force in system.forces if isinstance(force, BodyLoad)]
     bodies, values, first, n = [], [], [], 0
@@ -109,9 +118,5 @@ def body_load_arrays(system: System, functions: Functions) -> dict[str, Any]:
         first.append(n)
         values.append(part)
         n += len(part)
-    return {
-        "d_body": integers(bodies),
-        "d_factor": integers([functions.index(load.amplitude) for load in loads]),  # type: ignore[arg-type]
-        "d_first": integers(first),
-        "d_values": np.concatenate([*values, np.zeros(0)]),
-    }
+    factors = [functions.index(load.amplitude) for load in loads]  # type: ignore[arg-type]
+    return filled(BodyLoads(), body=bodies, factor=factors, value0=first, values=flat(values))

@@ -1,21 +1,23 @@
-"""Sliding joints as flat arrays: their lines, stations and sliding markers."""
+"""Sliding joints as the kernels see them: their lines, stations and sliding markers."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.marker_shape import MarkerShape
 from floatframe.bodies.markers import Marker, body_name
-from floatframe.compiling.bodies import integers, offsets, stacked
+from floatframe.compiling.bodies import integers, offsets
 from floatframe.compiling.connections import Connections, End
 from floatframe.compiling.markers import find_marker, joint_markers, marker_pose
 from floatframe.errors import ModelError
 from floatframe.joints.rows import MOMENT, NO_MOMENT
 from floatframe.joints.sliding import SlidingJoint, line_triad
+from floatframe.kernels import model
 from floatframe.kernels.model import JOINT
+from floatframe.kernels.records import filled
 from floatframe.rotations import rotation_matrix
 from floatframe.system import System
 
@@ -33,20 +35,25 @@ class Lines:
     s: list[float] = field(default_factory=list)
     station: list[int] = field(default_factory=list)
 
-    def arrays(self, n_markers: int) -> dict[str, Any]:
-        """Return the arrays of the model."""
-        of_marker = np.full(n_markers, -1, np.int64)
-        of_marker[self.marker] = np.arange(len(self.marker))
+    def records(self) -> dict[str, Any]:
+        """Return the parts of the model."""
         return {
-            "m_line": of_marker,
-            "line_marker": integers(self.marker),
-            "line_other": integers([m + 1 for m in self.marker]),
-            "line_row": integers(self.row),
-            "line_axis": stacked(self.axis, (3,)),
-            "line0": offsets(integers(self.counts)),
-            "line_s": np.array(self.s, dtype=float),
-            "line_m": integers(self.station),
+            "lines": filled(
+                model.Lines(),
+                marker=self.marker,
+                other=[m + 1 for m in self.marker],
+                row=self.row,
+                axis=self.axis,
+                station0=offsets(integers(self.counts)),
+            ),
+            "stations": filled(model.Stations(), s=self.s, marker=self.station),
         }
+
+    def of_markers(self, n_markers: int) -> IntArray:
+        """Return the line along which each marker slides, -1 for none."""
+        line = np.full(n_markers, -1, np.int64)
+        line[self.marker] = np.arange(len(self.marker))
+        return line
 
 
 def add_sliding(system: System, made: Connections, lines: Lines, joint: SlidingJoint) -> None:

@@ -13,6 +13,7 @@ from floatframe.bodies.markers import Marker, body_name
 from floatframe.compiling.bodies import body_n_q, integers, offsets
 from floatframe.errors import ModelError
 from floatframe.joints import Joint
+from floatframe.kernels.records import flat
 from floatframe.rotations import rotation_matrix
 from floatframe.state import State
 from floatframe.system import System
@@ -139,20 +140,25 @@ def marker_pose(marker: MarkerData, state: State, n_q: IntArray) -> tuple[Array,
     return state.r[i] + R @ rho, R @ axes
 
 
-def marker_shapes(markers: list[MarkerShape]) -> tuple[IntArray, Array]:
+def marker_shapes(markers: list[MarkerShape]) -> tuple[list[int], Array]:
     """Return where the shapes of each marker begin (-1 for none), and the shapes, flat."""
-    start, parts, n = [], [], 0
+    start: list[int] = []
+    parts: list[Array] = []
+    n = 0
     for marker in markers:
         start.append(-1 if marker.psi is None else n)
         if marker.psi is not None:
-            parts.append(np.ascontiguousarray(marker.psi, dtype=float).ravel())
+            parts.append(marker.psi)
             n += marker.psi.size
-    return integers(start), np.concatenate([*parts, np.zeros(0)])
+    return start, flat(parts)
 
 
-def marker_bending(markers: list[MarkerShape]) -> tuple[IntArray, Array]:
+def marker_bending(markers: list[MarkerShape]) -> tuple[list[int], Array]:
     """Return where K_P [l, 6, k] of each marker begins (-1 for none), and all of them, flat; one interface has one."""
-    start, known, parts, n = [], {}, [], 0
+    start: list[int] = []
+    known: dict = {}
+    parts: list[Array] = []
+    n = 0
     for marker in markers:
         if marker.bend is None or marker.bend.size == 0:
             start.append(-1)
@@ -160,7 +166,7 @@ def marker_bending(markers: list[MarkerShape]) -> tuple[IntArray, Array]:
         key = marker.bend.__array_interface__["data"][0], marker.bend.shape
         if key not in known:
             known[key] = n
-            parts.append(np.ascontiguousarray(np.moveaxis(marker.bend, 2, 0)).ravel())
+            parts.append(np.moveaxis(marker.bend, 2, 0))
             n += marker.bend.size
         start.append(known[key])
-    return integers(start), np.concatenate([*parts, np.zeros(0)])
+    return start, flat(parts)

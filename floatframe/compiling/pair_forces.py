@@ -1,12 +1,8 @@
-"""Bushings and contacts as flat arrays."""
+"""Bushings and contacts as the kernels see them."""
 
 from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
 
 from floatframe.bodies.markers import Marker, body_name
-from floatframe.compiling.bodies import integers, stacked
 from floatframe.compiling.connections import Connections, End
 from floatframe.compiling.forces import Functions
 from floatframe.compiling.markers import MarkerData, find_marker, marker_pose, marker_with_pose, n_q_of
@@ -14,7 +10,8 @@ from floatframe.errors import ModelError
 from floatframe.forces import Bushing, SphereContact
 from floatframe.forces.bushing import DEFORMATIONS
 from floatframe.joints.rows import MOMENT, MOMENT_B, PART, Row
-from floatframe.kernels.model import BUSHING, CONTACT
+from floatframe.kernels.model import BUSHING, CONTACT, Bushings, Contacts
+from floatframe.kernels.records import filled, of_items
 from floatframe.state import State
 from floatframe.system import System
 
@@ -23,39 +20,37 @@ __all__ = ["Pairs", "add_pair_laws", "bushing_markers"]
 
 @dataclass
 class Pairs:
-    """Numbers of bushings and contacts."""
+    """Bushings and contacts, with their names."""
 
     names: tuple[str, ...] = ()
-    bushings: list = field(default_factory=list)
-    tables: list[list[int]] = field(default_factory=list)
-    contacts: list[list[float]] = field(default_factory=list)
-
-    def arrays(self) -> dict[str, Any]:
-        """Return the arrays of the model."""
-        return {
-            "bushings": stacked(self.bushings, (78,)),
-            "bushing_table": integers(self.tables).reshape(-1, 6),  # type: ignore[arg-type]
-            "contacts": stacked(self.contacts, (9,)),
-        }
+    bushings: Bushings = field(default_factory=Bushings)
+    contacts: Contacts = field(default_factory=Contacts)
 
 
 def add_pair_laws(system: System, made: Connections, functions: Functions) -> Pairs:
     """Add bushings, then contacts."""
     pairs = Pairs()
+    tables: list[list[int]] = []
     bushings = [force for force in system.forces if isinstance(force, Bushing)]
     contacts = [force for force in system.forces if isinstance(force, SphereContact)]
     for bushing in bushings:
         a, b = bushing_markers(system, bushing, made.placed)
         made.add(bushing.name, BUSHING, ends_of(a, b), [Row(PART)] * 9, has_rates=True)
-        pairs.bushings.append(np.concatenate([bushing.stiffness.ravel(), bushing.damping.ravel(), bushing.preload]))
-        pairs.tables.append([functions.index(bushing.characteristics.get(name)) for name in DEFORMATIONS])
+        tables.append([functions.index(bushing.characteristics.get(name)) for name in DEFORMATIONS])
     for contact in contacts:
         where = f"force {contact.name!r}"
         a = find_marker(system, f"{where}: marker_a", contact.marker_a)
         b = find_marker(system, f"{where}: marker_b", contact.marker_b)
         require_two_bodies(where, a, b)
         made.add(contact.name, CONTACT, ends_of(a, b), [Row(PART, contact.axis)] * 10, has_rates=True)
-        pairs.contacts.append(contact.coefficients)
+    pairs.bushings = filled(
+        Bushings(),
+        stiffness=[bushing.stiffness for bushing in bushings],
+        damping=[bushing.damping for bushing in bushings],
+        preload=[bushing.preload for bushing in bushings],
+        table=tables,
+    )
+    pairs.contacts = of_items(Contacts(), [contact.coefficients for contact in contacts])
     pairs.names = (*(bushing.name for bushing in bushings), *(contact.name for contact in contacts))
     return pairs
 

@@ -1,4 +1,4 @@
-"""From the description of a system to the flat arrays of the kernels."""
+"""From the description of a system to the records of the kernels."""
 
 from dataclasses import dataclass
 
@@ -6,12 +6,13 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.compiling.bodies import body_types, integers, offsets, stacked, type_arrays
+from floatframe.compiling.bodies import body_types, integers, offsets, type_arrays
 from floatframe.compiling.callbacks import Callback
-from floatframe.compiling.connections import Connections, add_joint, add_spring
+from floatframe.compiling.connections import Connections as ConnectionLists
+from floatframe.compiling.connections import add_joint, add_spring
 from floatframe.compiling.coordinate_elements import add_networks
 from floatframe.compiling.elimination_order import plan_elimination
-from floatframe.compiling.forces import Functions, body_load_arrays, joint_force_arrays
+from floatframe.compiling.forces import Functions, body_loads, joint_forces
 from floatframe.compiling.lines import Lines, add_sliding
 from floatframe.compiling.markers import (
     MarkerData,
@@ -26,7 +27,8 @@ from floatframe.compiling.pair_forces import add_pair_laws
 from floatframe.forces import Gravity, PointForce, SpringDamper
 from floatframe.joints.rows import Row, kind_of
 from floatframe.joints.sliding import SlidingJoint
-from floatframe.kernels.model import Model
+from floatframe.kernels.model import Bodies, Connections, JointRows, Loads, Markers, Model, Springs
+from floatframe.kernels.records import filled
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
 from floatframe.system import System
@@ -74,7 +76,7 @@ def compiled_system(system: System) -> CompiledSystem:
 
 
 def compile_system(system: System) -> CompiledSystem:
-    """Return the flat arrays of a system.
+    """Return a system as the kernels see it.
 
     Raises
     ------
@@ -84,14 +86,13 @@ def compile_system(system: System) -> CompiledSystem:
     require_inertia(system.bodies)
     placed = place(system)
     types, kind = body_types(system.bodies)
-    model_types = type_arrays(types)
     n_q = n_q_of(system)
     gravity = np.zeros(3)
     for force in system.forces:
         if isinstance(force, Gravity):
             gravity = gravity + force.acceleration
 
-    made = Connections(placed, n_q)
+    made = ConnectionLists(placed, n_q)
     functions = Functions()
     lines = Lines()
     for joint in system.joints:
@@ -99,11 +100,15 @@ def compile_system(system: System) -> CompiledSystem:
             add_sliding(system, made, lines, joint)
         else:
             add_joint(system, made, joint)
-    springs, spring_table = [], []
     dampers = [force for force in system.forces if isinstance(force, SpringDamper)]
-    for spring in dampers:
-        springs.append(add_spring(system, made, spring))
-        spring_table.append(functions.index(spring.characteristic))
+    springs = filled(
+        Springs(),
+        stiffness=[spring.stiffness for spring in dampers],
+        damping=[spring.damping for spring in dampers],
+        free_length=[add_spring(system, made, spring) for spring in dampers],
+        preload=[spring.preload for spring in dampers],
+        table=[functions.index(spring.characteristic) for spring in dampers],
+    )
     pairs = add_pair_laws(system, made, functions)
     networks = add_networks(system, made, functions)
     markers, rows = made.markers, made.rows
@@ -111,71 +116,63 @@ def compile_system(system: System) -> CompiledSystem:
     load_marker = []
     for load in loads:
         load_marker.append(made.add_marker(find_marker(system, f"force {load.name!r}: marker", load.marker)))
-
     ends_of = [
         [m for m, data in enumerate(markers) if data.body == i and made.connection_of[m] >= 0] for i in range(len(n_q))
     ]
-    ends = [m for group in ends_of for m in group]
-    m_x0 = np.zeros(len(markers), np.int64)
-    m_x0[ends] = np.cumsum([0] + [6 + int(n_q[markers[m].body]) for m in ends])[:-1]
-    shapes = [marker.shape for marker in markers]
-    psi0, psi = marker_shapes(shapes)
-    bend0, bend = marker_bending(shapes)
-    connection_of_marker = integers(made.connection_of)
+    row_motion = [functions.index(row.motion) for row in rows]
+    forces, force0 = joint_forces(system, rows, made.owner, functions)
     model = Model(
-        kind=kind,
-        n_q=n_q,
-        q0=offsets(n_q),
-        u0=offsets(n_q + 6),
-        h0=offsets((n_q + 6) ** 2),
-        **model_types,
         gravity=gravity,
-        m_body=integers([m.body for m in markers]),
-        m_position=stacked([shape.position for shape in shapes], (3,)),
-        m_triad=stacked([shape.triad for shape in shapes], (3, 3)),
-        m_psi0=psi0,
-        psi=psi,
-        m_bend0=bend0,
-        bend=bend,
-        m_connection=connection_of_marker,
-        m_sign=np.array(made.sign, dtype=float),
-        m_force=integers(made.force),
-        m_moment=integers(made.moment),
-        m_follower=integers([0] * (len(markers) - len(loads)) + [int(load.is_follower) for load in loads]),
-        m_x0=m_x0,
-        end0=offsets(np.array([len(group) for group in ends_of])),
-        ends=integers(ends),
-        c_size=integers(made.sizes),
-        c_w0=offsets(integers(made.sizes)),
-        c_a=integers(made.a_of),
-        c_b=integers(made.b_of),
-        c_law=integers(made.law),
-        c_item=integers(made.item),
-        row_kind=integers([row.kind for row in rows]),
-        row_x=stacked([row.x for row in rows], (3,)),
-        row_y=stacked([row.y for row in rows], (3,)),
-        row_z=stacked([row.z for row in rows], (3,)),
-        row_c=np.array([row.c for row in rows], dtype=float),
-        row_part=integers([row.part for row in rows]),
-        row_soft=np.zeros(len(rows)),
-        row_motion=integers([functions.index(row.motion) for row in rows]),
-        **joint_force_arrays(system, rows, made.owner, functions),
-        c_rates=integers(made.rates),
-        **pairs.arrays(),
-        **networks.arrays(),
-        **lines.arrays(len(markers)),
-        spring_table=integers(spring_table),
-        l_factor=integers([functions.index(load.amplitude) for load in loads]),
-        **body_load_arrays(system, functions),
-        **functions.arrays(),
-        springs=stacked(springs, (4,)),
-        l_marker=integers(load_marker),
-        l_force=stacked([load.force for load in loads], (3,)),
-        l_torque=stacked([load.torque for load in loads], (3,)),
-        **plan_elimination(made.sizes, ends_of, connection_of_marker)._asdict(),
+        bodies=filled(
+            Bodies(),
+            kind=kind,
+            n_q=n_q,
+            q0=offsets(n_q),
+            u0=offsets(n_q + 6),
+            h0=offsets((n_q + 6) ** 2),
+            end0=offsets(integers([len(group) for group in ends_of])),
+            ends=[m for group in ends_of for m in group],
+        ),
+        body_types=type_arrays(types),
+        markers=marker_record(made, ends_of, lines, load_marker, [load.is_follower for load in loads]),
+        connections=filled(
+            Connections(),
+            size=made.sizes,
+            w0=offsets(integers(made.sizes)),
+            a=made.a_of,
+            b=made.b_of,
+            law=made.law,
+            item=made.item,
+            has_rates=made.rates,
+        ),
+        rows=filled(
+            JointRows(),
+            **{name: [getattr(row, name) for row in rows] for name in ("kind", "x", "y", "z", "c", "part")},
+            motion=row_motion,
+            soft=np.zeros(len(rows)),
+            force0=force0[:-1],
+            force1=force0[1:],
+        ),
+        joint_forces=forces,
+        springs=springs,
+        bushings=pairs.bushings,
+        contacts=pairs.contacts,
+        **networks.records(),
+        **lines.records(),
+        loads=filled(
+            Loads(),
+            marker=load_marker,
+            factor=[functions.index(load.amplitude) for load in loads],
+            force=[load.force for load in loads],
+            torque=[load.torque for load in loads],
+        ),
+        body_loads=body_loads(system, functions),
+        functions=functions.record(),
+        elimination=plan_elimination(made.sizes, ends_of, integers(made.connection_of)),
     )
     length = system_length(markers, placed, n_q, model)
-    model = model._replace(row_soft=row_softness(system, rows, model.mass[kind], length))
+    soft = row_softness(system, rows, model.body_types.mass[kind], length)
+    model = model._replace(rows=model.rows._replace(soft=soft))
     return CompiledSystem(
         model=model,
         body_names=tuple(body.name for body in system.bodies),
@@ -187,6 +184,38 @@ def compile_system(system: System) -> CompiledSystem:
         placed=placed,
         coordinates=tuple(row.coordinate_name for row in rows),
         length=length,
+    )
+
+
+def marker_record(
+    made: ConnectionLists, ends_of: list[list[int]], lines: Lines, load_marker: list[int], is_follower: list[bool]
+) -> Markers:
+    """Return the markers as the kernels see them; those of loads come last."""
+    markers = made.markers
+    shapes = [marker.shape for marker in markers]
+    ends = [m for group in ends_of for m in group]
+    x0 = np.zeros(len(markers), np.int64)
+    x0[ends] = np.cumsum([0] + [6 + int(made.n_q[markers[m].body]) for m in ends])[:-1]
+    turns = np.zeros(len(markers), np.int64)
+    turns[load_marker] = is_follower
+    psi0, psi = marker_shapes(shapes)
+    bend0, bend = marker_bending(shapes)
+    return filled(
+        Markers(),
+        body=[marker.body for marker in markers],
+        position=[shape.position for shape in shapes],
+        triad=[shape.triad for shape in shapes],
+        psi0=psi0,
+        psi=psi,
+        bend0=bend0,
+        bend=bend,
+        connection=made.connection_of,
+        sign=made.sign,
+        force=made.force,
+        moment=made.moment,
+        is_follower=turns,
+        x0=x0,
+        line=lines.of_markers(len(markers)),
     )
 
 
@@ -227,6 +256,6 @@ def place(system: System) -> State:
 def system_length(markers: list[MarkerData], placed: State, n_q: IntArray, model: Model) -> float:
     """Return the largest arm of a marker or radius of gyration in a body, or the size of the system; 1 if all are 0."""
     arms = [float(np.linalg.norm(marker.shape.position)) for marker in markers if marker.body >= 0]
-    radii = np.sqrt(np.maximum(np.trace(model.J0, axis1=1, axis2=2), 0.0) / (2 * model.mass))
+    radii = np.sqrt(np.maximum(np.trace(model.body_types.J0, axis1=1, axis2=2), 0.0) / (2 * model.body_types.mass))
     points = [marker_pose(marker, placed, n_q)[0] for marker in markers] + list(placed.r)
     return max([*arms, float(radii.max()), float(np.linalg.norm(np.ptp(np.array(points), axis=0)))]) or 1.0

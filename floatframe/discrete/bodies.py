@@ -140,7 +140,7 @@ def central_bodies(model: Model, names: tuple[str, ...], scheme: str) -> tuple[C
     """Return the constants of all bodies; `ModelError` if a mode of one has no mass."""
     known: dict[int, CentralBody] = {}
     bodies = []
-    for i, t in enumerate(int(kind) for kind in model.kind):
+    for i, t in enumerate(int(kind) for kind in model.bodies.kind):
         if t not in known:
             known[t] = central_body(model, i)
             M = known[t].mass_matrix(np.zeros(known[t].n))[3:, 3:]
@@ -155,24 +155,24 @@ def central_bodies(model: Model, names: tuple[str, ...], scheme: str) -> tuple[C
 
 def central_body(model: Model, i: int) -> CentralBody:
     """Return the constants of a body."""
-    t, n = int(model.kind[i]), int(model.n_q[i])
-    m, S = float(model.mass[t]), model.S[t]
+    t, n = int(model.bodies.kind[i]), int(model.bodies.n_q[i])
+    m, S = float(model.body_types.mass[t]), model.body_types.S[t]
 
     def stored(which: int, *shape: int) -> Array:
         if n == 0:
             return np.zeros(shape)
-        first = int(model.block0[t, which])
-        return model.blocks[first : first + int(np.prod(shape))].reshape(shape)
+        first = int(model.body_types.block0[t, which])
+        return model.body_types.blocks[first : first + int(np.prod(shape))].reshape(shape)
 
     C3_k = np.moveaxis(stored(C3, 3, 3, n), 2, 0)
     products = stored(S_AB, n, 3, 3, n)
-    is_stiffened = bool(model.is_stiffened[t]) and n > 0
+    is_stiffened = bool(model.body_types.is_stiffened[t]) and n > 0
     return CentralBody(
         m=m,
         S=S / m,
         C1=stored(C1, 3, n) / m,
         K_t=stored(K_TRANSLATION, n, 3 * n) / m if is_stiffened else None,
-        J0=model.J0[t],
+        J0=model.body_types.J0[t],
         C2=stored(C2, 3, n),
         J_k=C3_k + np.swapaxes(C3_k, 1, 2),
         S_ab=products.reshape(n, 9 * n),
@@ -201,8 +201,8 @@ def placed_bodies(bodies: tuple[CentralBody, ...], model: Model, state: State) -
     placed = []
     for i, body in enumerate(bodies):
         R = rotation_matrix(state.p[i])
-        u = state.u[model.u0[i] : model.u0[i + 1]]
-        q, q_dot, omega = state.q[model.q0[i] : model.q0[i + 1]], u[6:], u[3:6]
+        u = state.u[model.bodies.u0[i] : model.bodies.u0[i + 1]]
+        q, q_dot, omega = state.q[model.bodies.q0[i] : model.bodies.q0[i + 1]], u[6:], u[3:6]
         c = state.r[i] + R @ body.center(q)
         v = u[:3] + R @ body.drift(q, omega, q_dot)
         placed.append(Placed(c, state.p[i], R, q, v, omega, q_dot))

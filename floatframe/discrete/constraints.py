@@ -50,24 +50,24 @@ class Span:
 
 def is_driven(model: Model, k: int) -> bool:
     """Whether row k prescribes a motion."""
-    return bool(model.row_motion[k] >= 0)
+    return bool(model.rows.motion[k] >= 0)
 
 
 def held(model: Model, k: int, t: float) -> float:
     """Return the value that row k holds at time t."""
-    return value_of(model, int(model.row_motion[k]), t)[0] if is_driven(model, k) else float(model.row_c[k])
+    return value_of(model, int(model.rows.motion[k]), t)[0] if is_driven(model, k) else float(model.rows.c[k])
 
 
 def turn_direction(model: Model, k: int, t: float) -> Array:
     """Return the direction of marker A of a prescribed angle at time t."""
     angle = held(model, k, t)
-    return math.cos(angle) * model.row_x[k] + math.sin(angle) * model.row_z[k]
+    return math.cos(angle) * model.rows.x[k] + math.sin(angle) * model.rows.z[k]
 
 
 def constraint_value(model: Model, k: int, pair: Pair, span: Span) -> Array:
     """Return the value of row k at the end of a step; zero where the joint is closed."""
     a, b = pair
-    kind, x, y = int(model.row_kind[k]), model.row_x[k], model.row_y[k]
+    kind, x, y = int(model.rows.kind[k]), model.rows.x[k], model.rows.y[k]
     d = b.x_1 - a.x_1
     if kind == POINT:
         return dot(d, x)
@@ -77,20 +77,20 @@ def constraint_value(model: Model, k: int, pair: Pair, span: Span) -> Array:
         length = held(model, k, span.t_1)
         return 0.5 * (dot(d, d) / length - length)
     if kind == SCREW:
-        slope = float(model.row_c[k])
+        slope = float(model.rows.c[k])
         along, angle = dot(a.ends(slide_axis(model, k))[1], d), end_angle(model, k, pair)
         turns = np.floor((np.real(along) / slope - np.real(angle)) / (2 * np.pi) + 0.5)
         return along - slope * (angle + 2 * np.pi * turns)
     if kind == TURN:
         return dot(a.ends(turn_direction(model, k, span.t_1))[1], b.ends(y)[1])
     assert kind == DOT
-    return dot(a.ends(x)[1], b.ends(y)[1]) - float(model.row_c[k])
+    return dot(a.ends(x)[1], b.ends(y)[1]) - float(model.rows.c[k])
 
 
 def add_reaction(model: Model, k: int, pair: Pair, loads: Loads, span: Span, f: Array) -> None:
     """Add the loads of row k with multiplier f, (...,): their work is f times the change of the row."""
     a, b = pair
-    kind, x, y = int(model.row_kind[k]), model.row_x[k], model.row_y[k]
+    kind, x, y = int(model.rows.kind[k]), model.rows.x[k], model.rows.y[k]
     if kind_of(kind).is_length:
         direction = reaction_direction(model, k, pair, span)
         if kind in (SLIDE, SCREW):
@@ -98,7 +98,7 @@ def add_reaction(model: Model, k: int, pair: Pair, loads: Loads, span: Span, f: 
         b.add_force(loads[1], f[..., None] * direction)
         a.add_force(loads[0], -f[..., None] * direction)
         if kind == SCREW:
-            angle_loads(model, k, pair, loads, -float(model.row_c[k]) * f)
+            angle_loads(model, k, pair, loads, -float(model.rows.c[k]) * f)
         return
     e = turn_direction(model, k, span.t_force) if kind == TURN else x
     (E_0, E_1), (D_0, D_1) = a.ends(e), b.ends(y)
@@ -108,16 +108,16 @@ def add_reaction(model: Model, k: int, pair: Pair, loads: Loads, span: Span, f: 
 
 def slide_axis(model: Model, k: int) -> Array:
     """Return the axis in A along which row k measures a distance."""
-    x = model.row_x[k]
-    return np.cross(x, model.row_z[k]) if int(model.row_kind[k]) == SCREW else x
+    x = model.rows.x[k]
+    return np.cross(x, model.rows.z[k]) if int(model.rows.kind[k]) == SCREW else x
 
 
 def reaction_direction(model: Model, k: int, pair: Pair, span: Span) -> Array:
     """Return the force on B of a unit multiplier of row k, which holds a distance."""
     a, b = pair
-    kind, d = int(model.row_kind[k]), b.x_mean - a.x_mean
+    kind, d = int(model.rows.kind[k]), b.x_mean - a.x_mean
     if kind == POINT:
-        return np.broadcast_to(model.row_x[k], np.shape(d))
+        return np.broadcast_to(model.rows.x[k], np.shape(d))
     if kind == DISTANCE:
         return d / held(model, k, span.t_force)
     E_0, E_1 = a.ends(slide_axis(model, k))
@@ -129,22 +129,22 @@ def rate_in_time(model: Model, k: int, pair: Pair, t: float) -> float:
     if not is_driven(model, k):
         return 0.0
     a, b = pair
-    kind = int(model.row_kind[k])
-    value, rate = value_of(model, int(model.row_motion[k]), t)
+    kind = int(model.rows.kind[k])
+    value, rate = value_of(model, int(model.rows.motion[k]), t)
     if kind == SLIDE:
         return -rate
     if kind == DISTANCE:
         d = b.x_1 - a.x_1
         return -0.5 * rate * (float(d @ d) / value**2 + 1)
-    turning = math.cos(value) * model.row_z[k] - math.sin(value) * model.row_x[k]
-    return rate * float(a.ends(turning)[1] @ b.ends(model.row_y[k])[1])
+    turning = math.cos(value) * model.rows.z[k] - math.sin(value) * model.rows.x[k]
+    return rate * float(a.ends(turning)[1] @ b.ends(model.rows.y[k])[1])
 
 
 def end_angle(model: Model, k: int, pair: Pair) -> Array:
     """Return the angle of row k at the end of the step: that of D from Z towards -E."""
     a, b = pair
-    D = b.ends(model.row_y[k])[1]
-    return arctan2(-dot(a.ends(model.row_x[k])[1], D), dot(a.ends(model.row_z[k])[1], D))
+    D = b.ends(model.rows.y[k])[1]
+    return arctan2(-dot(a.ends(model.rows.x[k])[1], D), dot(a.ends(model.rows.z[k])[1], D))
 
 
 def arctan2(S: Array, C: Array) -> Array:
@@ -161,8 +161,8 @@ def angle_parts(model: Model, k: int, pair: Pair) -> tuple[Array, ...]:
     The angle th with sin th = S = -E·D, cos th = C = Z·D: C_mean dS - S_mean dC = sin(dth), kappa = dth / sin(dth).
     """
     a, b = pair
-    (E_0, E_1), (Z_0, Z_1) = a.ends(model.row_x[k]), a.ends(model.row_z[k])
-    D_0, D_1 = b.ends(model.row_y[k])
+    (E_0, E_1), (Z_0, Z_1) = a.ends(model.rows.x[k]), a.ends(model.rows.z[k])
+    D_0, D_1 = b.ends(model.rows.y[k])
     S_0, S_1, C_0, C_1 = -dot(E_0, D_0), -dot(E_1, D_1), dot(Z_0, D_0), dot(Z_1, D_1)
     sine, cosine = C_0 * S_1 - S_0 * C_1, C_0 * C_1 + S_0 * S_1
     dth = arctan2(sine, cosine)
@@ -176,16 +176,16 @@ def angle_loads(model: Model, k: int, pair: Pair, loads: Loads, f: Array) -> Non
     a, b = pair
     E, Z, D, S, C, kappa = angle_parts(model, k, pair)
     f = f * kappa
-    a.add_direction(loads[0], model.row_x[k], -(f * C)[..., None] * D)
-    a.add_direction(loads[0], model.row_z[k], -(f * S)[..., None] * D)
-    b.add_direction(loads[1], model.row_y[k], -(f * C)[..., None] * E - (f * S)[..., None] * Z)
+    a.add_direction(loads[0], model.rows.x[k], -(f * C)[..., None] * D)
+    a.add_direction(loads[0], model.rows.z[k], -(f * S)[..., None] * D)
+    b.add_direction(loads[1], model.rows.y[k], -(f * C)[..., None] * E - (f * S)[..., None] * Z)
 
 
 def angle_change(model: Model, k: int, pair: Pair) -> Array:
     """Return the change of the angle of row k over the step."""
     a, b = pair
     E, Z, D, S, C, kappa = angle_parts(model, k, pair)
-    dE, dZ, dD = a.change(model.row_x[k], E), a.change(model.row_z[k], Z), b.change(model.row_y[k], D)
+    dE, dZ, dD = a.change(model.rows.x[k], E), a.change(model.rows.z[k], Z), b.change(model.rows.y[k], D)
     dS, dC = -(dot(dE, D) + dot(E, dD)), dot(dZ, D) + dot(Z, dD)
     return kappa * (C * dS - S * dC)
 
@@ -193,7 +193,7 @@ def angle_change(model: Model, k: int, pair: Pair) -> Array:
 def slip_change(model: Model, k: int, pair: Pair) -> tuple[Array, Array, Array]:
     """Return the change of the distance of row k along its axis of A, the mean axis and the mean line from A to B."""
     a, b = pair
-    x = model.row_x[k]
+    x = model.rows.x[k]
     E_0, E_1 = a.ends(x)
     E, d = 0.5 * (E_0 + E_1), b.x_mean - a.x_mean
     return dot(a.change(x, E), d) + dot(E, b.dx - a.dx), E, d

@@ -20,8 +20,6 @@ from floatframe.rotations import cross, dot, turned
 
 __all__ = ["Given", "body_load", "coordinate_load", "point_load", "spring_load"]
 
-SPRING, FREE, DAMPER, PRELOAD, FRICTION, COEFFICIENT, SPEED = range(7)  #: columns of `Model.joint_forces`
-
 
 @dataclass(frozen=True, eq=False)
 class Given:
@@ -34,19 +32,20 @@ class Given:
 def spring_load(model: Model, c: int, pair: Pair, loads: Loads, span: Span) -> Given:
     """Add the loads of spring-damper c."""
     a, b = pair
-    s = int(model.c_item[c])
-    k, damping, free, preload = model.springs[s]
+    s = int(model.connections.item[c])
+    springs = model.springs
+    k, damping, free, preload = springs.stiffness[s], springs.damping[s], springs.free_length[s], springs.preload[s]
     d_0, d_1, dd = b.x_0 - a.x_0, b.x_1 - a.x_1, b.dx - a.dx
     d = 0.5 * (d_0 + d_1)
-    if k != 0 and free == 0 and damping == 0 and preload == 0 and model.spring_table[s] < 0:
+    if k != 0 and free == 0 and damping == 0 and preload == 0 and model.springs.table[s] < 0:
         add_pair(pair, loads, -k * d)  # through length zero
         return Given()
     both = np.sqrt(dot(d_0, d_0)) + np.sqrt(dot(d_1, d_1))
     change = 2 * dot(d, dd) / both
     tension = k * (0.5 * both - free) + preload + damping * change / span.h
     given = np.zeros(np.shape(change), change.dtype)
-    if model.spring_table[s] >= 0:
-        by_table = along_imaginary(model, int(model.spring_table[s]), 0.5 * both - free)
+    if model.springs.table[s] >= 0:
+        by_table = along_imaginary(model, int(model.springs.table[s]), 0.5 * both - free)
         tension = tension + by_table
         given = -by_table * change
     add_pair(pair, loads, -(2 * tension / both)[..., None] * d)
@@ -61,12 +60,12 @@ def add_pair(pair: Pair, loads: Loads, F: Array) -> None:
 
 def point_load(model: Model, k: int, marker: MarkerStep, load: Load | None, span: Span) -> Given:
     """Add load k, fixed in space or in its marker."""
-    factor = value_of(model, int(model.l_factor[k]), span.t_force)[0] if model.l_factor[k] >= 0 else 1.0
+    factor = value_of(model, int(model.loads.factor[k]), span.t_force)[0] if model.loads.factor[k] >= 0 else 1.0
     work: Array | float = 0.0
-    for part, is_force in ((model.l_force[k], True), (model.l_torque[k], False)):
+    for part, is_force in ((model.loads.force[k], True), (model.loads.torque[k], False)):
         if not np.any(part):
             continue
-        if model.m_follower[model.l_marker[k]]:
+        if model.markers.is_follower[model.loads.marker[k]]:
             V_0, V_1 = marker.ends(part)
             V = factor * 0.5 * (V_0 + V_1)
         else:
@@ -82,9 +81,9 @@ def point_load(model: Model, k: int, marker: MarkerStep, load: Load | None, span
 
 def body_load(model: Model, k: int, body: CentralBody, step: BodyStep, load: Load, span: Span) -> Given:
     """Add load case k of a body: force and torque about its frame origin in its axes, and modal forces."""
-    factor = value_of(model, int(model.d_factor[k]), span.t_force)[0]
-    first = int(model.d_first[k])
-    f, tau, modal = np.split(factor * model.d_values[first : first + 6 + body.n], [3, 6])
+    factor = value_of(model, int(model.body_loads.factor[k]), span.t_force)[0]
+    first = int(model.body_loads.value0[k])
+    f, tau, modal = np.split(factor * model.body_loads.values[first : first + 6 + body.n], [3, 6])
     q = 0.5 * (step.q_0 + step.q_1)
     s = body.center(q)
     R = 0.5 * (step.R_0 + step.R_1)
@@ -98,39 +97,39 @@ def body_load(model: Model, k: int, body: CentralBody, step: BodyStep, load: Loa
 
 def coordinate_load(model: Model, k: int, pair: Pair, loads: Loads, span: Span, normal: Array) -> Given:
     """Add the forces along the coordinate of row k (PUSH or TWIST); normal: force in the joint across its axis."""
-    is_angle = kind_of(model.row_kind[k]).is_angle
+    is_angle = kind_of(model.rows.kind[k]).is_angle
     if is_angle:
         change = angle_change(model, k, pair)
         end = end_angle(model, k, pair)
         begin = end - change if has_two_ends(pair) else end
     else:
         change, E, d = slip_change(model, k, pair)
-        x = model.row_x[k]
+        x = model.rows.x[k]
         begin = dot(pair[0].ends(x)[0], pair[1].x_0 - pair[0].x_0)
         end = dot(pair[0].ends(x)[1], pair[1].x_1 - pair[0].x_1)
     rate = change / span.h
     Q, given, taken = 0.0 * rate, 0.0 * rate, 0.0 * rate
-    for i in range(int(model.row_force0[k]), int(model.row_force1[k])):
-        f = model.joint_forces[i]
-        mean = 0.5 * (begin + end) - f[FREE]
+    for i in range(int(model.rows.force0[k]), int(model.rows.force1[k])):
+        f = model.joint_forces
+        mean = 0.5 * (begin + end) - f.free[i]
         if is_angle:
             mean = mean - 2 * np.pi * np.floor(np.real(mean) / (2 * np.pi) + 0.5)
-        entering = f[PRELOAD] + 0.0 * rate
-        if model.joint_force_motor[i] >= 0:
-            entering = entering + value_of(model, int(model.joint_force_motor[i]), span.t_force)[0]
-        if model.joint_force_table[i] >= 0:
-            entering = entering + along_imaginary(model, int(model.joint_force_table[i]), mean)
-        resisting = f[DAMPER] * rate
-        if f[FRICTION] > 0 or f[COEFFICIENT] > 0:
-            resisting = resisting + (f[FRICTION] + f[COEFFICIENT] * normal) * np.tanh(rate / f[SPEED])
-        Q = Q + entering - f[SPRING] * mean - resisting
+        entering = f.preload[i] + 0.0 * rate
+        if model.joint_forces.motor[i] >= 0:
+            entering = entering + value_of(model, int(model.joint_forces.motor[i]), span.t_force)[0]
+        if model.joint_forces.table[i] >= 0:
+            entering = entering + along_imaginary(model, int(model.joint_forces.table[i]), mean)
+        resisting = f.damping[i] * rate
+        if f.friction[i] > 0 or f.coefficient[i] > 0:
+            resisting = resisting + (f.friction[i] + f.coefficient[i] * normal) * np.tanh(rate / f.speed[i])
+        Q = Q + entering - f.stiffness[i] * mean - resisting
         given = given + entering * change
         taken = taken + resisting * change
     if is_angle:
         angle_loads(model, k, pair, loads, Q)
     else:
         add_pair(pair, loads, Q[..., None] * E)
-        pair[0].add_direction(loads[0], model.row_x[k], Q[..., None] * d)
+        pair[0].add_direction(loads[0], model.rows.x[k], Q[..., None] * d)
     return Given(given, taken)
 
 

@@ -10,9 +10,9 @@ __all__ = ["along_imaginary", "value_of"]
 
 def value_of(model: Model, f: int, t: float) -> tuple[float, float]:
     """Return function f at t and its rate: a polynomial of degree five and a sine on each piece."""
-    first, last = int(model.piece0[f]), int(model.piece0[f + 1])
-    k = first + max(int(np.searchsorted(model.piece_t[first:last], t, side="right")) - 1, 0)
-    x, c = t - model.piece_t[k], model.piece[k]
+    first, last = int(model.functions.piece0[f]), int(model.functions.piece0[f + 1])
+    k = first + max(int(np.searchsorted(model.functions.begin[first:last], t, side="right")) - 1, 0)
+    x, c = t - model.functions.begin[k], model.functions.piece[k]
     value, rate = 0.0, 0.0
     for a in c[5::-1]:
         rate = rate * x + value

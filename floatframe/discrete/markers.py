@@ -58,16 +58,16 @@ class BodyMarker:
 
 def body_marker(model: Model, bodies: tuple[CentralBody, ...], m: int) -> BodyMarker:
     """Return the constants of marker m of a model."""
-    i = int(model.m_body[m])
+    i = int(model.markers.body[m])
     if i < 0:
-        return BodyMarker(-1, None, MarkerShape(model.m_position[m], model.m_triad[m]))
-    body, first, bend0 = bodies[i], int(model.m_psi0[m]), int(model.m_bend0[m])
+        return BodyMarker(-1, None, MarkerShape(model.markers.position[m], model.markers.triad[m]))
+    body, first, bend0 = bodies[i], int(model.markers.psi0[m]), int(model.markers.bend0[m])
     n = body.n
-    psi = model.psi[first : first + 6 * n].reshape(6, n) if first >= 0 else None
-    bend = model.bend[bend0 : bend0 + 6 * n * n].reshape(n, 6, n) if bend0 >= 0 else None  # [l, a, k]
+    psi = model.markers.psi[first : first + 6 * n].reshape(6, n) if first >= 0 else None
+    bend = model.markers.bend[bend0 : bend0 + 6 * n * n].reshape(n, 6, n) if bend0 >= 0 else None  # [l, a, k]
     if bend is not None:
         bend = np.ascontiguousarray(np.moveaxis(bend, 0, 2))
-    return BodyMarker(i, body, MarkerShape(model.m_position[m], model.m_triad[m], psi, bend))
+    return BodyMarker(i, body, MarkerShape(model.markers.position[m], model.markers.triad[m], psi, bend))
 
 
 class Load:

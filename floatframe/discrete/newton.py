@@ -124,15 +124,15 @@ def connection_residual(
             steps = [None if x is None else step_of(placed[marker.body], x) for marker, x in ends]
             pair = pair_of(connection, (steps[0], steps[1]))
         values = ds.values(connection, pair, span)
-        out.append(np.stack(values, axis=-1) + ds.model.row_soft[list(connection.held)] * mu)
+        out.append(np.stack(values, axis=-1) + ds.model.rows.soft[list(connection.held)] * mu)
     return np.concatenate(out, axis=-1)
 
 
 def unknowns_of(ds: DiscreteSystem, connection: Connection) -> IntArray:
     """Return the numbers of the unknowns of a connection."""
-    parts = [np.arange(ds.model.u0[m.body], ds.model.u0[m.body + 1]) for m in (connection.a, connection.b)
+    parts = [np.arange(ds.model.bodies.u0[m.body], ds.model.bodies.u0[m.body + 1]) for m in (connection.a, connection.b)
              if m.body >= 0]  # fmt: skip
-    n_u = int(ds.model.u0[-1])
+    n_u = int(ds.model.bodies.u0[-1])
     return np.concatenate([*parts, n_u + connection.first + np.arange(len(connection.held))])
 
 
@@ -142,7 +142,7 @@ def assemble(
     """Return the residual of all unknowns, and the blocks of its derivative with their places."""
     residual, blocks = np.zeros(len(z)), []
     for i, place in enumerate(placed):
-        at = np.arange(ds.model.u0[i], ds.model.u0[i + 1])
+        at = np.arange(ds.model.bodies.u0[i], ds.model.bodies.u0[i + 1])
         value, derivative = local(
             partial(body_residual, ds, scheme, i, place, span),
             z[at], with_derivative=with_derivative,
@@ -193,11 +193,11 @@ def solve_step(
     StepError
         If Newton's method does not converge or its matrix is singular.
     """
-    h, n_u = span.h, int(ds.model.u0[-1])
+    h, n_u = span.h, int(ds.model.bodies.u0[-1])
     weight, floor = np.zeros(n_u), 0.0
     z = np.zeros(n_u + ds.n_held)
     for i, (body, place) in enumerate(zip(ds.bodies, placed, strict=True)):
-        u = slice(int(ds.model.u0[i]), int(ds.model.u0[i + 1]))
+        u = slice(int(ds.model.bodies.u0[i]), int(ds.model.bodies.u0[i + 1]))
         z[u] = h * np.concatenate([place.v, place.omega, place.q_dot])
         modal = np.diag(body.M) + 0.25 * h**2 * np.diag(body.K)
         weight[u] = np.concatenate([np.full(3, body.m), np.diag(body.J0), modal])
@@ -222,7 +222,7 @@ def solve_step(
         allowed = tolerance * (size + fall) + ROUNDOFF * np.sqrt(floor)
         excess = norm / allowed
         if norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2):
-            x = [z[ds.model.u0[i] : ds.model.u0[i + 1]] for i in range(len(placed))]
+            x = [z[ds.model.bodies.u0[i] : ds.model.bodies.u0[i + 1]] for i in range(len(placed))]
             return Solution(x, 2 * z[n_u:] / h**2, iteration + 1)
         if norm > SLOW * last:
             solver = None
@@ -252,7 +252,7 @@ def work_of(
         loads = (Load(sizes[0], (), float), Load(sizes[1], (), float))
         part = ds.connection_loads(connection, pair, loads, span, f)
         given, taken = given + float(part.given), taken + float(part.taken)
-        driven = f * (ds.model.row_motion[list(connection.held)] >= 0)
+        driven = f * (ds.model.rows.motion[list(connection.held)] >= 0)
         if driven.any():
             loads = (Load(sizes[0], (), float), Load(sizes[1], (), float))
             for j, k in enumerate(connection.held):

@@ -61,7 +61,7 @@ class DiscreteSystem:
     def connection_loads(self, connection: Connection, pair: Pair, loads: Loads, span: Span, f: Array) -> Given:
         """Add reactions with multipliers f, (..., n_held of it), and the forces of a connection."""
         model = self.model
-        if model.c_law[connection.number] == SPRING_LAW:
+        if model.connections.law[connection.number] == SPRING_LAW:
             return spring_load(model, connection.number, pair, loads, span)
         for j, k in enumerate(connection.held):
             add_reaction(model, k, pair, loads, span, f[..., j])
@@ -83,9 +83,9 @@ def normal_force(model: Model, k: int, connection: Connection, pair: Pair, f: Ar
     a, _ = pair
     F = np.zeros((*f.shape[:-1], 3), f.dtype)
     for j, row in enumerate(connection.held):
-        if is_held_length(model.row_kind[row]):
+        if is_held_length(model.rows.kind[row]):
             F = F + f[..., j, None] * reaction_direction(model, row, pair, span)
-    axis = model.row_x[k] if int(model.row_kind[k]) == PUSH else np.cross(model.row_x[k], model.row_z[k])
+    axis = model.rows.x[k] if int(model.rows.kind[k]) == PUSH else np.cross(model.rows.x[k], model.rows.z[k])
     E_0, E_1 = a.ends(axis)
     E = 0.5 * (E_0 + E_1)
     square = dot(F, F) - dot(F, E) ** 2
@@ -108,29 +108,29 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
             raise ModelError(f"{scheme}: forces of the kind {type(force).__name__} are not known to it; "
                              "use generalized-alpha")  # fmt: skip
     for c, name in enumerate(compiled.connection_names):
-        if model.c_law[c] not in (JOINT, SPRING_LAW):
+        if model.connections.law[c] not in (JOINT, SPRING_LAW):
             raise ModelError(f"{scheme}: {name!r} is of a kind that is not known to it; use generalized-alpha")
-        if max(model.m_line[model.c_a[c]], model.m_line[model.c_b[c]]) >= 0:
+        if max(model.markers.line[model.connections.a[c]], model.markers.line[model.connections.b[c]]) >= 0:
             words = "slides along a deformed line, which is not known to it"
             raise ModelError(f"{scheme}: {name!r} {words}; use generalized-alpha")
-        if not all(kind_of(k).in_steps for k in model.row_kind[model.c_w0[c] : model.c_w0[c + 1]]):
+        if not all(kind_of(k).in_steps for k in model.rows.kind[model.connections.w0[c] : model.connections.w0[c + 1]]):
             raise ModelError(f"{scheme}: joint {name!r} is of a kind that is not known to it; use generalized-alpha")
     bodies = central_bodies(model, compiled.body_names, scheme)
     connections, n_held = [], 0
-    for c in range(len(model.c_size)):
-        rows = range(int(model.c_w0[c]), int(model.c_w0[c + 1]))
-        held = tuple(k for k in rows if kind_of(model.row_kind[k]).holds)
-        loaded = tuple(k for k in rows if kind_of(model.row_kind[k]).is_loaded)
-        a, b = (body_marker(model, bodies, int(m)) for m in (model.c_a[c], model.c_b[c]))
+    for c in range(len(model.connections.size)):
+        rows = range(int(model.connections.w0[c]), int(model.connections.w0[c + 1]))
+        held = tuple(k for k in rows if kind_of(model.rows.kind[k]).holds)
+        loaded = tuple(k for k in rows if kind_of(model.rows.kind[k]).is_loaded)
+        a, b = (body_marker(model, bodies, int(m)) for m in (model.connections.a[c], model.connections.b[c]))
         connections.append(Connection(c, a, b, held, loaded, n_held))
         n_held += len(held)
     point_forces: list[list[tuple[int, BodyMarker]]] = [[] for _ in bodies]
     cases: list[list[int]] = [[] for _ in bodies]
-    for k, m in enumerate(model.l_marker):
+    for k, m in enumerate(model.loads.marker):
         marker = body_marker(model, bodies, int(m))
         if marker.body >= 0:
             point_forces[marker.body].append((k, marker))
-    for k, i in enumerate(model.d_body):
+    for k, i in enumerate(model.body_loads.body):
         cases[int(i)].append(k)
     return DiscreteSystem(
         model, bodies, tuple(connections), tuple(map(tuple, point_forces)), tuple(map(tuple, cases)), n_held,

@@ -109,13 +109,21 @@ class SphereContact:
             raise ModelError(f"{where}: exponent: expected 3/2 with modulus (Hertz), got {self.exponent:g}")
 
     @property
-    def coefficients(self) -> list[float]:
-        """Numbers for the kernels, in their order."""
+    def coefficients(self) -> dict[str, float]:
+        """Numbers for the kernels, by the names of `kernels.model.Contacts`."""
         k = self.stiffness
         if k is None:
             assert self.modulus is not None  # checked above
             k = hertz_stiffness(self.modulus, self.radius_b, self.radius_a)
         h = DISSIPATIONS[self.dissipation](self.restitution)
-        is_sphere = self.radius_a is not None
-        return [float(is_sphere), self.radius_a or 0.0, self.radius_b, k, self.exponent, h, self.friction,
-                self.friction_speed, self.slow]  # fmt: skip
+        return {
+            "is_sphere": self.radius_a is not None,
+            "radius_a": self.radius_a or 0.0,
+            "radius_b": self.radius_b,
+            "stiffness": k,
+            "exponent": self.exponent,
+            "dissipation": h,
+            "friction": self.friction,
+            "slip_speed": self.friction_speed,
+            "slow": self.slow,
+        }

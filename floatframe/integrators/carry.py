@@ -8,7 +8,8 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError
-from floatframe.kernels.model import Memory, Rows, Work, new_work
+from floatframe.kernels.memory import Memory, Rows, memory_at
+from floatframe.kernels.work import Work, new_work
 from floatframe.state import State
 from floatframe.system import System
 
@@ -76,20 +77,13 @@ def one_step_of(method: Integrator, system: System, t: float, h: float, carry: C
 
 
 def memory_of(carry: Carry) -> Memory:
-    """Return a copy of the memory that the kernels may overwrite."""
-    state = carry.state
-    return Memory(
-        state.r.copy(),
-        state.p.copy(),
-        state.q.copy(),
-        state.u.copy(),
-        np.array(carry.u_dot),
-        np.array(carry.a),
-        np.array(carry.w),
-        np.array(carry.work),
-        np.array(carry.power),
-        np.array([carry.h, carry.h_next, carry.n_steps, carry.n_rejected], dtype=float),
-    )
+    """Return a copy of the memory that the kernels may overwrite; its algorithmic accelerations are u_dot."""
+    memory = memory_at(carry.state, carry.u_dot, carry.w)
+    memory.work_given[...], memory.work_taken[...] = carry.work
+    memory.power_given[...], memory.power_taken[...] = carry.power
+    memory.h[...], memory.h_wanted[...] = carry.h, carry.h_next
+    memory.n_accepted[...], memory.n_rejected[...] = carry.n_steps, carry.n_rejected
+    return memory
 
 
 def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows]:
@@ -98,4 +92,4 @@ def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array,
 
     memory = memory_of(carry)
     rows = observe_state(compiled_system(system).model, work, memory, t)
-    return memory.power, rows
+    return np.array([memory.power_given, memory.power_taken]), rows

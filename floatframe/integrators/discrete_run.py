@@ -12,7 +12,8 @@ from floatframe.discrete.newton import StepError
 from floatframe.discrete.system import DiscreteSystem, discrete_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
-from floatframe.kernels.model import Rows, Work, new_rows
+from floatframe.kernels.memory import Rows, new_rows
+from floatframe.kernels.work import Work
 from floatframe.start.initial import consistent_state, solve_accelerations, with_compatible_velocities
 from floatframe.state import State
 from floatframe.system import System
@@ -55,7 +56,7 @@ class DiscreteScheme:
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the results at the carried state, with accelerations and reactions of the equations of motion."""
         compiled = compiled_system(system)
-        work.time[0] = t
+        work.state.time[...] = t
         fitting = with_compatible_velocities(compiled, work, carry.state)
         u_dot, w = solve_accelerations(compiled, work, fitting)
         _, rows = observed(system, t, replace(carry, u_dot=u_dot, w=w), work)

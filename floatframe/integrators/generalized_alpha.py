@@ -9,7 +9,9 @@ from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, memory_of, observed, one_step_of
-from floatframe.kernels.model import MASS, STIFFNESS, Model, Rows, Work, new_rows
+from floatframe.kernels.memory import Rows, new_rows
+from floatframe.kernels.model import MASS, STIFFNESS, Model
+from floatframe.kernels.work import Work
 from floatframe.start.constraint_words import open_joints
 from floatframe.start.initial import acceleration_rates, consistent_state, velocity_correction
 from floatframe.start.newton_equations import displaced, modal_diagonals
@@ -129,9 +131,10 @@ class GeneralizedAlpha:
         compiled = compiled_system(system)
         carry = self.prepared(system, carry, h, t0 + first * h)
         memory = memory_of(carry)
+        memory.a[:] = carry.a
         n_rows = (first + n_steps) // every - first // every
         rows = new_rows(compiled.model, n_rows)
-        iterations = int(work.counts[2])
+        iterations = int(work.counted.iterations)
         outcome = advance_steps(
             compiled.model,
             work,
@@ -153,14 +156,14 @@ class GeneralizedAlpha:
             State(memory.r, memory.p, memory.q, memory.u),
             memory.u_dot,
             memory.a,
-            float(memory.step[0]),
+            float(memory.h),
             memory.w,
-            memory.work,
-            memory.power,
-            carry.n_iterations + int(work.counts[2]) - iterations,
-            float(memory.step[1]),
-            int(memory.step[2]),
-            int(memory.step[3]),
+            np.array([memory.work_given, memory.work_taken]),
+            np.array([memory.power_given, memory.power_taken]),
+            carry.n_iterations + int(work.counted.iterations) - iterations,
+            float(memory.h_wanted),
+            int(memory.n_accepted),
+            int(memory.n_rejected),
         )
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
         failure = None if outcome.status == 0 else self.explain(system, work, outcome, self.least_step(h))
@@ -178,7 +181,7 @@ class GeneralizedAlpha:
             return h
         model = compiled.model
         _, _, beta, gamma = self.coefficients
-        weight, mass = mass_weights(model), model.mass[model.kind].sum()
+        weight, mass = mass_weights(model), model.body_types.mass[model.bodies.kind].sum()
         resolved = rates / (1 + h**2 * squared_frequencies(model))
         error = abs(gamma / 2 - beta - 1 / 12) * np.sqrt(weight @ resolved**2 / mass) / compiled.length
         fitting = (self.error_tolerance / error) ** (1 / 3) if error > 0 else h
@@ -227,8 +230,8 @@ class GeneralizedAlpha:
         words = f"Newton's method did not converge in {self.max_iterations} iterations"
         if np.isfinite(excess):
             words += f" (last correction {excess:.2g} times the allowed one)"
-        gaps = open_joints(compiled, work.g)
-        if gaps and np.isfinite(work.g).all():
+        gaps = open_joints(compiled, work.connections.g)
+        if gaps and np.isfinite(work.connections.g).all():
             words += f"; {gaps}"
         if least > 0:
             words += f"; this was the least step, h_min = {least:.3g}"
@@ -286,18 +289,18 @@ def hht(alpha: float = -0.1, **options: float) -> GeneralizedAlpha:
 
 def mass_weights(model: Model) -> Array:
     """Return mass, inertia and modal masses of all velocities, (n_u,)."""
-    result = np.zeros(int(model.u0[-1]))
-    for i, t in enumerate(model.kind):
-        parts = [np.full(3, model.mass[t]), np.diag(model.J0[t]), modal_diagonals(model, i, MASS)]
-        result[model.u0[i] : model.u0[i + 1]] = np.concatenate(parts)
+    result = np.zeros(int(model.bodies.u0[-1]))
+    for i, t in enumerate(model.bodies.kind):
+        parts = [np.full(3, model.body_types.mass[t]), np.diag(model.body_types.J0[t]), modal_diagonals(model, i, MASS)]
+        result[model.bodies.u0[i] : model.bodies.u0[i + 1]] = np.concatenate(parts)
     return result
 
 
 def squared_frequencies(model: Model) -> Array:
     """Return K_kk/M_kk for modal velocities (infinite without mass), 0 for the others, (n_u,) [1/s²]."""
-    result = np.zeros(int(model.u0[-1]))
-    for i in range(len(model.kind)):
+    result = np.zeros(int(model.bodies.u0[-1]))
+    for i in range(len(model.bodies.kind)):
         M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
         ratio = np.divide(K, M, out=np.full(len(M), np.inf), where=M > 0)
-        result[model.u0[i] + 6 : model.u0[i + 1]] = np.maximum(ratio, 0.0)
+        result[model.bodies.u0[i] + 6 : model.bodies.u0[i + 1]] = np.maximum(ratio, 0.0)
     return result

@@ -8,7 +8,9 @@ from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
-from floatframe.kernels.model import COUPLER, USER_FORCE, Rows, Work, new_rows, new_work
+from floatframe.kernels.memory import Rows, new_rows
+from floatframe.kernels.model import COUPLER, USER_FORCE
+from floatframe.kernels.work import Work, new_work
 from floatframe.rotations import euler_parameter_rates
 from floatframe.start.initial import assembled, consistent_state, solve_accelerations, with_compatible_velocities
 from floatframe.state import State
@@ -49,7 +51,7 @@ class Ida:
         solver_class()
         compiled = compiled_system(system)
         for c, name in enumerate(compiled.connection_names):
-            if compiled.model.c_law[c] in (COUPLER, USER_FORCE):
+            if compiled.model.connections.law[c] in (COUPLER, USER_FORCE):
                 raise ModelError(f"Ida: {name!r} has a memory of its own, which this scheme does not know; use another")
         made = consistent_state(system, state, t=t)
         return Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
@@ -60,7 +62,7 @@ class Ida:
 
     def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
         """Return the results at the carried state; the carry learns the power at it."""
-        work.time[0] = t
+        work.state.time[...] = t
         power, rows = observed(system, t, carry, work)
         return replace(carry, power=power), rows
 
@@ -82,7 +84,7 @@ class Ida:
         for k, y in enumerate(np.atleast_2d(solution.y)[len(asked) - n_steps :], start=first + 1):
             if not np.isfinite(y).all() or made.problem:
                 break
-            own.time[0] = t[k - first]
+            own.state.time[...] = t[k - first]
             state = assembled(compiled, own, state_of(compiled, y))
             state = with_compatible_velocities(compiled, own, state)
             u_dot, w = solve_accelerations(compiled, own, state)
@@ -118,7 +120,7 @@ def flattened(state: State) -> Array:
 
 def state_of(compiled: CompiledSystem, y: Array) -> State:
     """Return the state of a vector, its Euler parameters made of length one."""
-    n_b, n_q = len(compiled.model.kind), int(compiled.model.q0[-1])
+    n_b, n_q = len(compiled.model.bodies.kind), int(compiled.model.bodies.q0[-1])
     r, p, q, u = np.split(np.array(y), [3 * n_b, 7 * n_b, 7 * n_b + n_q])
     p = p.reshape(n_b, 4)
     return State(r.reshape(n_b, 3), p / np.linalg.norm(p, axis=1, keepdims=True), q, u)
@@ -135,13 +137,13 @@ class Motion:
         """Return y'."""
         model = self.compiled.model
         state = state_of(self.compiled, y)
-        self.work.time[0] = t
+        self.work.state.time[...] = t
         u_dot, _ = solve_accelerations(self.compiled, self.work, state)
         self.n_evaluations += 1
-        starts = model.u0[:-1]
+        starts = model.bodies.u0[:-1]
         r_dot = [state.u[k : k + 3] for k in starts]
         p_dot = [euler_parameter_rates(p, state.u[k + 3 : k + 6]) for p, k in zip(state.p, starts, strict=True)]
-        q_dot = [state.u[model.u0[i] + 6 : model.u0[i + 1]] for i in range(len(starts))]
+        q_dot = [state.u[model.bodies.u0[i] + 6 : model.bodies.u0[i + 1]] for i in range(len(starts))]
         return np.concatenate([*r_dot, *p_dot, *q_dot, u_dot])
 
     def residual(self, t: float, y: Array, y_dot: Array, result: Array) -> None:

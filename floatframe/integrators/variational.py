@@ -135,7 +135,7 @@ def closed_velocities(
         modal = Y + 0.5 * h * (force + load.modal)
         momenta.append(np.concatenate([body.m * x[:3] / h + 0.5 * h * load.force, turning, modal]))
         masses.append(mass_matrix(body, after.q))
-    n_u = int(model.u0[-1])
+    n_u = int(model.bodies.u0[-1])
     G, rate = np.zeros((ds.n_held, n_u)), np.zeros(ds.n_held)
     for c in ds.connections:
         pair = pair_of(c, (at(steps, c.a.body), at(steps, c.b.body)))
@@ -144,15 +144,15 @@ def closed_velocities(
             add_reaction(model, k, pair, (at(parts, c.a.body), at(parts, c.b.body)), end, np.array(1.0))
             for i in {c.a.body, c.b.body} - {-1}:
                 own = np.concatenate([parts[i].force, moved_to[i].R.T @ parts[i].torque, parts[i].modal])
-                G[j, model.u0[i] : model.u0[i + 1]] = own
+                G[j, model.bodies.u0[i] : model.bodies.u0[i + 1]] = own
             rate[j] = rate_in_time(model, k, pair, span.t_1)
     u, X = np.zeros(n_u), np.zeros((n_u, ds.n_held))
     for i, (M, p) in enumerate(zip(masses, momenta, strict=True)):
-        rows = slice(int(model.u0[i]), int(model.u0[i + 1]))
+        rows = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
         u[rows] = np.linalg.solve(M, p)
         X[rows] = np.linalg.solve(M, G[:, rows].T)
     held = [k for c in ds.connections for k in c.held]
-    soft = np.diag(model.row_soft[held])
+    soft = np.diag(model.rows.soft[held])
     try:
         impulse = np.linalg.solve(G @ X + soft, -(rate + G @ u)) if ds.n_held else nothing
     except np.linalg.LinAlgError:
@@ -160,7 +160,7 @@ def closed_velocities(
     u = u + X @ impulse
     result = []
     for i, (place, x) in enumerate(zip(placed, solution.x, strict=True)):
-        own = u[model.u0[i] : model.u0[i + 1]]
+        own = u[model.bodies.u0[i] : model.bodies.u0[i + 1]]
         result.append(moved(place, x, own[:3], own[3:6], own[6:]))
     return result, np.asarray(2 * impulse / h, dtype=float)
 

@@ -18,8 +18,8 @@ the cost.
 
 from floatframe.kernels.compiler.compilation import loops, view
 from floatframe.kernels.dense import add_products
+from floatframe.kernels.marker import cross
 from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
-from floatframe.kernels.rotation import cross
 
 __all__ = ["body_forces", "body_mass_product", "body_tangent", "modal_term"]
 
@@ -27,15 +27,15 @@ __all__ = ["body_forces", "body_mass_product", "body_tangent", "modal_term"]
 @view
 def block(model, i, which, size):
     """Return a constant block of body i as a view of the flat store."""
-    start = model.block0[model.kind[i], which]
-    return model.blocks[start : start + size]
+    start = model.body_types.block0[model.bodies.kind[i], which]
+    return model.body_types.blocks[start : start + size]
 
 
 @loops
 def modal_term(model, i, which, x, out):
     """Add M x, K x or D x of body i to out, (n_q,)."""
-    n = model.n_q[i]
-    if model.is_diagonal[model.kind[i], which - MASS]:
+    n = model.bodies.n_q[i]
+    if model.body_types.is_diagonal[model.bodies.kind[i], which - MASS]:
         diagonal = block(model, i, which, n)
         for k in range(n):
             out[k] += diagonal[k] * x[k]
@@ -51,21 +51,21 @@ def modal_term(model, i, which, x, out):
 @loops
 def first_moments(model, work, i):
     """Write s(q) and 1C(q) = ds/dq into `work`, and K_t q_dot, K_r q_dot of a stiffened body."""
-    t, n, q0, u0 = model.kind[i], model.n_q[i], model.q0[i], model.u0[i]
-    s = work.first[i]
-    s[0], s[1], s[2] = model.S[t, 0], model.S[t, 1], model.S[t, 2]
+    t, n, q0, u0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    s = work.bodies.s[i]
+    s[0], s[1], s[2] = model.body_types.S[t, 0], model.body_types.S[t, 1], model.body_types.S[t, 2]
     if n == 0:
         return
     own = block(model, i, C1, 3 * n)
-    first = work.C1[3 * q0 : 3 * (q0 + n)]
+    first = work.bodies.C1[3 * q0 : 3 * (q0 + n)]
     for j in range(3 * n):
         first[j] = own[j]
-    q = work.q[q0 : q0 + n]
-    if model.is_stiffened[t]:
-        qd = work.u[u0 + 6 : u0 + 6 + n]
+    q = work.state.q[q0 : q0 + n]
+    if model.body_types.is_stiffened[t]:
+        qd = work.state.u[u0 + 6 : u0 + 6 + n]
         K_t = block(model, i, K_TRANSLATION, 3 * n * n)
         K_r = block(model, i, K_ROTATION, 3 * n * n)
-        first_dot, turn_dot = work.C1_dot[3 * q0 : 3 * (q0 + n)], work.R_dot[3 * q0 : 3 * (q0 + n)]
+        first_dot, turn_dot = work.bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)], work.bodies.K_r_q_dot[3 * q0 : 3 * (q0 + n)]
         for j in range(3 * n):
             first_dot[j] = 0.0
             turn_dot[j] = 0.0
@@ -92,38 +92,38 @@ def sum_over_modes(columns, n, x):
 
 @loops
 def body_forces(model, work, i):
-    """Write the left sides of (1) to (3) of body i into `work.residual`, and s, 1C, W, Y, J, D_q_dot into `work`."""
-    t, n, u0, q0 = model.kind[i], model.n_q[i], model.u0[i], model.q0[i]
-    R, g = work.R[i], model.gravity
-    ud, u = work.u_dot, work.u
+    """Write the left sides of (1) to (3) of body i into the residual, and s, 1C, W, Y, J, D_q_dot."""
+    t, n, u0, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
+    R, g = work.state.R[i], model.gravity
+    ud, u = work.state.u_dot, work.state.u
     b0, b1, b2 = ud[u0] - g[0], ud[u0 + 1] - g[1], ud[u0 + 2] - g[2]
     a0 = R[0, 0] * b0 + R[1, 0] * b1 + R[2, 0] * b2
     a1 = R[0, 1] * b0 + R[1, 1] * b1 + R[2, 1] * b2
     a2 = R[0, 2] * b0 + R[1, 2] * b1 + R[2, 2] * b2
-    work.a_B[i, 0] = a0
-    work.a_B[i, 1] = a1
-    work.a_B[i, 2] = a2
+    work.bodies.a_B[i, 0] = a0
+    work.bodies.a_B[i, 1] = a1
+    work.bodies.a_B[i, 2] = a2
     o0, o1, o2 = u[u0 + 3], u[u0 + 4], u[u0 + 5]
     e0, e1, e2 = ud[u0 + 3], ud[u0 + 4], ud[u0 + 5]
-    q = work.q[q0 : q0 + n]
+    q = work.state.q[q0 : q0 + n]
     qd = u[u0 + 6 : u0 + 6 + n]
     qdd = ud[u0 + 6 : u0 + 6 + n]
-    J, Dd = work.J[i], work.D_q_dot[i]
+    J, Dd = work.bodies.J[i], work.bodies.D_q_dot[i]
     for a in range(3):
         for b in range(3):
-            J[a, b] = model.J0[t, a, b]
+            J[a, b] = model.body_types.J0[t, a, b]
             Dd[a, b] = 0.0
     first_moments(model, work, i)
-    s0, s1, s2 = work.first[i, 0], work.first[i, 1], work.first[i, 2]
-    res = work.residual[u0 : u0 + 6 + n]
+    s0, s1, s2 = work.bodies.s[i, 0], work.bodies.s[i, 1], work.bodies.s[i, 2]
+    res = work.bodies.residual[u0 : u0 + 6 + n]
     t0, t1, t2 = 0.0, 0.0, 0.0
     f0, f1, f2 = 0.0, 0.0, 0.0
     if n > 0:
-        W = work.W[9 * q0 : 9 * (q0 + n)]
-        Y = work.Y[3 * q0 : 3 * (q0 + n)]
+        W = work.bodies.W[9 * q0 : 9 * (q0 + n)]
+        Y = work.bodies.Y[3 * q0 : 3 * (q0 + n)]
         products(model, i, q, qd, W, Y)
         c2 = block(model, i, C2, 3 * n)
-        c1 = work.C1[3 * q0 : 3 * (q0 + n)]
+        c1 = work.bodies.C1[3 * q0 : 3 * (q0 + n)]
         c3 = block(model, i, C3, 9 * n)
         h = res[6:]
         for k in range(n):
@@ -177,10 +177,10 @@ def body_forces(model, work, i):
         f0 += w0
         f1 += w1
         f2 += w2
-        if model.is_stiffened[t]:
-            w0, w1, w2 = sum_over_modes(work.C1_dot[3 * q0 : 3 * (q0 + n)], n, qd)
+        if model.body_types.is_stiffened[t]:
+            w0, w1, w2 = sum_over_modes(work.bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)], n, qd)
             f0, f1, f2 = f0 + w0, f1 + w1, f2 + w2
-            w0, w1, w2 = sum_over_modes(work.R_dot[3 * q0 : 3 * (q0 + n)], n, qd)
+            w0, w1, w2 = sum_over_modes(work.bodies.K_r_q_dot[3 * q0 : 3 * (q0 + n)], n, qd)
             t0, t1, t2 = t0 + w0, t1 + w1, t2 + w2
         for b in range(3):
             ob = 2 * u[u0 + 3 + b]
@@ -188,7 +188,7 @@ def body_forces(model, work, i):
             t1 += Dd[1, b] * ob
             t2 += Dd[2, b] * ob
     # (1)
-    m = model.mass[t]
+    m = model.body_types.mass[t]
     x0, x1, x2 = cross(e0, e1, e2, s0, s1, s2)
     y0, y1, y2 = cross(o0, o1, o2, s0, s1, s2)
     y0, y1, y2 = cross(o0, o1, o2, y0, y1, y2)
@@ -209,7 +209,7 @@ def body_forces(model, work, i):
 @loops
 def products(model, i, q, qd, W, Y):
     """Write W_ab = S_ab q and Y = 4C q_dot."""
-    n = model.n_q[i]
+    n = model.bodies.n_q[i]
     S = block(model, i, S_AB, 9 * n * n)
     A = block(model, i, C4, 3 * n * n)
     for j in range(9 * n):
@@ -226,10 +226,10 @@ def body_mass_product(model, work, i, v, out):
 
     `body_forces` has been called for this configuration.
     """
-    t, n, q0 = model.kind[i], model.n_q[i], model.q0[i]
-    J, m = work.J[i], model.mass[t]
-    s0, s1, s2 = work.first[i, 0], work.first[i, 1], work.first[i, 2]
-    first = work.C1[3 * q0 : 3 * (q0 + n)]
+    t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
+    J, m = work.bodies.J[i], model.body_types.mass[t]
+    s0, s1, s2 = work.bodies.s[i, 0], work.bodies.s[i, 1], work.bodies.s[i, 2]
+    first = work.bodies.C1[3 * q0 : 3 * (q0 + n)]
     x0, x1, x2 = cross(v[3], v[4], v[5], s0, s1, s2)
     y0, y1, y2 = cross(s0, s1, s2, v[0], v[1], v[2])
     c0, c1, c2 = sum_over_modes(first, n, v[6:])
@@ -240,7 +240,7 @@ def body_mass_product(model, work, i, v, out):
     out[4] = y1 + J[1, 0] * v[3] + J[1, 1] * v[4] + J[1, 2] * v[5]
     out[5] = y2 + J[2, 0] * v[3] + J[2, 1] * v[4] + J[2, 2] * v[5]
     if n > 0:
-        W = work.W[9 * q0 : 9 * (q0 + n)]
+        W = work.bodies.W[9 * q0 : 9 * (q0 + n)]
         second = block(model, i, C2, 3 * n)
         for k in range(n):
             B0 = second[k] + W[7 * n + k] - W[5 * n + k]
@@ -285,16 +285,16 @@ def body_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     dq_dot = c_d dq, dq: c_k dq. The derivative by the rotation of the body itself (da = a × dphi) goes
     unweighted into turn, (6 + n, 3). `body_forces` has been called for this iterate.
     """
-    t, n, u0, q0 = model.kind[i], model.n_q[i], model.u0[i], model.q0[i]
-    m = model.mass[t]
-    u, J, Dd = work.u, work.J[i], work.D_q_dot[i]
-    a0, a1, a2 = work.a_B[i, 0], work.a_B[i, 1], work.a_B[i, 2]
+    t, n, u0, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
+    m = model.body_types.mass[t]
+    u, J, Dd = work.state.u, work.bodies.J[i], work.bodies.D_q_dot[i]
+    a0, a1, a2 = work.bodies.a_B[i, 0], work.bodies.a_B[i, 1], work.bodies.a_B[i, 2]
     o0, o1, o2 = u[u0 + 3], u[u0 + 4], u[u0 + 5]
     qd = u[u0 + 6 : u0 + 6 + n]
     H[:, :] = 0.0
     turn[:, :] = 0.0
-    s0, s1, s2 = work.first[i, 0], work.first[i, 1], work.first[i, 2]
-    v0, v1, v2 = sum_over_modes(work.C1[3 * q0 : 3 * (q0 + n)], n, qd)
+    s0, s1, s2 = work.bodies.s[i, 0], work.bodies.s[i, 1], work.bodies.s[i, 2]
+    v0, v1, v2 = sum_over_modes(work.bodies.C1[3 * q0 : 3 * (q0 + n)], n, qd)
     # by a
     for k in range(3):
         H[k, k] = c_m * m
@@ -362,15 +362,15 @@ def put_column(H, row, column, x0, x1, x2):
 @loops
 def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
     """Write the rows and columns of the modes; see `body_tangent`."""
-    n, q0, u0 = model.n_q[i], model.q0[i], model.u0[i]
-    W = work.W[9 * q0 : 9 * (q0 + n)]
-    Y = work.Y[3 * q0 : 3 * (q0 + n)]
-    c1 = work.C1[3 * q0 : 3 * (q0 + n)]
+    n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
+    W = work.bodies.W[9 * q0 : 9 * (q0 + n)]
+    Y = work.bodies.Y[3 * q0 : 3 * (q0 + n)]
+    c1 = work.bodies.C1[3 * q0 : 3 * (q0 + n)]
     c2 = block(model, i, C2, 3 * n)
     c3 = block(model, i, C3, 9 * n)
-    a0, a1, a2 = work.a_B[i, 0], work.a_B[i, 1], work.a_B[i, 2]
-    o0, o1, o2 = work.u[u0 + 3], work.u[u0 + 4], work.u[u0 + 5]
-    e0, e1, e2 = work.u_dot[u0 + 3], work.u_dot[u0 + 4], work.u_dot[u0 + 5]
+    a0, a1, a2 = work.bodies.a_B[i, 0], work.bodies.a_B[i, 1], work.bodies.a_B[i, 2]
+    o0, o1, o2 = work.state.u[u0 + 3], work.state.u[u0 + 4], work.state.u[u0 + 5]
+    e0, e1, e2 = work.state.u_dot[u0 + 3], work.state.u_dot[u0 + 4], work.state.u_dot[u0 + 5]
     for k in range(n):
         x0, x1, x2 = c1[k], c1[n + k], c1[2 * n + k]
         b0 = c2[k] + W[7 * n + k] - W[5 * n + k]
@@ -406,7 +406,7 @@ def modal_tangent(model, work, i, c_m, c_d, c_k, H, turn):
         row[5] = c_m * b2 + c_d * (2 * Y[2 * n + k] - j2)
         turn[6 + k, 0], turn[6 + k, 1], turn[6 + k, 2] = v0, v1, v2
     modal_columns(model, work, i, c_d, c_k, H)
-    if model.is_stiffened[model.kind[i]]:
+    if model.body_types.is_stiffened[model.bodies.kind[i]]:
         stiffened_columns(model, work, i, c_d, c_k, H)
     modal_block(model, i, MASS, c_m, H)
     modal_block(model, i, DAMPING, c_d, H)
@@ -420,33 +420,34 @@ def modal_columns(model, work, i, c_d, c_k, H):
     2 4C_kj·omega, B'_kj·alpha - omegaᵀ 5C_jk omega; Σ_k B'_kj q_ddot_k + 2 Σ_k q_dot_k 5C_jk omega, where B'_kj is the
     derivative of B_k by q_j: 4C_kj, and K_r,kj of a stiffened body; both are in S_ab.
     """
-    n, u0 = model.n_q[i], model.u0[i]
+    n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
     S = block(model, i, S_AB, 9 * n * n)
     A = block(model, i, C4, 3 * n * n)
-    qd = work.u[u0 + 6 : u0 + 6 + n]
-    qdd = work.u_dot[u0 + 6 : u0 + 6 + n]
-    o, weight = work.u[u0 + 3 : u0 + 6], work.scratch[:9]
-    e = work.u_dot[u0 + 3 : u0 + 6]
+    qd = work.state.u[u0 + 6 : u0 + 6 + n]
+    qdd = work.state.u_dot[u0 + 6 : u0 + 6 + n]
+    o = work.state.u[u0 + 3 : u0 + 6]
+    e = work.state.u_dot[u0 + 3 : u0 + 6]
     # alpha·B'_jk = alpha·B'_kj - 2 alpha·4C_kj, the former by S_ab
     f0, f1, f2 = 2 * (c_d * o[0] + c_k * e[0]), 2 * (c_d * o[1] + c_k * e[1]), 2 * (c_d * o[2] + c_k * e[2])
     square = o[0] * o[0] + o[1] * o[1] + o[2] * o[2]
-    for a in range(3):  # omegaᵀ 5C omega = Σ weight_ab S_ab
-        for b in range(3):
-            weight[3 * a + b] = -c_k * ((square if a == b else 0.0) - o[a] * o[b])
-    for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
-        weight[3 * c + b] += c_k * e[a]
-        weight[3 * b + c] -= c_k * e[a]
+    xy, xz, yz = c_k * o[0] * o[1], c_k * o[0] * o[2], c_k * o[1] * o[2]
+    weight = (  # omegaᵀ 5C omega = Σ weight_ab S_ab
+        c_k * (o[0] * o[0] - square), xy - c_k * e[2], xz + c_k * e[1],
+        xy + c_k * e[2], c_k * (o[1] * o[1] - square), yz - c_k * e[0],
+        xz - c_k * e[1], yz + c_k * e[0], c_k * (o[2] * o[2] - square),
+    )  # fmt: skip
     for j in range(n):
         row4 = A[3 * n * j : 3 * n * (j + 1)]  # 4C_kj over [a, k]
         rows = S[9 * n * j : 9 * n * (j + 1)]  # ∫ phi_a,k phi_b,j over [ab, k]
         out = H[6 + j, 6:]  # row j from column j: 4C is antisymmetric in k, j, the rest symmetric
         for k in range(n):
             out[k] = -(f0 * row4[k] + f1 * row4[n + k] + f2 * row4[2 * n + k])
-        for ab in range(9):
-            factor = weight[ab]
-            for k in range(n):
-                out[k] += factor * rows[ab * n + k]
+        for k in range(n):
+            out[k] += (
+                (weight[0] * rows[k] + weight[1] * rows[n + k] + weight[2] * rows[2 * n + k])
+                + (weight[3] * rows[3 * n + k] + weight[4] * rows[4 * n + k] + weight[5] * rows[5 * n + k])
+                + (weight[6] * rows[6 * n + k] + weight[7] * rows[7 * n + k] + weight[8] * rows[8 * n + k])
+            )
         trace = 0.0
         for r in range(3):
             for k in range(n):
@@ -467,12 +468,12 @@ def modal_columns(model, work, i, c_d, c_k, H):
 @loops
 def stiffened_columns(model, work, i, c_d, c_k, H):
     """Add what K_t gives beyond s(q) and 1C(q), and the derivatives of q_dotᵀK_t q_dot, q_dotᵀK_r q_dot."""
-    n, q0, u0 = model.n_q[i], model.q0[i], model.u0[i]
+    n, q0, u0 = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i]
     K_t = block(model, i, K_TRANSLATION, 3 * n * n)
-    first_dot, turn_dot = work.C1_dot[3 * q0 : 3 * (q0 + n)], work.R_dot[3 * q0 : 3 * (q0 + n)]
-    qdd = work.u_dot[u0 + 6 : u0 + 6 + n]
-    a0, a1, a2 = c_k * work.a_B[i, 0], c_k * work.a_B[i, 1], c_k * work.a_B[i, 2]
-    o0, o1, o2 = work.u[u0 + 3], work.u[u0 + 4], work.u[u0 + 5]
+    first_dot, turn_dot = work.bodies.K_t_q_dot[3 * q0 : 3 * (q0 + n)], work.bodies.K_r_q_dot[3 * q0 : 3 * (q0 + n)]
+    qdd = work.state.u_dot[u0 + 6 : u0 + 6 + n]
+    a0, a1, a2 = c_k * work.bodies.a_B[i, 0], c_k * work.bodies.a_B[i, 1], c_k * work.bodies.a_B[i, 2]
+    o0, o1, o2 = work.state.u[u0 + 3], work.state.u[u0 + 4], work.state.u[u0 + 5]
     for j in range(n):
         row = K_t[3 * n * j : 3 * n * (j + 1)]  # over [a, k]
         out = H[6 + j, 6:]
@@ -491,8 +492,8 @@ def stiffened_columns(model, work, i, c_d, c_k, H):
 @loops
 def modal_block(model, i, which, factor, H):
     """Add factor * M, K or D to the modal block of H."""
-    n = model.n_q[i]
-    if model.is_diagonal[model.kind[i], which - MASS]:
+    n = model.bodies.n_q[i]
+    if model.body_types.is_diagonal[model.bodies.kind[i], which - MASS]:
         diagonal = block(model, i, which, n)
         for k in range(n):
             H[6 + k, 6 + k] += factor * diagonal[k]

@@ -7,26 +7,30 @@ import logging
 import time
 from typing import NamedTuple
 
-import numpy as np
 from numba import types
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.compiler.choice import is_lean, words
 from floatframe.kernels.compiler.compilation import entry
 from floatframe.kernels.compiler.sources import source_digest
-from floatframe.kernels.compiler.structure import as_memory, as_model, as_rows, as_work, table_of
+from floatframe.kernels.compiler.structure import converter, table_of
 from floatframe.kernels.connections.connection import constraint_rates
 from floatframe.kernels.diagnostics import power
 from floatframe.kernels.evaluation import evaluate, linearize
 from floatframe.kernels.generalized_alpha import DONE, SINGULAR_BODY, SINGULAR_CONNECTION, advance, write_row
-from floatframe.kernels.model import Memory, Model, Rows, Work, new_rows
+from floatframe.kernels.memory import Memory, Rows, new_rows
+from floatframe.kernels.model import Model
+from floatframe.kernels.records import filled, integer, real, zeros
 from floatframe.kernels.schur import correction, factorize_bodies
+from floatframe.kernels.work import Work
 
 __all__ = [
+    "Order",
     "Outcome",
     "advance_steps",
     "evaluate_and_linearize",
     "newton_correction",
+    "no_memory",
     "observe_state",
     "prepare",
     "rates_of_constraints",
@@ -35,6 +39,29 @@ __all__ = [
 log = logging.getLogger(__name__)
 
 LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE = range(5)
+
+
+class Order(NamedTuple):
+    """What an entry is asked for."""
+
+    what: IntArray = integer()  #: LINEARIZE, RATES, CORRECT, OBSERVE or ADVANCE
+    c_m: Array = real()  #: weights of the parts of mass, damping, stiffness
+    c_d: Array = real(unit="s")
+    c_k: Array = real(unit="s²")
+    t0: Array = real(unit="s")  #: of step 0, or of the state that is observed
+    h: Array = real(unit="s")
+    first: IntArray = integer()  #: number of the first step
+    n_steps: IntArray = integer()
+    every: IntArray = integer()  #: results are written after every so many steps
+    alpha_m: Array = real()  #: coefficients of the method
+    alpha_f: Array = real()
+    beta: Array = real()
+    gamma: Array = real()
+    tolerance: Array = real()  #: of Newton's method
+    max_iterations: IntArray = integer()
+    length: Array = real(unit="m")  #: size of the system
+    most_error: Array = real()  #: of a step, 0 for none asked
+    h_min: Array = real(unit="s")  #: into which a step may be divided, 0 if it may not
 
 
 class Outcome(NamedTuple):
@@ -47,43 +74,32 @@ class Outcome(NamedTuple):
     excess: float  #: size of the last correction by the allowed one
 
 
+as_model, as_work, as_memory = converter(Model()), converter(Work()), converter(Memory())
+as_rows, as_order = converter(Rows()), converter(Order())
+
+
 def make_entry(digest):
     """Return the cached entry; the digest of the sources enters its key, see the package docstring."""
 
-    def run(what, model_table, work_table, memory_table, rows_table, numbers, integers, out):
+    def run(model_table, work_table, memory_table, rows_table, order_table):
         if digest == 0:
             return DONE, 0, 0, -1, 0.0
         model, work = as_model(model_table), as_work(work_table)
-        memory, rows = as_memory(memory_table), as_rows(rows_table)
+        memory, rows, order = as_memory(memory_table), as_rows(rows_table), as_order(order_table)
+        what = order.what
         if what == ADVANCE:
-            return advance(
-                model,
-                work,
-                memory,
-                numbers[0],
-                numbers[1],
-                integers[0],
-                integers[1],
-                integers[2],
-                numbers[6:10],
-                numbers[2],
-                integers[3],
-                numbers[3],
-                numbers[4],
-                numbers[5],
-                rows,
-            )
+            return advance(model, work, memory, rows, order)
         if what == OBSERVE:
-            work.counts[4] = 0
-            write_row(model, work, memory, numbers[0], rows)
-            memory.power[0], memory.power[1] = power(model, work)
+            work.counted.rows = 0
+            write_row(model, work, memory, order.t0, rows)
+            memory.power_given, memory.power_taken = power(model, work)
         else:
-            c_m, c_d, c_k = numbers[0], numbers[1], numbers[2]
+            c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
             evaluate(model, work, c_k if c_k > 0.0 else 1.0)
             if what == LINEARIZE:
                 linearize(model, work, c_m, c_d, c_k)
             elif what == RATES:
-                constraint_rates(model, work, out[0], out[1])
+                constraint_rates(model, work)
             else:
                 body = factorize_bodies(model, work, c_m, c_d, c_k)
                 if body >= 0:
@@ -101,18 +117,11 @@ def make_entry(digest):
 
 run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 
-TABLE = types.Array(types.int64, 1, "C")
-SIGNATURE = (
-    types.int64,
-    *[TABLE] * 4,
-    types.Array(types.float64, 1, "C"),
-    types.Array(types.int64, 1, "C"),
-    types.Array(types.float64, 2, "C"),
-)
+SIGNATURE = (types.Array(types.int64, 1, "C"),) * 5
 
-NOTHING = np.zeros(0)
-NO_INTEGERS = np.zeros(0, np.int64)
-NO_OUT = np.zeros((0, 0))
+NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w"), 0)
+NOTHING = zeros(Order(), {})
+NO_ROWS = zeros(Rows(), NO_SIZES)
 
 
 def prepare() -> bool:
@@ -125,47 +134,42 @@ def prepare() -> bool:
     return sum(run.stats.cache_misses.values()) > before
 
 
-def call(
-    what: int, model: Model, work: Work, memory: Memory, rows: Rows, numbers: Array, integers: IntArray, out: Array
-) -> Outcome:
-    """Run the entry; all arrays live until it returns."""
+def call(model: Model, work: Work, memory: Memory, rows: Rows, **order: float) -> Outcome:
+    """Run the entry with an order, what it does not name being zero; all arrays live until it returns."""
     if not run.signatures:
         began = time.perf_counter()
         if prepare():
             level = logging.INFO if is_lean else logging.WARNING  # what is not as usual is said
             log.log(level, "compiled the code of the motion in %.0f s, once: %s", time.perf_counter() - began, words())
-    tables = [table_of(data) for data in (model, work, memory, rows)]
-    return Outcome(*run(what, *tables, numbers, integers, out))
+    ordered = filled(Order(), **(NOTHING._asdict() | order))
+    return Outcome(*run(*(table_of(record) for record in (model, work, memory, rows, ordered))))
 
 
 def no_memory() -> Memory:
     """Return an empty memory, for what needs none."""
-    return Memory(np.zeros((0, 3)), np.zeros((0, 4)), *(np.zeros(0) for _ in range(8)))
+    return zeros(Memory(), NO_SIZES)
 
 
 def evaluate_and_linearize(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> None:
     """Write residuals and derivatives for the iterate in `work`; rows of wrenches weighted by c_k if above 0."""
-    numbers = np.array([c_m, c_d, c_k])
-    call(LINEARIZE, model, work, no_memory(), new_rows(model, 0), numbers, NO_INTEGERS, NO_OUT)
+    call(model, work, no_memory(), NO_ROWS, what=LINEARIZE, c_m=c_m, c_d=c_d, c_k=c_k)
 
 
 def rates_of_constraints(model: Model, work: Work) -> tuple[Array, Array]:
     """Return for every row the rate of the held quantity, and its second rate at zero u_dot, both (n_w,)."""
-    out = np.zeros((2, len(work.w)))
-    call(RATES, model, work, no_memory(), new_rows(model, 0), np.zeros(3), NO_INTEGERS, out)
-    return out[0], out[1]
+    call(model, work, no_memory(), NO_ROWS, what=RATES)
+    return work.connections.rate.copy(), work.connections.bias.copy()
 
 
 def newton_correction(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> Outcome:
     """Write the Newton correction (y, mu) for the iterate in `work`."""
-    numbers = np.array([c_m, c_d, c_k])
-    return call(CORRECT, model, work, no_memory(), new_rows(model, 0), numbers, NO_INTEGERS, NO_OUT)
+    return call(model, work, no_memory(), NO_ROWS, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k)
 
 
 def observe_state(model: Model, work: Work, memory: Memory, t: float) -> Rows:
     """Return the results at the state in the memory; the power at it goes into the memory."""
     rows = new_rows(model, 1)
-    call(OBSERVE, model, work, memory, rows, np.array([t]), NO_INTEGERS, NO_OUT)
+    call(model, work, memory, rows, what=OBSERVE, t0=t)
     return rows
 
 
@@ -188,6 +192,9 @@ def advance_steps(
     h_min: float,
 ) -> Outcome:
     """Advance the memory by n_steps of the generalized-alpha method; see `kernels.generalized_alpha.advance`."""
-    numbers = np.array([t0, h, tolerance, length, most_error, h_min, *coefficients])
-    integers = np.array([first, n_steps, every, max_iterations], np.int64)
-    return call(ADVANCE, model, work, memory, rows, numbers, integers, NO_OUT)
+    alpha_m, alpha_f, beta, gamma = coefficients
+    return call(
+        model, work, memory, rows, what=ADVANCE, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
+        alpha_m=alpha_m, alpha_f=alpha_f, beta=beta, gamma=gamma, tolerance=tolerance, max_iterations=max_iterations,
+        length=length, most_error=most_error, h_min=h_min,
+    )  # fmt: skip

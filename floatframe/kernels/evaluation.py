@@ -7,6 +7,7 @@ from floatframe.kernels.connections.deformed_line import slide_marker
 from floatframe.kernels.connections.time_function import time_function
 from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, rotate, wrench_to_body
 from floatframe.kernels.rotation import right_jacobian
+from floatframe.kernels.vector import put_matrix, vector
 
 __all__ = ["evaluate", "linearize", "tangent_of_body"]
 
@@ -14,35 +15,35 @@ __all__ = ["evaluate", "linearize", "tangent_of_body"]
 @inner
 def evaluate(model, work, c_k):
     """Write the residuals of bodies and rows for the iterate in `work`; rows of wrenches weighted by c_k."""
-    for m in range(model.m_body.shape[0]):
+    for m in range(model.markers.body.shape[0]):
         marker_motion(model, work, m)
         for k in range(6):
-            work.m_wrench[m, k] = 0.0
-    for k in range(model.line_marker.shape[0]):
+            work.markers.wrench[m, k] = 0.0
+    for k in range(model.lines.marker.shape[0]):
         slide_marker(model, work, k)
-    for c in range(model.c_size.shape[0]):
+    for c in range(model.connections.size.shape[0]):
         connection_rows(model, work, c, c_k)
-    for k in range(model.l_marker.shape[0]):
+    for k in range(model.loads.marker.shape[0]):
         load_wrench(model, work, k)
-    for i in range(model.kind.shape[0]):
+    for i in range(model.bodies.kind.shape[0]):
         body_forces(model, work, i)
-    for m in range(model.m_body.shape[0]):
+    for m in range(model.markers.body.shape[0]):
         wrench_to_body(model, work, m)
-    for d in range(model.d_body.shape[0]):
+    for d in range(model.body_loads.body.shape[0]):
         body_load(model, work, d)
-    work.counts[0] += 1
+    work.counted.evaluations += 1
 
 
 @inner
 def load_wrench(model, work, k):
     """Write the wrench of load k on its marker, ground axes."""
-    m = model.l_marker[k]
-    F, f, t = work.m_wrench[m], model.l_force[k], model.l_torque[k]
+    m = model.loads.marker[k]
+    F, f, t = work.markers.wrench[m], model.loads.force[k], model.loads.torque[k]
     factor = 1.0
-    if model.l_factor[k] >= 0:
-        factor, _, _ = time_function(model, model.l_factor[k], work.time[0])
-    if model.m_follower[m]:
-        A = work.m_A[m]
+    if model.loads.factor[k] >= 0:
+        factor, _, _ = time_function(model, model.loads.factor[k], work.state.time)
+    if model.markers.is_follower[m]:
+        A = work.markers.A[m]
         F[0], F[1], F[2] = rotate(A, f[0], f[1], f[2])
         F[3], F[4], F[5] = rotate(A, t[0], t[1], t[2])
     else:
@@ -56,10 +57,10 @@ def load_wrench(model, work, k):
 @inner
 def body_load(model, work, d):
     """Subtract load case d, fixed in the axes of its body, from the residual."""
-    i, first = model.d_body[d], model.d_first[d]
-    factor, _, _ = time_function(model, model.d_factor[d], work.time[0])
-    for k in range(6 + model.n_q[i]):
-        work.residual[model.u0[i] + k] -= factor * model.d_values[first + k]
+    i, first = model.body_loads.body[d], model.body_loads.value0[d]
+    factor, _, _ = time_function(model, model.body_loads.factor[d], work.state.time)
+    for k in range(6 + model.bodies.n_q[i]):
+        work.bodies.residual[model.bodies.u0[i] + k] -= factor * model.body_loads.values[first + k]
 
 
 @inner
@@ -68,14 +69,14 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
 
     turning, (3, 3): rotation of the body by its unknown dtheta, see `marker_columns`.
     """
-    n = model.n_q[i]
-    turn = work.scratch[9 : 9 + 3 * (6 + n)].reshape((6 + n, 3))
+    n = model.bodies.n_q[i]
+    turn = work.bodies.by_turn[: 6 + n]
     body_tangent(model, work, i, c_m, c_d, c_k, H, turn)
-    for e in range(model.end0[i], model.end0[i + 1]):
-        marker_stiffness(model, work, model.ends[e], c_k, H, turn)
-    for k in range(model.l_marker.shape[0]):
-        m = model.l_marker[k]
-        if model.m_body[m] == i:
+    for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+        marker_stiffness(model, work, model.bodies.ends[e], c_k, H, turn)
+    for k in range(model.loads.marker.shape[0]):
+        m = model.loads.marker[k]
+        if model.markers.body[m] == i:
             marker_stiffness(model, work, m, c_k, H, turn)
     for r in range(6 + n):
         for b in range(3):
@@ -86,17 +87,17 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
 def linearize(model, work, c_m, c_d, c_k):
     """Write H of every body, J_row and J_column of every end, and P, V of every connection (nothing factorised)."""
     rate = c_d / c_k if c_k > 0.0 else 0.0
-    for i in range(model.kind.shape[0]):
-        n = 6 + model.n_q[i]
-        turning = work.turning[i]
-        right_jacobian(work.theta[i], turning)
-        H = work.H[model.h0[i] : model.h0[i + 1]].reshape((n, n))
+    for i in range(model.bodies.kind.shape[0]):
+        n = 6 + model.bodies.n_q[i]
+        turning = work.bodies.T_right[i]
+        put_matrix(turning, right_jacobian(vector(work.state.theta[i])))
+        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
         tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
-        for e in range(model.end0[i], model.end0[i + 1]):
-            m = model.ends[e]
-            o = model.m_x0[m]
-            column = work.J_column[6 * o : 6 * (o + n)].reshape((6, n))
-            row = work.J_row[12 * o : 12 * (o + n)].reshape((12, n))
+        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+            m = model.bodies.ends[e]
+            o = model.markers.x0[m]
+            column = work.solver.J_column[6 * o : 6 * (o + n)].reshape((6, n))
+            row = work.solver.J_row[12 * o : 12 * (o + n)].reshape((12, n))
             marker_columns(model, work, m, rate, turning, column, row)
-    for c in range(model.c_size.shape[0]):
+    for c in range(model.connections.size.shape[0]):
         connection_derivatives(model, work, c, c_k)

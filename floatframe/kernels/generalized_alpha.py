@@ -10,6 +10,7 @@ from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
 from floatframe.kernels.schur import correction, factorize_bodies
 from floatframe.kernels.step_start import begin_step
+from floatframe.kernels.vector import product, put_matrix, vector
 
 __all__ = ["DIVERGED", "DONE", "INACCURATE", "SINGULAR_BODY", "SINGULAR_CONNECTION", "advance", "write_row"]
 
@@ -17,7 +18,6 @@ DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE = 0, 1, 2, 3, 4
 SLOW = 0.2  # ratio of corrections above which the factors are made anew
 MANY = 4  # iterations of a step after which the next one starts with new factors
 ROUNDOFF = 2e-15  # of a position
-H_OF_A, H_WANTED, N_ACCEPTED, N_REJECTED = range(4)  # places in `Memory.step`
 SAFETY = 0.9  # of the step that would just meet the error that is allowed
 LEAST, MOST, WORTH = 0.2, 2.0, 1.2  # a step becomes this much shorter, longer at most; longer only if by this much
 SAME = 1e-12  # relative difference of step sizes that are one
@@ -26,19 +26,19 @@ SAME = 1e-12  # relative difference of step sizes that are one
 @inner
 def put_weights(model, work, c_k):
     """Write the weights of the norm: mass, inertia, M + c_k K."""
-    for i in range(model.kind.shape[0]):
-        t, u0, n = model.kind[i], model.u0[i], model.n_q[i]
+    for i in range(model.bodies.kind.shape[0]):
+        t, u0, n = model.bodies.kind[i], model.bodies.u0[i], model.bodies.n_q[i]
         for k in range(3):
-            work.weight[u0 + k] = model.mass[t]
-            work.weight[u0 + 3 + k] = model.J0[t, k, k]
+            work.solver.weight[u0 + k] = model.body_types.mass[t]
+            work.solver.weight[u0 + 3 + k] = model.body_types.J0[t, k, k]
         for which in (MASS, STIFFNESS):
-            start = model.block0[t, which]
-            step = 1 if model.is_diagonal[t, which - MASS] else n + 1
+            start = model.body_types.block0[t, which]
+            step = 1 if model.body_types.is_diagonal[t, which - MASS] else n + 1
             factor = 1.0 if which == MASS else c_k
             for k in range(n):
                 if which == MASS:
-                    work.weight[u0 + 6 + k] = 0.0
-                work.weight[u0 + 6 + k] += factor * model.blocks[start + k * step]
+                    work.solver.weight[u0 + 6 + k] = 0.0
+                work.solver.weight[u0 + 6 + k] += factor * model.body_types.blocks[start + k * step]
 
 
 @inner
@@ -51,28 +51,23 @@ def copy(source, target):
 @inner
 def load_state(model, work, memory):
     """Copy the memory of the integrator into the iterate; rotation since the beginning of the step is zero."""
-    copy(memory.r.reshape(memory.r.size), work.r.reshape(memory.r.size))
-    copy(memory.q, work.q)
-    copy(memory.u, work.u)
-    copy(memory.u_dot, work.u_dot)
-    copy(memory.w, work.w)
-    for i in range(model.kind.shape[0]):
+    copy(memory.r.reshape(memory.r.size), work.state.r.reshape(memory.r.size))
+    copy(memory.q, work.state.q)
+    copy(memory.u, work.state.u)
+    copy(memory.u_dot, work.state.u_dot)
+    copy(memory.w, work.state.w)
+    for i in range(model.bodies.kind.shape[0]):
         for k in range(3):
-            work.theta[i, k] = 0.0
-    for i in range(model.kind.shape[0]):
-        matrix_of_euler_parameters(memory.p[i], work.R[i])
+            work.state.theta[i, k] = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        put_matrix(work.state.R[i], matrix_of_euler_parameters(memory.p[i]))
 
 
 @inner
-def turn_body(work, memory, i, step):
-    """Write R of body i: that of the beginning of the step, turned by theta. step, (3, 3), is overwritten."""
-    exp_matrix(work.theta[i], step)
-    start = work.turning[i]
-    matrix_of_euler_parameters(memory.p[i], start)
-    R = work.R[i]
-    for a in range(3):
-        for b in range(3):
-            R[a, b] = start[a, 0] * step[0, b] + start[a, 1] * step[1, b] + start[a, 2] * step[2, b]
+def turn_body(work, memory, i):
+    """Write R of body i: that of the beginning of the step, turned by theta."""
+    R_start = matrix_of_euler_parameters(memory.p[i])
+    put_matrix(work.state.R[i], product(R_start, exp_matrix(vector(work.state.theta[i]))))
 
 
 @inner
@@ -80,24 +75,23 @@ def predict(model, work, memory, h, alpha_f):
     """(1): a_new = a. Return the squared size of the acceleration and of the increment, in the norm of `weight`."""
     begin_step(model, work, memory, h, alpha_f)
     size, size_x = 0.0, 0.0
-    step = work.scratch[:9].reshape((3, 3))
-    for i in range(model.kind.shape[0]):
-        n, u0, q0 = model.n_q[i], model.u0[i], model.q0[i]
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
         for k in range(u0, u0 + 6 + n):
             a, u = memory.a[k], memory.u[k]
             x = h * (u + 0.5 * h * a)
-            work.u[k] = u + h * a
-            work.u_dot[k] = (a - alpha_f * memory.u_dot[k]) / (1 - alpha_f)
-            size += work.weight[k] * work.u_dot[k] ** 2
-            size_x += work.weight[k] * x * x
+            work.state.u[k] = u + h * a
+            work.state.u_dot[k] = (a - alpha_f * memory.u_dot[k]) / (1 - alpha_f)
+            size += work.solver.weight[k] * work.state.u_dot[k] ** 2
+            size_x += work.solver.weight[k] * x * x
             j = k - u0
             if j < 3:
-                work.r[i, j] = memory.r[i, j] + x
+                work.state.r[i, j] = memory.r[i, j] + x
             elif j < 6:
-                work.theta[i, j - 3] = x
+                work.state.theta[i, j - 3] = x
             else:
-                work.q[q0 + j - 6] = memory.q[q0 + j - 6] + x
-        turn_body(work, memory, i, step)
+                work.state.q[q0 + j - 6] = memory.q[q0 + j - 6] + x
+        turn_body(work, memory, i)
     return size, size_x
 
 
@@ -105,27 +99,26 @@ def predict(model, work, memory, h, alpha_f):
 def update(model, work, memory, by_rate, by_acceleration, c_k):
     """Add the correction (y, mu) to the iterate; return its squared norm."""
     total = 0.0
-    step = work.scratch[:9].reshape((3, 3))
-    for i in range(model.kind.shape[0]):
-        n, u0, q0 = model.n_q[i], model.u0[i], model.q0[i]
-        R, y = work.R[i], work.y[u0 : u0 + 6 + n]
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
+        R, y = work.state.R[i], work.solver.y[u0 : u0 + 6 + n]
         for k in range(6 + n):
-            total += work.weight[u0 + k] * y[k] * y[k]
+            total += work.solver.weight[u0 + k] * y[k] * y[k]
         x0, x1, x2 = y[0], y[1], y[2]
         for k in range(3):
             dx = R[k, 0] * x0 + R[k, 1] * x1 + R[k, 2] * x2
-            work.r[i, k] += dx
-            work.u[u0 + k] += by_rate * dx
-            work.u_dot[u0 + k] += by_acceleration * dx
-            work.theta[i, k] += y[3 + k]
+            work.state.r[i, k] += dx
+            work.state.u[u0 + k] += by_rate * dx
+            work.state.u_dot[u0 + k] += by_acceleration * dx
+            work.state.theta[i, k] += y[3 + k]
         for k in range(3, 6 + n):
-            work.u[u0 + k] += by_rate * y[k]
-            work.u_dot[u0 + k] += by_acceleration * y[k]
+            work.state.u[u0 + k] += by_rate * y[k]
+            work.state.u_dot[u0 + k] += by_acceleration * y[k]
         for k in range(n):
-            work.q[q0 + k] += y[6 + k]
-        turn_body(work, memory, i, step)
-    for k in range(work.mu.shape[0]):
-        work.w[k] += work.mu[k] / c_k
+            work.state.q[q0 + k] += y[6 + k]
+        turn_body(work, memory, i)
+    for k in range(work.solver.mu.shape[0]):
+        work.state.w[k] += work.solver.mu[k] / c_k
     return total
 
 
@@ -133,97 +126,98 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
 def roundoff_floor(model, work, length):
     """Return the squared norm of rounding errors of the positions."""
     total = 0.0
-    for i in range(model.kind.shape[0]):
+    for i in range(model.bodies.kind.shape[0]):
         size = length
         for k in range(3):
-            size += abs(work.r[i, k])
-        total += model.mass[model.kind[i]] * size * size
+            size += abs(work.state.r[i, k])
+        total += model.body_types.mass[model.bodies.kind[i]] * size * size
     return total * ROUNDOFF * ROUNDOFF
 
 
 @inner
-def local_error(model, work, memory, h, coefficients, length):
+def local_error(model, work, memory, order, h):
     """Return the estimated error of the increment of a step that has converged: rms over the mass, by the length."""
-    alpha_m, alpha_f, beta, gamma = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     total, mass = 0.0, 0.0
-    for i in range(model.kind.shape[0]):
-        t, u0, n = model.kind[i], model.u0[i], model.n_q[i]
-        mass += model.mass[t]
+    for i in range(model.bodies.kind.shape[0]):
+        t, u0, n = model.bodies.kind[i], model.bodies.u0[i], model.bodies.n_q[i]
+        mass += model.body_types.mass[t]
         for k in range(6 + n):
-            mean = (1 - alpha_f) * work.u_dot[u0 + k] + alpha_f * memory.u_dot[u0 + k]
+            mean = (1 - alpha_f) * work.state.u_dot[u0 + k] + alpha_f * memory.u_dot[u0 + k]
             jump = (mean - alpha_m * memory.a[u0 + k]) / (1 - alpha_m) - memory.a[u0 + k]
             if k < 3:
-                weight = model.mass[t]
+                weight = model.body_types.mass[t]
             elif k < 6:
-                weight = model.J0[t, k - 3, k - 3]
+                weight = model.body_types.J0[t, k - 3, k - 3]
             else:
-                step = 1 if model.is_diagonal[t, 0] else n + 1
-                weight = model.blocks[model.block0[t, MASS] + (k - 6) * step]
+                step = 1 if model.body_types.is_diagonal[t, 0] else n + 1
+                weight = model.body_types.blocks[model.body_types.block0[t, MASS] + (k - 6) * step]
             total += weight * jump * jump
     factor = abs(0.5 * gamma - beta - 1.0 / 12.0) * h * h  # 1/6 - (1/2 - gamma)/2 - beta
-    return factor * math.sqrt(total / mass) / length
+    return factor * math.sqrt(total / mass) / order.length
 
 
 @inner
-def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, length, most_error):
-    """Advance the memory by one step, unless its error by the allowed one is above `most_error`.
+def one_step(model, work, memory, order, h):
+    """Advance the memory by one step, unless its error is above the one that is allowed.
 
     Return (status, index of what is singular, last correction by the allowed one, error; -1 if not estimated).
     """
-    alpha_m, alpha_f, beta, gamma = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     c_k = beta * h * h
     c_d = gamma * h
     c_m = (1 - alpha_m) / (1 - alpha_f)
     size, size_x = predict(model, work, memory, h, alpha_f)
     g = model.gravity
     mass = 0.0
-    for i in range(model.kind.shape[0]):
-        mass += model.mass[model.kind[i]]
+    for i in range(model.bodies.kind.shape[0]):
+        mass += model.body_types.mass[model.bodies.kind[i]]
     size += mass * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-    allowed = tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
-    allowed += math.sqrt(roundoff_floor(model, work, length))
-    if work.factors[0] != c_m or work.factors[1] != c_d or work.factors[2] != c_k:
-        work.counts[3] = 1
+    allowed = order.tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
+    allowed += math.sqrt(roundoff_floor(model, work, order.length))
+    solver = work.solver
+    if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
+        work.solver.is_due = 1
     last = math.inf
     excess = math.inf
-    for iteration in range(max_iterations):
+    for iteration in range(order.max_iterations):
         evaluate(model, work, c_k)
         is_new = iteration == 0
-        if work.counts[3] == 1:
+        if work.solver.is_due == 1:
             body = factorize_bodies(model, work, c_m, c_d, c_k)
             if body >= 0:
                 return SINGULAR_BODY, body, excess, -1.0
-            work.factors[0], work.factors[1], work.factors[2] = c_m, c_d, c_k
-            work.counts[3] = 0
+            solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
+            work.solver.is_due = 0
             is_new = True
         connection = correction(model, work, c_k, is_new)
         if connection >= 0:
-            work.counts[3] = 1
+            work.solver.is_due = 1
             return SINGULAR_CONNECTION, connection, excess, -1.0
         norm = math.sqrt(update(model, work, memory, c_d / c_k, c_m / c_k, c_k))
-        work.counts[2] += 1
+        work.counted.iterations += 1
         if not math.isfinite(norm):
-            work.counts[3] = 1
+            work.solver.is_due = 1
             return DIVERGED, -1, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
-        has_states = model.state_row.shape[0] > 0  # they follow the bodies by one iteration
+        has_states = model.states.row.shape[0] > 0  # they follow the bodies by one iteration
         if iteration == 0 and has_states:
             last = norm
             continue
         if norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2):
             if iteration >= MANY:
-                work.counts[3] = 1
+                work.solver.is_due = 1
             error = -1.0
-            if most_error > 0.0:
-                error = local_error(model, work, memory, h, coefficients, length)
-                if not error <= most_error:
+            if order.most_error > 0.0:
+                error = local_error(model, work, memory, order, h)
+                if not error <= order.most_error:
                     return INACCURATE, -1, excess, error
             accept(model, work, memory, h, alpha_m, alpha_f)
             return DONE, -1, excess, error
         if norm > SLOW * last or iteration >= MANY:
-            work.counts[3] = 1
+            work.solver.is_due = 1
         last = norm
-    work.counts[3] = 1
+    work.solver.is_due = 1
     return DIVERGED, -1, excess, -1.0
 
 
@@ -231,31 +225,29 @@ def one_step(model, work, memory, h, coefficients, tolerance, max_iterations, le
 def accept(model, work, memory, h, alpha_m, alpha_f):
     """(3): write the iterate and the new algorithmic acceleration into the memory."""
     for k in range(memory.a.shape[0]):
-        mean = (1 - alpha_f) * work.u_dot[k] + alpha_f * memory.u_dot[k]
+        mean = (1 - alpha_f) * work.state.u_dot[k] + alpha_f * memory.u_dot[k]
         memory.a[k] = (mean - alpha_m * memory.a[k]) / (1 - alpha_m)
-    copy(work.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
-    copy(work.q, memory.q)
-    copy(work.u, memory.u)
-    copy(work.u_dot, memory.u_dot)
-    copy(work.w, memory.w)
-    p = work.scratch[:4]
-    for i in range(model.kind.shape[0]):
-        rotate_euler_parameters(memory.p[i], work.theta[i], p)
-        for k in range(4):
-            memory.p[i, k] = p[k]
+    copy(work.state.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
+    copy(work.state.q, memory.q)
+    copy(work.state.u, memory.u)
+    copy(work.state.u_dot, memory.u_dot)
+    copy(work.state.w, memory.w)
+    for i in range(model.bodies.kind.shape[0]):
+        p = memory.p[i]
+        p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, vector(work.state.theta[i]))
     loads, dissipated = power(model, work)
-    memory.work[0] += 0.5 * h * (memory.power[0] + loads)
-    memory.work[1] += 0.5 * h * (memory.power[1] + dissipated)
-    memory.power[0] = loads
-    memory.power[1] = dissipated
+    memory.work_given += 0.5 * h * (memory.power_given + loads)
+    memory.work_taken += 0.5 * h * (memory.power_taken + dissipated)
+    memory.power_given = loads
+    memory.power_taken = dissipated
 
 
 @inner
 def write_row(model, work, memory, t, rows):
     """Evaluate at the state in the memory and write the next row of the results."""
-    k = work.counts[4]
-    work.time[0] = t
-    work.counts[4] += 1
+    k = work.counted.rows
+    work.state.time = t
+    work.counted.rows += 1
     load_state(model, work, memory)
     evaluate(model, work, 1.0)
     rows.t[k] = t
@@ -266,18 +258,18 @@ def write_row(model, work, memory, t, rows):
     copy(memory.u_dot, rows.u_dot[k])
     copy(memory.w, rows.w[k])
     diagnose(model, work, rows.diagnostics[k], rows.drift[k])
-    rows.diagnostics[k, 10] = memory.work[0]
-    rows.diagnostics[k, 11] = memory.work[1]
+    rows.diagnostics[k, 10] = memory.work_given
+    rows.diagnostics[k, 11] = memory.work_taken
 
 
 @inner
 def resize(model, memory, h):
     """Turn the algorithmic accelerations into those of steps of size h: their distance from u_dot is of first order."""
-    ratio = h / memory.step[H_OF_A]
+    ratio = h / memory.h
     for k in range(memory.a.shape[0]):
         memory.a[k] = memory.u_dot[k] + ratio * (memory.a[k] - memory.u_dot[k])
     resize_states(model, memory, ratio)
-    memory.step[H_OF_A] = h
+    memory.h = h
 
 
 @inner
@@ -292,51 +284,48 @@ def step_after(h, error, most_error, has_failed):
 
 
 @inner
-def advance(
-    model, work, memory, t0, h, first, n_steps, every, coefficients, tolerance, max_iterations, length, most_error,
-    h_min, rows,
-):  # fmt: skip
+def advance(model, work, memory, rows, order):
     """Advance by n_steps of size h, the first of them number `first` from t0; write a row after every `every`-th.
 
-    With h_min above 0 each of these is divided into equal parts of at most the size that is wanted: one that fails, or
-    whose error is above `most_error` (if above 0), is tried again, shorter, down to h_min; then parts grow again.
+    The order is an `entry.Order`. With h_min above 0 each of these is divided into equal parts of at most the size that
+    is wanted: one that fails, or whose error is above `most_error` (if above 0), is tried again, shorter, down to
+    h_min; then parts grow again.
 
     Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
     """
-    put_weights(model, work, coefficients[2] * memory.step[H_OF_A] ** 2)
-    work.counts[4] = 0
+    h, first, h_min, most_error = order.h, order.first, order.h_min, order.most_error
+    put_weights(model, work, order.beta * memory.h**2)
+    work.counted.rows = 0
     excess = 0.0
-    for k in range(n_steps):
-        end = t0 + (first + k + 1) * h
+    for k in range(order.n_steps):
+        end = order.t0 + (first + k + 1) * h
         left = h
         has_failed = False
         while left > 0.0:
             n_parts = 1.0
             if h_min > 0.0:
-                n_parts = max(1.0, math.ceil(left / memory.step[H_WANTED] * (1.0 - 1e-9)))
+                n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
             part = left / n_parts
-            if abs(part - memory.step[H_OF_A]) > SAME * part:
+            if abs(part - memory.h) > SAME * part:
                 resize(model, memory, part)
-                put_weights(model, work, coefficients[2] * part * part)
-            work.time[0] = end - (left - part)
-            status, index, excess, error = one_step(
-                model, work, memory, memory.step[H_OF_A], coefficients, tolerance, max_iterations, length, most_error
-            )
+                put_weights(model, work, order.beta * part * part)
+            work.state.time = end - (left - part)
+            status, index, excess, error = one_step(model, work, memory, order, memory.h)
             if status == DONE:
-                memory.step[N_ACCEPTED] += 1.0
+                memory.n_accepted += 1
                 left = left - part if n_parts > 1.0 else 0.0
                 if h_min > 0.0:
-                    memory.step[H_WANTED] = min(step_after(part, error, most_error, has_failed), h)
+                    memory.h_wanted = min(step_after(part, error, most_error, has_failed), h)
                 has_failed = False
                 continue
             if h_min <= 0.0 or part <= h_min:
-                return status, k, work.counts[4], index, excess
-            memory.step[N_REJECTED] += 1.0
+                return status, k, work.counted.rows, index, excess
+            memory.n_rejected += 1
             shorter = 0.5 * part
             if status == INACCURATE:
                 shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
-            memory.step[H_WANTED] = max(shorter, h_min)
+            memory.h_wanted = max(shorter, h_min)
             has_failed = True
-        if (first + k + 1) % every == 0:
+        if (first + k + 1) % order.every == 0:
             write_row(model, work, memory, end, rows)
-    return DONE, n_steps, work.counts[4], -1, excess
+    return DONE, order.n_steps, work.counted.rows, -1, excess

@@ -1,4 +1,4 @@
-"""Rotations in the kernels: exponential map and its Jacobians, written into arrays that are given.
+"""Rotations in the kernels: exponential map and its Jacobians, as matrices of three rows (`kernels.vector`).
 
 With t = |theta|: exp = 1 + s tilde + a tilde², right Jacobian T = 1 - a tilde + b tilde², left Jacobian Tᵀ, with
 s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³; below t = 1/2 their series (the next term is under 1e-17).
@@ -7,9 +7,9 @@ s = sin t / t, a = (1 - cos t)/t², b = (t - sin t)/t³; below t = 1/2 their ser
 import math
 
 from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.vector import add, cross, dot, scaled, sub, unit
 
 __all__ = [
-    "cross",
     "exp_matrix",
     "left_jacobian",
     "left_jacobian_derivative",
@@ -70,101 +70,82 @@ def quotient_db(x):
 
 
 @inner
-def cross(a0, a1, a2, b0, b1, b2):
-    """Return a × b as three numbers."""
-    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
-
-
-@inner
-def polynomial(th, first, second, out):
-    """Write 1 + first tilde(th) + second tilde(th)² into out, (3, 3)."""
+def polynomial(th, first, second):
+    """Return 1 + first tilde(th) + second tilde(th)²."""
     x, y, z = th[0], th[1], th[2]
-    out[0, 0] = 1 - second * (y * y + z * z)
-    out[1, 1] = 1 - second * (x * x + z * z)
-    out[2, 2] = 1 - second * (x * x + y * y)
-    out[0, 1] = second * x * y - first * z
-    out[1, 0] = second * x * y + first * z
-    out[0, 2] = second * x * z + first * y
-    out[2, 0] = second * x * z - first * y
-    out[1, 2] = second * y * z - first * x
-    out[2, 1] = second * y * z + first * x
+    xy, xz, yz = second * x * y, second * x * z, second * y * z
+    return (
+        (1 - second * (y * y + z * z), xy - first * z, xz + first * y),
+        (xy + first * z, 1 - second * (x * x + z * z), yz - first * x),
+        (xz - first * y, yz + first * x, 1 - second * (x * x + y * y)),
+    )
 
 
 @inner
-def exp_matrix(th, out):
-    """Write the rotation matrix of a rotation vector."""
-    x = th[0] * th[0] + th[1] * th[1] + th[2] * th[2]
-    polynomial(th, quotient_s(x), quotient_a(x), out)
+def exp_matrix(th):
+    """Return the rotation matrix of a rotation vector."""
+    x = dot(th, th)
+    return polynomial(th, quotient_s(x), quotient_a(x))
 
 
 @inner
-def right_jacobian(th, out):
-    """Write T(th)."""
-    x = th[0] * th[0] + th[1] * th[1] + th[2] * th[2]
-    polynomial(th, -quotient_a(x), quotient_b(x), out)
+def right_jacobian(th):
+    """Return T(th)."""
+    x = dot(th, th)
+    return polynomial(th, -quotient_a(x), quotient_b(x))
 
 
 @inner
-def left_jacobian(th, out):
-    """Write T(th)ᵀ."""
-    x = th[0] * th[0] + th[1] * th[1] + th[2] * th[2]
-    polynomial(th, quotient_a(x), quotient_b(x), out)
+def left_jacobian(th):
+    """Return T(th)ᵀ."""
+    x = dot(th, th)
+    return polynomial(th, quotient_a(x), quotient_b(x))
 
 
 @inner
-def left_jacobian_derivative(th, v0, v1, v2, sign, out):
-    """Write d(Tᵀ v)/dth for sign = +1, d(T v)/dth for sign = -1, (3, 3), v held.
+def slope_row(e, f, b, d, a, th, v):
+    """Return row e of f thᵀ + b th vᵀ + d 1 - a tilde(v)."""
+    return add(add(scaled(dot(e, f), th), scaled(b * dot(e, th), v)), sub(scaled(d, e), scaled(a, cross(e, v))))
 
-    Tᵀ v = v + a th × v + b th × (th × v), and th × (th × v) = th (th·v) - v t².
+
+@inner
+def left_jacobian_derivative(th, v, sign):
+    """Return d(Tᵀ v)/dth for sign = +1, d(T v)/dth for sign = -1, v held.
+
+    Tᵀ v = v + a c + b e with c = th × v, e = th × c = th (th·v) - v t², so that the derivative is
+
+        (da c + db e - 2 b v) thᵀ + b th vᵀ + b (th·v) 1 - a tilde(v)
     """
-    x = th[0] * th[0] + th[1] * th[1] + th[2] * th[2]
+    x = dot(th, th)
     a, b, da, db = quotient_a(x) * sign, quotient_b(x), quotient_da(x) * sign, quotient_db(x)
-    dot = th[0] * v0 + th[1] * v1 + th[2] * v2
-    c0, c1, c2 = cross(th[0], th[1], th[2], v0, v1, v2)
-    v = (v0, v1, v2)
-    c = (c0, c1, c2)
-    for i in range(3):
-        along = da * c[i] + db * (th[i] * dot - v[i] * x)
-        for j in range(3):
-            out[i, j] = along * th[j] + b * (th[i] * v[j] - 2 * v[i] * th[j])
-        out[i, i] += b * dot
-    out[0, 1] += a * v2
-    out[1, 0] -= a * v2
-    out[0, 2] -= a * v1
-    out[2, 0] += a * v1
-    out[1, 2] += a * v0
-    out[2, 1] -= a * v0
+    c = cross(th, v)
+    f = sub(add(scaled(da, c), scaled(db, cross(th, c))), scaled(2 * b, v))
+    d = b * dot(th, v)
+    return (
+        slope_row(unit(0), f, b, d, a, th, v),
+        slope_row(unit(1), f, b, d, a, th, v),
+        slope_row(unit(2), f, b, d, a, th, v),
+    )
 
 
 @inner
-def matrix_of_euler_parameters(p, out):
-    """Write R_GB of p = (w, x, y, z)."""
+def matrix_of_euler_parameters(p):
+    """Return R_GB of p = (w, x, y, z)."""
     w, x, y, z = p[0], p[1], p[2], p[3]
-    out[0, 0] = w * w + x * x - y * y - z * z
-    out[1, 1] = w * w - x * x + y * y - z * z
-    out[2, 2] = w * w - x * x - y * y + z * z
-    out[0, 1] = 2 * (x * y - w * z)
-    out[1, 0] = 2 * (x * y + w * z)
-    out[0, 2] = 2 * (x * z + w * y)
-    out[2, 0] = 2 * (x * z - w * y)
-    out[1, 2] = 2 * (y * z - w * x)
-    out[2, 1] = 2 * (y * z + w * x)
+    return (
+        (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
+    )
 
 
 @inner
-def rotate_euler_parameters(p, th, out):
-    """Write p * exp(th/2), made of length one again, into out, (4,)."""
-    x = 0.25 * (th[0] * th[0] + th[1] * th[1] + th[2] * th[2])
-    s = 0.5 * quotient_s(x)
-    c = 1 - x * quotient_a(x)
-    b0, b1, b2 = s * th[0], s * th[1], s * th[2]
-    w = p[0] * c - p[1] * b0 - p[2] * b1 - p[3] * b2
-    c0, c1, c2 = cross(p[1], p[2], p[3], b0, b1, b2)
-    v0 = p[0] * b0 + c * p[1] + c0
-    v1 = p[0] * b1 + c * p[2] + c1
-    v2 = p[0] * b2 + c * p[3] + c2
-    scale = 1 / math.sqrt(w * w + v0 * v0 + v1 * v1 + v2 * v2)
-    out[0] = w * scale
-    out[1] = v0 * scale
-    out[2] = v1 * scale
-    out[3] = v2 * scale
+def rotate_euler_parameters(p, th):
+    """Return p * exp(th/2), made of length one again."""
+    x = 0.25 * dot(th, th)
+    b, c = scaled(0.5 * quotient_s(x), th), 1 - x * quotient_a(x)
+    a = (p[1], p[2], p[3])
+    w = p[0] * c - dot(a, b)
+    v = add(add(scaled(p[0], b), scaled(c, a)), cross(a, b))
+    scale = 1 / math.sqrt(w * w + dot(v, v))
+    return scale * w, scale * v[0], scale * v[1], scale * v[2]

@@ -19,28 +19,28 @@ __all__ = ["correction", "factorize_bodies"]
 def factorize_bodies(model, work, c_m, c_d, c_k):
     """Linearise at the iterate, factorise H and write X, Z. Return the body whose H is singular, or -1."""
     linearize(model, work, c_m, c_d, c_k)
-    work.counts[1] += 1
-    for i in range(model.kind.shape[0]):
-        n = 6 + model.n_q[i]
-        H = work.H[model.h0[i] : model.h0[i + 1]].reshape((n, n))
-        if not lu_factor(H, work.pivot[model.u0[i] : model.u0[i + 1]]):
+    work.counted.factorisations += 1
+    for i in range(model.bodies.kind.shape[0]):
+        n = 6 + model.bodies.n_q[i]
+        H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n))
+        if not lu_factor(H, work.solver.pivot[model.bodies.u0[i] : model.bodies.u0[i + 1]]):
             return i
-        for e in range(model.end0[i], model.end0[i + 1]):
-            o = model.m_x0[model.ends[e]]
-            column = work.J_column[6 * o : 6 * (o + n)].reshape((6, n))
-            X = work.X[6 * o : 6 * (o + n)].reshape((n, 6))
+        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+            o = model.markers.x0[model.bodies.ends[e]]
+            column = work.solver.J_column[6 * o : 6 * (o + n)].reshape((6, n))
+            X = work.solver.X[6 * o : 6 * (o + n)].reshape((n, 6))
             for r in range(n):
                 for k in range(6):
                     X[r, k] = column[k, r]
-            lu_solve_columns(H, work.pivot[model.u0[i] : model.u0[i + 1]], X)
-    for p in range(model.pair_row.shape[0]):
-        row_marker, column_marker = model.pair_row[p], model.pair_column[p]
-        n = 6 + model.n_q[model.m_body[row_marker]]
-        o = model.m_x0[row_marker]
-        row = work.J_row[12 * o : 12 * (o + n)].reshape((12, n))
-        o = model.m_x0[column_marker]
-        X = work.X[6 * o : 6 * (o + n)].reshape((n, 6))
-        Z = work.Z[p]
+            lu_solve_columns(H, work.solver.pivot[model.bodies.u0[i] : model.bodies.u0[i + 1]], X)
+    for p in range(model.elimination.pair_row.shape[0]):
+        row_marker, column_marker = model.elimination.pair_row[p], model.elimination.pair_column[p]
+        n = 6 + model.bodies.n_q[model.markers.body[row_marker]]
+        o = model.markers.x0[row_marker]
+        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape((12, n))
+        o = model.markers.x0[column_marker]
+        X = work.solver.X[6 * o : 6 * (o + n)].reshape((n, 6))
+        Z = work.solver.Z[p]
         for r in range(12):
             for k in range(6):
                 total = 0.0
@@ -53,28 +53,33 @@ def factorize_bodies(model, work, c_m, c_d, c_k):
 @inner
 def assemble(model, work, c_k):
     """Write the block matrix of the connections at the iterate."""
-    s = work.s
+    s = work.solver.blocks
     for k in range(s.shape[0]):
         s[k] = 0.0
-    for c in range(model.c_size.shape[0]):
+    for c in range(model.connections.size.shape[0]):
         connection_derivatives(model, work, c, c_k)
-        size, o = model.c_size[c], model.s_diagonal[c]
+        size, o = model.connections.size[c], model.elimination.diagonal[c]
         for r in range(size):
             for k in range(size):
-                s[o + r * size + k] = work.V[c, r, k]
-    for p in range(model.pair_row.shape[0]):
-        a, b = model.pair_row[p], model.pair_column[p]
-        c, d = model.m_connection[a], model.m_connection[b]
-        rows, columns, o = model.c_size[c], model.c_size[d], model.pair_block[p]
-        R, P, Z, sign = work.R[model.m_body[a]], work.P[a], work.Z[p], model.m_sign[b]
-        n_motion = 12 if model.c_rates[c] else 6
-        turned = work.scratch[:12]
+                s[o + r * size + k] = work.connections.V[c, r, k]
+    for p in range(model.elimination.pair_row.shape[0]):
+        a, b = model.elimination.pair_row[p], model.elimination.pair_column[p]
+        c, d = model.markers.connection[a], model.markers.connection[b]
+        rows, columns, o = model.connections.size[c], model.connections.size[d], model.elimination.pair_block[p]
+        R, P, Z, sign = (
+            work.state.R[model.markers.body[a]],
+            work.connections.P[a],
+            work.solver.Z[p],
+            model.markers.sign[b],
+        )
+        n_motion = 12 if model.connections.has_rates[c] else 6
+        turned = work.solver.motion
         for r in range(rows):
             for part in range(0, n_motion, 3):  # row r of P in body axes
                 for k in range(3):
                     turned[part + k] = P[r, part] * R[0, k] + P[r, part + 1] * R[1, k] + P[r, part + 2] * R[2, k]
             for part in range(0, 6, 3):
-                w_part = model.m_force[b] if part == 0 else model.m_moment[b]
+                w_part = model.markers.force[b] if part == 0 else model.markers.moment[b]
                 if w_part < 0:
                     continue
                 x0, x1, x2 = 0.0, 0.0, 0.0
@@ -89,27 +94,29 @@ def assemble(model, work, c_k):
 @inner
 def factorize_connections(model, work):
     """Block LU of the connections in the planned order. Return the connection with a singular block, or -1."""
-    s = work.s
-    for step in range(model.order.shape[0]):
-        j = model.order[step]
-        n, o = model.c_size[j], model.s_diagonal[j]
+    s = work.solver.blocks
+    for step in range(model.elimination.order.shape[0]):
+        j = model.elimination.order[step]
+        n, o = model.connections.size[j], model.elimination.diagonal[j]
         D = s[o : o + n * n].reshape((n, n))
-        pivot = work.s_pivot[model.c_w0[j] : model.c_w0[j + 1]]
+        pivot = work.solver.block_pivot[model.connections.w0[j] : model.connections.w0[j + 1]]
         if not lu_factor(D, pivot):
             return j
-        first, last = model.after0[step], model.after0[step + 1]
+        first, last = model.elimination.after0[step], model.elimination.after0[step + 1]
         for e in range(first, last):
-            m = model.c_size[model.after[e]]
-            o = model.after_upper[e]
+            m = model.connections.size[model.elimination.after[e]]
+            o = model.elimination.after_upper[e]
             lu_solve_columns(D, pivot, s[o : o + n * m].reshape((n, m)))
-        target = model.update0[step]
+        target = model.elimination.update0[step]
         for e in range(first, last):
-            rows = model.c_size[model.after[e]]
-            L = s[model.after_lower[e] : model.after_lower[e] + rows * n].reshape((rows, n))
+            rows = model.connections.size[model.elimination.after[e]]
+            L = s[model.elimination.after_lower[e] : model.elimination.after_lower[e] + rows * n].reshape((rows, n))
             for f in range(first, last):
-                columns = model.c_size[model.after[f]]
-                U = s[model.after_upper[f] : model.after_upper[f] + n * columns].reshape((n, columns))
-                o = model.update[target]
+                columns = model.connections.size[model.elimination.after[f]]
+                U = s[model.elimination.after_upper[f] : model.elimination.after_upper[f] + n * columns].reshape(
+                    (n, columns)
+                )
+                o = model.elimination.update[target]
                 target += 1
                 for r in range(rows):
                     for k in range(columns):
@@ -123,26 +130,30 @@ def factorize_connections(model, work):
 @inner
 def solve_connections(model, work):
     """Overwrite mu by the solution for the right side in mu."""
-    s, mu = work.s, work.mu
-    for step in range(model.order.shape[0]):
-        j = model.order[step]
-        n, o = model.c_size[j], model.s_diagonal[j]
-        own = mu[model.c_w0[j] : model.c_w0[j + 1]]
-        lu_solve(s[o : o + n * n].reshape((n, n)), work.s_pivot[model.c_w0[j] : model.c_w0[j + 1]], own)
-        for e in range(model.after0[step], model.after0[step + 1]):
-            i = model.after[e]
-            o = model.after_lower[e]
-            for r in range(model.c_size[i]):
+    s, mu = work.solver.blocks, work.solver.mu
+    for step in range(model.elimination.order.shape[0]):
+        j = model.elimination.order[step]
+        n, o = model.connections.size[j], model.elimination.diagonal[j]
+        own = mu[model.connections.w0[j] : model.connections.w0[j + 1]]
+        lu_solve(
+            s[o : o + n * n].reshape((n, n)),
+            work.solver.block_pivot[model.connections.w0[j] : model.connections.w0[j + 1]],
+            own,
+        )
+        for e in range(model.elimination.after0[step], model.elimination.after0[step + 1]):
+            i = model.elimination.after[e]
+            o = model.elimination.after_lower[e]
+            for r in range(model.connections.size[i]):
                 for k in range(n):
-                    mu[model.c_w0[i] + r] -= s[o + r * n + k] * own[k]
-    for step in range(model.order.shape[0] - 1, -1, -1):
-        j = model.order[step]
-        for e in range(model.after0[step], model.after0[step + 1]):
-            i = model.after[e]
-            o, columns = model.after_upper[e], model.c_size[i]
-            for r in range(model.c_size[j]):
+                    mu[model.connections.w0[i] + r] -= s[o + r * n + k] * own[k]
+    for step in range(model.elimination.order.shape[0] - 1, -1, -1):
+        j = model.elimination.order[step]
+        for e in range(model.elimination.after0[step], model.elimination.after0[step + 1]):
+            i = model.elimination.after[e]
+            o, columns = model.elimination.after_upper[e], model.connections.size[i]
+            for r in range(model.connections.size[j]):
                 for k in range(columns):
-                    mu[model.c_w0[j] + r] -= s[o + r * columns + k] * mu[model.c_w0[i] + k]
+                    mu[model.connections.w0[j] + r] -= s[o + r * columns + k] * mu[model.connections.w0[i] + k]
 
 
 @inner
@@ -151,12 +162,16 @@ def correction(model, work, c_k, is_new):
 
     Return the connection with a singular block, or -1.
     """
-    y, mu = work.y, work.mu
-    for i in range(model.kind.shape[0]):
-        n, u0 = 6 + model.n_q[i], model.u0[i]
+    y, mu = work.solver.y, work.solver.mu
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0 = 6 + model.bodies.n_q[i], model.bodies.u0[i]
         for k in range(u0, u0 + n):
-            y[k] = -c_k * work.residual[k]
-        lu_solve(work.H[model.h0[i] : model.h0[i + 1]].reshape((n, n)), work.pivot[u0 : u0 + n], y[u0 : u0 + n])
+            y[k] = -c_k * work.bodies.residual[k]
+        lu_solve(
+            work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n)),
+            work.solver.pivot[u0 : u0 + n],
+            y[u0 : u0 + n],
+        )
     if mu.shape[0] == 0:
         return -1
     if is_new:
@@ -165,39 +180,39 @@ def correction(model, work, c_k, is_new):
         if singular >= 0:
             return singular
     for k in range(mu.shape[0]):
-        mu[k] = -work.g[k]
-    motion = work.scratch[:12]
-    for i in range(model.kind.shape[0]):
-        n, u0, R = 6 + model.n_q[i], model.u0[i], work.R[i]
-        for e in range(model.end0[i], model.end0[i + 1]):
-            m = model.ends[e]
-            c = model.m_connection[m]
-            o, w0 = model.m_x0[m], model.c_w0[c]
-            n_motion = 12 if model.c_rates[c] else 6
+        mu[k] = -work.connections.g[k]
+    motion = work.solver.motion
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0, R = 6 + model.bodies.n_q[i], model.bodies.u0[i], work.state.R[i]
+        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+            m = model.bodies.ends[e]
+            c = model.markers.connection[m]
+            o, w0 = model.markers.x0[m], model.connections.w0[c]
+            n_motion = 12 if model.connections.has_rates[c] else 6
             for r in range(n_motion):
                 total = 0.0
                 for k in range(n):
-                    total += work.J_row[12 * o + r * n + k] * y[u0 + k]
+                    total += work.solver.J_row[12 * o + r * n + k] * y[u0 + k]
                 motion[r] = total
             for part in range(0, n_motion, 3):
                 x0, x1, x2 = motion[part], motion[part + 1], motion[part + 2]
                 for k in range(3):
                     motion[part + k] = R[k, 0] * x0 + R[k, 1] * x1 + R[k, 2] * x2
-            for r in range(model.c_size[c]):
+            for r in range(model.connections.size[c]):
                 total = 0.0
                 for k in range(n_motion):
-                    total += work.P[m, r, k] * motion[k]
+                    total += work.connections.P[m, r, k] * motion[k]
                 mu[w0 + r] -= total
     solve_connections(model, work)
-    for i in range(model.kind.shape[0]):
-        n, u0, R = 6 + model.n_q[i], model.u0[i], work.R[i]
-        for e in range(model.end0[i], model.end0[i + 1]):
-            m = model.ends[e]
-            c = model.m_connection[m]
-            o, w0, sign = model.m_x0[m], model.c_w0[c], model.m_sign[m]
-            size = 3 if model.m_moment[m] < 0 else 6
+    for i in range(model.bodies.kind.shape[0]):
+        n, u0, R = 6 + model.bodies.n_q[i], model.bodies.u0[i], work.state.R[i]
+        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
+            m = model.bodies.ends[e]
+            c = model.markers.connection[m]
+            o, w0, sign = model.markers.x0[m], model.connections.w0[c], model.markers.sign[m]
+            size = 3 if model.markers.moment[m] < 0 else 6
             for part in range(0, size, 3):
-                w_part = model.m_force[m] if part == 0 else model.m_moment[m]
+                w_part = model.markers.force[m] if part == 0 else model.markers.moment[m]
                 if w_part < 0:
                     motion[0], motion[1], motion[2] = 0.0, 0.0, 0.0
                     continue
@@ -208,6 +223,6 @@ def correction(model, work, c_k, is_new):
             for r in range(n):
                 total = 0.0
                 for k in range(size):
-                    total += work.X[6 * o + r * 6 + k] * motion[k]
+                    total += work.solver.X[6 * o + r * 6 + k] * motion[k]
                 y[u0 + r] += total
     return -1

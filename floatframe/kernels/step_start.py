@@ -11,8 +11,8 @@ __all__ = ["begin_step"]
 def begin_step(model, work, memory, h, alpha_f):
     """Take the unknowns of the last step as known, move coordinates of ports by their rates, and prepare states."""
     for k in range(memory.w.shape[0]):
-        work.w_start[k] = memory.w[k]
-        work.w[k] = memory.w[k]
-    for p in range(model.p_a.shape[0]):
+        work.state.w_start[k] = memory.w[k]
+        work.state.w[k] = memory.w[k]
+    for p in range(model.ports.a.shape[0]):
         predict_port(model, work, p, h)
     begin_states(model, work, memory, h, alpha_f)

@@ -11,7 +11,8 @@ from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator
-from floatframe.kernels.model import Rows, Work, new_work
+from floatframe.kernels.memory import Rows
+from floatframe.kernels.work import Work, new_work
 from floatframe.motion.events import Event, events_of, off_at_start, require_events, with_forces_off
 from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource

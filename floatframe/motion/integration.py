@@ -20,7 +20,8 @@ from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.integrators import CLASSES
 from floatframe.integrators.carry import Carry, Integrator
-from floatframe.kernels.model import Rows, new_work
+from floatframe.kernels.memory import Rows
+from floatframe.kernels.work import new_work
 from floatframe.motion.event_steps import EventWatch
 from floatframe.motion.events import require_times_of_events
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
@@ -290,7 +291,7 @@ class Run:
         try:
             while n_done < self.n_total and failure is None and not has_stopped:
                 if n_done % RESTART_STEPS == 0:
-                    work.factors[:] = 0.0  # made anew, as after a resumption
+                    work.solver.c_k[...] = 0.0  # factors are made anew, as after a resumption
                     if self.writer is not None and n_done and time.monotonic() - closed > SEGMENT_SECONDS:
                         self.writer.close_segment(self.record(carry, n_done))
                         closed = time.monotonic()
@@ -375,9 +376,9 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
         entries.append(
             BodyEntry(
                 body.name,
-                int(compiled.model.n_q[i]),
-                int(compiled.model.q0[i]),
-                int(compiled.model.u0[i]),
+                int(compiled.model.bodies.n_q[i]),
+                int(compiled.model.bodies.q0[i]),
+                int(compiled.model.bodies.u0[i]),
                 source,
                 digest_of(source),
                 isinstance(body, FlexibleBody) and body.is_stiffened,
@@ -406,7 +407,7 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
         tuple(entries),
         compiled.joint_names,
         compiled.spring_names,
-        tuple(int(k) for k in compiled.model.c_w0),
+        tuple(int(k) for k in compiled.model.connections.w0),
         run,
     )
 

@@ -15,6 +15,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.integrators.carry import Carry, Integrator
+from floatframe.kernels.records import leaves
 from floatframe.state import State
 from floatframe.system import System
 
@@ -41,7 +42,13 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
     """Return the memory of the integrator and the number of steps done; `ResultsError` if it is of another system."""
     placed, model = compiled_system(system).placed, compiled_system(system).model
     shapes = {name: getattr(placed, name).shape for name in STATE}
-    shapes |= {"u_dot": placed.u.shape, "a": placed.u.shape, "w": (int(model.c_w0[-1]),), "work": (2,), "power": (2,)}
+    shapes |= {
+        "u_dot": placed.u.shape,
+        "a": placed.u.shape,
+        "w": (int(model.connections.w0[-1]),),
+        "work": (2,),
+        "power": (2,),
+    }
     shapes |= dict.fromkeys((*STEPS, *COUNTS, "n_done"), ())
     for name, shape in shapes.items():
         if name not in record or record[name].shape != shape:
@@ -58,9 +65,9 @@ def system_digest(system: System, integrator: Integrator) -> str:
     if system.events:
         digest.update(repr(system.events).encode())
     compiled = compiled_system(system)
-    model = compiled.model._replace(user_address=np.zeros(0, np.int64))  # addresses change from process to process
-    parts = [*model, *(getattr(compiled.placed, name) for name in STATE)]
-    for part in parts:
+    arrays = dict(leaves(compiled.model)) | {name: getattr(compiled.placed, name) for name in STATE}
+    del arrays["users.address"]  # addresses change from process to process
+    for part in arrays.values():
         array = np.ascontiguousarray(part)
         digest.update(repr((array.shape, array.dtype.str)).encode() + array.tobytes())
     return digest.hexdigest()

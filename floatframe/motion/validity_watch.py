@@ -20,7 +20,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.system import compiled_system
 from floatframe.forces import PointForce
-from floatframe.kernels.model import Rows
+from floatframe.kernels.memory import Rows
 from floatframe.results.validity import LINEAR, STIFFENED, Limits, ValidityNote
 from floatframe.system import System
 
@@ -110,7 +110,7 @@ class ValidityWatch:
     def measures(self, part: Watched, rows: Rows) -> list[tuple[str, Array]]:
         """Return what is compared, each over the rows, (n_t,)."""
         model = compiled_system(self.system).model
-        i, q0, u0 = part.index, int(model.q0[part.index]), int(model.u0[part.index])
+        i, q0, u0 = part.index, int(model.bodies.q0[part.index]), int(model.bodies.u0[part.index])
         q = rows.q[:, q0 : q0 + part.body.reduced.n_q]
         omega = rows.u[:, u0 + 3 : u0 + 6]
         found = [("speed", np.linalg.norm(omega, axis=1) / part.frequency)]
@@ -190,17 +190,19 @@ def find_loads(system: System, part: Watched) -> None:
     model = compiled_system(system).model
     n = part.body.reduced.n_q
     forces = [force for force in system.forces if isinstance(force, PointForce)]
-    load_of = {int(m): force for m, force in zip(model.l_marker, forces, strict=True)}
-    for m in np.flatnonzero((model.m_body == part.index) & (model.m_psi0 >= 0)):
-        o = int(model.m_psi0[m])
-        own = model.psi[o : o + 6 * n].reshape(6, n)
+    load_of = {int(m): force for m, force in zip(model.loads.marker, forces, strict=True)}
+    for m in np.flatnonzero((model.markers.body == part.index) & (model.markers.psi0 >= 0)):
+        o = int(model.markers.psi0[m])
+        own = model.markers.psi[o : o + 6 * n].reshape(6, n)
         interface = next(k for k, i in enumerate(part.body.reduced.interfaces) if np.array_equal(i.Psi, own))
-        c = int(model.m_connection[m])
+        c = int(model.markers.connection[m])
         if c >= 0:
-            w0, moment = int(model.c_w0[c]), int(model.m_moment[m])
-            part.wrenches.append(Wrench(interface, float(model.m_sign[m]), w0, w0 + moment if moment >= 0 else -1))
+            w0, moment = int(model.connections.w0[c]), int(model.markers.moment[m])
+            part.wrenches.append(
+                Wrench(interface, float(model.markers.sign[m]), w0, w0 + moment if moment >= 0 else -1)
+            )
         elif int(m) in load_of:
-            part.loads.append(Load(interface, load_of[int(m)], np.asarray(model.m_triad[m])))
+            part.loads.append(Load(interface, load_of[int(m)], np.asarray(model.markers.triad[m])))
 
 
 def amplitudes(load: Load, t: Array, R: Array) -> Array:

@@ -103,7 +103,7 @@ def mode_scene(
     places = {name: nodes_at(system, i, rest) for i, name in enumerate(still)}
     size = float(np.linalg.norm(np.ptp(np.concatenate(list(places.values())), axis=0))) or 1.0
     largest = max(float(np.linalg.norm(a, axis=1).max()) for a in amplitudes.values()) or 1.0
-    turn = max(float(np.abs(shape[u0 + 3 : u0 + 6]).max()) for u0 in model.u0[:-1])
+    turn = max(float(np.abs(shape[u0 + 3 : u0 + 6]).max()) for u0 in model.bodies.u0[:-1])
     factor = min(SWING * size / largest, LARGEST_TURN / turn if turn > 0 else np.inf)
     states = [displaced(model, rest, in_ground_axes(model, rest, factor * np.real(shape * turned))) for turned in turns]
     scalars = colors_of(system, amplitudes, shape, turns, color)
@@ -171,7 +171,7 @@ def nodes_at(system: System, i: int, state: State) -> Array:
     """Return what is drawn of a body in a state, ground axes, (n_nodes, 3)."""
     model, body = compiled_system(system).model, system.bodies[i]
     if isinstance(body, FlexibleBody) and len(body.reduced.surface):
-        q = state.q[model.q0[i] : model.q0[i + 1]]
+        q = state.q[model.bodies.q0[i] : model.bodies.q0[i + 1]]
         local = body.reduced.nodes + body.reduced.Phi @ q
     else:
         local = corners_of(system, i)
@@ -181,10 +181,10 @@ def nodes_at(system: System, i: int, state: State) -> Array:
 def amplitude(system: System, i: int, shape: Array, rest: State) -> Array:
     """Return the complex displacement of the drawn nodes of a body in a mode, body axes, (n_nodes, 3)."""
     model, body = compiled_system(system).model, system.bodies[i]
-    u0 = int(model.u0[i])
-    move, turn, q = shape[u0 : u0 + 3], shape[u0 + 3 : u0 + 6], shape[u0 + 6 : int(model.u0[i + 1])]
+    u0 = int(model.bodies.u0[i])
+    move, turn, q = shape[u0 : u0 + 3], shape[u0 + 3 : u0 + 6], shape[u0 + 6 : int(model.bodies.u0[i + 1])]
     if isinstance(body, FlexibleBody) and len(body.reduced.surface):
-        local = body.reduced.nodes + body.reduced.Phi @ rest.q[model.q0[i] : model.q0[i + 1]]
+        local = body.reduced.nodes + body.reduced.Phi @ rest.q[model.bodies.q0[i] : model.bodies.q0[i + 1]]
         return np.asarray(move + np.cross(turn, local) + body.reduced.Phi @ q)
     return np.asarray(move + np.cross(turn, corners_of(system, i)))
 
@@ -202,7 +202,7 @@ def colors_of(
     found = {}
     for i, body in enumerate(system.bodies):
         if isinstance(body, FlexibleBody) and len(body.reduced.surface):
-            q = shape[int(model.u0[i]) + 6 : int(model.u0[i + 1])]
+            q = shape[int(model.bodies.u0[i]) + 6 : int(model.bodies.u0[i + 1])]
             found[body.name] = color.values(body.reduced, np.real(np.outer(turns, q)))
     return found
 

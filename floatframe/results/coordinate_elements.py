@@ -52,13 +52,13 @@ def user_force_motion(system: System, trajectory: Trajectory, name: str) -> User
     u = names.index(name)
     model, w, force = compiled_system(system).model, unknowns(system, trajectory), forces[u]
     k = len(system.couplers) + u
-    values = model.p_row[model.port0[k] : model.port0[k + 1]]
-    states = model.state_row[model.state0[u] : model.state0[u + 1]]
+    values = model.ports.row[model.networks.port0[k] : model.networks.port0[k + 1]]
+    states = model.states.row[model.users.state0[u] : model.users.state0[u + 1]]
     return UserForceMotion(
         trajectory.t,
         {each: w[:, row] for each, row in zip(force.coordinates, values, strict=True)},
         {each: w[:, row + 1] for each, row in zip(force.coordinates, values, strict=True)},
-        {each: w[:, model.core[k] + j] for j, each in enumerate(force.forces)},
+        {each: w[:, model.networks.core[k] + j] for j, each in enumerate(force.forces)},
         {each: w[:, row] for each, row in zip(force.states, states, strict=True)},
     )
 
@@ -66,7 +66,7 @@ def user_force_motion(system: System, trajectory: Trajectory, name: str) -> User
 def unknowns(system: System, trajectory: Trajectory) -> Array:
     """Return all unknowns of connections, (n_t, n_w); `ResultsError` if they are those of another system."""
     w = trajectory.source.read("w")
-    if w.shape[1] != int(compiled_system(system).model.c_w0[-1]):
+    if w.shape[1] != int(compiled_system(system).model.connections.w0[-1]):
         raise ResultsError(f"the motion of {trajectory.head.system!r} is not one of the system {system.name!r}")
     return w
 
@@ -84,7 +84,7 @@ def coupler_motion(system: System, trajectory: Trajectory, name: str) -> PortMot
         raise ResultsError(f"coupler_motion: no coupler {name!r}{nearest(name, names)}")
     model, w = compiled_system(system).model, unknowns(system, trajectory)
     k = names.index(name)
-    ports = slice(int(model.port0[k]), int(model.port0[k + 1]))
-    rows = model.p_row[ports]
-    force = np.outer(w[:, model.core[k]], model.p_factor[ports])
+    ports = slice(int(model.networks.port0[k]), int(model.networks.port0[k + 1]))
+    rows = model.ports.row[ports]
+    force = np.outer(w[:, model.networks.core[k]], model.ports.factor[ports])
     return PortMotion(trajectory.t, w[:, rows], w[:, rows + 1], force)

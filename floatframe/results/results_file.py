@@ -17,7 +17,7 @@ from fe_models.foundation.paths import near_file
 from fe_models.foundation.seal import Kind, altered, check_seal, newer
 from fe_models.foundation.words import quoted
 from floatframe.errors import ResultsError
-from floatframe.kernels.model import N_DRIFTS
+from floatframe.kernels.memory import N_DRIFTS
 from floatframe.results.head import Head, head_of_text
 
 __all__ = [

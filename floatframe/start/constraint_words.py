@@ -5,7 +5,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem
 from floatframe.joints.rows import is_held, is_held_length
-from floatframe.kernels.model import Work
+from floatframe.kernels.work import Work
 from floatframe.start.freedoms import scaled_constraints
 from floatframe.state import State
 
@@ -20,8 +20,8 @@ def open_joints(compiled: CompiledSystem, error: Array) -> str:
     model = compiled.model
     words = []
     for c, name in enumerate(compiled.connection_names):
-        rows = slice(int(model.c_w0[c]), int(model.c_w0[c + 1]))
-        kind = model.row_kind[rows]
+        rows = slice(int(model.connections.w0[c]), int(model.connections.w0[c + 1]))
+        kind = model.rows.kind[rows]
         g = np.where(is_held(kind), error[rows], 0.0)
         is_distance = is_held_length(kind)
         gap, angle = np.linalg.norm(g[is_distance]), np.linalg.norm(g[~is_distance])
@@ -44,8 +44,8 @@ def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> st
     A drive is taken back where its row is spanned by those of the joints and of the drives before it.
     """
     model = compiled.model
-    holds = np.flatnonzero(is_held(model.row_kind))
-    drives = np.flatnonzero(model.row_motion[holds] >= 0)
+    holds = np.flatnonzero(is_held(model.rows.kind))
+    drives = np.flatnonzero(model.rows.motion[holds] >= 0)
     if not len(drives):
         return ""
     try:
@@ -60,7 +60,7 @@ def conflict_of_drives(compiled: CompiledSystem, work: Work, state: State) -> st
             left = np.linalg.norm(rows[k] - rows[basis].T @ shares)
             if left <= SPANNED:
                 involved = [basis[i] for i in np.flatnonzero(np.abs(shares) > INVOLVED)]
-                others = [i for i in involved if model.row_motion[holds[i]] >= 0]
+                others = [i for i in involved if model.rows.motion[holds[i]] >= 0]
                 name = drive_name(compiled, int(holds[k]))
                 if others:
                     partners = " and ".join(drive_name(compiled, int(holds[i])) for i in others)

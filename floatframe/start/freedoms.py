@@ -13,7 +13,8 @@ import scipy.linalg as la
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem
 from floatframe.joints.rows import is_held
-from floatframe.kernels.model import Model, Work
+from floatframe.kernels.model import Model
+from floatframe.kernels.work import Work
 from floatframe.start.newton_equations import linearized, set_iterate, with_mass_for_all
 from floatframe.state import State
 
@@ -52,8 +53,8 @@ class Mobility:
 def constraint_mobility(compiled: CompiledSystem, work: Work, state: State) -> Mobility:
     """Return the mobility at a state in which the joints are closed."""
     model = compiled.model
-    holds = is_held(model.row_kind)
-    owner = np.repeat(np.arange(len(model.c_size)), model.c_size)[holds]
+    holds = is_held(model.rows.kind)
+    owner = np.repeat(np.arange(len(model.connections.size)), model.connections.size)[holds]
     with_modes, rigid = scaled_constraints(model, work, state)
     repeated, repeated_rigid = dependent_rows(with_modes), dependent_rows(rigid)
     counts = {
@@ -62,8 +63,8 @@ def constraint_mobility(compiled: CompiledSystem, work: Work, state: State) -> M
         if repeated[owner == c].any()
     }
     return Mobility(
-        n_bodies=len(model.kind),
-        n_modes=int(model.q0[-1]),
+        n_bodies=len(model.bodies.kind),
+        n_modes=int(model.bodies.q0[-1]),
         n_constraints=int(holds.sum()),
         n_redundant=int(repeated.sum()),
         n_redundant_rigid=int(repeated_rigid.sum()),
@@ -75,10 +76,10 @@ def scaled_constraints(model: Model, work: Work, state: State) -> tuple[Array, A
     """Return G L⁻ᵀ with M = L Lᵀ, rows of length one: with the modes and for rigid bodies, dense."""
     set_iterate(work, state)
     parts = linearized(model, work, 1.0, 0.0, 0.0)
-    G = parts.G.toarray()[is_held(model.row_kind)]
-    scaled, rigid = np.zeros_like(G), np.zeros((len(G), 6 * len(model.kind)))
+    G = parts.G.toarray()[is_held(model.rows.kind)]
+    scaled, rigid = np.zeros_like(G), np.zeros((len(G), 6 * len(model.bodies.kind)))
     for i, H in enumerate(with_mass_for_all(model, parts.H)):
-        u = slice(int(model.u0[i]), int(model.u0[i + 1]))
+        u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
         L = np.linalg.cholesky(0.5 * (H + H.T))
         scaled[:, u] = la.solve_triangular(L, G[:, u].T, lower=True).T
         rigid[:, 6 * i : 6 * i + 6] = la.solve_triangular(L[:6, :6], G[:, u][:, :6].T, lower=True).T

@@ -21,7 +21,8 @@ from floatframe.compiling.callbacks import raise_errors_of
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
-from floatframe.kernels.model import STIFFNESS, Model, Work, new_work
+from floatframe.kernels.model import STIFFNESS, Model
+from floatframe.kernels.work import Work, new_work
 from floatframe.start.constraint_words import conflict_of_drives, open_joints
 from floatframe.start.freedoms import Mobility, constraint_mobility, scaled_constraints
 from floatframe.start.newton_equations import (
@@ -49,7 +50,6 @@ __all__ = [
 
 ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
 MOST_ITERATIONS = 30
-FRICTION_COEFFICIENT = 5  #: column of `Model.joint_forces`
 NEAR_BY = 1e-3  #: rad, and part of the size of the system: a small way from a position
 REDUNDANT = 1e-10  #: smallest eigenvalue of G M⁻¹ Gᵀ, scaled to a unit diagonal, of independent constraints
 
@@ -87,7 +87,7 @@ def consistent_state(system: System, state: State | None = None, *, t: float = 0
     compiled = compiled_system(system)
     state = compiled.placed if state is None else checked(compiled, state)
     work = new_work(compiled.model)
-    work.time[0] = t
+    work.state.time[...] = t
     state = assembled(compiled, work, state)
     require_independent_constraints(compiled, work, state)
     state = with_compatible_velocities(compiled, work, state)
@@ -108,19 +108,19 @@ def checked(compiled: CompiledSystem, state: State) -> State:
 def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
     """(1): return the state with all joints closed."""
     model = compiled.model
-    holds = is_held_position(model.row_kind)
+    holds = is_held_position(model.rows.kind)
     if not holds.any():
         return state
-    scale = np.where(is_held_length(model.row_kind), compiled.length, 1.0)
+    scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, state, w=start_unknowns(model))
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         raise_errors_of(compiled.callbacks)
-        error = np.where(holds, work.g, 0.0)
+        error = np.where(holds, work.connections.g, 0.0)
         if np.abs(error / scale).max() <= ASSEMBLED:
             return state
         try:
-            y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.u)), -error)
+            y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.state.u)), -error)
         except RuntimeError:
             break
         if not np.isfinite(y).all():
@@ -131,7 +131,7 @@ def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
         raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
-    reach = ", and that the drives stay within reach" if (model.row_motion[holds] >= 0).any() else ""
+    reach = ", and that the drives stay within reach" if (model.rows.motion[holds] >= 0).any() else ""
     raise ModelError(
         f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the bodies "
         f"nearer to their joints, or check lengths and axes{reach}"
@@ -141,8 +141,8 @@ def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
 def require_independent_constraints(compiled: CompiledSystem, work: Work, state: State) -> None:
     """Raise `ModelError` naming the joints if some constraints repeat others, unless these are to share their load."""
     model = compiled.model
-    holds = is_held(model.row_kind)
-    if not holds.any() or model.row_soft.any():
+    holds = is_held(model.rows.kind)
+    if not holds.any() or model.rows.soft.any():
         return
     rows, _ = scaled_constraints(model, work, state)
     if not rows.any(axis=1).all():
@@ -155,7 +155,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, state:
     if conflict:
         raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
     share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
-    owner = np.repeat(np.arange(len(model.c_size)), model.c_size)[holds]
+    owner = np.repeat(np.arange(len(model.connections.size)), model.connections.size)[holds]
     involved = [name for c, name in enumerate(compiled.connection_names) if share[owner == c].sum() > 1e-6]
     if is_singular_position(compiled, work, state, n_redundant):
         raise ModelError(
@@ -176,11 +176,11 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, state:
 def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_redundant: int) -> bool:
     """Whether fewer constraints repeat others a thousandth of a radian along the motions that the joints allow."""
     model = compiled.model
-    holds = is_held(model.row_kind)
+    holds = is_held(model.rows.kind)
     set_iterate(work, state)
     G = linearized(model, work, 1.0, 0.0, 0.0).G.toarray()[holds]
     modal = np.ones(G.shape[1], dtype=bool)
-    for u0 in model.u0[:-1]:
+    for u0 in model.bodies.u0[:-1]:
         modal[u0 : u0 + 6] = False
         G[:, u0 + 3 : u0 + 6] /= compiled.length
     _, values, right = np.linalg.svd(G[:, ~modal])
@@ -189,7 +189,7 @@ def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_r
         return False
     y = np.zeros(G.shape[1])
     y[~modal] = NEAR_BY * np.random.default_rng(0).normal(size=len(allowed)) @ allowed
-    for u0 in model.u0[:-1]:
+    for u0 in model.bodies.u0[:-1]:
         y[u0 : u0 + 3] *= compiled.length
     try:
         near = assembled(compiled, work, displaced(model, state, in_ground_axes(model, state, y)))
@@ -204,14 +204,14 @@ def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: Stat
     from floatframe.kernels.entry import rates_of_constraints
 
     model = compiled.model
-    if len(work.w) == 0:
+    if len(work.state.w) == 0:
         return state
     set_iterate(work, state, w=start_unknowns(model))
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     rate, _ = rates_of_constraints(model, work)
     if not np.any(rate):
         return state
-    y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.u)), -rate)
+    y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.state.u)), -rate)
     return State(state.r, state.p, state.q, state.u + in_ground_axes(model, state, y))
 
 
@@ -226,12 +226,12 @@ def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> t
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         _, bias = rates_of_constraints(model, work)
         raise_errors_of(compiled.callbacks)
-        rows = -np.where(is_held(model.row_kind), bias, work.g)
-        y, change = solve(with_mass_for_all(model, parts.H), parts, -work.residual, rows)
+        rows = -np.where(is_held(model.rows.kind), bias, work.connections.g)
+        y, change = solve(with_mass_for_all(model, parts.H), parts, -work.bodies.residual, rows)
         w = w + change
         raise_errors_of(compiled.callbacks)
         # friction by the normal force is not linear in the reactions, nor are users' forces in their states
-        is_linear = not has_normal_friction(model) and not len(model.state_row)
+        is_linear = not has_normal_friction(model) and not len(model.states.row)
         if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
             break
     return in_ground_axes(model, state, y), w
@@ -239,14 +239,14 @@ def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> t
 
 def start_unknowns(model: Model) -> Array:
     """Return the unknowns of connections before anything is known: the states of user forces at their start, (n_w,)."""
-    w = np.zeros(int(model.c_w0[-1]))
-    w[model.state_row] = model.state_start
+    w = np.zeros(int(model.connections.w0[-1]))
+    w[model.states.row] = model.states.start
     return w
 
 
 def has_normal_friction(model: Model) -> bool:
     """Whether some friction depends on the force in its joint."""
-    return bool((model.joint_forces[:, FRICTION_COEFFICIENT] > 0).any())
+    return bool((model.joint_forces.coefficient > 0).any())
 
 
 def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t: float = 0.0) -> Array:
@@ -257,9 +257,9 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
     """
     model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
     work = new_work(model)
-    turning = max((float(np.linalg.norm(state.u[k + 3 : k + 6])) for k in model.u0[:-1]), default=0.0)
-    falling = max(float(np.linalg.norm(u_dot[k : k + 3])) / compiled.length for k in model.u0[:-1])
-    swinging = max(float(np.linalg.norm(u_dot[k + 3 : k + 6])) for k in model.u0[:-1])
+    turning = max((float(np.linalg.norm(state.u[k + 3 : k + 6])) for k in model.bodies.u0[:-1]), default=0.0)
+    falling = max(float(np.linalg.norm(u_dot[k : k + 3])) / compiled.length for k in model.bodies.u0[:-1])
+    swinging = max(float(np.linalg.norm(u_dot[k + 3 : k + 6])) for k in model.bodies.u0[:-1])
     fastest = max(highest_frequency(model), turning, np.sqrt(falling), np.sqrt(swinging), fastest_motion(model))
     if fastest == 0.0:
         return np.zeros_like(u_dot)
@@ -267,19 +267,19 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
 
     def u_dot_after(step: float) -> Array:
         moved = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
-        work.time[0] = t + step
+        work.state.time[...] = t + step
         return solve_accelerations(compiled, work, State(moved.r, moved.p, moved.q, state.u + step * u_dot))[0]
 
-    if len(model.piece_t):
+    if len(model.functions.begin):
         return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
     return (u_dot_after(s) - u_dot_after(-s)) / (2 * s)
 
 
 def fastest_motion(model: Model) -> float:
     """Return the highest rate of prescribed motions: of their sines, or one over the shortest piece [1/s]."""
-    fastest = float(np.abs(model.piece[:, 7]).max(initial=0.0))
-    for first, last in zip(model.piece0[:-1], model.piece0[1:], strict=True):
-        lengths = np.diff(model.piece_t[first:last])
+    fastest = float(np.abs(model.functions.piece[:, 7]).max(initial=0.0))
+    for first, last in zip(model.functions.piece0[:-1], model.functions.piece0[1:], strict=True):
+        lengths = np.diff(model.functions.begin[first:last])
         fastest = max(fastest, 1 / float(lengths.min()) if len(lengths) else 1.0)
     return fastest
 
@@ -293,20 +293,20 @@ def velocity_correction(
     """
     model = compiled.model
     work = new_work(model)
-    holds = is_held_position(model.row_kind)
+    holds = is_held_position(model.rows.kind)
     if not holds.any():
-        return np.zeros(len(work.u))
+        return np.zeros(len(work.state.u))
     w = start_unknowns(model)
-    if len(model.p_row):  # angles of couplers and user forces are those next to where their rates lead
-        work.time[0] = t
+    if len(model.ports.row):  # angles of couplers and user forces are those next to where their rates lead
+        work.state.time[...] = t
         set_iterate(work, state, w=w)
         linearized(model, work, 1.0, 0.0, 0.0)
-        w[model.p_row] = -work.g[model.p_row] - h * work.g[model.p_row + 1]
-    work.time[0] = t + h
+        w[model.ports.row] = -work.connections.g[model.ports.row] - h * work.connections.g[model.ports.row + 1]
+    work.state.time[...] = t + h
     set_iterate(work, after, w=w)
     linearized(model, work, 1.0, 0.0, 0.0)
-    gap = np.where(holds, work.g, 0.0)
-    work.time[0] = t
+    gap = np.where(holds, work.connections.g, 0.0)
+    work.state.time[...] = t
     set_iterate(work, state, w=start_unknowns(model))
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     H = []
@@ -314,5 +314,5 @@ def velocity_correction(
         block = block.copy()
         block[6:, 6:] += beta * h**2 * modal_matrix(model, i, STIFFNESS)
         H.append(block)
-    y, _ = solve(tuple(H), parts, np.zeros(len(work.u)), -gap / h)
+    y, _ = solve(tuple(H), parts, np.zeros(len(work.state.u)), -gap / h)
     return in_ground_axes(model, state, y)

@@ -8,7 +8,7 @@ ones of a frame that is clamped to a place where the body is hinged.
 import numpy as np
 
 from floatframe.compiling.system import compiled_system
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.state import State
 from floatframe.system import System
@@ -19,7 +19,7 @@ __all__ = ["indefinite_mass_words", "indefinite_masses"]
 def indefinite_masses(system: System, state: State) -> tuple[str, ...]:
     """Return the names of the stiffened bodies whose mass matrix is not positive definite at a state."""
     model = compiled_system(system).model
-    stiffened = [i for i, kind in enumerate(model.kind) if model.is_stiffened[kind]]
+    stiffened = [i for i, kind in enumerate(model.bodies.kind) if model.body_types.is_stiffened[kind]]
     if not stiffened or not all(np.isfinite(part).all() for part in (state.q, state.p)):
         return ()
     work = new_work(model)

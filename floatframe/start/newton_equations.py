@@ -7,7 +7,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from fe_models.foundation.arrays import Array
-from floatframe.kernels.model import MASS, STIFFNESS, Model, Work
+from floatframe.kernels.model import MASS, STIFFNESS, Model
+from floatframe.kernels.work import Work
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.state import State
 
@@ -41,14 +42,14 @@ class Linearized:
 
 def set_iterate(work: Work, state: State, u_dot: Array | None = None, w: Array | None = None) -> None:
     """Write a state into the working arrays; accelerations and wrenches zero if not given."""
-    work.r[:] = state.r
+    work.state.r[:] = state.r
     for i, p in enumerate(state.p):
-        work.R[i] = rotation_matrix(p)
-    work.q[:] = state.q
-    work.u[:] = state.u
-    work.u_dot[:] = 0.0 if u_dot is None else u_dot
-    work.w[:] = 0.0 if w is None else w
-    work.theta[:] = 0.0
+        work.state.R[i] = rotation_matrix(p)
+    work.state.q[:] = state.q
+    work.state.u[:] = state.u
+    work.state.u_dot[:] = 0.0 if u_dot is None else u_dot
+    work.state.w[:] = 0.0 if w is None else w
+    work.state.theta[:] = 0.0
 
 
 def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> Linearized:
@@ -57,25 +58,25 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
 
     evaluate_and_linearize(model, work, c_m, c_d, c_k)
     H = []
-    for i in range(len(model.kind)):
-        n = 6 + int(model.n_q[i])
-        H.append(work.H[model.h0[i] : model.h0[i + 1]].reshape(n, n).copy())
-    n_w, n_u = len(work.w), len(work.u)
+    for i in range(len(model.bodies.kind)):
+        n = 6 + int(model.bodies.n_q[i])
+        H.append(work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape(n, n).copy())
+    n_w, n_u = len(work.state.w), len(work.state.u)
     J_parts: list[tuple[Array, int, int]] = []
     G_parts: list[tuple[Array, int, int]] = []
-    for m in model.ends:
-        i, c, o = int(model.m_body[m]), int(model.m_connection[m]), int(model.m_x0[m])
-        n, size = 6 + int(model.n_q[i]), int(model.c_size[c])
-        R4 = np.kron(np.eye(4), work.R[i])
-        column = work.J_column[6 * o : 6 * (o + n)].reshape(6, n)
-        row = work.J_row[12 * o : 12 * (o + n)].reshape(12, n)
-        w0, u0 = int(model.c_w0[c]), int(model.u0[i])
-        carried = model.m_sign[m] * (R4[:6, :6] @ column)
-        for part, place in ((0, int(model.m_force[m])), (3, int(model.m_moment[m]))):
+    for m in model.bodies.ends:
+        i, c, o = int(model.markers.body[m]), int(model.markers.connection[m]), int(model.markers.x0[m])
+        n, size = 6 + int(model.bodies.n_q[i]), int(model.connections.size[c])
+        R4 = np.kron(np.eye(4), work.state.R[i])
+        column = work.solver.J_column[6 * o : 6 * (o + n)].reshape(6, n)
+        row = work.solver.J_row[12 * o : 12 * (o + n)].reshape(12, n)
+        w0, u0 = int(model.connections.w0[c]), int(model.bodies.u0[i])
+        carried = model.markers.sign[m] * (R4[:6, :6] @ column)
+        for part, place in ((0, int(model.markers.force[m])), (3, int(model.markers.moment[m]))):
             if place >= 0:
                 J_parts.append((carried[part : part + 3], w0 + place, u0))
-        G_parts.append((work.P[m, :size] @ R4 @ row, w0, u0))
-    blocks = [work.V[c, :size, :size].copy() for c, size in enumerate(model.c_size)]
+        G_parts.append((work.connections.P[m, :size] @ R4 @ row, w0, u0))
+    blocks = [work.connections.V[c, :size, :size].copy() for c, size in enumerate(model.connections.size)]
     V = sp.csr_array(sp.block_diag(blocks)) if blocks else sp.csr_array((0, 0))
     return Linearized(tuple(H), summed(J_parts, (n_w, n_u)), summed(G_parts, (n_w, n_u)), V)
 
@@ -103,29 +104,29 @@ def solve(H: tuple[Array, ...], parts: Linearized, forces: Array, rows: Array) -
 
 def modal_diagonals(model: Model, i: int, which: int) -> Array:
     """Return the diagonal of M*, K* or D* of a body, (n_q,)."""
-    n, t = int(model.n_q[i]), model.kind[i]
+    n, t = int(model.bodies.n_q[i]), model.bodies.kind[i]
     if n == 0:
         return np.zeros(0)
-    start = model.block0[t, which]
-    step = 1 if model.is_diagonal[t, which - MASS] else n + 1
-    return model.blocks[start : start + n * step : step][:n]
+    start = model.body_types.block0[t, which]
+    step = 1 if model.body_types.is_diagonal[t, which - MASS] else n + 1
+    return model.body_types.blocks[start : start + n * step : step][:n]
 
 
 def modal_matrix(model: Model, i: int, which: int) -> Array:
     """Return M*, K* or D* of a body, (n_q, n_q)."""
-    n, t = int(model.n_q[i]), model.kind[i]
+    n, t = int(model.bodies.n_q[i]), model.bodies.kind[i]
     if n == 0:
         return np.zeros((0, 0))
-    start = model.block0[t, which]
-    if model.is_diagonal[t, which - MASS]:
-        return np.diag(model.blocks[start : start + n])
-    return model.blocks[start : start + n * n].reshape(n, n)
+    start = model.body_types.block0[t, which]
+    if model.body_types.is_diagonal[t, which - MASS]:
+        return np.diag(model.body_types.blocks[start : start + n])
+    return model.body_types.blocks[start : start + n * n].reshape(n, n)
 
 
 def highest_frequency(model: Model) -> float:
     """Return the largest sqrt(K_kk/M_kk) of all modes with mass [rad/s]; 0 without modes."""
     highest = 0.0
-    for i in range(len(model.kind)):
+    for i in range(len(model.bodies.kind)):
         M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
         with_mass = M > 0
         if with_mass.any():
@@ -162,11 +163,11 @@ def with_mass_for_all(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
 def displaced(model: Model, state: State, x: Array) -> State:
     """Return the state displaced by x = (dr in ground axes, rotation vector in body axes, dq) per body, (n_u,)."""
     r, p, q = state.r.copy(), state.p.copy(), state.q.copy()
-    for i in range(len(model.kind)):
-        u0, u1 = model.u0[i], model.u0[i + 1]
+    for i in range(len(model.bodies.kind)):
+        u0, u1 = model.bodies.u0[i], model.bodies.u0[i + 1]
         r[i] += x[u0 : u0 + 3]
         p[i] = product(p[i], euler_parameters_of_rotation_vector(x[u0 + 3 : u0 + 6]))
-        q[model.q0[i] : model.q0[i + 1]] += x[u0 + 6 : u1]
+        q[model.bodies.q0[i] : model.bodies.q0[i + 1]] += x[u0 + 6 : u1]
     return State(r, p, q, state.u)
 
 
@@ -181,6 +182,6 @@ def in_ground_axes(model: Model, state: State, y: Array) -> Array:
     """Return body unknowns with their translation turned from body to ground axes, (n_u,)."""
     x = y.copy()
     for i, p in enumerate(state.p):
-        u0 = model.u0[i]
+        u0 = model.bodies.u0[i]
         x[u0 : u0 + 3] = rotation_matrix(p) @ y[u0 : u0 + 3]
     return x

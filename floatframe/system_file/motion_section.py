@@ -33,6 +33,7 @@ TIME_FUNCTIONS: dict[str, Callable[..., TimeFunction]] = {
     "piecewise": piecewise,
 }
 
+
 class MotionSection(Table):
     """A function of time by its type; the other keys are the parameters of that type."""
 

@@ -9,7 +9,7 @@ from tests.floatframe.kernels.test_tangent import C_K, Iterate, newton_matrices
 def assert_tangent_is_exact(system, *, seed=1, step=1e-5, tolerance=4e-9, prepare=None):
     """Compare the Newton matrix at a random iterate with central differences; prepare(iterate) may change it."""
     iterate = Iterate(system, seed)
-    iterate.work.time[0] = 0.37
+    iterate.work.state.time[...] = 0.37
     if prepare is not None:
         prepare(iterate)
     exact, approximate = newton_matrices(iterate, step=step)

@@ -22,12 +22,13 @@ import math
 
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.time_function import time_function
-from floatframe.kernels.marker import rotate, rotate_back
-from floatframe.kernels.rotation import cross, exp_matrix
+from floatframe.kernels.marker import cross, rotate, rotate_back
+from floatframe.kernels.rotation import exp_matrix
+from floatframe.kernels.vector import product, put_matrix
 
 __all__ = ["bushing_energy", "bushing_power", "bushing_state", "bushing_variation"]
 
-# places in work.pair; C is the first nine
+# places in work.pair.numbers; C is the first nine
 E, THETA, Y, OMEGA, MEAN, GAMMA, E_DOT, THETA_DOT, F, M, P, SCALARS, SLOPE = (
     9,
     12,
@@ -145,32 +146,31 @@ def by_dS(s, k, h0, h1, h2, u0, u1, u2):
 
 
 @inner
-def law_of(K, first, x0, x1, x2, y0, y1, y2, r):
-    """Return component r of the product of the matrix that begins in K at `first` by (x, y)."""
-    o = first + 6 * r
-    return (
-        K[o] * x0 + K[o + 1] * x1 + K[o + 2] * x2 + K[o + 3] * y0 + K[o + 4] * y1 + K[o + 5] * y2
-    )  # fmt: skip
+def law_of(K, x0, x1, x2, y0, y1, y2, r):
+    """Return component r of K (x, y)."""
+    row = K[r]
+    return row[0] * x0 + row[1] * x1 + row[2] * x2 + row[3] * y0 + row[4] * y1 + row[5] * y2
 
 
 @inner
 def bushing_state(model, work, c):
-    """Write all that follows from the motion of the markers of bushing c into work.pair."""
-    a, b, s, K = model.c_a[c], model.c_b[c], work.pair, model.bushings[model.c_item[c]]
-    A, B = work.m_A[a], work.m_A[b]
+    """Write all that follows from the motion of the markers of bushing c into work.pair.numbers."""
+    a, b, s, K = (
+        model.connections.a[c],
+        model.connections.b[c],
+        work.pair.numbers,
+        model.bushings.stiffness[model.connections.item[c]],
+    )
+    D, preload = model.bushings.damping[model.connections.item[c]], model.bushings.preload[model.connections.item[c]]
+    A, B = work.markers.A[a], work.markers.A[b]
     t0, t1, t2 = rotation_vector(A, B)
     put(s, THETA, t0, t1, t2)
-    half = s[INPUT : INPUT + 3]
-    put(half, 0, 0.5 * t0, 0.5 * t1, 0.5 * t2)
-    turn = s[OUTPUT : OUTPUT + 9].reshape((3, 3))
-    exp_matrix(half, turn)
     C = s[:9].reshape((3, 3))
-    for i in range(3):
-        C[0, i], C[1, i], C[2, i] = rotate(A, turn[0, i], turn[1, i], turn[2, i])
+    put_matrix(C, product(A, exp_matrix((0.5 * t0, 0.5 * t1, 0.5 * t2))))
     alpha, beta, alpha_1, beta_1, tau, tau_1 = scalars(t0 * t0 + t1 * t1 + t2 * t2)
     put(s, SCALARS, alpha, beta, alpha_1)
     put(s, SCALARS + 3, beta_1, tau, tau_1)
-    d, v, o, q = work.m_r, work.m_v, work.m_omega[a], work.m_omega[b]
+    d, v, o, q = work.markers.r, work.markers.v, work.markers.omega[a], work.markers.omega[b]
     e0, e1, e2 = rotate_back(C, d[b, 0] - d[a, 0], d[b, 1] - d[a, 1], d[b, 2] - d[a, 2])
     y0, y1, y2 = rotate_back(C, v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2])
     u0, u1, u2 = rotate_back(C, q[0] - o[0], q[1] - o[1], q[2] - o[2])
@@ -188,9 +188,9 @@ def bushing_state(model, work, c):
     put(s, E_DOT, ed0, ed1, ed2)
     put(s, THETA_DOT, td0, td1, td2)
     for r in range(6):
-        value = law_of(K, 0, e0, e1, e2, t0, t1, t2, r) + law_of(K, 36, ed0, ed1, ed2, td0, td1, td2, r) + K[72 + r]
+        value = law_of(K, e0, e1, e2, t0, t1, t2, r) + law_of(D, ed0, ed1, ed2, td0, td1, td2, r) + preload[r]
         s[SLOPE + r] = 0.0
-        table = model.bushing_table[model.c_item[c], r]
+        table = model.bushings.table[model.connections.item[c], r]
         if table >= 0:
             own, slope, _ = time_function(model, table, s[E + r])
             value += own
@@ -212,8 +212,9 @@ def bushing_state(model, work, c):
 
 @inner
 def bushing_variation(model, work, c):
-    """Write the change of F, M, N for the variation of the motion that stands in work.pair, all in ground axes."""
-    s, K = work.pair, model.bushings[model.c_item[c]]
+    """Write the change of F, M, N for the variation of the motion in work.pair.numbers, ground axes."""
+    s, K = work.pair.numbers, model.bushings.stiffness[model.connections.item[c]]
+    D = model.bushings.damping[model.connections.item[c]]
     C = s[:9].reshape((3, 3))
     tau, tau_1 = s[SCALARS + 4], s[SCALARS + 5]
     e0, e1, e2 = three(s, E)
@@ -257,8 +258,8 @@ def bushing_variation(model, work, c):
     change = (de0, de1, de2, h0, h1, h2)
     for r in range(6):
         out[r] = (
-            law_of(K, 0, de0, de1, de2, h0, h1, h2, r)
-            + law_of(K, 36, dd0, dd1, dd2, dt0, dt1, dt2, r)
+            law_of(K, de0, de1, de2, h0, h1, h2, r)
+            + law_of(D, dd0, dd1, dd2, dt0, dt1, dt2, r)
             + s[SLOPE + r] * change[r]
         )
     df0, df1, df2 = three(out, 0)
@@ -292,27 +293,28 @@ def turn_with(C, out, k, c0, c1, c2, x0, x1, x2, X0, X1, X2):
 @inner
 def bushing_energy(model, work, c):
     """Return 1/2 xiᵀ K xi + preload · xi; tables count as forces, see `bushing_power`."""
-    s, K = work.pair, model.bushings[model.c_item[c]]
+    s, K = work.pair.numbers, model.bushings.stiffness[model.connections.item[c]]
+    preload = model.bushings.preload[model.connections.item[c]]
     bushing_state(model, work, c)
     total = 0.0
     for r in range(6):
-        linear = law_of(K, 0, s[E], s[E + 1], s[E + 2], s[THETA], s[THETA + 1], s[THETA + 2], r)
-        total += s[E + r] * (0.5 * linear + K[72 + r])
+        linear = law_of(K, s[E], s[E + 1], s[E + 2], s[THETA], s[THETA + 1], s[THETA + 2], r)
+        total += s[E + r] * (0.5 * linear + preload[r])
     return total
 
 
 @inner
 def bushing_power(model, work, c):
     """Return the power that enters by tables, and that taken by damping."""
-    s, K = work.pair, model.bushings[model.c_item[c]]
+    s, D = work.pair.numbers, model.bushings.damping[model.connections.item[c]]
     bushing_state(model, work, c)
     given, taken = 0.0, 0.0
     for r in range(6):
         rate = s[E_DOT + r]
         taken += rate * law_of(
-            K, 36, s[E_DOT], s[E_DOT + 1], s[E_DOT + 2], s[THETA_DOT], s[THETA_DOT + 1], s[THETA_DOT + 2], r
+            D, s[E_DOT], s[E_DOT + 1], s[E_DOT + 2], s[THETA_DOT], s[THETA_DOT + 1], s[THETA_DOT + 2], r
         )
-        table = model.bushing_table[model.c_item[c], r]
+        table = model.bushings.table[model.connections.item[c], r]
         if table >= 0:
             value, _, _ = time_function(model, table, s[E + r])
             given -= value * rate

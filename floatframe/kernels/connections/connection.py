@@ -61,9 +61,8 @@ from floatframe.kernels.connections.relative_motion import (
 from floatframe.kernels.connections.rolling import rolling_acceleration, rolling_derivatives, rolling_rate, rolling_row
 from floatframe.kernels.connections.time_function import time_function
 from floatframe.kernels.connections.user_force import user_force_derivatives, user_force_rows
-from floatframe.kernels.marker import marker_acceleration_bias, rotate
+from floatframe.kernels.marker import cross, marker_acceleration_bias, rotate
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, JOINT, SPRING, USER_FORCE
-from floatframe.kernels.rotation import cross
 
 __all__ = [
     "connection_derivatives",
@@ -78,9 +77,17 @@ __all__ = [
 @inner
 def spring_line(model, work, c):
     """Return r_B - r_A, v_B - v_A (six numbers) and the length of spring c."""
-    a, b = model.c_a[c], model.c_b[c]
-    x0, x1, x2 = (work.m_r[b, 0] - work.m_r[a, 0], work.m_r[b, 1] - work.m_r[a, 1], work.m_r[b, 2] - work.m_r[a, 2])
-    y0, y1, y2 = (work.m_v[b, 0] - work.m_v[a, 0], work.m_v[b, 1] - work.m_v[a, 1], work.m_v[b, 2] - work.m_v[a, 2])
+    a, b = model.connections.a[c], model.connections.b[c]
+    x0, x1, x2 = (
+        work.markers.r[b, 0] - work.markers.r[a, 0],
+        work.markers.r[b, 1] - work.markers.r[a, 1],
+        work.markers.r[b, 2] - work.markers.r[a, 2],
+    )
+    y0, y1, y2 = (
+        work.markers.v[b, 0] - work.markers.v[a, 0],
+        work.markers.v[b, 1] - work.markers.v[a, 1],
+        work.markers.v[b, 2] - work.markers.v[a, 2],
+    )
     return x0, x1, x2, y0, y1, y2, math.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
 
 
@@ -90,14 +97,15 @@ def spring_tension(model, work, c):
 
     At length zero the tension has a direction only if the free length is zero: then k remains.
     """
-    k, damping, free, preload = model.springs[model.c_item[c]]
+    i, springs = model.connections.item[c], model.springs
+    k, damping, free, preload = springs.stiffness[i], springs.damping[i], springs.free_length[i], springs.preload[i]
     x0, x1, x2, y0, y1, y2, length = spring_line(model, work, c)
     if length == 0.0:
         return k, length, 0.0
     rate = (x0 * y0 + x1 * y1 + x2 * y2) / length
     tension = k * (length - free) + damping * rate + preload
-    if model.spring_table[model.c_item[c]] >= 0:
-        value, _, _ = time_function(model, model.spring_table[model.c_item[c]], length - free)
+    if springs.table[i] >= 0:
+        value, _, _ = time_function(model, springs.table[i], length - free)
         tension += value
     return tension / length, length, rate
 
@@ -116,8 +124,8 @@ def loaded_row(model, work, k, a, b, w, c_k):
     e0, e1, e2 = loaded_axis(model, work, k, a, b)
     x, v = loaded_coordinate(model, work, k, a, b)
     normal, _ = normal_force(w, e0, e1, e2)
-    Q, _, _, _ = coordinate_force(model, work, k, model.row_kind[k] != PUSH, x, v, normal)
-    part = model.row_part[k]
+    Q, _, _, _ = coordinate_force(model, work, k, model.rows.kind[k] != PUSH, x, v, normal)
+    part = model.rows.part[k]
     return c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2] + Q)
 
 
@@ -130,8 +138,8 @@ def loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
            - (e × omega_A)·(dr_B - dr_A) + (e × s)·dphi_A
     TWIST  dx by `screw_angle`,   dv = e·(domega_B - domega_A) + (e × (omega_B - omega_A))·dphi_A
     """
-    o, p = work.m_omega[a], work.m_omega[b]
-    part, is_angle = model.row_part[k], model.row_kind[k] != PUSH
+    o, p = work.markers.omega[a], work.markers.omega[b]
+    part, is_angle = model.rows.part[k], model.rows.kind[k] != PUSH
     e0, e1, e2 = loaded_axis(model, work, k, a, b)
     x, v = loaded_coordinate(model, work, k, a, b)
     normal, along = normal_force(w, e0, e1, e2)
@@ -162,7 +170,7 @@ def loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
         n0, n1, n2 = n0 + Q_x * m0, n1 + Q_x * m1, n2 + Q_x * m2
         m0, m1, m2 = cross(e0, e1, e2, s0, s1, s2)
         n0, n1, n2 = n0 + Q_v * m0, n1 + Q_v * m1, n2 + Q_v * m2
-    P = P_b if model.row_kind[k] == TWIST_B else P_a  # of the marker that holds the axis
+    P = P_b if model.rows.kind[k] == TWIST_B else P_a  # of the marker that holds the axis
     P[r, 3] += c_k * n0
     P[r, 4] += c_k * n1
     P[r, 5] += c_k * n2
@@ -171,75 +179,79 @@ def loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 @inner
 def connection_rows(model, work, c, c_k):
     """Write the residual of connection c, and its wrench on its markers."""
-    if model.c_law[c] == COUPLER:
+    if model.connections.law[c] == COUPLER:
         coupler_rows(model, work, c, c_k)
         return
-    if model.c_law[c] == USER_FORCE:
+    if model.connections.law[c] == USER_FORCE:
         user_force_rows(model, work, c, c_k)
         return
-    a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
-    w = work.w[w0 : w0 + size]
+    a, b, w0, size = model.connections.a[c], model.connections.b[c], model.connections.w0[c], model.connections.size[c]
+    w = work.state.w[w0 : w0 + size]
     for k in range(3):
-        work.m_wrench[a, k] += w[k]
-        work.m_wrench[b, k] -= w[k]
-        if model.m_moment[a] >= 0:
-            work.m_wrench[a, 3 + k] += w[model.m_moment[a] + k]
-        if model.m_moment[b] >= 0:
-            work.m_wrench[b, 3 + k] -= w[model.m_moment[b] + k]
-    if model.c_law[c] == BUSHING or model.c_law[c] == CONTACT:
+        work.markers.wrench[a, k] += w[k]
+        work.markers.wrench[b, k] -= w[k]
+        if model.markers.moment[a] >= 0:
+            work.markers.wrench[a, 3 + k] += w[model.markers.moment[a] + k]
+        if model.markers.moment[b] >= 0:
+            work.markers.wrench[b, 3 + k] -= w[model.markers.moment[b] + k]
+    if model.connections.law[c] == BUSHING or model.connections.law[c] == CONTACT:
         pair_rows(model, work, c, c_k)
         return
-    if model.c_law[c] == SPRING:
+    if model.connections.law[c] == SPRING:
         tension, _, _ = spring_tension(model, work, c)
         for k in range(3):
-            work.g[w0 + k] = c_k * (work.w[w0 + k] - tension * (work.m_r[b, k] - work.m_r[a, k]))
+            work.connections.g[w0 + k] = c_k * (
+                work.state.w[w0 + k] - tension * (work.markers.r[b, k] - work.markers.r[a, k])
+            )
         return
     r0, r1, r2 = distance(work, a, b)
     for k in range(w0, w0 + size):
-        kind, x, part = model.row_kind[k], model.row_x[k], model.row_part[k]
+        kind, x, part = model.rows.kind[k], model.rows.x[k], model.rows.part[k]
         if kind == POINT:
             force = x[0] * w[0] + x[1] * w[1] + x[2] * w[2]
-            work.g[k] = model.row_soft[k] * c_k * force - (x[0] * r0 + x[1] * r1 + x[2] * r2)
+            work.connections.g[k] = model.rows.soft[k] * c_k * force - (x[0] * r0 + x[1] * r1 + x[2] * r2)
         elif kind == ARM:
             n0, n1, n2 = cross(r0, r1, r2, w[0], w[1], w[2])
             n0, n1, n2 = w[MOMENT] - n0, w[MOMENT + 1] - n1, w[MOMENT + 2] - n2
             if size > MOMENT_B:
                 n0, n1, n2 = n0 - w[MOMENT_B], n1 - w[MOMENT_B + 1], n2 - w[MOMENT_B + 2]
-            work.g[k] = c_k * (x[0] * n0 + x[1] * n1 + x[2] * n2)
+            work.connections.g[k] = c_k * (x[0] * n0 + x[1] * n1 + x[2] * n2)
         elif kind == ROD:
-            work.g[k] = c_k * (x[0] * (w[0] - w[3] * r0) + x[1] * (w[1] - w[3] * r1) + x[2] * (w[2] - w[3] * r2))
+            work.connections.g[k] = c_k * (
+                x[0] * (w[0] - w[3] * r0) + x[1] * (w[1] - w[3] * r1) + x[2] * (w[2] - w[3] * r2)
+            )
         elif kind == DISTANCE:
             length, _, _ = prescribed(model, work, k)
-            work.g[k] = 0.5 * ((r0 * r0 + r1 * r1 + r2 * r2) / length - length)
+            work.connections.g[k] = 0.5 * ((r0 * r0 + r1 * r1 + r2 * r2) / length - length)
         elif kind == SCREW:
-            slope = model.row_c[k]
+            slope = model.rows.c[k]
             angle, _, _, _ = screw_angle(model, work, k, a, b)
             e0, e1, e2 = screw_axis(model, work, k, a)
             along = e0 * r0 + e1 * r1 + e2 * r2
             turns = math.floor((along / slope - angle) / (2 * math.pi) + 0.5)
-            work.g[k] = along - slope * (angle + 2 * math.pi * turns)
+            work.connections.g[k] = along - slope * (angle + 2 * math.pi * turns)
         elif kind == PUSH or kind == TWIST or kind == TWIST_B:
-            work.g[k] = loaded_row(model, work, k, a, b, w, c_k)
+            work.connections.g[k] = loaded_row(model, work, k, a, b, w, c_k)
         elif kind == GAUGE_B:
-            y = model.row_y[k]
-            e0, e1, e2 = rotate(work.m_A[b], y[0], y[1], y[2])
-            work.g[k] = c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2])
+            y = model.rows.y[k]
+            e0, e1, e2 = rotate(work.markers.A[b], y[0], y[1], y[2])
+            work.connections.g[k] = c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2])
         elif kind == RIM_HEIGHT or kind == ROLL or kind == RIM:
-            work.g[k] = rolling_row(model, work, k, a, b, w, c_k)
+            work.connections.g[k] = rolling_row(model, work, k, a, b, w, c_k)
         elif kind == LINE or kind == LINE_FREE:
-            work.g[k] = line_row(model, work, k, a, b, w, c_k)
+            work.connections.g[k] = line_row(model, work, k, a, b, w, c_k)
         elif kind == TURN_B:
-            y = model.row_y[k]
+            y = model.rows.y[k]
             e0, e1, e2 = direction_of_a(model, work, k, b)
-            d0, d1, d2 = rotate(work.m_A[a], y[0], y[1], y[2])
-            work.g[k] = e0 * d0 + e1 * d1 + e2 * d2
+            d0, d1, d2 = rotate(work.markers.A[a], y[0], y[1], y[2])
+            work.connections.g[k] = e0 * d0 + e1 * d1 + e2 * d2
         else:
             e0, e1, e2 = direction_of_a(model, work, k, a)
             if kind == GAUGE:
-                work.g[k] = c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2])
+                work.connections.g[k] = c_k * (e0 * w[part] + e1 * w[part + 1] + e2 * w[part + 2])
             elif kind == THREAD:
-                slope = model.row_c[k]
-                work.g[k] = c_k * (
+                slope = model.rows.c[k]
+                work.connections.g[k] = c_k * (
                     e0 * (w[MOMENT_B] + slope * w[0])
                     + e1 * (w[MOMENT_B + 1] + slope * w[1])
                     + e2 * (w[MOMENT_B + 2] + slope * w[2])
@@ -247,48 +259,50 @@ def connection_rows(model, work, c, c_k):
             elif kind == SLIDE:
                 value, _, _ = prescribed(model, work, k)
                 force = e0 * w[0] + e1 * w[1] + e2 * w[2]
-                work.g[k] = e0 * r0 + e1 * r1 + e2 * r2 - value - model.row_soft[k] * c_k * force
+                work.connections.g[k] = e0 * r0 + e1 * r1 + e2 * r2 - value - model.rows.soft[k] * c_k * force
             else:  # DOT, TURN, LINE_TURN
-                y = model.row_y[k]
-                d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
-                held = model.row_c[k] if kind == DOT else 0.0
-                work.g[k] = e0 * d0 + e1 * d1 + e2 * d2 - held
-                if model.row_soft[k] > 0.0:
+                y = model.rows.y[k]
+                d0, d1, d2 = rotate(work.markers.A[b], y[0], y[1], y[2])
+                held = model.rows.c[k] if kind == DOT else 0.0
+                work.connections.g[k] = e0 * d0 + e1 * d1 + e2 * d2 - held
+                if model.rows.soft[k] > 0.0:
                     n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
-                    work.g[k] += model.row_soft[k] * c_k * (n0 * w[part] + n1 * w[part + 1] + n2 * w[part + 2])
+                    work.connections.g[k] += (
+                        model.rows.soft[k] * c_k * (n0 * w[part] + n1 * w[part + 1] + n2 * w[part + 2])
+                    )
 
 
 @inner
 def connection_derivatives(model, work, c, c_k):
     """Write P at the markers and V of connection c."""
-    if model.c_law[c] == COUPLER:
+    if model.connections.law[c] == COUPLER:
         coupler_derivatives(model, work, c, c_k)
         return
-    if model.c_law[c] == USER_FORCE:
+    if model.connections.law[c] == USER_FORCE:
         user_force_derivatives(model, work, c, c_k)
         return
-    a, b, w0, size = model.c_a[c], model.c_b[c], model.c_w0[c], model.c_size[c]
-    P_a, P_b, V, w = work.P[a], work.P[b], work.V[c], work.w[w0 : w0 + size]
+    a, b, w0, size = model.connections.a[c], model.connections.b[c], model.connections.w0[c], model.connections.size[c]
+    P_a, P_b, V, w = work.connections.P[a], work.connections.P[b], work.connections.V[c], work.state.w[w0 : w0 + size]
     for r in range(size):
         for j in range(12):
             P_a[r, j] = 0.0
             P_b[r, j] = 0.0
         for j in range(size):
             V[r, j] = 0.0
-    if model.c_law[c] == BUSHING or model.c_law[c] == CONTACT:
+    if model.connections.law[c] == BUSHING or model.connections.law[c] == CONTACT:
         pair_derivatives(model, work, c, c_k)
         return
-    if model.c_law[c] == SPRING:
+    if model.connections.law[c] == SPRING:
         spring_derivatives(model, work, c, c_k)
         return
     r0, r1, r2 = distance(work, a, b)
     for r in range(size):
         k = w0 + r
-        kind, x, part = model.row_kind[k], model.row_x[k], model.row_part[k]
+        kind, x, part = model.rows.kind[k], model.rows.x[k], model.rows.part[k]
         if kind == POINT:
             put_pair(P_a, P_b, r, 0, 1.0, x[0], x[1], x[2])
             for j in range(3):
-                V[r, j] = model.row_soft[k] * x[j]
+                V[r, j] = model.rows.soft[k] * x[j]
         elif kind == ARM:  # x·(M - N - d × F) = x·(M - N) - (x × d)·F, and (x × d)·F = d·(F × x)
             n0, n1, n2 = cross(x[0], x[1], x[2], r0, r1, r2)
             V[r, 0], V[r, 1], V[r, 2] = -n0, -n1, -n2
@@ -310,7 +324,7 @@ def connection_derivatives(model, work, c, c_k):
             e0, e1, e2 = screw_axis(model, work, k, a)
             put_pair(P_a, P_b, r, 0, -1.0, e0, e1, e2)
             _, t0, t1, t2 = screw_angle(model, work, k, a, b)
-            put_pair(P_a, P_b, r, 3, -model.row_c[k], t0, t1, t2)
+            put_pair(P_a, P_b, r, 3, -model.rows.c[k], t0, t1, t2)
             n0, n1, n2 = cross(e0, e1, e2, r0, r1, r2)
             P_a[r, 3] += n0
             P_a[r, 4] += n1
@@ -318,8 +332,8 @@ def connection_derivatives(model, work, c, c_k):
         elif kind == PUSH or kind == TWIST or kind == TWIST_B:
             loaded_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V)
         elif kind == GAUGE_B:
-            y = model.row_y[k]
-            e0, e1, e2 = rotate(work.m_A[b], y[0], y[1], y[2])
+            y = model.rows.y[k]
+            e0, e1, e2 = rotate(work.markers.A[b], y[0], y[1], y[2])
             n0, n1, n2 = cross(e0, e1, e2, w[part], w[part + 1], w[part + 2])
             P_b[r, 3], P_b[r, 4], P_b[r, 5] = c_k * n0, c_k * n1, c_k * n2
             V[r, part], V[r, part + 1], V[r, part + 2] = e0, e1, e2
@@ -328,9 +342,9 @@ def connection_derivatives(model, work, c, c_k):
         elif kind == LINE or kind == LINE_FREE:
             line_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V)
         elif kind == TURN_B:
-            y = model.row_y[k]
+            y = model.rows.y[k]
             e0, e1, e2 = direction_of_a(model, work, k, b)
-            d0, d1, d2 = rotate(work.m_A[a], y[0], y[1], y[2])
+            d0, d1, d2 = rotate(work.markers.A[a], y[0], y[1], y[2])
             n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
             put_pair(P_b, P_a, r, 3, 1.0, n0, n1, n2)
         else:
@@ -340,7 +354,7 @@ def connection_derivatives(model, work, c, c_k):
                 P_a[r, 3], P_a[r, 4], P_a[r, 5] = c_k * n0, c_k * n1, c_k * n2
                 V[r, part], V[r, part + 1], V[r, part + 2] = e0, e1, e2
             elif kind == THREAD:
-                slope = model.row_c[k]
+                slope = model.rows.c[k]
                 n0, n1, n2 = cross(
                     e0, e1, e2,
                     w[MOMENT_B] + slope * w[0], w[MOMENT_B + 1] + slope * w[1], w[MOMENT_B + 2] + slope * w[2],
@@ -351,16 +365,16 @@ def connection_derivatives(model, work, c, c_k):
             elif kind == SLIDE:
                 put_pair(P_a, P_b, r, 0, -1.0, e0, e1, e2)
                 P_a[r, 3], P_a[r, 4], P_a[r, 5] = cross(e0, e1, e2, r0, r1, r2)
-                V[r, 0], V[r, 1], V[r, 2] = -model.row_soft[k] * e0, -model.row_soft[k] * e1, -model.row_soft[k] * e2
+                V[r, 0], V[r, 1], V[r, 2] = -model.rows.soft[k] * e0, -model.rows.soft[k] * e1, -model.rows.soft[k] * e2
             else:  # DOT, TURN, LINE_TURN
-                y = model.row_y[k]
-                d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+                y = model.rows.y[k]
+                d0, d1, d2 = rotate(work.markers.A[b], y[0], y[1], y[2])
                 n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
                 put_pair(P_a, P_b, r, 3, 1.0, n0, n1, n2)
                 if kind == LINE_TURN:
                     line_turn_by_place(model, work, r, a, n0, n1, n2, P_a, P_b)
-                if model.row_soft[k] > 0.0:  # its change with the direction is left out: of second order
-                    f = model.row_soft[k]
+                if model.rows.soft[k] > 0.0:  # its change with the direction is left out: of second order
+                    f = model.rows.soft[k]
                     V[r, part], V[r, part + 1], V[r, part + 2] = f * n0, f * n1, f * n2
 
 
@@ -370,11 +384,16 @@ def spring_derivatives(model, work, c, c_k):
 
     d(s d)/dr_B = (k - s/l) d dᵀ + (s/l) 1 + (c/l) d (v - l_dot d)ᵀ,  d(s d)/dv_B = c d dᵀ.
     """
-    P_a, P_b, V = work.P[model.c_a[c]], work.P[model.c_b[c]], work.V[c]
-    k, damping, free, _ = model.springs[model.c_item[c]]
+    P_a, P_b, V = (
+        work.connections.P[model.connections.a[c]],
+        work.connections.P[model.connections.b[c]],
+        work.connections.V[c],
+    )
+    i, springs = model.connections.item[c], model.springs
+    k, damping, free = springs.stiffness[i], springs.damping[i], springs.free_length[i]
     x0, x1, x2, y0, y1, y2, own_length = spring_line(model, work, c)
-    if model.spring_table[model.c_item[c]] >= 0:
-        _, slope, _ = time_function(model, model.spring_table[model.c_item[c]], own_length - free)
+    if springs.table[i] >= 0:
+        _, slope, _ = time_function(model, springs.table[i], own_length - free)
         k += slope
     tension, length, rate = spring_tension(model, work, c)
     x, y = (x0, x1, x2), (y0, y1, y2)
@@ -397,11 +416,11 @@ def spring_derivatives(model, work, c, c_k):
 def moving_direction(model, work, k, a):
     """Return E, E_dot less omega_A × E, and E_ddot less alpha and omega terms, of row k: nine numbers, ground axes."""
     e0, e1, e2 = direction_of_a(model, work, k, a)
-    if model.row_kind[k] != TURN and model.row_kind[k] != TURN_B:
+    if model.rows.kind[k] != TURN and model.rows.kind[k] != TURN_B:
         return e0, e1, e2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     angle, rate, second = prescribed(model, work, k)
-    x, z, c, s = model.row_x[k], model.row_z[k], math.cos(angle), math.sin(angle)
-    n0, n1, n2 = rotate(work.m_A[a], c * z[0] - s * x[0], c * z[1] - s * x[1], c * z[2] - s * x[2])
+    x, z, c, s = model.rows.x[k], model.rows.z[k], math.cos(angle), math.sin(angle)
+    n0, n1, n2 = rotate(work.markers.A[a], c * z[0] - s * x[0], c * z[1] - s * x[1], c * z[2] - s * x[2])
     square = rate * rate
     return (
         e0, e1, e2, rate * n0, rate * n1, rate * n2,
@@ -412,9 +431,13 @@ def moving_direction(model, work, k, a):
 @inner
 def row_rate(model, work, k, a, b):
     """Return the rate of the held quantity of row k between markers a and b; zero for rows that hold none."""
-    kind, x, y = model.row_kind[k], model.row_x[k], model.row_y[k]
-    o, p = work.m_omega[a], work.m_omega[b]
-    v0, v1, v2 = work.m_v[b, 0] - work.m_v[a, 0], work.m_v[b, 1] - work.m_v[a, 1], work.m_v[b, 2] - work.m_v[a, 2]
+    kind, x, y = model.rows.kind[k], model.rows.x[k], model.rows.y[k]
+    o, p = work.markers.omega[a], work.markers.omega[b]
+    v0, v1, v2 = (
+        work.markers.v[b, 0] - work.markers.v[a, 0],
+        work.markers.v[b, 1] - work.markers.v[a, 1],
+        work.markers.v[b, 2] - work.markers.v[a, 2],
+    )
     if kind == POINT:
         return -(x[0] * v0 + x[1] * v1 + x[2] * v2)
     r0, r1, r2 = distance(work, a, b)
@@ -427,7 +450,7 @@ def row_rate(model, work, k, a, b):
         _, t0, t1, t2 = screw_angle(model, work, k, a, b)
         f0, f1, f2 = cross(o[0], o[1], o[2], e0, e1, e2)
         turning = t0 * (o[0] - p[0]) + t1 * (o[1] - p[1]) + t2 * (o[2] - p[2])
-        return f0 * r0 + f1 * r1 + f2 * r2 + e0 * v0 + e1 * v1 + e2 * v2 - model.row_c[k] * turning
+        return f0 * r0 + f1 * r1 + f2 * r2 + e0 * v0 + e1 * v1 + e2 * v2 - model.rows.c[k] * turning
     if kind == RIM_HEIGHT or kind == ROLL:
         return rolling_rate(model, work, k, a, b)
     if kind == LINE or kind == LINE_TURN:
@@ -441,7 +464,7 @@ def row_rate(model, work, k, a, b):
         if kind == SLIDE:
             _, rate, _ = prescribed(model, work, k)
             return f0 * r0 + f1 * r1 + f2 * r2 + e0 * v0 + e1 * v1 + e2 * v2 - rate
-        d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+        d0, d1, d2 = rotate(work.markers.A[b], y[0], y[1], y[2])
         h0, h1, h2 = cross(p[0], p[1], p[2], d0, d1, d2)
         return f0 * d0 + f1 * d1 + f2 * d2 + e0 * h0 + e1 * h1 + e2 * h2
     return 0.0
@@ -454,12 +477,16 @@ def row_acceleration(model, work, k, a, b, bias_a, bias_b):
     E_ddot·D + 2 E_dot·D_dot + E·D_ddot with E_ddot = al × E + w × (w × E) + 2 w × E' + E'', E' and E'' the rates in A;
     the second rate of the angle of a screw is that of parallel axes.
     """
-    kind, x, y = model.row_kind[k], model.row_x[k], model.row_y[k]
+    kind, x, y = model.rows.kind[k], model.rows.x[k], model.rows.y[k]
     c0, c1, c2 = bias_b[0] - bias_a[0], bias_b[1] - bias_a[1], bias_b[2] - bias_a[2]
     if kind == POINT:
         return -(x[0] * c0 + x[1] * c1 + x[2] * c2)
-    o, p = work.m_omega[a], work.m_omega[b]
-    v0, v1, v2 = work.m_v[b, 0] - work.m_v[a, 0], work.m_v[b, 1] - work.m_v[a, 1], work.m_v[b, 2] - work.m_v[a, 2]
+    o, p = work.markers.omega[a], work.markers.omega[b]
+    v0, v1, v2 = (
+        work.markers.v[b, 0] - work.markers.v[a, 0],
+        work.markers.v[b, 1] - work.markers.v[a, 1],
+        work.markers.v[b, 2] - work.markers.v[a, 2],
+    )
     r0, r1, r2 = distance(work, a, b)
     if kind == DISTANCE:
         L, rate, second = prescribed(model, work, k)
@@ -488,8 +515,8 @@ def row_acceleration(model, work, k, a, b, bias_a, bias_b):
                 return along - second
             _, t0, t1, t2 = screw_angle(model, work, k, a, b)
             turning = t0 * (bias_a[3] - bias_b[3]) + t1 * (bias_a[4] - bias_b[4]) + t2 * (bias_a[5] - bias_b[5])
-            return along - model.row_c[k] * turning
-        d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+            return along - model.rows.c[k] * turning
+        d0, d1, d2 = rotate(work.markers.A[b], y[0], y[1], y[2])
         h0, h1, h2 = cross(p[0], p[1], p[2], d0, d1, d2)
         hh0, hh1, hh2 = cross(p[0], p[1], p[2], h0, h1, h2)
         b0, b1, b2 = cross(bias_b[3], bias_b[4], bias_b[5], d0, d1, d2)
@@ -502,23 +529,23 @@ def row_acceleration(model, work, k, a, b, bias_a, bias_b):
 
 
 @inner
-def constraint_rates(model, work, rate, bias):
-    """Write for every row the rate of the held quantity and its second rate at zero u_dot, both (n_w,).
+def constraint_rates(model, work):
+    """Write for every row the rate of the held quantity and its second rate at zero u_dot into `work.connections`.
 
     `evaluate` has been called for the iterate.
     """
-    motion = work.m_bias
-    for m in range(model.m_body.shape[0]):
+    motion, rate, bias = work.markers.bias, work.connections.rate, work.connections.bias
+    for m in range(model.markers.body.shape[0]):
         marker_acceleration_bias(model, work, m, motion[m])
-    for c in range(model.c_size.shape[0]):
-        a, b = model.c_a[c], model.c_b[c]
-        if model.c_law[c] != JOINT:
-            for k in range(model.c_w0[c], model.c_w0[c + 1]):
+    for c in range(model.connections.size.shape[0]):
+        a, b = model.connections.a[c], model.connections.b[c]
+        if model.connections.law[c] != JOINT:
+            for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
                 rate[k], bias[k] = 0.0, 0.0
-        if model.c_law[c] == COUPLER:
+        if model.connections.law[c] == COUPLER:
             coupler_rates(model, work, c, rate, bias)
-        if model.c_law[c] != JOINT:
+        if model.connections.law[c] != JOINT:
             continue
-        for k in range(model.c_w0[c], model.c_w0[c + 1]):
+        for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
             rate[k] = row_rate(model, work, k, a, b)
             bias[k] = row_acceleration(model, work, k, a, b, motion[a], motion[b])

@@ -14,13 +14,10 @@ import math
 
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.bushing import INPUT, LAW, OUTPUT, dot, put, three
-from floatframe.kernels.marker import rotate
-from floatframe.kernels.rotation import cross
+from floatframe.kernels.marker import cross, rotate
 
 __all__ = ["contact_energy", "contact_power", "contact_state", "contact_variation"]
 
-#: columns of `contacts`: 1 for a sphere on A, radii, k, n, h, mu, v_s, slow speed
-IS_SPHERE, RADIUS_A, RADIUS_B, STIFFNESS, EXPONENT, DISSIPATION, FRICTION, SLIP_SPEED, SLOW = range(9)
 NORMAL, D, RHO, V, REL, GAP, RATE, FORCE, BY_X, BY_RATE, SLIP, FREE, DEPTH = (
     0,
     3,
@@ -40,20 +37,21 @@ NORMAL, D, RHO, V, REL, GAP, RATE, FORCE, BY_X, BY_RATE, SLIP, FREE, DEPTH = (
 
 @inner
 def contact_state(model, work, c):
-    """Write all that follows from the motion of the markers of contact c into work.pair."""
-    a, b, s, data = model.c_a[c], model.c_b[c], work.pair, model.contacts[model.c_item[c]]
-    r, v, o, q = work.m_r, work.m_v, work.m_omega[a], work.m_omega[b]
+    """Write all that follows from the motion of the markers of contact c into work.pair.numbers."""
+    a, b, s, i = model.connections.a[c], model.connections.b[c], work.pair.numbers, model.connections.item[c]
+    data = model.contacts
+    r, v, o, q = work.markers.r, work.markers.v, work.markers.omega[a], work.markers.omega[b]
     d0, d1, d2 = r[b, 0] - r[a, 0], r[b, 1] - r[a, 1], r[b, 2] - r[a, 2]
     y0, y1, y2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
-    radius = data[RADIUS_B]
-    if data[IS_SPHERE] > 0.0:
+    radius = data.radius_b[i]
+    if data.is_sphere[i]:
         length = math.sqrt(dot(d0, d1, d2, d0, d1, d2))
         N0, N1, N2 = d0 / length, d1 / length, d2 / length
-        gap = length - radius - data[RADIUS_A]
+        gap = length - radius - data.radius_a[i]
         rate = dot(N0, N1, N2, y0, y1, y2)
     else:
-        x = model.row_x[model.c_w0[c]]
-        N0, N1, N2 = rotate(work.m_A[a], x[0], x[1], x[2])
+        x = model.rows.x[model.connections.w0[c]]
+        N0, N1, N2 = rotate(work.markers.A[a], x[0], x[1], x[2])
         gap = dot(N0, N1, N2, d0, d1, d2) - radius
         x0, x1, x2 = cross(o[0], o[1], o[2], d0, d1, d2)
         rate = dot(N0, N1, N2, y0 - x0, y1 - x1, y2 - x2)
@@ -68,26 +66,26 @@ def contact_state(model, work, c):
     put(s, V, V0 - along * N0, V1 - along * N1, V2 - along * N2)
     put(s, REL, V0, V1, V2)
     put(s, GAP, gap, rate, 0.0)
-    start = work.w_start[model.c_w0[c] + 9]
-    speed = start if start > 0.0 else max(-start, data[SLOW])
+    start = work.state.w_start[model.connections.w0[c] + 9]
+    speed = start if start > 0.0 else max(-start, data.slow[i])
     s[BY_X], s[BY_RATE], s[FREE], s[DEPTH] = 0.0, 0.0, 0.0, max(-gap, 0.0)
     s[LAW + 9] = speed
     if gap < 0.0:
-        n, h = data[EXPONENT], data[DISSIPATION] / speed
-        spring = data[STIFFNESS] * (-gap) ** n
+        n, h = data.exponent[i], data.dissipation[i] / speed
+        spring = data.stiffness[i] * (-gap) ** n
         factor = 1.0 - h * rate
         if factor > 0.0:
             s[FORCE] = spring * factor
             s[BY_X] = n * spring / -gap * factor
             s[BY_RATE] = -spring * h
     else:
-        s[LAW + 9] = min(rate, -data[SLOW])
-        s[FREE] = 1.0 if rate < -data[SLOW] else 0.0
+        s[LAW + 9] = min(rate, -data.slow[i])
+        s[FREE] = 1.0 if rate < -data.slow[i] else 0.0
     f = s[FORCE]
-    slow = data[SLIP_SPEED]
+    slow = data.slip_speed[i]
     size = math.sqrt(dot(s[V], s[V + 1], s[V + 2], s[V], s[V + 1], s[V + 2]) + slow * slow)
     s[SLIP] = size
-    rub = data[FRICTION] * f / size
+    rub = data.friction[i] * f / size
     F0, F1, F2 = rub * s[V] - f * N0, rub * s[V + 1] - f * N1, rub * s[V + 2] - f * N2
     put(s, LAW, F0, F1, F2)
     x0, x1, x2 = cross(d0 + rho0, d1 + rho1, d2 + rho2, F0, F1, F2)
@@ -98,18 +96,19 @@ def contact_state(model, work, c):
 
 @inner
 def contact_variation(model, work, c):
-    """Write the change of F, M, N and v_0 for the variation of the motion that stands in work.pair, ground axes."""
-    a, b, s, data = model.c_a[c], model.c_b[c], work.pair, model.contacts[model.c_item[c]]
-    o, q = work.m_omega[a], work.m_omega[b]
+    """Write the change of F, M, N and v_0 for the variation of the motion in work.pair.numbers, ground axes."""
+    a, b, s, i = model.connections.a[c], model.connections.b[c], work.pair.numbers, model.connections.item[c]
+    data = model.contacts
+    o, q = work.markers.omega[a], work.markers.omega[b]
     out = s[OUTPUT : OUTPUT + 10]
     N0, N1, N2 = three(s, NORMAL)
     d0, d1, d2 = three(s, D)
     rho0, rho1, rho2 = three(s, RHO)
     dd0, dd1, dd2 = three(s, INPUT)
     dv0, dv1, dv2 = three(s, INPUT + 9)
-    v, r = work.m_v, data[RADIUS_B]
+    v, r = work.markers.v, data.radius_b[i]
     y0, y1, y2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
-    if data[IS_SPHERE] > 0.0:
+    if data.is_sphere[i]:
         length = dot(N0, N1, N2, d0, d1, d2)
         along = dot(N0, N1, N2, dd0, dd1, dd2)
         n0, n1, n2 = (dd0 - along * N0) / length, (dd1 - along * N1) / length, (dd2 - along * N2) / length
@@ -137,7 +136,7 @@ def contact_variation(model, work, c):
     change = dot(n0, n1, n2, s[REL], s[REL + 1], s[REL + 2]) + dot(N0, N1, N2, V0, V1, V2)
     V0, V1, V2 = V0 - change * N0 - along * n0, V1 - change * N1 - along * n1, V2 - change * N2 - along * n2
     # force
-    f, size, mu = s[FORCE], s[SLIP], data[FRICTION]
+    f, size, mu = s[FORCE], s[SLIP], data.friction[i]
     df = -s[BY_X] * gap + s[BY_RATE] * rate
     g = dot(s[V], s[V + 1], s[V + 2], V0, V1, V2) / (size * size)
     rub = mu * f / size
@@ -158,16 +157,16 @@ def contact_variation(model, work, c):
 @inner
 def contact_energy(model, work, c):
     """Return k x^(n + 1)/(n + 1)."""
-    s, data = work.pair, model.contacts[model.c_item[c]]
+    s, data, i = work.pair.numbers, model.contacts, model.connections.item[c]
     contact_state(model, work, c)
-    return data[STIFFNESS] * s[DEPTH] ** (data[EXPONENT] + 1.0) / (data[EXPONENT] + 1.0)
+    return data.stiffness[i] * s[DEPTH] ** (data.exponent[i] + 1.0) / (data.exponent[i] + 1.0)
 
 
 @inner
 def contact_power(model, work, c):
     """Return the power taken by restitution and friction."""
-    s, data = work.pair, model.contacts[model.c_item[c]]
+    s, data, i = work.pair.numbers, model.contacts, model.connections.item[c]
     contact_state(model, work, c)
-    spring = data[STIFFNESS] * s[DEPTH] ** data[EXPONENT]
+    spring = data.stiffness[i] * s[DEPTH] ** data.exponent[i]
     slip = dot(s[V], s[V + 1], s[V + 2], s[V], s[V + 1], s[V + 2])
-    return -(s[FORCE] - spring) * s[RATE] + data[FRICTION] * s[FORCE] * slip / s[SLIP]
+    return -(s[FORCE] - spring) * s[RATE] + data.friction[i] * s[FORCE] * slip / s[SLIP]

@@ -7,13 +7,11 @@ from floatframe.kernels.connections.time_function import time_function
 
 __all__ = ["coordinate_force", "coordinate_power", "coordinate_strain"]
 
-STIFFNESS, FREE, DAMPING, PRELOAD, FRICTION, COEFFICIENT, SPEED = range(7)  # columns of `joint_forces`
-
 
 @inner
 def excess(model, i, is_angle, x):
     """Return a coordinate less its free value; of an angle the value between -pi and pi."""
-    x -= model.joint_forces[i, FREE]
+    x -= model.joint_forces.free[i]
     return x - 2 * math.pi * math.floor(x / (2 * math.pi) + 0.5) if is_angle else x
 
 
@@ -24,25 +22,25 @@ def coordinate_force(model, work, k, is_angle, x, v, normal):
     -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the forces there.
     """
     Q, Q_x, Q_v, Q_n = 0.0, 0.0, 0.0, 0.0
-    for i in range(model.row_force0[k], model.row_force1[k]):
-        f = model.joint_forces[i]
+    for i in range(model.rows.force0[k], model.rows.force1[k]):
+        f = model.joint_forces
         d = excess(model, i, is_angle, x)
-        Q += f[PRELOAD] - f[STIFFNESS] * d - f[DAMPING] * v
-        Q_x -= f[STIFFNESS]
-        Q_v -= f[DAMPING]
-        if model.joint_force_motor[i] >= 0:
-            value, _, _ = time_function(model, model.joint_force_motor[i], work.time[0])
+        Q += f.preload[i] - f.stiffness[i] * d - f.damping[i] * v
+        Q_x -= f.stiffness[i]
+        Q_v -= f.damping[i]
+        if model.joint_forces.motor[i] >= 0:
+            value, _, _ = time_function(model, model.joint_forces.motor[i], work.state.time)
             Q += value
-        if model.joint_force_table[i] >= 0:
-            value, slope, _ = time_function(model, model.joint_force_table[i], d)
+        if model.joint_forces.table[i] >= 0:
+            value, slope, _ = time_function(model, model.joint_forces.table[i], d)
             Q += value
             Q_x += slope
-        if f[FRICTION] > 0.0 or f[COEFFICIENT] > 0.0:
-            ratio = math.tanh(v / f[SPEED])
-            most = f[FRICTION] + f[COEFFICIENT] * normal
+        if f.friction[i] > 0.0 or f.coefficient[i] > 0.0:
+            ratio = math.tanh(v / f.speed[i])
+            most = f.friction[i] + f.coefficient[i] * normal
             Q -= most * ratio
-            Q_v -= most * (1.0 - ratio * ratio) / f[SPEED]
-            Q_n -= f[COEFFICIENT] * ratio
+            Q_v -= most * (1.0 - ratio * ratio) / f.speed[i]
+            Q_n -= f.coefficient[i] * ratio
     return Q, Q_x, Q_v, Q_n
 
 
@@ -50,8 +48,8 @@ def coordinate_force(model, work, k, is_angle, x, v, normal):
 def coordinate_strain(model, k, is_angle, x):
     """Return the energy in the linear springs of row k."""
     total = 0.0
-    for i in range(model.row_force0[k], model.row_force1[k]):
-        total += 0.5 * model.joint_forces[i, STIFFNESS] * excess(model, i, is_angle, x) ** 2
+    for i in range(model.rows.force0[k], model.rows.force1[k]):
+        total += 0.5 * model.joint_forces.stiffness[i] * excess(model, i, is_angle, x) ** 2
     return total
 
 
@@ -59,14 +57,14 @@ def coordinate_strain(model, k, is_angle, x):
 def coordinate_power(model, work, k, is_angle, x, v, Q):
     """Return the power that enters by row k, and that taken by dampers and friction; Q: its whole force."""
     given, springs = 0.0, 0.0
-    for i in range(model.row_force0[k], model.row_force1[k]):
+    for i in range(model.rows.force0[k], model.rows.force1[k]):
         d = excess(model, i, is_angle, x)
-        springs -= model.joint_forces[i, STIFFNESS] * d
-        given += model.joint_forces[i, PRELOAD]
-        if model.joint_force_motor[i] >= 0:
-            value, _, _ = time_function(model, model.joint_force_motor[i], work.time[0])
+        springs -= model.joint_forces.stiffness[i] * d
+        given += model.joint_forces.preload[i]
+        if model.joint_forces.motor[i] >= 0:
+            value, _, _ = time_function(model, model.joint_forces.motor[i], work.state.time)
             given += value
-        if model.joint_force_table[i] >= 0:
-            value, _, _ = time_function(model, model.joint_force_table[i], d)
+        if model.joint_forces.table[i] >= 0:
+            value, _, _ = time_function(model, model.joint_forces.table[i], d)
             given += value
     return given * v, (given + springs - Q) * v

@@ -21,55 +21,57 @@ __all__ = ["coupler_derivatives", "coupler_power", "coupler_rates", "coupler_row
 @inner
 def coupler_rows(model, work, c, c_k):
     """Write the residual of coupler c, and its wrenches."""
-    i = model.c_item[c]
-    k = model.core[i]
-    lam = work.w[k]
+    i = model.connections.item[c]
+    k = model.networks.core[i]
+    lam = work.state.w[k]
     held, _, _ = prescribed(model, work, k)
     total = -held
-    for p in range(model.port0[i], model.port0[i + 1]):
-        factor = model.p_factor[p]
+    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
+        factor = model.ports.factor[p]
         port_rows(model, work, p, factor * lam, c_k)
         x, _ = port_motion(model, work, p)
         total += factor * x
-    work.g[k] = model.row_x[k, 0] * total
+    work.connections.g[k] = model.rows.x[k, 0] * total
 
 
 @inner
 def coupler_derivatives(model, work, c, c_k):
     """Write P at the markers and V of coupler c."""
-    i, size = model.c_item[c], model.c_size[c]
-    k = model.core[i]
-    V = work.V[c]
+    i, size = model.connections.item[c], model.connections.size[c]
+    k = model.networks.core[i]
+    V = work.connections.V[c]
     for r in range(size):
         for j in range(size):
             V[r, j] = 0.0
-        for p in range(model.port0[i], model.port0[i + 1]):
+        for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
             for j in range(12):
-                work.P[model.p_a[p], r, j] = 0.0
-                work.P[model.p_b[p], r, j] = 0.0
-    for p in range(model.port0[i], model.port0[i + 1]):
-        factor = model.p_factor[p]
-        port_derivatives(model, work, c, p, factor * work.w[k], k, factor, c_k)
-        port_gradient(model, work, p, k - model.c_w0[c], factor * model.row_x[k, 0], 0.0)
+                work.connections.P[model.ports.a[p], r, j] = 0.0
+                work.connections.P[model.ports.b[p], r, j] = 0.0
+    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
+        factor = model.ports.factor[p]
+        port_derivatives(model, work, c, p, factor * work.state.w[k], k, factor, c_k)
+        port_gradient(model, work, p, k - model.connections.w0[c], factor * model.rows.x[k, 0], 0.0)
 
 
 @inner
 def coupler_rates(model, work, c, rate, bias):
     """Write the rate of the held row of coupler c, and its second rate at zero u_dot."""
-    i = model.c_item[c]
-    k = model.core[i]
+    i = model.connections.item[c]
+    k = model.networks.core[i]
     _, first, second = prescribed(model, work, k)
     first, second = -first, -second
-    for p in range(model.port0[i], model.port0[i + 1]):
-        factor = model.p_factor[p]
+    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
+        factor = model.ports.factor[p]
         first += factor * port_tangent_rate(model, work, p)
-        second += factor * port_second_rate(model, work, p, work.m_bias[model.p_a[p]], work.m_bias[model.p_b[p]])
-    rate[k], bias[k] = model.row_x[k, 0] * first, model.row_x[k, 0] * second
+        second += factor * port_second_rate(
+            model, work, p, work.markers.bias[model.ports.a[p]], work.markers.bias[model.ports.b[p]]
+        )
+    rate[k], bias[k] = model.rows.x[k, 0] * first, model.rows.x[k, 0] * second
 
 
 @inner
 def coupler_power(model, work, c):
     """Return the power that enters where the constant of the coupler changes with time: lam dc/dt."""
-    k = model.core[model.c_item[c]]
+    k = model.networks.core[model.connections.item[c]]
     _, first, _ = prescribed(model, work, k)
-    return work.w[k] * first
+    return work.state.w[k] * first

@@ -23,15 +23,14 @@ import math
 from floatframe.joints.rows import LINE, LINE_TURN, MOMENT
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.relative_motion import distance, prescribed, put_pair
-from floatframe.kernels.marker import pose_on_body, rotate, rotate_back
-from floatframe.kernels.rotation import cross, left_jacobian
+from floatframe.kernels.marker import cross, pose_on_body, rotate, rotate_back
+from floatframe.kernels.rotation import left_jacobian
+from floatframe.kernels.vector import put_matrix, vector
 
 __all__ = [
     "line_acceleration", "line_derivatives", "line_rate", "line_row", "line_turn_by_place", "slide_marker",
 ]  # fmt: skip
 
-# columns of work.line; vectors in ground axes
-S, S_DOT, SLOPE, BY_PLACE, N_0, KAPPA, CURVE, SLOPE_DOT = 0, 1, 2, 3, 4, 7, 10, 13
 MOST, CLOSE = 30, 1e-14
 
 
@@ -44,19 +43,19 @@ def dot(a0, a1, a2, b0, b1, b2):
 @inner
 def piece(model, k, s):
     """Return the first of the two stations about s and their distance; before or after the line: the nearest piece."""
-    j, last = model.line0[k], model.line0[k + 1] - 2
-    while j < last and s > model.line_s[j + 1]:
+    j, last = model.lines.station0[k], model.lines.station0[k + 1] - 2
+    while j < last and s > model.stations.s[j + 1]:
         j += 1
-    return j, model.line_s[j + 1] - model.line_s[j]
+    return j, model.stations.s[j + 1] - model.stations.s[j]
 
 
 @inner
 def weights(model, k, j, h, s, order):
     """Return a_1, a_2, b_1, b_2 or their derivatives by s."""
-    x = (s - model.line_s[j]) / h
+    x = (s - model.stations.s[j]) / h
     if x < 0.0 or x > 1.0:
         end = 1.0 if x > 1.0 else 0.0
-        by_slope = s - model.line_s[j] - end * h if order == 0 else (1.0 if order == 1 else 0.0)
+        by_slope = s - model.stations.s[j] - end * h if order == 0 else (1.0 if order == 1 else 0.0)
         own = 1.0 if order == 0 else 0.0
         return own * (1.0 - end), own * end, by_slope * (1.0 - end), by_slope * end
     if order == 0:
@@ -72,7 +71,7 @@ def weights(model, k, j, h, s, order):
 @inner
 def linear_weight(model, j, h, s):
     """Return l_2 and its derivative."""
-    x = (s - model.line_s[j]) / h
+    x = (s - model.stations.s[j]) / h
     if x < 0.0:
         return 0.0, 0.0
     if x > 1.0:
@@ -93,9 +92,11 @@ def displacement(model, work, k, s, order):
     """Return D, D' or D'' at s, body axes."""
     j, h = piece(model, k, s)
     a1, a2, b1, b2 = weights(model, k, j, h, s, order)
-    m1, m2, e = model.line_m[j], model.line_m[j + 1], model.line_axis[k]
-    c1, c2 = model.m_position[m1], model.m_position[m2]
-    x0, x1, x2 = combined(e, a1, a2, b1, b2, work.rho[m1], work.angle[m1], work.rho[m2], work.angle[m2])
+    m1, m2, e = model.stations.marker[j], model.stations.marker[j + 1], model.lines.axis[k]
+    c1, c2 = model.markers.position[m1], model.markers.position[m2]
+    x0, x1, x2 = combined(
+        e, a1, a2, b1, b2, work.markers.rho[m1], work.markers.angle[m1], work.markers.rho[m2], work.markers.angle[m2]
+    )
     return (
         x0 - a1 * c1[0] - a2 * c2[0],
         x1 - a1 * c1[1] - a2 * c2[1],
@@ -106,14 +107,18 @@ def displacement(model, work, k, s, order):
 @inner
 def place_of(model, work, k, b):
     """Return the place s nearest to the point of marker b."""
-    m, e = model.line_marker[k], model.line_axis[k]
-    i = model.m_body[m]
-    c = model.m_position[m]  # of s = 0
-    x0, x1, x2 = work.m_r[b, 0] - work.r[i, 0], work.m_r[b, 1] - work.r[i, 1], work.m_r[b, 2] - work.r[i, 2]
-    x0, x1, x2 = rotate_back(work.R[i], x0, x1, x2)
+    m, e = model.lines.marker[k], model.lines.axis[k]
+    i = model.markers.body[m]
+    c = model.markers.position[m]  # of s = 0
+    x0, x1, x2 = (
+        work.markers.r[b, 0] - work.state.r[i, 0],
+        work.markers.r[b, 1] - work.state.r[i, 1],
+        work.markers.r[b, 2] - work.state.r[i, 2],
+    )
+    x0, x1, x2 = rotate_back(work.state.R[i], x0, x1, x2)
     x0, x1, x2 = x0 - c[0], x1 - c[1], x2 - c[2]
     s = dot(x0, x1, x2, e[0], e[1], e[2])
-    length = model.line_s[model.line0[k + 1] - 1]
+    length = model.stations.s[model.lines.station0[k + 1] - 1]
     for _ in range(MOST):
         d0, d1, d2 = displacement(model, work, k, s, 0)
         t0, t1, t2 = displacement(model, work, k, s, 1)
@@ -131,23 +136,28 @@ def place_of(model, work, k, b):
 @inner
 def slide_marker(model, work, k):
     """Put the sliding marker of line k to its place and write its motion; all other markers have theirs."""
-    m, b, row = model.line_marker[k], model.line_other[k], model.line_row[k]
-    i, e = model.m_body[m], model.line_axis[k]
+    m, b, row = model.lines.marker[k], model.lines.other[k], model.lines.row[k]
+    i, e = model.markers.body[m], model.lines.axis[k]
     is_driven = row >= 0
     if is_driven:
         s, rate, _ = prescribed(model, work, row)
     else:
         s, rate = place_of(model, work, k, b), 0.0
     j, h = piece(model, k, s)
-    m1, m2 = model.line_m[j], model.line_m[j + 1]
+    m1, m2 = model.stations.marker[j], model.stations.marker[j + 1]
     w1, by_s = linear_weight(model, j, h, s)
     d0, d1, d2 = displacement(model, work, k, s, 0)
     t0, t1, t2 = displacement(model, work, k, s, 1)
     u0, u1, u2 = displacement(model, work, k, s, 2)
-    rho, rho_dot, angle, angle_dot = work.rho[m], work.rho_dot[m], work.angle[m], work.angle_dot[m]
-    c = model.m_position[m]
+    rho, rho_dot, angle, angle_dot = (
+        work.markers.rho[m],
+        work.markers.rho_dot[m],
+        work.markers.angle[m],
+        work.markers.angle_dot[m],
+    )
+    c = model.markers.position[m]
     rho[0], rho[1], rho[2] = c[0] + s * e[0] + d0, c[1] + s * e[1] + d1, c[2] + s * e[2] + d2
-    th1, th2 = work.angle[m1], work.angle[m2]
+    th1, th2 = work.markers.angle[m1], work.markers.angle[m2]
     twist = (1 - w1) * dot(e[0], e[1], e[2], th1[0], th1[1], th1[2]) + w1 * dot(
         e[0], e[1], e[2], th2[0], th2[1], th2[2]
     )
@@ -159,42 +169,69 @@ def slide_marker(model, work, k):
     # rates
     a1, a2, b1, b2 = weights(model, k, j, h, s, 0)
     rho_dot[0], rho_dot[1], rho_dot[2] = combined(
-        e, a1, a2, b1, b2, work.rho_dot[m1], work.angle_dot[m1], work.rho_dot[m2], work.angle_dot[m2]
+        e,
+        a1,
+        a2,
+        b1,
+        b2,
+        work.markers.rho_dot[m1],
+        work.markers.angle_dot[m1],
+        work.markers.rho_dot[m2],
+        work.markers.angle_dot[m2],
     )
     c1, c2, f1, f2 = weights(model, k, j, h, s, 1)
-    y0, y1, y2 = combined(e, c1, c2, f1, f2, work.rho_dot[m1], work.angle_dot[m1], work.rho_dot[m2], work.angle_dot[m2])
-    o1, o2 = work.angle_dot[m1], work.angle_dot[m2]
+    y0, y1, y2 = combined(
+        e,
+        c1,
+        c2,
+        f1,
+        f2,
+        work.markers.rho_dot[m1],
+        work.markers.angle_dot[m1],
+        work.markers.rho_dot[m2],
+        work.markers.angle_dot[m2],
+    )
+    o1, o2 = work.markers.angle_dot[m1], work.markers.angle_dot[m2]
     turn = (1 - w1) * dot(e[0], e[1], e[2], o1[0], o1[1], o1[2]) + w1 * dot(e[0], e[1], e[2], o2[0], o2[1], o2[2])
     x0, x1, x2 = cross(e[0], e[1], e[2], y0, y1, y2)
     angle_dot[0], angle_dot[1], angle_dot[2] = x0 + turn * e[0], x1 + turn * e[1], x2 + turn * e[2]
-    left_jacobian(angle, work.T_left[m])
-    spin = work.spin[m]
-    spin[0], spin[1], spin[2] = rotate(work.T_left[m], angle_dot[0], angle_dot[1], angle_dot[2])
+    put_matrix(work.markers.T_left[m], left_jacobian(vector(angle)))
+    spin = work.markers.spin[m]
+    spin[0], spin[1], spin[2] = rotate(work.markers.T_left[m], angle_dot[0], angle_dot[1], angle_dot[2])
     shapes(model, work, m, m1, m2, e, (a1, a2, b1, b2), (c1, c2, f1, f2), w1)
     pose_on_body(model, work, m)
     # the line in ground axes
-    line, R = work.line[k], work.R[i]
+    line, R = work.lines, work.state.R[i]
     t0, t1, t2 = t0 + e[0], t1 + e[1], t2 + e[2]
     slope = math.sqrt(dot(t0, t1, t2, t0, t1, t2))
     n0, n1, n2 = rotate(R, t0 / slope, t1 / slope, t2 / slope)
     if not is_driven:
-        v = work.m_v
+        v = work.markers.v
         rate = dot(n0, n1, n2, v[b, 0] - v[m, 0], v[b, 1] - v[m, 1], v[b, 2] - v[m, 2]) / slope
-    line[S], line[S_DOT], line[SLOPE], line[BY_PLACE] = s, rate, slope, 0.0 if is_driven else 1.0 / slope
-    line[N_0], line[N_0 + 1], line[N_0 + 2] = n0, n1, n2
-    p0, p1, p2 = rotate(work.T_left[m], p0, p1, p2)
-    line[KAPPA], line[KAPPA + 1], line[KAPPA + 2] = rotate(R, p0, p1, p2)
-    line[CURVE], line[CURVE + 1], line[CURVE + 2] = rotate(R, u0, u1, u2)
-    u = model.u0[i] + 3
-    x0, x1, x2 = cross(work.u[u], work.u[u + 1], work.u[u + 2], t0, t1, t2)
-    line[SLOPE_DOT], line[SLOPE_DOT + 1], line[SLOPE_DOT + 2] = rotate(R, x0 + y0, x1 + y1, x2 + y2)
+    line.s[k], line.s_dot[k], line.slope[k], line.by_place[k] = s, rate, slope, 0.0 if is_driven else 1.0 / slope
+    line.n_0[k, 0], line.n_0[k, 1], line.n_0[k, 2] = n0, n1, n2
+    p0, p1, p2 = rotate(work.markers.T_left[m], p0, p1, p2)
+    line.kappa[k, 0], line.kappa[k, 1], line.kappa[k, 2] = rotate(R, p0, p1, p2)
+    line.curve[k, 0], line.curve[k, 1], line.curve[k, 2] = rotate(R, u0, u1, u2)
+    u = model.bodies.u0[i] + 3
+    x0, x1, x2 = cross(work.state.u[u], work.state.u[u + 1], work.state.u[u + 2], t0, t1, t2)
+    line.slope_dot[k, 0], line.slope_dot[k, 1], line.slope_dot[k, 2] = rotate(R, x0 + y0, x1 + y1, x2 + y2)
 
 
 @inner
 def shapes(model, work, m, m1, m2, e, value, slope, w):
     """Write the derivatives of displacement and rotation of the sliding marker by q."""
-    n, o, o1, o2 = model.n_q[model.m_body[m]], model.m_psi0[m], model.m_psi0[m1], model.m_psi0[m2]
-    own, first, second = work.psi[o : o + 6 * n], work.psi[o1 : o1 + 6 * n], work.psi[o2 : o2 + 6 * n]
+    n, o, o1, o2 = (
+        model.bodies.n_q[model.markers.body[m]],
+        model.markers.psi0[m],
+        model.markers.psi0[m1],
+        model.markers.psi0[m2],
+    )
+    own, first, second = (
+        work.markers.psi[o : o + 6 * n],
+        work.markers.psi[o1 : o1 + 6 * n],
+        work.markers.psi[o2 : o2 + 6 * n],
+    )
     for q in range(n):
         d1, d2 = (first[q], first[n + q], first[2 * n + q]), (second[q], second[n + q], second[2 * n + q])
         th1 = (first[3 * n + q], first[4 * n + q], first[5 * n + q])
@@ -212,11 +249,11 @@ def shapes(model, work, m, m1, m2, e, value, slope, w):
 @inner
 def normal(model, work, row, a):
     """Return n_i of row k, ground axes: 0 along the line, 1 nearest to y of the marker, 2 across both."""
-    line, part = work.line[model.m_line[a]], model.row_part[row]
-    n0, n1, n2 = line[N_0], line[N_0 + 1], line[N_0 + 2]
+    i, line, part = model.markers.line[a], work.lines, model.rows.part[row]
+    n0, n1, n2 = line.n_0[i, 0], line.n_0[i, 1], line.n_0[i, 2]
     if part == 0:
         return n0, n1, n2
-    A = work.m_A[a]
+    A = work.markers.A[a]
     along = dot(A[0, 1], A[1, 1], A[2, 1], n0, n1, n2)
     y0, y1, y2 = A[0, 1] - along * n0, A[1, 1] - along * n1, A[2, 1] - along * n2
     size = math.sqrt(dot(y0, y1, y2, y0, y1, y2))
@@ -229,22 +266,22 @@ def normal(model, work, row, a):
 @inner
 def free_moment(model, work, a):
     """Return kappa / |r'|, ground axes."""
-    line = work.line[model.m_line[a]]
-    f = 1.0 / line[SLOPE]
-    return f * line[KAPPA], f * line[KAPPA + 1], f * line[KAPPA + 2]
+    i, line = model.markers.line[a], work.lines
+    f = 1.0 / line.slope[i]
+    return f * line.kappa[i, 0], f * line.kappa[i, 1], f * line.kappa[i, 2]
 
 
 @inner
 def line_row(model, work, k, a, b, w, c_k):
     """Return the residual of a row LINE or LINE_FREE."""
-    if model.row_kind[k] == LINE:
+    if model.rows.kind[k] == LINE:
         n0, n1, n2 = normal(model, work, k, a)
         r0, r1, r2 = distance(work, a, b)
         held = dot(n0, n1, n2, r0, r1, r2)
-        return held - model.row_soft[k] * c_k * dot(n0, n1, n2, w[0], w[1], w[2])
-    line = work.line[model.m_line[a]]
-    total = dot(line[N_0], line[N_0 + 1], line[N_0 + 2], w[0], w[1], w[2])
-    if model.m_moment[a] >= 0:
+        return held - model.rows.soft[k] * c_k * dot(n0, n1, n2, w[0], w[1], w[2])
+    i, line = model.markers.line[a], work.lines
+    total = dot(line.n_0[i, 0], line.n_0[i, 1], line.n_0[i, 2], w[0], w[1], w[2])
+    if model.markers.moment[a] >= 0:
         m0, m1, m2 = free_moment(model, work, a)
         total += dot(m0, m1, m2, w[MOMENT], w[MOMENT + 1], w[MOMENT + 2])
     return c_k * total
@@ -253,17 +290,17 @@ def line_row(model, work, k, a, b, w, c_k):
 @inner
 def line_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """Write row r of P and V of a row LINE or LINE_FREE."""
-    if model.row_kind[k] == LINE:
+    if model.rows.kind[k] == LINE:
         n0, n1, n2 = normal(model, work, k, a)
         put_pair(P_a, P_b, r, 0, -1.0, n0, n1, n2)
-        f = -model.row_soft[k]
+        f = -model.rows.soft[k]
         V[r, 0], V[r, 1], V[r, 2] = f * n0, f * n1, f * n2
         return
-    line = work.line[model.m_line[a]]
-    n0, n1, n2 = line[N_0], line[N_0 + 1], line[N_0 + 2]
+    i, line = model.markers.line[a], work.lines
+    n0, n1, n2 = line.n_0[i, 0], line.n_0[i, 1], line.n_0[i, 2]
     V[r, 0], V[r, 1], V[r, 2] = n0, n1, n2
     x0, x1, x2 = cross(n0, n1, n2, w[0], w[1], w[2])
-    if model.m_moment[a] >= 0:
+    if model.markers.moment[a] >= 0:
         m0, m1, m2 = free_moment(model, work, a)
         V[r, MOMENT], V[r, MOMENT + 1], V[r, MOMENT + 2] = m0, m1, m2
         y0, y1, y2 = cross(m0, m1, m2, w[MOMENT], w[MOMENT + 1], w[MOMENT + 2])
@@ -274,30 +311,30 @@ def line_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 @inner
 def line_turn_by_place(model, work, r, a, n0, n1, n2, P_a, P_b):
     """Write the part of row r that comes by s, which follows the points: n = E × D."""
-    line = work.line[model.m_line[a]]
-    f = -line[BY_PLACE] * dot(n0, n1, n2, line[KAPPA], line[KAPPA + 1], line[KAPPA + 2])
-    put_pair(P_a, P_b, r, 0, f, line[N_0], line[N_0 + 1], line[N_0 + 2])
+    i, line = model.markers.line[a], work.lines
+    f = -line.by_place[i] * dot(n0, n1, n2, line.kappa[i, 0], line.kappa[i, 1], line.kappa[i, 2])
+    put_pair(P_a, P_b, r, 0, f, line.n_0[i, 0], line.n_0[i, 1], line.n_0[i, 2])
 
 
 @inner
 def line_rate(model, work, k, a, b):
     """Return the rate of the held quantity of a row LINE or LINE_TURN."""
-    line, v = work.line[model.m_line[a]], work.m_v
-    if model.row_kind[k] == LINE_TURN:
-        x, y, o, p = model.row_x[k], model.row_y[k], work.m_omega[a], work.m_omega[b]
-        e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
-        d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+    i, line, v = model.markers.line[a], work.lines, work.markers.v
+    if model.rows.kind[k] == LINE_TURN:
+        x, y, o, p = model.rows.x[k], model.rows.y[k], work.markers.omega[a], work.markers.omega[b]
+        e0, e1, e2 = rotate(work.markers.A[a], x[0], x[1], x[2])
+        d0, d1, d2 = rotate(work.markers.A[b], y[0], y[1], y[2])
         n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
-        s_dot = line[S_DOT]
+        s_dot = line.s_dot[i]
         return dot(
             n0, n1, n2,
-            o[0] - p[0] + s_dot * line[KAPPA], o[1] - p[1] + s_dot * line[KAPPA + 1],
-            o[2] - p[2] + s_dot * line[KAPPA + 2],
+            o[0] - p[0] + s_dot * line.kappa[i, 0], o[1] - p[1] + s_dot * line.kappa[i, 1],
+            o[2] - p[2] + s_dot * line.kappa[i, 2],
         )  # fmt: skip
     n0, n1, n2 = normal(model, work, k, a)
     rate = dot(n0, n1, n2, v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2])
-    if model.row_part[k] == 0:
-        rate -= line[S_DOT] * line[SLOPE]
+    if model.rows.part[k] == 0:
+        rate -= line.s_dot[i] * line.slope[i]
     return rate
 
 
@@ -308,24 +345,24 @@ def line_acceleration(model, work, k, a, b, bias_a, bias_b):
     r_ddot of the place = a + 2 s_dot r'_dot + s_dot² r'' + s_ddot r'. Of LINE_TURN the change of kappa with time and
     place is left out.
     """
-    line = work.line[model.m_line[a]]
-    s_dot = line[S_DOT]
-    x0 = bias_b[0] - bias_a[0] - 2 * s_dot * line[SLOPE_DOT] - s_dot * s_dot * line[CURVE]
-    x1 = bias_b[1] - bias_a[1] - 2 * s_dot * line[SLOPE_DOT + 1] - s_dot * s_dot * line[CURVE + 1]
-    x2 = bias_b[2] - bias_a[2] - 2 * s_dot * line[SLOPE_DOT + 2] - s_dot * s_dot * line[CURVE + 2]
-    row = model.line_row[model.m_line[a]]
-    second = line[BY_PLACE] * dot(line[N_0], line[N_0 + 1], line[N_0 + 2], x0, x1, x2)
+    i, line = model.markers.line[a], work.lines
+    s_dot = line.s_dot[i]
+    x0 = bias_b[0] - bias_a[0] - 2 * s_dot * line.slope_dot[i, 0] - s_dot * s_dot * line.curve[i, 0]
+    x1 = bias_b[1] - bias_a[1] - 2 * s_dot * line.slope_dot[i, 1] - s_dot * s_dot * line.curve[i, 1]
+    x2 = bias_b[2] - bias_a[2] - 2 * s_dot * line.slope_dot[i, 2] - s_dot * s_dot * line.curve[i, 2]
+    row = model.lines.row[model.markers.line[a]]
+    second = line.by_place[i] * dot(line.n_0[i, 0], line.n_0[i, 1], line.n_0[i, 2], x0, x1, x2)
     if row >= 0:
         _, _, second = prescribed(model, work, row)
-    if model.row_kind[k] == LINE:
+    if model.rows.kind[k] == LINE:
         n0, n1, n2 = normal(model, work, k, a)
         held = dot(n0, n1, n2, x0, x1, x2)
-        return held - second * line[SLOPE] if model.row_part[k] == 0 else held
-    x, y, o, p = model.row_x[k], model.row_y[k], work.m_omega[a], work.m_omega[b]
-    k0, k1, k2 = line[KAPPA], line[KAPPA + 1], line[KAPPA + 2]
+        return held - second * line.slope[i] if model.rows.part[k] == 0 else held
+    x, y, o, p = model.rows.x[k], model.rows.y[k], work.markers.omega[a], work.markers.omega[b]
+    k0, k1, k2 = line.kappa[i, 0], line.kappa[i, 1], line.kappa[i, 2]
     o0, o1, o2 = o[0] + s_dot * k0, o[1] + s_dot * k1, o[2] + s_dot * k2
-    e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
-    d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+    e0, e1, e2 = rotate(work.markers.A[a], x[0], x[1], x[2])
+    d0, d1, d2 = rotate(work.markers.A[b], y[0], y[1], y[2])
     n0, n1, n2 = cross(e0, e1, e2, d0, d1, d2)
     q0, q1, q2 = cross(o[0], o[1], o[2], k0, k1, k2)
     turning = dot(

@@ -23,8 +23,8 @@ __all__ = ["pair_derivatives", "pair_energy", "pair_power", "pair_rows"]
 
 @inner
 def pair_state(model, work, c):
-    """Write what follows from the motion of the markers of connection c into work.pair."""
-    if model.c_law[c] == BUSHING:
+    """Write what follows from the motion of the markers of connection c into work.pair.numbers."""
+    if model.connections.law[c] == BUSHING:
         bushing_state(model, work, c)
     else:
         contact_state(model, work, c)
@@ -34,16 +34,16 @@ def pair_state(model, work, c):
 def pair_rows(model, work, c, c_k):
     """Write the residual of connection c."""
     pair_state(model, work, c)
-    w0 = model.c_w0[c]
-    for k in range(model.c_size[c]):
-        work.g[w0 + k] = c_k * (work.w[w0 + k] - work.pair[LAW + k])
+    w0 = model.connections.w0[c]
+    for k in range(model.connections.size[c]):
+        work.connections.g[w0 + k] = c_k * (work.state.w[w0 + k] - work.pair.numbers[LAW + k])
 
 
 @inner
 def pair_derivatives(model, work, c, c_k):
     """Write P at both markers and V of connection c; both are zero before."""
-    a, b, size = model.c_a[c], model.c_b[c], model.c_size[c]
-    P_a, P_b, V, s = work.P[a], work.P[b], work.V[c], work.pair
+    a, b, size = model.connections.a[c], model.connections.b[c], model.connections.size[c]
+    P_a, P_b, V, s = work.connections.P[a], work.connections.P[b], work.connections.V[c], work.pair.numbers
     pair_state(model, work, c)
     for r in range(size):
         V[r, r] = 1.0
@@ -51,7 +51,7 @@ def pair_derivatives(model, work, c, c_k):
         s[INPUT + k] = 0.0
     for k in range(18):
         s[INPUT + k] = 1.0
-        if model.c_law[c] == BUSHING:
+        if model.connections.law[c] == BUSHING:
             bushing_variation(model, work, c)
         else:
             contact_variation(model, work, c)
@@ -76,7 +76,7 @@ def pair_derivatives(model, work, c, c_k):
 @inner
 def pair_energy(model, work, c):
     """Return the energy held by connection c."""
-    if model.c_law[c] == BUSHING:
+    if model.connections.law[c] == BUSHING:
         return bushing_energy(model, work, c)
     return contact_energy(model, work, c)
 
@@ -84,6 +84,6 @@ def pair_energy(model, work, c):
 @inner
 def pair_power(model, work, c):
     """Return the power that enters by tables of connection c, and that taken by damping and friction."""
-    if model.c_law[c] == BUSHING:
+    if model.connections.law[c] == BUSHING:
         return bushing_power(model, work, c)
     return 0.0, contact_power(model, work, c)

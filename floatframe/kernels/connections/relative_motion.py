@@ -5,8 +5,7 @@ import math
 from floatframe.joints.rows import PUSH, TURN, TURN_B, TWIST_B
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.time_function import time_function
-from floatframe.kernels.marker import rotate
-from floatframe.kernels.rotation import cross
+from floatframe.kernels.marker import cross, rotate
 
 __all__ = [
     "direction_of_a",
@@ -25,10 +24,10 @@ __all__ = [
 @inner
 def prescribed(model, work, k):
     """Return the motion of row k at the time of the iterate, its rate and its second rate; its constant without."""
-    if model.row_motion[k] < 0:
-        return model.row_c[k], 0.0, 0.0
-    value, rate, second = time_function(model, model.row_motion[k], work.time[0])
-    if model.row_kind[k] == TURN_B:  # seen from B, A turns back
+    if model.rows.motion[k] < 0:
+        return model.rows.c[k], 0.0, 0.0
+    value, rate, second = time_function(model, model.rows.motion[k], work.state.time)
+    if model.rows.kind[k] == TURN_B:  # seen from B, A turns back
         return -value, -rate, -second
     return value, rate, second
 
@@ -36,18 +35,22 @@ def prescribed(model, work, k):
 @inner
 def direction_of_a(model, work, k, a):
     """Return the direction of marker a in row k, ground axes; that of a prescribed angle turns with time."""
-    x = model.row_x[k]
-    if model.row_kind[k] == TURN or model.row_kind[k] == TURN_B:
+    x = model.rows.x[k]
+    if model.rows.kind[k] == TURN or model.rows.kind[k] == TURN_B:
         angle, _, _ = prescribed(model, work, k)
-        z, c, s = model.row_z[k], math.cos(angle), math.sin(angle)
-        return rotate(work.m_A[a], c * x[0] + s * z[0], c * x[1] + s * z[1], c * x[2] + s * z[2])
-    return rotate(work.m_A[a], x[0], x[1], x[2])
+        z, c, s = model.rows.z[k], math.cos(angle), math.sin(angle)
+        return rotate(work.markers.A[a], c * x[0] + s * z[0], c * x[1] + s * z[1], c * x[2] + s * z[2])
+    return rotate(work.markers.A[a], x[0], x[1], x[2])
 
 
 @inner
 def distance(work, a, b):
     """Return r_B - r_A."""
-    return (work.m_r[b, 0] - work.m_r[a, 0], work.m_r[b, 1] - work.m_r[a, 1], work.m_r[b, 2] - work.m_r[a, 2])
+    return (
+        work.markers.r[b, 0] - work.markers.r[a, 0],
+        work.markers.r[b, 1] - work.markers.r[a, 1],
+        work.markers.r[b, 2] - work.markers.r[a, 2],
+    )
 
 
 @inner
@@ -56,10 +59,10 @@ def screw_angle(model, work, k, a, b):
 
     th = atan2(S, C), S = -E·D, C = Z·D.
     """
-    x, y, z = model.row_x[k], model.row_y[k], model.row_z[k]
-    e0, e1, e2 = rotate(work.m_A[a], x[0], x[1], x[2])
-    z0, z1, z2 = rotate(work.m_A[a], z[0], z[1], z[2])
-    d0, d1, d2 = rotate(work.m_A[b], y[0], y[1], y[2])
+    x, y, z = model.rows.x[k], model.rows.y[k], model.rows.z[k]
+    e0, e1, e2 = rotate(work.markers.A[a], x[0], x[1], x[2])
+    z0, z1, z2 = rotate(work.markers.A[a], z[0], z[1], z[2])
+    d0, d1, d2 = rotate(work.markers.A[b], y[0], y[1], y[2])
     S, C = -(e0 * d0 + e1 * d1 + e2 * d2), z0 * d0 + z1 * d1 + z2 * d2
     p0, p1, p2 = cross(e0, e1, e2, d0, d1, d2)
     q0, q1, q2 = cross(z0, z1, z2, d0, d1, d2)
@@ -70,9 +73,9 @@ def screw_angle(model, work, k, a, b):
 @inner
 def screw_axis(model, work, k, a):
     """Return the axis x × z of a screw, ground axes."""
-    x, z = model.row_x[k], model.row_z[k]
+    x, z = model.rows.x[k], model.rows.z[k]
     n0, n1, n2 = cross(x[0], x[1], x[2], z[0], z[1], z[2])
-    return rotate(work.m_A[a], n0, n1, n2)
+    return rotate(work.markers.A[a], n0, n1, n2)
 
 
 @inner
@@ -81,7 +84,7 @@ def turned_angle(model, work, k, a, b):
 
     By a rotation of B: the opposite.
     """
-    if model.row_kind[k] == TWIST_B:
+    if model.rows.kind[k] == TWIST_B:
         angle, t0, t1, t2 = screw_angle(model, work, k, b, a)
         return -angle, t0, t1, t2
     return screw_angle(model, work, k, a, b)
@@ -90,10 +93,10 @@ def turned_angle(model, work, k, a, b):
 @inner
 def loaded_axis(model, work, k, a, b):
     """Return the axis of a coordinate with forces, ground axes."""
-    if model.row_kind[k] == PUSH:
-        x = model.row_x[k]
-        return rotate(work.m_A[a], x[0], x[1], x[2])
-    return screw_axis(model, work, k, b if model.row_kind[k] == TWIST_B else a)
+    if model.rows.kind[k] == PUSH:
+        x = model.rows.x[k]
+        return rotate(work.markers.A[a], x[0], x[1], x[2])
+    return screw_axis(model, work, k, b if model.rows.kind[k] == TWIST_B else a)
 
 
 @inner
@@ -103,8 +106,8 @@ def loaded_coordinate(model, work, k, a, b):
     It is a distance along an axis of A, or an angle about it (TWIST_B: about an axis of B).
     """
     e0, e1, e2 = loaded_axis(model, work, k, a, b)
-    o, p = work.m_omega[a], work.m_omega[b]
-    if model.row_kind[k] != PUSH:
+    o, p = work.markers.omega[a], work.markers.omega[b]
+    if model.rows.kind[k] != PUSH:
         angle, _, _, _ = turned_angle(model, work, k, a, b)
         return angle, e0 * (p[0] - o[0]) + e1 * (p[1] - o[1]) + e2 * (p[2] - o[2])
     r0, r1, r2 = distance(work, a, b)
@@ -115,12 +118,12 @@ def loaded_coordinate(model, work, k, a, b):
 @inner
 def slip(work, a, b, r0, r1, r2):
     """Return the velocity of the point of B as seen from A: v_B - v_A - omega_A × d."""
-    o = work.m_omega[a]
+    o = work.markers.omega[a]
     n0, n1, n2 = cross(o[0], o[1], o[2], r0, r1, r2)
     return (
-        work.m_v[b, 0] - work.m_v[a, 0] - n0,
-        work.m_v[b, 1] - work.m_v[a, 1] - n1,
-        work.m_v[b, 2] - work.m_v[a, 2] - n2,
+        work.markers.v[b, 0] - work.markers.v[a, 0] - n0,
+        work.markers.v[b, 1] - work.markers.v[a, 1] - n1,
+        work.markers.v[b, 2] - work.markers.v[a, 2] - n2,
     )
 
 

@@ -15,8 +15,7 @@ import math
 from floatframe.joints.rows import MOMENT_B, RIM, RIM_HEIGHT
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.relative_motion import distance
-from floatframe.kernels.marker import rotate
-from floatframe.kernels.rotation import cross
+from floatframe.kernels.marker import cross, rotate
 
 __all__ = ["rolling_acceleration", "rolling_derivatives", "rolling_rate", "rolling_row"]
 
@@ -30,9 +29,9 @@ def dot(a0, a1, a2, b0, b1, b2):
 @inner
 def rim(model, work, k, a, b):
     """Return N, n, c, s and rho: eleven numbers, ground axes."""
-    z, y, R = model.row_z[k], model.row_y[k], model.row_c[k]
-    N0, N1, N2 = rotate(work.m_A[a], z[0], z[1], z[2])
-    n0, n1, n2 = rotate(work.m_A[b], y[0], y[1], y[2])
+    z, y, R = model.rows.z[k], model.rows.y[k], model.rows.c[k]
+    N0, N1, N2 = rotate(work.markers.A[a], z[0], z[1], z[2])
+    n0, n1, n2 = rotate(work.markers.A[b], y[0], y[1], y[2])
     c = dot(N0, N1, N2, n0, n1, n2)
     u0, u1, u2 = N0 - c * n0, N1 - c * n1, N2 - c * n2
     s = math.sqrt(dot(u0, u1, u2, u0, u1, u2))
@@ -44,13 +43,13 @@ def rim(model, work, k, a, b):
 def rim_velocity(work, a, b, rho0, rho1, rho2):
     """Return the velocity of the rim at the contact as seen from A."""
     d0, d1, d2 = distance(work, a, b)
-    o, p = work.m_omega[a], work.m_omega[b]
+    o, p = work.markers.omega[a], work.markers.omega[b]
     x0, x1, x2 = cross(p[0], p[1], p[2], rho0, rho1, rho2)
     y0, y1, y2 = cross(o[0], o[1], o[2], d0 + rho0, d1 + rho1, d2 + rho2)
     return (
-        work.m_v[b, 0] - work.m_v[a, 0] + x0 - y0,
-        work.m_v[b, 1] - work.m_v[a, 1] + x1 - y1,
-        work.m_v[b, 2] - work.m_v[a, 2] + x2 - y2,
+        work.markers.v[b, 0] - work.markers.v[a, 0] + x0 - y0,
+        work.markers.v[b, 1] - work.markers.v[a, 1] + x1 - y1,
+        work.markers.v[b, 2] - work.markers.v[a, 2] + x2 - y2,
     )
 
 
@@ -58,14 +57,14 @@ def rim_velocity(work, a, b, rho0, rho1, rho2):
 def rolling_row(model, work, k, a, b, w, c_k):
     """Return the residual of a row RIM_HEIGHT, ROLL or RIM."""
     N0, N1, N2, _, _, _, _, s, rho0, rho1, rho2 = rim(model, work, k, a, b)
-    kind, x = model.row_kind[k], model.row_x[k]
+    kind, x = model.rows.kind[k], model.rows.x[k]
     if kind == RIM_HEIGHT:
         d0, d1, d2 = distance(work, a, b)
-        return dot(N0, N1, N2, d0, d1, d2) - model.row_c[k] * s
+        return dot(N0, N1, N2, d0, d1, d2) - model.rows.c[k] * s
     if kind == RIM:
         m0, m1, m2 = cross(rho0, rho1, rho2, w[0], w[1], w[2])
         return c_k * dot(x[0], x[1], x[2], w[MOMENT_B] - m0, w[MOMENT_B + 1] - m1, w[MOMENT_B + 2] - m2)
-    t0, t1, t2 = rotate(work.m_A[a], x[0], x[1], x[2])
+    t0, t1, t2 = rotate(work.markers.A[a], x[0], x[1], x[2])
     v0, v1, v2 = rim_velocity(work, a, b, rho0, rho1, rho2)
     return dot(t0, t1, t2, v0, v1, v2)
 
@@ -79,7 +78,7 @@ def add_by_rim(model, P_a, P_b, k, r, g0, g1, g2, N0, N1, N2, n0, n1, n2, c, s):
     """
     u0, u1, u2 = (N0 - c * n0) / s, (N1 - c * n1) / s, (N2 - c * n2) / s
     m = (dot(u0, u1, u2, g0, g1, g2) * c / s - dot(n0, n1, n2, g0, g1, g2)) / s
-    f = -model.row_c[k]
+    f = -model.rows.c[k]
     x0, x1, x2 = cross(N0, N1, N2, g0 / s + m * n0, g1 / s + m * n1, g2 / s + m * n2)
     P_a[r, 3] += f * x0
     P_a[r, 4] += f * x1
@@ -94,10 +93,10 @@ def add_by_rim(model, P_a, P_b, k, r, g0, g1, g2, N0, N1, N2, n0, n1, n2, c, s):
 def rolling_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """Write row r of P and V of a row RIM_HEIGHT, ROLL or RIM; both are zero before."""
     N0, N1, N2, n0, n1, n2, c, s, rho0, rho1, rho2 = rim(model, work, k, a, b)
-    kind, x = model.row_kind[k], model.row_x[k]
+    kind, x = model.rows.kind[k], model.rows.x[k]
     d0, d1, d2 = distance(work, a, b)
     if kind == RIM_HEIGHT:  # N·dd + d·dN + R c/s dc
-        f = model.row_c[k] * c / s
+        f = model.rows.c[k] * c / s
         for j in range(3):
             value = (N0, N1, N2)[j]
             P_a[r, j], P_b[r, j] = -value, value
@@ -111,8 +110,8 @@ def rolling_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
         g0, g1, g2 = cross(x[0], x[1], x[2], w[0], w[1], w[2])
         add_by_rim(model, P_a, P_b, k, r, c_k * g0, c_k * g1, c_k * g2, N0, N1, N2, n0, n1, n2, c, s)
         return
-    o, p = work.m_omega[a], work.m_omega[b]
-    t0, t1, t2 = rotate(work.m_A[a], x[0], x[1], x[2])
+    o, p = work.markers.omega[a], work.markers.omega[b]
+    t0, t1, t2 = rotate(work.markers.A[a], x[0], x[1], x[2])
     first = 6 if c_k > 0.0 else 0
     for j in range(3):
         value = (t0, t1, t2)[j]
@@ -135,7 +134,7 @@ def rolling_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 @inner
 def rim_rates(work, a, b, N0, N1, N2, n0, n1, n2):
     """Return the rates of N and n, and of c: seven numbers."""
-    o, p = work.m_omega[a], work.m_omega[b]
+    o, p = work.markers.omega[a], work.markers.omega[b]
     x0, x1, x2 = cross(o[0], o[1], o[2], N0, N1, N2)
     y0, y1, y2 = cross(p[0], p[1], p[2], n0, n1, n2)
     return x0, x1, x2, y0, y1, y2, dot(x0, x1, x2, n0, n1, n2) + dot(N0, N1, N2, y0, y1, y2)
@@ -144,13 +143,17 @@ def rim_rates(work, a, b, N0, N1, N2, n0, n1, n2):
 @inner
 def rolling_rate(model, work, k, a, b):
     """Return the rate of a row RIM_HEIGHT; of ROLL what it holds, the velocity."""
-    if model.row_kind[k] != RIM_HEIGHT:
-        return rolling_row(model, work, k, a, b, work.w, 1.0)
+    if model.rows.kind[k] != RIM_HEIGHT:
+        return rolling_row(model, work, k, a, b, work.state.w, 1.0)
     N0, N1, N2, n0, n1, n2, c, s, _, _, _ = rim(model, work, k, a, b)
     X0, X1, X2, _, _, _, c_dot = rim_rates(work, a, b, N0, N1, N2, n0, n1, n2)
     d0, d1, d2 = distance(work, a, b)
-    v0, v1, v2 = work.m_v[b, 0] - work.m_v[a, 0], work.m_v[b, 1] - work.m_v[a, 1], work.m_v[b, 2] - work.m_v[a, 2]
-    return dot(N0, N1, N2, v0, v1, v2) + dot(X0, X1, X2, d0, d1, d2) + model.row_c[k] * c * c_dot / s
+    v0, v1, v2 = (
+        work.markers.v[b, 0] - work.markers.v[a, 0],
+        work.markers.v[b, 1] - work.markers.v[a, 1],
+        work.markers.v[b, 2] - work.markers.v[a, 2],
+    )
+    return dot(N0, N1, N2, v0, v1, v2) + dot(X0, X1, X2, d0, d1, d2) + model.rows.c[k] * c * c_dot / s
 
 
 @inner
@@ -167,12 +170,16 @@ def rolling_acceleration(model, work, k, a, b, bias_a, bias_b):
     """Return the second rate of RIM_HEIGHT, the first of ROLL, for given accelerations (6) of both markers."""
     N0, N1, N2, n0, n1, n2, c, s, rho0, rho1, rho2 = rim(model, work, k, a, b)
     X0, X1, X2, Y0, Y1, Y2, c_dot = rim_rates(work, a, b, N0, N1, N2, n0, n1, n2)
-    o, p, x = work.m_omega[a], work.m_omega[b], model.row_x[k]
+    o, p, x = work.markers.omega[a], work.markers.omega[b], model.rows.x[k]
     d0, d1, d2 = distance(work, a, b)
-    v0, v1, v2 = work.m_v[b, 0] - work.m_v[a, 0], work.m_v[b, 1] - work.m_v[a, 1], work.m_v[b, 2] - work.m_v[a, 2]
+    v0, v1, v2 = (
+        work.markers.v[b, 0] - work.markers.v[a, 0],
+        work.markers.v[b, 1] - work.markers.v[a, 1],
+        work.markers.v[b, 2] - work.markers.v[a, 2],
+    )
     h0, h1, h2 = bias_b[0] - bias_a[0], bias_b[1] - bias_a[1], bias_b[2] - bias_a[2]
-    R = model.row_c[k]
-    if model.row_kind[k] == RIM_HEIGHT:
+    R = model.rows.c[k]
+    if model.rows.kind[k] == RIM_HEIGHT:
         XX0, XX1, XX2 = turned_twice(o, bias_a[3], bias_a[4], bias_a[5], N0, N1, N2)
         YY0, YY1, YY2 = turned_twice(p, bias_b[3], bias_b[4], bias_b[5], n0, n1, n2)
         c_ddot = dot(XX0, XX1, XX2, n0, n1, n2) + 2 * dot(X0, X1, X2, Y0, Y1, Y2) + dot(N0, N1, N2, YY0, YY1, YY2)
@@ -184,7 +191,7 @@ def rolling_acceleration(model, work, k, a, b, bias_a, bias_b):
     q0 = f * (X0 - c_dot * n0 - c * Y0) + g * rho0
     q1 = f * (X1 - c_dot * n1 - c * Y1) + g * rho1
     q2 = f * (X2 - c_dot * n2 - c * Y2) + g * rho2
-    t0, t1, t2 = rotate(work.m_A[a], x[0], x[1], x[2])
+    t0, t1, t2 = rotate(work.markers.A[a], x[0], x[1], x[2])
     T0, T1, T2 = cross(o[0], o[1], o[2], t0, t1, t2)
     V0, V1, V2 = rim_velocity(work, a, b, rho0, rho1, rho2)
     w0, w1, w2 = cross(p[0], p[1], p[2], q0, q1, q2)

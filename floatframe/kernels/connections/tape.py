@@ -110,57 +110,57 @@ def binary(op, x, y):
 
 @inner
 def tape_value(model, work, f):
-    """Return the value of tape f at the inputs in `work`; results of all operations stay in work.tape."""
-    first, last = model.tape0[f], model.tape0[f + 1]
+    """Return the value of tape f at the inputs in `work`; results of all operations stay in work.tapes.results."""
+    first, last = model.tapes.operation0[f], model.tapes.operation0[f + 1]
     for k in range(first, last):
-        op, a, b = model.tape_op[k], model.tape_a[k], model.tape_b[k]
+        op, a, b = model.tapes.op[k], model.tapes.a[k], model.tapes.b[k]
         value = 0.0
         if op == CONSTANT:
-            value = model.tape_c[k]
+            value = model.tapes.c[k]
         elif op == INPUT:
-            value = work.inputs[a]
+            value = work.users.inputs[a]
         elif op == CALL:
-            value, _, _ = time_function(model, b, work.tape[a])
+            value, _, _ = time_function(model, b, work.tapes.results[a])
         elif op == SELECT:  # the operation before holds the condition
-            value = work.tape[a] if work.tape[k - first - 1] != 0.0 else work.tape[b]
+            value = work.tapes.results[a] if work.tapes.results[k - first - 1] != 0.0 else work.tapes.results[b]
         elif op < ADD:
-            value, _ = unary(op, work.tape[a])
+            value, _ = unary(op, work.tapes.results[a])
         else:
-            value, _, _ = binary(op, work.tape[a], work.tape[b])
-        work.tape[k - first] = value
-    return work.tape[last - first - 1]
+            value, _, _ = binary(op, work.tapes.results[a], work.tapes.results[b])
+        work.tapes.results[k - first] = value
+    return work.tapes.results[last - first - 1]
 
 
 @inner
 def tape_gradient(model, work, f, gradient):
     """Write the derivatives of tape f by all inputs; return its value."""
     value = tape_value(model, work, f)
-    first, n = model.tape0[f], model.tape0[f + 1] - model.tape0[f]
-    bar = work.tape_bar
+    first, n = model.tapes.operation0[f], model.tapes.operation0[f + 1] - model.tapes.operation0[f]
+    bar = work.tapes.bars
     for k in range(gradient.shape[0]):
         gradient[k] = 0.0
     for k in range(n):
         bar[k] = 0.0
     bar[n - 1] = 1.0
     for k in range(n - 1, -1, -1):
-        op, a, b, s = model.tape_op[first + k], model.tape_a[first + k], model.tape_b[first + k], bar[k]
+        op, a, b, s = model.tapes.op[first + k], model.tapes.a[first + k], model.tapes.b[first + k], bar[k]
         if s == 0.0 or op == CONSTANT:
             continue
         if op == INPUT:
             gradient[a] += s
         elif op == CALL:
-            _, slope, _ = time_function(model, b, work.tape[a])
+            _, slope, _ = time_function(model, b, work.tapes.results[a])
             bar[a] += s * slope
         elif op == SELECT:
-            if work.tape[k - 1] != 0.0:
+            if work.tapes.results[k - 1] != 0.0:
                 bar[a] += s
             else:
                 bar[b] += s
         elif op < ADD:
-            _, slope = unary(op, work.tape[a])
+            _, slope = unary(op, work.tapes.results[a])
             bar[a] += s * slope
         else:
-            _, by_a, by_b = binary(op, work.tape[a], work.tape[b])
+            _, by_a, by_b = binary(op, work.tapes.results[a], work.tapes.results[b])
             bar[a] += s * by_a
             bar[b] += s * by_b
     return value

@@ -14,7 +14,6 @@ from floatframe.kernels.connections.tape import tape_gradient, tape_value
 
 __all__ = ["begin_states", "resize_states", "user_force_derivatives", "user_force_power", "user_force_rows"]
 
-KAPPA, RHO = 0, 1  # places in work.state_scheme
 STEP = 1e-7  # of differences of users' functions, relative
 LEAST_STEP = 1e-9
 
@@ -22,114 +21,114 @@ LEAST_STEP = 1e-9
 @inner
 def network_of(model, c):
     """Return the number of user force c among all networks (couplers come first)."""
-    return model.c_item[c] + model.port0.shape[0] - 1 - model.user_states.shape[0]
+    return model.connections.item[c] + model.networks.port0.shape[0] - 1 - model.users.n_states.shape[0]
 
 
 @inner
 def gather_inputs(model, work, c):
-    """Write t, x, v, z into work.inputs; return the numbers of ports and of inputs."""
-    i, u = network_of(model, c), model.c_item[c]
-    first, last = model.port0[i], model.port0[i + 1]
+    """Write t, x, v, z into work.users.inputs; return the numbers of ports and of inputs."""
+    i, u = network_of(model, c), model.connections.item[c]
+    first, last = model.networks.port0[i], model.networks.port0[i + 1]
     n = last - first
-    work.inputs[0] = work.time[0]
+    work.users.inputs[0] = work.state.time
     for p in range(first, last):
         x, v = port_motion(model, work, p)
-        work.inputs[1 + p - first] = x
-        work.inputs[1 + n + p - first] = v
-    row = model.core[i] + model.user_forces[u]
-    for s in range(model.user_states[u]):
-        work.inputs[1 + 2 * n + s] = work.w[row + 3 * s]
-    return n, 1 + 2 * n + model.user_states[u]
+        work.users.inputs[1 + p - first] = x
+        work.users.inputs[1 + n + p - first] = v
+    row = model.networks.core[i] + model.users.n_forces[u]
+    for s in range(model.users.n_states[u]):
+        work.users.inputs[1 + 2 * n + s] = work.state.w[row + 3 * s]
+    return n, 1 + 2 * n + model.users.n_states[u]
 
 
 @inner
 def user_values(model, work, c):
-    """Write forces and rates of states into work.outputs; return the numbers of ports, inputs and outputs."""
-    u = model.c_item[c]
+    """Write forces and rates of states into work.users.outputs; return the numbers of ports, inputs and outputs."""
+    u = model.connections.item[c]
     n, n_in = gather_inputs(model, work, c)
-    n_out = model.user_forces[u] + model.user_states[u]
-    if model.user_address[u] != 0:
-        call_user_function(model.user_address[u], work.inputs, work.outputs)
+    n_out = model.users.n_forces[u] + model.users.n_states[u]
+    if model.users.address[u] != 0:
+        call_user_function(model.users.address[u], work.users.inputs, work.users.outputs)
     else:
         for j in range(n_out):
-            work.outputs[j] = tape_value(model, work, model.user_tape0[u] + j)
+            work.users.outputs[j] = tape_value(model, work, model.users.tape0[u] + j)
     return n, n_in, n_out
 
 
 @inner
 def user_gradients(model, work, c):
-    """Write the derivatives of all outputs by all inputs into work.gradients, row by row; return numbers as above."""
-    u = model.c_item[c]
+    """Write the derivatives of all outputs by all inputs into `gradients`, row by row; return numbers as above."""
+    u = model.connections.item[c]
     n, n_in, n_out = user_values(model, work, c)
-    if model.user_address[u] == 0:
+    if model.users.address[u] == 0:
         for j in range(n_out):
-            tape_gradient(model, work, model.user_tape0[u] + j, work.gradients[j * n_in : (j + 1) * n_in])
+            tape_gradient(model, work, model.users.tape0[u] + j, work.users.gradients[j * n_in : (j + 1) * n_in])
         return n, n_in, n_out
     for k in range(n_in):
-        here = work.inputs[k]
+        here = work.users.inputs[k]
         step = max(STEP * abs(here), LEAST_STEP)
-        work.inputs[k] = here + step
-        call_user_function(model.user_address[u], work.inputs, work.trial)
-        work.inputs[k] = here - step
+        work.users.inputs[k] = here + step
+        call_user_function(model.users.address[u], work.users.inputs, work.users.trial)
+        work.users.inputs[k] = here - step
         for j in range(n_out):
-            work.gradients[j * n_in + k] = work.trial[j]
-        call_user_function(model.user_address[u], work.inputs, work.trial)
-        work.inputs[k] = here
+            work.users.gradients[j * n_in + k] = work.users.trial[j]
+        call_user_function(model.users.address[u], work.users.inputs, work.users.trial)
+        work.users.inputs[k] = here
         for j in range(n_out):
-            work.gradients[j * n_in + k] = (work.gradients[j * n_in + k] - work.trial[j]) / (2 * step)
+            work.users.gradients[j * n_in + k] = (work.users.gradients[j * n_in + k] - work.users.trial[j]) / (2 * step)
     return n, n_in, n_out
 
 
 @inner
 def user_force_rows(model, work, c, c_k):
     """Write the residual of user force c, and its wrenches."""
-    i, u = network_of(model, c), model.c_item[c]
-    for p in range(model.port0[i], model.port0[i + 1]):
-        port_rows(model, work, p, work.w[model.p_core[p]], c_k)
+    i, u = network_of(model, c), model.connections.item[c]
+    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
+        port_rows(model, work, p, work.state.w[model.ports.core[p]], c_k)
     user_values(model, work, c)
-    k = model.core[i]
-    for j in range(model.user_forces[u]):
-        work.g[k + j] = c_k * (work.w[k + j] - work.outputs[j])
-    k += model.user_forces[u]
-    for s in range(model.user_states[u]):
-        base = work.state_base[model.state0[u] + s]
-        rate = work.w[k + 1]
-        work.g[k] = c_k * (work.w[k] - base[0] - work.state_scheme[KAPPA] * rate)
-        work.g[k + 1] = c_k * (rate - work.outputs[model.user_forces[u] + s])
-        work.g[k + 2] = c_k * (work.w[k + 2] - base[1] - work.state_scheme[RHO] * rate)
+    k = model.networks.core[i]
+    for j in range(model.users.n_forces[u]):
+        work.connections.g[k + j] = c_k * (work.state.w[k + j] - work.users.outputs[j])
+    k += model.users.n_forces[u]
+    for s in range(model.users.n_states[u]):
+        i = model.users.state0[u] + s
+        rate = work.state.w[k + 1]
+        work.connections.g[k] = c_k * (work.state.w[k] - work.states.base[i] - work.states.kappa * rate)
+        work.connections.g[k + 1] = c_k * (rate - work.users.outputs[model.users.n_forces[u] + s])
+        work.connections.g[k + 2] = c_k * (work.state.w[k + 2] - work.states.rate_base[i] - work.states.rho * rate)
         k += 3
 
 
 @inner
 def user_force_derivatives(model, work, c, c_k):
     """Write P at the markers and V of user force c."""
-    i, u, size, w0 = network_of(model, c), model.c_item[c], model.c_size[c], model.c_w0[c]
-    first, last = model.port0[i], model.port0[i + 1]
-    V = work.V[c]
+    i, u, size, w0 = network_of(model, c), model.connections.item[c], model.connections.size[c], model.connections.w0[c]
+    first, last = model.networks.port0[i], model.networks.port0[i + 1]
+    V = work.connections.V[c]
     for r in range(size):
         for j in range(size):
             V[r, j] = 0.0
         for p in range(first, last):
             for j in range(12):
-                work.P[model.p_a[p], r, j] = 0.0
-                work.P[model.p_b[p], r, j] = 0.0
+                work.connections.P[model.ports.a[p], r, j] = 0.0
+                work.connections.P[model.ports.b[p], r, j] = 0.0
     for p in range(first, last):
-        port_derivatives(model, work, c, p, work.w[model.p_core[p]], model.p_core[p], 1.0, c_k)
+        port_derivatives(model, work, c, p, work.state.w[model.ports.core[p]], model.ports.core[p], 1.0, c_k)
     n, n_in, n_out = user_gradients(model, work, c)
-    n_forces, n_states = model.user_forces[u], model.user_states[u]
-    core = model.core[i] - w0
+    n_forces, n_states = model.users.n_forces[u], model.users.n_states[u]
+    core = model.networks.core[i] - w0
     for j in range(n_out):
         r = core + j if j < n_forces else core + n_forces + 3 * (j - n_forces) + 1
         V[r, r] = 1.0
-        slopes = work.gradients[j * n_in : (j + 1) * n_in]
+        slopes = work.users.gradients[j * n_in : (j + 1) * n_in]
         for p in range(first, last):
             port_gradient(model, work, p, r, -c_k * slopes[1 + p - first], -c_k * slopes[1 + n + p - first])
         for s in range(n_states):
             V[r, core + n_forces + 3 * s] -= slopes[1 + 2 * n + s]
     for s in range(n_states):
         r = core + n_forces + 3 * s
-        V[r, r], V[r, r + 1] = 1.0, -work.state_scheme[KAPPA]
-        V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.state_scheme[RHO]
+        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa
+        V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
 
 
 @inner
@@ -137,10 +136,10 @@ def user_force_power(model, work, c):
     """Return the power of user force c on the bodies."""
     i = network_of(model, c)
     total = 0.0
-    for p in range(model.port0[i], model.port0[i + 1]):
-        if model.p_force[p] >= 0:
+    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
+        if model.ports.force[p] >= 0:
             _, v = port_motion(model, work, p)
-            total += work.w[model.p_core[p]] * v
+            total += work.state.w[model.ports.core[p]] * v
     return total
 
 
@@ -154,19 +153,19 @@ def begin_states(model, work, memory, h, alpha_f):
     rho_inf = alpha_f / (1.0 - alpha_f)
     d_m, d_f = (3.0 * rho_inf - 1.0) / (2.0 * (rho_inf + 1.0)), alpha_f
     th = 0.5 + d_f - d_m
-    work.state_scheme[RHO] = (1.0 - d_f) / (1.0 - d_m)
-    work.state_scheme[KAPPA] = h * th * work.state_scheme[RHO]
-    for s in range(model.state_row.shape[0]):
-        k = model.state_row[s]
+    work.states.rho = (1.0 - d_f) / (1.0 - d_m)
+    work.states.kappa = h * th * work.states.rho
+    for s in range(model.states.row.shape[0]):
+        k = model.states.row[s]
         z, g, a = memory.w[k], memory.w[k + 1], memory.w[k + 2]
         base = (d_f * g - d_m * a) / (1.0 - d_m)
-        work.state_base[s, 0] = z + h * ((1.0 - th) * a + th * base)
-        work.state_base[s, 1] = base
+        work.states.base[s] = z + h * ((1.0 - th) * a + th * base)
+        work.states.rate_base[s] = base
 
 
 @inner
 def resize_states(model, memory, ratio):
     """Turn the algorithmic rates into those of steps that are longer by `ratio`."""
-    for s in range(model.state_row.shape[0]):
-        k = model.state_row[s]
+    for s in range(model.states.row.shape[0]):
+        k = model.states.row[s]
         memory.w[k + 2] = memory.w[k + 1] + ratio * (memory.w[k + 2] - memory.w[k + 1])

@@ -69,8 +69,8 @@ class ControlSensor:
 def angles_of(system: System, k: int) -> list[bool]:
     """Return which coordinates of coupler or user force number k are angles."""
     model = compiled_system(system).model
-    rows = model.p_row[model.port0[k] : model.port0[k + 1]]
-    return [kind_of(code).is_angle for code in model.row_kind[rows]]
+    rows = model.ports.row[model.networks.port0[k] : model.networks.port0[k + 1]]
+    return [kind_of(code).is_angle for code in model.rows.kind[rows]]
 
 
 def port_units(system: System, is_angle: bool) -> tuple[str, str, str]:

@@ -280,7 +280,7 @@ def test_small_motions_about_a_steady_rotation_are_those_of_the_integrated_syste
     # nu = N z_dot + Omega N z, in body axes
     xi, nu = linear.N @ z0, linear.N @ rate0
     state = turning.state
-    for u0 in model.u0[:-1]:
+    for u0 in model.bodies.u0[:-1]:
         w = state.u[u0 + 3 : u0 + 6]
         nu[u0 : u0 + 3] += np.cross(w, xi[u0 : u0 + 3])
         nu[u0 + 3 : u0 + 6] += np.cross(w, xi[u0 + 3 : u0 + 6])
@@ -288,7 +288,7 @@ def test_small_motions_about_a_steady_rotation_are_those_of_the_integrated_syste
     def moved(factor):
         ground = factor * np.array(xi)
         u = state.u + factor * nu
-        for i, u0 in enumerate(model.u0[:-1]):
+        for i, u0 in enumerate(model.bodies.u0[:-1]):
             R = rotation_matrix(state.p[i])
             ground[u0 : u0 + 3] = R @ ground[u0 : u0 + 3]
             u[u0 : u0 + 3] = state.u[u0 : u0 + 3] + R @ (factor * nu[u0 : u0 + 3])
@@ -302,7 +302,7 @@ def test_small_motions_about_a_steady_rotation_are_those_of_the_integrated_syste
     A[:n, n:] = np.eye(n)
     A[n:] = -la.solve(linear.M, np.hstack([linear.K, linear.C]))
     z = (la.expm(A * t_end) @ np.concatenate([z0, rate0]))[:n]
-    exact = (linear.N @ z)[model.u0[1] + 6 : model.u0[2]]
+    exact = (linear.N @ z)[model.bodies.u0[1] + 6 : model.bodies.u0[2]]
     assert_allclose(difference, exact, rtol=0, atol=2e-3 * np.abs(exact).max())
 
 

@@ -39,7 +39,7 @@ from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.analyses.snapshot import snapshot
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import constant, harmonic, polynomial_of_time
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.mechanisms import double_pendulum, four_bar, slider_crank
 from floatframe.results.joint_coordinates import joint_coordinates
 from floatframe.rotations import rotation_matrix

@@ -8,7 +8,8 @@ from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.system import compiled_system
 from floatframe.forces import Gravity
 from floatframe.kernels.entry import evaluate_and_linearize, observe_state
-from floatframe.kernels.model import Memory, new_work
+from floatframe.kernels.memory import memory_at
+from floatframe.kernels.work import new_work
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
@@ -58,14 +59,12 @@ def test_equations_of_motion_are_the_sums_over_the_particles(case, seed):
     evaluate_and_linearize(compiled_system(system).model, work, 1.0, 0.0, 0.0)
     expected = generalized_forces(points, state, u_dot, compiled_system(system).model.gravity)
     expected[6:] += K @ state.q + D @ state.u[6:]
-    assert_allclose(work.residual, expected, rtol=0, atol=ROUNDOFF * np.abs(expected).max())
+    assert_allclose(work.bodies.residual, expected, rtol=0, atol=ROUNDOFF * np.abs(expected).max())
 
 
 def observed(system, state):
     """Return the row of results at a state."""
-    n = len(state.u)
-    memory = Memory(state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), np.zeros(n), np.zeros(n),
-                    np.zeros(0), np.zeros(2), np.zeros(2), np.zeros(4))  # fmt: skip
+    memory = memory_at(state, np.zeros(len(state.u)), np.zeros(int(compiled_system(system).model.connections.w0[-1])))
     return observe_state(
         compiled_system(system).model, new_work(compiled_system(system).model), memory, 0.0
     ).diagnostics[0]
@@ -95,7 +94,7 @@ def test_power_of_the_forces_is_the_rate_of_the_kinetic_energy(case, seed):
     work = new_work(compiled_system(system).model)
     set_iterate(work, state, u_dot)
     evaluate_and_linearize(compiled_system(system).model, work, 1.0, 0.0, 0.0)
-    forces = work.residual.copy()
+    forces = work.bodies.residual.copy()
     forces[6:] -= K @ state.q + D @ state.u[6:]
     R = rotation_matrix(state.p[0])
     power = forces @ np.concatenate([R.T @ state.u[:3], state.u[3:]])

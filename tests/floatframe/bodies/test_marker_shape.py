@@ -15,7 +15,7 @@ from floatframe.discrete.bodies import central_bodies
 from floatframe.discrete.markers import body_marker
 from floatframe.joints import SphericalJoint
 from floatframe.kernels.entry import evaluate_and_linearize, rates_of_constraints
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
@@ -54,14 +54,14 @@ def test_motion_in_results_is_that_of_the_kernels(kind, seed):
     set_iterate(work, state)
     evaluate_and_linearize(compiled.model, work, 1.0, 0.0, 0.0)
     rates_of_constraints(compiled.model, work)
-    m = int(compiled.model.c_a[0])
+    m = int(compiled.model.connections.a[0])
     for found, expected in (
-        (motion.position, work.m_r[m]),
-        (motion.axes, work.m_A[m]),
-        (motion.velocity, work.m_v[m]),
-        (motion.omega, work.m_omega[m]),
-        (motion.acceleration, work.m_bias[m, :3]),
-        (motion.alpha, work.m_bias[m, 3:]),
+        (motion.position, work.markers.r[m]),
+        (motion.axes, work.markers.A[m]),
+        (motion.velocity, work.markers.v[m]),
+        (motion.omega, work.markers.omega[m]),
+        (motion.acceleration, work.markers.bias[m, :3]),
+        (motion.alpha, work.markers.bias[m, 3:]),
     ):
         assert_allclose(found, expected, rtol=0, atol=ROUNDOFF * max(1.0, np.abs(expected).max()))
 
@@ -77,7 +77,7 @@ def test_place_at_the_start_and_in_discrete_steps_is_that_of_the_results(kind):
     assert_allclose(r_P, state.r[0] + R @ rho, rtol=0, atol=ROUNDOFF)
     assert_allclose(A_P, R @ axes, rtol=0, atol=ROUNDOFF)
     bodies = central_bodies(compiled.model, ("body",), "test")
-    own = body_marker(compiled.model, bodies, int(compiled.model.c_a[0]))
+    own = body_marker(compiled.model, bodies, int(compiled.model.connections.a[0]))
     sigma, theta = own.deformation(state.q)
     assert_allclose(sigma + bodies[0].center(state.q), rho, rtol=0, atol=ROUNDOFF)
     assert_allclose(rotation_exp(theta) @ own.shape.triad, axes, rtol=0, atol=ROUNDOFF)

@@ -56,7 +56,9 @@ def test_static_tells_where_the_rod_hangs_and_what_holds_it(pendulum):
 
 def test_static_prints_the_sensors_at_the_equilibrium(pendulum):
     """The rod hangs: its end, at twice the centre of mass, is 1 below the hinge; the angle is -90 degrees."""
-    text = PENDULUM + """
+    text = (
+        PENDULUM
+        + """
 [sensors.end]
 type = "position"
 body = "rod"
@@ -71,6 +73,7 @@ coordinate = "angle"
 type = "reaction"
 of = "hinge"
 """
+    )
     pendulum.write_text(text)
     sensors = json.loads(invoke("static", pendulum, "--json"))["sensors"]
     assert_allclose([sensors[f"end {c}"]["value"] for c in "xyz"], [0, -1, 0], rtol=0, atol=1e-8)

@@ -15,7 +15,8 @@ from floatframe.errors import ModelError, SystemFileError
 from floatframe.forces import Gravity, PointForce
 from floatframe.joints import FixedJoint, SphericalJoint
 from floatframe.kernels.entry import evaluate_and_linearize, observe_state, rates_of_constraints
-from floatframe.kernels.model import Memory, new_work
+from floatframe.kernels.memory import memory_at
+from floatframe.kernels.work import new_work
 from floatframe.results.place_motion import interface_motion
 from floatframe.results.recovery import interface_positions
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
@@ -133,13 +134,11 @@ def test_equations_of_motion_are_lagranges_of_the_kinetic_energy_to_second_order
         weight.sum(axis=0), np.cross(rho, weight).sum(axis=0), np.einsum("pa,pak->k", weight, by_shapes),
     ])  # fmt: skip
     assert np.abs(bent).max() > 0.1
-    assert_allclose(work.residual, expected, rtol=0, atol=10 * ROUNDOFF * np.abs(expected).max())
+    assert_allclose(work.bodies.residual, expected, rtol=0, atol=10 * ROUNDOFF * np.abs(expected).max())
 
 
 def observed(system, state):
-    n = len(state.u)
-    memory = Memory(state.r.copy(), state.p.copy(), state.q.copy(), state.u.copy(), np.zeros(n), np.zeros(n),
-                    np.zeros(0), np.zeros(2), np.zeros(2), np.zeros(4))  # fmt: skip
+    memory = memory_at(state, np.zeros(len(state.u)), np.zeros(int(compiled_system(system).model.connections.w0[-1])))
     return observe_state(
         compiled_system(system).model, new_work(compiled_system(system).model), memory, 0.0
     ).diagnostics[0]
@@ -225,18 +224,18 @@ def test_markers_move_with_their_interface_and_carry_forces_to_it_with_the_same_
         work = new_work(compiled_system(system).model)
         set_iterate(work, state)
         evaluate_and_linearize(compiled_system(system).model, work, 1.0, 0.0, 0.0)
-        forces.append(work.residual.copy())
+        forces.append(work.bodies.residual.copy())
     r_P, A = place_of(body, "end_b", state)
-    assert_allclose(work.m_r[0], r_P, rtol=0, atol=ROUNDOFF)
-    assert_allclose(work.m_A[0], A, rtol=0, atol=ROUNDOFF)
+    assert_allclose(work.markers.r[0], r_P, rtol=0, atol=ROUNDOFF)
+    assert_allclose(work.markers.A[0], A, rtol=0, atol=ROUNDOFF)
     s = 1e-5
     (r_plus, A_plus), (r_minus, A_minus) = (place_of(body, "end_b", moved(free, state, state.u, x)) for x in (s, -s))
-    assert_allclose(work.m_v[0], (r_plus - r_minus) / (2 * s), rtol=0, atol=1e-8)
+    assert_allclose(work.markers.v[0], (r_plus - r_minus) / (2 * s), rtol=0, atol=1e-8)
     spin = (A_plus - A_minus) / (2 * s) @ A.T
     omega = np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2
-    assert_allclose(work.m_omega[0], omega, rtol=0, atol=1e-8)
+    assert_allclose(work.markers.omega[0], omega, rtol=0, atol=1e-8)
     power = (forces[0] - forces[1]) @ in_body_axes(state, state.u)
-    assert_allclose(power, f @ work.m_v[0] + t @ work.m_omega[0], rtol=ROUNDOFF, atol=0)
+    assert_allclose(power, f @ work.markers.v[0] + t @ work.markers.omega[0], rtol=ROUNDOFF, atol=0)
 
 
 def test_second_rates_of_constraints_are_the_derivative_of_their_rates():

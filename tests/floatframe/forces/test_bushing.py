@@ -20,7 +20,7 @@ from floatframe import (
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import table
 from floatframe.kernels.entry import evaluate_and_linearize
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
 from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
@@ -78,7 +78,7 @@ def test_wrench_is_the_derivative_of_the_potential(angle):
     work = new_work(compiled_system(system).model)
     set_iterate(work, State(r, p, np.zeros(0), np.zeros(12)))
     evaluate_and_linearize(compiled_system(system).model, work, 1.0, 0.0, 0.0)
-    w = -work.g
+    w = -work.connections.g
     found = np.concatenate([w[:3], w[3:6], -w[:3], -w[6:9]])
     assert_allclose(found, -np.array(gradient), rtol=0, atol=1e-7 * np.abs(gradient).max())
 

@@ -50,7 +50,7 @@ def test_newton_matrix_is_the_derivative_of_the_residual(joint, coordinates):
     forces = [JointForce(f"f {name}", "j", name, **EVERYTHING) for name in coordinates]
     forces += [JointForce("second", "j", coordinates[0], damping=0.4)]
     iterate = Iterate(System(plain.bodies, plain.joints, forces), 1)
-    iterate.work.time[0] = 0.37
+    iterate.work.state.time[...] = 0.37
     exact, approximate = newton_matrices(iterate)
     assert_allclose(exact, approximate, rtol=0, atol=1e-8 * max(np.abs(approximate).max(), 1 / C_K))
 

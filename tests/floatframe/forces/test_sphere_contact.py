@@ -45,9 +45,9 @@ def gap_at(system, prepare):
 
     iterate = Iterate(system, 1)
     prepare(iterate)
-    n_u = int(iterate.model.u0[-1])
+    n_u = int(iterate.model.bodies.u0[-1])
     iterate.residual(np.zeros(n_u), np.zeros(iterate.n_w))
-    return float(iterate.work.pair[15])
+    return float(iterate.work.pair.numbers[15])
 
 
 @pytest.mark.parametrize("radius_a", [None, 0.2], ids=["plane", "sphere"])
@@ -56,7 +56,7 @@ def test_newton_matrix_is_the_derivative_of_the_residual(radius_a, depth):
     build, depth = touching(radius_a, depth=depth)
 
     def prepare(iterate):
-        iterate.work.w_start[-1] = 5.0
+        iterate.work.state.w_start[-1] = 5.0
 
     gap = gap_at(build(10.0), prepare)
     assert_tangent_is_exact(build(10.0 + gap + depth), prepare=prepare)

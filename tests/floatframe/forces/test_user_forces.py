@@ -31,7 +31,7 @@ from floatframe import (
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import harmonic, smooth_step, table
 from floatframe.kernels.entry import evaluate_and_linearize
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
 from tests.floatframe.finite_differences import assert_tangent_is_exact
@@ -89,7 +89,7 @@ def two_bodies(way):
 @pytest.mark.parametrize("way", WAYS)
 def test_newton_matrix_is_the_derivative_of_the_residual(way):
     def prepare(iterate):
-        iterate.work.state_scheme[:] = 0.3, 0.8
+        iterate.work.states.kappa[...], iterate.work.states.rho[...] = 0.3, 0.8
 
     tolerance = 4e-9 if way == "expressions" else 1e-6  # functions are differenced
     assert_tangent_is_exact(two_bodies(way), prepare=prepare, tolerance=tolerance)
@@ -115,7 +115,7 @@ def test_kernels_evaluate_an_expression_as_python_does(text):
     known = {name: getattr(math, name) for name in dir(math)} | {"abs": abs, "min": min, "max": max, "pi": math.pi}
     known["sign"] = lambda value: float(np.sign(value))
     expected = eval(text.replace("^", "**"), known, {"x": x, "y": y, "z": z, "k": 2.5})
-    assert_allclose(work.outputs[0], expected, rtol=1e-14, atol=1e-15)
+    assert_allclose(work.users.outputs[0], expected, rtol=1e-14, atol=1e-15)
 
 
 def wheel(force, omega=0.0):

@@ -34,7 +34,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import harmonic, polynomial_of_time
 from floatframe.joints.rows import is_held, is_held_velocity
 from floatframe.kernels.entry import evaluate_and_linearize, rates_of_constraints
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.results.joint_coordinates import joint_coordinate, joint_coordinates
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 from floatframe.start.newton_equations import displaced, set_iterate
@@ -93,7 +93,7 @@ def pair(make, *, is_apart=True):
 @pytest.mark.parametrize("make", CASES)
 def test_newton_matrix_is_the_derivative_of_the_residual(make):
     iterate = Iterate(pair(make), 1)
-    iterate.work.time[0] = 0.37
+    iterate.work.state.time[...] = 0.37
     exact, approximate = newton_matrices(iterate)
     assert_allclose(exact, approximate, rtol=0, atol=2e-9 * max(np.abs(approximate).max(), 1 / C_K))
 
@@ -102,13 +102,13 @@ def held(system, state, t):
     """Return what the joint holds, its rate and its second rate at zero acceleration (of velocities: zero)."""
     model = compiled_system(system).model
     work = new_work(model)
-    work.time[0] = t
+    work.state.time[...] = t
     set_iterate(work, state)
     evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
-    rows = is_held(model.row_kind)
+    rows = is_held(model.rows.kind)
     rate, bias = (part[rows] for part in rates_of_constraints(model, work))
-    is_velocity = is_held_velocity(model.row_kind[rows])
-    return work.g[rows].copy(), np.where(is_velocity, bias, rate), np.where(is_velocity, np.nan, bias)
+    is_velocity = is_held_velocity(model.rows.kind[rows])
+    return work.connections.g[rows].copy(), np.where(is_velocity, bias, rate), np.where(is_velocity, np.nan, bias)
 
 
 @pytest.mark.parametrize("make", CASES)

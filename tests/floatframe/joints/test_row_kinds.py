@@ -11,7 +11,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.joints import JOINTS, CylindricalJoint, DistanceJoint, ScrewJoint, UniversalJoint
 from floatframe.joints.rows import ROW_KINDS, RelativePlace, is_held, is_held_length, is_held_position, is_held_velocity
 from floatframe.kernels.entry import evaluate_and_linearize
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.start.newton_equations import displaced, in_ground_axes, set_iterate
 from floatframe.state import State
@@ -112,8 +112,8 @@ def test_kernels_measure_a_coordinate_as_the_record_says(make, name):
     work = new_work(model)
     set_iterate(work, state)
     evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
-    a, b = int(model.c_a[0]), int(model.c_b[0])
-    place = RelativePlace(work.m_A[a], work.m_A[b], work.m_r[b] - work.m_r[a])
-    slip = work.m_v[b] - work.m_v[a] - np.cross(work.m_omega[a], place.d)
-    rate = own.direction(place) @ own.moves(slip, work.m_omega[b] - work.m_omega[a])
-    assert_allclose(work.g[number], -k * own.value(place) - c * rate, rtol=0, atol=1e-13)
+    a, b = int(model.connections.a[0]), int(model.connections.b[0])
+    place = RelativePlace(work.markers.A[a], work.markers.A[b], work.markers.r[b] - work.markers.r[a])
+    slip = work.markers.v[b] - work.markers.v[a] - np.cross(work.markers.omega[a], place.d)
+    rate = own.direction(place) @ own.moves(slip, work.markers.omega[b] - work.markers.omega[a])
+    assert_allclose(work.connections.g[number], -k * own.value(place) - c * rate, rtol=0, atol=1e-13)

@@ -34,7 +34,7 @@ from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.bodies.mode_choice import frozen_to_rigid
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import polynomial_of_time
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import interface_motion, point_motion
 from floatframe.start.newton_equations import linearized, set_iterate
@@ -306,8 +306,8 @@ def test_row_of_its_rate_gives_the_rate_of_the_results(geometric):
     linearized(compiled.model, work, 1.0, 0.0, 0.0)
     row = coordinate_rows(system, compiled, work, state)["slide.distance"]
     u = state.u.copy()
-    for i, first in enumerate(compiled.model.u0[:-1]):
-        u[first : first + 3] = work.R[i].T @ u[first : first + 3]
+    for i, first in enumerate(compiled.model.bodies.u0[:-1]):
+        u[first : first + 3] = work.state.R[i].T @ u[first : first + 3]
     assert_allclose(row @ u, joint_coordinate(system, motion, "slide", "distance").rate[-1], rtol=1e-9)
 
 

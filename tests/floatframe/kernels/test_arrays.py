@@ -13,29 +13,61 @@ from numba.np.arrayobj import make_array
 from floatframe.compiling.system import compiled_system
 from floatframe.kernels.compiler.choice import is_lean
 from floatframe.kernels.compiler.compilation import array_type, array_value, entry, inner, loops, matrix_loops
-from floatframe.kernels.compiler.structure import Structure, table_of
+from floatframe.kernels.compiler.structure import Structure, n_words, table_of
 from floatframe.kernels.entry import no_memory, prepare, run
-from floatframe.kernels.model import Memory, Model, Rows, Work, new_rows, new_work
+from floatframe.kernels.memory import Memory, Rows, new_rows
+from floatframe.kernels.model import JointRows, Model
+from floatframe.kernels.records import leaves, measured
+from floatframe.kernels.work import Work, new_work
 from tests.floatframe.kernels.test_tangent import system_with_everything
 
 MODEL = compiled_system(system_with_everything()).model
 
 
+def places(structure, first=0, within=""):
+    """Return type and place in the table of every array of a structure by name."""
+    found = {}
+    for name, (kind, place) in structure.fields.items():
+        if isinstance(kind, Structure):
+            found |= places(kind, first + place, f"{within}{name}.")
+        else:
+            found[within + name] = kind, first + place
+    return found
+
+
 @pytest.mark.parametrize(
-    ("kind", "data"),
-    [(Model, MODEL), (Work, new_work(MODEL)), (Memory, no_memory()), (Rows, new_rows(MODEL, 3))],
+    ("declaration", "data"),
+    [(Model(), MODEL), (Work(), new_work(MODEL)), (Memory(), no_memory()), (Rows(), new_rows(MODEL, 3))],
     ids=["Model", "Work", "Memory", "Rows"],
 )
-def test_arrays_are_what_the_kernels_take_them_for(kind, data):
+def test_arrays_are_what_the_kernels_take_them_for(declaration, data):
     """Number, dimensions and order of every array; its address and shape where the kernels look for them."""
-    fields, table = Structure(kind).fields, table_of(data)
-    for name, array in data._asdict().items():
-        block, place = fields[name]
+    found, table = places(Structure(declaration)), table_of(data)
+    arrays = dict(leaves(data))
+    assert list(arrays) == list(found)
+    assert len(table) == n_words(declaration)
+    for name, array in arrays.items():
+        kind, place = found[name]
         assert array.flags.c_contiguous, name
-        assert array.dtype == (np.int64 if str(block.dtype) == "int64" else np.float64), name
-        assert array.ndim == block.ndim, name
+        assert array.dtype == (np.int64 if "int64" in str(kind) else np.float64), name
+        assert array.ndim == getattr(kind, "ndim", 0), name
         assert table[place] == array.ctypes.data, name
         assert tuple(table[place + 1 : place + 1 + array.ndim]) == array.shape, name
+
+
+def test_an_array_that_is_not_what_is_declared_is_named():
+    rows = MODEL.rows
+    wrong = [
+        rows._replace(x=rows.x[:, :2].copy()),
+        rows._replace(x=rows.x[1:].copy()),
+        rows._replace(x=rows.x.astype(np.float32)),
+        rows._replace(x=np.asfortranarray(rows.x)),
+        rows._replace(x=JointRows().x),
+    ]
+    measured(Model(), MODEL)
+    for each in wrong:
+        with pytest.raises(ValueError, match=r"Model\.rows\.x: expected"):
+            measured(Model(), MODEL._replace(rows=each))
 
 
 @intrinsic

@@ -12,7 +12,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.forces import Gravity, PointForce, SpringDamper
 from floatframe.joints import FixedJoint, RevoluteJoint, SphericalJoint
 from floatframe.kernels.entry import newton_correction
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.state import State
@@ -70,7 +70,7 @@ class Iterate:
         rng = np.random.default_rng(seed)
         self.model = compiled_system(system).model
         self.work = new_work(self.model)
-        n_b, n_q, n_u = len(self.model.kind), int(self.model.q0[-1]), int(self.model.u0[-1])
+        n_b, n_q, n_u = len(self.model.bodies.kind), int(self.model.bodies.q0[-1]), int(self.model.bodies.u0[-1])
         p = np.array([euler_parameters_of_rotation_vector(rng.normal(size=3)) for _ in range(n_b)])
         self.r, self.q, self.theta = rng.normal(size=(n_b, 3)), rng.normal(size=n_q), rng.normal(size=(n_b, 3))
         self.u, self.u_dot, self.w = rng.normal(size=n_u), rng.normal(size=n_u), rng.normal(size=self.n_w)
@@ -79,33 +79,33 @@ class Iterate:
 
     @property
     def n_w(self):
-        return int(self.model.c_w0[-1])
+        return int(self.model.connections.w0[-1])
 
     def residual(self, y, mu):
         """Return the scaled residual after a step (y, mu) of the unknowns, and leave it in `work`."""
         model, work = self.model, self.work
         set_iterate(work, State(self.r, self.p, self.q, self.u), self.u_dot, self.w + mu / C_K)
-        for i in range(len(model.kind)):
-            own = y[model.u0[i] : model.u0[i + 1]]
+        for i in range(len(model.bodies.kind)):
+            own = y[model.bodies.u0[i] : model.bodies.u0[i + 1]]
             R = self.R_start[i] @ rotation_exp(self.theta[i])
             step = np.concatenate([R @ own[:3], own[3:]])
-            u = slice(model.u0[i], model.u0[i + 1])
-            work.r[i] += step[:3]
-            work.theta[i] = self.theta[i] + own[3:6]
-            work.R[i] = self.R_start[i] @ rotation_exp(work.theta[i])
-            work.q[model.q0[i] : model.q0[i + 1]] += own[6:]
-            work.u[u] += C_D / C_K * step
-            work.u_dot[u] += C_M / C_K * step
+            u = slice(model.bodies.u0[i], model.bodies.u0[i + 1])
+            work.state.r[i] += step[:3]
+            work.state.theta[i] = self.theta[i] + own[3:6]
+            work.state.R[i] = self.R_start[i] @ rotation_exp(work.state.theta[i])
+            work.state.q[model.bodies.q0[i] : model.bodies.q0[i + 1]] += own[6:]
+            work.state.u[u] += C_D / C_K * step
+            work.state.u_dot[u] += C_M / C_K * step
         parts = linearized(model, work, C_M, C_D, C_K)
-        return np.concatenate([C_K * work.residual, work.g]), parts
+        return np.concatenate([C_K * work.bodies.residual, work.connections.g]), parts
 
 
 def newton_matrix(model, parts, n_w):
     """Return the dense Newton matrix over (y, mu)."""
-    n_u = int(model.u0[-1])
+    n_u = int(model.bodies.u0[-1])
     matrix = np.zeros((n_u + n_w, n_u + n_w))
     for i, H in enumerate(parts.H):
-        u = slice(model.u0[i], model.u0[i + 1])
+        u = slice(model.bodies.u0[i], model.bodies.u0[i + 1])
         matrix[u, u] = H
     matrix[:n_u, n_u:] = -parts.J.T.toarray()
     matrix[n_u:, :n_u] = parts.G.toarray()
@@ -115,7 +115,7 @@ def newton_matrix(model, parts, n_w):
 
 def newton_matrices(iterate, *, step=1e-5):
     """Return the Newton matrix at an iterate, and the central differences of the residual."""
-    n_u = int(iterate.model.u0[-1])
+    n_u = int(iterate.model.bodies.u0[-1])
     n = n_u + iterate.n_w
     _, parts = iterate.residual(np.zeros(n_u), np.zeros(n - n_u))
     approximate = np.zeros((n, n))
@@ -136,11 +136,11 @@ def test_newton_matrix_is_the_derivative_of_the_residual(seed):
 
 def test_elimination_body_by_body_solves_the_whole_newton_system():
     iterate = Iterate(system_with_everything(), 5)
-    n_u = int(iterate.model.u0[-1])
+    n_u = int(iterate.model.bodies.u0[-1])
     residual, parts = iterate.residual(np.zeros(n_u), np.zeros(iterate.n_w))
     matrix = newton_matrix(iterate.model, parts, iterate.n_w)
     expected = np.linalg.solve(matrix, -residual)
     outcome = newton_correction(iterate.model, iterate.work, C_M, C_D, C_K)
     assert outcome.status == 0
-    found = np.concatenate([iterate.work.y, iterate.work.mu])
+    found = np.concatenate([iterate.work.solver.y, iterate.work.solver.mu])
     assert_allclose(found, expected, rtol=0, atol=1e-13 * np.linalg.cond(matrix) * np.abs(expected).max())

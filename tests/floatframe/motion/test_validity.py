@@ -27,11 +27,13 @@ from floatframe.cli.app import app
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError
 from floatframe.kernels.entry import observe_state
-from floatframe.kernels.model import Memory, new_work
+from floatframe.kernels.memory import memory_at
+from floatframe.kernels.work import new_work
 from floatframe.mechanisms import spin_up_beam, spinning_shaft
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.validity import LINEAR, STIFFENED, ValidityNote, notes_from_json, notes_to_json
 from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.state import State
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness
 
 N_Q = 4
@@ -43,8 +45,7 @@ def rows_of(system, q, u, u_dot, p=None):
     model = compiled_system(system).model
     placed = compiled_system(system).placed
     p = placed.p if p is None else p
-    memory = Memory(placed.r.copy(), p.copy(), q, u, u_dot, np.zeros(len(u)), np.zeros(int(model.c_w0[-1])),
-                    np.zeros(2), np.zeros(2), np.zeros(4))  # fmt: skip
+    memory = memory_at(State(placed.r, p, q, u), u_dot, np.zeros(int(model.connections.w0[-1])))
     return observe_state(model, new_work(model), memory, 0.5)
 
 
@@ -107,7 +108,12 @@ def test_load_of_a_column_is_told_by_its_first_buckling_load():
 def rows_at_rest(system):
     """Return a row at rest under gravity."""
     model = compiled_system(system).model
-    return rows_of(system, np.zeros(int(model.q0[-1])), np.zeros(int(model.u0[-1])), np.zeros(int(model.u0[-1])))
+    return rows_of(
+        system,
+        np.zeros(int(model.bodies.q0[-1])),
+        np.zeros(int(model.bodies.u0[-1])),
+        np.zeros(int(model.bodies.u0[-1])),
+    )
 
 
 def soft_beam(geometric=True):

@@ -22,7 +22,7 @@ from floatframe import (
 )
 from floatframe.compiling.system import compiled_system
 from floatframe.kernels.entry import evaluate_and_linearize, rates_of_constraints
-from floatframe.kernels.model import new_work
+from floatframe.kernels.work import new_work
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.start.initial import solve_accelerations
 from floatframe.start.newton_equations import displaced, set_iterate
@@ -39,8 +39,8 @@ def constraints(system, state):
     work = new_work(model)
     set_iterate(work, state)
     evaluate_and_linearize(model, work, 1.0, 0.0, 0.0)
-    held = (model.row_kind == 0) | (model.row_kind == 1)
-    return (work.g[held], *(part[held] for part in rates_of_constraints(model, work)))
+    held = (model.rows.kind == 0) | (model.rows.kind == 1)
+    return (work.connections.g[held], *(part[held] for part in rates_of_constraints(model, work)))
 
 
 def open_chain():
@@ -88,7 +88,7 @@ def test_rates_are_the_derivatives_of_the_constraints_along_a_motion(seed):
     system = system_with_everything()
     rng = np.random.default_rng(seed)
     model = compiled_system(system).model
-    n_b, n_q, n_u = len(model.kind), int(model.q0[-1]), int(model.u0[-1])
+    n_b, n_q, n_u = len(model.bodies.kind), int(model.bodies.q0[-1]), int(model.bodies.u0[-1])
     p = np.array([euler_parameters_of_rotation_vector(rng.normal(size=3)) for _ in range(n_b)])
     state = State(rng.normal(size=(n_b, 3)), p, rng.normal(size=n_q), rng.normal(size=n_u))
     _, rate, bias = constraints(system, state)

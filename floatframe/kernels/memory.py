@@ -1,0 +1,67 @@
+"""What an integrator remembers after a step, and the results of output times; sizes as in `kernels.model`."""
+
+from typing import NamedTuple
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.kernels.model import Model, n_b, n_c, n_w
+from floatframe.kernels.records import Size, integer, real, zeros
+from floatframe.kernels.work import n_q, n_u, state_sizes
+from floatframe.state import State
+
+__all__ = ["N_DIAGNOSTICS", "N_DRIFTS", "Memory", "Rows", "memory_at", "new_rows"]
+
+N_DIAGNOSTICS = 12  #: kinetic, strain, gravity, springs, linear momentum (3), angular about the origin (3), work (2)
+N_DRIFTS = 4  #: of a joint: distance, angle, their rates
+
+n_t = Size("n_t")
+
+
+class Memory(NamedTuple):
+    """What an integrator knows after a step; overwritten by the next."""
+
+    r: Array = real(n_b, 3, unit="m")
+    p: Array = real(n_b, 4)  #: Euler parameters
+    q: Array = real(n_q)
+    u: Array = real(n_u, unit="m/s, rad/s, 1/s")
+    u_dot: Array = real(n_u, unit="m/s², rad/s², 1/s²")
+    a: Array = real(n_u, unit="m/s², rad/s², 1/s²")  #: algorithmic acceleration
+    w: Array = real(n_w, unit="N, N m")
+    work_given: Array = real(unit="J")  #: by forces and drives
+    work_taken: Array = real(unit="J")  #: by dampers, friction and modal damping
+    power_given: Array = real(unit="W")
+    power_taken: Array = real(unit="W")
+    h: Array = real(unit="s")  #: size of the step to which `a` belongs
+    h_wanted: Array = real(unit="s")  #: of the next step
+    n_accepted: IntArray = integer()  #: steps
+    n_rejected: IntArray = integer()
+
+
+class Rows(NamedTuple):
+    """Results of consecutive output times."""
+
+    t: Array = real(n_t, unit="s")
+    r: Array = real(n_t, n_b, 3, unit="m")
+    p: Array = real(n_t, n_b, 4)
+    q: Array = real(n_t, n_q)
+    u: Array = real(n_t, n_u, unit="m/s, rad/s, 1/s")
+    u_dot: Array = real(n_t, n_u, unit="m/s², rad/s², 1/s²")
+    w: Array = real(n_t, n_w, unit="N, N m")
+    diagnostics: Array = real(n_t, N_DIAGNOSTICS, unit="J, kg m/s, kg m²/s, J")
+    drift: Array = real(n_t, n_c, N_DRIFTS, unit="m, rad, m/s, rad/s")
+
+
+def memory_at(state: State, u_dot: Array, w: Array) -> Memory:
+    """Return the memory at a state, a copy, with algorithmic accelerations equal to u_dot, before any step."""
+    sizes = {"n_b": len(state.r), "n_q": len(state.q), "n_u": len(state.u), "n_w": len(w)}
+    memory = zeros(Memory(), sizes)
+    for name in ("r", "p", "q", "u"):
+        getattr(memory, name)[:] = getattr(state, name)
+    memory.u_dot[:] = u_dot
+    memory.a[:] = u_dot
+    memory.w[:] = w
+    return memory
+
+
+def new_rows(model: Model, n_t: int) -> Rows:
+    """Return room for the results of n_t output times."""
+    return zeros(Rows(), state_sizes(model) | {"n_c": len(model.connections.size), "n_t": n_t})

@@ -1,0 +1,141 @@
+"""Records of arrays, the shape, the unit and the kind of numbers of each declared once: where its record names it.
+
+A record is a named tuple of arrays and of other records. Made without values it holds their declarations, so that
+`Work()` declares all working arrays, and everything else follows from it:
+
+    zeros(Work(), sizes)         the arrays, all zero
+    filled(Springs(), ...)       arrays made of lists
+    of_items(Springs(), items)   arrays made of items with one entry for each array
+    measured(Model(), model)     the sizes of given arrays, which must be what is declared
+    leaves(model)                the arrays in their order; kernels find them in it (compiler/structure.py)
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+
+__all__ = ["Declared", "Size", "filled", "flat", "integer", "leaves", "measured", "of_items", "real", "zeros"]
+
+Record = TypeVar("Record", bound=NamedTuple)
+
+
+@dataclass(frozen=True)
+class Size:
+    """A size of arrays: a number of things by its name, or factor * number + more."""
+
+    name: str
+    factor: int = 1
+    more: int = 0
+
+    def __rmul__(self, factor: int) -> "Size":
+        return Size(self.name, factor * self.factor, factor * self.more)
+
+    def __add__(self, more: int) -> "Size":
+        return Size(self.name, self.factor, self.more + more)
+
+    def of(self, sizes: Mapping[str, int]) -> int:
+        """Return the number."""
+        return self.factor * sizes[self.name] + self.more
+
+    def __str__(self) -> str:
+        product = self.name if self.factor == 1 else f"{self.factor} {self.name}"
+        return f"{product} + {self.more}" if self.more else product
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What an array of a record is."""
+
+    dtype: type
+    shape: tuple[Size | int, ...]  #: () for one number
+    unit: str  #: "" for numbers without
+
+
+def real(*shape: Size | int, unit: str = "") -> Any:
+    """Declare an array of reals."""
+    return Declared(np.float64, shape, unit)
+
+
+def integer(*shape: Size | int) -> Any:
+    """Declare an array of integers."""
+    return Declared(np.int64, shape, "")
+
+
+def zeros(declaration: Record, sizes: Mapping[str, int]) -> Record:
+    """Return the arrays of a record, all zero."""
+    made: list[Any] = []
+    for each in declaration:
+        if isinstance(each, Declared):
+            shape = [size.of(sizes) if isinstance(size, Size) else size for size in each.shape]
+            made.append(np.zeros(shape, each.dtype))
+        else:
+            made.append(zeros(each, sizes))
+    return type(declaration)(*made)
+
+
+def filled(declaration: Record, **values: Any) -> Record:
+    """Return a record with arrays made of lists of entries; of an array of one number, made of that."""
+    made: dict[str, Any] = {}
+    for name, declared in zip(declaration._fields, declaration, strict=True):
+        array = np.array(values.pop(name), declared.dtype, order="C")
+        made[name] = array.reshape(-1, *declared.shape[1:]) if declared.shape else array
+    if values:
+        raise TypeError(f"{type(declaration).__name__} has no arrays {', '.join(values)}")
+    return declaration._replace(**made)
+
+
+def of_items(declaration: Record, items: Sequence[Mapping[str, Any]], **whole: Any) -> Record:
+    """Return a record with arrays made of items, each with one entry for each array, but for the arrays given whole."""
+    names = [name for name in declaration._fields if name not in whole]
+    return filled(declaration, **{name: [item[name] for item in items] for name in names}, **whole)
+
+
+def leaves(record: Any, within: str = "") -> Iterator[tuple[str, Any]]:
+    """Return name and array, or declaration, of all in a record and the records in it."""
+    for name, each in zip(record._fields, record, strict=True):
+        if isinstance(each, tuple):
+            yield from leaves(each, f"{within}{name}.")
+        else:
+            yield f"{within}{name}", each
+
+
+def measured(declaration: Record, record: Record) -> dict[str, int]:
+    """Return the sizes of the arrays of a record by name.
+
+    Raises
+    ------
+    ValueError
+        If an array is not what is declared, or has another size than the arrays before it.
+    """
+    sizes: dict[str, int] = {}
+    where = type(declaration).__name__
+    declared = dict(leaves(declaration))
+    for name, array in leaves(record):
+        each = declared[name]
+        if not isinstance(array, np.ndarray) or array.dtype != each.dtype or array.ndim != len(each.shape):
+            raise ValueError(f"{where}.{name}: expected {each}, got {described(array)}")
+        if not array.flags.c_contiguous:
+            raise ValueError(f"{where}.{name}: expected an array in C order")
+        for n, size in zip(array.shape, each.shape, strict=True):
+            if isinstance(size, Size):
+                known = sizes.setdefault(size.name, (n - size.more) // size.factor)
+                size = size.factor * known + size.more
+            if n != size:
+                raise ValueError(
+                    f"{where}.{name}: expected shape ({', '.join(map(str, each.shape))}), got {array.shape}"
+                )
+    return sizes
+
+
+def described(value: Any) -> str:
+    """Return what an array is, in words."""
+    return f"{value.dtype} of shape {value.shape}" if isinstance(value, np.ndarray) else repr(value)
+
+
+def flat(arrays: list[Array]) -> Array:
+    """Return arrays one after the other, as one vector."""
+    return np.concatenate([*(np.ascontiguousarray(each, dtype=float).ravel() for each in arrays), np.zeros(0)])

@@ -1,0 +1,227 @@
+"""The working arrays of the kernels: the iterate and everything that follows from it, overwritten by every evaluation.
+
+Sizes as in `kernels.model`, and n_most: most modes of a body, most_rows: most rows of a connection, n_x: Σ (6 + n_q)
+over the ends of connections. Vectors are in ground axes where nothing else is said.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.kernels.model import Model, n_b, n_c, n_lines, n_m, n_pairs, n_states, n_w
+from floatframe.kernels.records import Size, integer, measured, real, zeros
+
+__all__ = [
+    "BodyWork",
+    "ConnectionWork",
+    "Counted",
+    "Iterate",
+    "LineWork",
+    "MarkerWork",
+    "PairWork",
+    "Solver",
+    "StateWork",
+    "TapeWork",
+    "UserWork",
+    "Work",
+    "new_work",
+    "sizes_of",
+    "state_sizes",
+]
+
+n_q, n_u, n_x, n_most, most_rows = (Size(name) for name in ("n_q", "n_u", "n_x", "n_most", "most_rows"))
+n_inputs, n_outputs, n_gradients, n_results = (Size(name) for name in ("inputs", "outputs", "gradients", "results"))
+
+
+class Iterate(NamedTuple):
+    """The iterate."""
+
+    r: Array = real(n_b, 3, unit="m")  #: position of the frame origins
+    R: Array = real(n_b, 3, 3)  #: R_GB
+    q: Array = real(n_q)
+    u: Array = real(n_u, unit="m/s, rad/s, 1/s")  #: velocities
+    u_dot: Array = real(n_u, unit="m/s², rad/s², 1/s²")  #: accelerations
+    theta: Array = real(n_b, 3, unit="rad")  #: rotation since the beginning of the step, body axes
+    w: Array = real(n_w, unit="N, N m")  #: wrenches of the connections on their markers A
+    w_start: Array = real(n_w, unit="N, N m")  #: the same at the beginning of the step
+    time: Array = real(unit="s")
+
+
+class BodyWork(NamedTuple):
+    """Bodies, see kernels/body.py; body axes."""
+
+    a_B: Array = real(n_b, 3, unit="m/s²")  # noqa: N815  #: acceleration of the frame origin minus gravity
+    s: Array = real(n_b, 3, unit="kg m")  #: s(q)
+    J: Array = real(n_b, 3, 3, unit="kg m²")  #: J(q)
+    D_q_dot: Array = real(n_b, 3, 3, unit="kg m²/s")  #: Σ q_dot_k D_k
+    C1: Array = real(3 * n_q, unit="kg m")  #: 1C(q) = ds/dq [a, k] of each body
+    K_t_q_dot: Array = real(3 * n_q, unit="kg m/s")  #: [a, k] of stiffened bodies
+    K_r_q_dot: Array = real(3 * n_q, unit="kg m²/s")  #: [a, k] of stiffened bodies
+    W: Array = real(9 * n_q, unit="kg m²")  #: S_ab q [ab, k] of each body
+    Y: Array = real(3 * n_q, unit="kg m²/s")  #: Σ_l 4C_kl q_dot_l [a, k] of each body
+    residual: Array = real(n_u, unit="N, N m, N m")  #: inertia and elastic minus applied and reaction forces
+    T_right: Array = real(n_b, 3, 3)  #: right Jacobian at theta: rotation of the body by its unknown
+    by_turn: Array = real(n_most + 6, 3, unit="N/rad")  #: derivative of the residual of one body by its rotation
+    velocity: Array = real(n_most + 6, unit="m/s, rad/s, 1/s")  #: u of one body
+    momentum: Array = real(n_most + 6, unit="kg m/s, kg m²/s")  #: M u of one body
+    modal: Array = real(n_most, unit="N m")  #: M q_ddot, K q or D q_dot of one body
+
+
+class MarkerWork(NamedTuple):
+    """Markers, see kernels/marker.py."""
+
+    psi: Array = real(Size("numbers of psi"), unit="m, rad")  #: Psi(q), laid out as `Markers.psi`
+    rho: Array = real(n_m, 3, unit="m")  #: from the frame origin, body axes
+    rho_dot: Array = real(n_m, 3, unit="m/s")  #: its rate in the body, body axes
+    T_left: Array = real(n_m, 3, 3)  #: left Jacobian at the elastic rotation, body axes
+    angle: Array = real(n_m, 3, unit="rad")  #: elastic rotation vector, body axes
+    angle_dot: Array = real(n_m, 3, unit="rad/s")  #: body axes
+    spin: Array = real(n_m, 3, unit="rad/s")  #: T_left angle_dot, body axes
+    r: Array = real(n_m, 3, unit="m")  #: position
+    A: Array = real(n_m, 3, 3)  #: axes as columns
+    v: Array = real(n_m, 3, unit="m/s")
+    omega: Array = real(n_m, 3, unit="rad/s")
+    wrench: Array = real(n_m, 6, unit="N, N m")  #: force and moment on the marker
+    bias: Array = real(n_m, 6, unit="m/s², rad/s²")  #: acceleration and angular acceleration at zero u_dot
+    bend_dot: Array = real(6 * n_most, unit="m/s, rad/s")  #: K_P q_dot [6, k] of one marker
+
+
+class LineWork(NamedTuple):
+    """Sliding markers on their lines, see kernels/connections/deformed_line.py."""
+
+    s: Array = real(n_lines, unit="m")  #: place
+    s_dot: Array = real(n_lines, unit="m/s")
+    slope: Array = real(n_lines)  #: |r'|
+    by_place: Array = real(n_lines)  #: 1/|r'|: how s follows the point of B; 0 if it is driven
+    n_0: Array = real(n_lines, 3)  #: r'/|r'|
+    kappa: Array = real(n_lines, 3, unit="rad/m")  #: turning of the axes by s
+    curve: Array = real(n_lines, 3, unit="1/m")  #: r''
+    slope_dot: Array = real(n_lines, 3, unit="1/s")  #: rate of r' at a place
+
+
+class ConnectionWork(NamedTuple):
+    """Rows of connections, and what the bodies and the wrenches make of them."""
+
+    g: Array = real(n_w, unit="m, rad, kg m")  #: residual of the rows, scaled
+    P: Array = real(n_m, most_rows, 12)  #: derivative of the rows by the motion of a marker (r, phi, v, omega)
+    V: Array = real(n_c, most_rows, most_rows)  #: derivative of the rows by their own wrench
+    rate: Array = real(n_w, unit="m/s, rad/s")  #: of what the rows hold
+    bias: Array = real(n_w, unit="m/s², rad/s²")  #: its second rate at zero u_dot
+
+
+class PairWork(NamedTuple):
+    """What a bushing or contact makes of the motion of its markers, see kernels/connections/pair_law.py."""
+
+    numbers: Array = real(128)
+
+
+class UserWork(NamedTuple):
+    """One user force."""
+
+    inputs: Array = real(n_inputs)  #: t, values and rates of the coordinates, states
+    outputs: Array = real(n_outputs)  #: forces, rates of states
+    trial: Array = real(n_outputs)  #: the same, for differences
+    gradients: Array = real(n_gradients)  #: of the outputs by the inputs, row by row
+
+
+class StateWork(NamedTuple):
+    """States of user forces in a step, see kernels/connections/user_force.py."""
+
+    base: Array = real(n_states)  #: known part of the value after the step
+    rate_base: Array = real(n_states, unit="1/s")  #: known part of its algorithmic rate
+    kappa: Array = real(unit="s")
+    rho: Array = real()
+
+
+class TapeWork(NamedTuple):
+    """One expression."""
+
+    results: Array = real(n_results)  #: of its operations
+    bars: Array = real(n_results)  #: derivatives of its value by them
+
+
+class Solver(NamedTuple):
+    """Newton's correction, see kernels/schur.py."""
+
+    H: Array = real(Size("numbers of H"))  #: tangent of each body, then its LU factors, flat
+    pivot: IntArray = integer(n_u)
+    J_row: Array = real(12 * n_x)  #: marker motion (12) by body unknowns, at 12 x0
+    J_column: Array = real(6 * n_x)  #: marker motion (6) by body velocities, at 6 x0
+    X: Array = real(6 * n_x)  #: H⁻¹ J_columnᵀ [unknown, 6], at 6 x0
+    Z: Array = real(n_pairs, 12, 6)  #: J_row X for each pair of ends
+    blocks: Array = real(Size("numbers of blocks"))  #: block matrix of the connections, flat
+    block_pivot: IntArray = integer(n_w)
+    mu: Array = real(n_w)  #: correction of the wrenches, times c_k
+    y: Array = real(n_u)  #: correction of the bodies
+    weight: Array = real(n_u, unit="kg, kg m²")  #: of the norm of corrections
+    motion: Array = real(12)  #: of one marker
+    c_m: Array = real()  #: coefficients for which H was factorised, zero for never
+    c_d: Array = real(unit="s")
+    c_k: Array = real(unit="s²")
+    is_due: IntArray = integer()  #: whether to factorise at the next iterate
+
+
+class Counted(NamedTuple):
+    """What has been done since these arrays were made."""
+
+    evaluations: IntArray = integer()
+    factorisations: IntArray = integer()
+    iterations: IntArray = integer()
+    rows: IntArray = integer()  #: written into the results of the present call
+
+
+class Work(NamedTuple):
+    """The working arrays of a system."""
+
+    state: Iterate = Iterate()
+    bodies: BodyWork = BodyWork()
+    markers: MarkerWork = MarkerWork()
+    lines: LineWork = LineWork()
+    connections: ConnectionWork = ConnectionWork()
+    pair: PairWork = PairWork()
+    users: UserWork = UserWork()
+    states: StateWork = StateWork()
+    tapes: TapeWork = TapeWork()
+    solver: Solver = Solver()
+    counted: Counted = Counted()
+
+
+def state_sizes(model: Model) -> dict[str, int]:
+    """Return the sizes of what changes with time, by name."""
+    bodies = model.bodies
+    n_u, n_w = int(bodies.u0[-1]), int(model.connections.w0[-1])
+    return {"n_b": len(bodies.kind), "n_q": int(bodies.q0[-1]), "n_u": n_u, "n_w": n_w}
+
+
+def sizes_of(model: Model) -> dict[str, int]:
+    """Return the sizes of all arrays of a system by name; `ValueError` if those of the model do not fit together."""
+    bodies, markers, users = model.bodies, model.markers, model.users
+    is_end = (markers.connection >= 0) & (markers.body >= 0)
+    n_ports = np.diff(model.networks.port0)[len(model.networks.core) - len(users.n_states) :]
+    n_in, n_out = 1 + 2 * n_ports + users.n_states, users.n_forces + users.n_states
+    return (
+        measured(Model(), model)
+        | state_sizes(model)
+        | {
+            "n_x": int(sum(6 + bodies.n_q[markers.body[is_end]])),
+            "n_most": int(max(bodies.n_q, default=0)),
+            "most_rows": int(max(model.connections.size, default=0)),
+            "inputs": int(max(n_in, default=0)),
+            "outputs": int(max(n_out, default=0)),
+            "gradients": int(max(n_in, default=0) * max(n_out, default=0)),
+            "results": int(max(np.diff(model.tapes.operation0), default=0)),
+            "numbers of H": int(bodies.h0[-1]),
+            "numbers of blocks": int(model.elimination.n_store),
+        }
+    )
+
+
+def new_work(model: Model) -> Work:
+    """Return working arrays for a compiled system."""
+    work = zeros(Work(), sizes_of(model))
+    work.markers.psi[:] = model.markers.psi
+    work.states.base[:] = model.states.start
+    work.states.rho[...] = 1.0
+    work.solver.is_due[...] = 1
+    return work
