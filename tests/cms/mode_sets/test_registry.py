@@ -250,7 +250,8 @@ def test_loaded_modes_are_near_those_of_the_loaded_body(body, families):
         K = V.T @ body.K.toarray() @ V + V[body.b].T @ K_load @ V[body.b]
         M = V.T @ body.M.toarray() @ V + V[body.b].T @ M_load @ V[body.b]
         errors[make] = np.abs(la.eigh(K, M, eigvals_only=True)[:6] / expected[:6] - 1).max()
-    assert errors[benfield_hruda] < 1e-7
+    roundoff = 10 * np.finfo(float).eps * expected[-1] / expected[0]  # of the dense road, as above
+    assert errors[benfield_hruda] < roundoff
     assert errors[craig_bampton] > 1e-5
 
 
