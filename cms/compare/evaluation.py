@@ -8,14 +8,14 @@ import scipy.linalg as la
 from cms.compare.coordinates import Coordinates
 from cms.compare.free_shapes import Subset
 from cms.compare.full_model import FullModel
-from cms.quality.of_body.conditioning import conditioning_record, dropped_record
 from cms.quality.of_reduction.completeness import NO_ENERGY, StaticCompleteness, completeness_records
+from cms.quality.of_reduction.conditioning import conditioning_record, dropped_record
 from cms.quality.of_reduction.deformation import DeformationError, deformation_record, lengths, nodal_lengths, relative
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.of_reduction.frequencies import compare_shapes, frequency_records, mac
 from cms.quality.of_reduction.frf import ResponseComparison, compare_responses, response_record
 from cms.quality.of_reduction.residuals import ResidualBounds, residual_record
 from cms.quality.record import QualityRecord, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.port_model import FrequencyResponse, PortModel, modal_response
 from fe_models.foundation.arrays import Array
 

@@ -7,7 +7,7 @@ import scipy.linalg as la
 
 from cms.compare.coordinates import Coordinates
 from cms.errors import ModeSetError
-from cms.quality.of_reduction.free_basis import FreeBasis
+from cms.quality.reference.free_basis import FreeBasis
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_basis.independent import RANK_TOLERANCE
 from cms.reduced_basis.rigid_content import elastic_directions

@@ -17,8 +17,8 @@ from cms.families.families import Families
 from cms.families.sharing import families_of
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.of_reduction.frf import DAMPING, LOWEST, compare_responses, frequency_grid
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.full_reference import FullReference
 from cms.quality.reference.port_model import PortModel, modal_response
 from fe_models.body.fe_body import FEBody

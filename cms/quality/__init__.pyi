@@ -11,8 +11,6 @@ from .of_reduction.deformation import deformation_error as deformation_error
 from .of_reduction.deformation import deformation_record as deformation_record
 from .of_reduction.deformation import nodal_deformation_error as nodal_deformation_error
 from .of_reduction.deformation import recovered_displacements as recovered_displacements
-from .of_reduction.free_basis import FreeBasis as FreeBasis
-from .of_reduction.free_basis import free_basis as free_basis
 from .of_reduction.frequencies import FrequencyComparison as FrequencyComparison
 from .of_reduction.frequencies import compare_frequencies as compare_frequencies
 from .of_reduction.frequencies import mac as mac
@@ -32,6 +30,8 @@ from .record import QualityRecord as QualityRecord
 from .record import has_failed as has_failed
 from .record import worst as worst
 from .reduction_check import check_reduction as check_reduction
+from .reference.free_basis import FreeBasis as FreeBasis
+from .reference.free_basis import free_basis as free_basis
 from .reference.full_reference import FullReference as FullReference
 from .reference.full_reference import usable_band as usable_band
 from .reference.port_model import FrequencyResponse as FrequencyResponse

@@ -3,10 +3,9 @@
 from cms.mode_set import ModeSet
 from cms.quality.body_check import check_body
 from cms.quality.errors import QualityError
-from cms.quality.of_body.conditioning import column_condition, conditioning_record, dropped_record
 from cms.quality.of_reduction.completeness import completeness_records, static_completeness
+from cms.quality.of_reduction.conditioning import column_condition, conditioning_record, dropped_record
 from cms.quality.of_reduction.deformation import deformation_error, deformation_record
-from cms.quality.of_reduction.free_basis import free_basis
 from cms.quality.of_reduction.frequencies import compare_frequencies, frequency_records
 from cms.quality.of_reduction.frf import response_comparison, response_record
 from cms.quality.of_reduction.full_shapes import full_shapes, same_body_record
@@ -15,6 +14,7 @@ from cms.quality.of_reduction.interface_stiffening import has_both_kinds, interf
 from cms.quality.of_reduction.mass_properties import check_grounding, check_invariants, check_mass_properties
 from cms.quality.of_reduction.residuals import residual_bounds, residual_record
 from cms.quality.record import QualityRecord
+from cms.quality.reference.free_basis import free_basis
 from cms.quality.reference.full_reference import FullReference, usable_band
 from cms.quality.reference.port_model import port_model
 from cms.quality.reference.transient import Snapshots

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from cms.quality.of_body.free_pencil import free_pencil, port_rows, stiffness_scale
 from cms.quality.record import QualityRecord, information, judge
+from cms.quality.reference.free_pencil import free_pencil, port_rows, stiffness_scale
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from cms.quality.of_body.free_pencil import free_elastic_modes, has_inertia
 from cms.quality.record import QualityRecord, information, judge
+from cms.quality.reference.free_pencil import free_elastic_modes, has_inertia
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cms.quality.of_body.free_pencil import port_rows, stiffness_scale
 from cms.quality.of_body.identities import body_length, mode_size
 from cms.quality.record import QualityRecord, information, judge
+from cms.quality.reference.free_pencil import port_rows, stiffness_scale
 from cms.reduced_body.reduced_body import ReducedBody, ReducedInterface
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array

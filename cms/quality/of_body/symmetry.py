@@ -3,8 +3,8 @@
 import numpy as np
 import scipy.linalg as la
 
-from cms.quality.of_body.free_pencil import free_pencil
 from cms.quality.record import QualityRecord, judge
+from cms.quality.reference.free_pencil import free_pencil
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.record import QualityRecord, information, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.full_reference import FullReference
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import load_columns

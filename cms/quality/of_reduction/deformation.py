@@ -13,8 +13,8 @@ from types import MappingProxyType
 import numpy as np
 
 from cms.quality.errors import QualityError
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.record import QualityRecord, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.transient import Snapshots
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.fe_body import FEBody

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.record import QualityRecord, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.full_reference import FullReference
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.quality.errors import QualityError
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.record import QualityRecord, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.full_reference import FullReference
 from cms.quality.reference.port_model import FrequencyResponse, PortModel, modal_response
 from fe_models.foundation.arrays import Array, frozen

@@ -12,8 +12,8 @@ import numpy as np
 
 from cms.errors import BodyError, ModeSetError
 from cms.mode_set import ModeSet
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.record import QualityRecord, information, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.ports import Ports
 from cms.reduced_basis.finishing import finish
 from cms.reduced_basis.frames import FRAMES, Axes, Frame, NodalFrame, frame_condition

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse.linalg as sla
 
 from cms.families.rigid_modes import geometric_rigid_modes
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.record import QualityRecord, information, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.full_reference import FullReference
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from fe_models.foundation.arrays import Array, frozen

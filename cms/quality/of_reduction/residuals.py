@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.record import QualityRecord, information, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.full_reference import FullReference
 from fe_models.foundation.arrays import Array, frozen
 

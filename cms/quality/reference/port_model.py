@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.quality.errors import QualityError
-from cms.quality.of_body.free_pencil import free_elastic_modes, free_pencil, port_rows
+from cms.quality.reference.free_pencil import free_elastic_modes, free_pencil, port_rows
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.components import MOTION_COMPONENTS

@@ -15,7 +15,7 @@ import numpy as np
 
 from cms.families.families import Families
 from cms.quality.errors import QualityError
-from cms.quality.of_reduction.free_basis import FreeBasis, ritz_basis
+from cms.quality.reference.free_basis import FreeBasis, ritz_basis
 from cms.quality.reference.port_model import PortModel
 from cms.quality.reference.ports import Ports
 from cms.solvers.mode_count import ModeCount

@@ -17,7 +17,7 @@ from cms.families.families import Families
 from cms.families.flexibility import BoundaryConditions, Flexibility
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.quality.errors import QualityError
-from cms.quality.of_reduction.free_basis import FreeBasis, ritz_basis
+from cms.quality.reference.free_basis import FreeBasis, ritz_basis
 from cms.quality.reference.ports import Ports
 from cms.solvers.mode_count import ModeCount
 from fe_models.body.fe_body import FEBody

@@ -23,7 +23,7 @@ from cms.compare.verdicts import answer, crossings, is_good, ranking, set_senten
 from cms.errors import CompareError
 from cms.families.families import Families
 from cms.families.interface_loads import point_load
-from cms.quality.of_body.conditioning import column_condition
+from cms.quality.of_reduction.conditioning import column_condition
 from cms.quality.of_reduction.frf import response_comparison
 from cms.quality.record import information, judge
 from cms.quality.reduction_check import check_reduction

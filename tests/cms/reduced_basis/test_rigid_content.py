@@ -13,8 +13,8 @@ from cms.families.rigid_modes import geometric_rigid_modes
 from cms.mode_set import ModeSet
 from cms.mode_sets import craig_bampton_ir
 from cms.quality.body_check import check_body
-from cms.quality.of_body.free_pencil import free_elastic_modes
-from cms.quality.of_reduction.free_basis import free_basis
+from cms.quality.reference.free_basis import free_basis
+from cms.quality.reference.free_pencil import free_elastic_modes
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_basis.frames import NodalFrame, TisserandFrame
 from cms.reduced_basis.independent import Columns, independent_columns

@@ -8,9 +8,9 @@ from cms.mode_set import ModeSet
 from cms.mode_sets import craig_bampton
 from cms.quality.body_check import check_body
 from cms.quality.of_body.effective_mass import effective_mass
-from cms.quality.of_body.free_pencil import free_elastic_modes, free_pencil
 from cms.quality.of_body.interface_motions import missing_motions
 from cms.quality.of_body.step_size import step_size
+from cms.quality.reference.free_pencil import free_elastic_modes, free_pencil
 from cms.reduced_basis.damping import ModalDamping
 from cms.reduced_basis.frames import NodalFrame, TisserandFrame
 from cms.reduction import reduce

@@ -11,8 +11,8 @@ from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS, craig_bampton, guyan
 from cms.quality.errors import QualityError
 from cms.quality.of_reduction.deformation import NORMS, deformation_error, deformation_record, nodal_deformation_error
-from cms.quality.of_reduction.free_basis import FreeBasis, free_basis
 from cms.quality.plots import plot_deformation_error
+from cms.quality.reference.free_basis import FreeBasis, free_basis
 from cms.quality.reference.transient import (
     LoadHistory,
     Snapshots,

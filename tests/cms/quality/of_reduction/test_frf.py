@@ -7,9 +7,9 @@ from cms.families.families import Families
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS, craig_bampton
 from cms.quality.errors import QualityError
-from cms.quality.of_reduction.free_basis import free_basis
 from cms.quality.of_reduction.frf import basis_ports, compare_responses, frequency_grid, peaks, response_comparison
 from cms.quality.plots import frf_figure, plot_frf
+from cms.quality.reference.free_basis import free_basis
 from cms.quality.reference.full_reference import FullReference
 from cms.quality.reference.port_model import file_response, modal_response, port_model
 from cms.quality.reference.ports import Ports

@@ -13,9 +13,8 @@ from cms.families.rigid_modes import geometric_rigid_modes
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS, craig_bampton, guyan
 from cms.quality.errors import QualityError
-from cms.quality.of_body.conditioning import column_condition
 from cms.quality.of_reduction.completeness import energy_error, static_completeness
-from cms.quality.of_reduction.free_basis import FreeBasis, free_basis, ritz_basis
+from cms.quality.of_reduction.conditioning import column_condition
 from cms.quality.of_reduction.frequencies import compare_frequencies, mac
 from cms.quality.of_reduction.full_shapes import full_shapes
 from cms.quality.of_reduction.held_mass import held_mass, held_mass_record
@@ -23,6 +22,7 @@ from cms.quality.of_reduction.interface_stiffening import interface_stiffening
 from cms.quality.of_reduction.mass_properties import check_grounding, rigid_mass_matrix
 from cms.quality.of_reduction.residuals import residual_bounds
 from cms.quality.reduction_check import check_reduction
+from cms.quality.reference.free_basis import FreeBasis, free_basis, ritz_basis
 from cms.quality.reference.full_reference import FullReference, usable_band
 from cms.reduced_basis.frames import BuckensFrame, NodalFrame, TisserandFrame
 from cms.reduction import reduce

@@ -3,8 +3,8 @@
 import numpy as np
 
 from cms.mode_set import ModeSet
-from cms.quality.of_reduction.free_basis import FreeBasis
 from cms.quality.record import QualityRecord, judge
+from cms.quality.reference.free_basis import FreeBasis
 from cms.reduced_basis.independent import Columns, independent_columns
 from cms.solvers.sparse_product import SymmetricProduct
 from fe_models.body.fe_body import FEBody
