@@ -8,7 +8,7 @@ import numpy as np
 
 from fe_models.errors import MaterialError
 from fe_models.foundation.arrays import IntArray
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.mesh import Mesh
 
 __all__ = ["Material", "assign_materials"]
@@ -89,7 +89,9 @@ def assign_materials(
     number = {kind: np.full(len(cells), -1, np.int64) for kind, cells in mesh.cells.items()}
     for group, material in materials.items():
         if group not in mesh.cell_sets:
-            raise MaterialError(f"materials: the mesh has no group of cells {group!r}{nearest(group, mesh.cell_sets)}")
+            raise MaterialError(
+                f"materials: the mesh has no group of cells {quoted(group)}{nearest(group, mesh.cell_sets)}"
+            )
         index = used.index(material)
         for kind, rows in mesh.cell_sets[group].items():
             taken = rows[(number[kind][rows] >= 0) & (number[kind][rows] != index)]

@@ -17,7 +17,7 @@ from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import Units, unit_system
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from fe_models.solids.body import scalar_mass_gram
 
 __all__ = ["ScalarMassModel", "body_from_matrices", "body_from_npz", "scalar_mass_of"]
@@ -212,7 +212,7 @@ def body_from_npz(path: str | Path, *, name: str | None = None, units: Units | N
     known |= {key + part for key in "MKD" for part in ("", "_row", "_col", "_data", "_indptr", "_indices")}
     for key in arrays:
         if key not in known and not key.startswith("interface/"):
-            raise MeshError(f"{path}: unknown array {key!r}{nearest(key, known)}")
+            raise MeshError(f"{path}: unknown array {quoted(key)}{nearest(key, known)}")
     for key in ("nodes", "dofs"):
         require_key(path, arrays, key)
     nodes = arrays["nodes"]
@@ -302,7 +302,9 @@ def interfaces_of(path: Path, arrays: Mapping[str, np.ndarray]) -> list[Interfac
         if key.startswith("interface/"):
             name, _, part = key.removeprefix("interface/").rpartition("/")
             if not name or part not in INTERFACE_KEYS:
-                raise MeshError(f"{path}: {key!r}: expected interface/<name>/<part>{nearest(part, INTERFACE_KEYS)}")
+                raise MeshError(
+                    f"{path}: {quoted(key)}: expected interface/<name>/<part>{nearest(part, INTERFACE_KEYS)}"
+                )
             groups.setdefault(name, {})[part] = arrays[key]
     interfaces = []
     for name, parts in groups.items():

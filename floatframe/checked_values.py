@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import quoted
 from floatframe.errors import ModelError
 
 __all__ = ["Array", "array_of_shape", "number", "rotation_of", "unit_vector"]
@@ -16,8 +17,8 @@ def array_of_shape(where: str, values: Any, shape: tuple[int, ...]) -> Array:
     """Return a read-only float64 copy; `ModelError` naming `where` if shape or finiteness is wrong."""
     try:
         array = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise ModelError(f"{where}: expected numbers of shape {shape}, got {values!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ModelError(f"{where}: expected numbers of shape {shape}, got {quoted(values)}") from None
     if array.shape != shape:
         raise ModelError(f"{where}: expected shape {shape}, got {array.shape}")
     if not np.isfinite(array).all():
@@ -30,8 +31,8 @@ def number(where: str, value: Any, *, at_least: float | None = None, above: floa
     """Return a finite float; `ModelError` naming `where` if it is none or out of bounds."""
     try:
         result = float(value)
-    except (TypeError, ValueError):
-        raise ModelError(f"{where}: expected a number, got {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ModelError(f"{where}: expected a number, got {quoted(value)}") from None
     if not np.isfinite(result):
         raise ModelError(f"{where}: expected a finite number, got {result}")
     if at_least is not None and result < at_least:

@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.copies import frozen_copies
 
 __all__ = ["State"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class State:
     """Positions and velocities of all bodies, in the order of the system.

@@ -4,8 +4,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units, unit_system
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.ground import GROUND
 from floatframe.bodies.rigid_body import RigidBody
@@ -28,6 +29,7 @@ class Named(Protocol):
         """Its name, used once."""
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class System:
     """Bodies, the joints between them and the forces on them.
@@ -83,7 +85,7 @@ class System:
             if body.name == name:
                 return body
         choices = [body.name for body in self.bodies]
-        raise ModelError(f"system {self.name!r}: no body {name!r}{nearest(name, choices)}")
+        raise ModelError(f"system {self.name!r}: no body {quoted(name)}{nearest(name, choices)}")
 
 
 def require_names(where: str, names: Iterable[str], *, taken: Iterable[str] = ()) -> None:

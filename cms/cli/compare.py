@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from cms.cli.console import print_table, say, stages
 from cms.errors import CompareError
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 if TYPE_CHECKING:
     from cms.compare.comparison import Comparison
@@ -114,10 +114,12 @@ def parse_sets(text: str) -> tuple[str, ...]:
 
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
-        raise CompareError(f"--sets {text!r}: expected names of mode sets with commas between{nearest('', MODE_SETS)}")
+        raise CompareError(
+            f"--sets {quoted(text)}: expected names of mode sets with commas between{nearest('', MODE_SETS)}"
+        )
     for name in names:
         if name not in MODE_SETS:
-            raise CompareError(f"--sets {text!r}: unknown mode set {name!r}{nearest(name, MODE_SETS)}")
+            raise CompareError(f"--sets {text!r}: unknown mode set {quoted(name)}{nearest(name, MODE_SETS)}")
         if names.count(name) > 1:
             raise CompareError(f"--sets {text!r}: {name!r} stands there twice")
     return tuple(names)
@@ -138,7 +140,7 @@ def parse_load(text: str) -> Any:
     for part in filter(None, (word.strip() for word in rest.split(","))):
         key, _, number = (word.strip() for word in part.partition("="))
         if key not in LOAD_KEYS:
-            raise CompareError(f"--load {text!r}: unknown key {key!r}{nearest(key, LOAD_KEYS)}")
+            raise CompareError(f"--load {text!r}: unknown key {quoted(key)}{nearest(key, LOAD_KEYS)}")
         try:
             values[key] = float(number)
         except ValueError:

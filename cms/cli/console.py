@@ -9,6 +9,7 @@ import logging
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -110,7 +111,11 @@ def guarded(command: Callable[P, R]) -> Callable[P, R]:
     @functools.wraps(command)
     def safe(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
-            return command(*args, **kwargs)
+            with warnings.catch_warnings(record=True) as caught:  # of overflows and the like; none beside a refusal
+                result = command(*args, **kwargs)
+            for each in caught:
+                warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
+            return result
         except KeyboardInterrupt:
             print_error("interrupted; no output was left half written")
             raise typer.Exit(INTERRUPTED) from None

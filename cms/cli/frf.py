@@ -13,7 +13,7 @@ from cms.quality.reference.port_model import FrequencyResponse, file_response
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["FrfRequest", "parse_band", "parse_component", "run_frf"]
 
@@ -77,7 +77,7 @@ def parse_band(text: str) -> Array:
             raise ValueError
     except (ValueError, IndexError):
         raise QualityError(
-            f"--band {text!r}: expected lowest:highest or lowest:highest:number in Hz, as 10:5000 or 10:5000:800"
+            f"--band {quoted(text)}: expected lowest:highest or lowest:highest:number in Hz, as 10:5000 or 10:5000:800"
         ) from None
     return frequency_grid(lowest, highest, points)
 
@@ -88,7 +88,9 @@ def parse_component(text: str) -> tuple[int, int]:
     force = force or motion
     for word in (motion, force):
         if word not in MOTION_COMPONENTS:
-            raise QualityError(f"--component {text!r}: {word!r} is no component{nearest(word, MOTION_COMPONENTS)}")
+            raise QualityError(
+                f"--component {text!r}: {quoted(word)} is no component{nearest(word, MOTION_COMPONENTS)}"
+            )
     return MOTION_COMPONENTS.index(motion), MOTION_COMPONENTS.index(force)
 
 

@@ -22,7 +22,7 @@ from cms.quality.of_reduction.frf import DAMPING
 from cms.quality.reference.ports import Ports
 from cms.quality.reference.transient import Snapshots
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["compare"]
 
@@ -121,7 +121,7 @@ def check_request(options: Mapping[str, Any], counts: Sequence[int]) -> None:
         raise CompareError(f"sets: expected at least one mode set; choices: {', '.join(sorted(MODE_SETS))}")
     for name in options:
         if name not in MODE_SETS:
-            raise CompareError(f"sets: unknown mode set {name!r}{nearest(name, MODE_SETS)}")
+            raise CompareError(f"sets: unknown mode set {quoted(name)}{nearest(name, MODE_SETS)}")
     if not counts or min(counts) < 0:
         raise CompareError(f"modes: expected numbers of modes, 0 or more, got {list(counts)}")
 

@@ -3,6 +3,7 @@
 import re
 
 from cms.errors import CompareError
+from fe_models.foundation.words import quoted
 
 __all__ = ["mode_counts"]
 
@@ -28,19 +29,20 @@ def mode_counts(text: str) -> tuple[int, ...]:
     counts: set[int] = set()
     for part in text.split(","):
         words = part.strip()
+        where = f"modes: {quoted(text)}: {quoted(words)}"
         if not re.fullmatch(r"\d+(:\d+){0,2}", words):
             raise CompareError(
-                f"modes: {text!r}: {words!r} is not a number of modes; expected whole numbers, 0 or more, as 0:30 "
+                f"{where} is not a number of modes; expected whole numbers, 0 or more, as 0:30 "
                 "(from:to), 0:30:5 (from:to:step) or 0,2,5 (a list)"
             )
-        numbers = [int(word) for word in words.split(":")]
+        numbers = [int(word) if len(word) < 10 else 10**9 for word in words.split(":")]
         first, last = numbers[0], numbers[1] if len(numbers) > 1 else numbers[0]
         step = numbers[2] if len(numbers) > 2 else 1
         if last < first:
-            raise CompareError(f"modes: {text!r}: {words!r} runs from {first} down to {last}; expected {last}:{first}")
+            raise CompareError(f"{where} runs from {first} down to {last}; expected {last}:{first}")
         if step < 1:
-            raise CompareError(f"modes: {text!r}: {words!r} has step {step}; expected 1 or more")
+            raise CompareError(f"{where} has step {step}; expected 1 or more")
         if (last - first) // step >= MOST_COUNTS:
-            raise CompareError(f"modes: {text!r}: {words!r} names more than {MOST_COUNTS} numbers; take a larger step")
+            raise CompareError(f"{where} names more than {MOST_COUNTS} numbers; take a larger step")
         counts.update(range(first, last + 1, step))
     return tuple(sorted(counts))

@@ -23,7 +23,7 @@ from cms.quality.reference.full_reference import FullReference
 from cms.quality.reference.port_model import PortModel, modal_response
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["MEASURES", "Selection", "Trial", "select_modes"]
 
@@ -283,7 +283,7 @@ def _sentence(
 
 def _check(name: str, error: float, band: tuple[float, float], measure: str) -> None:
     if name not in MODE_SETS:
-        raise ModeSetError(f"select_modes: unknown mode set {name!r}{nearest(name, MODE_SETS)}")
+        raise ModeSetError(f"select_modes: unknown mode set {quoted(name)}{nearest(name, MODE_SETS)}")
     if "n_modes" not in inspect.signature(MODE_SETS[name]).parameters:
         raise ModeSetError(f"select_modes: mode set {name!r} has no number of modes to choose")
     if not 0 < error < 1:
@@ -291,4 +291,4 @@ def _check(name: str, error: float, band: tuple[float, float], measure: str) -> 
     if len(band) != 2 or not 0 <= band[0] < band[1] < np.inf:
         raise ModeSetError(f"select_modes: band = {tuple(band)}; expected two frequencies (from, to), 0 <= from < to")
     if measure not in MEASURES:
-        raise ModeSetError(f"select_modes: unknown measure {measure!r}{nearest(measure, MEASURES)}")
+        raise ModeSetError(f"select_modes: unknown measure {quoted(measure)}{nearest(measure, MEASURES)}")

@@ -9,7 +9,7 @@ from cms.errors import BodyError
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["free_directions"]
 
@@ -51,7 +51,7 @@ def _directions(body: FEBody, interface: Interface, component: str) -> Array:
     """Return this component at every node of the interface, over its dofs, (n_dofs, n_nodes)."""
     where = f"body {body.name!r}: free dofs of interface {interface.name!r}"
     if component not in MOTION_COMPONENTS:
-        raise BodyError(f"{where}: unknown component {component!r}{nearest(component, MOTION_COMPONENTS)}")
+        raise BodyError(f"{where}: unknown component {quoted(component)}{nearest(component, MOTION_COMPONENTS)}")
     axis = la.block_diag(interface.triad, interface.triad)[:, MOTION_COMPONENTS.index(component)]
     node, local = body.dofs[np.asarray(interface.dofs)].T
     nodes = list(dict.fromkeys(node.tolist()))

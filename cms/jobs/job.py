@@ -25,7 +25,7 @@ from fe_models.body.load_cases import LOAD_CASE_KINDS
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number, read_toml, validated
 from fe_models.foundation.units import UNIT_SYSTEMS
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["SELECTIONS", "DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
 
@@ -46,7 +46,7 @@ def accepted(value: Any) -> tuple[str, ...]:
     words = names(value)
     for word in words:
         if word not in ACCEPTABLE:
-            raise ValueError(f"{word!r} is not a finding that can be accepted{nearest(word, ACCEPTABLE)}")
+            raise ValueError(f"{quoted(word)} is not a finding that can be accepted{nearest(word, ACCEPTABLE)}")
     return words
 
 

@@ -15,7 +15,7 @@ from cms.solvers.mode_count import ModeCount
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
     "FRAMES",
@@ -50,7 +50,7 @@ def components(value: Any) -> tuple[str, ...]:
         raise ValueError(f"expected a list of components, each once, of {', '.join(MOTION_COMPONENTS)}")
     for word in words:
         if word not in MOTION_COMPONENTS:
-            raise ValueError(f"unknown component {word!r}{nearest(str(word), MOTION_COMPONENTS)}")
+            raise ValueError(f"unknown component {quoted(word)}{nearest(str(word), MOTION_COMPONENTS)}")
     return tuple(words)
 
 
@@ -95,7 +95,7 @@ def extras(value: Any) -> tuple[str, ...]:
         raise ValueError(f"expected a list, each once, of {', '.join(EXTRA_COLUMNS)}")
     for word in words:
         if word not in EXTRA_COLUMNS:
-            raise ValueError(f"unknown extra columns {word!r}{nearest(str(word), EXTRA_COLUMNS)}")
+            raise ValueError(f"unknown extra columns {quoted(word)}{nearest(str(word), EXTRA_COLUMNS)}")
     return tuple(words)
 
 

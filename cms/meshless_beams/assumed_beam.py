@@ -37,7 +37,7 @@ from cms.solvers.orientation import orientation
 from fe_models.body.beam_line import BeamLine
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Units
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["beam_from_assumed_modes"]
 
@@ -104,7 +104,7 @@ def beam_from_assumed_modes(
     """
     where = f"beam_from_assumed_modes: {name!r}"
     if functions not in AXIS_FUNCTIONS:
-        raise ModeSetError(f"{where}: unknown functions {functions!r}{nearest(functions, AXIS_FUNCTIONS)}")
+        raise ModeSetError(f"{where}: unknown functions {quoted(functions)}{nearest(functions, AXIS_FUNCTIONS)}")
     if n_shear is None:
         n_shear = n_bending + 1 if line.has_shear and n_bending > 0 else 0
     counts = {"axial": n_axial, "bending": n_bending, "torsion": n_torsion, "shear": n_shear}
@@ -237,7 +237,7 @@ def frame_of_beam(
             )
         return placed("tisserand", frame, center)
     if frame.at is not None and frame.at not in names:
-        raise BodyError(f"{where}: nodal frame: no station {frame.at!r}{nearest(frame.at, names)}")
+        raise BodyError(f"{where}: nodal frame: no station {quoted(frame.at)}{nearest(frame.at, names)}")
     held = held_dofs(where, frame, x_station, names)
     default = center if frame.at is None else np.array([x_station[names.index(frame.at)], 0.0, 0.0])
     return placed("nodal", frame, default, held)

@@ -14,7 +14,7 @@ from cms.mode_sets.mesh_field import coupled_field
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 if TYPE_CHECKING:
     from cms.families.families import Families
@@ -81,7 +81,7 @@ def assumed_modes(
     body = body_of(body)
     body.require_coupled()
     if functions not in AXIS_FUNCTIONS:
-        raise ModeSetError(f"assumed_modes: unknown functions {functions!r}{nearest(functions, AXIS_FUNCTIONS)}")
+        raise ModeSetError(f"assumed_modes: unknown functions {quoted(functions)}{nearest(functions, AXIS_FUNCTIONS)}")
     if poisson is not None and not -1 < poisson <= 0.5:
         raise ModeSetError(f"assumed_modes: poisson = {poisson}; expected a number between -1 and 0.5")
     counts = _counts(n_modes, n_axial, n_bending, n_torsion)

@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline
 
 from cms.errors import ModeSetError
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["AXIS_FUNCTIONS", "AxisFunctions", "axis_functions"]
 
@@ -75,5 +75,5 @@ AXIS_FUNCTIONS = {"legendre": legendre, "monomials": monomials, "splines": cubic
 def axis_functions(family: str, s: Array, span: Array, n: int, first: int) -> AxisFunctions:
     """Return n functions of a family, complete with all degrees below `first`, at the points s within the span."""
     if family not in AXIS_FUNCTIONS:
-        raise ModeSetError(f"assumed_modes: unknown functions {family!r}{nearest(family, AXIS_FUNCTIONS)}")
+        raise ModeSetError(f"assumed_modes: unknown functions {quoted(family)}{nearest(family, AXIS_FUNCTIONS)}")
     return AXIS_FUNCTIONS[family](s, span, n, first)

@@ -14,7 +14,7 @@ from cms.solvers.sparse_product import SymmetricProduct
 from fe_models.body.fe_body import FEBody
 from fe_models.body.load_cases import LoadCase, load_columns
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["EXTRA_COLUMNS", "with_centrifugal", "with_load_cases"]
 
@@ -57,7 +57,7 @@ def with_load_cases(modes: ModeSet, body: FEBody | Families, *, names: Sequence[
         for name in names:
             if name not in by_name:
                 raise ModeSetError(
-                    f"with_load_cases: body {body.name!r}: no load case {name!r}{nearest(name, by_name)}"
+                    f"with_load_cases: body {body.name!r}: no load case {quoted(name)}{nearest(name, by_name)}"
                 )
         cases = [by_name[name] for name in names]
     return _with_responses(modes, source, cases, "load case")

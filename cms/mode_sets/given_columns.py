@@ -8,7 +8,7 @@ from cms.errors import ModeSetError
 from cms.mode_sets.mesh_field import coupled_field
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["OVER", "coupled_columns", "tell_frequencies"]
 
@@ -76,7 +76,7 @@ def coupled_columns(where: str, body: FEBody, V: Array, over: str | None) -> tup
 def told_or_counted(where: str, body: FEBody, V: Array, over: str | None) -> str:
     """Return over which dofs the columns are."""
     if over is not None and over not in OVER:
-        raise ModeSetError(f"{where}: columns_over = {over!r}: unknown{nearest(str(over), OVER)}")
+        raise ModeSetError(f"{where}: columns_over = {quoted(over)}: unknown{nearest(str(over), OVER)}")
     rows = {"coupled": body.n_dof, "mesh": n_mesh(body)}
     if not has_own_mesh(body):
         rows = {"coupled": body.n_dof} if over is None else {over: body.n_dof}

@@ -13,7 +13,7 @@ import numpy as np
 
 from cms.quality.errors import QualityError
 from cms.quality.limits import LIMITS
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["VERDICTS", "QualityRecord", "Verdict", "has_failed", "information", "judge", "plain", "worst"]
 
@@ -67,7 +67,7 @@ def judge(
         If there is no limit of that name.
     """
     if name not in LIMITS:
-        raise QualityError(f"quality record {name!r}: unknown{nearest(name, LIMITS)}")
+        raise QualityError(f"quality record {quoted(name)}: unknown{nearest(name, LIMITS)}")
     limit = LIMITS[name]
     value = float(value)
     verdict: Verdict

@@ -6,6 +6,7 @@ import numpy as np
 
 from cms.errors import BodyError
 from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, frozen, require_finite, require_shape
+from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units
 
 __all__ = ["SPIN_PAIRS", "GeometricStiffness"]
@@ -13,6 +14,7 @@ __all__ = ["SPIN_PAIRS", "GeometricStiffness"]
 SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omega_a omega_b in the order of `spin`
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class GeometricStiffness:
     """K_j,kl = [Phi.T K_geo(sigma_j) Phi]_kl of unit loads f_j, sigma_j the stress of the static response to f_j.

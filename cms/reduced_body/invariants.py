@@ -6,10 +6,12 @@ from functools import cached_property
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.copies import frozen_copies
 
 __all__ = ["Moments", "moments_from_gram"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Moments:
     """Canonical moments of a body about the origin of its frame B.

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.copies import frozen_copies
 
 __all__ = ["NodalSums"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class NodalSums:
     """Weighted sums over all nodes about the origin of a frame B, w: weight of a node, translations only.

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
@@ -14,12 +13,14 @@ from cms.reduced_body.source_columns import SourceColumns
 from cms.reduced_body.stress import PointStress
 from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["BodyFrame", "ReducedBody", "ReducedInterface"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class BodyFrame:
     """The frame B in which the elastic displacement is measured, as it lies in the undeformed mesh.
@@ -46,6 +47,7 @@ class BodyFrame:
         require_finite("body frame: axes", self.axes)
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedInterface:
     """An interface of a reduced body: its reference point in B and the motion of that point with q."""
@@ -69,6 +71,7 @@ class ReducedInterface:
         require_shape(f"{where}: triad", self.triad, (3, 3))
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedBody:
     """A body as r = c + Phi q in its frame B, with M-orthonormal, K-diagonal shapes (docs/theory.md §3-5).
@@ -124,7 +127,7 @@ class ReducedBody:
                 raise BodyError(f"{where}: quadratic modes without the geometric stiffness that is their inertia")
         for name in ("labels", "sources", "interfaces", "load_cases"):
             put(self, name, tuple(getattr(self, name)))
-        put(self, "provenance", MappingProxyType(dict(self.provenance)))
+        put(self, "provenance", FrozenMapping(dict(self.provenance)))
         n, n_kept = self.n_q, len(self.nodes)
         for name, shape in {
             "M": (n, n),
@@ -182,7 +185,7 @@ class ReducedBody:
             if interface.name == name:
                 return interface
         choices = [interface.name for interface in self.interfaces]
-        raise BodyError(f"reduced body {self.name!r}: no interface {name!r}{nearest(name, choices)}")
+        raise BodyError(f"reduced body {self.name!r}: no interface {quoted(name)}{nearest(name, choices)}")
 
     def load_case(self, name: str) -> ReducedLoadCase:
         """Return the load case of that name; `BodyError` with the choices if there is none."""
@@ -190,4 +193,4 @@ class ReducedBody:
             if case.name == name:
                 return case
         choices = [case.name for case in self.load_cases]
-        raise BodyError(f"reduced body {self.name!r}: no load case {name!r}{nearest(name, choices)}")
+        raise BodyError(f"reduced body {self.name!r}: no load case {quoted(name)}{nearest(name, choices)}")

@@ -6,10 +6,12 @@ import numpy as np
 
 from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.copies import frozen_copies
 
 __all__ = ["SourceColumns", "source_columns"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class SourceColumns:
     """The columns a reduced body was made of, and what is needed to tell their shares in any mode.

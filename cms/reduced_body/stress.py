@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.copies import frozen_copies
 
 __all__ = ["PointStress", "von_mises"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointStress:
     """Stress modes at named points beside the nodes, such as the outer points of beam sections."""

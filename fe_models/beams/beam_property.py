@@ -9,7 +9,7 @@ from fe_models.beams.section_properties import SectionProperties
 from fe_models.beams.sections import Section
 from fe_models.errors import SectionError
 from fe_models.foundation.arrays import IntArray
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from fe_models.material import Material
 from fe_models.meshes.line_mesh import LineMesh
 
@@ -53,7 +53,9 @@ def assign_properties(
     used = tuple(dict.fromkeys(properties.values()))
     for group, item in properties.items():
         if group not in mesh.line_sets:
-            raise SectionError(f"sections: the mesh has no group of lines {group!r}{nearest(group, mesh.line_sets)}")
+            raise SectionError(
+                f"sections: the mesh has no group of lines {quoted(group)}{nearest(group, mesh.line_sets)}"
+            )
         rows, index = mesh.line_sets[group], used.index(item)
         taken = rows[(number[rows] >= 0) & (number[rows] != index)]
         if taken.size:

@@ -21,7 +21,7 @@ from fe_models.foundation.arrays import (
 )
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import Units, unit_system
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["INTERFACE_KINDS", "MULTIPLIER", "ElementModel", "FEBody", "Interface", "Recovery", "StressPointModel"]
 
@@ -157,7 +157,7 @@ class Interface:
     def __post_init__(self) -> None:
         where = f"interface {self.name!r}"
         if self.kind not in INTERFACE_KINDS:
-            raise BodyError(f"{where}: unknown kind {self.kind!r}{nearest(self.kind, INTERFACE_KINDS)}")
+            raise BodyError(f"{where}: unknown kind {quoted(self.kind)}{nearest(self.kind, INTERFACE_KINDS)}")
         object.__setattr__(self, "nodes", frozen_int(self.nodes))
         object.__setattr__(self, "reference", frozen(self.reference))
         object.__setattr__(self, "triad", frozen(self.triad))
@@ -297,7 +297,7 @@ class FEBody:
             if interface.name == name:
                 return interface
         choices = [interface.name for interface in self.interfaces]
-        raise BodyError(f"body {self.name!r}: no interface {name!r}{nearest(name, choices)}")
+        raise BodyError(f"body {self.name!r}: no interface {quoted(name)}{nearest(name, choices)}")
 
     def require_coupled(self) -> None:
         """Raise `BodyError` unless every interface has its boundary dofs."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
+from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.errors import BodyError
 
 __all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases", "load_columns"]
@@ -13,6 +14,7 @@ __all__ = ["LOAD_CASE_KINDS", "LoadCase", "ReducedLoadCase", "check_load_cases",
 LOAD_CASE_KINDS = ("pressure", "gravity", "force")  #: in words of the job file; a body takes any text
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class LoadCase:
     """A named load of unit amplitude: generalised forces over the dofs of its body.
@@ -33,6 +35,7 @@ class LoadCase:
         require_finite(f"load case {self.name!r}: f", self.f)
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReducedLoadCase:
     """A named load on a reduced body: its resultant and its modal forces, for an amplitude of one."""

@@ -5,11 +5,24 @@ built-in kind that a caller would expect. What is raised on the ground about bod
 `fe_models`, where it is raised, and of `cms`, whose callers catch it.
 """
 
+from typing import Any
+
 __all__ = ["BodyError", "CmsError", "FeModelsError", "ModalFileError", "ReportedError", "UnitsError"]
 
 
 class ReportedError(Exception):
     """Root of every error that is raised on purpose; its text is meant for the user."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies have the same text and attributes, whatever arguments the error was made with."""
+        return remade, (type(self), self.args, self.__dict__)
+
+
+def remade(kind: type[ReportedError], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> ReportedError:
+    """Return an error of a kind as it was."""
+    error = kind.__new__(kind, *arguments)
+    error.__dict__.update(attributes)
+    return error
 
 
 class FeModelsError(ReportedError):

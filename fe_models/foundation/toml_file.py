@@ -6,14 +6,15 @@ path, the value that was found and that description.
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from math import inf, isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
-from fe_models.foundation.paths import near_file
-from fe_models.foundation.words import nearest
+from fe_models.foundation.paths import is_stream, near_file
+from fe_models.foundation.words import nearest, shortened
 
 __all__ = ["Matrix3", "Range", "Table", "Vector3", "choice", "read_toml", "validated"]
 
@@ -25,12 +26,17 @@ class Table(BaseModel):
 
 
 Model = TypeVar("Model", bound=Table)
+DEEPEST = 20  #: levels of tables and lists in a file
+GREATEST = 1e100  #: number in a file: products of three stay finite, and nothing physical is greater
+MOST_PROBLEMS = 20  #: told at once
 
 
 def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
     """Return the content of a TOML file; raise `error` with the place and the reason if it is none."""
+    if is_stream(path):
+        raise error(f"{path}: expected a file, got a device or a pipe")
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        content = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise error(f"{path}: no such file{near_file(path)}") from None
     except OSError as problem:
@@ -39,8 +45,35 @@ def read_toml(path: Path, error: type[Exception]) -> dict[str, Any]:
         raise error(
             f"{path}: expected a text file in UTF-8 (TOML), got other bytes at position {problem.start}"
         ) from None
-    except tomllib.TOMLDecodeError as problem:
-        raise error(f"{path}: not valid TOML: {problem}") from None
+    except RecursionError:
+        raise too_deep(path, error) from None
+    except ValueError as problem:  # a TOMLDecodeError, or a whole number of thousands of digits
+        words = f"{problem}" if isinstance(problem, tomllib.TOMLDecodeError) else "a number has too many digits"
+        raise error(f"{path}: not valid TOML: {shortened(words, 200)}") from None
+    require_usable(content, path, error)
+    return content
+
+
+def too_deep(path: Path, error: type[Exception]) -> Exception:
+    """Return the error of a file that is nested beyond all measure."""
+    return error(f"{path}: tables and lists are nested too deeply; expected up to {DEEPEST} levels")
+
+
+def require_usable(content: Any, path: Path, error: type[Exception]) -> None:
+    """Raise `error` if a number is too great to be reckoned with, or tables and lists are nested too deeply."""
+    level: list[tuple[tuple[str | int, ...], Any]] = [((), content)]
+    for _ in range(DEEPEST):
+        inner: list[tuple[tuple[str | int, ...], Any]] = []
+        for where, value in level:
+            if isinstance(value, dict | list):
+                items = value.items() if isinstance(value, dict) else enumerate(value)
+                inner += [((*where, key), item) for key, item in items]
+            elif isinstance(value, int | float) and GREATEST < abs(value) != inf:
+                raise error(f"{path}: {key_path(where)} = {shown(value)}: expected a number up to {GREATEST:g} in size")
+        if not inner:
+            return
+        level = inner
+    raise too_deep(path, error)
 
 
 def validated(
@@ -54,7 +87,9 @@ def validated(
         problems = [describe(model, detail) for detail in details]
     if len(problems) == 1:
         raise error(f"{path}: {problems[0]}")
-    raise error("\n".join([f"{path}: {len(problems)} problems:", *(f"  {text}" for text in problems)]))
+    n = len(problems)
+    problems = [*problems[:MOST_PROBLEMS], *([f"... and {n - MOST_PROBLEMS} more"] if n > MOST_PROBLEMS else [])]
+    raise error("\n".join([f"{path}: {n} problems:", *(f"  {text}" for text in problems)]))
 
 
 def describe(model: type[BaseModel], detail: ErrorDetails) -> str:
@@ -78,7 +113,8 @@ def describe(model: type[BaseModel], detail: ErrorDetails) -> str:
 def key_path(location: Sequence[str | int]) -> str:
     """Return the location as TOML writes it: materials.steel.young."""
     return ".".join(
-        str(part) if str(part).replace("_", "").replace("-", "").isalnum() else f'"{part}"' for part in location
+        shortened(str(part)) if str(part).replace("_", "").replace("-", "").isalnum() else f'"{shortened(str(part))}"'
+        for part in location
     )
 
 
@@ -99,9 +135,11 @@ def table_at(model: type[BaseModel], location: Sequence[str | int]) -> type[Base
 
 def shown(value: Any) -> str:
     """Return a value as the user wrote it, shortened."""
-    text = {True: "true", False: "false"}.get(value) if isinstance(value, bool) else None
-    text = text or (f'"{value}"' if isinstance(value, str) else str(value))
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) and abs(value) > GREATEST:  # Python does not write whole numbers of thousands of digits
+        return "a whole number of more than 100 digits"
+    return shortened(f'"{value}"' if isinstance(value, str) else str(value), 60)
 
 
 def choice(what: str, choices: Callable[[], Sequence[str]]) -> Any:
@@ -132,8 +170,11 @@ def interval(value: Any) -> tuple[float, ...]:
 
 
 def is_no_number(value: Any) -> bool:
-    """Whether a TOML value is anything but a finite number."""
-    return isinstance(value, bool) or not isinstance(value, int | float) or value - value != 0
+    """Whether a TOML value is anything but a number that is finite as a float."""
+    try:
+        return isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return True
 
 
 def rows(value: Any) -> tuple[tuple[float, ...], ...]:

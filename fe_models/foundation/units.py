@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fe_models.foundation.errors import UnitsError
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["UNIT_SYSTEMS", "Units", "unit_system"]
 
@@ -51,5 +51,5 @@ def unit_system(name: str) -> Units:
         If the name is unknown; the message lists the choices and the nearest name.
     """
     if name not in UNIT_SYSTEMS:
-        raise UnitsError(f"units: unknown unit system {name!r}{nearest(name, UNIT_SYSTEMS)}")
+        raise UnitsError(f"units: unknown unit system {quoted(name)}{nearest(name, UNIT_SYSTEMS)}")
     return UNIT_SYSTEMS[name]

@@ -6,7 +6,7 @@ from difflib import get_close_matches
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["nearest", "node_list", "quoted"]
+__all__ = ["nearest", "node_list", "quoted", "shortened"]
 
 LONGEST = 80  #: characters of a name or value in a message
 MOST_CHOICES = 40  #: names in a message
@@ -25,9 +25,9 @@ def nearest(name: str, choices: Iterable[str]) -> str:
     return f"{hint} choices: {', '.join(shown)}{more}"
 
 
-def shortened(text: str) -> str:
+def shortened(text: str, longest: int = LONGEST) -> str:
     """Return a text, cut where it is longer than a line of a message should be."""
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
 def node_list(nodes: Iterable[int], positions: NDArray[np.float64]) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus_deck import DeckBlock, mesh_blocks
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
@@ -77,7 +77,7 @@ class _Sets:
             elif entry in self.entries:
                 parts.append(self._members(entry, nodes_of, (*seen, key)))
             else:
-                raise MeshError(f"{here} names an unknown set {entry!r}{nearest(entry, self.entries)}")
+                raise MeshError(f"{here} names an unknown set {quoted(entry)}{nearest(entry, self.entries)}")
         return np.unique(np.concatenate(parts))
 
 
@@ -129,7 +129,9 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
 
     def nodes_of(name: str) -> IntArray:
         if name not in element_sets.spelling:
-            raise MeshError(f"{where}: a node set names an unknown ELSET {name!r}{nearest(name, element_sets.entries)}")
+            raise MeshError(
+                f"{where}: a node set names an unknown ELSET {quoted(name)}{nearest(name, element_sets.entries)}"
+            )
         members = groups[element_sets.spelling[name]]
         return np.concatenate([table[np.isin(table[:, 0], members), 1:].ravel() for table in tables])
 

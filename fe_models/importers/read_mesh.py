@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from fe_models.errors import FeModelsError, MeshError
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus import read_abaqus
 from fe_models.importers.gmsh import read_gmsh
 from fe_models.importers.line_cells import line_mesh_from_raw
@@ -123,7 +123,7 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
     if path.is_dir():
         raise MeshError(f"{where}: expected a file, got a directory")
     if suffix not in MESH_FORMATS:
-        raise MeshError(f"{where}: unknown suffix {suffix!r}{nearest(suffix, MESH_FORMATS)}")
+        raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, MESH_FORMATS)}")
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["read_tables"]
@@ -99,7 +99,7 @@ def _table(path: Path, columns: tuple[str, ...], required: tuple[str, ...]) -> t
     names = [name.strip().lower() for name in next(csv.reader([head], delimiter=delimiter))]
     for name in names:
         if name not in columns:
-            raise MeshError(f"{where}: unknown column {name!r}{nearest(name, columns)}")
+            raise MeshError(f"{where}: unknown column {quoted(name)}{nearest(name, columns)}")
     missing = [name for name in required if name not in names]
     if missing or len(set(names)) < len(names):
         what = f"missing {', '.join(missing)}" if missing else "a column is there twice"

@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
 from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
 
 __all__ = ["LineMesh", "straight_line"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class LineMesh:
     """Nodes and two-node lines of one body.
@@ -39,7 +40,7 @@ class LineMesh:
         put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
         put(self, "node_numbers", frozen_int(self.node_numbers))
         for name in ("line_sets", "node_sets"):
-            put(self, name, MappingProxyType({group: frozen_int(m) for group, m in getattr(self, name).items()}))
+            put(self, name, FrozenMapping({group: frozen_int(m) for group, m in getattr(self, name).items()}))
         n = len(self.lines)
         if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or not len(self.nodes):
             raise BeamError(f"line mesh: nodes: expected (n_nodes, 3), got {self.nodes.shape}")

@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
 
 __all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh"]
 
@@ -14,6 +14,7 @@ SOLID_TYPES = ("tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27",
 FACE_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Nodes and cells of one body, in the node order of meshio (VTK)."""
@@ -36,14 +37,14 @@ class Mesh:
         put(self, "node_numbers", frozen_int(self.node_numbers))
         put(self, "notes", tuple(self.notes))
         for name in ("cells", "faces", "cell_numbers"):
-            put(self, name, MappingProxyType({kind: frozen_int(c) for kind, c in getattr(self, name).items()}))
+            put(self, name, FrozenMapping({kind: frozen_int(c) for kind, c in getattr(self, name).items()}))
         for name in ("cell_sets", "face_sets"):
             sets = {
-                group: MappingProxyType({kind: frozen_int(rows) for kind, rows in by_type.items()})
+                group: FrozenMapping({kind: frozen_int(rows) for kind, rows in by_type.items()})
                 for group, by_type in getattr(self, name).items()
             }
-            put(self, name, MappingProxyType(sets))
-        put(self, "node_sets", MappingProxyType({group: frozen_int(n) for group, n in self.node_sets.items()}))
+            put(self, name, FrozenMapping(sets))
+        put(self, "node_sets", FrozenMapping({group: frozen_int(n) for group, n in self.node_sets.items()}))
 
     @property
     def n_cells(self) -> int:

@@ -2,18 +2,19 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
 
 __all__ = ["FLAT_TYPES", "ShellMesh", "flat_plate", "mapped_shell"]
 
 FLAT_TYPES = ("triangle", "quad")  #: meshio names and node order
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ShellMesh:
     """Nodes and flat cells of one body; lines between its nodes may stiffen it.
@@ -43,12 +44,12 @@ class ShellMesh:
         put(self, "node_numbers", frozen_int(self.node_numbers))
         put(self, "notes", tuple(self.notes))
         for name in ("cells", "line_sets", "node_sets", "cell_numbers"):
-            put(self, name, MappingProxyType({key: frozen_int(rows) for key, rows in getattr(self, name).items()}))
+            put(self, name, FrozenMapping({key: frozen_int(rows) for key, rows in getattr(self, name).items()}))
         sets = {
-            group: MappingProxyType({kind: frozen_int(rows) for kind, rows in by_type.items()})
+            group: FrozenMapping({kind: frozen_int(rows) for kind, rows in by_type.items()})
             for group, by_type in self.cell_sets.items()
         }
-        put(self, "cell_sets", MappingProxyType(sets))
+        put(self, "cell_sets", FrozenMapping(sets))
         if self.nodes.ndim != 2 or self.nodes.shape[1] != 3 or not len(self.nodes):
             raise ShellError(f"shell mesh: nodes: expected (n_nodes, 3), got {self.nodes.shape}")
         if not np.isfinite(self.nodes).all():

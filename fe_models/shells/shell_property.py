@@ -7,7 +7,7 @@ import numpy as np
 
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import IntArray
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from fe_models.material import Material
 from fe_models.meshes.shell_mesh import ShellMesh
 
@@ -63,7 +63,7 @@ def assign_shell_properties(
     number = {kind: np.full(len(cells), -1, np.int64) for kind, cells in mesh.cells.items()}
     for group, item in properties.items():
         if group not in mesh.cell_sets:
-            raise ShellError(f"shells: the mesh has no group of cells {group!r}{nearest(group, mesh.cell_sets)}")
+            raise ShellError(f"shells: the mesh has no group of cells {quoted(group)}{nearest(group, mesh.cell_sets)}")
         index = used.index(item)
         for kind, rows in mesh.cell_sets[group].items():
             taken = rows[(number[kind][rows] >= 0) & (number[kind][rows] != index)]

@@ -14,7 +14,7 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.cell_shapes import CELL_SHAPES
 from fe_models.meshes.mesh import SOLID_TYPES
 
@@ -154,7 +154,7 @@ def reference_element(kind: str) -> ReferenceElement:
         If the cell type is not a supported solid.
     """
     if kind not in SOLID_TYPES:
-        raise MeshError(f"solid elements: unknown cell type {kind!r}{nearest(kind, SOLID_TYPES)}")
+        raise MeshError(f"solid elements: unknown cell type {quoted(kind)}{nearest(kind, SOLID_TYPES)}")
     cell, degree_stiffness, degree_mass = RULES[kind]
     (stress_cell, stress_degree), low_order = STRESS_RULES[kind]
     stress_points, stress_weights = quadrature(stress_cell, stress_degree)

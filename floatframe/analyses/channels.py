@@ -8,7 +8,8 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import STRESS_COMPONENTS
-from fe_models.foundation.words import nearest
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.analyses.marker_jacobian import marker_jacobian
 from floatframe.bodies.markers import Marker
@@ -36,6 +37,7 @@ QUANTITIES = ("translation", "rotation")
 RATES = ("displacement", "velocity", "acceleration")
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Channel:
     """The motion of a marker along a direction: displacement [m], or rotation [rad] about it.
@@ -59,6 +61,7 @@ class Channel:
         require_rate(where, self.rate)
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class CoordinateChannel:
     """A joint coordinate; as an input the force or torque along it."""
@@ -72,6 +75,7 @@ class CoordinateChannel:
         require_rate(f"channel {self.name!r}", self.rate)
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class StressChannel:
     """A stress component at a node of a flexible body, in axes of its frame; an output only."""
@@ -142,7 +146,7 @@ def coordinate_row(system: System, compiled: CompiledSystem, work: Work, channel
     rows = coordinate_rows(system, compiled, work, state)
     name = f"{channel.joint}.{channel.coordinate}"
     if name not in rows:
-        raise ModelError(f"channel {channel.name!r}: no joint coordinate {name!r}{nearest(name, list(rows))}")
+        raise ModelError(f"channel {channel.name!r}: no joint coordinate {quoted(name)}{nearest(name, list(rows))}")
     return rows[name]
 
 

@@ -16,13 +16,15 @@ import numpy as np
 from cms.reduced_body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
 from floatframe.checked_values import array_of_shape, number
 from floatframe.errors import ModelError
 
 __all__ = ["AddedMass", "with_masses"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class AddedMass:
     """A small part fixed to an interface."""
@@ -78,7 +80,9 @@ def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:
     for part in masses:
         names = [interface.name for interface in body.interfaces]
         if part.interface not in names:
-            raise ModelError(f"body {body.name!r}: no interface {part.interface!r}{nearest(part.interface, names)}")
+            raise ModelError(
+                f"body {body.name!r}: no interface {quoted(part.interface)}{nearest(part.interface, names)}"
+            )
         k = names.index(part.interface)
         node = body.interfaces[k]
         m, places = part.particles()

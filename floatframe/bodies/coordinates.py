@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import unit_vector
 from floatframe.errors import ModelError
@@ -20,6 +21,7 @@ class JointCoordinate:
     coordinate: str  #: of it, such as "angle"
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class AxialDistance:
     """Distance of the point of marker B from that of marker A along an axis of A; a force acts at the point of B."""
@@ -32,6 +34,7 @@ class AxialDistance:
         object.__setattr__(self, "axis", unit_vector("AxialDistance: axis", self.axis))
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class AxialAngle:
     """Angle of marker B about an axis of A, zero as placed; its rate is that of the angular velocity along the axis.
@@ -48,6 +51,7 @@ class AxialAngle:
         object.__setattr__(self, "axis", unit_vector("AxialAngle: axis", self.axis))
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointDistance:
     """Distance of the points of two markers; a force acts along the line between them."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.rigid_body import euler_parameters_from_user
 from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
@@ -15,6 +16,7 @@ from floatframe.rotations import rotation_matrix
 __all__ = ["FlexibleBody"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class FlexibleBody:
     """An instance of a reduced body; several instances share its data.

@@ -25,6 +25,7 @@ import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.rotations import cross, left_jacobian, rotation_exp, spin_rate, tilde, turned
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
 ]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class MarkerShape:
     """A marker in its body."""

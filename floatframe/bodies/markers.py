@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import array_of_shape, rotation_of
 
 __all__ = ["Marker", "Named", "Place", "body_name"]
@@ -17,6 +18,7 @@ class Named(Protocol):
         """Its name."""
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Marker:
     """A place with axes on a body.

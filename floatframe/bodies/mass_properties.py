@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import array_of_shape, number, rotation_of
 from floatframe.errors import ModelError
 
 __all__ = ["MassProperties", "combined", "mass_properties", "point_mass"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class MassProperties:
     """Mass, centre of mass and inertia tensor about it, in the axes of the body frame."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import array_of_shape, number
 from floatframe.errors import ModelError
 
@@ -13,6 +14,7 @@ __all__ = ["RigidBody"]
 TRIANGLE_DEFECT = 1e-6  #: relative excess of one principal moment over the sum of the others taken for rounding
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class RigidBody:
     """A rigid body and its given motion at the start.

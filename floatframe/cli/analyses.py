@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 __all__ = ["register"]
 
+MOST_SPEEDS = 10_000
+GREATEST_SPEED = 1e100
+
 SystemArgument = Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")]
 Json = Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")]
 Speed = Annotated[float, typer.Option(help="Speed of a steady rotation of the whole system [rad/time unit].")]
@@ -270,15 +273,19 @@ def speed_range(text: str) -> Any:
     """Return speeds from "from:to:number"."""
     import numpy as np
 
+    from fe_models.foundation.words import shortened
     from floatframe.errors import ModelError
 
     try:
         first, last, number = text.split(":")
-        values = np.linspace(float(first), float(last), int(number))
+        ends, n = (float(first), float(last)), int(number)
     except ValueError:
-        values = np.zeros(0)
-    if not len(values) or not np.isfinite(values).all():
-        raise ModelError(f'--speeds {text}: expected "from:to:number", such as 0:200:21')
+        ends, n = (0.0, 0.0), 0
+    if not 1 <= n <= MOST_SPEEDS or not max(map(abs, ends)) <= GREATEST_SPEED:
+        raise ModelError(
+            f'--speeds {shortened(text)}: expected "from:to:number", such as 0:200:21, and up to {MOST_SPEEDS} speeds'
+        )
+    values = np.linspace(*ends, n)
     return values
 
 

@@ -108,8 +108,6 @@ def inverse_command(
 
 def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) -> "tuple[System, Trajectory, Path]":
     """Compute the motion that the drives of a system file decide; return system, motion and where it was written."""
-    import numpy as np
-
     from fe_models.foundation.words import nearest
     from floatframe.analyses.driven_motion import ELASTICITY
     from floatframe.analyses.kinematics import kinematics
@@ -131,9 +129,8 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
                 progress=lambda p: advance(p.n_steps / p.n_total),
             )  # fmt: skip
         else:
-            n = max(1, round(run.t_end / (run.h * run.output_every)))
             motion = kinematics(
-                model, np.linspace(0.0, run.t_end, n + 1), elasticity=ELASTICITY[elastic], output=path,
+                model, run.output_times(), elasticity=ELASTICITY[elastic], output=path,
                 progress=lambda done, all_: advance(done / all_),
             )  # fmt: skip
     return model, motion, path

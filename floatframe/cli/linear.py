@@ -1,5 +1,6 @@
 """The commands of the linearised system with inputs and outputs: linearize, response."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -176,6 +177,7 @@ def channel_of(system: "System", text: str) -> "AnyChannel":
 
 def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, float]:
     """Return a band "from:to" in Hz; without, from a third of the lowest mode to three times the highest one."""
+    from fe_models.foundation.words import shortened
     from floatframe.analyses import system_modes
     from floatframe.errors import ModelError
 
@@ -185,8 +187,10 @@ def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, f
         return (float(f.min()) / 3, float(f.max()) * 3) if len(f) else (0.1, 10.0)
     try:
         first, last = (float(part) for part in text.split(":"))
+        if not 0 < first < last < math.inf:
+            raise ValueError
     except ValueError:
-        raise ModelError(f'--band {text}: expected "from:to" in Hz, such as 1:500') from None
+        raise ModelError(f'--band {shortened(text)}: expected "from:to" in Hz, such as 1:500') from None
     return first, last
 
 

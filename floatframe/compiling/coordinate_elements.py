@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate
 from floatframe.compiling.bodies import integers, offsets
 from floatframe.compiling.callbacks import Callback, callback_of
@@ -207,7 +207,7 @@ def joint_port(system: System, where: str, wanted: JointCoordinate, made: Connec
     """Return the port of a coordinate of a joint."""
     names = [joint.name for joint in system.joints]
     if wanted.joint not in names:
-        raise ModelError(f"{where}: no joint {wanted.joint!r}{nearest(wanted.joint, names)}")
+        raise ModelError(f"{where}: no joint {quoted(wanted.joint)}{nearest(wanted.joint, names)}")
     joint = system.joints[names.index(wanted.joint)]
     if wanted.coordinate not in joint.coordinates:
         raise ModelError(

@@ -7,7 +7,7 @@ import numpy as np
 
 from cms.errors import CmsError
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.markers import body_name
 from floatframe.compiling.bodies import integers, offsets
@@ -78,7 +78,7 @@ def joint_forces(
     names = [joint.name for joint in system.joints]
     for force in forces:
         if force.joint not in names:
-            raise ModelError(f"force {force.name!r}: no joint {force.joint!r}{nearest(force.joint, names)}")
+            raise ModelError(f"force {force.name!r}: no joint {quoted(force.joint)}{nearest(force.joint, names)}")
     of_row = [
         [f for f in forces if row.coordinate and (f.joint, f.coordinate) == (name, row.coordinate.name)]
         for row, name in zip(rows, owner, strict=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.ground import GROUND
 from floatframe.bodies.marker_shape import MarkerShape, interface_shape
@@ -51,7 +51,7 @@ def find_body(system: System, where: str, name: str) -> int:
         return GROUND_INDEX
     names = [body.name for body in system.bodies]
     if name not in names:
-        raise ModelError(f"{where}: no body {name!r}{nearest(name, [GROUND.name, *names])}")
+        raise ModelError(f"{where}: no body {quoted(name)}{nearest(name, [GROUND.name, *names])}")
     return names.index(name)
 
 

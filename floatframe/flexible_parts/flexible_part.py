@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.markers import Marker
 from floatframe.errors import ModelError
 from floatframe.forces import Force
@@ -28,7 +28,7 @@ class FlexiblePart:
     def marker(self, place: str) -> Marker:
         """Return the marker at a place; `ModelError` with the choices if there is none."""
         if place not in self.markers:
-            raise ModelError(f"part {self.name!r}: no place {place!r}{nearest(place, self.markers)}")
+            raise ModelError(f"part {self.name!r}: no place {quoted(place)}{nearest(place, self.markers)}")
         return self.markers[place]
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Named
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -10,6 +11,7 @@ from floatframe.functions.time_functions import TimeFunction, constant
 __all__ = ["BodyLoad"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class BodyLoad:
     """A load case of a flexible body times an amplitude; it turns with the body.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
@@ -16,6 +17,7 @@ __all__ = ["DEFORMATIONS", "Bushing"]
 DEFORMATIONS = ("x", "y", "z", "rx", "ry", "rz")  #: in the order of the rows of the matrices
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Bushing:
     """Force and torque K xi + D xi_dot + preload + tables(xi) between two markers; derived from a potential.

@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import array_of_shape
 
 __all__ = ["Gravity"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Gravity:
     """A uniform acceleration of free fall; it acts on every particle of the deformed bodies."""

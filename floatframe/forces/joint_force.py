@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.functions.time_functions import TimeFunction
@@ -9,6 +10,7 @@ from floatframe.functions.time_functions import TimeFunction
 __all__ = ["JointForce"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class JointForce:
     """A force or torque that acts to increase a free coordinate x of a joint (a distance or an angle).

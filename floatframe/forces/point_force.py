@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
@@ -13,6 +14,7 @@ from floatframe.functions.time_functions import TimeFunction
 __all__ = ["PointForce"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointForce:
     """A force and a torque that act on a marker."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number, unit_vector
 from floatframe.errors import ModelError
@@ -61,6 +62,7 @@ def hertz_stiffness(modulus: float, radius: float, other_radius: float | None = 
     return 4 / 3 * E * R**0.5
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class SphereContact:
     """A sphere about the point of marker B meets a plane through the point of marker A, or a sphere about it.

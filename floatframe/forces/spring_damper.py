@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -10,6 +11,7 @@ from floatframe.functions.time_functions import TimeFunction
 __all__ = ["SpringDamper"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class SpringDamper:
     """Tension k (l - l_0) + c l_dot + preload + characteristic(l - l_0) along the line from marker A to marker B.

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.coordinates import Coordinate, coordinate_words
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -12,6 +13,7 @@ from floatframe.functions.time_functions import TimeFunction
 __all__ = ["UserForce"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class UserForce:
     """Forces Q along coordinates x, and states z with z_dot = g, as functions of t, x, x_dot and z.

@@ -7,10 +7,11 @@ its exact gradient (kernels/connections/tape.py), so that nothing is compiled fo
 
 import ast
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted, shortened
 from floatframe.errors import ModelError
 
 __all__ = ["CONSTANTS", "FUNCTIONS", "Tape", "compile_expression"]
@@ -30,6 +31,7 @@ OPERATORS: dict[type, int] = {
     ast.Add: ADD, ast.Sub: SUBTRACT, ast.Mult: MULTIPLY, ast.Div: DIVIDE, ast.Pow: POWER, ast.BitXor: POWER,
 }  # fmt: skip
 MOST_OPERATIONS = 500
+LONGEST_TEXT = 10_000  #: characters
 
 
 @dataclass
@@ -78,14 +80,23 @@ def compile_expression(
     ModelError
         With the token and its column, if it is not an expression or uses what does not exist.
     """
+    if isinstance(text, str) and len(text) > LONGEST_TEXT:
+        raise ModelError(f"{where}: expected up to {LONGEST_TEXT} characters, got {len(text)}: {quoted(text)}")
     try:
-        tree = ast.parse(text.strip().replace("^", "**"), mode="eval").body
+        with warnings.catch_warnings():  # of the parser, about what reads oddly: 1if x<1else 2
+            warnings.simplefilter("ignore", SyntaxWarning)
+            warnings.simplefilter("ignore", DeprecationWarning)
+            tree = ast.parse(text.strip().replace("^", "**"), mode="eval").body
+        writer = Writer(where, text, tuple(inputs), dict(parameters or {}), dict(functions or {}), Tape())
+        writer.write(tree)
     except (SyntaxError, AttributeError, ValueError) as problem:
+        if isinstance(problem, ModelError):
+            raise
         column = getattr(problem, "offset", None)
         place = f" at column {column}" if column else ""
-        raise ModelError(f"{where}: {text!r} is not an expression{place}; see docs/system_file.md") from None
-    writer = Writer(where, text, tuple(inputs), dict(parameters or {}), dict(functions or {}), Tape())
-    writer.write(tree)
+        raise ModelError(f"{where}: {quoted(text)} is not an expression{place}; see docs/system_file.md") from None
+    except (RecursionError, MemoryError):  # the parser's own limits
+        raise ModelError(f"{where}: {quoted(text)} is nested too deeply; use fewer operations and brackets") from None
     if len(writer.tape.op) > MOST_OPERATIONS:
         raise ModelError(f"{where}: expected up to {MOST_OPERATIONS} operations, got {len(writer.tape.op)}")
     return writer.tape
@@ -105,7 +116,7 @@ class Writer:
     def refuse(self, node: ast.AST, words: str, hint: str = "") -> ModelError:
         """Return the error about a node."""
         column = getattr(node, "col_offset", 0) + 1
-        return ModelError(f"{self.where}: {words} at column {column} of {self.text!r}{hint}")
+        return ModelError(f"{self.where}: {words} at column {column} of {quoted(self.text)}{hint}")
 
     def write(self, node: ast.AST) -> int:
         """Write a node; return the number of its operation."""
@@ -127,13 +138,19 @@ class Writer:
             yes, no = self.write(node.body), self.write(node.orelse)
             self.compare(node.test)
             return self.tape.add(SELECT, yes, no)
-        raise self.refuse(node, f"{ast.unparse(node)!r} is no part of the language (see docs/system_file.md)")
+        raise self.refuse(node, f"{quoted(ast.unparse(node))} is no part of the language (see docs/system_file.md)")
 
     def number(self, node: ast.Constant) -> int:
         """Write a number."""
         if isinstance(node.value, bool) or not isinstance(node.value, int | float):
-            raise self.refuse(node, f"expected a number, got {ast.unparse(node)}")
-        return self.tape.add(CONSTANT, c=float(node.value))
+            raise self.refuse(node, f"expected a number, got {shortened(ast.unparse(node))}")
+        try:
+            value = float(node.value)
+        except OverflowError:
+            value = math.inf
+        if not math.isfinite(value):
+            raise self.refuse(node, "expected a number below 1.8e308")
+        return self.tape.add(CONSTANT, c=value)
 
     def name(self, node: ast.Name) -> int:
         """Write an input, a parameter or a constant."""
@@ -144,12 +161,12 @@ class Writer:
             return self.tape.add(CONSTANT, c=float(known[node.id]))
         if node.id in self.functions or node.id in FUNCTIONS:
             raise self.refuse(node, f"{node.id!r} is a function; expected {node.id}(...)")
-        raise self.refuse(node, f"unknown name {node.id!r}", nearest(node.id, [*self.inputs, *known]))
+        raise self.refuse(node, f"unknown name {quoted(node.id)}", nearest(node.id, [*self.inputs, *known]))
 
     def call(self, node: ast.Call) -> int:
         """Write a call of a function."""
         if not isinstance(node.func, ast.Name) or node.keywords:
-            raise self.refuse(node, f"{ast.unparse(node)!r} is no part of the language")
+            raise self.refuse(node, f"{quoted(ast.unparse(node))} is no part of the language")
         name, n = node.func.id, len(node.args)
         if name in self.functions:
             if n != 1:
@@ -157,7 +174,7 @@ class Writer:
             return self.tape.add(CALL, self.write(node.args[0]), self.functions[name])
         if name not in FUNCTIONS:
             choices = [*FUNCTIONS, *self.functions]
-            raise self.refuse(node, f"unknown function {name!r}", nearest(name, choices))
+            raise self.refuse(node, f"unknown function {quoted(name)}", nearest(name, choices))
         code, expected = FUNCTIONS[name]
         if n != expected:
             raise self.refuse(node, f"{name} takes {expected} argument{'s' * (expected > 1)}, got {n}")
@@ -167,7 +184,7 @@ class Writer:
     def compare(self, node: ast.AST) -> int:
         """Write a comparison: 1 if it holds, 0 if not."""
         if not isinstance(node, ast.Compare) or len(node.ops) != 1:
-            raise self.refuse(node, f"expected one comparison such as x < 1, got {ast.unparse(node)!r}")
+            raise self.refuse(node, f"expected one comparison such as x < 1, got {quoted(ast.unparse(node))}")
         a, b = self.write(node.left), self.write(node.comparators[0])
         kind = type(node.ops[0])
         if kind is ast.Lt:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 
@@ -30,6 +31,7 @@ N_COEFFICIENTS = 9  #: of a piece: six of the polynomial in t - t_k, then amplit
 MOST_PIECES = 20000
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class TimeFunction:
     """A piecewise function: the first piece holds before its beginning too, the last without end."""

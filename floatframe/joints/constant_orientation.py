@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import rotation_of
 from floatframe.joints.rows import FORCE, GAUGE, MOMENT, Row, orientation_rows
@@ -12,6 +13,7 @@ from floatframe.joints.rows import FORCE, GAUGE, MOMENT, Row, orientation_rows
 __all__ = ["ConstantOrientation"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ConstantOrientation:
     """Holds the orientation of marker B in marker A; three constraints.

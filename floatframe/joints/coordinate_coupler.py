@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.coordinates import Coordinate, coordinate_words
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -11,6 +12,7 @@ from floatframe.functions.time_functions import TimeFunction, constant
 __all__ = ["CoordinateCoupler"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class CoordinateCoupler:
     """Holds a linear relation between coordinates: Σ a_k x_k = c; one constraint.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -16,6 +17,7 @@ from floatframe.joints.rows import DISTANCE, NO_MOMENT, ROD, SPAN, Row, RowCoord
 __all__ = ["DistanceJoint"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class DistanceJoint:
     """Holds the points of two markers at a distance, as a massless rod does; one constraint.

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import rotation_of
 from floatframe.joints.rows import MOMENT, Row, orientation_rows, point_rows
@@ -10,6 +11,7 @@ from floatframe.joints.rows import MOMENT, Row, orientation_rows, point_rows
 __all__ = ["FixedJoint"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class FixedJoint:
     """Holds marker B at marker A; six constraints.

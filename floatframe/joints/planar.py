@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
@@ -14,6 +15,7 @@ from floatframe.joints.rows import DOT, MOMENT_B, SLIDE, Row, arm_rows, slide_ro
 __all__ = ["PlanarJoint"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class PlanarJoint:
     """Keeps the point of marker B in a plane of marker A and the normals parallel; three constraints.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import checked_axes, checked_motions, normals_of
@@ -14,6 +15,7 @@ from floatframe.joints.rows import NO_MOMENT, SLIDE, Row, arm_rows, slide_row
 __all__ = ["PointOnLine"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class PointOnLine:
     """Keeps the point of marker B on a line through the point of marker A; two constraints.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import checked_axes, checked_motions, normals_of
@@ -14,6 +15,7 @@ from floatframe.joints.rows import MOMENT_B, SLIDE, Row, arm_rows, orientation_r
 __all__ = ["PrismaticJoint"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class PrismaticJoint:
     """Leaves marker B to slide along an axis of marker A without turning; five constraints.

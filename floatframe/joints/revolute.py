@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.axis_frame import axis_in_b, checked_axes, checked_motions, normals_of, turning_frame
@@ -14,6 +15,7 @@ from floatframe.joints.rows import DOT, MOMENT, Row, point_rows, turn_row
 __all__ = ["RevoluteJoint"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class RevoluteJoint:
     """Leaves one rotation between two markers, about an axis; five constraints.

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -14,6 +15,7 @@ from floatframe.joints.rows import MOMENT_B, RIM, RIM_HEIGHT, ROLL, Row, arm_row
 __all__ = ["RollingDisc"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class RollingDisc:
     """A thin disc about the point of marker B rolls without slip on a plane through the point of marker A.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
@@ -29,6 +30,7 @@ from floatframe.joints.rows import (
 __all__ = ["ScrewJoint"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ScrewJoint:
     """Leaves marker B to turn about an axis and slide along it, `lead` for each turn; five constraints.

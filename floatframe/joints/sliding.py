@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker, Place
 from floatframe.checked_values import unit_vector
 from floatframe.errors import ModelError
@@ -18,6 +19,7 @@ __all__ = ["SlidingJoint"]
 ALONG, ACROSS, UPWARD = range(3)  #: parts of LINE rows
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class SlidingJoint:
     """Keeps the point of marker B on the deformed line through interfaces of a flexible body; two constraints.

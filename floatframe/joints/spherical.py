@@ -3,12 +3,14 @@
 from dataclasses import dataclass
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.joints.rows import NO_MOMENT, Row, point_rows
 
 __all__ = ["SphericalJoint"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class SphericalJoint:
     """Holds the point of marker B at the point of marker A; three constraints."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Place
 from floatframe.errors import ModelError
 from floatframe.functions.time_functions import TimeFunction
@@ -15,6 +16,7 @@ from floatframe.joints.rows import DOT, MOMENT, Row, point_rows, turn_row, turn_
 __all__ = ["UniversalJoint"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class UniversalJoint:
     """Holds two points together and an axis of marker A at a right angle to one of marker B; four constraints.

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad, Bushing, Force, JointForce, PointForce, SpringDamper
@@ -134,7 +134,7 @@ def require_events(system: System) -> None:
         for name in (*event.switch_on, *event.switch_off):
             if name not in forces or not name:
                 choices = [key for key in forces if key]
-                raise ModelError(f"{where}: no force {name!r}{nearest(name, choices)}")
+                raise ModelError(f"{where}: no force {quoted(name)}{nearest(name, choices)}")
             if type(forces[name]) not in SILENT:
                 raise ModelError(f"{where}: a force of the kind {type(forces[name]).__name__} cannot be switched")
 

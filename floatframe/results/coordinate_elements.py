@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.forces import UserForce
@@ -48,7 +48,7 @@ def user_force_motion(system: System, trajectory: Trajectory, name: str) -> User
     forces = [force for force in system.forces if isinstance(force, UserForce)]
     names = [force.name for force in forces]
     if name not in names:
-        raise ResultsError(f"user_force_motion: no user force {name!r}{nearest(name, names)}")
+        raise ResultsError(f"user_force_motion: no user force {quoted(name)}{nearest(name, names)}")
     u = names.index(name)
     model, w, force = compiled_system(system).model, unknowns(system, trajectory), forces[u]
     k = len(system.couplers) + u
@@ -81,7 +81,7 @@ def coupler_motion(system: System, trajectory: Trajectory, name: str) -> PortMot
     """
     names = [coupler.name for coupler in system.couplers]
     if name not in names:
-        raise ResultsError(f"coupler_motion: no coupler {name!r}{nearest(name, names)}")
+        raise ResultsError(f"coupler_motion: no coupler {quoted(name)}{nearest(name, names)}")
     model, w = compiled_system(system).model, unknowns(system, trajectory)
     k = names.index(name)
     ports = slice(int(model.networks.port0[k]), int(model.networks.port0[k + 1]))

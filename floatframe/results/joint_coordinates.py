@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
@@ -51,7 +51,7 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     """
     names = [each.name for each in system.joints]
     if joint not in names or names != list(trajectory.head.joints):
-        raise ResultsError(f"joint_coordinate: no joint {joint!r} in the motion{nearest(joint, names)}")
+        raise ResultsError(f"joint_coordinate: no joint {quoted(joint)} in the motion{nearest(joint, names)}")
     found: Joint = system.joints[names.index(joint)]
     if coordinate not in found.coordinates:
         raise ResultsError(

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.hdf5_file import as_attribute, opened, own_items, require_digest
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.seal import Kind, altered, check_seal, newer
@@ -65,6 +66,7 @@ class ArraySource(Protocol):
         """Return a whole dataset by its name in `DATASETS`."""
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class MemorySource:
     """Arrays in memory."""
@@ -76,6 +78,7 @@ class MemorySource:
         return self.arrays[name]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class FileSource:
     """Arrays in one file, or in consecutive segments, which were checked."""

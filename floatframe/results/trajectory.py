@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units, unit_system
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ResultsError
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import ArraySource, open_results, validity_text
@@ -19,6 +20,7 @@ from floatframe.state import State
 __all__ = ["BodyMotion", "Drift", "Energies", "Reaction", "Trajectory", "read_results"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
     """Motion of one body: its frame B and its modal coordinates."""
@@ -35,6 +37,7 @@ class BodyMotion:
     q_ddot: Array  #: (n_t, n_q)
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Energies:
     """Energies of the whole system, each (n_t,) [J]."""
@@ -57,6 +60,7 @@ class Energies:
         return self.total - self.work + self.dissipated
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Reaction:
     """Force and moment that a joint or spring exerts on its marker A, ground axes."""
@@ -65,6 +69,7 @@ class Reaction:
     moment: Array  #: (n_t, 3) [N m]; zero where there is none
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Drift:
     """How far a joint is from being closed, each (n_t,)."""
@@ -75,6 +80,7 @@ class Drift:
     angle_rate: Array  #: [rad/s]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """A motion, in memory or (read when asked for) on disk."""
@@ -110,7 +116,7 @@ class Trajectory:
         for i, body in enumerate(self.head.bodies):
             if body.name == name:
                 return i, body
-        raise ResultsError(f"trajectory: no body {name!r}{nearest(name, self.body_names)}")
+        raise ResultsError(f"trajectory: no body {quoted(name)}{nearest(name, self.body_names)}")
 
     def body(self, name: str) -> BodyMotion:
         """Return the motion of a body."""
@@ -138,7 +144,7 @@ class Trajectory:
     def reaction(self, name: str) -> Reaction:
         """Return what a joint or spring-damper exerts on its marker A."""
         if name not in self.connection_names:
-            raise ResultsError(f"trajectory: no joint or spring {name!r}{nearest(name, self.connection_names)}")
+            raise ResultsError(f"trajectory: no joint or spring {quoted(name)}{nearest(name, self.connection_names)}")
         c = self.connection_names.index(name)
         w = self.source.read("w")[:, self.head.w0[c] : self.head.w0[c + 1]]
         moment = w[:, 3:6] if w.shape[1] >= 6 else np.zeros((len(w), 3))
@@ -147,7 +153,7 @@ class Trajectory:
     def drift(self, name: str) -> Drift:
         """Return how far a joint is from being closed."""
         if name not in self.head.joints:
-            raise ResultsError(f"trajectory: no joint {name!r}{nearest(name, self.head.joints)}")
+            raise ResultsError(f"trajectory: no joint {quoted(name)}{nearest(name, self.head.joints)}")
         return Drift(*self.source.read("drift")[:, self.head.joints.index(name)].T)
 
     @cached_property

@@ -12,7 +12,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.inverse_dynamics import inverse_dynamics
 from floatframe.analyses.kinematics import kinematics
@@ -65,7 +65,7 @@ class StudyTable:
         """Return the numbers of an output at all points, (n_points,), NaN where a point failed."""
         names = [output.name for output in self.study.outputs]
         if name not in names:
-            raise ModelError(f"study: no output {name!r}{nearest(name, names)}")
+            raise ModelError(f"study: no output {quoted(name)}{nearest(name, names)}")
         return np.array([row.outputs[names.index(name)] for row in self.rows])
 
 
@@ -170,11 +170,6 @@ class StudyPoint:
         return MOTIONS[self.study.analysis](system, required_run(given, self.study.system))
 
 
-def driven_times(run: RunOptions) -> Array:
-    """Return the output times of a run."""
-    return np.linspace(0.0, run.t_end, max(1, round(run.t_end / (run.h * run.output_every))) + 1)
-
-
 def motion_of_run(system: System, run: RunOptions) -> Trajectory:
     """Return the integrated motion."""
     return integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every)
@@ -188,8 +183,8 @@ def equilibrium_of(system: System) -> Trajectory:
 
 MOTIONS: dict[str, Callable[[System, RunOptions], Trajectory]] = {
     "run": motion_of_run,
-    "kinematics": lambda system, run: kinematics(system, driven_times(run)),
-    "inverse": lambda system, run: inverse_dynamics(system, driven_times(run)).motion,
+    "kinematics": lambda system, run: kinematics(system, run.output_times()),
+    "inverse": lambda system, run: inverse_dynamics(system, run.output_times()).motion,
 }
 
 
@@ -199,7 +194,9 @@ def taken(output: Output, system: System, motion: Trajectory) -> tuple[float, st
     sensors = [*(sensor.name for sensor in system.sensors), *coordinates]
     fitting = [name for name in sensors if output.of == name or output.of.startswith(name + " ")]
     if not fitting:
-        raise ModelError(f"output {output.name!r}: of = {output.of!r}: no such sensor{nearest(output.of, sensors)}")
+        raise ModelError(
+            f"output {output.name!r}: of = {quoted(output.of)}: no such sensor{nearest(output.of, sensors)}"
+        )
     name = max(fitting, key=len)
     measurement = measured(system, motion, [sensor_of(system, name)])[name]
     column = output.of[len(name) + 1 :]

@@ -46,7 +46,9 @@ class ParameterSection(Table):
     )
     first: float | None = Field(None, description="a number, the first value")
     last: float | None = Field(None, description="a number, the last value")
-    number: Annotated[int, Field(ge=1)] | None = Field(None, description="a whole number above 0, how many values")
+    number: Annotated[int, Field(ge=1, le=MOST_POINTS)] | None = Field(
+        None, description=f"a whole number above 0 and up to {MOST_POINTS}, how many values"
+    )
     scale: choice("scale", lambda: SCALES) = Field(  # type: ignore[valid-type]
         "linear", description=f"one of {', '.join(SCALES)}"
     )

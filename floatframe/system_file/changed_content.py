@@ -4,7 +4,7 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["changed"]
 
@@ -33,7 +33,7 @@ def changed(
             if key is None:
                 choices = list(here) if isinstance(here, dict) else [str(k) for k in range(len(here))]
                 name = left.split(".")[0]
-                raise error(f"{where}: the key path {path!r}: there is no {name!r}{nearest(name, choices)}")
+                raise error(f"{where}: the key path {path!r}: there is no {quoted(name)}{nearest(name, choices)}")
             here, left = here[key], rest
             if not isinstance(here, dict | list):
                 raise error(f"{where}: the key path {path!r} goes on after a value: {here!r}")

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from inspect import signature
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.toml_file import Table, choice
 from fe_models.foundation.words import nearest
 from floatframe.errors import SystemFileError
@@ -16,6 +18,7 @@ from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 
 __all__ = ["RunOptions", "RunSection", "required_run"]
 
+MOST_TIMES = 1e8  #: at which a driven motion is computed
 NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme")
 
 
@@ -89,6 +92,16 @@ class RunOptions:
     h: float
     output_every: int
     integrator: Integrator
+
+    def output_times(self) -> Array:
+        """Return the times of the results of a run, (n_t,) [s]; `SystemFileError` if no memory would hold them."""
+        wanted = self.t_end / (self.h * self.output_every)
+        if not wanted <= MOST_TIMES:
+            raise SystemFileError(
+                f"run: t_end = {self.t_end:g} with h = {self.h:g} and output_every = {self.output_every} are "
+                f"{wanted:.1e} times, expected up to {MOST_TIMES:.0e}; take t_end nearer, or a greater h"
+            )
+        return np.linspace(0.0, self.t_end, max(1, round(wanted)) + 1)
 
 
 def required_run(run: RunOptions | None, path: str | os.PathLike[str]) -> RunOptions:

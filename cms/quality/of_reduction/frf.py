@@ -22,6 +22,7 @@ __all__ = [
 ]
 
 DAMPING = 0.01  #: ratio of every mode in the full and the reduced response that are compared
+MOST_POINTS = 1_000_000  #: frequencies of a response
 POINTS = 400
 LOWEST = 0.05  #: lower end of the band over the first elastic frequency: below it the body moves rigidly
 
@@ -57,8 +58,8 @@ def frequency_grid(lowest: float, highest: float, points: int = POINTS) -> Array
     """
     if not (0 < lowest < highest < np.inf):
         raise QualityError(f"band {lowest:g}:{highest:g}: expected 0 < lowest < highest [Hz]")
-    if points < 2:
-        raise QualityError(f"band {lowest:g}:{highest:g}: expected 2 or more frequencies, got {points}")
+    if not 2 <= points <= MOST_POINTS:
+        raise QualityError(f"band {lowest:g}:{highest:g}: expected 2 to {MOST_POINTS} frequencies, got {points:g}")
     return np.geomspace(lowest, highest, points)
 
 

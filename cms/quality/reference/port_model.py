@@ -9,7 +9,7 @@ from cms.quality.reference.free_pencil import free_elastic_modes, free_pencil, p
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.components import MOTION_COMPONENTS
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["FrequencyResponse", "PortModel", "file_response", "modal_response", "port_model"]
 
@@ -67,9 +67,8 @@ class FrequencyResponse:
         columns = [k for k, label in enumerate(self.inputs) if label.rsplit(" ", 1)[0] == excited]
         for name, found, labels in ((answering, rows, self.outputs), (excited, columns, self.inputs)):
             if not found:
-                raise QualityError(
-                    f"frequency response: no interface {name!r}{nearest(name, {i.rsplit(' ', 1)[0] for i in labels})}"
-                )
+                hint = nearest(name, {i.rsplit(" ", 1)[0] for i in labels})
+                raise QualityError(f"frequency response: no interface {quoted(name)}{hint}")
         return FrequencyResponse(
             self.frequencies,
             self.H[:, rows][:, :, columns].copy(),

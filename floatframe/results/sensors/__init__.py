@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import cast
 
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.results.sensors.coordinate_elements import ControlSensor, CouplerSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
@@ -113,4 +113,4 @@ def sensor_of(system: System, name: str) -> Sensor:
             return sensor
     coordinates = [f"{each.name}.{c}" for each in system.joints for c in each.coordinates]
     choices = [*(sensor.name for sensor in system.sensors), *coordinates]
-    raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {name!r}{nearest(name, choices)}")
+    raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {quoted(name)}{nearest(name, choices)}")

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
@@ -16,6 +17,7 @@ from floatframe.system import System
 __all__ = ["ControlSensor", "CouplerSensor"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class CouplerSensor:
     """A coupler: value, rate and force of each of its terms, numbered from 1."""
@@ -27,7 +29,7 @@ class CouplerSensor:
         """Return the columns "value 1", "rate 1", "force 1", "value 2", ..."""
         names = [coupler.name for coupler in system.couplers]
         if self.of not in names:
-            raise ModelError(f"sensor {self.name!r}: no coupler {self.of!r}{nearest(self.of, names)}")
+            raise ModelError(f"sensor {self.name!r}: no coupler {quoted(self.of)}{nearest(self.of, names)}")
         found = coupler_motion(system, trajectory, self.of)
         columns: dict[str, Array] = {}
         units: dict[str, str] = {}
@@ -38,6 +40,7 @@ class CouplerSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ControlSensor:
     """A user force: its coordinates, their rates, its forces along them, its states, all by their names."""
@@ -50,7 +53,7 @@ class ControlSensor:
         forces = [force for force in system.forces if isinstance(force, UserForce)]
         names = [force.name for force in forces]
         if self.of not in names:
-            raise ModelError(f"sensor {self.name!r}: no user force {self.of!r}{nearest(self.of, names)}")
+            raise ModelError(f"sensor {self.name!r}: no user force {quoted(self.of)}{nearest(self.of, names)}")
         found = user_force_motion(system, trajectory, self.of)
         k = names.index(self.of)
         columns: dict[str, Array] = {}

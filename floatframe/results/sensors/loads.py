@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.words import nearest
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
 from floatframe.compiling.markers import find_marker, joint_markers
 from floatframe.compiling.pair_forces import bushing_markers
 from floatframe.compiling.system import compiled_system
@@ -24,6 +25,7 @@ AXES = ("ground", "marker")
 ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ReactionSensor:
     """Force and moment that a joint or spring-damper exerts on its marker A, in ground axes or its own."""
@@ -40,7 +42,7 @@ class ReactionSensor:
         """Return force and moment over time: components and sizes."""
         choices = list(trajectory.connection_names)
         if self.of not in choices:
-            raise ModelError(f"sensor {self.name!r}: no joint or spring {self.of!r}{nearest(self.of, choices)}")
+            raise ModelError(f"sensor {self.name!r}: no joint or spring {quoted(self.of)}{nearest(self.of, choices)}")
         reaction = trajectory.reaction(self.of)
         vectors = {"force ": reaction.force, "moment ": reaction.moment}
         if self.axes == "marker":
@@ -64,6 +66,7 @@ class ReactionSensor:
         return Measurement(self.name, trajectory.t, columns, units)
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class CoordinateSensor:
     """A coordinate of a joint: value, rate, and the force along it."""
@@ -86,6 +89,7 @@ class CoordinateSensor:
         )
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class EnergySensor:
     """Energies of the whole system: kinetic, strain, gravity, springs, work, dissipated, total and balance."""
@@ -98,6 +102,7 @@ class EnergySensor:
         return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, unit_words(system.units, "energy")))
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class MomentumSensor:
     """Linear momentum, and angular momentum about the ground origin, in ground axes."""
@@ -113,6 +118,7 @@ class MomentumSensor:
         return Measurement(self.name, trajectory.t, linear[0] | angular[0], linear[1] | angular[1])
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ModeSensor:
     """A modal coordinate of a flexible body and its strain energy."""

@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
 
 __all__ = ["Measurement", "unit_words", "vector_columns"]
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """Columns over time by name, such as x, y, z, size."""
@@ -22,8 +23,8 @@ class Measurement:
     units: Mapping[str, str]  #: of each column, in the symbols of the system
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
-        object.__setattr__(self, "units", MappingProxyType(dict(self.units)))
+        object.__setattr__(self, "columns", FrozenMapping(dict(self.columns)))
+        object.__setattr__(self, "units", FrozenMapping(dict(self.units)))
 
     @property
     def headers(self) -> tuple[str, ...]:

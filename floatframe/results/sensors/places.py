@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.markers import Marker, body_name
 from floatframe.checked_values import unit_vector
@@ -53,6 +54,7 @@ def nearest_node(body: FlexibleBody, position: Array) -> int:
     return int(np.argmin(np.linalg.norm(body.reduced.nodes - local, axis=1)))
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class PlaceSensor:
     """Position, velocity, acceleration, rotation vector or angular velocity of a marker.
@@ -123,6 +125,7 @@ def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
     return np.asarray(np.einsum("tba,tb->ta", other.axes, seen))
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class AngleSensor:
     """The angle by which marker B has turned against marker A about an axis of A, without jumps."""
@@ -145,6 +148,7 @@ class AngleSensor:
         return Measurement(self.name, trajectory.t, {"angle": angle}, {"angle": "rad"})
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class DisplacementSensor:
     """Elastic displacement of an interface or node of a flexible body, in axes of its frame B, all modes included."""

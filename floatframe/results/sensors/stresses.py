@@ -8,7 +8,8 @@ from cms.reduced_body.reduced_body import ReducedBody
 from cms.reduced_body.stress import von_mises
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import STRESS_COMPONENTS
-from fe_models.foundation.words import nearest
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.checked_values import array_of_shape, number, unit_vector
 from floatframe.errors import ModelError
@@ -28,7 +29,7 @@ def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
     for body in system.bodies:
         if body.name == name and isinstance(body, FlexibleBody):
             return body
-    raise ModelError(f"sensor {sensor!r}: no flexible body {name!r}{nearest(name, choices)}")
+    raise ModelError(f"sensor {sensor!r}: no flexible body {quoted(name)}{nearest(name, choices)}")
 
 
 def modes_at(body: FlexibleBody, sensor: str, position: Array | None, point: str | None) -> Array:
@@ -40,11 +41,12 @@ def modes_at(body: FlexibleBody, sensor: str, position: Array | None, point: str
     names = () if reduced.point_stress is None else reduced.point_stress.names
     if reduced.point_stress is None or point not in names:
         raise ModelError(
-            f"sensor {sensor!r}: body {body.name!r} has no stress point {point!r}{nearest(point, list(names))}"
+            f"sensor {sensor!r}: body {body.name!r} has no stress point {quoted(point)}{nearest(point, list(names))}"
         )
     return np.asarray(reduced.point_stress.modes[list(names).index(point)])
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class StressSensor:
     """Stress at a node or stress point: six components in axes of the body frame, and von Mises'."""
@@ -71,6 +73,7 @@ class StressSensor:
         return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, system.units.stress_symbol))
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class VonMisesSensor:
     """The largest von Mises stress of a body over its kept nodes, and at which node it is."""
@@ -88,6 +91,7 @@ class VonMisesSensor:
         )
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class StrainGauge:
     """Strain along a direction at a node, from its stress by Hooke's law of an isotropic material.
@@ -125,6 +129,7 @@ class StrainGauge:
         return Measurement(self.name, trajectory.t, {"strain": q @ strain}, {"strain": "-"})
 
 
+@frozen_copies
 @dataclass(frozen=True, eq=False)
 class ElongationSensor:
     """Change of the distance between two nodes of a body over that distance: an extensometer; needs no stress modes."""

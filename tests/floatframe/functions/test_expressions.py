@@ -45,8 +45,21 @@ def test_a_tape_has_an_operation_for_every_node(text):
         ("1 if x == y else 2", "expected one of < <= > >="),
         ("+".join(["x"] * 400), "expected up to 500 operations"),
         (3.0, "is not an expression"),
+        ("(" * 300 + "x" + ")" * 300, "is not an expression"),
+        ("-" * 3000 + "x", "nested too deeply"),
+        ("+".join(["x"] * 3000), "nested too deeply"),
+        ("x" * 20_000, "expected up to 10000 characters, got 20000"),
+        ("1" + "0" * 400 + " * x", "expected a number below"),
+        ("1e400 * x", "expected a number below"),
+        ("x * \0", "is not an expression"),
+        ("long" * 500, "unknown name"),
     ],
 )
 def test_what_is_no_expression_is_refused(text, words):
-    with pytest.raises(ModelError, match=words):
+    with pytest.raises(ModelError, match=words) as error:
         compile_expression("f", text, ["x", "y", "z"])
+    assert len(str(error.value)) < 400
+
+
+def test_what_only_reads_oddly_is_taken_without_a_warning():
+    assert compile_expression("f", "1if x<1else 2", ["x"]).op

@@ -1,0 +1,80 @@
+"""Frozen data classes whose pickled and deep copies are frozen too.
+
+NumPy gives copies of read-only arrays that can be written to, and a mapping proxy cannot be pickled at all.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from typing import Any, TypeVar
+
+import numpy as np
+import scipy.sparse as sp
+
+__all__ = ["FrozenMapping", "frozen_copies"]
+
+Class = TypeVar("Class", bound=type)
+Key = TypeVar("Key")
+Item = TypeVar("Item")
+
+
+class FrozenMapping(Mapping[Key, Item]):
+    """A mapping that cannot be changed, and whose copies cannot either."""
+
+    __slots__ = ("_items",)
+
+    def __init__(self, items: Mapping[Key, Item]) -> None:
+        self._items = dict(items)
+
+    def __getitem__(self, key: Key) -> Item:
+        return self._items[key]
+
+    def __iter__(self) -> Iterator[Key]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __or__(self, other: Mapping[Key, Item]) -> dict[Key, Item]:
+        return self._items | dict(other)
+
+    def __ror__(self, other: Mapping[Key, Item]) -> dict[Key, Item]:
+        return dict(other) | self._items
+
+    def __repr__(self) -> str:
+        return repr(self._items)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return restored_mapping, (self._items,)
+
+
+def restored_mapping(items: dict[Any, Any]) -> "FrozenMapping[Any, Any]":
+    """Return a mapping whose arrays are read-only again."""
+    return FrozenMapping({key: read_only(value) for key, value in items.items()})
+
+
+def frozen_copies(kind: Class) -> Class:
+    """Decorate a frozen data class: copies hold its fields alone, nothing derived from them, and arrays read-only."""
+
+    def state(self: Any) -> dict[str, Any]:
+        return {part.name: getattr(self, part.name) for part in fields(self)}
+
+    def restore(self: Any, values: dict[str, Any]) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, read_only(value))
+
+    kind.__getstate__ = state  # type: ignore[method-assign, assignment]
+    kind.__setstate__ = restore  # type: ignore[attr-defined]
+    return kind
+
+
+def read_only(value: Any) -> Any:
+    """Return a value whose arrays cannot be written to, also those in tuples and sparse matrices."""
+    if isinstance(value, np.ndarray):
+        value.flags.writeable = False
+    elif isinstance(value, tuple):
+        for each in value:
+            read_only(each)
+    elif sp.issparse(value):
+        for name in ("data", "indices", "indptr"):
+            read_only(getattr(value, name, None))
+    return value
