@@ -14,7 +14,9 @@ from floatframe.kernels.records import Size, integer, measured, real, zeros
 
 __all__ = [
     "BodyWork",
+    "BushingWork",
     "ConnectionWork",
+    "ContactWork",
     "Counted",
     "Iterate",
     "LineWork",
@@ -111,9 +113,53 @@ class ConnectionWork(NamedTuple):
 
 
 class PairWork(NamedTuple):
-    """What a bushing or contact makes of the motion of its markers, see kernels/connections/pair_law.py."""
+    """One bushing or contact, see kernels/connections/pair_force.py."""
 
-    numbers: Array = real(128)
+    law: Array = real(10, unit="N, N m, m/s")  #: F and M on A, N, of a contact v_0, as they follow from the motion
+    motion: Array = real(18)  #: variation of d, phi_A, phi_B, and of their rates
+    change: Array = real(10)  #: of `law` by it
+
+
+class BushingWork(NamedTuple):
+    """One bushing, see kernels/connections/bushing.py; axes of C."""
+
+    C: Array = real(3, 3)  #: middle axes, in ground axes
+    xi: Array = real(6, unit="m, rad")  #: e, theta
+    xi_dot: Array = real(6, unit="m/s, rad/s")
+    force: Array = real(6, unit="N, N m")  #: f, m
+    slope: Array = real(6, unit="N/m, N m")  #: of the tables
+    v: Array = real(3, unit="m/s")  #: d_dot
+    omega: Array = real(3, unit="rad/s")  #: of B less that of A
+    mean: Array = real(3, unit="rad/s")  #: of A and B
+    gamma: Array = real(3, unit="rad/s")  #: angular velocity of C
+    p: Array = real(3, unit="N m")  #: f × e
+    alpha: Array = real()
+    beta: Array = real()
+    alpha_1: Array = real()  #: alpha'/t
+    beta_1: Array = real()  #: beta'/t
+    tau: Array = real()
+    tau_1: Array = real()  #: tau'/t
+    dxi: Array = real(6, unit="m, rad")  #: changes by a variation
+    dxi_dot: Array = real(6, unit="m/s, rad/s")
+    dforce: Array = real(6, unit="N, N m")
+
+
+class ContactWork(NamedTuple):
+    """One contact, see kernels/connections/contact.py."""
+
+    N: Array = real(3)
+    d: Array = real(3, unit="m")
+    rho: Array = real(3, unit="m")
+    V: Array = real(3, unit="m/s")  #: velocity of B at the point of contact as seen from A
+    V_t: Array = real(3, unit="m/s")  #: slip
+    slip: Array = real(unit="m/s")  #: sqrt(|V_t|² + v_s²)
+    gap: Array = real(unit="m")
+    depth: Array = real(unit="m")
+    rate: Array = real(unit="m/s")  #: of the gap
+    f: Array = real(unit="N")
+    f_by_depth: Array = real(unit="N/m")
+    f_by_rate: Array = real(unit="N s/m")
+    v_0_by_rate: Array = real()
 
 
 class UserWork(NamedTuple):
@@ -180,6 +226,8 @@ class Work(NamedTuple):
     lines: LineWork = LineWork()
     connections: ConnectionWork = ConnectionWork()
     pair: PairWork = PairWork()
+    bushing: BushingWork = BushingWork()
+    contact: ContactWork = ContactWork()
     users: UserWork = UserWork()
     states: StateWork = StateWork()
     tapes: TapeWork = TapeWork()

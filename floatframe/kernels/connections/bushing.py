@@ -22,84 +22,48 @@ import math
 
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.time_function import time_function
-from floatframe.kernels.marker import cross, rotate, rotate_back
 from floatframe.kernels.rotation import exp_matrix
-from floatframe.kernels.vector import product, put_matrix
+from floatframe.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    norm,
+    product,
+    put,
+    put_matrix,
+    scaled,
+    sub,
+    transposed,
+    turned,
+    turned_back,
+    vector,
+)
 
 __all__ = ["bushing_energy", "bushing_power", "bushing_state", "bushing_variation"]
 
-# places in work.pair.numbers; C is the first nine
-E, THETA, Y, OMEGA, MEAN, GAMMA, E_DOT, THETA_DOT, F, M, P, SCALARS, SLOPE = (
-    9,
-    12,
-    15,
-    18,
-    21,
-    24,
-    27,
-    30,
-    33,
-    36,
-    39,
-    42,
-    48,
-)
-LAW, INPUT, OUTPUT = 60, 72, 90  # results: F, M, N; variations: dd, a, b, dv, domega_A, domega_B; their F, M, N
 SERIES_BELOW = 0.01  # t² at the switch
 A1, A2, A3, A4, A5 = 1 / 24, 7 / 5760, 31 / 967680, 127 / 154828800, 73 / 3503554560  # of alpha - 1 in t²
 
 
 @inner
-def dot(a0, a1, a2, b0, b1, b2):
-    """Return a · b."""
-    return a0 * b0 + a1 * b1 + a2 * b2
-
-
-@inner
-def three(s, k):
-    """Return three numbers from place k on."""
-    return s[k], s[k + 1], s[k + 2]
-
-
-@inner
-def put(s, k, x0, x1, x2):
-    """Write three numbers from place k on."""
-    s[k], s[k + 1], s[k + 2] = x0, x1, x2
-
-
-@inner
 def rotation_vector(A, B):
-    """Return the rotation vector of Aᵀ B, no longer than pi."""
-    x, y, z, w = 0.0, 0.0, 0.0, 1.0
-    for k in range(3):
-        w += A[k, 0] * B[k, 0] + A[k, 1] * B[k, 1] + A[k, 2] * B[k, 2]
-        x += A[k, 2] * B[k, 1] - A[k, 1] * B[k, 2]
-        y += A[k, 0] * B[k, 2] - A[k, 2] * B[k, 0]
-        z += A[k, 1] * B[k, 0] - A[k, 0] * B[k, 1]
-    if w < 1.0:  # more than 90 degrees: x from the symmetric part, x² = (1 + R00 - R11 - R22)/4 and so on
-        squares = (0.0, 0.0, 0.0)
-        trace = w - 1.0
-        r00, r11, r22, s01, s02, s12 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(3):
-            r00 += A[k, 0] * B[k, 0]
-            r11 += A[k, 1] * B[k, 1]
-            r22 += A[k, 2] * B[k, 2]
-            s01 += A[k, 0] * B[k, 1] + A[k, 1] * B[k, 0]
-            s02 += A[k, 0] * B[k, 2] + A[k, 2] * B[k, 0]
-            s12 += A[k, 1] * B[k, 2] + A[k, 2] * B[k, 1]
-        squares = (1 + 2 * r00 - trace, 1 + 2 * r11 - trace, 1 + 2 * r22 - trace)  # 4 x², 4 y², 4 z²
-        twist = (x, y, z)  # 4 w times x, y, z
-        if squares[0] >= squares[1] and squares[0] >= squares[2]:
-            x, y, z, w = squares[0], s01, s02, twist[0]
-        elif squares[1] >= squares[2]:
-            x, y, z, w = s01, squares[1], s12, twist[1]
-        else:
-            x, y, z, w = s02, s12, squares[2], twist[2]
+    """Return the rotation vector of R = Aᵀ B, no longer than pi, by a quaternion (w, x) of any length."""
+    R = product(transposed(A), B)
+    w = 1.0 + R[0][0] + R[1][1] + R[2][2]  # 4 w², and 4 w times x
+    x = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
+    if w < 1.0:  # more than 90 degrees: 4 times the largest of x, y, z times all of them
+        k = 0 if R[0][0] >= R[1][1] and R[0][0] >= R[2][2] else (1 if R[1][1] >= R[2][2] else 2)
+        symmetric = (
+            (2.0 + 2 * R[0][0] - w, R[0][1] + R[1][0], R[0][2] + R[2][0]),
+            (R[0][1] + R[1][0], 2.0 + 2 * R[1][1] - w, R[1][2] + R[2][1]),
+            (R[0][2] + R[2][0], R[1][2] + R[2][1], 2.0 + 2 * R[2][2] - w),
+        )
+        w, x = x[k], symmetric[k]
         if w < 0.0:
-            x, y, z, w = -x, -y, -z, -w
-    length = math.sqrt(x * x + y * y + z * z)
-    factor = 2.0 * math.atan2(length, w) / length if length > 0.0 else 0.0
-    return factor * x, factor * y, factor * z
+            w, x = -w, scaled(-1.0, x)
+    length = norm(x)
+    return scaled(2.0 * math.atan2(length, w) / length if length > 0.0 else 0.0, x)
 
 
 @inner
@@ -126,196 +90,123 @@ def scalars(t2):
 
 
 @inner
-def by_S(s, u0, u1, u2):
+def by_S(s, u):
     """Return S u."""
-    t0, t1, t2 = three(s, THETA)
-    f = s[SCALARS + 1] * dot(t0, t1, t2, u0, u1, u2)
-    alpha = s[SCALARS]
-    return alpha * u0 + f * t0, alpha * u1 + f * t1, alpha * u2 + f * t2
+    theta = vector(s.xi[3:])
+    return add(scaled(s.alpha, u), scaled(s.beta * dot(theta, u), theta))
 
 
 @inner
-def by_dS(s, k, h0, h1, h2, u0, u1, u2):
+def by_dS(s, k, h, u):
     """Return dS u for dtheta = h and k = theta · h."""
-    t0, t1, t2 = three(s, THETA)
-    beta, a, b = s[SCALARS + 1], s[SCALARS + 2] * k, s[SCALARS + 3] * k
-    along = dot(t0, t1, t2, u0, u1, u2)
-    f = b * along + beta * dot(h0, h1, h2, u0, u1, u2)
-    g = beta * along
-    return a * u0 + f * t0 + g * h0, a * u1 + f * t1 + g * h1, a * u2 + f * t2 + g * h2
+    theta = vector(s.xi[3:])
+    along = dot(theta, u)
+    by_theta = s.beta_1 * k * along + s.beta * dot(h, u)
+    return add(add(scaled(s.alpha_1 * k, u), scaled(by_theta, theta)), scaled(s.beta * along, h))
 
 
 @inner
-def law_of(K, x0, x1, x2, y0, y1, y2, r):
-    """Return component r of K (x, y)."""
-    row = K[r]
-    return row[0] * x0 + row[1] * x1 + row[2] * x2 + row[3] * y0 + row[4] * y1 + row[5] * y2
+def law(row, x):
+    """Return the product of a row of stiffness or damping, (6,), by deformations or their rates, (6,)."""
+    return row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3] * x[3] + row[4] * x[4] + row[5] * x[5]
 
 
 @inner
 def bushing_state(model, work, c):
-    """Write all that follows from the motion of the markers of bushing c into work.pair.numbers."""
-    a, b, s, K = (
-        model.connections.a[c],
-        model.connections.b[c],
-        work.pair.numbers,
-        model.bushings.stiffness[model.connections.item[c]],
-    )
-    D, preload = model.bushings.damping[model.connections.item[c]], model.bushings.preload[model.connections.item[c]]
-    A, B = work.markers.A[a], work.markers.A[b]
-    t0, t1, t2 = rotation_vector(A, B)
-    put(s, THETA, t0, t1, t2)
-    C = s[:9].reshape((3, 3))
-    put_matrix(C, product(A, exp_matrix((0.5 * t0, 0.5 * t1, 0.5 * t2))))
-    alpha, beta, alpha_1, beta_1, tau, tau_1 = scalars(t0 * t0 + t1 * t1 + t2 * t2)
-    put(s, SCALARS, alpha, beta, alpha_1)
-    put(s, SCALARS + 3, beta_1, tau, tau_1)
-    d, v, o, q = work.markers.r, work.markers.v, work.markers.omega[a], work.markers.omega[b]
-    e0, e1, e2 = rotate_back(C, d[b, 0] - d[a, 0], d[b, 1] - d[a, 1], d[b, 2] - d[a, 2])
-    y0, y1, y2 = rotate_back(C, v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2])
-    u0, u1, u2 = rotate_back(C, q[0] - o[0], q[1] - o[1], q[2] - o[2])
-    n0, n1, n2 = rotate_back(C, 0.5 * (q[0] + o[0]), 0.5 * (q[1] + o[1]), 0.5 * (q[2] + o[2]))
-    x0, x1, x2 = cross(t0, t1, t2, u0, u1, u2)
-    g0, g1, g2 = n0 - tau * x0, n1 - tau * x1, n2 - tau * x2
-    x0, x1, x2 = cross(e0, e1, e2, g0, g1, g2)
-    ed0, ed1, ed2 = y0 + x0, y1 + x1, y2 + x2
-    td0, td1, td2 = by_S(s, u0, u1, u2)
-    put(s, E, e0, e1, e2)
-    put(s, Y, y0, y1, y2)
-    put(s, OMEGA, u0, u1, u2)
-    put(s, MEAN, n0, n1, n2)
-    put(s, GAMMA, g0, g1, g2)
-    put(s, E_DOT, ed0, ed1, ed2)
-    put(s, THETA_DOT, td0, td1, td2)
+    """Write what follows from the motion of bushing c into work.bushing, F, M and N into work.pair."""
+    a, b, i, markers = model.connections.a[c], model.connections.b[c], model.connections.item[c], work.markers
+    s, K, D = work.bushing, model.bushings.stiffness[i], model.bushings.damping[i]
+    theta = rotation_vector(markers.A[a], markers.A[b])
+    C = product(markers.A[a], exp_matrix(scaled(0.5, theta)))
+    s.alpha, s.beta, s.alpha_1, s.beta_1, s.tau, s.tau_1 = scalars(dot(theta, theta))
+    omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
+    e = turned_back(C, sub(markers.r[b], markers.r[a]))
+    put(s.xi, 0, e)
+    put(s.xi, 3, theta)
+    v = turned_back(C, sub(markers.v[b], markers.v[a]))
+    omega = turned_back(C, sub(omega_b, omega_a))
+    mean = turned_back(C, scaled(0.5, add(omega_a, omega_b)))
+    gamma = sub(mean, scaled(s.tau, cross(theta, omega)))
+    put(s.xi_dot, 0, add(v, cross(e, gamma)))
+    put(s.xi_dot, 3, by_S(s, omega))
     for r in range(6):
-        value = law_of(K, e0, e1, e2, t0, t1, t2, r) + law_of(D, ed0, ed1, ed2, td0, td1, td2, r) + preload[r]
-        s[SLOPE + r] = 0.0
-        table = model.bushings.table[model.connections.item[c], r]
+        s.force[r] = law(K[r], s.xi) + law(D[r], s.xi_dot) + model.bushings.preload[i, r]
+        s.slope[r] = 0.0
+        table = model.bushings.table[i, r]
         if table >= 0:
-            own, slope, _ = time_function(model, table, s[E + r])
-            value += own
-            s[SLOPE + r] = slope
-        s[F + r] = value
-    f0, f1, f2 = three(s, F)
-    p0, p1, p2 = cross(f0, f1, f2, e0, e1, e2)
-    put(s, P, p0, p1, p2)
-    h0, h1, h2 = cross(t0, t1, t2, p0, p1, p2)
-    m0, m1, m2 = by_S(s, s[M], s[M + 1], s[M + 2])
-    h0, h1, h2 = tau * h0 + m0, tau * h1 + m1, tau * h2 + m2
-    x0, x1, x2 = rotate(C, f0, f1, f2)
-    put(s, LAW, x0, x1, x2)
-    x0, x1, x2 = rotate(C, h0 - 0.5 * p0, h1 - 0.5 * p1, h2 - 0.5 * p2)
-    put(s, LAW + 3, x0, x1, x2)
-    x0, x1, x2 = rotate(C, h0 + 0.5 * p0, h1 + 0.5 * p1, h2 + 0.5 * p2)
-    put(s, LAW + 6, x0, x1, x2)
+            value, s.slope[r], _ = time_function(model, table, s.xi[r])
+            s.force[r] += value
+    f, m = vector(s.force), vector(s.force[3:])
+    p = cross(f, e)
+    turning = add(scaled(s.tau, cross(theta, p)), by_S(s, m))
+    put_matrix(s.C, C)
+    put(s.v, 0, v)
+    put(s.omega, 0, omega)
+    put(s.mean, 0, mean)
+    put(s.gamma, 0, gamma)
+    put(s.p, 0, p)
+    put(work.pair.law, 0, turned(C, f))
+    put(work.pair.law, 3, turned(C, sub(turning, scaled(0.5, p))))
+    put(work.pair.law, 6, turned(C, add(turning, scaled(0.5, p))))
 
 
 @inner
 def bushing_variation(model, work, c):
-    """Write the change of F, M, N for the variation of the motion in work.pair.numbers, ground axes."""
-    s, K = work.pair.numbers, model.bushings.stiffness[model.connections.item[c]]
-    D = model.bushings.damping[model.connections.item[c]]
-    C = s[:9].reshape((3, 3))
-    tau, tau_1 = s[SCALARS + 4], s[SCALARS + 5]
-    e0, e1, e2 = three(s, E)
-    t0, t1, t2 = three(s, THETA)
-    w0, w1, w2 = three(s, OMEGA)
-    g0, g1, g2 = three(s, GAMMA)
-    d0, d1, d2 = rotate_back(C, s[INPUT], s[INPUT + 1], s[INPUT + 2])
-    a0, a1, a2 = rotate_back(C, s[INPUT + 3], s[INPUT + 4], s[INPUT + 5])
-    b0, b1, b2 = rotate_back(C, s[INPUT + 6], s[INPUT + 7], s[INPUT + 8])
-    v0, v1, v2 = rotate_back(C, s[INPUT + 9], s[INPUT + 10], s[INPUT + 11])
-    oa0, oa1, oa2 = rotate_back(C, s[INPUT + 12], s[INPUT + 13], s[INPUT + 14])
-    ob0, ob1, ob2 = rotate_back(C, s[INPUT + 15], s[INPUT + 16], s[INPUT + 17])
-    u0, u1, u2 = b0 - a0, b1 - a1, b2 - a2
-    x0, x1, x2 = cross(t0, t1, t2, u0, u1, u2)
-    c0, c1, c2 = 0.5 * (a0 + b0) - tau * x0, 0.5 * (a1 + b1) - tau * x1, 0.5 * (a2 + b2) - tau * x2
-    h0, h1, h2 = by_S(s, u0, u1, u2)
-    k = dot(t0, t1, t2, h0, h1, h2)
-    x0, x1, x2 = cross(e0, e1, e2, c0, c1, c2)
-    de0, de1, de2 = d0 + x0, d1 + x1, d2 + x2
+    """Write the change of F, M, N for the variation of the motion in work.pair, ground axes."""
+    s, pair, i = work.bushing, work.pair, model.connections.item[c]
+    K, D, C = model.bushings.stiffness[i], model.bushings.damping[i], matrix(s.C)
+    e, theta, omega, gamma = vector(s.xi), vector(s.xi[3:]), vector(s.omega), vector(s.gamma)
+    a, b = turned_back(C, pair.motion[3:6]), turned_back(C, pair.motion[6:9])
+    u = sub(b, a)
+    dc = sub(scaled(0.5, add(a, b)), scaled(s.tau, cross(theta, u)))
+    dtheta = by_S(s, u)
+    k = dot(theta, dtheta)
+    de = add(turned_back(C, pair.motion[:3]), cross(e, dc))
     # rates
-    x0, x1, x2 = cross(s[Y], s[Y + 1], s[Y + 2], c0, c1, c2)
-    dy0, dy1, dy2 = v0 + x0, v1 + x1, v2 + x2
-    x0, x1, x2 = cross(w0, w1, w2, c0, c1, c2)
-    dw0, dw1, dw2 = ob0 - oa0 + x0, ob1 - oa1 + x1, ob2 - oa2 + x2
-    x0, x1, x2 = cross(s[MEAN], s[MEAN + 1], s[MEAN + 2], c0, c1, c2)
-    n0, n1, n2 = 0.5 * (oa0 + ob0) + x0, 0.5 * (oa1 + ob1) + x1, 0.5 * (oa2 + ob2) + x2
-    x0, x1, x2 = by_S(s, dw0, dw1, dw2)
-    y0, y1, y2 = by_dS(s, k, h0, h1, h2, w0, w1, w2)
-    dt0, dt1, dt2 = x0 + y0, x1 + y1, x2 + y2
-    x0, x1, x2 = cross(t0, t1, t2, w0, w1, w2)
-    y0, y1, y2 = cross(h0, h1, h2, w0, w1, w2)
-    z0, z1, z2 = cross(t0, t1, t2, dw0, dw1, dw2)
-    n0 -= tau_1 * k * x0 + tau * (y0 + z0)
-    n1 -= tau_1 * k * x1 + tau * (y1 + z1)
-    n2 -= tau_1 * k * x2 + tau * (y2 + z2)
-    x0, x1, x2 = cross(de0, de1, de2, g0, g1, g2)
-    y0, y1, y2 = cross(e0, e1, e2, n0, n1, n2)
-    dd0, dd1, dd2 = dy0 + x0 + y0, dy1 + x1 + y1, dy2 + x2 + y2
+    domega_a, domega_b = turned_back(C, pair.motion[12:15]), turned_back(C, pair.motion[15:18])
+    dv = add(turned_back(C, pair.motion[9:12]), cross(s.v, dc))
+    domega = add(sub(domega_b, domega_a), cross(omega, dc))
+    dmean = add(scaled(0.5, add(domega_a, domega_b)), cross(s.mean, dc))
+    by_turn = add(scaled(s.tau_1 * k, cross(theta, omega)), scaled(s.tau, cross(dtheta, omega)))
+    dgamma = sub(dmean, add(by_turn, scaled(s.tau, cross(theta, domega))))
+    put(s.dxi, 0, de)
+    put(s.dxi, 3, dtheta)
+    put(s.dxi_dot, 0, add(dv, add(cross(de, gamma), cross(e, dgamma))))
+    put(s.dxi_dot, 3, add(by_S(s, domega), by_dS(s, k, dtheta, omega)))
     # force and torque in C
-    out = s[OUTPUT : OUTPUT + 9]
-    change = (de0, de1, de2, h0, h1, h2)
     for r in range(6):
-        out[r] = (
-            law_of(K, de0, de1, de2, h0, h1, h2, r)
-            + law_of(D, dd0, dd1, dd2, dt0, dt1, dt2, r)
-            + s[SLOPE + r] * change[r]
-        )
-    df0, df1, df2 = three(out, 0)
-    f0, f1, f2 = three(s, F)
-    p0, p1, p2 = three(s, P)
-    x0, x1, x2 = cross(df0, df1, df2, e0, e1, e2)
-    y0, y1, y2 = cross(f0, f1, f2, de0, de1, de2)
-    dp0, dp1, dp2 = x0 + y0, x1 + y1, x2 + y2
-    x0, x1, x2 = cross(t0, t1, t2, p0, p1, p2)
-    y0, y1, y2 = cross(h0, h1, h2, p0, p1, p2)
-    z0, z1, z2 = cross(t0, t1, t2, dp0, dp1, dp2)
-    m0, m1, m2 = by_S(s, out[3], out[4], out[5])
-    l0, l1, l2 = by_dS(s, k, h0, h1, h2, s[M], s[M + 1], s[M + 2])
-    m0 += l0 + tau_1 * k * x0 + tau * (y0 + z0)
-    m1 += l1 + tau_1 * k * x1 + tau * (y1 + z1)
-    m2 += l2 + tau_1 * k * x2 + tau * (y2 + z2)
-    turn_with(C, out, 0, c0, c1, c2, df0, df1, df2, s[LAW], s[LAW + 1], s[LAW + 2])
-    turn_with(C, out, 3, c0, c1, c2, m0 - 0.5 * dp0, m1 - 0.5 * dp1, m2 - 0.5 * dp2, s[LAW + 3], s[LAW + 4], s[LAW + 5])
-    turn_with(C, out, 6, c0, c1, c2, m0 + 0.5 * dp0, m1 + 0.5 * dp1, m2 + 0.5 * dp2, s[LAW + 6], s[LAW + 7], s[LAW + 8])
-
-
-@inner
-def turn_with(C, out, k, c0, c1, c2, x0, x1, x2, X0, X1, X2):
-    """Write C x + (C c) × X from place k on: the change in ground axes of a vector X, x its change in C."""
-    g0, g1, g2 = rotate(C, c0, c1, c2)
-    y0, y1, y2 = cross(g0, g1, g2, X0, X1, X2)
-    x0, x1, x2 = rotate(C, x0, x1, x2)
-    put(out, k, x0 + y0, x1 + y1, x2 + y2)
+        s.dforce[r] = law(K[r], s.dxi) + law(D[r], s.dxi_dot) + s.slope[r] * s.dxi[r]
+    f, m, p, df, dm = vector(s.force), vector(s.force[3:]), vector(s.p), vector(s.dforce), vector(s.dforce[3:])
+    dp = add(cross(df, e), cross(f, de))
+    by_turn = add(scaled(s.tau_1 * k, cross(theta, p)), scaled(s.tau, cross(dtheta, p)))
+    by_force = add(scaled(s.tau, cross(theta, dp)), by_S(s, dm))
+    turning = add(add(by_turn, by_force), by_dS(s, k, dtheta, m))
+    turn = turned(C, dc)
+    put(pair.change, 0, add(turned(C, df), cross(turn, pair.law)))
+    put(pair.change, 3, add(turned(C, sub(turning, scaled(0.5, dp))), cross(turn, pair.law[3:])))
+    put(pair.change, 6, add(turned(C, add(turning, scaled(0.5, dp))), cross(turn, pair.law[6:])))
 
 
 @inner
 def bushing_energy(model, work, c):
     """Return 1/2 xiᵀ K xi + preload · xi; tables count as forces, see `bushing_power`."""
-    s, K = work.pair.numbers, model.bushings.stiffness[model.connections.item[c]]
-    preload = model.bushings.preload[model.connections.item[c]]
+    s, i = work.bushing, model.connections.item[c]
     bushing_state(model, work, c)
     total = 0.0
     for r in range(6):
-        linear = law_of(K, s[E], s[E + 1], s[E + 2], s[THETA], s[THETA + 1], s[THETA + 2], r)
-        total += s[E + r] * (0.5 * linear + preload[r])
+        total += s.xi[r] * (0.5 * law(model.bushings.stiffness[i, r], s.xi) + model.bushings.preload[i, r])
     return total
 
 
 @inner
 def bushing_power(model, work, c):
     """Return the power that enters by tables, and that taken by damping."""
-    s, D = work.pair.numbers, model.bushings.damping[model.connections.item[c]]
+    s, i = work.bushing, model.connections.item[c]
     bushing_state(model, work, c)
     given, taken = 0.0, 0.0
     for r in range(6):
-        rate = s[E_DOT + r]
-        taken += rate * law_of(
-            D, s[E_DOT], s[E_DOT + 1], s[E_DOT + 2], s[THETA_DOT], s[THETA_DOT + 1], s[THETA_DOT + 2], r
-        )
-        table = model.bushings.table[model.connections.item[c], r]
-        if table >= 0:
-            value, _, _ = time_function(model, table, s[E + r])
-            given -= value * rate
+        taken += s.xi_dot[r] * law(model.bushings.damping[i, r], s.xi_dot)
+        if model.bushings.table[i, r] >= 0:
+            value, _, _ = time_function(model, model.bushings.table[i, r], s.xi[r])
+            given -= value * s.xi_dot[r]
     return given, taken

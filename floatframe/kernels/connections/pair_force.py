@@ -6,15 +6,7 @@ rates of these three, one after the other.
 """
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.bushing import (
-    INPUT,
-    LAW,
-    OUTPUT,
-    bushing_energy,
-    bushing_power,
-    bushing_state,
-    bushing_variation,
-)
+from floatframe.kernels.connections.bushing import bushing_energy, bushing_power, bushing_state, bushing_variation
 from floatframe.kernels.connections.contact import contact_energy, contact_power, contact_state, contact_variation
 from floatframe.kernels.model import BUSHING
 
@@ -23,7 +15,7 @@ __all__ = ["pair_derivatives", "pair_energy", "pair_power", "pair_rows"]
 
 @inner
 def pair_state(model, work, c):
-    """Write what follows from the motion of the markers of connection c into work.pair.numbers."""
+    """Write the wrench that follows from the motion of the markers of connection c into work.pair."""
     if model.connections.law[c] == BUSHING:
         bushing_state(model, work, c)
     else:
@@ -36,41 +28,39 @@ def pair_rows(model, work, c, c_k):
     pair_state(model, work, c)
     w0 = model.connections.w0[c]
     for k in range(model.connections.size[c]):
-        work.connections.g[w0 + k] = c_k * (work.state.w[w0 + k] - work.pair.numbers[LAW + k])
+        work.connections.g[w0 + k] = c_k * (work.state.w[w0 + k] - work.pair.law[k])
 
 
 @inner
 def pair_derivatives(model, work, c, c_k):
-    """Write P at both markers and V of connection c; both are zero before."""
-    a, b, size = model.connections.a[c], model.connections.b[c], model.connections.size[c]
-    P_a, P_b, V, s = work.connections.P[a], work.connections.P[b], work.connections.V[c], work.pair.numbers
+    """Write P at both markers and V of connection c; both are zero before.
+
+    The parts of the motion and where they stand in P: d = r_B - r_A moves with both markers, phi_A and phi_B with one;
+    then the same of the rates.
+    """
+    size, pair = model.connections.size[c], work.pair
+    P_a, P_b = work.connections.P[model.connections.a[c]], work.connections.P[model.connections.b[c]]
     pair_state(model, work, c)
     for r in range(size):
-        V[r, r] = 1.0
+        work.connections.V[c, r, r] = 1.0
     for k in range(18):
-        s[INPUT + k] = 0.0
+        pair.motion[k] = 0.0
     for k in range(18):
-        s[INPUT + k] = 1.0
+        pair.motion[k] = 1.0
         if model.connections.law[c] == BUSHING:
             bushing_variation(model, work, c)
         else:
             contact_variation(model, work, c)
-        s[INPUT + k] = 0.0
-        part, j = k // 3, k % 3
+        pair.motion[k] = 0.0
+        part, j = k // 3 % 3, 6 * (k // 9) + k % 3  # d, phi_A or phi_B; column in P of r or v
         for r in range(size):
-            change = c_k * s[OUTPUT + r]
+            change = c_k * pair.change[r]
             if part == 0:
                 P_a[r, j], P_b[r, j] = change, -change
             elif part == 1:
                 P_a[r, 3 + j] = -change
-            elif part == 2:
-                P_b[r, 3 + j] = -change
-            elif part == 3:
-                P_a[r, 6 + j], P_b[r, 6 + j] = change, -change
-            elif part == 4:
-                P_a[r, 9 + j] = -change
             else:
-                P_b[r, 9 + j] = -change
+                P_b[r, 3 + j] = -change
 
 
 @inner

@@ -47,7 +47,7 @@ def gap_at(system, prepare):
     prepare(iterate)
     n_u = int(iterate.model.bodies.u0[-1])
     iterate.residual(np.zeros(n_u), np.zeros(iterate.n_w))
-    return float(iterate.work.pair.numbers[15])
+    return float(iterate.work.contact.gap)
 
 
 @pytest.mark.parametrize("radius_a", [None, 0.2], ids=["plane", "sphere"])
