@@ -20,6 +20,7 @@ from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_basis.frames import (
     BuckensFrame,
     Frame,
+    HeldFrame,
     NodalFrame,
     TisserandFrame,
     checked_dofs,
@@ -66,6 +67,12 @@ def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None
         (a file of version 1) for a Buckens frame; if a rigid-body motion is among its shapes; or if it has a geometric
         stiffness and the reaction of the new frame is no combination of its unit loads (`geometric_conversion`).
     """
+    if reduced.is_held or isinstance(frame, HeldFrame):
+        raise BodyError(
+            f"reduced body {reduced.name!r}: a body that is held to the ground has the frame of the ground, and a "
+            "free one "
+            "any other; reduce it anew with or without its supports"
+        )
     C, target = condition_of(reduced, frame)  # (1)
     require_convertible(reduced, target)
     Y, M_R = rigid_mass(reduced.moments)

@@ -13,7 +13,7 @@ from cms.families.sharing import body_of
 from cms.mode_set import ModeSet
 from cms.reduced_basis.damping import Damping, modal_damping
 from cms.reduced_basis.finishing import FinishedBasis, finish
-from cms.reduced_basis.frames import Frame, TisserandFrame, frame_condition
+from cms.reduced_basis.frames import Frame, HeldFrame, TisserandFrame, frame_condition
 from cms.reduced_basis.matrix_moments import gram_from_matrices
 from cms.reduced_basis.node_motion import reference_motion
 from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
@@ -35,7 +35,7 @@ def reduce(
     source: FEBody | Families,
     modes: ModeSet,
     *,
-    frame: Frame | None = None,
+    frame: Frame | HeldFrame | None = None,
     damping: Damping | None = None,
     stress: bool = True,
     geometric: bool | UnitStates = False,
@@ -50,7 +50,7 @@ def reduce(
     modes
         A mode set of that body.
     frame
-        Body reference frame; Tisserand (mean axis) by default.
+        Body reference frame; Tisserand (mean axis) by default, of a held body the ground.
     damping
         Added to the body's own D, which is projected; none by default.
     stress
@@ -81,7 +81,7 @@ def reduce(
             f"reduce: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body "
             f"{body.name!r} has {body.n_dof}; make the set from this body"
         )
-    frame = frame or TisserandFrame()
+    frame = frame or (HeldFrame() if body.is_held else TisserandFrame())
     condition = frame_condition(body, frame)
     if states is not None:
         require_states_of(body, condition.frame, states)

@@ -1,6 +1,7 @@
 """Bodies from the matrices of another program: plain arrays, or an .npz file."""
 
 import hashlib
+import logging
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
@@ -10,17 +11,24 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from fe_models.body.fe_body import FEBody, Interface, put_translations
+from fe_models.body.freedom import rigid_forces
+from fe_models.body.held_causes import mistake_of, support_words
 from fe_models.body.mass_loads import MassLoads
+from fe_models.body.positive_mass import DENSE, negative_mass, positive_mass
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
+from fe_models.reports.unit_check import implausible_matrices
 from fe_models.solids.body import scalar_mass_gram
 
 __all__ = ["ScalarMassModel", "body_from_matrices", "body_from_npz", "scalar_mass_of"]
+
+log = logging.getLogger(__name__)
 
 PATTERN_TOLERANCE = 1e-10  #: largest |M - M_s ⊗ 1₃| / |M| that is taken for rounding of the other program
 INTERFACE_KEYS = ("kind", "nodes", "reference", "triad", "weights")
@@ -89,6 +97,9 @@ def body_from_matrices(
     D: Any = None,
     surface: Any = None,
     provenance: Mapping[str, str] | None = None,
+    held: bool = False,
+    mend_mass: bool = False,
+    accept: Iterable[str] = (),
 ) -> FEBody:
     """Make a body of mass and stiffness from any program.
 
@@ -105,11 +116,21 @@ def body_from_matrices(
         Node and component (0-2 translation, 3-5 rotation, mesh axes) of every row, in any order, (n_dof, 2).
     name, units, interfaces, surface, provenance
         As in `FEBody`.
+    held
+        Whether the body is meant to be held to the ground, by springs, supports or rows that were taken out. It is
+        labelled so (`FEBody.is_held`): it can be checked, reduced, compared and exported, a floating frame refuses it.
+    mend_mass
+        Whether slightly negative eigenvalues of M, as some programs write them, are set to zero (`positive_mass`).
+    accept
+        Findings to accept: "units", that size, density or wave speed are implausible.
 
     Raises
     ------
     BodyError
-        If shapes do not fit, a matrix is not symmetric or finite, or two rows are the same dof.
+        If shapes do not fit, a matrix is not symmetric or finite, a component is not 0 to 5, or two rows are the same
+        dof; if K answers rigid-body motion and the body is not said to be held, or a mistake explains it (rows in
+        another order, exchanged nodes, a penalty on the diagonal); if it is said to be held and is free; if M is
+        indefinite; if no body in these units has such a size, density or wave speed.
     """
     where = f"body {name!r}"
     nodes, dofs = np.asarray(nodes, dtype=float), np.asarray(dofs)
@@ -119,6 +140,11 @@ def body_from_matrices(
     sparse = {key: sp.csc_array(matrix, dtype=float) for key, matrix in matrices.items()}
     for key, matrix in sparse.items():
         require_both_triangles(f"{where}: {key}", matrix)
+    if dofs.ndim == 2 and dofs.shape[1] == 2 and len(dofs) and (dofs[:, 1] < 0).any():
+        raise BodyError(
+            f"{where}: dofs: expected components 0 to 5, got {int(dofs[:, 1].min())} in row "
+            f"{int(np.argmin(dofs[:, 1]))}; multipliers and other dofs without displacement are no part of a body"
+        )
     record = dict(provenance or {}) | {"mesh": (provenance or {}).get("mesh", "matrices")}
     body = FEBody(
         name=name,
@@ -135,10 +161,90 @@ def body_from_matrices(
     if len(unique) < len(body.dofs):
         node, component = unique[count > 1][0]
         raise BodyError(f"{where}: dofs: component {component} of node {node} is listed {count.max()} times")
+    require_freedom(body, held=held)
+    require_units(body, accept=tuple(accept))
+    if mend_mass:
+        body = positive_mass(body)
+        record |= {key: value for key, value in body.provenance.items() if key == "mass mended"}
+    else:
+        require_positive_mass(body)
     M_s = scalar_mass_of(body)
     record["mass moments"] = "approximate: M is not M_s ⊗ 1" if M_s is None else "exact: M = M_s ⊗ 1"
     model = None if M_s is None else ScalarMassModel(name, M_s, body.nodes, body.dofs)
-    return replace(body, element_model=model, provenance=record)
+    if held:
+        record["held"] = "to the ground, as it was said"
+    return replace(body, element_model=model, provenance=record, is_held=held)
+
+
+def require_freedom(body: FEBody, *, held: bool) -> None:
+    """Raise `BodyError` unless the body is free, or held as it is said to be and by no mistake."""
+    where = f"body {body.name!r}"
+    forces = rigid_forces(body.K, body.M, body.nodes, body.dofs)
+    mass = np.diag(forces.mass)[:3]
+    if not mass.max() > 0:
+        raise BodyError(f"{where}: M: expected a positive mass, got {mass.max():.4g}")
+    if forces.is_free:
+        if held:
+            raise BodyError(f"{where}: held: K answers no rigid-body motion, so the body is free; remove held")
+        return
+    mistake = mistake_of(body.K, body.M, body.nodes, body.dofs, forces, with_rows=not held)
+    if mistake is not None:
+        raise BodyError(f"{where}: these are not the matrices of a free body: {mistake}")
+    words = support_words(forces, body.dofs, body.units.time)
+    if not held:
+        raise BodyError(
+            f"{where}: these are not the matrices of a free body: {words}. Release it; or if it is meant to be held "
+            "(springs to the ground, supports), say so: held = true in the [body] of a job or in the file, "
+            "held=True in "
+            "Python. A held body can be reduced, checked and compared, but no floating frame can take it"
+        )
+    if n_free := forces.n_free:
+        raise BodyError(
+            f"{where}: held: {n_free} of the rigid-body motions stay free while others are held ({words}); expected a "
+            "body that is held in all of them, or free in all"
+        )
+
+
+def require_positive_mass(body: FEBody) -> None:
+    """Raise `BodyError` if M is indefinite by more than rounding; large matrices are left to the eigensolver."""
+    if body.n_dof > DENSE:
+        return
+    values, _ = negative_mass(body.M, body.dofs)
+    if len(values):
+        raise BodyError(
+            f"body {body.name!r}: M is indefinite: {len(values)} eigenvalues below zero, down to {values[0]:.1e} of "
+            "the "
+            "largest (translations and rotations scaled alike): motions with negative kinetic energy. If that is the "
+            "rounding of another program, mend_mass = true in the [body] of a job, mend_mass=True in Python sets them "
+            "to zero and tells what that changes; else mend the matrix"
+        )
+
+
+def require_units(body: FEBody, *, accept: tuple[str, ...]) -> None:
+    """Raise `BodyError` if no body in these units has such a size, density or wave speed; warn of what is doubtful."""
+    if unknown := set(accept) - {"units"}:
+        raise BodyError(f"body {body.name!r}: accept: unknown {unknown.pop()!r}; expected 'units'")
+    mass = float(np.diag(rigid_forces(body.K, body.M, body.nodes, body.dofs).mass)[:3].max())
+    for is_error, text in implausible_matrices(body.units, body.nodes, mass, wave_speeds(body)):
+        if is_error and "units" not in accept:
+            raise BodyError(f"body {body.name!r}: {text}; or accept = [\"units\"] if it is meant")
+        log.warning("body %r: %s", body.name, text)
+
+
+def wave_speeds(body: FEBody) -> Array:
+    """Return sqrt(K_kk / M_kk) times the distance to the nearest node, of translations with mass, (k,).
+
+    In a fine mesh that is the speed of waves times a number between 1 and 10.
+    """
+    used = np.unique(body.dofs[:, 0])
+    if len(used) < 2:
+        return np.zeros(0)
+    distance = np.zeros(len(body.nodes))
+    distance[used] = cKDTree(body.nodes[used]).query(body.nodes[used], k=2)[0][:, 1]
+    K, M = body.K.diagonal(), body.M.diagonal()
+    rows = np.flatnonzero((body.dofs[:, 1] < 3) & (M > 0) & (K > 0))
+    speed = np.sqrt(K[rows] / M[rows]) * distance[body.dofs[rows, 0]]
+    return np.asarray(speed[speed > 0])
 
 
 def scalar_mass_of(body: FEBody) -> sp.csr_array | None:
@@ -179,7 +285,15 @@ def require_both_triangles(where: str, matrix: sp.csc_array) -> None:
         )
 
 
-def body_from_npz(path: str | Path, *, name: str | None = None, units: Units | None = None) -> FEBody:
+def body_from_npz(
+    path: str | Path,
+    *,
+    name: str | None = None,
+    units: Units | None = None,
+    held: bool = False,
+    mend_mass: bool = False,
+    accept: Iterable[str] = (),
+) -> FEBody:
     """Read a body from an .npz archive of plain arrays (`numpy.savez`); pickled objects are refused.
 
     =================================  ==============================================================================
@@ -191,6 +305,7 @@ def body_from_npz(path: str | Path, *, name: str | None = None, units: Units | N
     nodes                              (n_nodes, 3)
     dofs                               (n_dof, 2): node, from 0, and component, 0-2 translation and 3-5 rotation
     units (or the argument `units`)    name of the unit system, such as "mm-t-s"
+    held (optional)                    1: the body is meant to be held to the ground
     surface (optional)                 triangles of nodes for drawing, (n_tri, 3)
     interface/<name>/nodes             members; and for the same <name>, optional:
     interface/<name>/kind              "rigid" (default), "distributing" or "nodes"
@@ -198,6 +313,11 @@ def body_from_npz(path: str | Path, *, name: str | None = None, units: Units | N
     interface/<name>/triad             (3, 3), axes as columns, default: mesh axes
     interface/<name>/weights           (n_members,), default: equal
     =================================  ==============================================================================
+
+    Parameters
+    ----------
+    held, mend_mass, accept
+        As for `body_from_matrices`; held also by the key of the file.
 
     Raises
     ------
@@ -208,7 +328,7 @@ def body_from_npz(path: str | Path, *, name: str | None = None, units: Units | N
     """
     path = Path(path)
     arrays = read_arrays(path)
-    known = {"nodes", "dofs", "units", "surface"}
+    known = {"nodes", "dofs", "units", "surface", "held"}
     known |= {key + part for key in "MKD" for part in ("", "_row", "_col", "_data", "_indptr", "_indices")}
     for key in arrays:
         if key not in known and not key.startswith("interface/"):
@@ -231,7 +351,20 @@ def body_from_npz(path: str | Path, *, name: str | None = None, units: Units | N
         D=sparse_of(path, arrays, "D", n_dof) if has_damping else None,
         surface=arrays.get("surface"),
         provenance={"mesh": str(path), "mesh sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
+        held=held or is_held(path, arrays),
+        mend_mass=mend_mass,
+        accept=accept,
     )
+
+
+def is_held(path: Path, arrays: Mapping[str, np.ndarray]) -> bool:
+    """Return what the key `held` says; False where there is none."""
+    if "held" not in arrays:
+        return False
+    value = arrays["held"]
+    if value.size != 1 or value.dtype.kind not in "biu" or value.item() not in (0, 1):
+        raise MeshError(f"{path}: held: expected one number, 0 or 1, got {value.dtype} {value.shape}")
+    return bool(value.item())
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:

@@ -228,6 +228,8 @@ class Families:
     # -- inside ----------------------------------------------------------------------------------------------------
 
     def _require_free(self) -> None:
+        if self.body.is_held:
+            return  # as it is meant to be: it has no rigid-body motion
         force = np.abs(self.body.K @ self.Psi_R).max(axis=0)
         scale = np.abs(self.body.K).max() * np.abs(self.Psi_R).max(axis=0)
         if (force > GROUNDED * scale).any():

@@ -201,6 +201,8 @@ def _free_motions(condensed: CondensedBody, conditions: BoundaryConditions) -> A
     """Return the rigid-body motions the conditions leave free, (n_dof, n_n)."""
     h, Z = condensed.fixed.b, conditions.Z
     Psi_R = condensed.Psi_R
+    if not Psi_R.shape[1]:
+        return Psi_R  # a held body has none
     size = _lengths(condensed.body, h, np.eye(len(h)))
     scaled = Psi_R[h] / size[:, None]
     column = np.abs(scaled).max(axis=0)

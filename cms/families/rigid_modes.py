@@ -63,7 +63,7 @@ def determinate_dofs(body: FEBody, candidates: IntArray) -> IntArray:
 
 
 def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
-    """Rigid-body modes about the mean of the nodes, without those the body's dofs do not know.
+    """Rigid-body modes about the mean of the nodes, without those the body's dofs do not know; none of a held body.
 
     Returns
     -------
@@ -77,6 +77,8 @@ def independent_rigid_modes(body: FEBody) -> tuple[Array, IntArray]:
     BodyError
         If the body has no displacement dofs.
     """
+    if body.is_held:
+        return np.zeros((body.n_dof, 0)), np.zeros(0, np.int64)
     Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
     scaled = _in_lengths(body, Psi_R)
     scaled[:, 3:] /= body.length or 1.0
@@ -107,6 +109,8 @@ def determinate_partition(body: FEBody, Psi_R: Array) -> tuple[IntArray, IntArra
     extra
         Those of them that are interior dofs; empty for a body whose interfaces hold it.
     """
+    if not Psi_R.shape[1]:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
     scaled = _in_lengths(body, Psi_R)
     scaled /= np.abs(scaled).max(axis=0)
     n_r = scaled.shape[1]

@@ -90,5 +90,8 @@ def body_of_matrices(job: Job, path: Path, stages: Stages) -> FEBody:
     from fe_models.matrices import body_from_npz
 
     with stages("read matrices"):
-        body = body_from_npz(path, name=job.body.name, units=unit_system(job.body.units))
+        body = body_from_npz(
+            path, name=job.body.name, units=unit_system(job.body.units), held=bool(job.body.held),
+            mend_mass=bool(job.body.mend_mass), accept=[word for word in job.body.accept if word == "units"],
+        )  # fmt: skip
         return body.with_load_cases(*load_cases_of(job, body))

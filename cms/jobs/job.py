@@ -96,6 +96,12 @@ class BodySection(Table):
     units: choice("unit system", lambda: tuple(UNIT_SYSTEMS)) = Field(  # type: ignore[valid-type]
         description=f"the unit system of the numbers, one of {', '.join(UNIT_SYSTEMS)}"
     )
+    held: bool | None = Field(
+        None, description="true or false, for matrices: whether the body is meant to be held to the ground"
+    )
+    mend_mass: bool | None = Field(
+        None, description="true or false, for matrices: whether slightly negative masses are set to zero"
+    )
     accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
 
     @field_validator("mesh", "matrices", "nodes", "lines", mode="before")
@@ -112,6 +118,9 @@ class BodySection(Table):
     def _one_source(self) -> "BodySection":
         if (self.nodes is None) != (self.lines is None):
             raise ValueError(f"{'lines' if self.nodes else 'nodes'}: missing; tables of nodes and lines come together")
+        for key in ("held", "mend_mass"):
+            if getattr(self, key) is not None and self.matrices is None:
+                raise ValueError(f"{key}: belongs to matrices; a body built from a mesh is free, its mass positive")
         if self.part is not None and self.matrices is not None:
             raise ValueError("part: matrices cannot be cut; remove it, or give the mesh")
         given = [key for key in ("mesh", "matrices", "lines") if getattr(self, key) is not None]

@@ -10,14 +10,17 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase
 
 if TYPE_CHECKING:
-    from cms.reduced_basis.frames import Frame
+    from cms.reduced_basis.frames import Frame, HeldFrame
     from fe_models.material import Material
     from fe_models.meshes.line_mesh import LineMesh
     from fe_models.meshes.mesh import Mesh
     from fe_models.meshes.shell_mesh import ShellMesh
     from fe_models.meshes.split import AnyMesh
 
-__all__ = ["frame_of", "interface_of", "interfaces_of", "load_cases_of", "materials_of", "part_of_mesh", "selection_of"]
+__all__ = [
+    "frame_of", "interface_of", "interfaces_of", "load_cases_of", "materials_of", "moving_frame_of", "part_of_mesh",
+    "selection_of",
+]  # fmt: skip
 
 
 def part_of_mesh(job: Job, mesh: "AnyMesh") -> "AnyMesh":
@@ -104,8 +107,24 @@ def load_case_of(
     return loads.selection_load(body, mesh, name, chosen, force=force, torque=torque, reference=section.reference)
 
 
-def frame_of(job: Job) -> "Frame":
-    """Return the body frame of the job."""
+def frame_of(job: Job, *, held: bool = False) -> "Frame | HeldFrame":
+    """Return the body frame of the job; of a held body it is the ground, and no other may be asked for."""
+    from cms.reduced_basis.frames import HeldFrame
+
+    reduction = job.reduction
+    if held:
+        if "frame" in reduction.model_fields_set:
+            raise JobError(
+                f'reduction.frame = "{reduction.frame}": body {job.body.name!r} is held to the ground, as it was '
+                'said; its '
+                "frame is the ground: remove frame"
+            )
+        return HeldFrame(reduction.origin, reduction.axes)
+    return moving_frame_of(job)
+
+
+def moving_frame_of(job: Job) -> "Frame":
+    """Return the body frame of the job for a body that is free."""
     from cms.reduced_basis.frames import FRAMES, NodalFrame
 
     reduction = job.reduction

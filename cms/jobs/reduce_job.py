@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
-from cms.jobs.parts_of_job import frame_of
+from cms.jobs.parts_of_job import frame_of, moving_frame_of
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.stages import Stages
@@ -55,7 +55,7 @@ def reduce_job(
         return reduce(
             coupled,
             modes,
-            frame=frame_of(job),
+            frame=frame_of(job, held=coupled.is_held),
             damping=None if job.damping is None else job.damping.damping,
             stress=job.reduction.stress is not False,
             quadratic=bool(job.reduction.quadratic_modes),
@@ -81,4 +81,4 @@ def modes_and_states(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSe
         if not wanted and not job.reduction.quadratic_modes:
             return modes, None
         with stages("static states"):
-            return modes, unit_states(families, frame=frame_of(job))
+            return modes, unit_states(families, frame=moving_frame_of(job))

@@ -13,7 +13,8 @@ from fe_models.foundation.units import Units, unit_system
 
 __all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
 
-VERSION = 2  #: of the format; a reader refuses greater ones, and reads all that are less
+VERSION = 3  #: of the format; a reader refuses greater ones, and reads all that are less
+FREE_VERSION = 2  #: of files of free bodies: what version 3 adds, bodies that are held, is not in them
 KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 
 
@@ -25,7 +26,7 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
     ModalFileError
         If the file cannot be written.
     """
-    write_sealed(content_of(reduced, VERSION), path)
+    write_sealed(content_of(reduced, VERSION if reduced.is_held else FREE_VERSION), path)
 
 
 def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> ReducedBody:

@@ -180,14 +180,14 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
 
 
 def free_elastic(Q: Columns, G_K: Array, elastic: Array, condition: FrameCondition, omega2_1: float) -> Array:
-    """Squared elastic frequencies of the unsupported reduced body, ascending [1/s²]: its pencil in mean axes.
+    """Squared elastic frequencies of the reduced body without joints, ascending [1/s²]: its pencil in mean axes.
 
     The mean-axis mass QᵀMQ - Yᵀ (Psi_RᵀMPsi_R)⁻¹ Y, Y = Psi_RᵀMQ, from Gram matrices alone.
     """
     Y = condition.M_Psi_R.T @ Q.X
     rigid_mass = condition.Psi_R.T @ condition.M_Psi_R
     scale = np.sqrt(np.diag(rigid_mass))
-    if not scale.all() or np.linalg.cond(rigid_mass / np.outer(scale, scale)) > 1e12:
+    if len(scale) and (not scale.all() or np.linalg.cond(rigid_mass / np.outer(scale, scale)) > 1e12):
         return np.zeros(0)  # a body without inertia about some axis has no mean axes
     G_M = gram(Q.X, Q.MX) - Y.T @ np.linalg.solve(rigid_mass, Y)
     A_K = within(G_K, elastic)

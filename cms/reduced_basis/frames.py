@@ -19,8 +19,8 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = [
-    "FRAMES", "BuckensFrame", "Frame", "FrameCondition", "NodalFrame", "TisserandFrame", "determinate_rows",
-    "frame_condition",
+    "FRAMES", "BuckensFrame", "Frame", "FrameCondition", "HeldFrame", "NodalFrame", "TisserandFrame",
+    "determinate_rows", "frame_condition",
 ]  # fmt: skip
 
 RANK_TOLERANCE = 1e-8  #: least pivot of the held dofs: a lever arm over the width of the nodes
@@ -60,6 +60,14 @@ class BuckensFrame:
     axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
 
 
+@dataclass(frozen=True)
+class HeldFrame:
+    """The frame of a body that is held to the ground: the mesh axes, which no elastic displacement turns or shifts."""
+
+    origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the mesh origin
+    axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
+
+
 Frame = NodalFrame | TisserandFrame | BuckensFrame
 FRAMES: dict[str, type[Frame]] = {"nodal": NodalFrame, "tisserand": TisserandFrame, "buckens": BuckensFrame}
 
@@ -70,8 +78,8 @@ class FrameCondition:
 
     frame: BodyFrame
     rigid_part: Callable[[Array], Array]  #: columns (n_dof, k) -> C (6, k): what to take off as Psi_R C
-    Psi_R: Array  #: rigid-body modes about the centre of mass, (n_dof, 6)
-    M_Psi_R: Array  #: (n_dof, 6)
+    Psi_R: Array  #: rigid-body modes about the centre of mass, (n_dof, 6); of a held body (n_dof, 0)
+    M_Psi_R: Array  #: M times them, as wide
     W: Array  #: W Psi_R, whose rows the condition is: Psi_Rᵀ W u = 0, (n_dof, 6)
     center: Array  #: the centre of mass, which Psi_R is about, mesh axes, (3,) [m]
 
@@ -80,7 +88,7 @@ class FrameCondition:
         return columns - self.Psi_R @ self.rigid_part(columns)
 
 
-def frame_condition(body: FEBody, frame: Frame) -> FrameCondition:
+def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
     """Make the frame ready for a body: the dofs or the mass matrix it rests on, its origin.
 
     Raises
@@ -88,6 +96,16 @@ def frame_condition(body: FEBody, frame: Frame) -> FrameCondition:
     BodyError
         If the named interface or the given dofs do not hold the body, or the body has no mass or no inertia.
     """
+    if isinstance(frame, HeldFrame) != body.is_held:
+        raise BodyError(
+            f"body {body.name!r}: is held to the ground, as it was said; its frame is the ground: leave the frame out"
+            if body.is_held
+            else f"body {body.name!r}: is free; a HeldFrame is that of a body which is held to the ground"
+        )
+    if isinstance(frame, HeldFrame):
+        none = np.zeros((body.n_dof, 0))
+        at = placed("held", frame, np.zeros(3))
+        return FrameCondition(at, lambda columns: np.zeros((0, columns.shape[1])), none, none, none, np.zeros(3))
     Psi_0 = geometric_rigid_modes(body)
     rigid_mass = Psi_0.T @ (body.M @ Psi_0)
     mass = rigid_mass[0, 0]
@@ -133,7 +151,7 @@ def frame_condition(body: FEBody, frame: Frame) -> FrameCondition:
     )
 
 
-def placed(kind: str, frame: Frame, default_origin: Array, held: IntArray | None = None) -> BodyFrame:
+def placed(kind: str, frame: Frame | HeldFrame, default_origin: Array, held: IntArray | None = None) -> BodyFrame:
     """Return the body frame with its origin and axes, as asked for or the default ones."""
     origin = default_origin if frame.origin is None else np.asarray(frame.origin, dtype=float)
     axes = np.eye(3) if frame.axes is None else np.array(frame.axes, dtype=float).T

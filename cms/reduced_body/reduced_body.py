@@ -28,7 +28,7 @@ class BodyFrame:
     c_mesh = origin + axes @ c_B.
     """
 
-    kind: str  #: "nodal", "tisserand" or "buckens"
+    kind: str  #: "nodal", "tisserand" or "buckens"; "held": the body is held to the ground, and no frame can move
     origin: Array  #: in mesh coordinates, (3,) [m]
     axes: Array = field(default_factory=lambda: np.eye(3))  #: columns: axes of B in mesh axes, (3, 3)
     at: str = ""  #: interface that carries a nodal frame; "": other dofs
@@ -89,7 +89,7 @@ class ReducedBody:
     energy_shares: Array  #: share of each source column group in the mode's energy, (n_q, n_sources)
     sources: tuple[str, ...]  #: names of the groups of source columns, (n_sources,)
     moments: Moments
-    free_frequencies: Array  #: of the unsupported reduced body, elastic only, ascending [Hz]
+    free_frequencies: Array  #: of the reduced body without joints, elastic only, ascending [Hz]; a held body as held
     nodes: Array  #: kept nodes (surface, interfaces) in B, (n_kept, 3) [m]
     node_ids: IntArray  #: their indices in the mesh the body came from, (n_kept,)
     Phi: Array  #: translations of the kept nodes in B, (n_kept, 3, n_q)
@@ -171,6 +171,11 @@ class ReducedBody:
     def n_q(self) -> int:
         """Number of modes."""
         return np.asarray(self.K).shape[0]
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the body is held to the ground, as it is meant to be; no floating frame can take it."""
+        return self.frame.kind == "held"
 
     @property
     def frequencies(self) -> Array:

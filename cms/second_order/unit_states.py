@@ -65,7 +65,7 @@ def states_of(source: FEBody | Families, condition: FrameCondition) -> UnitState
 
 def has_geometric_stiffness(body: FEBody) -> bool:
     """Return whether the elements behind the body know their geometric stiffness."""
-    return body.element_model is not None and body.element_model.has_geometric_stiffness
+    return not body.is_held and body.element_model is not None and body.element_model.has_geometric_stiffness
 
 
 def require_geometric_stiffness(body: FEBody) -> None:

@@ -189,6 +189,8 @@ def refuse_negative(theta: Array) -> None:
     """Refuse a pencil with eigenvalues below the shift."""
     if len(theta) and theta[-1] < -NEGATIVE * theta[0]:
         raise EigenError(
-            "eigenmodes: an eigenvalue omega² lies below the shift; expected a stiffness without negative energy, and "
-            "a shift below its lowest mode"
+            "eigenmodes: an eigenvalue omega² lies below the shift; expected a stiffness and a mass without negative "
+            "energy, and a shift below the lowest mode. A mass that is slightly indefinite, as some programs write "
+            "it, is "
+            "mended by mend_mass = true in the [body] of a job, mend_mass=True of body_from_matrices"
         )

@@ -191,7 +191,7 @@ class Recovery:
 
 @dataclass(frozen=True, eq=False)
 class FEBody:
-    """Finite element model of one free body.
+    """Finite element model of one body: free, or held to the ground where it says so.
 
     Dof k is component `dofs[k, 1]` (0-2 translation, 3-5 rotation, `MULTIPLIER`) of node `dofs[k, 0]`, mesh axes.
     A body is *coupled* when every interface has its boundary dofs (`cms.couple`); mode sets want a coupled body.
@@ -218,6 +218,7 @@ class FEBody:
     #: volume each node stands for, none negative, (n_nodes,) [m³]; None: unknown, nodes with translations count equally
     node_volumes: Array | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)  #: where it came from: file, digest, options
+    is_held: bool = False  #: whether it is held to the ground, as it is meant to be; no floating frame takes it
 
     def __post_init__(self) -> None:
         where = f"body {self.name!r}"

@@ -1,17 +1,25 @@
-"""Whether size, density and modulus are plausible in the unit system they are said to be in."""
+"""Whether size, density, modulus, frequency and wave speed are plausible in the unit system they are said to be in."""
 
 from collections.abc import Iterable
 from typing import Protocol
 
+import numpy as np
+
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.units import UNIT_SYSTEMS, Units
 
-__all__ = ["implausible_units"]
+__all__ = ["hull_volume", "implausible_matrices", "implausible_motion", "implausible_units"]
 
 SIZE = (1e-4, 1e3)  #: diagonal of a body [m]
 DENSITY = (10.0, 25_000.0)  #: from rigid foam to osmium [kg/m³]
 MODULUS = (1e3, 2e12)  #: from soft gel to above diamond [Pa]
 WAVE_SPEED = (10.0, 30_000.0)  #: sqrt(E / rho): from soft rubber to above diamond [m/s]
 STEEL = 7850.0  #: [kg/m³]
+LIGHTEST = 1e-3  #: mass over the volume of the convex hull, which is full of air in a frame [kg/m³]
+MESHED_SPEED = (1.0, 3e5)  #: sqrt(K_kk / M_kk) times the distance of nodes: waves times up to ten [m/s]
+SWING_SPEED = (1e-3, 6e4)  #: 2 f L of the first elastic frequency: waves or less, far less in a slender body [m/s]
+FLAT = 1e-6  #: thickness of a cloud of points over its size, below which it has no volume
+LENGTHS = {1e-3: "mm", 1e3: "m", 0.0254: "inches"}  #: by what nodes are multiplied that seem to be in another length
 
 
 class _Elastic(Protocol):
@@ -40,15 +48,7 @@ def implausible_units(units: Units, size: float, materials: Iterable[_Elastic]) 
     fitting = [u.name for u in UNIT_SYSTEMS.values() if u.name != units.name and _fits(u, size, materials)]
     advice = f"all numbers would fit {' or '.join(fitting)}" if fitting else "no known unit system fits all numbers"
     advice = f"{advice}; change the units or the numbers"
-    metres = size * units.length
-    if not SIZE[0] <= metres <= SIZE[1]:
-        texts.append(
-            (
-                True,
-                f"units {units.name}: the body is {size:.4g} {units.length_symbol} = {metres:.4g} m large; "
-                f"expected {SIZE[0]:g} to {SIZE[1]:g} m. {advice}",
-            )
-        )
+    texts += [(is_error, f"units {units.name}: {text}. {advice}") for is_error, text in size_findings(units, size)]
     for material in materials:
         rho = material.rho * units.to_si(mass=1, length=-3)
         E = material.E * units.to_si(mass=1, length=-1, time=-2)
@@ -85,6 +85,103 @@ def implausible_units(units: Units, size: float, materials: Iterable[_Elastic]) 
                     )
                 )
     return texts
+
+
+def implausible_matrices(units: Units, nodes: Array, mass: float, speeds: Array) -> list[tuple[bool, str]]:
+    """Return (is an error, text) for what is implausible about bare matrices and the nodes beside them.
+
+    Parameters
+    ----------
+    units
+        The declared unit system.
+    nodes
+        (n_nodes, 3), in its length unit.
+    mass
+        Of the body, in its mass unit.
+    speeds
+        sqrt(K_kk / M_kk) times the distance to the nearest node, of many rows; empty: not known.
+    """
+    texts = _matrix_findings(units, nodes, mass, speeds)
+    if not texts:
+        return []
+    moved = [
+        f"the nodes seem to be in {words} beside matrices in {units.name}: times {factor:g} all numbers would fit"
+        for factor, words in LENGTHS.items()
+        if not _matrix_findings(units, factor * np.asarray(nodes), mass, factor * np.asarray(speeds))
+    ]
+    fitting = moved[:1] + [
+        f"all numbers would fit {other.name}"
+        for other in UNIT_SYSTEMS.values()
+        if other.name != units.name and not _matrix_findings(other, nodes, mass, speeds)
+    ]
+    advice = " or ".join(fitting) or "no known unit system fits all numbers"
+    advice += "; change the units or the numbers"
+    return [(is_error, f"units {units.name}: {text}; {advice}") for is_error, text in texts]
+
+
+def _matrix_findings(units: Units, nodes: Array, mass: float, speeds: Array) -> list[tuple[bool, str]]:
+    size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+    texts = size_findings(units, size)
+    hull = hull_volume(nodes)
+    volume = hull or size**3
+    if volume > 0:
+        rho = mass / volume * units.to_si(mass=1, length=-3)
+        if rho > DENSITY[1] or (hull and rho < LIGHTEST):
+            place = "a convex hull" if hull else "a cube around all nodes"
+            texts.append((
+                True,
+                f"the mass is {mass:.4g} {units.mass_symbol} in {place} of {volume:.4g} {units.length_symbol}³, "
+                f"{rho:.4g} kg/m³; expected {LIGHTEST:g} to {DENSITY[1]:g} kg/m³",
+            ))  # fmt: skip
+    if len(speeds):
+        speed = float(np.median(speeds)) * units.to_si(length=1, time=-1)
+        if not MESHED_SPEED[0] <= speed <= MESHED_SPEED[1]:
+            texts.append((
+                speed > MESHED_SPEED[1],
+                f"from node to node waves would run at about {speed:.4g} m/s; expected {MESHED_SPEED[0]:g} to "
+                f"{MESHED_SPEED[1]:g} m/s",
+            ))  # fmt: skip
+    return texts
+
+
+def implausible_motion(units: Units, nodes: Array, mass: float, frequency: float | None) -> list[str]:
+    """Return texts about size, density and first elastic frequency of a body that are implausible.
+
+    Parameters
+    ----------
+    frequency
+        Lowest elastic frequency of the free body [Hz]; None: there is none.
+    """
+    texts = [text for _, text in _matrix_findings(units, nodes, mass, np.zeros(0))] if len(nodes) else []
+    size = float(np.linalg.norm(np.ptp(nodes, axis=0))) * units.length if len(nodes) else 0.0
+    if frequency is not None and size > 0:
+        speed = 2 * frequency * size
+        if not SWING_SPEED[0] <= speed <= SWING_SPEED[1]:
+            texts.append(
+                f"it is {size:.4g} m large and vibrates from {frequency:.4g} Hz on, as if waves "
+                f"ran at {speed:.4g} m/s; expected {SWING_SPEED[0]:g} to {SWING_SPEED[1]:g} m/s"
+            )
+    return texts
+
+
+def size_findings(units: Units, size: float) -> list[tuple[bool, str]]:
+    """Return the finding about a size in the length unit, if it is implausible."""
+    metres = size * units.length
+    if size == 0 or SIZE[0] <= metres <= SIZE[1]:
+        return []
+    return [(True, f"the body is {size:.4g} {units.length_symbol} = {metres:.4g} m large; expected {SIZE[0]:g} to "
+                   f"{SIZE[1]:g} m")]  # fmt: skip
+
+
+def hull_volume(points: Array) -> float:
+    """Volume of the convex hull of points; 0 where they lie in a plane, or on a line."""
+    from scipy.spatial import ConvexHull
+
+    centered = np.asarray(points) - np.mean(points, axis=0)
+    extents = np.linalg.svd(centered, compute_uv=False) if len(centered) > 3 else np.zeros(3)
+    if len(extents) < 3 or extents[2] <= FLAT * extents[0]:
+        return 0.0
+    return float(ConvexHull(centered).volume)
 
 
 def _fits(units: Units, size: float, materials: list[_Elastic]) -> bool:

@@ -45,6 +45,12 @@ class FlexibleBody:
 
     def __post_init__(self) -> None:
         where = f"flexible body {self.name!r}"
+        if self.reduced.is_held:
+            raise ModelError(
+                f"{where}: the reduced body {self.reduced.name!r} is held to the ground, and a floating frame "
+                "carries a "
+                "body that is free; reduce it anew without its supports, and hold it here by joints or bushings"
+            )
         put = object.__setattr__
         for name in ("position", "velocity", "omega_B"):
             put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))

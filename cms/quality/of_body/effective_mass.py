@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.quality.record import QualityRecord, information, judge
-from cms.quality.reference.free_pencil import free_pencil, port_rows, stiffness_scale
+from cms.quality.reference.free_pencil import stiffness_scale, whole_pencil, whole_port_rows
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
@@ -44,14 +44,16 @@ class EffectiveMass:
 def effective_mass(reduced: ReducedBody, at: str) -> EffectiveMass:
     """Effective modal mass for base motion of an interface, from a modal file alone, whatever its frame.
 
-    (1) x = T q with the interface held: rigid motion takes back Psi q, x_r = -G⁻¹ Psi q, G the port's rigid part
+    (1) x = T q with the interface held: rigid motion takes back Psi q, x_r = -G⁻¹ Psi q, G the port's rigid part. A
+        held body is driven by the ground instead: x_r = 0, and the interface only says about which point
     (2) modes of Tᵀ M T, K*
     (3) participation L_k = z_kᵀ Tᵀ M X_r of unit rigid motions X_r about the interface; effective mass L_k²
 
     The sum over all modes of the full model is the rigid mass less what sits on the interface itself.
     """
-    pencil, rows = free_pencil(reduced), port_rows(reduced, at)
-    T = np.vstack([-np.linalg.solve(rows[:, :6], rows[:, 6:]), np.eye(reduced.n_q)])  # (1)
+    pencil, rows = whole_pencil(reduced), whole_port_rows(reduced, at)
+    back = 0 * rows[:, 6:] if reduced.is_held else -np.linalg.solve(rows[:, :6], rows[:, 6:])
+    T = np.vstack([back, np.eye(reduced.n_q)])  # (1)
     M = T.T @ pencil.M @ T
     Z, is_massive = elastic_eigenvectors(reduced.K, (M + M.T) / 2, stiffness_scale(reduced))  # (2)
     Z = Z[:, is_massive]

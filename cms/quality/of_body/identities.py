@@ -80,7 +80,7 @@ def check_free_frequencies(reduced: ReducedBody) -> QualityRecord:
     They couple 1C, 2C, S, R and m with K and M, so a wrong sign in one of them shows.
     """
     stored = np.asarray(reduced.free_frequencies)
-    if not has_inertia(reduced):
+    if not reduced.is_held and not has_inertia(reduced):
         return information("free-frequencies", "the body has no inertia about some axis, so no free-free frequencies")
     try:
         omega2, _, is_massive = free_elastic_modes(reduced)

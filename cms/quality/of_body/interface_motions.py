@@ -62,9 +62,10 @@ def missing_motions(reduced: ReducedBody) -> Array:
     weight = np.sqrt(stiffness_scale(reduced) / np.where(stiffness > 0, stiffness, np.inf))
     scale = np.tile(np.repeat([1.0, length], 3), len(reduced.interfaces))
     A = scale[:, None] * np.vstack([port_rows(reduced, interface.name) for interface in reduced.interfaces])
-    A[:, 3:6] /= length
-    A[:, :6] /= np.sqrt(reduced.moments.m)
-    A[:, 6:] *= weight
+    n_r = A.shape[1] - reduced.n_q
+    A[:, 3:n_r] /= length
+    A[:, :n_r] /= np.sqrt(reduced.moments.m)
+    A[:, n_r:] *= weight
     wanted = np.concatenate([provided_rows(interface) for interface in reduced.interfaces])
     row_size = np.linalg.norm(A[wanted], axis=1, keepdims=True)
     U, singular, _ = np.linalg.svd(A[wanted] / np.where(row_size > 0, row_size, 1.0))

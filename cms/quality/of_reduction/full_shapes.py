@@ -16,7 +16,7 @@ from cms.quality.record import QualityRecord, information, judge
 from cms.quality.reference.free_basis import FreeBasis
 from cms.quality.reference.ports import Ports
 from cms.reduced_basis.finishing import finish
-from cms.reduced_basis.frames import FRAMES, Axes, Frame, NodalFrame, frame_condition
+from cms.reduced_basis.frames import FRAMES, Axes, Frame, HeldFrame, NodalFrame, frame_condition
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
@@ -90,13 +90,15 @@ def finished_again(body: FEBody, basis: FreeBasis, reduced: ReducedBody) -> Arra
         return None
 
 
-def named_frame(frame: BodyFrame) -> Frame:
+def named_frame(frame: BodyFrame) -> Frame | HeldFrame:
     """Return the frame that a file names."""
     x, y, z = frame.origin.tolist()
     axes = cast(Axes, tuple(tuple(float(v) for v in axis) for axis in frame.axes.T))
     if frame.kind == "nodal":
         dofs = None if frame.at or not len(frame.dofs) else tuple((int(n), int(c)) for n, c in frame.dofs)
         return NodalFrame(frame.at or None, (x, y, z), axes, dofs)
+    if frame.kind == "held":
+        return HeldFrame((x, y, z), axes)
     if frame.kind not in FRAMES:
         raise BodyError(f"frame kind {frame.kind!r} is unknown; expected one of {', '.join(FRAMES)}")
     return FRAMES[frame.kind](origin=(x, y, z), axes=axes)

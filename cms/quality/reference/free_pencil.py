@@ -9,18 +9,23 @@ from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, frozen
 
-__all__ = ["FreePencil", "free_elastic_modes", "free_pencil", "has_inertia", "port_rows"]
+__all__ = [
+    "FreePencil", "free_elastic_modes", "free_pencil", "has_inertia", "port_rows", "whole_pencil", "whole_port_rows",
+]  # fmt: skip
 
 NO_INERTIA = 1e-12  #: least eigenvalue of the scaled rigid mass matrix, below which there is no inertia about an axis
 
 
 @dataclass(frozen=True, eq=False)
 class FreePencil:
-    """M x'' + D x' + K x = f for x = (translation of B, rotation of B, q), small motion, components in B."""
+    """M x'' + D x' + K x = f for x = (translation of B, rotation of B, q), small motion, components in B.
 
-    M: Array  #: (6 + n_q, 6 + n_q)
-    K: Array  #: (6 + n_q, 6 + n_q)
-    D: Array  #: (6 + n_q, 6 + n_q)
+    Of a held body x = q alone: its frame does not move.
+    """
+
+    M: Array  #: (n_r + n_q, n_r + n_q), n_r = 6, of a held body 0
+    K: Array  #: (n_r + n_q, n_r + n_q)
+    D: Array  #: (n_r + n_q, n_r + n_q)
 
     def __post_init__(self) -> None:
         for name in ("M", "K", "D"):
@@ -28,6 +33,11 @@ class FreePencil:
 
 
 def free_pencil(reduced: ReducedBody) -> FreePencil:
+    """Return the pencil of a body without joints; of a held body that of its modes alone."""
+    return FreePencil(reduced.M, reduced.K, reduced.D) if reduced.is_held else whole_pencil(reduced)
+
+
+def whole_pencil(reduced: ReducedBody) -> FreePencil:
     """Return the pencil of docs/theory.md §6 at rest.
 
     M = [m 1, -S~, 1C; S~, J(0), 2C; 1Cᵀ, 2Cᵀ, M*], K = diag(0, K*), D = diag(0, D*).
@@ -56,7 +66,7 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
     omega2
         Squared frequencies, stiffness of massless shapes, (n,) [1/s²].
     X
-        Shapes over x, (6 + n_q, n).
+        Shapes over x, (n_r + n_q, n).
     is_massive
         (n,) bool.
 
@@ -66,8 +76,9 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
         If the body has no inertia about some axis, or a mode neither stiffness nor mass.
     """
     pencil = free_pencil(reduced)
-    M_rr, M_rq = pencil.M[:6, :6], pencil.M[:6, 6:]
-    T = np.vstack([-np.linalg.solve(M_rr, M_rq), np.eye(reduced.n_q)])
+    T = np.eye(reduced.n_q)
+    if not reduced.is_held:
+        T = np.vstack([-np.linalg.solve(pencil.M[:6, :6], pencil.M[:6, 6:]), T])
     G_M = T.T @ pencil.M @ T
     Z, is_massive = elastic_eigenvectors(reduced.K, (G_M + G_M.T) / 2, stiffness_scale(reduced))
     omega2 = np.einsum("kq,kl,lq->q", Z, reduced.K, Z)
@@ -77,7 +88,7 @@ def free_elastic_modes(reduced: ReducedBody) -> tuple[Array, Array, np.ndarray]:
 
 def has_inertia(reduced: ReducedBody) -> bool:
     """Whether the rigid body has mass and a moment of inertia about every axis, by its scaled mass matrix."""
-    M_rr = free_pencil(reduced).M[:6, :6]
+    M_rr = whole_pencil(reduced).M[:6, :6]
     size = np.sqrt(np.maximum(np.diag(M_rr), 0.0))
     return bool((size > 0).all() and np.linalg.eigvalsh(M_rr / np.outer(size, size))[0] > NO_INERTIA)
 
@@ -90,7 +101,14 @@ def stiffness_scale(reduced: ReducedBody) -> float:
 
 
 def port_rows(reduced: ReducedBody, name: str) -> Array:
-    """Motion of an interface's reference point with x, components in B, (6, 6 + n_q)."""
+    """Motion of an interface's reference point with x, components in B, (6, n_r + n_q)."""
+    if reduced.is_held:
+        return np.asarray(reduced.interface(name).Psi)
+    return whole_port_rows(reduced, name)
+
+
+def whole_port_rows(reduced: ReducedBody, name: str) -> Array:
+    """Motion of an interface's reference point with rigid motion and modes, components in B, (6, 6 + n_q)."""
     interface = reduced.interface(name)
     rows = np.zeros((6, 6 + reduced.n_q))
     rows[:3, :6] = rigid_motion_of_points(interface.position[None], np.zeros(3))[0]

@@ -83,14 +83,15 @@ def port_model(reduced: ReducedBody) -> PortModel:
     """Return the free modes of a reduced body at its interfaces, from its file alone."""
     omega2, X, is_massive = free_elastic_modes(reduced)
     rows = mesh_port_rows(reduced)
-    M_rr = free_pencil(reduced).M[:6, :6]
-    N = np.linalg.inv(np.linalg.cholesky(M_rr)).T
+    N = np.zeros((0, 0))
+    if not reduced.is_held:
+        N = np.linalg.inv(np.linalg.cholesky(free_pencil(reduced).M[:6, :6])).T
     names = tuple(interface.name for interface in reduced.interfaces)
-    return PortModel(names, omega2, is_massive, rows @ X, rows[:, :6] @ N)
+    return PortModel(names, omega2, is_massive, rows @ X, rows[:, : len(N)] @ N)
 
 
 def mesh_port_rows(reduced: ReducedBody) -> Array:
-    """Motion of all reference points with x, components in mesh axes, (6 n_ports, 6 + n_q)."""
+    """Motion of all reference points with x, components in mesh axes, (6 n_ports, n_r + n_q)."""
     if not reduced.interfaces:
         raise QualityError(f"body {reduced.name!r}: has no interface; forces and motions need a place")
     turn = np.kron(np.eye(2), reduced.frame.axes)

@@ -1,0 +1,136 @@
+"""Why matrices are those of no free body: a support that is meant, or a mistake that can be named.
+
+A support answers translations where it stands. Rows in another order answer everywhere, and fit once they are put in
+order; nodes that are not where K has them answer turns alone; a penalty stands out on the diagonal.
+"""
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+
+from fe_models.body.freedom import MOTIONS, RigidForces, rigid_forces
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import node_list
+
+__all__ = ["mistake_of", "support_words"]
+
+PENALTY = 1e6  #: of the median of the diagonal, in a row that answers with nearly all of its stiffness
+ALONE = 0.9  #: share of a row that counts as nearly all
+LENGTHS = {1e-3: "mm beside matrices in m", 1e3: "m beside matrices in mm", 0.0254: "inches beside matrices in m",
+           1 / 0.0254: "m beside matrices in inches"}  # fmt: skip
+#: by what the nodes would have to be multiplied: what they are in
+MOST_SOLVED = 3000  #: dofs of suspected nodes whose true places are sought
+APART = 1e-3  #: distance from a node to its true place over the size of the body, that is a mistake
+
+
+def mistake_of(
+    K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces, *, with_rows: bool
+) -> str | None:
+    """Return in words what is wrong with matrices that are not free; None if a support explains them.
+
+    (1) a penalty on the diagonal
+    (2) the same matrices are free with their rows in another order, or with the nodes in another unit
+    (3) turns are answered and translations are not, and not by springs of rotations: nodes are not where K has them;
+        their true places u = -K_SS⁻¹ K_S,rest Psi_rest, S the dofs of suspected nodes, tell which
+    (4) rows that other nodes have are missing (only `with_rows`)
+
+    Parameters
+    ----------
+    forces
+        `rigid_forces` of these matrices.
+    with_rows
+        Whether missing rows are a mistake; where the body is said to be held they are its support.
+    """
+    diagonal = np.abs(K.diagonal())
+    median = float(np.median(diagonal[diagonal > 0])) if (diagonal > 0).any() else 1.0
+    is_penalty = (diagonal > PENALTY * median) & (forces.share.max(axis=1, initial=0.0) > ALONE)
+    if is_penalty.any():  # (1)
+        k = int(np.argmax(np.where(is_penalty, diagonal, 0.0)))
+        return (
+            f"K has {diagonal[k]:.3g} on the diagonal of row {k} (node {dofs[k, 0]}, component {dofs[k, 1]}), the "
+            "median "
+            f"is {median:.3g}: a support by penalty ({int(is_penalty.sum())} such rows), which costs the digits of "
+            "everything beside it; give the matrices without it"
+        )
+    if order := fitting_order(K, M, nodes, dofs):  # (2)
+        return f"the rows are in {order} order and dofs list another; list the dofs in the order of the rows"
+    for factor, words in LENGTHS.items():
+        if rigid_forces(K, M, factor * nodes, dofs).is_free:
+            return f"the nodes are in {words}: times {factor:.6g} everything fits; mend the nodes"
+    turns_only = not forces.is_answered[:3].any() and bool(forces.is_possible[:3].all())
+    if turns_only and (dofs[forces.rows, 1] < 3).any():  # (3)
+        moved = moved_words(K, nodes, dofs, forces)
+        return f"K answers turns and no translation: nodes are not where K has them{moved}"
+    missing = missing_rows(dofs, len(nodes))
+    if with_rows and len(missing):  # (4)
+        node, component = missing[0]
+        return (
+            f"{len(missing)} rows that other nodes have are missing, such as component {component} of node {node}: "
+            "rows "
+            "taken out hold the body to the ground; give all rows, or say that the body is held"
+        )
+    return None
+
+
+def fitting_order(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray) -> str:
+    """Return the order of rows in which these matrices are free; "" if it is none of the usual ones."""
+    node, component = dofs.T
+    orders = {"component-major": np.lexsort((node, component)), "node-major": np.lexsort((component, node))}
+    for name, order in orders.items():
+        if not np.array_equal(order, np.arange(len(dofs))) and rigid_forces(K, M, nodes, dofs[order]).is_free:
+            return name
+    return ""
+
+
+def moved_words(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces) -> str:
+    """Say which nodes are elsewhere, as far as that can be told."""
+    suspected = np.unique(dofs[forces.rows, 0])
+    S = np.flatnonzero(np.isin(dofs[:, 0], suspected))
+    rest = np.flatnonzero(~np.isin(dofs[:, 0], suspected))
+    if len(S) > MOST_SOLVED or len(rest) < 6:
+        return "; mend the nodes, or the order of the dofs"
+    center = nodes.mean(axis=0)
+    from fe_models.body.rigid_motion import rigid_motion_of_dofs
+
+    Psi = rigid_motion_of_dofs(nodes, dofs, center)[:, 3:]
+    try:
+        u = sla.splu(sp.csc_array(K[S][:, S])).solve(-np.asarray(K[S][:, rest] @ Psi[rest]))
+    except RuntimeError:  # the suspected nodes are a mechanism by themselves
+        return "; mend the nodes, or the order of the dofs"
+    place = np.full((len(nodes), 3), np.nan)
+    node, component = dofs[S].T
+    for target, (along, turn, sign) in enumerate(((1, 2, 1.0), (2, 0, 1.0), (0, 1, 1.0))):
+        rows = np.flatnonzero(component == along)  # a turn about z moves points along y by x
+        place[node[rows], target] = sign * u[rows, turn] + center[target]
+    distance = np.linalg.norm(place[suspected] - nodes[suspected], axis=1)
+    is_apart = distance > APART * np.linalg.norm(np.ptp(nodes, axis=0))
+    wrong = suspected[is_apart]
+    if not len(wrong):
+        return "; mend the nodes, or the order of the dofs"
+    if len(wrong) == 2:
+        a, b = wrong
+        if max(np.linalg.norm(place[a] - nodes[b]), np.linalg.norm(place[b] - nodes[a])) < APART * distance.max():
+            return f": nodes {a} and {b} are exchanged; mend their order in nodes or in dofs"
+    return (
+        f": {len(wrong)} of them, {node_list(wrong[:3].tolist(), nodes)}; by K node {wrong[0]} belongs to "
+        f"({', '.join(f'{x:.6g}' for x in place[wrong[0]])})"
+    )
+
+
+def missing_rows(dofs: IntArray, n_nodes: int) -> list[tuple[int, int]]:
+    """Return (node, component) of dofs that nodes lack, of components that most nodes with dofs have."""
+    has = np.zeros((n_nodes, 6), dtype=bool)
+    has[dofs[:, 0], dofs[:, 1]] = True
+    wanted = has[np.unique(dofs[:, 0])].mean(axis=0) > 0.5
+    return [(int(node), int(component)) for node, component in np.argwhere(~has & wanted)]
+
+
+def support_words(forces: RigidForces, dofs: IntArray, time: float) -> str:
+    """Return in words where a body is held and how stiffly; time: [s] of its time unit."""
+    row, motion = forces.place
+    n_nodes = len(np.unique(dofs[forces.rows, 0]))
+    return (
+        f"{len(forces.rows)} rows of {n_nodes} nodes answer rigid-body motion by up to "
+        f"{forces.largest.max():.1e} of the stiffest entry, most at node {dofs[row, 0]} for {MOTIONS[motion]}; "
+        f"the body would swing at {forces.swing.max() / time:.3g} Hz"
+    )

@@ -1,0 +1,101 @@
+"""Mass matrices with slightly negative eigenvalues, as some programs write them, and the remedy."""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+import scipy.sparse.linalg as sla
+
+from fe_models.body.fe_body import FEBody
+from fe_models.body.rigid_motion import rigid_motion_of_dofs
+from fe_models.errors import BodyError
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["DENSE", "ROUNDING", "negative_mass", "positive_mass"]
+
+ROUNDING = 1e-10  #: eigenvalue of the scaled mass below zero, of the largest, that is rounding
+MENDED = 1e-3  #: the same, up to which it is mended: beyond it this is no mass matrix
+DENSE = 1500  #: dofs up to which all eigenvalues are found
+MOST_NEGATIVE = 200  #: negative eigenvalues of a large matrix that are sought
+NOTHING = 1e-13  #: entry of such a vector, of its largest, that is left out so that the matrix stays sparse
+
+
+def scales(M: sp.csc_array, dofs: IntArray) -> Array:
+    """Return the root of the largest mass of a translation, and of the largest inertia of a rotation, one per dof."""
+    diagonal = np.abs(M.diagonal())
+    size = np.ones(len(dofs))
+    for is_kind in (dofs[:, 1] < 3, dofs[:, 1] >= 3):
+        largest = diagonal[is_kind].max(initial=0.0)
+        size[is_kind] = np.sqrt(largest) if largest > 0 else 1.0
+    return size
+
+
+def negative_mass(M: sp.csc_array, dofs: IntArray) -> tuple[Array, Array]:
+    """Return negative eigenvalues of M and their vectors, translations and rotations scaled to a largest mass of 1.
+
+    Parameters
+    ----------
+    M
+        (n_dof, n_dof).
+    dofs
+        (node, component), (n_dof, 2).
+
+    Returns
+    -------
+    values
+        Below -`ROUNDING` of the largest, ascending, (k,) [-].
+    vectors
+        (n_dof, k) [kg^(1/2), kg^(1/2) m]: M + sum |value| v vᵀ has none of them.
+    """
+    size = scales(M, dofs)
+    scaled = sp.csc_array(sp.diags_array(1 / size) @ M @ sp.diags_array(1 / size))
+    n = scaled.shape[0]
+    if n <= DENSE:
+        values, vectors = la.eigh(scaled.toarray())
+    else:
+        k = 8
+        while True:
+            values, vectors = sla.eigsh(scaled, k=min(k, n - 1), which="SA", ncv=min(n, 4 * k + 40), tol=1e-10)
+            if values.max() >= 0 or k >= MOST_NEGATIVE:
+                break
+            k *= 3
+    largest = float(np.abs(values).max()) if n <= DENSE else float(abs(scaled).sum(axis=0).max())
+    order = np.argsort(values)
+    is_negative = values[order] < -ROUNDING * largest
+    kept = order[is_negative]
+    return values[kept] / largest, size[:, None] * vectors[:, kept] * np.sqrt(largest)
+
+
+def positive_mass(body: FEBody) -> FEBody:
+    """Return the body with the negative eigenvalues of its mass set to zero, and what was done in its provenance.
+
+    (1) eigenvalues and vectors of M below zero, translations and rotations scaled alike (`negative_mass`)
+    (2) M + sum |value| v vᵀ: the nearest matrix in that scale that has none; those motions lose their kinetic energy
+
+    Raises
+    ------
+    BodyError
+        If an eigenvalue is below `-MENDED` of the largest: this is no mass matrix with rounding, but another matrix.
+    """
+    where = f"body {body.name!r}"
+    values, vectors = negative_mass(body.M, body.dofs)  # (1)
+    if not len(values):
+        return body
+    if values[0] < -MENDED:
+        raise BodyError(
+            f"{where}: M has an eigenvalue of {values[0]:.1e} of its largest; expected -{MENDED:.0e} at the least, "
+            "which "
+            "could be mended: is this the mass matrix, with its rows in the order of dofs?"
+        )
+    local = np.where(np.abs(vectors) > NOTHING * np.abs(vectors).max(axis=0), vectors, 0.0)
+    V = sp.csc_array(local * np.sqrt(np.abs(values)))
+    M = sp.csc_array(body.M + V @ V.T)  # (2)
+    Psi_R = rigid_motion_of_dofs(body.nodes, body.dofs, body.nodes.mean(axis=0))
+    before, after = (np.einsum("nk,nk->k", Psi_R, matrix @ Psi_R) for matrix in (body.M, M))
+    change = float((np.abs(after - before) / np.where(before > 0, before, 1.0)).max())
+    record = {
+        "mass mended": f"{len(values)} negative eigenvalues, down to {values[0]:.1e} of the largest, set to zero; mass "
+        f"and inertia changed by up to {change:.1e}"
+    }
+    return replace(body, M=M, provenance={**dict(body.provenance), **record})
