@@ -8,8 +8,15 @@ import numpy as np
 
 from cms.cli.console import output_path, print_table, say
 from cms.quality.errors import QualityError
-from cms.quality.of_reduction.frf import POINTS, compare_responses, frequency_grid
-from cms.quality.reference.port_model import FrequencyResponse, file_response
+from cms.quality.of_reduction.frf import POINTS, compare_responses, frequency_grid, resonance_grid
+from cms.quality.reference.port_model import (
+    FrequencyResponse,
+    PortModel,
+    file_resonances,
+    file_response,
+    modal_response,
+    resonances,
+)
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
@@ -37,7 +44,7 @@ class FrfRequest:
 
 
 def run_frf(request: FrfRequest) -> None:
-    """Compute the response, print its peaks, and write what was asked for."""
+    """Compute the response, with points around all resonances, print its peaks, and write what was asked for."""
     from cms.modal_file.file import read
 
     frequencies = parse_band(request.band)
@@ -47,8 +54,14 @@ def run_frf(request: FrfRequest) -> None:
     for name in (request.excited, request.answering):
         reduced.interface(name)  # refuse an unknown one before any work
     damping = OVERLAY_DAMPING if request.damping is None and request.job is not None else request.damping
+    frequencies = resonance_grid(frequencies, *file_resonances(reduced, damping=damping))
+    full = None
+    if request.job is not None:
+        model, time = full_model(request, reduced, float(frequencies[-1]))
+        frequencies = resonance_grid(frequencies, *resonances(model, damping=damping or 0.0, time=time))
+        whole = modal_response(model, frequencies, damping=damping or 0.0, time=time)
+        full = whole.between(request.excited, request.answering)
     own = file_response(reduced, frequencies, damping=damping).between(request.excited, request.answering)
-    full = None if request.job is None else full_response(request, reduced, frequencies, damping or 0.0)
     print_peaks(request, reduced, own, full, pairs)
     for path in paths:
         if path.suffix in TABLES:
@@ -102,14 +115,13 @@ def checked_output(path: Path, request: FrfRequest) -> Path:
     return Path(output_path(path, "", QualityError, overwrite_of=inputs))
 
 
-def full_response(request: FrfRequest, reduced: ReducedBody, frequencies: Array, damping: float) -> FrequencyResponse:
-    """Compute the response of the full model of a job between the two interfaces."""
+def full_model(request: FrfRequest, reduced: ReducedBody, highest: float) -> tuple[PortModel, float]:
+    """Return the full model of a job at the two interfaces, known up to a frequency [Hz], and its time unit [s]."""
     from cms.cli.console import stages
     from cms.families.families import Families
     from cms.jobs.body_of_job import coupled_body, uncoupled_body
     from cms.jobs.job import read_job
     from cms.quality.reduction_check import require_same_units
-    from cms.quality.reference.port_model import modal_response
     from cms.quality.reference.ports import Ports
     from cms.quality.reference.reference_response import reference_response
 
@@ -123,10 +135,8 @@ def full_response(request: FrfRequest, reduced: ReducedBody, frequencies: Array,
         names = tuple(dict.fromkeys((request.excited, request.answering)))
         ports = Ports.of_body(body, names)
         with clock("full model"), Families(body) as families:
-            known = reference_response(families, ports, float(frequencies[-1]) * body.units.time)
-    time = body.units.time
-    full = modal_response(known.model, frequencies, damping=damping, time=time)
-    return full.between(request.excited, request.answering)
+            known = reference_response(families, ports, highest * body.units.time)
+    return known.model, body.units.time
 
 
 def print_peaks(

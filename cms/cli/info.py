@@ -14,14 +14,16 @@ if TYPE_CHECKING:
 __all__ = ["info_command", "info_record", "print_body"]
 
 
-def info_record(file: Path, units: str | None = None) -> str:
-    """Return what is in a modal file as JSON text."""
+def info_record(file: Path, units: str | None = None, mass_at: str | None = None) -> str:
+    """Return what is in a modal file as JSON text, with the effective masses at an interface if one is named."""
     import json
 
-    from cms.cli.record import body_record
+    from cms.cli.record import body_record, effective_mass_record
     from cms.modal_file.file import digest, read
 
-    return json.dumps({**body_record(read(file, units=units)), "digest": digest(file)}, indent=2)
+    body = read(file, units=units)
+    more = {} if mass_at is None else {"effective_mass": effective_mass_record(body, mass_at)}
+    return json.dumps({**body_record(body), **more, "digest": digest(file)}, indent=2)
 
 
 def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
@@ -121,17 +123,47 @@ def info_command(
     file: ModalFile,
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
     units: Annotated[str | None, typer.Option(help="Show numbers in another unit system, such as m-kg-s.")] = None,
+    mass_at: Annotated[
+        str | None,
+        typer.Option("--effective-mass", help="Effective mass of every mode while this interface is held and driven."),
+    ] = None,
 ) -> None:
     """Show what is in a modal file: mass, inertia, units, frame, modes, interfaces, load cases, provenance.
 
     Example: cms info rod.h5 --json
 
     Example: cms info rod.h5 --units m-kg-s
+
+    Example: cms info rod.h5 --effective-mass big_end
     """
     if json:
-        typer.echo(info_record(file, units))
+        typer.echo(info_record(file, units, mass_at))
         return
     from cms.modal_file.file import digest, read
 
-    print_body(read(file, units=units), everything=True)
+    body = read(file, units=units)
+    if mass_at is not None:
+        print_effective_mass(body, mass_at)
+        return
+    print_body(body, everything=True)
     say(f"digest {digest(file)}")
+
+
+def print_effective_mass(body: "ReducedBody", at: str) -> None:
+    """Print the share of every mode in mass and inertia, and their sums up to it, while an interface is driven."""
+    from cms.quality.of_body.effective_mass import DIRECTIONS, effective_mass_at
+
+    found = effective_mass_at(body, at)
+    shares, sums = 100 * found.share, 100 * found.cumulative
+    where = f"the ground driven, about {at!r}" if body.is_held else f"{at!r} held and driven"
+    mass, length = body.units.mass_symbol, body.units.length_symbol
+    headings = ("mode>", "Hz>", *(f"{name} %>" for name in DIRECTIONS), *(f"sum {name}>" for name in DIRECTIONS))
+    rows = [
+        (k + 1, hertz(found.frequencies[k]), *(f"{x:.2f}" for x in shares[k]), *(f"{x:.1f}" for x in sums[k]))
+        for k in range(len(found.frequencies))
+    ]
+    print_table(f"Effective mass of {body.name}, {where}, axes of B", headings, rows)
+    totals = [f"{name} {total:.6g}" for name, total in zip(DIRECTIONS, found.total, strict=True)]
+    say(f"100 %: {', '.join(totals)} ({mass}, {mass} {length}²)")
+    rest = ", ".join(f"{name} {100 * x:.1f} %" for name, x in zip(DIRECTIONS, found.remainder, strict=True))
+    say(f"In no mode (on the interface itself, or of higher modes): {rest}")

@@ -9,7 +9,7 @@ from cms.reduced_body.invariants import Moments
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 
-__all__ = ["body_record", "body_size", "central_inertia", "in_hertz"]
+__all__ = ["body_record", "body_size", "central_inertia", "effective_mass_record", "in_hertz"]
 
 
 def central_inertia(moments: Moments) -> Array:
@@ -93,6 +93,23 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
         "kept_nodes": len(body.nodes),
         "surface_triangles": len(body.surface),
         "provenance": dict(body.provenance),
+    }
+
+
+def effective_mass_record(body: ReducedBody, at: str) -> dict[str, Any]:
+    """Return the effective masses while an interface is held and driven, in plain types; frequencies in Hz."""
+    from cms.quality.of_body.effective_mass import DIRECTIONS, effective_mass_at
+
+    found = effective_mass_at(body, at)
+    return {
+        "at": at,
+        "directions": list(DIRECTIONS),
+        "frequencies_hz": found.frequencies.tolist(),
+        "mass": found.mass.tolist(),
+        "share": found.share.tolist(),
+        "cumulative_share": found.cumulative.tolist(),
+        "total": found.total.tolist(),
+        "remainder": found.remainder.tolist(),
     }
 
 

@@ -38,7 +38,7 @@ class SetResult:
     words: str  #: what its columns are
     points: tuple[Point, ...]  #: by ascending number of modes; empty where the set could not be made
     shown: int | None  #: index of the point that details are given for; None where there is none
-    verdict: Literal["pass", "fail", "error"]  #: "error": it could not be made
+    verdict: Literal["pass", "warn", "fail", "error"]  #: the worst that decides, at the shown point; "error": not made
     sentence: str  #: why, in words
     columns: Mapping[str, int] = field(default_factory=dict)  #: family -> number of columns of the shown point
     seconds: float = 0.0  #: to make it with the most modes and to judge all numbers of modes

@@ -4,7 +4,7 @@ import inspect
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from cms.compare.coordinates import Coordinates, ReferenceBasis
 from cms.compare.evaluation import Reference, judge_subset
 from cms.compare.free_shapes import judged_subset
 from cms.compare.subsets import SUBSETS
-from cms.compare.verdicts import is_good, set_sentence, shown_point
+from cms.compare.verdicts import is_good, set_sentence, severity, shown_point
 from cms.errors import CmsError, ModeSetError
 from cms.families.families import Families
 from cms.mode_set import ModeSet
@@ -40,7 +40,7 @@ def set_result(
         return SetResult(name, words, (), None, "error", f"could not be made: {error}")
     shown = shown_point(points)
     kept = tuple(point if k == shown else without_curves(point) for k, point in enumerate(points))
-    verdict: Literal["pass", "fail"] = "pass" if any(point.is_good for point in points) else "fail"
+    verdict = severity(points)
     chosen = columns[shown] if shown is not None else {}
     return SetResult(
         name, words, kept, shown, verdict, set_sentence(points) + refused, chosen, time.perf_counter() - began

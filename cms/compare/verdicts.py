@@ -1,6 +1,7 @@
 """Which mode set is good enough, with how few modes, and why: sentences from records."""
 
 from collections.abc import Sequence
+from typing import Literal
 
 from cms.compare.comparison import Point, SetResult
 from cms.quality.limits import LIMITS
@@ -9,6 +10,7 @@ from cms.quality.record import QualityRecord
 __all__ = [
     "DECIDING",
     "DOUBTS",
+    "accuracy",
     "answer",
     "crossings",
     "is_good",
@@ -16,6 +18,7 @@ __all__ = [
     "number_words",
     "ranking",
     "set_sentence",
+    "severity",
     "shown_point",
 ]
 
@@ -43,6 +46,26 @@ def is_good(records: Sequence[QualityRecord]) -> bool:
     return all(record.verdict in ("pass", "info") for record in records if record.name in DECIDING)
 
 
+def severity(points: Sequence[Point]) -> Literal["pass", "warn", "fail"]:
+    """Return the worst verdict of the deciding records at the shown point: what `cms check` says of that reduction."""
+    shown = shown_point(points)
+    if shown is None:
+        return "fail"
+    verdicts = {record.verdict for record in points[shown].records if record.name in DECIDING}
+    return "fail" if "fail" in verdicts else "warn" if "warn" in verdicts else "pass"
+
+
+def accuracy(point: Point) -> float:
+    """Return the largest deciding value over its limit, three digits: the smaller, the more accurate."""
+    shares = [
+        record.value / record.tolerance
+        for record in point.records
+        if record.name in DECIDING and record.tolerance and record.verdict != "info"
+    ]
+    largest = max(shares, default=0.0)
+    return float(f"{largest:.3g}") if largest > EXACT else 0.0
+
+
 def shown_point(points: Sequence[Point]) -> int | None:
     """Return the index of the smallest point that is good enough, else of the largest; None if there is none."""
     if not points:
@@ -58,7 +81,8 @@ def set_sentence(points: Sequence[Point]) -> str:
     point = points[shown]
     if not point.is_good:
         most = f"even with {modes_words(point.n_modes)}" if len(points) > 1 else f"with {modes_words(point.n_modes)}"
-        return f"not good enough {most}: {'; '.join(miss(record) for record in missed(point))}"
+        what = "not good enough" if severity(points) == "fail" else "misses a limit, though not by far,"
+        return f"{what} {most}: {'; '.join(miss(record) for record in missed(point))}"
     text = f"good enough with {modes_words(point.n_modes)}, {point.n_q} coordinates"
     if shown == 0:
         return f"{text}, the fewest that were tried"
@@ -77,10 +101,13 @@ def miss(record: QualityRecord) -> str:
 
 
 def ranking(sets: Sequence[SetResult]) -> tuple[str, ...]:
-    """Return the sets that are good enough: fewest coordinates first, then fewest modes, then as they were given."""
-    good = [result for result in sets if result.verdict == "pass" and result.detail is not None]
-    good.sort(key=lambda result: (result.detail.n_q, result.detail.n_modes))  # type: ignore[union-attr]
-    return tuple(result.name for result in good)
+    """Return the sets that are good enough: fewest coordinates first, then most accurate, then fewest modes.
+
+    Sets that are equal in all of it, such as those of one span, stand as they were given.
+    """
+    good = [(result.name, result.detail) for result in sets if result.verdict == "pass" and result.detail is not None]
+    good.sort(key=lambda found: (found[1].n_q, accuracy(found[1]), found[1].n_modes))
+    return tuple(name for name, _ in good)
 
 
 def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> str:
@@ -90,7 +117,8 @@ def answer(sets: Sequence[SetResult], order: Sequence[str], band_hz: float) -> s
         tried = [result for result in sets if result.detail is not None]
         if not tried:
             return "No mode set could be made; the reasons stand below."
-        nearest_ = min(tried, key=lambda result: len(missed(result.detail)))  # type: ignore[arg-type]
+        severe = ("pass", "warn", "fail", "error")
+        nearest_ = min(tried, key=lambda result: (severe.index(result.verdict), len(missed(result.detail))))  # type: ignore[arg-type]
         assert nearest_.detail is not None
         what = ", ".join(DECIDING[record.name] for record in missed(nearest_.detail))
         return (

@@ -18,7 +18,12 @@ __all__ = [
     "verdict_cell",
 ]
 
-MARKS = {"pass": "\u2713 good enough", "fail": "\u2715 not good enough", "error": "! could not be made"}
+MARKS = {
+    "pass": "\u2713 good enough",
+    "warn": "! misses a limit",
+    "fail": "\u2715 not good enough",
+    "error": "! could not be made",
+}
 #: short headings of the deciding records, and what their charts show
 COLUMNS = {
     "frequency-error": "free frequencies",

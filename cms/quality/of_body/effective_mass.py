@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
+from cms.quality.errors import QualityError
 from cms.quality.record import QualityRecord, information, judge
 from cms.quality.reference.free_pencil import stiffness_scale, whole_pencil, whole_port_rows
 from cms.reduced_basis.finishing import elastic_eigenvectors
@@ -12,7 +13,7 @@ from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, frozen
 
-__all__ = ["EffectiveMass", "check_driven_mass", "effective_mass"]
+__all__ = ["EffectiveMass", "check_driven_mass", "effective_mass", "effective_mass_at"]
 
 DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
@@ -36,9 +37,33 @@ class EffectiveMass:
         return self.mass / np.where(self.total > 0, self.total, 1.0)
 
     @property
+    def cumulative(self) -> Array:
+        """Sum of the shares of all modes up to each, (n, 6)."""
+        return np.asarray(np.cumsum(self.share, axis=0))
+
+    @property
     def remainder(self) -> Array:
         """Share of the mass that no mode represents, by direction, (6,); 0 where there is nothing to move."""
         return np.where(self.total > 0, 1.0 - self.share.sum(axis=0), 0.0)
+
+
+def effective_mass_at(reduced: ReducedBody, at: str) -> EffectiveMass:
+    """Return `effective_mass` of an interface that can be held, of a body that has modes and inertia.
+
+    Raises
+    ------
+    QualityError
+        If the interface has its nodes on one line, so that holding it leaves a turn free, or the file is inconsistent.
+    """
+    if not reduced.is_held and not can_be_held(reduced, at):
+        raise QualityError(
+            f"body {reduced.name!r}: interface {at!r}: its nodes lie on one line, so holding it leaves a turn free; "
+            "take another interface"
+        )
+    try:
+        return effective_mass(reduced, at)
+    except np.linalg.LinAlgError as error:
+        raise QualityError(f"body {reduced.name!r}: no modes with {at!r} held: {error}; run cms check") from error
 
 
 def effective_mass(reduced: ReducedBody, at: str) -> EffectiveMass:

@@ -17,6 +17,7 @@ __all__ = [
     "compare_responses",
     "frequency_grid",
     "peaks",
+    "resonance_grid",
     "response_comparison",
     "response_record",
 ]
@@ -24,6 +25,8 @@ __all__ = [
 DAMPING = 0.01  #: ratio of every mode in the full and the reduced response that are compared
 MOST_POINTS = 1_000_000  #: frequencies of a response
 POINTS = 400
+AROUND = np.array([0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0])  #: half widths from a resonance
+UNDAMPED = 1e-4  #: ratio by which points stand around a resonance without damping, whose peak has no height
 LOWEST = 0.05  #: lower end of the band over the first elastic frequency: below it the body moves rigidly
 
 
@@ -61,6 +64,32 @@ def frequency_grid(lowest: float, highest: float, points: int = POINTS) -> Array
     if not 2 <= points <= MOST_POINTS:
         raise QualityError(f"band {lowest:g}:{highest:g}: expected 2 to {MOST_POINTS} frequencies, got {points:g}")
     return np.geomspace(lowest, highest, points)
+
+
+def resonance_grid(grid: Array, resonances: Array, ratios: Array) -> Array:
+    """Return a grid with points around resonances, so that peaks have their height at any damping, (n_f,) [Hz].
+
+    A peak is at f_k sqrt(1 - 2 zeta²) and half as wide as 2 zeta f_k: points at multiples of the half width from there,
+    half of them within it. Of a resonance without damping the point itself is left out.
+
+    Parameters
+    ----------
+    grid
+        Ascending, (n,) [Hz].
+    resonances
+        f_k, (n_modes,) [Hz].
+    ratios
+        zeta_k, none negative, (n_modes,) [-].
+    """
+    in_band = (resonances > grid[0] / 2) & (resonances < 2 * grid[-1]) & (ratios < np.sqrt(0.5))
+    f, zeta = resonances[in_band], ratios[in_band]
+    has_peak = zeta > 0
+    peak = f * np.sqrt(1 - 2 * zeta**2)
+    width = f * np.where(has_peak, zeta, UNDAMPED)
+    offsets = np.concatenate([-AROUND[:0:-1], AROUND])
+    points = peak[:, None] + width[:, None] * offsets
+    points = points[has_peak[:, None] | (offsets != 0)]
+    return np.unique(np.concatenate([grid, points[(points > grid[0]) & (points < grid[-1])]]))
 
 
 def basis_ports(reference: FullReference, basis: FreeBasis) -> PortModel:

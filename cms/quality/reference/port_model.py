@@ -11,7 +11,9 @@ from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["FrequencyResponse", "PortModel", "file_response", "modal_response", "port_model"]
+__all__ = [
+    "FrequencyResponse", "PortModel", "file_resonances", "file_response", "modal_response", "port_model", "resonances",
+]  # fmt: skip
 
 CHUNK = 2**22  #: complex entries of the systems solved at once
 
@@ -118,8 +120,7 @@ def modal_response(
         If a frequency is not above 0, or the damping is negative.
     """
     require_frequencies(frequencies)
-    if not 0 <= damping < np.inf:
-        raise QualityError(f"frequency response: damping = {damping}; expected a ratio of 0 or more (0.01 is 1 %)")
+    require_damping(damping)
     omega = (2 * np.pi * time * np.asarray(frequencies))[:, None]
     omega_k = np.sqrt(np.maximum(model.omega2, 0.0))
     dynamic = model.is_massive * (2j * damping * omega_k * omega - omega**2)
@@ -129,6 +130,33 @@ def modal_response(
     labels = tuple(f"{name} {component}" for name in model.names for component in MOTION_COMPONENTS)
     words = f"{100 * damping:.3g} % in every free-free mode" if damping else "no damping"
     return FrequencyResponse(np.asarray(frequencies, dtype=float), H, labels, labels, words, time)
+
+
+def resonances(model: PortModel, *, damping: float, time: float = 1.0) -> tuple[Array, Array]:
+    """Return frequencies and ratios of the elastic modes with mass, (n_massive,) [Hz] and [-]; parameters as there."""
+    omega2 = model.omega2[model.is_massive]
+    frequencies = np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi) / time
+    return frequencies, np.full(len(frequencies), damping)
+
+
+def file_resonances(reduced: ReducedBody, *, damping: float | None = None) -> tuple[Array, Array]:
+    """Return frequencies and damping ratios of the modes without joints, (n_massive,) [Hz] and [-].
+
+    With the D of the file the ratio is that of its diagonal in these modes, xᵀ D x / 2 omega: light damping.
+
+    Parameters
+    ----------
+    damping
+        Ratio of every mode instead.
+    """
+    if damping is not None:
+        require_damping(damping)
+    omega2, X, is_massive = free_elastic_modes(reduced)
+    omega = np.sqrt(np.maximum(omega2[is_massive], 0.0))
+    D = free_pencil(reduced).D
+    own = np.einsum("nk,nm,mk->k", X[:, is_massive], D, X[:, is_massive]) / (2 * np.where(omega > 0, omega, np.inf))
+    ratios = np.maximum(own, 0.0) if damping is None else np.full(len(omega), damping)
+    return omega / (2 * np.pi) / reduced.units.time, ratios
 
 
 def file_response(reduced: ReducedBody, frequencies: Array, *, damping: float | None = None) -> FrequencyResponse:
@@ -157,6 +185,12 @@ def file_response(reduced: ReducedBody, frequencies: Array, *, damping: float | 
     labels = tuple(f"{i.name} {component}" for i in reduced.interfaces for component in MOTION_COMPONENTS)
     words = "the damping of the file" if reduced.D.any() else "no damping"
     return FrequencyResponse(np.asarray(frequencies, dtype=float), H, labels, labels, words, time)
+
+
+def require_damping(damping: float) -> None:
+    """Refuse a damping ratio that is negative or no number."""
+    if not 0 <= damping < np.inf:
+        raise QualityError(f"frequency response: damping = {damping}; expected a ratio of 0 or more (0.01 is 1 %)")
 
 
 def require_frequencies(frequencies: Array) -> None:

@@ -19,7 +19,7 @@ from cms.compare.full_model import centered_directions, held_mass
 from cms.compare.mode_counts import mode_counts
 from cms.compare.pulse import Pulse, default_pulse
 from cms.compare.subsets import SUBSETS
-from cms.compare.verdicts import answer, crossings, is_good, ranking, set_sentence, shown_point
+from cms.compare.verdicts import accuracy, answer, crossings, is_good, ranking, set_sentence, severity, shown_point
 from cms.errors import CompareError
 from cms.families.families import Families
 from cms.families.interface_loads import point_load
@@ -227,8 +227,7 @@ def point(n_modes, n_q, **values):
 
 def result_of(name, *points):
     shown = shown_point(points)
-    good = any(p.is_good for p in points)
-    return SetResult(name, "", points, shown, "pass" if good else "fail", set_sentence(points))
+    return SetResult(name, "", points, shown, severity(points), set_sentence(points))
 
 
 def test_the_verdict_names_the_smallest_set_that_passes():
@@ -249,6 +248,23 @@ def test_sets_of_equal_size_stand_in_the_order_they_were_given_in():
     assert ranking([a, b]) == ("rubin", "herting")
     assert ranking([b, a]) == ("herting", "rubin")
     assert "herting needs as many" in answer([a, b], ("rubin", "herting"), 1.0)
+
+
+def test_sets_of_equal_size_are_ranked_by_their_worst_number_over_its_limit():
+    rough = result_of("rubin", point(3, 15, frequency_error=0.009, mac=1e-4))
+    fine = result_of("herting", point(5, 15, frequency_error=1e-4, mac=0.01))
+    assert [accuracy(r.detail) for r in (rough, fine)] == [0.9, 0.5]
+    assert ranking([rough, fine]) == ("herting", "rubin")
+
+
+def test_a_set_that_misses_a_limit_and_fails_none_warns_as_a_check_does():
+    near = result_of("craig-bampton", point(9, 15, static_inertia=0.2))
+    assert (near.verdict, near.detail.record("static-inertia").verdict) == ("warn", "warn")
+    assert near.sentence.startswith("misses a limit, though not by far, with 9 vibration modes: static inertia loads")
+    far = result_of("guyan", point(0, 6, mac=0.9, static_inertia=0.2))
+    assert far.verdict == "fail"
+    assert ranking([near, far]) == ()
+    assert "Nearest comes craig-bampton" in answer([far, near], (), 100.0)
 
 
 def test_where_no_set_passes_the_answer_names_the_nearest_and_what_it_misses():

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cms.errors import BodyError
 from cms.mode_set import ModeSet
 from cms.mode_sets import craig_bampton
 from cms.quality.body_check import check_body
-from cms.quality.of_body.effective_mass import effective_mass
+from cms.quality.of_body.effective_mass import effective_mass, effective_mass_at
 from cms.quality.of_body.interface_motions import missing_motions
 from cms.quality.of_body.step_size import step_size
 from cms.quality.reference.free_pencil import free_elastic_modes, free_pencil
@@ -186,6 +187,14 @@ def test_effective_mass_of_a_clamped_rod_is_eight_over_pi_squared():
     assert_allclose(found.total[:3], 7850.0 * 1e-4, rtol=1e-9)
     # what the held node keeps: the Schur complement of the consistent mass of a long row, rho A h / (2 sqrt 3)
     assert_allclose(found.remainder[0], 1 / (2 * np.sqrt(3)) / 24, rtol=1e-9)
+
+
+def test_sums_of_effective_mass_end_at_what_the_modes_carry(nodal):
+    found = effective_mass_at(nodal, "left")
+    assert_allclose(found.cumulative[-1] + found.remainder, np.where(found.total > 0, 1.0, 0.0), rtol=0, atol=1e-12)
+    assert_allclose(np.diff(found.cumulative, axis=0), found.share[1:], rtol=0, atol=1e-12)
+    with pytest.raises(BodyError, match="no interface 'lift'"):
+        effective_mass_at(nodal, "lift")
 
 
 @pytest.mark.parametrize("at", ["left", "right"])

@@ -7,11 +7,18 @@ from cms.families.families import Families
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS, craig_bampton
 from cms.quality.errors import QualityError
-from cms.quality.of_reduction.frf import basis_ports, compare_responses, frequency_grid, peaks, response_comparison
+from cms.quality.of_reduction.frf import (
+    basis_ports,
+    compare_responses,
+    frequency_grid,
+    peaks,
+    resonance_grid,
+    response_comparison,
+)
 from cms.quality.plots import frf_figure, plot_frf
 from cms.quality.reference.free_basis import free_basis
 from cms.quality.reference.full_reference import FullReference
-from cms.quality.reference.port_model import file_response, modal_response, port_model
+from cms.quality.reference.port_model import file_resonances, file_response, modal_response, port_model
 from cms.quality.reference.ports import Ports
 from cms.quality.reference.reference_response import RESPONSE_TOLERANCE, reference_response
 from cms.reduced_basis.damping import ModalDamping
@@ -201,7 +208,7 @@ def test_peaks_are_the_natural_frequencies(body):
             "no interface 'rigt'; did you mean 'right'",
         ),
         (lambda r: frequency_grid(10.0, 5.0), "expected 0 < lowest < highest"),
-        (lambda r: frequency_grid(1.0, 5.0, 1), "expected 2 or more frequencies"),
+        (lambda r: frequency_grid(1.0, 5.0, 1), "expected 2 to 1000000 frequencies"),
     ],
 )
 def test_bad_requests_are_refused_in_one_message(body, call, words):
@@ -222,3 +229,42 @@ def test_plots_show_every_curve_with_its_values(body):
     assert_allclose(ax.get_lines()[0].get_ydata(), np.abs(found.H[:, 2, 2]), rtol=0)
     figure = frf_figure({"a": found}, [(0, 0), (2, 4)], ["one", "two"], is_inertance=True, title="t")
     assert [ax.get_ylabel() for ax in figure.axes] == ["one", "two", "phase [deg]", "phase [deg]"]
+
+
+# Points around resonances --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["ratio", "the file's D"])
+@pytest.mark.parametrize("damping", [1e-4, 1e-3, 1e-2])
+def test_peaks_have_their_height_however_narrow_they_are(body, damping, own):
+    """Against a scan of each peak a thousand times finer than its width; the even grid alone misses most of it."""
+    reduced = reduce(body, craig_bampton(body, n_modes=6), damping=ModalDamping(damping))
+    asked = None if own else damping
+    f, zeta = file_resonances(reduced, damping=asked)
+    assert_allclose(f, reduced.free_frequencies, rtol=1e-8)
+    even = frequency_grid(10.0, 3000.0)
+    grid = resonance_grid(even, f, zeta)
+    assert np.isin(even, grid).all()
+    assert (np.diff(grid) > 0).all()
+    lost = []
+    for f_k, zeta_k in zip(f[f < 3000], zeta[f < 3000], strict=True):
+        fine = f_k * (1 + zeta_k * np.linspace(-1, 1, 2001))
+        true = largest_response(reduced, fine, asked)
+        if true == largest_response(reduced, fine[[0, -1]], asked):
+            continue  # on the flank of another peak
+        near = grid[(grid >= fine[0]) & (grid <= fine[-1])]
+        assert largest_response(reduced, near, asked) >= 0.999 * true
+        coarse = even[(even > 0.99 * f_k) & (even < 1.01 * f_k)]
+        lost.append(1 - largest_response(reduced, coarse, asked) / true)
+    assert (max(lost) > 0.5) == (damping < 5e-3)
+
+
+def largest_response(reduced, frequencies, damping):
+    return np.abs(file_response(reduced, frequencies, damping=damping).H).max()
+
+
+def test_an_undamped_resonance_is_approached_and_left_out():
+    grid = resonance_grid(np.array([1.0, 100.0]), np.array([10.0, 1e3]), np.zeros(2))
+    assert 10.0 not in grid
+    assert len(grid) == 2 + 22
+    assert (np.abs(grid[1:-1] / 10 - 1) <= 1.2e-3 * (1 + 1e-9)).all()
