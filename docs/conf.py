@@ -36,7 +36,7 @@ extensions = [
     "copied_pages",
     "offline",
 ]
-exclude_patterns = ["extensions", "**.ipynb_checkpoints"]
+exclude_patterns = ["extensions", "gallery/*", "**.ipynb_checkpoints"]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb", ".rst": "restructuredtext"}
 
 # pages
@@ -54,6 +54,7 @@ autosummary_generate = False
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 add_module_names = False
+smartquotes = False  # u' is a derivative
 python_use_unqualified_type_names = True
 
 # the look

@@ -37,7 +37,7 @@ def balanced_truncation(
     damping_ratio: float = 0.01,
     n_rich: int | None = None,
 ) -> ModeSet:
-    """Balanced truncation of the elastic part of the free body: [Psi_R, balanced directions].
+    """Balanced truncation of the elastic part of the free body: [Psi_R, balanced directions] [1]_.
 
     (1) rich basis: free modes and residual attachment modes, M-orthonormal and K-diagonal, in which the Lyapunov
         equation is small
@@ -69,6 +69,10 @@ def balanced_truncation(
     ------
     ModeSetError
         If not exactly one of n_modes and tolerance is given, numbers are out of range, or a mode is undamped.
+
+    References
+    ----------
+    .. [1] Koutsovasilis & Beitelschmidt (2008), docs/bibliography.md, compare such sets; derived in docs/theory.md §3.
     """
     if (n_modes is None) == (tolerance is None):
         raise ModeSetError(

@@ -51,7 +51,7 @@ def craig_bampton(
 
     References
     ----------
-    .. [1] docs/theory.md §2-3.
+    .. [1] Hurty (1965), Craig & Bampton (1968), docs/bibliography.md; derived in docs/theory.md §2-3.
     """
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
@@ -67,11 +67,15 @@ def craig_bampton_ir(
     *,
     free: Mapping[str, Sequence[str]] | None = None,
 ) -> ModeSet:
-    """Craig-Bampton with inertia relief: [Psi_C, Psi_H, fixed-interface modes].
+    """Craig-Bampton with inertia relief: [Psi_C, Psi_H, fixed-interface modes] [1]_.
 
     Psi_H, the static responses to rigid-body accelerations with B held, make the set statically complete: exact for
     gravity and for every static interface load of the accelerated body, whatever the number of modes. Parameters and
     errors are those of `craig_bampton`.
+
+    References
+    ----------
+    .. [1] Hintz (1975), docs/bibliography.md; derived in docs/theory.md §2.
     """
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
@@ -82,7 +86,12 @@ def craig_bampton_ir(
 
 
 def guyan(body: FEBody | Families, *, families: Families | None = None) -> ModeSet:
-    """Guyan-Irons static condensation: constraint modes only (Craig-Bampton with n_modes = 0)."""
+    """Guyan-Irons static condensation: constraint modes only (Craig-Bampton with n_modes = 0) [1]_.
+
+    References
+    ----------
+    .. [1] Guyan (1965), docs/bibliography.md.
+    """
     with families_of(body) as families:
         body = families.body
         require_interfaces("guyan", body)

@@ -61,13 +61,17 @@ def rubin(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Rubin mode set: [Psi_R, free modes, residual attachment modes].
+    """Rubin mode set: [Psi_R, free modes, residual attachment modes] [1]_.
 
     (1) K phi = omega² M phi of the free body
     (2) residual attachment: Psi_U - Phi Lambda⁻¹ Phi_Bᵀ, the static remainder of the modes that are left out
 
     Statically complete, and exact to omega² about zero frequency at the interfaces. Parameters and errors are those of
     `normal_modes`, but the body needs an interface; n_modes = 0 gives [Psi_R, Psi_U].
+
+    References
+    ----------
+    .. [1] Rubin (1975), docs/bibliography.md; derived in docs/theory.md §2-3.
     """
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
@@ -81,10 +85,14 @@ def macneal(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Span of MacNeal's set, that of `rubin`: his reduction differs in the pencil alone, which lacks residual inertia.
+    """Span of MacNeal's set, that of `rubin`: his reduction differs in the pencil alone, without residual inertia [1]_.
 
     A floating frame needs the inertia of every shape, so here it is kept; `reduced_pencil.macneal_pencil` has the
     pencil itself, to compare. Parameters and errors are those of `rubin`.
+
+    References
+    ----------
+    .. [1] MacNeal (1971), docs/bibliography.md; derived in docs/theory.md §3.
     """
     modes = rubin(body, n_modes)
     return replace(modes, name="macneal", options={**modes.options, "span": "of rubin, with residual inertia"})
@@ -94,10 +102,14 @@ def dual_craig_bampton(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Span of the dual Craig-Bampton set, that of `rubin`: it differs in its unknowns, which are interface forces.
+    """Span of the dual Craig-Bampton set, that of `rubin`: it differs in its unknowns, which are interface forces [1]_.
 
     A floating frame needs displacements; `reduced_pencil.dual_craig_bampton_pencil` has the pencil itself, to
     compare. Parameters and errors are those of `rubin`.
+
+    References
+    ----------
+    .. [1] Rixen (2004), docs/bibliography.md; derived in docs/theory.md §3.
     """
     modes = rubin(body, n_modes)
     return replace(modes, name="dual-craig-bampton", options={**modes.options, "span": "of rubin, in displacements"})
@@ -107,7 +119,7 @@ def craig_chang(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Craig-Chang mode set: Rubin's span in physical interface coordinates.
+    """Craig-Chang mode set: Rubin's span in physical interface coordinates [1]_.
 
     u = Phi q + Psi_d f with the rigid-body and free modes Phi and the residual attachment modes Psi_d; on the boundary
     u_B = Phi_B q + G_d f, so f = G_d⁻¹ (u_B - Phi_B q), and
@@ -117,6 +129,10 @@ def craig_chang(
 
     Where modes are kept in so great a number that G_d is singular, its pseudo-inverse loses nothing: a force without
     residual displacement at the interfaces has none anywhere. Parameters and errors are those of `rubin`.
+
+    References
+    ----------
+    .. [1] Craig & Chang (1976), Craig & Chang (1977), docs/bibliography.md; derived in docs/theory.md §3.
     """
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)
@@ -137,10 +153,14 @@ def herting(
     body: FEBody | Families,
     n_modes: int | ModeCount,
 ) -> ModeSet:
-    """Herting mode set: [Psi_C, Psi_H, phi - Psi_C phi_B] with phi the free modes.
+    """Herting mode set: [Psi_C, Psi_H, phi - Psi_C phi_B] with phi the free modes [1]_.
 
     Statically complete as Craig-Bampton with inertia relief, with the exact modes of the free body besides. Parameters
     and errors are those of `rubin`.
+
+    References
+    ----------
+    .. [1] Herting (1985), docs/bibliography.md; derived in docs/theory.md §3.
     """
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)

@@ -41,7 +41,7 @@ def krylov(
     band: tuple[float, float] | None = None,
     load_cases: bool = True,
 ) -> ModeSet:
-    """Krylov mode set: [Psi_R, blocks of moments] of the loads F = [unit loads on the boundary dofs, load cases].
+    """Krylov mode set: [Psi_R, blocks of moments] of the loads F = [unit loads on the boundary dofs, load cases] [1]_.
 
     (1) shift 0: X_1 = Pᵀ G P F, X_{j+1} = Pᵀ G P M X_j on the elastic flexibility of the free body;
         inertia loads of rigid-body accelerations need no column, since P M Psi_R = 0 and Psi_R is in the set
@@ -77,6 +77,10 @@ def krylov(
     ModeSetError
         If not exactly one of n_modes, n_blocks and tolerance is given, numbers are out of range, or a shift is a
         natural frequency.
+
+    References
+    ----------
+    .. [1] Craig & Hale (1988), docs/bibliography.md; the moments are derived in docs/theory.md §3.
     """
     _check(n_modes, n_blocks, shifts, tolerance, band)
     source, body = body, body_of(body)

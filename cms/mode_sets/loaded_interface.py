@@ -25,7 +25,7 @@ def benfield_hruda(
     *,
     loads: Sequence[InterfaceLoad] = (),
 ) -> ModeSet:
-    """Benfield-Hruda mode set: [Psi_C, phi - Psi_C phi_B], phi the loaded-interface modes.
+    """Benfield-Hruda mode set: [Psi_C, phi - Psi_C phi_B], phi the loaded-interface modes [1]_.
 
     (1) (K + K_load) phi = omega² (M + M_load) phi, with the mass and stiffness of the neighbours on the boundary
     (2) phi - Psi_C phi_B spans the same beside Psi_C, and stays well-conditioned with it
@@ -50,6 +50,10 @@ def benfield_hruda(
         If there is no load, or no mode below the cutoff.
     BodyError
         If a load names an unknown interface or is not a mass or stiffness.
+
+    References
+    ----------
+    .. [1] Benfield & Hruda (1971), docs/bibliography.md; derived in docs/theory.md §2-3.
     """
     with families_of(body) as families:
         body, wanted = families.body, mode_count(n_modes)

@@ -43,7 +43,12 @@ class NodalFrame:
 
 @dataclass(frozen=True)
 class TisserandFrame:
-    """Mean-axis frame: Psi_Rᵀ M u = 0, least relative kinetic energy; origin at the undeformed centre of mass."""
+    """Mean-axis frame: Psi_Rᵀ M u = 0, least relative kinetic energy; origin at the undeformed centre of mass [1]_.
+
+    References
+    ----------
+    .. [1] Canavin & Likins (1977), docs/bibliography.md; docs/theory.md §4.
+    """
 
     origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the default
     axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes

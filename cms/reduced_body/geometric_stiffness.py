@@ -17,11 +17,15 @@ SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omeg
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class GeometricStiffness:
-    """K_j,kl = [Phi.T K_geo(sigma_j) Phi]_kl of unit loads f_j, sigma_j the stress of the static response to f_j.
+    """K_j,kl = [Phi.T K_geo(sigma_j) Phi]_kl of unit loads f_j, sigma_j the stress of the static response to f_j [1]_.
 
     All in the frame B of the reduced body, over its modes q, with one support for all loads (theory.md §7); a tensile
     stress makes K_j positive. Half the quadratic form, 1/2 qᵀ K_j q, is minus the work of f_j on the displacement of
     second order.
+
+    References
+    ----------
+    .. [1] Schwertassek & Wallrapp (1999), docs/bibliography.md; derived in docs/theory.md §7.
     """
 
     translation: Array  #: K_t,a, unit load -rho e_a: frame acceleration minus gravity, (3, n_q, n_q) [1/m per q²]

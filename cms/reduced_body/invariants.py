@@ -14,10 +14,14 @@ __all__ = ["Moments", "moments_from_gram"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Canonical moments of a body about the origin of its frame B.
+    """Canonical moments of a body about the origin of its frame B [1]_.
 
     c: undeformed position, phi_k: shape k (translation), both in B; integrals over mass. Shapes are without unit
     when q is a length; with M-orthonormal shapes the unit of phi is 1/sqrt(kg) and q has sqrt(kg) m.
+
+    References
+    ----------
+    .. [1] Wallrapp (1994), docs/bibliography.md, has them as standard input data; derived in docs/theory.md §5.
     """
 
     m: float  #: mass, ∫ 1 [kg]

@@ -1,5 +1,6 @@
-"""Pages whose sources lie outside this folder: notebooks and the files at the top of the checkout."""
+"""Pages whose sources lie outside this folder: notebooks, with the pictures kept of them, and files at the top."""
 
+import base64
 import json
 import re
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 from sphinx.application import Sphinx
 
 ROOT = Path(__file__).resolve().parents[2]
-TOP = {"CHANGELOG.md": "changelog.md", "benchmarks/README.md": "benchmarks.md"}
+TOP = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md", "benchmarks/README.md": "benchmarks.md"}
 PYTHON = {"language_info": {"name": "python", "pygments_lexer": "ipython3"}}  #: stored notebooks leave it out
 
 
@@ -22,11 +23,21 @@ def copy_pages(app: Sphinx) -> None:
             old.unlink()
     for name, path in sources.items():
         notebook = json.loads(path.read_text(encoding="utf-8"))
+        for k, cell in enumerate(notebook["cells"]):
+            pictures = sorted((Path(app.srcdir) / "gallery" / "notebooks").glob(f"{path.stem}_{k}_*.png"))
+            if cell["cell_type"] == "code":
+                cell["outputs"] = [shown(picture) for picture in pictures]
         put(json.dumps(notebook | {"metadata": notebook["metadata"] | PYTHON}), folder / name)
     project = Path(app.srcdir) / "project"
     project.mkdir(exist_ok=True)
     for name, copied in TOP.items():
         put((ROOT / name).read_text(encoding="utf-8"), project / copied)
+
+
+def shown(picture: Path) -> dict[str, Any]:
+    """Return a kept picture as the output of a cell."""
+    data = {"image/png": base64.b64encode(picture.read_bytes()).decode("ascii")}
+    return {"output_type": "display_data", "data": data, "metadata": {}}
 
 
 def put(text: str, target: Path) -> None:

@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import re
 from pathlib import Path
 from typing import Any
 
@@ -124,7 +125,8 @@ def entries(owner: str, names: list[str]) -> list[str]:
 
 def first_line(module: str) -> str:
     """Return the first line of a module's docstring, references to pages and sections included."""
-    return (importlib.import_module(module).__doc__ or "").strip().split("\n")[0]
+    line = (importlib.import_module(module).__doc__ or "").strip().split("\n")[0]
+    return re.sub(r"(?:docs/)?(\w+)\.md", r":doc:`\1 </\1>`", line)
 
 
 def heading(text: str, mark: str) -> list[str]:

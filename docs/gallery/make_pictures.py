@@ -1,0 +1,158 @@
+"""Makes the pictures of the gallery and of README.md: `python docs/gallery/make_pictures.py [NAME ...]`.
+
+Names are those of MECHANISMS and of the notebooks; without one all are made. The demo's mechanism becomes a film of one
+turn (gif), the others a still each; of a notebook every picture is kept, as NAME_CELL_NUMBER.png. Pictures are shipped,
+small, because making them takes minutes; the documentation shows them as they are.
+"""
+
+import base64
+import io
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+from PIL import Image
+
+import cms
+import fe_models as fm
+import floatframe as ff
+from floatframe import mechanisms
+from floatframe.functions.time_functions import cycloidal_spin_up
+from floatframe.pictures.animation import animate
+from floatframe.system_file.read_system import read_system
+
+HERE = Path(__file__).resolve().parent
+NOTEBOOKS = HERE.parents[1] / "notebooks"
+WIDTH = 480  #: of stills and films [px]
+COLORS = 128
+
+
+def slider_crank() -> None:
+    """The last turn of the demo's slider-crank, at true scale."""
+    from cms.cli.demo import put_inputs
+
+    with tempfile.TemporaryDirectory() as folder:
+        put_inputs(Path(folder))
+        cms.write(cms.reduce_job(Path(folder) / "rod.toml"), Path(folder) / "rod.h5")
+        system, run = read_system(Path(folder) / "crank.toml")
+        motion = ff.integrate(system, run.integrator, t_end=run.t_end, h=run.h, output_every=2)
+        film, n = Path(folder) / "film.gif", 38  # pictures of a turn, 15 a second, 100 times slower
+        animate(motion, drawn(system), film, speed=0.01, fps=15, magnification=1.0)
+        frames = [cut(frame) for frame in iio.imread(film)[-n:]]
+    save_film(frames, HERE / "slider_crank.gif", fps=15)
+
+
+def still(name: str, make: Callable[[], tuple[ff.System, float, float]]) -> None:
+    """The last instant of a motion: make returns system, end and step."""
+    system, t_end, h = make()
+    motion = ff.integrate(system, ff.GeneralizedAlpha(0.8), t_end=t_end, h=h, output_every=4)
+    with tempfile.TemporaryDirectory() as folder:
+        film = Path(folder) / "film.gif"
+        animate(motion, drawn(system), film, speed=t_end / 1.0, fps=12)
+        save_still(cut(iio.imread(film)[-1]), HERE / f"{name}.png")
+
+
+def rod_of(length: float, *, height: float, width: float, young: float = 210e9, rho: float = 7850.0, n_modes: int = 4):
+    """Return a reduced beam along x with a drawn surface, interfaces "start" and "end"."""
+    line = fm.straight_line((0, 0, 0), (length, 0, 0), 10)
+    ends = [fm.line_interface(line, end, fm.NodeSet(end)) for end in ("start", "end")]
+    section = fm.BeamProperty(fm.Rectangle(height, width), fm.Material("rod", young, 0.3, rho))
+    body = fm.beam_body(line, section, name="rod", units=fm.unit_system("m-kg-s"), interfaces=ends)
+    body = fm.couple(body)
+    return cms.reduce(body, cms.craig_bampton(body, n_modes=n_modes), frame=cms.TisserandFrame(), geometric=True)
+
+
+def four_bar() -> tuple[ff.System, float, float]:
+    """A driven four-bar linkage whose coupler bends."""
+    drive = cycloidal_spin_up(omega=18.0, duration=0.3)
+    return mechanisms.four_bar(drive=drive, flexible_coupler=rod_of(0.9, height=0.006, width=0.03)), 0.62, 5e-4
+
+
+def satellite() -> tuple[ff.System, float, float]:
+    """A free hub with two booms that is turned by a torque."""
+    system = mechanisms.satellite(boom=rod_of(5.0, height=0.02, width=0.04, young=70e9, rho=2700.0), hub_mass=30.0)
+    push = ff.PointForce("wheel", ff.Marker("hub"), torque=(0.0, 0.0, 30.0))
+    return ff.System(system.bodies, system.joints, [push], system.units, "satellite turned by a torque"), 1.2, 1e-3
+
+
+def chain() -> tuple[ff.System, float, float]:
+    """A chain of five flexible bars that was let go level."""
+    bar = rod_of(0.5, height=0.002, width=0.02, young=70e9, rho=2700.0)
+    return mechanisms.chain(5, rod=bar, angles=(0.0,) * 5), 0.6, 5e-4
+
+
+MECHANISMS: dict[str, Callable[[], None]] = {
+    "slider_crank": slider_crank,
+    **{maker.__name__: partial(still, maker.__name__, maker) for maker in (four_bar, satellite, chain)},
+}
+
+
+def notebook(path: Path) -> None:
+    """Run a notebook and keep its pictures."""
+    import nbformat
+    from nbclient import NotebookClient
+
+    document = nbformat.read(path, as_version=4)
+    NotebookClient(document, timeout=1800, resources={"metadata": {"path": str(path.parent.parent)}}).execute()
+    for old in (HERE / "notebooks").glob(f"{path.stem}_*.png"):
+        old.unlink()
+    for k, cell in enumerate(document.cells):
+        shown = [output["data"] for output in cell.get("outputs", []) if "image/png" in output.get("data", {})]
+        for i, data in enumerate(shown):
+            picture = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
+            save_still(np.asarray(picture.convert("RGB")), HERE / "notebooks" / f"{path.stem}_{k}_{i}.png", width=900)
+
+
+def drawn(system: ff.System) -> dict:
+    """Return what the bodies of a system look like, by name."""
+    return {body.name: getattr(body, "reduced", body) for body in system.bodies}
+
+
+def cut(frame: np.ndarray) -> np.ndarray:
+    """Return a frame without the empty rows above and below what is drawn."""
+    busy = np.flatnonzero((np.ptp(frame[..., :3].astype(int), axis=1) > 12).any(axis=1))
+    low, high = max(busy.min() - 4, 0), min(busy.max() + 4, len(frame))
+    return frame[low : high + 1, :, :3]
+
+
+def save_still(frame: np.ndarray, path: Path, *, width: int = WIDTH) -> None:
+    """Write a picture with few colours."""
+    picture = Image.fromarray(frame)
+    if picture.width > width:
+        picture = picture.resize((width, round(picture.height * width / picture.width)), Image.Resampling.LANCZOS)
+    picture.quantize(COLORS, dither=Image.Dither.NONE).save(path, optimize=True)
+    print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB", flush=True)
+
+
+def save_film(frames: list[np.ndarray], path: Path, *, fps: float) -> None:
+    """Write a film with one table of few colours."""
+    height = max(len(frame) for frame in frames)
+    pictures = []
+    for frame in frames:
+        whole = np.full((height, frame.shape[1], 3), frame[0, 0], dtype=np.uint8)
+        whole[: len(frame)] = frame
+        picture = Image.fromarray(whole)
+        pictures.append(picture.resize((WIDTH, round(height * WIDTH / picture.width)), Image.Resampling.LANCZOS))
+    colors = pictures[len(pictures) // 2].quantize(COLORS, dither=Image.Dither.NONE)
+    tables = [picture.quantize(COLORS, palette=colors, dither=Image.Dither.NONE) for picture in pictures]
+    tables[0].save(path, save_all=True, append_images=tables[1:], duration=1000 / fps, loop=0, optimize=True)
+    print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB, {len(frames)} pictures")
+
+
+def main(names: list[str]) -> None:
+    """Make the pictures that are named, or all."""
+    books = {path.stem: partial(notebook, path) for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
+    makers = MECHANISMS | books
+    unknown = [name for name in names if name not in makers]
+    if unknown:
+        sys.exit(f"no picture {unknown[0]!r}; choices: {', '.join(makers)}")
+    for name in names or makers:
+        makers[name]()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
