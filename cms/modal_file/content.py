@@ -140,6 +140,12 @@ class Contents:
             raise ModalFileError(f"dataset {path}: expected numbers, got text")
         return values
 
+    def number(self, path: str) -> float:
+        """Return the one number of a dataset."""
+        values = self.array(path)
+        require_shape(f"dataset {path}", values, ())
+        return float(values)
+
     def arrays(self, group: str, *names: str) -> dict[str, Any]:
         """Return the numbers of datasets of a group by name."""
         return {name: self.array(f"{group}/{name}") for name in names}
@@ -181,7 +187,7 @@ def body_of(content: Content) -> ReducedBody:
     array, words, attribute = contents.array, contents.words, contents.attribute
     is_1 = content.version < 2  # the version before held dofs, and rotations told apart
     moments = Moments(
-        m=float(array("/moments/m")),
+        m=contents.number("/moments/m"),
         **contents.arrays("/moments", "S", "R", "C1", "P", "S_kl"),
         is_exact=bool(attribute("/moments", "is_exact", int)),
     )
@@ -245,7 +251,7 @@ def columns_of(contents: Contents) -> SourceColumns:
 def nodal_sums_of(contents: Contents) -> NodalSums:
     """Return the weighted sums over the nodes."""
     return NodalSums(
-        w=float(contents.array("/nodal_sums/w")),
+        w=contents.number("/nodal_sums/w"),
         **contents.arrays("/nodal_sums", "S", "R", "U1", "U2"),
         is_volume=bool(contents.attribute("/nodal_sums", "is_volume", int)),
     )

@@ -56,6 +56,9 @@ _ORDER = {
 }  # meshio (VTK) place -> Gmsh place, for types that differ: the edges are numbered in another sequence
 
 
+MOST_EXACT = 2.0**53  #: whole numbers up to here are exact as float64
+
+
 class _Text:
     """Numbers of one section of a text file, in sequence."""
 
@@ -78,7 +81,11 @@ class _Text:
         return values
 
     def ints(self, count: int) -> IntArray:
-        return self.doubles(count).astype(np.int64)
+        values = self.doubles(count)
+        bad = ~(np.abs(values) < MOST_EXACT) | (values != np.round(values))
+        if bad.any():
+            raise MeshError(f"{self._where}: expected whole numbers, got {values[bad][0]:g}; the file is damaged")
+        return values.astype(np.int64)
 
     sizes = ints
 

@@ -271,9 +271,10 @@ def test_misshapen_and_missing_datasets_are_refused(path):
         lambda values, attributes: values.update(t=np.arange(len(values["t"]))),
         lambda values, attributes: values.update(t=values["t"][::-1]),
         lambda values, attributes: values.update(t=values["t"] * np.nan),
+        lambda values, attributes: values.update(u=np.full_like(values["u"], np.inf)),
     ):
         whole = path.read_bytes()
-        with pytest.raises(ResultsError, match=r"misshapen|ascend"):
+        with pytest.raises(ResultsError, match=r"misshapen|ascend|finite"):
             read_results(rewritten(path, change))
         path.write_bytes(whole)
 

@@ -1,0 +1,151 @@
+"""The campaign runs every case in a worker process with a limit of time, and counts what became of it.
+
+    python -m tests --campaign                     everything: 1000 bad inputs, 100 kills
+    python -m tests --campaign jobs 147            one case, its verdict in words
+
+A hang is a case beyond `LIMIT` seconds; a worker that ends is a traceback of its case. The exit code is 0 if there is
+no traceback, no hang, no wrong acceptance and no unclear message.
+"""
+
+import importlib
+import shutil
+import tempfile
+import time
+from collections import Counter
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from tests.campaign.verdict import ACCEPTED, HANG, REFUSED, TRACEBACK, UNCLEAR, WRONG, Verdict
+
+__all__ = ["FAMILIES", "main"]
+
+FAMILIES: dict[str, tuple[str, int]] = {  # what it is -> the function of a case, how many
+    "jobs": ("tests.campaign.jobs:job_case", 240),
+    "meshes": ("tests.campaign.jobs:mesh_case", 180),
+    "systems": ("tests.campaign.systems:system_case", 200),
+    "bytes": ("tests.campaign.files:bytes_case", 90),
+    "heads": ("tests.campaign.files:head_case", 90),
+    "expressions": ("tests.campaign.expressions:expression_case", 100),
+    "commands": ("tests.campaign.commands:command_case", 100),
+    "kills": ("tests.campaign.kills:kill_case", 100),
+}
+LIMIT = 60.0  #: seconds of a case
+FIRST = 600.0  #: of the first one in a worker, which may compile the kernels
+PROCESSES = 2
+
+
+def case_of(family: str) -> Any:
+    """Return the function of a family."""
+    module, name = FAMILIES[family][0].split(":")
+    return getattr(importlib.import_module(module), name)
+
+
+def serve(pipe: Connection, home: str) -> None:
+    """Run the cases that are asked for; the main function of a worker."""
+    number = 0
+    while True:
+        family, seed = pipe.recv()
+        number += 1
+        folder = Path(home) / f"case{number}"
+        folder.mkdir()
+        try:
+            verdict = case_of(family)(seed, folder)
+        except BaseException as error:  # of the oracle too: it must understand what was accepted
+            verdict = Verdict(TRACEBACK, f"{type(error).__name__}: {error}"[:600])
+        shutil.rmtree(folder, ignore_errors=True)
+        pipe.send(verdict)
+
+
+class Worker:
+    """A process that runs cases, and the one it is at."""
+
+    def __init__(self, home: Path) -> None:
+        self.home = Path(tempfile.mkdtemp(dir=home))
+        self.pipe, other = get_context("spawn").Pipe()
+        self.process = get_context("spawn").Process(target=serve, args=(other, str(self.home)), daemon=False)
+        self.process.start()
+        other.close()
+        self.case: tuple[str, int] | None = None
+        self.is_first = True
+        self.deadline = 0.0
+
+    def give(self, case: tuple[str, int]) -> None:
+        """Give it a case."""
+        self.case, self.deadline = case, time.monotonic() + (FIRST if self.is_first else LIMIT)
+        self.is_first = False
+        self.pipe.send(case)
+
+    def end(self) -> None:
+        """End the process."""
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+        shutil.rmtree(self.home, ignore_errors=True)
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run the campaign, or the one case that is named; print what was found and the counts in the last line."""
+    words = list(words or ())
+    if len(words) == 2:
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "case").mkdir()
+            verdict = case_of(words[0])(int(words[1]), Path(folder) / "case")
+        print(f"{words[0]} {words[1]}: {verdict.kind}: {verdict.words}")
+        return int(verdict.kind not in (REFUSED, ACCEPTED))
+    chosen = words or list(FAMILIES)
+    cases = [(family, seed) for family in chosen for seed in range(FAMILIES[family][1])]
+    begun = time.monotonic()
+    counts: dict[str, Counter[str]] = {family: Counter() for family in chosen}
+    with tempfile.TemporaryDirectory(prefix="campaign-") as home:
+        for case, verdict in verdicts(cases, Path(home)):
+            counts[case[0]][verdict.kind] += 1
+            if verdict.words.startswith("compared"):
+                counts[case[0]]["compared"] += 1
+            if verdict.kind not in (REFUSED, ACCEPTED):
+                print(f"{case[0]} {case[1]}: {verdict.kind}: {' '.join(verdict.words.split())[:500]}", flush=True)
+    for family, count in counts.items():
+        told = ", ".join(f"{kind} {count[kind]}" for kind in (REFUSED, ACCEPTED, TRACEBACK, HANG, WRONG, UNCLEAR))
+        print(f"{family}: {told}")
+    total: Counter[str] = sum(counts.values(), Counter())
+    n_kills = sum(counts.get("kills", Counter())[kind] for kind in (ACCEPTED, REFUSED, TRACEBACK, HANG, WRONG, UNCLEAR))
+    print(
+        f"campaign: {len(cases) - n_kills} bad inputs, {n_kills} kills in {time.monotonic() - begun:.0f} s: "
+        f"{total[TRACEBACK]} tracebacks, {total[HANG]} hangs, {total[WRONG]} wrong acceptances, "
+        f"{total[UNCLEAR]} unclear messages"
+    )
+    return int(any(total[kind] for kind in (TRACEBACK, HANG, WRONG, UNCLEAR)))
+
+
+def verdicts(cases: list[tuple[str, int]], home: Path) -> Any:
+    """Yield (case, verdict) as they come; a worker that hangs or ends is replaced."""
+    waiting, workers = list(reversed(cases)), [Worker(home) for _ in range(PROCESSES)]
+    try:
+        while waiting or any(worker.case for worker in workers):
+            for worker in workers:
+                if worker.case is None and waiting:
+                    worker.give(waiting.pop())
+            ready = wait([worker.pipe for worker in workers if worker.case], timeout=1.0)
+            for k, worker in enumerate(workers):
+                case = worker.case
+                if case is None:
+                    continue
+                if worker.pipe in ready:
+                    try:
+                        verdict = worker.pipe.recv()
+                        worker.case = None
+                    except (EOFError, OSError):
+                        worker.process.join(5)
+                        verdict = Verdict(TRACEBACK, f"the process ended with exit code {worker.process.exitcode}")
+                elif time.monotonic() > worker.deadline:
+                    verdict = Verdict(HANG, f"no answer within {LIMIT:g} s")
+                else:
+                    continue
+                if worker.case is not None:
+                    worker.end()
+                    workers[k] = Worker(home)
+                yield case, verdict
+    finally:
+        for worker in workers:
+            worker.end()

@@ -1,0 +1,90 @@
+"""The oracles of the campaign: whole inputs pass, and each of them sees the fault it is there for."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from tests.campaign.campaign import FAMILIES, case_of
+from tests.campaign.expressions import value_of_tape
+from tests.campaign.jobs import JOB, job_case, wrong_body
+from tests.campaign.plain_mesh import FORMATS, bar, read_plain
+from tests.campaign.systems import SYSTEM, system_case, wrong_motion
+from tests.campaign.verdict import ACCEPTED, REFUSED
+
+
+@pytest.fixture(scope="module")
+def reduced(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("job")
+    assert job_case(0, folder).kind == ACCEPTED
+    return folder
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("", "", ""),
+    ("7.85e-9", "7.8500001e-9", "mass"),
+    ("210000.0", "210000.1", "K is not that of the mesh"),
+    ("0.3", "0.30001", "K is not that of the mesh"),
+    ('"mm-t-s"', '"m-kg-s"', "units"),
+    ("n_modes = 4", "n_modes = 5", "modes, asked for 5"),
+    ("ratio = 0.01", "ratio = 0.0100001", "damping"),
+    ("[30.0, 5.0, 4.0]", "[30.0, 5.0, 4.00001]", "reference point"),
+    ("point = [0.0", "point = [10.0", "do not follow it"),
+    ("interfaces.right", "interfaces.rihgt", "interfaces"),
+])  # fmt: skip
+def test_a_body_of_another_job_is_seen(reduced, old, new, words):
+    reason = wrong_body(reduced, JOB.replace(old, new).encode())
+    assert reason.startswith(words) or words in reason
+    assert bool(reason) == bool(words)
+
+
+@pytest.fixture(scope="module")
+def moved(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("system")
+    assert system_case(0, folder).words == "compared"
+    return folder / "out.h5"
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("", "", ""),
+    ("mass = 2.0", "mass = 2.0001", "forces on stick"),
+    ("[0.0, 0.2, 0.001]", "[0.0, 0.2001, 0.001]", "moments on stick"),
+    ("[0.05, 0.0, 0.0]", "[0.0501, 0.0, 0.0]", "on stick"),
+    ("-9.81]", "-9.8101]", "forces on"),
+    ("stiffness = 50.0", "stiffness = 50.01", "force of stay"),
+    ("damping = 1.0", "damping = 1.01", "force of stay"),
+    ("[0.5, 0.2, 0.0]", "[0.5, 0.2001, 0.0]", "on ball"),
+    ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 0.9, 0.1]", "axis of joint pin"),
+    ("marker_a = [0.5, 0.0, 0.0]", "marker_a = [0.5, 0.0, 0.01]", "joint link is open"),
+    ("t_end = 0.1", "t_end = 0.102", "times"),
+    ("position = [0.5, 0.0, 0.0]", "position = [0.5, 0.0, 0.01]", "joint pin is open"),
+])  # fmt: skip
+def test_a_motion_of_another_system_is_seen(moved, old, new, words):
+    reason = wrong_motion(tomllib.loads(SYSTEM.replace(old, new, 1)), moved)
+    assert bool(reason) == bool(words)
+    assert words in reason
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_the_plain_reading_gives_back_what_was_written(suffix):
+    nodes, tets = bar()
+    found, cells = read_plain(FORMATS[suffix](nodes, tets), suffix)
+    np.testing.assert_array_equal([found[k + 1] for k in range(len(nodes))], nodes)
+    np.testing.assert_array_equal(np.array(cells) - 1, tets)
+
+
+def test_a_tape_of_another_expression_has_another_value():
+    from floatframe.functions.expressions import compile_expression
+
+    one = compile_expression("f", "x - y/z", ["x", "y", "z"])
+    other = compile_expression("f", "x - z/y", ["x", "y", "z"])
+    assert value_of_tape(one, (3.0, 2.0, 4.0)) == 2.5
+    assert value_of_tape(other, (3.0, 2.0, 4.0)) == 1.0
+
+
+@pytest.mark.parametrize("family", [name for name in FAMILIES if name != "kills"])
+def test_the_first_cases_of_every_family_pass(tmp_path, family):
+    for seed in range(3, 7):
+        (tmp_path / str(seed)).mkdir()
+        verdict = case_of(family)(seed, tmp_path / str(seed))
+        assert verdict.kind in (REFUSED, ACCEPTED), verdict.words
