@@ -1,7 +1,7 @@
 """One instant of a fully driven system: place, velocities and accelerations from joints and drives alone.
 
 Unknowns are the motions of the body frames; modal coordinates stand still (q' = q'' = 0). With G the columns of the
-constraint rows for them, M the masses, P, V as in joints/rows.py:
+constraint rows for them, M the masses, P, V as in joints/rows/kinds.py:
 
     (1) positions       G dx = -g                     Newton, until g = 0
     (2) velocities      G u = -dg/dt

@@ -147,7 +147,11 @@ def compile_system(system: System) -> CompiledSystem:
         ),
         rows=filled(
             JointRows(),
-            **{name: [getattr(row, name) for row in rows] for name in ("kind", "x", "y", "z", "c", "part")},
+            **{name: [getattr(row, name) for row in rows] for name in ("kind", "x", "y", "z", "u", "c", "part")},
+            **{
+                name: [getattr(kind_of(row.kind), name) for row in rows]
+                for name in ("holds", "is_length", "is_angle", "is_loaded")
+            },
             motion=row_motion,
             soft=np.zeros(len(rows)),
             force0=force0[:-1],

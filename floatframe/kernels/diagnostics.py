@@ -2,31 +2,18 @@
 
 import math
 
-from floatframe.joints.rows import (
-    DISTANCE,
-    DOT,
-    LINE,
-    LINE_TURN,
-    POINT,
-    PUSH,
-    RIM_HEIGHT,
-    ROLL,
-    SCREW,
-    SLIDE,
-    TURN,
-    TURN_B,
-    TWIST,
-    TWIST_B,
-)
+from floatframe.joints.rows.kinds import NOTHING, VELOCITY
 from floatframe.kernels.body import body_mass_product, modal_term
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.connection import normal_force, row_rate, spring_tension
-from floatframe.kernels.connections.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
+from floatframe.kernels.connections.connection import row_rates
 from floatframe.kernels.connections.coupler import coupler_power
 from floatframe.kernels.connections.pair_force import pair_energy, pair_power
-from floatframe.kernels.connections.relative_motion import loaded_axis, loaded_coordinate
+from floatframe.kernels.connections.spring_damper import spring_tension
 from floatframe.kernels.connections.time_function import time_function
 from floatframe.kernels.connections.user_force import user_force_power
+from floatframe.kernels.joints.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
+from floatframe.kernels.joints.loaded_rows import normal_force
+from floatframe.kernels.joints.relative_motion import loaded_axis, loaded_coordinate
 from floatframe.kernels.marker import cross, rotate, rotate_back
 from floatframe.kernels.memory import N_DRIFTS
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, SPRING, STIFFNESS, USER_FORCE
@@ -96,18 +83,17 @@ def diagnose(model, work, out, drift):
             continue
         a, b = model.connections.a[c], model.connections.b[c]
         for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
-            kind = model.rows.kind[k]
-            if kind in (POINT, SLIDE, DISTANCE, SCREW, RIM_HEIGHT, LINE):
-                drift[c, 0] += work.connections.g[k] ** 2
-                drift[c, 2] += row_rate(model, work, k, a, b) ** 2
-            elif kind in (PUSH, TWIST, TWIST_B):
+            rows = model.rows
+            if rows.is_loaded[k]:
                 x, _ = loaded_coordinate(model, work, k, a, b)
-                out[3] += coordinate_strain(model, k, kind != PUSH, x)
-            elif kind == ROLL:
+                out[3] += coordinate_strain(model, k, rows.is_angle[k] != 0, x)
+            elif rows.holds[k] == VELOCITY:
                 drift[c, 2] += work.connections.g[k] ** 2
-            elif kind in (DOT, TURN, TURN_B, LINE_TURN):
-                drift[c, 1] += work.connections.g[k] ** 2
-                drift[c, 3] += row_rate(model, work, k, a, b) ** 2
+            elif rows.holds[k] != NOTHING:
+                which = 0 if rows.is_length[k] else 1
+                rate, _ = row_rates(model, work, k, a, b)
+                drift[c, which] += work.connections.g[k] ** 2
+                drift[c, 2 + which] += rate**2
         for k in range(N_DRIFTS):
             drift[c, k] = math.sqrt(drift[c, k])
 
@@ -137,11 +123,10 @@ def loaded_power(model, work, c):
     w0, a, b = model.connections.w0[c], model.connections.a[c], model.connections.b[c]
     w = work.state.w[w0 : model.connections.w0[c + 1]]
     for k in range(w0, model.connections.w0[c + 1]):
-        if model.rows.kind[k] in (PUSH, TWIST, TWIST_B):
-            is_angle = model.rows.kind[k] != PUSH
+        if model.rows.is_loaded[k]:
+            is_angle = model.rows.is_angle[k] != 0
             x, v = loaded_coordinate(model, work, k, a, b)
-            e0, e1, e2 = loaded_axis(model, work, k, a, b)
-            normal, _ = normal_force(w, e0, e1, e2)
+            normal, _ = normal_force(w, loaded_axis(model, work, k, a, b))
             Q, _, _, _ = coordinate_force(model, work, k, is_angle, x, v, normal)
             given, taken = coordinate_power(model, work, k, is_angle, x, v, Q)
             loads += given

@@ -121,12 +121,17 @@ class Connections(NamedTuple):
 
 
 class JointRows(NamedTuple):
-    """Rows, see joints/rows.py."""
+    """Rows, see joints/rows/kinds.py."""
 
     kind: IntArray = integer(n_w)
+    holds: IntArray = integer(n_w)  #: NOTHING, POSITION or VELOCITY
+    is_length: IntArray = integer(n_w)  #: whether what it holds is a length
+    is_angle: IntArray = integer(n_w)  #: whether its coordinate is an angle
+    is_loaded: IntArray = integer(n_w)  #: whether it carries forces along its coordinate
     x: Array = real(n_w, 3)
     y: Array = real(n_w, 3)
     z: Array = real(n_w, 3)
+    u: Array = real(n_w, 3)
     c: Array = real(n_w, unit="m or rad")
     part: IntArray = integer(n_w)  #: where the part of the wrench begins of which it speaks
     motion: IntArray = integer(n_w)  #: its function of time, -1 for none
@@ -136,7 +141,7 @@ class JointRows(NamedTuple):
 
 
 class JointForces(NamedTuple):
-    """Forces along coordinates of joints, sorted by row, see kernels/connections/coordinate_force.py."""
+    """Forces along coordinates of joints, sorted by row, see kernels/joints/coordinate_force.py."""
 
     stiffness: Array = real(n_forces, unit="N/m or N m")
     free: Array = real(n_forces, unit="m or rad")
@@ -210,7 +215,7 @@ class Ports(NamedTuple):
 
 
 class Lines(NamedTuple):
-    """Deformed lines with a marker that slides, see kernels/connections/deformed_line.py."""
+    """Deformed lines with a marker that slides, see kernels/joints/deformed_line.py."""
 
     marker: IntArray = integer(n_lines)  #: that slides, its position that of s = 0
     other: IntArray = integer(n_lines)  #: marker B

@@ -90,7 +90,7 @@ class MarkerWork(NamedTuple):
 
 
 class LineWork(NamedTuple):
-    """Sliding markers on their lines, see kernels/connections/deformed_line.py."""
+    """Sliding markers on their lines, see kernels/joints/deformed_line.py."""
 
     s: Array = real(n_lines, unit="m")  #: place
     s_dot: Array = real(n_lines, unit="m/s")

@@ -30,7 +30,7 @@ class SlidingPlace:
 
 
 def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, end: PlaceMotion) -> SlidingPlace:
-    """Return where marker B, whose motion is given, is along the line; as in kernels/connections/deformed_line.py."""
+    """Return where marker B, whose motion is given, is along the line; as in kernels/joints/deformed_line.py."""
     name = body_name(joint.marker_a.body)
     body = system.body(name)
     assert isinstance(body, FlexibleBody)

@@ -1,7 +1,7 @@
 """Consistent initial conditions: assembled positions, compatible velocities, accelerations and reactions.
 
 All three solve the same system with the mass matrix M of the bodies and the rows G of the joints (P, V as in
-joints/rows.py; unknown reactions w, their lines GAUGE and SPRING included):
+joints/rows/kinds.py; unknown reactions w, their lines GAUGE and SPRING included):
 
     (1) positions       W dx - Jᵀ w = 0,       G dx = -g           W = M + s K; Newton until g = 0
     (2) velocities      W du - Jᵀ w = 0,       G du = -G u

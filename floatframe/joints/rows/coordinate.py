@@ -10,7 +10,7 @@ With axes A_a, A_b and the point of B at d from that of A, in ground axes, E the
 S = -X · Y, C = Z · Y with X, Z the directions x, z of the marker with the axis and Y the direction y of the other. The
 generalised force along it is -E · (part of the wrench); where an angle and a distance follow each other (a screw),
 -E · (N + slope F) or -E · (F + N/slope). All of it for stacks: vectors along the last axis. The kernels have the same
-formulas compiled, in kernels/connections/relative_motion.py.
+formulas compiled, in kernels/joints/relative_motion.py.
 """
 
 from dataclasses import dataclass, field

@@ -24,15 +24,15 @@ Y = A_B u, d = r_B - r_A and f(t) the prescribed motion of a row (constant c wit
               TWIST_B      TWIST about an axis of B
               RIM x        N - rho × F = 0, along x in ground axes     the force acts at the rim of a disc on B
 
-Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/connections/deformed_line.py.
+Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/joints/deformed_line.py.
 
 rho leads from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
-kernels/connections/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is
+kernels/joints/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is
 COUPLE; SPAN is the distance of two points as a coordinate.
 
 Joints whose points coincide need one moment (N = M), the others take the force at the point of B and have ARM rows.
 
-A kind is its entry in `ROW_KINDS`, and its formulas in the kernels (kernels/connections/row_formulas.py). Who wants to
+A kind is its entry in `ROW_KINDS`, and its formulas in the kernels (kernels/joints/row_formulas.py). Who wants to
 know whether a row holds something, what its unit is or how its coordinate is measured, looks here.
 """
 

@@ -37,6 +37,7 @@ class Row:
     y: Array = field(default_factory=lambda: ZERO)  #: direction in the axes of marker B, (3,)
     c: float = 0.0  #: value that is held, or slope of a screw
     z: Array = field(default_factory=lambda: ZERO)  #: second direction in the axes of marker A, (3,)
+    u: Array = field(default_factory=lambda: ZERO)  #: second direction in the axes of marker B, (3,)
     part: int = FORCE  #: of the wrench: FORCE, MOMENT or MOMENT_B; of DOT: where its reaction is
     motion: TimeFunction | None = None  #: prescribed motion of the held quantity; None: c
     coordinate: RowCoordinate | None = None  #: of the joint to which the row belongs

@@ -13,7 +13,7 @@ from floatframe.kernels.connections.element_coordinate import (
     port_second_rate,
     port_tangent_rate,
 )
-from floatframe.kernels.connections.relative_motion import prescribed
+from floatframe.kernels.joints.relative_motion import prescribed
 
 __all__ = ["coupler_derivatives", "coupler_power", "coupler_rates", "coupler_rows"]
 

@@ -16,9 +16,16 @@ nearest to the value before), the force or torque on A (3), and where a PUSH has
 
 import math
 
-from floatframe.joints.rows import PUSH, SPAN, TWIST_B
+from floatframe.joints.rows.kinds import PUSH, SPAN, TWIST_B
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.relative_motion import distance, loaded_axis, loaded_coordinate, turned_angle
+from floatframe.kernels.joints.relative_motion import (
+    distance,
+    loaded_axis,
+    loaded_coordinate,
+    relative_velocity,
+    slip,
+    turned_angle,
+)
 from floatframe.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, unit, vector
 
 __all__ = [
@@ -43,12 +50,6 @@ def port_line(model, work, p):
 
 
 @inner
-def relative_velocity(work, a, b):
-    """Return v_B - v_A."""
-    return sub(work.markers.v[b], work.markers.v[a])
-
-
-@inner
 def relative_rotation(work, a, b):
     """Return omega_B - omega_A."""
     return sub(work.markers.omega[b], work.markers.omega[a])
@@ -57,8 +58,8 @@ def relative_rotation(work, a, b):
 @inner
 def turning_gradient(model, work, k, a, b):
     """Return the derivative of an angle by the rotation of A; by that of B it is the opposite."""
-    _, t0, t1, t2 = turned_angle(model, work, k, a, b)
-    return t0, t1, t2
+    _, t = turned_angle(model, work, k, a, b)
+    return t
 
 
 @inner
@@ -112,7 +113,7 @@ def add_pair(P_a, P_b, r, column, x):
 
 @inner
 def port_gradient(model, work, p, r, by_x, by_v):
-    """Add by_x dx + by_v dv of port p to row r of P at both markers; see `loaded_row_derivatives`."""
+    """Add by_x dx + by_v dv of port p to row r of P at both markers; see kernels/joints/loaded_rows.py."""
     a, b, k = model.ports.a[p], model.ports.b[p], model.ports.row[p]
     P_a, P_b, kind = work.connections.P[a], work.connections.P[b], model.rows.kind[k]
     e, d = port_line(model, work, p), distance(work, a, b)
@@ -123,10 +124,10 @@ def port_gradient(model, work, p, r, by_x, by_v):
         add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
     elif kind == PUSH:
         omega_a = vector(work.markers.omega[a])
-        arm, slip = cross(e, d), sub(relative_velocity(work, a, b), cross(omega_a, d))
+        arm, seen = cross(e, d), slip(work, a, b, d)
         add_pair(P_a, P_b, r, 0, sub(scaled(by_v, cross(e, omega_a)), scaled(by_x, e)))
         add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
-        put_sum(P_a[r], 3, add(scaled(by_x, arm), scaled(by_v, cross(e, slip))))
+        put_sum(P_a[r], 3, add(scaled(by_x, arm), scaled(by_v, cross(e, seen))))
         put_sum(P_a[r], 9, scaled(by_v, arm))
     else:
         add_pair(P_a, P_b, r, 3, scaled(by_x, turning_gradient(model, work, k, a, b)))
