@@ -91,7 +91,7 @@ def test_imports_are_found_as_python_reads_them():
                     left += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             left = [name for name in left if name.split(".")[0] in PACKAGES]
     assert source_files(ENTRY) == sorted(known)
-    assert ROOT / "floatframe" / "joints" / "rows.py" in known
+    assert ROOT / "floatframe" / "joints" / "rows" / "kinds.py" in known
     assert ROOT / "floatframe" / "functions" / "expressions.py" in known
 
 
