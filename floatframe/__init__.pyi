@@ -60,6 +60,7 @@ from .integrators import hht as hht
 from .integrators import newmark as newmark
 from .integrators import trapezoidal as trapezoidal
 from .joints import ConstantOrientation as ConstantOrientation
+from .joints import ConstantVelocityJoint as ConstantVelocityJoint
 from .joints import CylindricalJoint as CylindricalJoint
 from .joints import DistanceJoint as DistanceJoint
 from .joints import FixedJoint as FixedJoint

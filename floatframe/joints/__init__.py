@@ -1,6 +1,7 @@
 """Joints: one file each; `JOINTS` is the registry for the system file."""
 
 from floatframe.joints.constant_orientation import ConstantOrientation
+from floatframe.joints.constant_velocity import ConstantVelocityJoint
 from floatframe.joints.cylindrical import CylindricalJoint
 from floatframe.joints.distance import DistanceJoint
 from floatframe.joints.fixed import FixedJoint
@@ -18,6 +19,7 @@ from floatframe.joints.universal import UniversalJoint
 __all__ = [
     "JOINTS",
     "ConstantOrientation",
+    "ConstantVelocityJoint",
     "CylindricalJoint",
     "DistanceJoint",
     "FixedJoint",
@@ -36,6 +38,7 @@ __all__ = [
 
 Joint = (
     ConstantOrientation
+    | ConstantVelocityJoint
     | CylindricalJoint
     | DistanceJoint
     | FixedJoint
@@ -53,6 +56,7 @@ Joint = (
 
 JOINTS = {
     "constant-orientation": ConstantOrientation,
+    "constant-velocity": ConstantVelocityJoint,
     "cylindrical": CylindricalJoint,
     "distance": DistanceJoint,
     "fixed": FixedJoint,

@@ -18,8 +18,8 @@ the cost.
 
 from floatframe.kernels.compiler.compilation import loops, view
 from floatframe.kernels.dense import add_products
-from floatframe.kernels.marker import cross
 from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
+from floatframe.kernels.scalars import cross
 
 __all__ = ["body_forces", "body_mass_product", "body_tangent", "modal_term"]
 

@@ -14,9 +14,9 @@ from floatframe.kernels.connections.user_force import user_force_power
 from floatframe.kernels.joints.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
 from floatframe.kernels.joints.loaded_rows import normal_force
 from floatframe.kernels.joints.relative_motion import loaded_axis, loaded_coordinate
-from floatframe.kernels.marker import cross, rotate, rotate_back
 from floatframe.kernels.memory import N_DRIFTS
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, SPRING, STIFFNESS, USER_FORCE
+from floatframe.kernels.scalars import cross, rotate, rotate_back
 
 __all__ = ["diagnose", "power"]
 

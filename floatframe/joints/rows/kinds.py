@@ -13,6 +13,7 @@ Y = A_B u, d = r_B - r_A and f(t) the prescribed motion of a row (constant c wit
               SCREW x z y  E · d = c th                                th the angle of D from Z, about the axis E
               TURN_B       TURN with A and B exchanged and -f          turns about an axis of B
               RIM_HEIGHT   Z · (d + rho) = 0                           a disc touches the plane normal to Z of A
+              EQUAL_TURN   E · Y - Z · D = 0                           shafts x × z of A and y × u of B turn equally
               ROLL x       E · (velocity of the rim at the contact) = 0   held as a velocity: it rolls
     wrench    GAUGE x      E · part = 0                                none along what is free, part one of F, M, N
               PUSH x       E · F + Q = 0                               force Q(s, s_dot, F, t) along a free distance
@@ -22,6 +23,7 @@ Y = A_B u, d = r_B - r_A and f(t) the prescribed motion of a row (constant c wit
               ARM x        M - N - d × F = 0, along x in ground axes   forces on A and B balance about one point
               ROD x        F - mu d = 0, along x in ground axes        force along the line of the points
               TWIST_B      TWIST about an axis of B
+              BISECTOR x   part · (E × (Z + D)) = 0                    moment along the bisector of the shafts Z, D
               RIM x        N - rho × F = 0, along x in ground axes     the force acts at the rim of a disc on B
 
 Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are in kernels/joints/deformed_line.py.
@@ -45,9 +47,11 @@ from fe_models.foundation.arrays import IntArray
 
 __all__ = [
     "ARM",
+    "BISECTOR",
     "COUPLE",
     "DISTANCE",
     "DOT",
+    "EQUAL_TURN",
     "FORCE",
     "GAUGE",
     "GAUGE_B",
@@ -88,6 +92,7 @@ __all__ = [
 #: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
 POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
 RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B, LINE, LINE_TURN, LINE_FREE = range(14, 25)
+EQUAL_TURN, BISECTOR = range(25, 27)
 NOTHING, POSITION, VELOCITY = range(3)  #: what a row holds
 FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
 NO_MOMENT = -1  #: in place of a part: nothing acts there
@@ -134,6 +139,8 @@ ROW_KINDS = (
     RowKind(LINE, "stays on a deformed line", POSITION, is_length=True),
     RowKind(LINE_TURN, "keeps its direction to a deformed line", POSITION),
     RowKind(LINE_FREE, "no force along a deformed line"),
+    RowKind(EQUAL_TURN, "two shafts turn equally", POSITION),
+    RowKind(BISECTOR, "moment along the bisector of two shafts"),
 )
 
 HOLDS = np.array([kind.holds for kind in ROW_KINDS])

@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 
 from floatframe.joints.rows.kinds import (
     ARM,
+    BISECTOR,
     DISTANCE,
     DOT,
+    EQUAL_TURN,
     GAUGE,
     GAUGE_B,
     LINE,
@@ -30,7 +32,7 @@ from floatframe.joints.rows.kinds import (
     TWIST,
     TWIST_B,
 )
-from floatframe.kernels.joints import deformed_line, held_rows, loaded_rows, rolling, wrench_rows
+from floatframe.kernels.joints import constant_velocity, deformed_line, held_rows, loaded_rows, rolling, wrench_rows
 from floatframe.kernels.joints.by_code import by_code
 
 __all__ = ["HELD", "WRENCH", "held_by_place", "held_rates", "held_value", "wrench_derivatives", "wrench_value"]
@@ -64,6 +66,7 @@ HELD = {
     SCREW: Held(held_rows.screw_value, held_rows.screw_rates),
     RIM_HEIGHT: Held(rolling.height_value, rolling.height_rates),
     ROLL: Held(rolling.roll_value, rolling.roll_rates, rolling.roll_by_place),
+    EQUAL_TURN: Held(constant_velocity.equal_turn_value, constant_velocity.equal_turn_rates),
     LINE: Held(deformed_line.line_value, deformed_line.line_rates),
     LINE_TURN: Held(deformed_line.line_turn_value, deformed_line.line_turn_rates),
 }
@@ -74,6 +77,7 @@ WRENCH = {
     ARM: Wrench(wrench_rows.arm_value, wrench_rows.arm_derivatives),
     ROD: Wrench(wrench_rows.rod_value, wrench_rows.rod_derivatives),
     RIM: Wrench(rolling.rim_value, rolling.rim_derivatives),
+    BISECTOR: Wrench(constant_velocity.bisector_value, constant_velocity.bisector_derivatives),
     LINE_FREE: Wrench(deformed_line.line_free_value, deformed_line.line_free_derivatives),
     PUSH: LOADED,
     TWIST: LOADED,

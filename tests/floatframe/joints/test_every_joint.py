@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from floatframe import (
     GROUND,
     ConstantOrientation,
+    ConstantVelocityJoint,
     CylindricalJoint,
     DistanceJoint,
     FixedJoint,
@@ -55,6 +56,7 @@ JOINTS = {  # make(name, a, b), constraints
     "point-on-plane": (lambda *ends: PointOnPlane("j", *ends, axis=AXIS), 1),
     "universal": (lambda *ends: UniversalJoint("j", *ends, axis=(1, 0.1, 0), axis_b=(0, 1, 0)), 4),
     "distance": (lambda *ends: DistanceJoint("j", *ends), 1),
+    "constant-velocity": (lambda *ends: ConstantVelocityJoint("j", *ends, axis=AXIS, axis_b=(0, 1, 0.1)), 4),
     "constant-orientation": (lambda *ends: ConstantOrientation("j", *ends), 3),
     "rolling-disc": (lambda *ends: RollingDisc("j", *ends, radius=0.8, axis=AXIS, axis_b=(1, 0.1, 0)), 3),
 }

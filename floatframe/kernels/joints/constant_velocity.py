@@ -1,0 +1,67 @@
+"""Two shafts that turn equally: rows of the constant-velocity joint.
+
+With E, Z normal to the shaft of A and to each other, and D, U those directions of B that were along them when B was
+turned straight from shaft to shaft, the axis of the rotation from A to B is normal to both shafts' bisector if
+
+    EQUAL_TURN   E · U - Z · D = 0
+    BISECTOR e   M · (E × (Z_A + Z_B)) = 0,  E, Z_A of A and Z_B = D of B: M is along the bisector of the shafts
+"""
+
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.joints.held_rows import product, product_rates
+from floatframe.kernels.joints.relative_motion import direction
+from floatframe.kernels.vector import add, cross, dot, put, scaled, sub, vector
+
+__all__ = ["bisector_derivatives", "bisector_value", "equal_turn_rates", "equal_turn_value"]
+
+
+@inner
+def equal_turn_value(model, work, k, a, b):
+    """EQUAL_TURN: E · U - Z · D."""
+    rows = model.rows
+    g_1, zero, m_1, _ = product(direction(work, a, rows.x[k]), direction(work, b, rows.u[k]))
+    g_2, _, m_2, _ = product(direction(work, a, rows.z[k]), direction(work, b, rows.y[k]))
+    m = sub(m_1, m_2)
+    return g_1 - g_2, zero, m, scaled(-1.0, m)
+
+
+@inner
+def equal_turn_rates(model, work, k, a, b):
+    """EQUAL_TURN."""
+    rows, zero = model.rows, (0.0, 0.0, 0.0)
+    o, p = vector(work.markers.omega[a]), vector(work.markers.omega[b])
+    E, Z, D, U = (
+        direction(work, a, rows.x[k]),
+        direction(work, a, rows.z[k]),
+        direction(work, b, rows.y[k]),
+        direction(work, b, rows.u[k]),
+    )
+    _, beta_1 = product_rates(o, p, E, zero, zero, U)
+    _, beta_2 = product_rates(o, p, Z, zero, zero, D)
+    return 0.0, beta_1 - beta_2
+
+
+@inner
+def shafts(model, work, k, a, b):
+    """Return E, the shaft of A and that of B."""
+    rows = model.rows
+    return direction(work, a, rows.x[k]), direction(work, a, rows.z[k]), direction(work, b, rows.y[k])
+
+
+@inner
+def bisector_value(model, work, k, a, b, w):
+    """BISECTOR: M · (E × (Z_A + Z_B))."""
+    E, Z_a, Z_b = shafts(model, work, k, a, b)
+    return dot(vector(w[model.rows.part[k] :]), cross(E, add(Z_a, Z_b)))
+
+
+@inner
+def bisector_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
+    """BISECTOR: M · (dphi × E) × S = dphi · (E × (S × M)), M · E × (dphi × Z) = dphi · (Z × (M × E))."""
+    part = model.rows.part[k]
+    E, Z_a, Z_b = shafts(model, work, k, a, b)
+    M, S = vector(w[part:]), add(Z_a, Z_b)
+    put(V[r], part, cross(E, S))
+    across = cross(M, E)
+    put(P_a[r], 3, scaled(c_k, add(cross(E, cross(S, M)), cross(Z_a, across))))
+    put(P_b[r], 3, scaled(c_k, cross(Z_b, across)))
