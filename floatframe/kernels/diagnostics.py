@@ -9,7 +9,6 @@ from floatframe.kernels.connections.connection import row_rates
 from floatframe.kernels.connections.coupler import coupler_power
 from floatframe.kernels.connections.pair_force import pair_energy, pair_power
 from floatframe.kernels.connections.spring_damper import spring_tension
-from floatframe.kernels.connections.time_function import time_function
 from floatframe.kernels.connections.user_force import user_force_power
 from floatframe.kernels.joints.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
 from floatframe.kernels.joints.loaded_rows import normal_force
@@ -17,6 +16,7 @@ from floatframe.kernels.joints.relative_motion import loaded_axis, loaded_coordi
 from floatframe.kernels.memory import N_DRIFTS
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, SPRING, STIFFNESS, USER_FORCE
 from floatframe.kernels.scalars import cross, rotate, rotate_back
+from floatframe.kernels.time_function import time_function
 
 __all__ = ["diagnose", "power"]
 

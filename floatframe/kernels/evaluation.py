@@ -3,11 +3,11 @@
 from floatframe.kernels.body import body_forces, body_tangent
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.connection import connection_derivatives, connection_rows
-from floatframe.kernels.connections.time_function import time_function
 from floatframe.kernels.joints.deformed_line import slide_marker
 from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, wrench_to_body
 from floatframe.kernels.rotation import right_jacobian
 from floatframe.kernels.scalars import rotate
+from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import put_matrix, vector
 
 __all__ = ["evaluate", "linearize", "tangent_of_body"]

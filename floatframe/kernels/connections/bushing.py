@@ -21,8 +21,8 @@ so that by virtual work, with p = f × e,  F = C f is the force on A (on B the o
 import math
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.time_function import time_function
 from floatframe.kernels.rotation import exp_matrix
+from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import (
     add,
     cross,

@@ -5,8 +5,8 @@ d(s d)/dr_B = (k - s/l) d dᵀ + (s/l) 1 + (c/l) d (v - l_dot d)ᵀ,   d(s d)/dv
 """
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.time_function import time_function
 from floatframe.kernels.joints.relative_motion import distance, relative_velocity
+from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import dot, norm, put, scaled, sub, vector
 
 __all__ = ["spring_derivatives", "spring_rows", "spring_tension"]

@@ -35,7 +35,7 @@ from floatframe.functions.expressions import (
     TANH,
 )
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.time_function import time_function
+from floatframe.kernels.time_function import time_function
 
 __all__ = ["tape_gradient", "tape_value"]
 

@@ -1,7 +1,7 @@
 """Two shafts that turn equally: rows of the constant-velocity joint.
 
-With E, Z normal to the shaft of A and to each other, and D, U those directions of B that lay along them when both shafts
-were in line, B is A turned straight from shaft to shaft, about an axis normal to both, if
+With E, Z normal to the shaft of A and to each other, and D, U those directions of B that lay along them when both
+shafts were in line, B is A turned straight from shaft to shaft, about an axis normal to both, if
 
     EQUAL_TURN   E · U - Z · D = 0          its gradient is along the bisector of the shafts (docs/theory.md §10)
     BISECTOR     M · (E × (Z_A + Z_B)) = 0  Z_A = A_A z, Z_B = A_B y the shafts: M is along their bisector, for two E

@@ -3,7 +3,7 @@
 import math
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.time_function import time_function
+from floatframe.kernels.time_function import time_function
 
 __all__ = ["coordinate_force", "coordinate_power", "coordinate_strain"]
 

@@ -4,7 +4,7 @@ import math
 
 from floatframe.joints.rows.kinds import PUSH, TWIST_B
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.time_function import time_function
+from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
 
 __all__ = [
