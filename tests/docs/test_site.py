@@ -1,0 +1,104 @@
+"""The parts of the documentation site that are our own: formulas, pages of names, plain text, no network."""
+
+import importlib
+import logging
+import re
+import sys
+import warnings
+from types import SimpleNamespace
+
+import pytest
+
+from tests.root import ROOT
+
+
+def extension(name):
+    """Import an extension of the site; the library that draws formulas is deprecated in its own imports."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        sys.path.insert(0, str(ROOT / "docs" / "extensions"))
+        try:
+            return importlib.import_module(name)
+        finally:
+            sys.path.remove(str(ROOT / "docs" / "extensions"))
+
+
+drawn_math, offline, plain_text, public_names = map(extension, ("drawn_math", "offline", "plain_text", "public_names"))
+
+
+def test_every_public_name_has_an_entry_on_one_page_of_names(tmp_path):
+    public_names.write_pages(SimpleNamespace(srcdir=tmp_path))
+    entries = []
+    for page in (tmp_path / "api").glob("*.rst"):
+        text = page.read_text(encoding="utf-8")
+        owner = re.search(r"currentmodule:: (\S+)", text)
+        entries += [
+            (owner[1], name) for name in re.findall(r"^\.\. auto(?:class|function|data):: (\w+)", text, re.MULTILINE)
+        ]
+    assert len(entries) == len(set(entries))
+    for package in public_names.PACKAGES:
+        handed_on = public_names.names_from_below(package)
+        expected = set(public_names.public_names(package)) - set(handed_on)
+        assert {name for owner, name in entries if owner == package} == expected
+        assert all((other, name) in entries for name, other in handed_on.items())
+
+
+def test_a_page_of_names_that_is_gone_is_removed(tmp_path):
+    (tmp_path / "api").mkdir()
+    (tmp_path / "api" / "cms.gone.rst").write_text("old")
+    public_names.write_pages(SimpleNamespace(srcdir=tmp_path))
+    assert not (tmp_path / "api" / "cms.gone.rst").exists()
+    assert (tmp_path / "api" / "cms.mode_sets.rst").exists()
+
+
+def test_a_formula_is_a_picture_with_its_text_and_stands_on_the_line():
+    picture = drawn_math.svg(r"\Psi_R^{\mathsf T} M \Phi = 0", is_display=False)
+    assert picture.startswith("<svg")
+    assert r"\Psi_R^{\mathsf T} M \Phi = 0" in picture
+    assert 'fill="currentColor"' in picture
+    below = float(re.search(r"vertical-align: (-?[\d.]+)em", picture)[1])
+    assert -1.0 < below < 0.0  # the subscript hangs below the line
+    assert "vertical-align" not in drawn_math.svg("x", is_display=True)
+
+
+def test_a_formula_that_is_not_understood_is_a_warning(caplog):
+    with caplog.at_level(logging.WARNING, logger="sphinx"):
+        text = drawn_math.drawn(r"x''^2", None, is_display=False)
+    assert text == "<code>x&#x27;&#x27;^2</code>"
+    assert "cannot be drawn" in caplog.text
+
+
+def test_letters_are_defined_once_on_a_page():
+    page = SimpleNamespace()
+    first = drawn_math.letters_once(page, drawn_math.svg("x + x", is_display=False))
+    again = drawn_math.letters_once(page, drawn_math.svg(r"x\ x", is_display=False))
+    assert first.count("<symbol") == 2
+    x = re.search(r'<symbol id="([^"]*)"', first)[1]
+    assert f'<symbol id="{x}"' not in again
+    assert again.count(f'href="#{x}"') == 2  # a space between letters takes none of them away
+
+
+@pytest.mark.parametrize(
+    ("html", "is_refused"),
+    [
+        ('<script src="https://example.org/x.js"></script>', True),
+        ('<link rel="stylesheet" href="//example.org/x.css"/>', True),
+        ('<img alt="" src="http://example.org/x.png">', True),
+        ('<script src="_static/x.js"></script><a href="https://example.org">there</a>', False),
+    ],
+)
+def test_a_page_that_loads_from_the_network_is_refused(html, is_refused, tmp_path):
+    (tmp_path / "page.html").write_text(html)
+    site = SimpleNamespace(outdir=tmp_path, builder=SimpleNamespace(format="html"))
+    if is_refused:
+        with pytest.raises(offline.SphinxError, match=r"page.html: .*example.org"):
+            offline.check(site, None)
+    else:
+        offline.check(site, None)
+
+
+def test_formulas_in_docstrings_are_escaped_and_pages_become_links(tmp_path):
+    (tmp_path / "theory.md").touch()
+    lines = ["|x| and q_ of a*b, `code_` (docs/theory.md §3)", ">>> a*b"]
+    plain_text.docstring_escaped(SimpleNamespace(srcdir=tmp_path), "function", "f", None, None, lines)
+    assert lines == [r"\|x\| and q\_ of a\*b, `code_` (:doc:`theory </theory>` §3)", ">>> a*b"]
