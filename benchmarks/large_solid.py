@@ -66,7 +66,7 @@ def line(path):
         body = result
     modes = cms.craig_bampton(body, n_modes=N_MODES)
     stamp("mode set")
-    reduced = cms.reduce(body, modes, frame=cms.NodalFrame("big_end"))
+    reduced = cms.reduce(body, modes, frame=cms.NodalFrame("big_end"), geometric=False)
     stamp("reduce")
     cms.write(reduced, OUT / "line.h5")
     stamp("write")

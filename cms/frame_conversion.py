@@ -40,7 +40,7 @@ from fe_models.body.load_cases import ReducedLoadCase
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["convert_frame"]
+__all__ = ["Change", "convert_frame", "converted"]
 
 
 def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = None) -> ReducedBody:
@@ -67,11 +67,17 @@ def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None
         (a file of version 1) for a Buckens frame; if a rigid-body motion is among its shapes; or if it has a geometric
         stiffness and the reaction of the new frame is no combination of its unit loads (`geometric_conversion`).
     """
+    return converted(reduced, frame, damping=damping)[0]
+
+
+def converted(
+    reduced: ReducedBody, frame: Frame, *, damping: Damping | None = None
+) -> tuple[ReducedBody, "Change"]:
+    """Return what `convert_frame` returns, and the change that led there."""
     if reduced.is_held or isinstance(frame, HeldFrame):
         raise BodyError(
             f"reduced body {reduced.name!r}: a body that is held to the ground has the frame of the ground, and a "
-            "free one "
-            "any other; reduce it anew with or without its supports"
+            "free one any other; reduce it anew with or without its supports"
         )
     C, target = condition_of(reduced, frame)  # (1)
     require_convertible(reduced, target)
@@ -80,7 +86,7 @@ def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None
     Z, is_massive = modes_of(reduced, (M + M.T) / 2)  # (3)
     change = Change(C, Z, *relative_place(reduced.frame, target))
     change = replace(change, Z=Z @ orientation(orienting_rows(reduced, change), omega2_of(reduced, Z)))
-    return changed_body(reduced, target, change, is_massive, damping)  # (4)
+    return changed_body(reduced, target, change, is_massive, damping), change  # (4)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from cms.reduced_body.nodal_sums import NodalSums
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.second_order.geometric_reduction import stiffness_of_states
 from cms.second_order.quadratic_modes import quadratic_modes
-from cms.second_order.unit_states import UnitStates, require_geometric_stiffness, states_of
+from cms.second_order.unit_states import UnitStates, has_geometric_stiffness, require_geometric_stiffness, states_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase, ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray
@@ -38,7 +38,7 @@ def reduce(
     frame: Frame | HeldFrame | None = None,
     damping: Damping | None = None,
     stress: bool = True,
-    geometric: bool | UnitStates = False,
+    geometric: bool | UnitStates | None = None,
     quadratic: bool = False,
 ) -> ReducedBody:
     """Reduce a body to the span of a mode set.
@@ -57,9 +57,10 @@ def reduce(
         Whether to keep the stress of the modes at the kept nodes and the stress points, where the body knows it.
     geometric
         Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`), with which a multibody
-        system stiffens the body by its spin, accelerations and interface loads. It costs the static solution of 12 +
-        6 n_interfaces loads and one pass over the elements. Or the static states of the unit loads in this frame
-        (`unit_states`), so that no factorisation is needed any more.
+        system stiffens the body by its spin, accelerations and interface loads; by default where the elements are
+        known. It costs a factorisation, if `source` does not bring one, the static solution of 12 + 6 n_interfaces
+        loads and one pass over the elements. Or the static states of the unit loads in this frame (`unit_states`), so
+        that no factorisation is needed any more.
     quadratic
         Whether to add quadratic modes, the displacement of second order of every kept node (`quadratic_modes`),
         with the geometric stiffness that is their inertia. For slender bodies: three static solutions a kept node.
@@ -76,6 +77,8 @@ def reduce(
     states = geometric if isinstance(geometric, UnitStates) else None
     if geometric or quadratic:
         require_geometric_stiffness(body)
+    elif geometric is None:
+        geometric = has_geometric_stiffness(body)
     if modes.columns.shape[0] != body.n_dof:
         raise ModeSetError(
             f"reduce: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body "

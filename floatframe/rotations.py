@@ -20,6 +20,7 @@ from fe_models.foundation.arrays import Array
 __all__ = [
     "cross",
     "dot",
+    "euler_parameter_product",
     "euler_parameter_rates",
     "euler_parameters",
     "euler_parameters_of_rotation_vector",
@@ -105,6 +106,13 @@ def euler_parameters_of_rotation_vector(theta: Array) -> Array:
     x = 0.25 * dot(theta, theta)
     s, a, _ = quotients(x)
     return np.concatenate([(1 - a * x)[..., None], 0.5 * s[..., None] * theta], axis=-1)
+
+
+def euler_parameter_product(p: Array, other: Array) -> Array:
+    """Return the Euler parameters, (..., 4), of R(p) R(other)."""
+    w, v, w_o, v_o = p[..., :1], p[..., 1:], other[..., :1], other[..., 1:]
+    scalar = w * w_o - dot(v, v_o)[..., None]
+    return np.concatenate([scalar, w * v_o + w_o * v + cross(v, v_o)], axis=-1)
 
 
 def euler_parameter_rates(p: Array, omega_B: Array) -> Array:

@@ -35,7 +35,7 @@ def list_modes(path: Path, *, as_json: bool) -> None:
         with clock(f"mode set {job.reduction.set}"):
             modes = job_mode_set(body, job.reduction)
         with clock("reduce"):
-            reduced = reduce(body, modes, frame=frame_of(job, held=body.is_held), stress=False)
+            reduced = reduce(body, modes, frame=frame_of(job, held=body.is_held), stress=False, geometric=False)
     record = mode_record(modes, reduced)
     if as_json:
         typer.echo(json.dumps(record, indent=2))

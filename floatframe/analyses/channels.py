@@ -156,6 +156,8 @@ def stress_row(system: System, compiled: CompiledSystem, channel: StressChannel)
     row = np.zeros(int(compiled.model.bodies.u0[-1]))
     i = compiled.body_names.index(channel.body)
     modes = modes_at(body, channel.name, channel.position, None)
+    if body.mean_axes is not None:
+        modes = modes @ body.mean_axes.Z
     row[int(compiled.model.bodies.u0[i]) + 6 : int(compiled.model.bodies.u0[i + 1])] = modes[
         STRESS_COMPONENTS.index(channel.component)
     ]

@@ -9,18 +9,24 @@ A flow that ends in the equilibrium, made implicit with growing steps (pseudo-tr
 Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them.
 """
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array
+from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
 from floatframe.checked_values import array_of_shape
+from floatframe.compiling.file_frames import motion_of_file
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.joints.rows import is_held_velocity
+from floatframe.kernels.model import STIFFNESS
 from floatframe.kernels.work import Work, new_work
+from floatframe.motion.validity_watch import ValidityWatch
+from floatframe.results.validity import ValidityNote
 from floatframe.rotations import rotation_matrix
 from floatframe.start.initial import assembled, checked, require_independent_constraints
 from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
@@ -29,14 +35,18 @@ from floatframe.start.newton_equations import (
     displaced,
     in_ground_axes,
     linearized,
+    modal_matrix,
     set_iterate,
     solve,
     with_modal_weight,
 )
+from floatframe.start.placement import require_placed_near
 from floatframe.state import State
 from floatframe.system import System
 
 __all__ = ["Equilibrium", "static_equilibrium", "steady_rotation"]
+
+log = logging.getLogger(__name__)
 
 LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
 FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: of tau in one step, while the residual falls or stands
@@ -55,6 +65,7 @@ class Equilibrium:
     omega: Array  #: angular velocity of the steady rotation, ground axes, (3,) [rad/s]; zero at rest
     residual: float  #: largest force out of balance, relative to the forces at work
     n_iterations: int
+    validity: tuple[ValidityNote, ...] = ()  #: bodies that are out of the range of their frame, as for a motion
 
 
 def static_equilibrium(
@@ -116,7 +127,9 @@ def steady_rotation(
             "hold the body by other joints, or integrate the motion"
         )
     work = new_work(model)
-    state = assembled(compiled, work, compiled.placed if state is None else checked(compiled, state))
+    given = compiled.placed if state is None else checked(compiled, state)
+    state = assembled(compiled, work, given)
+    require_placed_near(compiled, given, state)
     require_independent_constraints(compiled, work, state)
     holds = held_rows(model)
     w, tau, last = np.zeros(len(work.state.w)), 0.0, np.inf
@@ -137,7 +150,8 @@ def steady_rotation(
         is_told = bool((np.abs(gaps) <= told)[~holds].all())
         if error <= tolerance and is_closed and is_told:
             _require_rotation(compiled, work, omega)
-            return Equilibrium(state, u_dot, w, omega, error, iteration)
+            notes = notes_at(system, work, state, u_dot, w)
+            return Equilibrium(*motion_of_file(compiled, state, u_dot), w, omega, error, iteration, notes)
         if iteration == max_iterations:
             break
         if tau == 0.0:
@@ -164,6 +178,15 @@ def steady_rotation(
         h=0.0,
         residual=error,
     )
+
+
+def notes_at(system: System, work: Work, state: State, u_dot: Array, w: Array) -> tuple[ValidityNote, ...]:
+    """Return, and log, which bodies are out of the range of their frame in a state of the engine."""
+    watch = ValidityWatch(system)
+    rows, _ = observed_state(compiled_system(system), work, state, u_dot, w, 0.0)
+    for note in watch.observe(rows):
+        log.warning("equilibrium: %s", note.words)
+    return watch.notes
 
 
 def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array) -> tuple[State, Array]:
@@ -205,9 +228,14 @@ def _size(W: tuple[Array, ...], forces: Array) -> float:
 
 
 def _forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: tuple[Array, ...]) -> float:
-    """Return the length of the forces of joints, springs and weight, in the norm of the residual."""
-    reactions = _size(W, parts.J.T @ work.state.w) if len(work.state.w) else 0.0
-    return max(reactions, _size(W, work.bodies.residual + (parts.J.T @ work.state.w if len(work.state.w) else 0.0)))
+    """Return the length of the forces of joints, springs, weight and deformation, in the norm of the residual."""
+    bodies, residual = compiled.model.bodies, work.bodies.residual
+    reactions = parts.J.T @ work.state.w if len(work.state.w) else np.zeros_like(residual)
+    elastic = np.zeros_like(residual)
+    for i, u0 in enumerate(bodies.u0[:-1]):
+        q = work.state.q[int(bodies.q0[i]) : int(bodies.q0[i + 1])]
+        elastic[int(u0) + 6 : int(bodies.u0[i + 1])] = modal_matrix(compiled.model, i, STIFFNESS) @ q
+    return max(_size(W, part) for part in (reactions, residual + reactions, elastic))
 
 
 def _rounding(compiled: CompiledSystem, parts: Linearized, state: State) -> Array:

@@ -15,7 +15,8 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven_freedoms import SingularityGuard, free_coordinates
 from floatframe.analyses.driven_motion import ELASTICITY, Elasticity, Instant, frozen_bodies
 from floatframe.analyses.joint_rates import driven_coordinates
-from floatframe.analyses.snapshot import observed_state
+from floatframe.analyses.observed_state import observed_state
+from floatframe.compiling.file_frames import rows_of_file
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.joints.rows import is_held_velocity
@@ -108,6 +109,7 @@ def kinematics(
                     done = done + (time - t[k - 1]) / 2 * (power[0] + power[1])
                 power[0] = power[1]
                 rows.diagnostics[0, 10:12] = done
+                rows = rows_of_file(compiled, rows)
                 if writer is None:
                     kept.append(rows)
                 else:

@@ -19,6 +19,7 @@ from fe_models.foundation.arrays import Array, frozen
 from floatframe.analyses.channels import AnyChannel, StressChannel, channel_rows, channel_units, channels_of
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.system_matrices import tangents, turning_matrices
+from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
@@ -172,7 +173,9 @@ def linearize(
     about = static_equilibrium(system) if about is None else about
     compiled = compiled_system(system)
     model, work = compiled.model, new_work(compiled.model)
-    set_iterate(work, about.state, about.u_dot, about.w)
+    state, u_dot = motion_of_engine(compiled, about.state, about.u_dot)
+    set_iterate(work, state, u_dot, about.w)
+    shown = small_motions_of_file(compiled, state.q)
     parts = tangents(model, work)
     Omega, Omega_t = turning_matrices(model, work)
     N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.bodies.u0[:-1]])
@@ -185,15 +188,23 @@ def linearize(
         K=N.T @ (parts.K + parts.C @ Omega + parts.M @ Omega_t @ Omega) @ N,
         B=(channel_rows(system, compiled, work, inputs) @ N).T,
         L=channel_rows(system, compiled, work, outputs) @ N,
-        N=N,
+        N=la.block_diag(*shown) @ N,
         inputs=tuple(channel.name for channel in inputs),
         outputs=tuple(channel.name for channel in outputs),
         body_names=compiled.body_names,
-        body_masses=linearized(model, work, 1.0, 0.0, 0.0).H,
+        body_masses=tuple(
+            seen_from(T, mass) for T, mass in zip(shown, linearized(model, work, 1.0, 0.0, 0.0).H, strict=True)
+        ),
         rates=tuple(getattr(channel, "rate", 0) for channel in outputs),
         input_units=tuple(channel_units(system, channel)[1] for channel in inputs),
         output_units=tuple(channel_units(system, channel)[0] for channel in outputs),
     )
+
+
+def seen_from(T: Array, mass: Array) -> Array:
+    """Return a mass matrix over the motions T x of what it is over x."""
+    by_x = np.linalg.inv(T)
+    return np.asarray(by_x.T @ mass @ by_x)
 
 
 def allowed_motions(G: Array, length: float, bodies: list[int]) -> Array:

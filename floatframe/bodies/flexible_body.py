@@ -8,6 +8,7 @@ import numpy as np
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
+from floatframe.bodies.mean_axes import MeanAxes, mean_axes
 from floatframe.bodies.rigid_body import euler_parameters_from_user
 from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
@@ -74,6 +75,17 @@ class FlexibleBody:
     def is_stiffened(self) -> bool:
         """Whether the geometric stiffness of the reduced body counts."""
         return self.stiffening is not False and self.reduced.geometric is not None
+
+    @property
+    def mean_axes(self) -> MeanAxes | None:
+        """How the engine moves a stiffened body of another frame: in mean axes; None: in the frame of its file."""
+        return mean_axes(self.reduced) if self.is_stiffened else None
+
+    @property
+    def moved(self) -> ReducedBody:
+        """The reduced body in the frame in which the engine moves it."""
+        axes = self.mean_axes
+        return self.reduced if axes is None else axes.reduced
 
     @property
     def frame_orientation(self) -> Array:

@@ -40,7 +40,7 @@ def body_types(bodies: Sequence[Body]) -> tuple[list[RigidBody | ReducedBody], I
     types: list[RigidBody | ReducedBody] = []
     kind, keys = [], []
     for body in bodies:
-        data = body.reduced if isinstance(body, FlexibleBody) else body
+        data = body.moved if isinstance(body, FlexibleBody) else body
         key = id(data), isinstance(body, FlexibleBody) and body.is_stiffened
         if key not in keys:
             keys.append(key)

@@ -110,7 +110,7 @@ def body_loads(system: System, functions: Functions) -> BodyLoads:
         if not isinstance(body, FlexibleBody):
             raise ModelError(f"{where}: body {body_name(load.body)!r} is not flexible and has no load cases")
         try:
-            case = body.reduced.load_case(load.load_case)
+            case = body.moved.load_case(load.load_case)
         except CmsError as error:
             raise ModelError(f"{where}: {error}") from None
         part: Array = np.concatenate([case.force, case.torque, case.h])

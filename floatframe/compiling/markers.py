@@ -81,7 +81,7 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
             f"{where}: flexible body {body.name!r} has no interface {marker.interface!r}"
             f"{nearest(marker.interface, choices)}"
         )
-    shape = interface_shape(body.reduced, marker.interface, is_stiffened=body.is_stiffened)
+    shape = interface_shape(body.moved, marker.interface, is_stiffened=body.is_stiffened)
     return MarkerData(index, replace(shape, triad=shape.triad @ triad))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.mean_axes import FrameMotion, MeanAxes
 from floatframe.compiling.bodies import body_types, integers, offsets, type_arrays
 from floatframe.compiling.callbacks import Callback
 from floatframe.compiling.connections import Connections as ConnectionLists
@@ -51,7 +52,8 @@ class CompiledSystem:
     network_names: tuple[str, ...]  #: of couplers, then user forces
     callbacks: tuple[Callback, ...]  #: users' functions that the kernels call
     owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
-    placed: State  #: the state as given, before it is made consistent
+    placed: State  #: the state as given, before it is made consistent, in the frames of the engine
+    mean_axes: tuple[MeanAxes | None, ...]  #: of bodies that the engine moves in another frame than their file's
     coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
     length: float  #: size of the system as placed [m]; scales rotations against translations
 
@@ -84,7 +86,8 @@ def compile_system(system: System) -> CompiledSystem:
         If a joint or force names what does not exist, or has two markers on one body.
     """
     require_inertia(system.bodies)
-    placed = place(system)
+    axes = tuple(body.mean_axes if isinstance(body, FlexibleBody) else None for body in system.bodies)
+    placed = place(system, axes)
     types, kind = body_types(system.bodies)
     n_q = n_q_of(system)
     gravity = np.zeros(3)
@@ -186,6 +189,7 @@ def compile_system(system: System) -> CompiledSystem:
         callbacks=tuple(networks.callbacks),
         owners=tuple(made.owner),
         placed=placed,
+        mean_axes=axes,
         coordinates=tuple(row.coordinate_name for row in rows),
         length=length,
     )
@@ -238,23 +242,35 @@ def row_softness(system: System, rows: list[Row], mass: Array, length: float) ->
     return soft
 
 
-def place(system: System) -> State:
-    """Return the state of the bodies as given."""
+def place(system: System, mean_axes: tuple[MeanAxes | None, ...]) -> State:
+    """Return the state of the bodies as given, in the frames of the engine."""
     r: list[Array] = []
     p: list[Array] = []
     q: list[Array] = []
     u: list[Array] = []
-    for body in system.bodies:
+    for body, axes in zip(system.bodies, mean_axes, strict=True):
         if isinstance(body, FlexibleBody):
-            r.append(body.frame_position)
-            p.append(euler_parameters(body.frame_orientation))
-            q.append(body.q)
-            u += [body.frame_velocity, body.frame_omega, body.q_dot]
+            motion = motion_at_start(body)
+            if axes is not None:
+                motion = axes.to_mean(motion)
+            r.append(motion.r)
+            p.append(motion.p)
+            q.append(motion.q)
+            u += [motion.v, motion.omega, motion.q_dot]
         else:
             r.append(body.position)
             p.append(body.orientation)
             u += [body.velocity, body.omega_B]
     return State(r=np.array(r), p=np.array(p), q=np.concatenate([*q, np.zeros(0)]), u=np.concatenate(u))
+
+
+def motion_at_start(body: FlexibleBody) -> FrameMotion:
+    """Return the motion of the frame of a body's file at the start, without accelerations."""
+    zero = np.zeros(3)
+    return FrameMotion(
+        body.frame_position, euler_parameters(body.frame_orientation), body.q, body.frame_velocity, body.frame_omega,
+        body.q_dot, zero, zero, np.zeros_like(body.q),
+    )  # fmt: skip
 
 
 def system_length(markers: list[MarkerData], placed: State, n_q: IntArray, model: Model) -> float:

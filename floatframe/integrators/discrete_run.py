@@ -14,7 +14,7 @@ from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.work import Work
-from floatframe.start.initial import consistent_state, solve_accelerations, with_compatible_velocities
+from floatframe.start.initial import consistent_motion, solve_accelerations, with_compatible_velocities
 from floatframe.state import State
 from floatframe.system import System
 
@@ -43,7 +43,7 @@ class DiscreteScheme:
 
     def start(self, system: System, t: float, state: State | None = None) -> Carry:
         """Return the memory at the beginning, from a state made consistent; `a` holds the multipliers of the joints."""
-        consistent = consistent_state(system, state, t=t)
+        consistent = consistent_motion(system, state, t=t)
         n_held = discrete_system(system, type(self).__name__).n_held
         return Carry(
             consistent.state, consistent.u_dot, np.zeros(n_held), 0.0, consistent.w, np.zeros(2), np.zeros(2)

@@ -13,7 +13,7 @@ from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import MASS, STIFFNESS, Model
 from floatframe.kernels.work import Work
 from floatframe.start.constraint_words import open_joints
-from floatframe.start.initial import acceleration_rates, consistent_state, velocity_correction
+from floatframe.start.initial import acceleration_rates, consistent_motion, velocity_correction
 from floatframe.start.newton_equations import displaced, modal_diagonals
 from floatframe.state import State
 from floatframe.system import System
@@ -100,7 +100,7 @@ class GeneralizedAlpha:
 
     def start(self, system: System, t: float, state: State | None = None) -> Carry:
         """Return the memory at the beginning: the state made consistent, its accelerations and their rates."""
-        consistent = consistent_state(system, state, t=t)
+        consistent = consistent_motion(system, state, t=t)
         rates = acceleration_rates(compiled_system(system), consistent, t)
         return Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
 

@@ -12,7 +12,7 @@ from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.work import Work, new_work
 from floatframe.rotations import euler_parameter_rates
-from floatframe.start.initial import assembled, consistent_state, solve_accelerations, with_compatible_velocities
+from floatframe.start.initial import assembled, consistent_motion, solve_accelerations, with_compatible_velocities
 from floatframe.state import State
 from floatframe.system import System
 
@@ -53,7 +53,7 @@ class Ida:
         for c, name in enumerate(compiled.connection_names):
             if compiled.model.connections.law[c] in (COUPLER, USER_FORCE):
                 raise ModelError(f"Ida: {name!r} has a memory of its own, which this scheme does not know; use another")
-        made = consistent_state(system, state, t=t)
+        made = consistent_motion(system, state, t=t)
         return Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from floatframe.compiling.file_frames import rows_of_file, state_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator
@@ -60,7 +61,8 @@ class EventWatch:
 
     def measured(self, before: Rows, after: Rows) -> Array:
         """Return what each event watches at two times, (2, n_events)."""
-        arrays = arrays_of([before, after])
+        compiled = compiled_system(self.full)
+        arrays = arrays_of([rows_of_file(compiled, row) for row in (before, after)])
         arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
         motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
         columns = []
@@ -135,7 +137,7 @@ class EventWatch:
                 self.has_stopped = True
                 return carry, row, work, None
             self.switch((self.off | set(event.switch_off)) - set(event.switch_on))
-            fresh = integrator.start(self.system, t, carry.state)
+            fresh = integrator.start(self.system, t, state_of_file(compiled_system(self.full), carry.state))
             stored, work_done = float(row.diagnostics[-1, SPRINGS]), carry.work
             carry = replace(
                 fresh, work=work_done, n_iterations=carry.n_iterations, n_steps=carry.n_steps,

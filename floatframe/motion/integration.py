@@ -16,6 +16,7 @@ from fe_models.foundation.digest import file_digest
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.checked_values import number
 from floatframe.compiling.callbacks import raise_errors_of
+from floatframe.compiling.file_frames import rows_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.integrators import CLASSES
@@ -270,11 +271,12 @@ class Run:
         """Take rows of results; tell when a body leaves the range of its linear frame."""
         for note in self.watch.observe(rows):
             log.warning("%s", note.words)
+        told = rows_of_file(compiled_system(self.system), rows)
         if self.writer is None:
-            self.kept.append(rows)
+            self.kept.append(told)
         else:
             self.writer.validity = notes_to_json(self.watch.notes)
-            self.writer.append(rows)
+            self.writer.append(told)
 
     def advance(
         self, carry: Carry, n_done: int, batch_steps: int, progress: Callable[[Progress], None] | None

@@ -5,6 +5,8 @@ The stiffness of a body under its loads is K + Σ lambda_j K_j, with the amplitu
 the interfaces, all in body axes. In units of K its change is A = Σ lambda_j K^(-1/2) K_j K^(-1/2): the loads are
 -min(eig A) of those that buckle the body, and a linear frame is wrong in stiffness by max |eig A|.
 
+Where the body has no matrices, those of the interface loads are estimated from the rotations of the interfaces.
+
 The eigenvalues are found once per batch of rows, where Σ |lambda_j| |K_j| is largest, and only if that bound is above
 the limit and what was seen before.
 """
@@ -18,10 +20,15 @@ from cms.reduced_body.geometric_stiffness import SPIN_PAIRS
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.compiling.system import compiled_system
+from floatframe.compiling.file_frames import rows_of_file
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.forces import PointForce
+from floatframe.joints.rows import is_held
 from floatframe.kernels.memory import Rows
+from floatframe.kernels.model import JOINT, STIFFNESS
+from floatframe.kernels.work import new_work
 from floatframe.results.validity import LINEAR, STIFFENED, Limits, ValidityNote
+from floatframe.start.newton_equations import linearized, modal_matrix, set_iterate
 from floatframe.system import System
 
 __all__ = ["ValidityWatch"]
@@ -55,9 +62,9 @@ class Watched:
     index: int
     body: FlexibleBody
     limits: Limits
-    frequency: float  #: lowest angular frequency [rad/s]
+    frequency: float  #: lowest angular frequency with one of its joints held, or free [rad/s]
     Psi_r: Array  #: rotations of the interfaces by q, (3 n, n_q)
-    scaled: Array  #: K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows without matrices
+    scaled: Array  #: K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows where K is singular
     norms: Array  #: their largest |eigenvalue|, (n_loads,)
     wrenches: list[Wrench] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
@@ -70,11 +77,11 @@ class ValidityWatch:
         """Begin with a system, and the notes of the part of the motion that is already done."""
         self.system = system
         self.found = {(note.body, note.kind): note for note in notes}
-        self.bodies = [
-            watched(i, body)
-            for i, body in enumerate(system.bodies)
-            if isinstance(body, FlexibleBody) and is_elastic(body)
+        elastic = [
+            (i, body) for i, body in enumerate(system.bodies) if isinstance(body, FlexibleBody) and is_elastic(body)
         ]
+        frequencies = held_frequencies(compiled_system(system), [i for i, _ in elastic]) if elastic else []
+        self.bodies = [watched(i, body, omega) for (i, body), omega in zip(elastic, frequencies, strict=True)]
         for part in self.bodies:
             if len(part.norms):
                 find_loads(system, part)
@@ -88,9 +95,10 @@ class ValidityWatch:
         """Take rows of results; return the notes that are new with them."""
         if len(rows.t) == 0:
             return ()
+        told = rows_of_file(compiled_system(self.system), rows)
         new = []
         for part in self.bodies:
-            for kind, values in self.measures(part, rows):
+            for kind, values in self.measures(part, rows, told):
                 k = int(np.nanargmax(values)) if np.isfinite(values).any() else 0
                 largest, limit = float(values[k]), getattr(part.limits, kind)
                 if not largest > limit:
@@ -107,8 +115,11 @@ class ValidityWatch:
                     self.found[key] = replace(self.found[key], largest=largest, t_largest=t)
         return tuple(new)
 
-    def measures(self, part: Watched, rows: Rows) -> list[tuple[str, Array]]:
-        """Return what is compared, each over the rows, (n_t,)."""
+    def measures(self, part: Watched, rows: Rows, told: Rows) -> list[tuple[str, Array]]:
+        """Return what is compared, each over the rows of the engine, told in the frames of the files, (n_t,).
+
+        A rotation is that against the frame in which the engine moves the body, a load that of the frame of its file.
+        """
         model = compiled_system(self.system).model
         i, q0, u0 = part.index, int(model.bodies.q0[part.index]), int(model.bodies.u0[part.index])
         q = rows.q[:, q0 : q0 + part.body.reduced.n_q]
@@ -118,12 +129,12 @@ class ValidityWatch:
             angles = (q @ part.Psi_r.T).reshape(len(q), -1, 3)
             found.append(("rotation", np.linalg.norm(angles, axis=2).max(axis=1)))
         if len(part.norms):
-            found.append(("load", self.load_measure(part, rows, i, u0, omega)))
+            found.append(("load", self.load_measure(part, told, i, u0)))
         return found
 
-    def load_measure(self, part: Watched, rows: Rows, i: int, u0: int, omega: Array) -> Array:
+    def load_measure(self, part: Watched, rows: Rows, i: int, u0: int) -> Array:
         """Return the change of the stiffness by the loads; -1 in the rows where it is not looked for."""
-        R = rotations(rows.p[:, i])
+        R, omega = rotations(rows.p[:, i]), rows.u[:, u0 + 3 : u0 + 6]
         lam = np.zeros((len(rows.t), len(part.norms)))
         acceleration = rows.u_dot[:, u0 : u0 + 3] - compiled_system(self.system).model.gravity
         lam[:, :3] = in_body(R, acceleration)
@@ -154,17 +165,58 @@ def is_elastic(body: FlexibleBody) -> bool:
     return bool(np.isfinite(body.reduced.frequencies).any() and (body.reduced.frequencies > 0).any())
 
 
-def watched(index: int, body: FlexibleBody) -> Watched:
+def held_frequencies(compiled: CompiledSystem, bodies: list[int]) -> list[float]:
+    """Return of bodies the lowest angular frequency above zero with one joint held, whichever makes it least [rad/s].
+
+    What a joint holds stands still then, so that a body that is clamped by one of its joints has the frequency of a
+    cantilever whatever the frame of its file; a body without joints has that of the free body. None above zero: inf.
+    """
+    model, work = compiled.model, new_work(compiled.model)
+    set_iterate(work, compiled.placed)
+    parts = linearized(model, work, 1.0, 0.0, 0.0)
+    rows = parts.G.tocsr()
+    found = []
+    for i in bodies:
+        u = slice(int(model.bodies.u0[i]), int(model.bodies.u0[i + 1]))
+        K = np.zeros_like(parts.H[i])
+        K[6:, 6:] = modal_matrix(model, i, STIFFNESS)
+        lowest = []
+        for c in np.flatnonzero(model.connections.law == JOINT):
+            own = np.arange(model.connections.w0[c], model.connections.w0[c + 1])
+            G = rows[own[is_held(model.rows.kind)[own]]][:, u].toarray()
+            if G.any():
+                lowest.append(lowest_frequency(parts.H[i], K, G))
+        found.append(min(lowest) if lowest else lowest_frequency(parts.H[i], K, np.zeros((0, len(K)))))
+    return found
+
+
+def lowest_frequency(M: Array, K: Array, G: Array) -> float:
+    """Return the lowest angular frequency above zero of motions with G x = 0; motions of a rigid body come first in x.
+
+    The pencil (M, K + s M) has no singular side: its eigenvalues are 1/(omega² + s), the largest of them those of the
+    rigid-body motions that G leaves free.
+    """
+    Z = la.null_space(G) if len(G) else np.eye(len(K))
+    n_rigid = 6 - (np.linalg.matrix_rank(G[:, :6]) if len(G) else 0)
+    M, K = Z.T @ M @ Z, Z.T @ K @ Z
+    s = np.trace(K) / np.trace(M) / len(K)
+    values = la.eigvalsh((M + M.T) / 2, (K + K.T) / 2 + s * (M + M.T) / 2)[::-1]
+    elastic = values[n_rigid:]
+    if not len(elastic) or not elastic[0] > 0:
+        return float("inf")
+    return float(np.sqrt(max(1 / elastic[0] - s, 0.0))) or float("inf")
+
+
+def watched(index: int, body: FlexibleBody, frequency: float) -> Watched:
     """Return what is known of a body before the motion."""
     reduced = body.reduced
-    frequencies = np.asarray(reduced.frequencies)
-    turning = [np.asarray(interface.Psi[3:]) for interface in reduced.interfaces if interface.has_rotation]
+    turning = [np.asarray(interface.Psi[3:]) for interface in body.moved.interfaces if interface.has_rotation]
     scaled, norms = scaled_unit_loads(reduced)
     return Watched(
         index=index,
         body=body,
         limits=STIFFENED if body.is_stiffened else LINEAR,
-        frequency=2 * np.pi * float(frequencies[frequencies > 0].min()),
+        frequency=frequency,
         Psi_r=np.concatenate(turning) if turning else np.zeros((0, reduced.n_q)),
         scaled=scaled,
         norms=norms,
@@ -172,17 +224,38 @@ def watched(index: int, body: FlexibleBody) -> Watched:
 
 
 def scaled_unit_loads(reduced: ReducedBody) -> tuple[Array, Array]:
-    """Return K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²), and their norms; empty without matrices."""
+    """Return K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²), and their norms; empty where K is singular."""
     n, geometric = reduced.n_q, reduced.geometric
     values, vectors = la.eigh(reduced.K)
-    if geometric is None or not values[0] > 0:
+    if not values[0] > 0:
         return np.zeros((0, n * n)), np.zeros(0)
     root = vectors / np.sqrt(values)
-    K = np.concatenate(
-        [geometric.translation, geometric.rotation, geometric.spin, geometric.interfaces.reshape(-1, n, n)]
-    )
+    if geometric is None:
+        K = np.concatenate([np.zeros((N_INERTIAL, n, n)), estimated_interface_loads(reduced).reshape(-1, n, n)])
+    else:
+        K = np.concatenate(
+            [geometric.translation, geometric.rotation, geometric.spin, geometric.interfaces.reshape(-1, n, n)]
+        )
     scaled = root.T @ K @ root
     return scaled.reshape(len(K), n * n), np.abs(np.linalg.eigvalsh(scaled)).max(axis=1)
+
+
+def estimated_interface_loads(reduced: ReducedBody) -> Array:
+    """Return an estimate of the matrices of unit wrenches at interfaces, (n_interfaces, 6, n, n), for a body without.
+
+    A force N along the line e of length l from the centre of mass to an interface does the work -N l/2 times the mean
+    square of the slopes between them. Half the square of the slope at the interface is that of a half sine.
+    """
+    n, center = reduced.n_q, reduced.moments.center_of_mass
+    K = np.zeros((len(reduced.interfaces), 6, n, n))
+    for own, interface in zip(K, reduced.interfaces, strict=True):
+        arm = np.asarray(interface.position) - center
+        length = float(np.linalg.norm(arm))
+        if length > 0:
+            e = arm / length
+            slopes = np.cross(e, np.asarray(interface.Psi[3:]), axisb=0)
+            own[:3] = e[:, None, None] * (length / 2 * slopes @ slopes.T)
+    return K
 
 
 def find_loads(system: System, part: Watched) -> None:
@@ -194,7 +267,7 @@ def find_loads(system: System, part: Watched) -> None:
     for m in np.flatnonzero((model.markers.body == part.index) & (model.markers.psi0 >= 0)):
         o = int(model.markers.psi0[m])
         own = model.markers.psi[o : o + 6 * n].reshape(6, n)
-        interface = next(k for k, i in enumerate(part.body.reduced.interfaces) if np.array_equal(i.Psi, own))
+        interface = next(k for k, i in enumerate(part.body.moved.interfaces) if np.array_equal(i.Psi, own))
         c = int(model.markers.connection[m])
         if c >= 0:
             w0, moment = int(model.connections.w0[c]), int(model.markers.moment[m])

@@ -6,13 +6,14 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
+from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.joints import Joint
 from floatframe.joints.rows import MOMENT, RelativePlace
 from floatframe.joints.sliding import SlidingJoint
-from floatframe.results.place_motion import PlaceMotion, shape_motion, still_place
+from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
 from floatframe.results.sliding_place import sliding_place
 from floatframe.results.trajectory import Trajectory
 from floatframe.rotations import cross, dot
@@ -94,4 +95,8 @@ def end_motion(system: System, trajectory: Trajectory, end: MarkerData) -> Place
     """Return the motion of a marker, with its axes."""
     if end.body < 0:
         return still_place(trajectory.t, end.shape)
-    return shape_motion(trajectory, system.bodies[end.body].name, end.shape)
+    body = system.bodies[end.body]
+    motion = trajectory.body(body.name)
+    if isinstance(body, FlexibleBody):
+        motion, _ = as_moved(trajectory, body.name, body.reduced)
+    return shape_motion(motion, end.shape)

@@ -3,7 +3,7 @@
 The kinematics of a marker are in bodies/marker_shape.py.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from floatframe.bodies.marker_shape import (
     marker_motion,
     motion_in_body,
 )
+from floatframe.bodies.mean_axes import FrameMotion, mean_axes
 from floatframe.errors import ResultsError
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.trajectory import BodyMotion, Trajectory
@@ -61,13 +62,13 @@ def interface_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, in
         If there is no such interface.
     """
     require_same_modes(trajectory, body, reduced)
+    motion, moved = as_moved(trajectory, body, reduced)
     is_stiffened = trajectory.entry(body)[1].is_stiffened
-    return shape_motion(trajectory, body, interface_shape(reduced, interface, is_stiffened=is_stiffened))
+    return shape_motion(motion, interface_shape(moved, interface, is_stiffened=is_stiffened))
 
 
-def shape_motion(trajectory: Trajectory, body: str, shape: MarkerShape) -> PlaceMotion:
-    """Return the motion of a marker of a body; `ResultsError` if there is no such body."""
-    motion = trajectory.body(body)
+def shape_motion(motion: BodyMotion, shape: MarkerShape) -> PlaceMotion:
+    """Return the motion of a marker of a body, both in the same frame."""
     return place_of(motion, motion_in_body(shape, motion.q, motion.q_dot, motion.q_ddot))
 
 
@@ -76,6 +77,20 @@ def still_place(t: Array, shape: MarkerShape) -> PlaceMotion:
     still = np.zeros((len(t), 3))
     axes = np.broadcast_to(shape.triad, (len(t), 3, 3))
     return PlaceMotion(t, still + shape.position, still, still, axes, still)
+
+
+def as_moved(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[BodyMotion, ReducedBody]:
+    """Return the motion of a body as the engine has it, and the reduced body in that frame: in it joints are closed."""
+    motion = trajectory.body(body)
+    axes = mean_axes(reduced) if trajectory.entry(body)[1].is_stiffened else None
+    if axes is None:
+        return motion, reduced
+    told = FrameMotion(
+        motion.r, motion.p, motion.q, motion.v, motion.omega_B, motion.q_dot, motion.v_dot, motion.omega_B_dot,
+        motion.q_ddot,
+    )  # fmt: skip
+    moved = axes.to_mean(told)
+    return BodyMotion(motion.t, *(getattr(moved, each.name) for each in fields(moved))), axes.reduced
 
 
 def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: int) -> PlaceMotion:

@@ -9,7 +9,7 @@ from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.marker_shape import interface_shape
 from floatframe.bodies.markers import body_name
 from floatframe.joints.sliding import SlidingJoint, line_triad
-from floatframe.results.place_motion import PlaceMotion
+from floatframe.results.place_motion import PlaceMotion, as_moved
 from floatframe.results.trajectory import Trajectory
 from floatframe.rotations import cross, dot, left_jacobian, rotation_matrix, turned
 from floatframe.system import System
@@ -34,7 +34,7 @@ def sliding_place(system: System, trajectory: Trajectory, joint: SlidingJoint, e
     name = body_name(joint.marker_a.body)
     body = system.body(name)
     assert isinstance(body, FlexibleBody)
-    reduced, motion = body.reduced, trajectory.body(name)
+    motion, reduced = as_moved(trajectory, name, body.reduced)
     points = np.array([reduced.interface(station).position for station in joint.stations])
     places, triad = line_triad(f"joint {joint.name!r}", points, joint.normal)
     e = triad[:, 0]

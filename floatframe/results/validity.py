@@ -14,13 +14,13 @@ class Limits:
 
     rotation: float  #: elastic rotation of an interface in the body frame [rad]
     load: float  #: relative change of the stiffness by the loads; of a stiffened body: loads by the first buckling load
-    speed: float  #: angular speed by the lowest angular frequency of the body
+    speed: float  #: angular speed by the lowest angular frequency of the body, held by one of its joints
 
 
 #: a linear frame: its strain is wrong by the square of the rotation, its stiffness by what the loads change of it
 LINEAR = Limits(rotation=0.1, load=0.1, speed=0.2)
 #: with the terms of second order what is left goes with the third power of the rotation; near buckling a body bends far
-STIFFENED = Limits(rotation=0.3, load=0.7, speed=12.0)
+STIFFENED = Limits(rotation=0.3, load=0.7, speed=3.5)
 
 KINDS = ("rotation", "load", "speed")
 
@@ -44,10 +44,13 @@ class ValidityNote:
         if self.kind == "rotation":
             return f"an interface turns by {self.largest:.3g} rad against the body frame (limit {self.limit:g})"
         if self.kind == "speed":
-            return f"it turns with {self.largest:.3g} of its lowest frequency (limit {self.limit:g})"
+            return f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g})"
         if self.is_stiffened:
             return f"its loads reach {self.largest:.3g} of those that buckle it (limit {self.limit:g})"
-        return f"its loads change its stiffness by {100 * self.largest:.3g} % (limit {100 * self.limit:g} %)"
+        change = f"{100 * self.largest:.3g} % (limit {100 * self.limit:g} %)"
+        if self.has_matrices:
+            return f"its loads change its stiffness by {change}"
+        return f"its loads change its stiffness by about {change}, estimated from the rotation of its interfaces"
 
     @property
     def action(self) -> str:

@@ -18,6 +18,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.bodies.rigid_body import euler_parameters_from_user
 from floatframe.checked_values import array_of_shape
 from floatframe.compiling.callbacks import raise_errors_of
+from floatframe.compiling.file_frames import motion_of_file, state_of_engine
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
@@ -36,12 +37,14 @@ from floatframe.start.newton_equations import (
     with_mass_for_all,
     with_modal_weight,
 )
+from floatframe.start.placement import require_placed_near
 from floatframe.state import State
 from floatframe.system import System
 
 __all__ = [
     "ConsistentState",
     "acceleration_rates",
+    "consistent_motion",
     "consistent_state",
     "mobility",
     "solve_accelerations",
@@ -84,25 +87,32 @@ def consistent_state(system: System, state: State | None = None, *, t: float = 0
     ModelError
         If the joints cannot be closed from these positions, or some constraints repeat others.
     """
+    made = consistent_motion(system, state, t=t)
+    return ConsistentState(*motion_of_file(compiled_system(system), made.state, made.u_dot), made.w)
+
+
+def consistent_motion(system: System, state: State | None = None, *, t: float = 0.0) -> ConsistentState:
+    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files."""
     compiled = compiled_system(system)
-    state = compiled.placed if state is None else checked(compiled, state)
+    given = compiled.placed if state is None else checked(compiled, state)
     work = new_work(compiled.model)
     work.state.time[...] = t
-    state = assembled(compiled, work, state)
+    state = assembled(compiled, work, given)
+    require_placed_near(compiled, given, state)
     require_independent_constraints(compiled, work, state)
     state = with_compatible_velocities(compiled, work, state)
     return ConsistentState(state, *solve_accelerations(compiled, work, state))
 
 
 def checked(compiled: CompiledSystem, state: State) -> State:
-    """Return a state given by the user; `ModelError` if it is not one of this system."""
+    """Return a state given by the user in the frames of the engine; `ModelError` if it is not one of this system."""
     p = np.empty_like(compiled.placed.p)
     for name in ("r", "p", "q", "u"):
         value = array_of_shape(f"state: {name}", getattr(state, name), getattr(compiled.placed, name).shape)
         if name == "p":
             for i, parameters in enumerate(value):
                 p[i] = euler_parameters_from_user(f"state: p of body {compiled.body_names[i]!r}", parameters)
-    return State(state.r, p, state.q, state.u)
+    return state_of_engine(compiled, State(state.r, p, state.q, state.u))
 
 
 def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:

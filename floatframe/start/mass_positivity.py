@@ -1,8 +1,8 @@
 """Whether the mass matrices of stiffened bodies are positive definite at a state.
 
-The kinetic energy of a stiffened body is cut off after the second order of the deformation (theory.md §7), so that it
-can become negative where a linear one cannot: far deflections, or shapes that nearly are a rigid rotation, as the high
-ones of a frame that is clamped to a place where the body is hinged.
+The kinetic energy of a stiffened body is cut off after the second order of the deformation (THEORY §7), so that it can
+become negative where a linear one cannot: at far deflections. (In a frame held where the body is hinged, shapes that
+nearly are a rigid rotation make it so early: therefore stiffened bodies move in mean axes.)
 """
 
 import numpy as np
@@ -44,6 +44,5 @@ def indefinite_mass_words(names: tuple[str, ...]) -> str:
     told = ", ".join(repr(name) for name in names)
     return (
         f"the mass matrix of the stiffened body {told} is not positive definite there: its deformation is beyond the "
-        "second order; reduce it in a mean-axis frame (Tisserand), not one that is held where the body is hinged, or "
-        "split it into parts"
+        "second order; split it into parts (cms split, [body] part)"
     )

@@ -20,6 +20,7 @@ from floatframe.analyses.linearization import linearize
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.sweep import sweep
 from floatframe.analyses.system_modes import SystemModes, system_modes
+from floatframe.compiling.file_frames import state_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.motion.integration import integrate
@@ -118,11 +119,17 @@ def check(study: Study, point: tuple[Any, ...]) -> None:
             mode_and_part(output)
         return
     try:
-        placed = snapshot(system, compiled_system(system).placed)
+        placed = as_placed(system)
     except Exception:  # what this point brings about is a row, if the file without it does better
-        system, placed = plain, snapshot(plain, compiled_system(plain).placed)
+        system, placed = plain, as_placed(plain)
     for output in study.outputs:
         taken(output, system, placed)
+
+
+def as_placed(system: System) -> Trajectory:
+    """Return the bodies as placed as a motion of one time."""
+    compiled = compiled_system(system)
+    return snapshot(system, state_of_file(compiled, compiled.placed))
 
 
 def read_system_keys(study: Study) -> None:

@@ -62,7 +62,7 @@ def reduced_body(
     return ReducedBody(
         name=name,
         units=unit_system(units),
-        frame=BodyFrame("nodal", np.zeros(3)),
+        frame=BodyFrame("tisserand", np.zeros(3)),  # said to be, so that the engine moves it as it is
         M=points.moments().M,
         K=K,
         D=np.zeros((n_q, n_q)) if D is None else D,

@@ -6,6 +6,7 @@ A place on a flexible body is an interface, or the kept node nearest to a positi
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from fe_models.foundation.arrays import Array
@@ -22,6 +23,8 @@ from floatframe.results.trajectory import Trajectory
 from floatframe.system import System
 
 __all__ = ["PLACE_QUANTITIES", "AngleSensor", "DisplacementSensor", "PlaceSensor", "nearest_node", "place_motion"]
+
+FAR = 0.1  #: of the size of a body: from a node that is meant to stand for a position
 
 PLACE_QUANTITIES = {
     "position": "length",
@@ -48,10 +51,28 @@ def place_motion(system: System, trajectory: Trajectory, where: str, marker: Mar
 
 
 def nearest_node(body: FlexibleBody, position: Array) -> int:
-    """Return the index of the kept node nearest to a position in mesh axes, as the mesh was drawn."""
-    frame = body.reduced.frame
+    """Return the index of the kept node nearest to a position in mesh axes, as the mesh was drawn.
+
+    Raises
+    ------
+    ModelError
+        If the position is farther from it than a tenth of the body, and than nodes are from each other.
+    """
+    frame, nodes = body.reduced.frame, body.reduced.nodes
     local = (np.asarray(position, dtype=float) - frame.origin) @ frame.axes
-    return int(np.argmin(np.linalg.norm(body.reduced.nodes - local, axis=1)))
+    away = np.linalg.norm(nodes - local, axis=1)
+    nearest = int(np.argmin(away))
+    size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
+    if away[nearest] > FAR * size and len(nodes) > 1:
+        spacing = float(cKDTree(nodes).query(nodes, k=2)[0][:, 1].max())
+        if away[nearest] > spacing:
+            x, y, z = frame.origin + frame.axes @ nodes[nearest]
+            raise ModelError(
+                f"flexible body {body.name!r}: position {np.asarray(position).tolist()} is {away[nearest]:.3g} away "
+                f"from its nearest kept node, [{x:.4g}, {y:.4g}, {z:.4g}]; the body has a size of {size:.3g}: give a "
+                "position in the axes and units of its mesh, at a node that the file keeps"
+            )
+    return nearest
 
 
 @frozen_copies

@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
 
+import cms
 from floatframe import (
     GROUND,
     ConvergenceError,
@@ -38,9 +39,11 @@ from floatframe.analyses import (
 from floatframe.compiling.system import compiled_system
 from floatframe.mechanisms import slider_crank
 from floatframe.mechanisms.rods import slender_inertia
+from floatframe.results.place_motion import interface_motion
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
 from floatframe.start.newton_equations import displaced
 from floatframe.state import State
+from tests.bodies import bar
 from tests.floatframe.point_masses import PointMasses, random_point_masses, reduced_body, stiffness
 
 G = 9.81
@@ -457,3 +460,19 @@ def test_a_snapshot_of_an_equilibrium_measures_what_holds_it():
     assert_allclose(still.reaction(system.joints[0].name).force[0], rest.w[:3], rtol=0, atol=0)
     assert_allclose(still.body("rod").r[0], rest.state.r[0], rtol=0, atol=0)
     assert_allclose(snapshot(system, rest.state).reaction(system.joints[0].name).force, 0, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("frame", [cms.NodalFrame("left"), cms.TisserandFrame()], ids=["nodal", "mean"])
+@pytest.mark.parametrize("offset", [0.0, 0.4])
+def test_a_free_body_that_spins_about_its_centre_of_mass_is_found(frame, offset):
+    """A bar along x that spins about z is longer by rho omega² L³/(12 E); from beside the axis it moves onto it."""
+    speed, length, young, rho = 300.0, 1.0, 210e9, 7850.0
+    part = cms.couple(bar(nx=10))
+    reduced = cms.reduce(part, cms.craig_bampton(part, n_modes=4), frame=frame)
+    middle = reduced.frame.origin + reduced.frame.axes @ reduced.moments.center_of_mass
+    system = System([FlexibleBody("bar", reduced, position=-middle + [offset, 0, 0])])
+    found = steady_rotation(system, (0.0, 0.0, speed))
+    motion = snapshot(system, found)
+    ends = [interface_motion(motion, "bar", reduced, name).position[0] for name in ("left", "right")]
+    assert_allclose(np.linalg.norm(ends[1] - ends[0]) - length, rho * speed**2 * length**3 / (12 * young), rtol=0.05)
+    assert_allclose(np.mean(ends, axis=0)[:2], 0.0, atol=1e-9)

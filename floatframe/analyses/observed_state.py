@@ -1,0 +1,23 @@
+"""What the kernels tell of one state: a row of results, and the power of loads and dampers."""
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import CompiledSystem
+from floatframe.kernels.memory import Rows, memory_at
+from floatframe.kernels.work import Work
+from floatframe.state import State
+
+__all__ = ["observed_state"]
+
+
+def observed_state(
+    compiled: CompiledSystem, work: Work, state: State, u_dot: Array, w: Array, t: float
+) -> tuple[Rows, Array]:
+    """Return the row of results of a state of the engine and the power of loads and dampers at it, (2,)."""
+    from floatframe.kernels.entry import observe_state
+
+    work.state.time[...] = t
+    memory = memory_at(state, u_dot, w)
+    rows = observe_state(compiled.model, work, memory, t)
+    return rows, np.array([memory.power_given, memory.power_taken])
