@@ -1,4 +1,4 @@
-"""A stiffened body in mean axes, and the motion of the frame of its file in them (THEORY §7).
+"""A stiffened body in mean axes, and the motion of the frame of its file in them (docs/theory.md §7).
 
 The engine moves a stiffened body in its mean axes B', whatever frame B its file has. The strain of a body does not
 depend on who looks at it, so that the coordinates of both frames belong to each other for good, q = Z q'. What is
