@@ -1,8 +1,8 @@
 """Whether the mass matrices of stiffened bodies are positive definite at a state.
 
-The kinetic energy of a stiffened body is cut off after the second order of the deformation (docs/theory.md §7), so that it can
-become negative where a linear one cannot: at far deflections. (In a frame held where the body is hinged, shapes that
-nearly are a rigid rotation make it so early: therefore stiffened bodies move in mean axes.)
+The kinetic energy of a stiffened body is cut off after the second order of the deformation (docs/theory.md §7), so that
+it can become negative where a linear one cannot: at far deflections. (In a frame held where the body is hinged, shapes
+that nearly are a rigid rotation make it so early: therefore stiffened bodies move in mean axes.)
 """
 
 import numpy as np
