@@ -1,10 +1,12 @@
 """Which mode set is good enough, with how few modes, and why: sentences from records."""
 
+import math
 from collections.abc import Sequence
 from typing import Literal
 
 from cms.compare.comparison import Point, SetResult
 from cms.quality.limits import LIMITS
+from cms.quality.numbers import share
 from cms.quality.record import QualityRecord
 
 __all__ = [
@@ -182,13 +184,7 @@ def modes_words(n_modes: int) -> str:
 
 
 def number_words(value: float | None) -> str:
-    """Return a number without unit: percents where they read well, powers of ten below, 'none found' for infinity."""
+    """Return a number without unit as reports write it; words for what is missing."""
     if value is None:
         return "none"
-    if value != value or value in (float("inf"), float("-inf")):
-        return "with modes missing"
-    if value == 0:
-        return "0"
-    if value < 1e-4:
-        return f"{value:.0e}".replace("e-0", "e-")
-    return f"{100 * value:.2g} %" if value < 0.995 else f"{100 * value:.3g} %"
+    return share(value) if math.isfinite(value) else "with modes missing"

@@ -32,7 +32,7 @@ MEASURE_NAMES = ("frequency", "frf")  #: of `cms.compare.mode_selection`, whose 
 SET_OPTIONS = (
     "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
     "load_cases", "damping_ratio", "n_rich", "functions", "n_axial", "n_bending", "n_torsion", "axis", "point",
-    "poisson", "columns", "columns_over",
+    "poisson", "columns", "columns_over", "inputs", "outputs",
 )  # fmt: skip
 #: keys that belong to some mode sets
 AUTO = "auto"  #: instead of a number of modes: as few as meet error over band
@@ -88,6 +88,14 @@ def shift_list(value: Any) -> tuple[float, ...]:
     return tuple(float(x) for x in values)
 
 
+def places(value: Any) -> tuple[str, ...]:
+    """Return one name or a list of names of interfaces, with a component or without."""
+    words = [value] if isinstance(value, str) else value
+    if not isinstance(words, list | tuple) or not words or any(not isinstance(w, str) or not w for w in words):
+        raise ValueError('expected a list of interfaces, or with a component, such as "big_end uz"')
+    return tuple(words)
+
+
 def extras(value: Any) -> tuple[str, ...]:
     """Return one kind of extra columns or a list of kinds."""
     words = [value] if isinstance(value, str) else value
@@ -105,6 +113,7 @@ AmountOrMatrix = Annotated[Rows, BeforeValidator(amount_or_matrix)]
 CountOrAuto = Annotated[int | str, BeforeValidator(count_or_auto)]
 Count = Annotated[int, Field(ge=0)]
 Shifts = Annotated[tuple[float, ...], BeforeValidator(shift_list)]
+Places = Annotated[tuple[str, ...], BeforeValidator(places)]
 Extras = Annotated[tuple[str, ...], BeforeValidator(extras)]
 
 
@@ -200,6 +209,8 @@ class ReductionSection(Table):
     n_rich: Annotated[int, Field(ge=1)] | None = Field(
         None, description="a whole number, 1 or more, of free modes to balance"
     )
+    inputs: Places | None = Field(None, description='a list of interfaces, or with a component, such as "big_end uz"')
+    outputs: Places | None = Field(None, description='a list of interfaces, or with a component, such as "big_end uz"')
     functions: choice("functions", lambda: tuple(AXIS_FUNCTIONS)) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(AXIS_FUNCTIONS)}"
     )

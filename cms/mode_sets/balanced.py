@@ -1,31 +1,39 @@
 """Balanced truncation of the second-order system: directions ranked by what the interfaces excite and see."""
 
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cms.errors import ModeSetError
+from cms.errors import EigenError, ModeSetError
 from cms.families.families import Families
 from cms.families.receptance import boundary_scale
 from cms.families.sharing import body_of, families_of
+from cms.families.static_modes import boundary_labels
 from cms.mode_set import ModeSet
 from cms.mode_sets.balancing import balance
 from cms.mode_sets.blocks import mode_set, rigid_block, static_block
 from cms.mode_sets.selection import require_interfaces
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_basis.independent import Columns, gram, independent_columns
+from cms.solvers.eigen import EigenResult
 from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import nearest
 
 __all__ = ["balanced_truncation"]
+
+log = logging.getLogger(__name__)
 
 FEWEST_RICH = 60  #: free modes of the rich basis, at least
 LOWER_PART = 0.6  #: of all modes of a small body, that the rich basis takes by default
 RICH_FACTOR = 3  #: free modes of the rich basis for each mode asked for
 NOTHING_LEFT = 1e-7  #: length of a residual attachment mode, of the whole one, below which it is rounding
 STIFF = 1e-12  #: compliance of a boundary dof, of the largest, below which it is rounding
+FEWEST_FOUND = 4  #: free modes without which there is nothing to balance
 REPORTED = 12  #: singular values in the options of the set; all of them are in its data
 
 
@@ -36,14 +44,16 @@ def balanced_truncation(
     tolerance: float | None = None,
     damping_ratio: float = 0.01,
     n_rich: int | None = None,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
 ) -> ModeSet:
     """Balanced truncation of the elastic part of the free body: [Psi_R, balanced directions] [1]_.
 
     (1) rich basis: free modes and residual attachment modes, M-orthonormal and K-diagonal, in which the Lyapunov
         equation is small
     (2) damping: that of the body projected, and a modal ratio, since without damping there is no Gramian
-    (3) loads and responses at all boundary dofs, each in the unit in which its own static elastic response is 1, so
-        that a stiff direction and a soft one, a force and a moment, count alike
+    (3) loads and responses at all boundary dofs, or at chosen ones, each in the unit in which its own static elastic
+        response is 1, so that a stiff direction and a soft one, a force and a moment, count alike
     (4) position-velocity balancing (`cms.mode_sets.balancing`): one symmetric projection, ranked by its singular values
 
     The number of directions is that of `n_modes`, or as many as leave a part of at most `tolerance` of the sum of the
@@ -63,12 +73,18 @@ def balanced_truncation(
     damping_ratio
         Modal damping that is added for the balancing alone, of critical; 1 % by default.
     n_rich
-        Free modes of the rich basis; by default 3 n_modes, but 60 at least, and three fifths of all at most.
+        Free modes of the rich basis; by default 3 n_modes, but 60 at least, and three fifths of all at most; fewer
+        where the eigensolver cannot find so many.
+    inputs, outputs
+        Where loads act and responses are seen: interfaces, or one component of them, as "big_end" or "big_end uz"; all
+        boundary dofs by default, the inputs as outputs where inputs alone are given. Loads elsewhere, such as those of
+        joints at other interfaces, are then answered by what the chosen ones need.
 
     Raises
     ------
     ModeSetError
-        If not exactly one of n_modes and tolerance is given, numbers are out of range, or a mode is undamped.
+        If not exactly one of n_modes and tolerance is given, numbers are out of range, a name is no interface or
+        component, a mode is undamped, or the rich basis cannot be had.
 
     References
     ----------
@@ -101,16 +117,21 @@ def balanced_truncation(
         D = np.diag(2 * damping_ratio * np.sqrt(rich.omega2))
         if body.D is not None:
             D = D + gram(rich.Phi, body.D @ rich.Phi)
+        into = chosen_dofs(body, "inputs", inputs)
+        out_of = into if outputs is None else chosen_dofs(body, "outputs", outputs)
         at_b = rich.Phi[body.b]
         compliance = np.einsum("bk,bk->b", at_b, at_b / rich.omega2)
         levered = compliance * boundary_scale(body) ** 2
         is_elastic = levered > STIFF * levered.max()
         scale = np.where(is_elastic, 1 / np.sqrt(np.where(is_elastic, compliance, 1.0)), 0.0)
-        system = balance(rich.omega2, D, (scale[:, None] * at_b).T)
+        loads = (scale[:, None] * at_b).T
+        is_symmetric = np.array_equal(into, out_of)
+        system = balance(rich.omega2, D, loads[:, into], None if is_symmetric else loads[:, out_of])
         sigma = system.position_velocity
+        sides = 1 if is_symmetric else 2  # directions for each singular value: that of loads and that of responses
         if n_modes is None:
             left = 1 - np.cumsum(sigma) / sigma.sum()
-            n_modes = int(np.argmax(left <= (tolerance or 0.0))) + 1
+            n_modes = min(n, sides * (int(np.argmax(left <= (tolerance or 0.0))) + 1))
         columns = static_block(
             combine(rich.Phi, system.T[:, :n_modes]),
             [f"balanced {k + 1}" for k in range(n_modes)],
@@ -119,14 +140,33 @@ def balanced_truncation(
         options = {
             "n_modes": str(n_modes),
             "rich basis": f"{n} elastic columns",
+            "inputs": ", ".join(inputs) if inputs is not None else "all interfaces",
+            "outputs": ", ".join(outputs) if outputs is not None else "as the inputs",
             "damping": f"ratio {damping_ratio!r}" + (" and that of the body" if body.D is not None else ""),
             "Hankel singular values": _listed(system.hankel),
             "position-velocity singular values": _listed(sigma),
-            "part left out": f"{sigma[n_modes:].sum() / sigma.sum():.3g}",
+            "part left out": f"{sigma[n_modes // sides :].sum() / sigma.sum():.3g}",
         }
         modes = mode_set("balanced-truncation", families, [rigid_block(families), columns], options=options)
         data = {"hankel": system.hankel, "hankel signs": system.signs, "position-velocity": sigma}
         return replace(modes, data=data)
+
+
+def chosen_dofs(body: FEBody, key: str, names: Sequence[str] | None) -> IntArray:
+    """Return which of the boundary dofs are named, ascending, (n,); all of them where nothing is said."""
+    labels = [label.removeprefix("at ") for label in boundary_labels(body, "at")]
+    if names is None:
+        return np.arange(len(labels), dtype=np.int64)
+    if isinstance(names, str) or not len(names):
+        raise ModeSetError(f"balanced_truncation: {key}: expected a list of interfaces, or such as 'pin uz'")
+    chosen: set[int] = set()
+    for name in names:
+        found = {k for k, label in enumerate(labels) if label == name or label.startswith(f"{name} ")}
+        if not found:
+            choices = [interface.name for interface in body.interfaces] + labels
+            raise ModeSetError(f"balanced_truncation: {key}: {name!r} is no interface{nearest(name, choices)}")
+        chosen |= found
+    return np.array(sorted(chosen), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +185,7 @@ def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichB
     body = families.body
     n_most = int((body.M.diagonal() > 0).sum()) - families.Psi_R.shape[1]
     n_free = min(n_asked, n_most) if n_asked is not None else min(n_default, int(LOWER_PART * n_most))
-    modes = families.free_modes(n_modes=max(1, n_free))
+    modes = most_free_modes(families, max(1, n_free))
     residual = families.residual_attachment(modes)
     is_left = _stiffness(body, residual) > NOTHING_LEFT**2 * _stiffness(body, families.Psi_U)
     V = np.hstack([modes.Phi, residual[:, is_left]])
@@ -157,6 +197,27 @@ def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichB
     Z, is_massive = elastic_eigenvectors(G_K, gram(Q.X, Q.MX), omega2_1)
     Z = Z[:, is_massive]
     return RichBasis(combine(Q.X, Z), np.einsum("kq,kl,lq->q", Z, G_K, Z))
+
+
+def most_free_modes(families: Families, n: int) -> EigenResult:
+    """Return n free modes, or as many as the eigensolver finds to its tolerance: the highest of a coarse mesh are hard.
+
+    Raises
+    ------
+    ModeSetError
+        If it finds none.
+    """
+    while True:
+        try:
+            return families.free_modes(n_modes=n)
+        except EigenError as error:
+            if n <= FEWEST_FOUND:
+                raise ModeSetError(
+                    f"balanced_truncation: body {families.body.name!r}: the rich basis needs free modes, and not even "
+                    f"{n} were found: {error}"
+                ) from error
+            log.info("balanced truncation: %d free modes were not found (%s); fewer are tried", n, error)
+            n = max(FEWEST_FOUND, 2 * n // 3)
 
 
 def _stiffness(body: FEBody, u: Array) -> Array:

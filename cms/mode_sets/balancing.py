@@ -10,15 +10,16 @@ from fe_models.foundation.arrays import Array, frozen
 
 __all__ = ["BalancedSystem", "balance"]
 
+NOTHING_NEW = 1e-6  #: what is left of a unit direction beside those before it, below which it adds nothing
 NEGATIVE = 1e-9  #: part of the largest eigenvalue of a Gramian by which rounding may make another one negative
 
 
 @dataclass(frozen=True, eq=False)
 class BalancedSystem:
-    """What balancing tells about 1 q_ddot + D q_dot + diag(omega²) q = B u, y = Bᵀ q."""
+    """What balancing tells about 1 q_ddot + D q_dot + diag(omega²) q = B u, y = Cᵀ q."""
 
     hankel: Array  #: Hankel singular values of u -> y, descending, (2 n,)
-    signs: Array  #: +1 or -1 for each: the symmetric system is balanced up to these signs, (2 n,)
+    signs: Array  #: +1 or -1 for each: with C = B the system is balanced up to these signs; else +1, (2 n,)
     position_velocity: Array  #: position-velocity singular values, descending, (n,)
     T: Array  #: balanced directions as columns over q, orthonormal, (n, n)
 
@@ -27,15 +28,18 @@ class BalancedSystem:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
 
-def balance(omega2: Array, D: Array, B: Array) -> BalancedSystem:
-    """Balance the position and velocity of a symmetric second-order system with collocated loads and responses.
+def balance(omega2: Array, D: Array, B: Array, C: Array | None = None) -> BalancedSystem:
+    """Balance the position and velocity of a symmetric second-order system with loads B u and responses y = Cᵀ q.
 
-    (1) A P + P Aᵀ + b bᵀ = 0 in the states x = (omega q, q_dot): P is the Gramian of reachability
-    (2) the system is symmetric, E x_dot = ..., E = [[D, 1], [1, 0]], so the Gramian of observability is Q = E P E and
-        the Hankel singular values sqrt(eig(P Q)) are |eig(Rᵀ E R)|, P = R Rᵀ
-    (3) in particular its velocity part is Q_v = P_p, the position part of P: balancing P_p against Q_v is one
-        orthogonal matrix T, P_p = T diag(sigma) Tᵀ, for load and response sides alike, and the leading columns of T
-        project M, D and K by one congruence, which keeps them symmetric and definite
+    (1) A P + P Aᵀ + b bᵀ = 0 in the states x = (omega q, q_dot): P is the Gramian of reachability, and P_C that of the
+        loads C
+    (2) the system is symmetric, E x_dot = ..., E = [[D, 1], [1, 0]], so the Gramian of observability is E P_C E, and
+        the Hankel singular values sqrt(eig(P E P_C E)) are the singular values of R_Cᵀ E R, P = R Rᵀ
+    (3) its velocity part is the position part of P_C: positions are balanced against velocities by the singular values
+        sigma of L_Cᵀ L, P_p = L Lᵀ, with the directions L v that loads reach and L_C u that responses see
+    (4) T: both directions in turn, by descending sigma, made orthonormal. Where C is B they are one, T diagonalises
+        P_p = T diag(sigma) Tᵀ. The leading columns of T project M, D and K by one congruence, which keeps them
+        symmetric and definite; with both directions in it the error is of second order, as that of two projections
 
     Parameters
     ----------
@@ -45,34 +49,81 @@ def balance(omega2: Array, D: Array, B: Array) -> BalancedSystem:
         Modal damping, (n, n) [1/s], such that every mode is damped.
     B
         Modal loads, (n, n_u).
+    C
+        Modal responses, (n, n_y); those of the loads by default.
 
     Raises
     ------
     ModeSetError
-        If a mode is undamped: its Gramian is infinite.
+        If a mode is undamped: its Gramian is infinite; or if the Gramian cannot be found to rounding.
     """
     n = len(omega2)
     omega = np.sqrt(omega2)
     A = np.block([[np.zeros((n, n)), np.diag(omega)], [-np.diag(omega), -D]])
-    b = np.concatenate([np.zeros_like(B), B])
     decay = -la.eigvals(A).real
     if decay.min() <= 1e-10 * omega.min():
         raise ModeSetError(
             f"balance: a mode decays at {decay.min():.1e} per time unit beside its frequency of at least "
             f"{omega.min() / (2 * np.pi):.6g}; expected damping of every mode; give damping_ratio above 0"
         )
-    P = la.solve_continuous_lyapunov(A, -b @ b.T)  # (1)
-    P = (P + P.T) / 2
+    E = np.block([[D / np.outer(omega, omega), np.diag(1 / omega)], [np.diag(1 / omega), np.zeros((n, n))]])
+    P = gramian(A, B)  # (1)
+    R = root(P)
+    P_p = P[:n, :n] / np.outer(omega, omega)
+    if C is None:
+        signed = la.eigvalsh(R.T @ E @ R)  # (2)
+        order = np.argsort(-np.abs(signed))
+        sigma, T = la.eigh(P_p)  # (3), (4)
+        hankel, signs = np.abs(signed[order]), np.sign(signed[order])
+        return BalancedSystem(hankel, signs, np.maximum(sigma[::-1], 0.0), T[:, ::-1])
+    P_C = gramian(A, C)
+    hankel = la.svdvals(root(P_C).T @ E @ R)  # (2)
+    L, L_C = root(P_p), root(P_C[:n, :n] / np.outer(omega, omega))
+    U, sigma, Vt = la.svd(L_C.T @ L)  # (3)
+    return BalancedSystem(hankel, np.ones(2 * n), sigma, in_turn(L @ Vt.T, L_C @ U))
+
+
+def gramian(A: Array, B: Array) -> Array:
+    """Return P of A P + P Aᵀ + b bᵀ = 0, b = (0, B), (2 n, 2 n)."""
+    b = np.concatenate([np.zeros_like(B), B])
+    try:
+        P = la.solve_continuous_lyapunov(A, -b @ b.T)
+    except la.LinAlgError as error:
+        raise ModeSetError(
+            f"balance: the Lyapunov equation of {len(B)} modes cannot be solved ({error}); give a smaller n_rich, or "
+            "more damping"
+        ) from error
+    return np.asarray((P + P.T) / 2)
+
+
+def root(P: Array) -> Array:
+    """Return R of P = R Rᵀ; eigenvalues below zero by rounding count as zero, more is refused."""
     values, vectors = la.eigh(P)
     if values.min() < -NEGATIVE * values.max():
         raise ModeSetError(
             f"balance: the Gramian has an eigenvalue {values.min() / values.max():.1e} of its largest, expected none "
             "below 0 but for rounding; give more damping or fewer modes"
         )
-    R = vectors * np.sqrt(np.maximum(values, 0.0))
-    E = np.block([[D / np.outer(omega, omega), np.diag(1 / omega)], [np.diag(1 / omega), np.zeros((n, n))]])
-    signed = la.eigvalsh(R.T @ E @ R)  # (2)
-    order = np.argsort(-np.abs(signed))
-    P_p = P[:n, :n] / np.outer(omega, omega)
-    sigma, T = la.eigh(P_p)  # (3)
-    return BalancedSystem(np.abs(signed[order]), np.sign(signed[order]), np.maximum(sigma[::-1], 0.0), T[:, ::-1])
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def in_turn(reached: Array, seen: Array) -> Array:
+    """Return an orthonormal basis, (n, n), of both kinds of directions in turn; what adds nothing is left out.
+
+    Parameters
+    ----------
+    reached, seen
+        Directions by descending importance, (n, n) each.
+    """
+    n = len(reached)
+    T = np.zeros((n, 0))
+    for k in range(n):
+        for v in (reached[:, k], seen[:, k]):
+            length = float(np.linalg.norm(v))
+            rest = v / length if length > 0 else v
+            for _ in range(2):  # twice is enough
+                rest = rest - T @ (T.T @ rest)
+            left = float(np.linalg.norm(rest))
+            if left > NOTHING_NEW and T.shape[1] < n:
+                T = np.hstack([T, rest[:, None] / left])
+    return np.hstack([T, la.null_space(T.T)]) if T.shape[1] < n else T

@@ -13,6 +13,7 @@ from cms.report.words import share
 from fe_models.foundation.arrays import Array
 
 __all__ = [
+    "CONVERGENCE_HEIGHT",
     "MAC_HEIGHT",
     "convergence_chart",
     "deformation_chart",
@@ -27,7 +28,7 @@ DECADES = 4  #: below its limit that the chart of a record reaches; smaller valu
 DIRECTIONS = ("x", "y", "z", "about x", "about y", "about z")
 INK, GRID = "#3d4650", "#e3e7eb"
 
-MAC_HEIGHT = 270
+MAC_HEIGHT, CONVERGENCE_HEIGHT = 270, 290  #: of a chart and of its place [px]
 
 Chart = dict[str, Any]
 
@@ -54,7 +55,7 @@ def convergence_chart(comparison: Comparison, name: str) -> Chart:
             }
         )  # fmt: skip
     layout = base_layout("vibration modes", "error [-]")
-    layout |= {"height": 290, "showlegend": False}
+    layout |= {"height": CONVERGENCE_HEIGHT, "showlegend": False}
     layout["yaxis"] |= log_axis([y for trace in traces for y in trace["y"]] + ([tolerance] if tolerance else []))
     layout["xaxis"]["rangemode"] = "tozero"
     if tolerance:

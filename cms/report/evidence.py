@@ -6,6 +6,7 @@ from cms.compare.comparison import Comparison
 from cms.compare.verdicts import DECIDING, crossings, modes_words
 from cms.quality.limits import LIMITS
 from cms.report.charts import (
+    CONVERGENCE_HEIGHT,
     MAC_HEIGHT,
     Chart,
     convergence_chart,
@@ -59,7 +60,8 @@ def convergence_section(comparison: Comparison) -> Section:
             continue
         charts[f"chart-{name}"] = chart
         caption = f"{SEEN[name]} {crossings(comparison.sets, name)}"
-        figures.append(figure(f"chart-{name}", caption, title=sentence_case(title)[:-1], kind="convergence"))
+        title = sentence_case(title)[:-1]
+        figures.append(figure(f"chart-{name}", caption, title=title, height=CONVERGENCE_HEIGHT, kind="convergence"))
     switch = (
         '<div class="switch screen-only" role="group" aria-label="Horizontal axis">'
         '<button data-column="0" aria-pressed="true">by vibration modes</button>'

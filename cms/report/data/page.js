@@ -34,7 +34,7 @@
   // paper is narrower than the screen
   window.addEventListener("beforeprint", () => {
     for (const box of drawn) {
-      const width = box.closest(".grid.three") ? 218 : box.closest(".grid") ? 325 : 680;
+      const width = box.closest(".grid.three") ? 218 : box.closest(".grid") ? 332 : 695;  // 184 mm, gaps as in page.css
       Plotly.relayout(box, { width: width });
     }
   });

@@ -7,10 +7,14 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
 import fe_models as fm
-from cms.errors import ModeSetError
+from cms.errors import EigenError, ModeSetError
+from cms.families.families import Families
 from cms.families.receptance import largest_error, receptance_of_modes
+from cms.mode_set import ModeSet
 from cms.mode_sets.balanced import balanced_truncation
 from cms.mode_sets.balancing import balance
+from cms.quality.reference.port_model import file_response
+from cms.reduction import reduce
 from fe_models.body.couplings import couple
 from fe_models.foundation.units import unit_system
 from tests.bodies import bar, chain
@@ -218,3 +222,96 @@ def test_a_small_body_is_balanced_without_asking_for_its_highest_modes():
     sigma = modes.data["position-velocity"]
     assert modes.columns.shape[1] == 6 + 4
     assert sigma[4:].sum() < 0.02 * sigma.sum()
+
+
+# Chosen inputs and outputs -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_hankel_values_between_loads_and_other_responses_are_those_of_the_first_order_system(seed):
+    omega2, D, B = system(n_u=2, seed=seed)
+    C = np.random.default_rng(seed + 50).normal(size=(6, 1))
+    A, b, _ = first_order(omega2, D, B)
+    c = np.concatenate([C, np.zeros_like(C)]).T
+    expected, *_ = square_root_balancing(A, b, c, 4)
+    assert_allclose(balance(omega2, D, B, C).hankel, expected, rtol=1e-7, atol=1e-9 * expected[0])
+
+
+def test_loads_given_as_responses_too_have_the_directions_of_the_symmetric_case():
+    omega2, D, B = system()
+    one, two = balance(omega2, D, B), balance(omega2, D, B, B)
+    assert_allclose(two.position_velocity, one.position_velocity, rtol=1e-8)
+    assert_allclose(two.hankel, one.hankel, rtol=1e-7, atol=1e-9 * one.hankel[0])
+    assert_allclose(np.abs(two.T.T @ one.T), np.eye(6), rtol=0, atol=1e-6)
+
+
+def test_directions_of_loads_and_responses_are_orthonormal_and_meet_the_transfer_function():
+    """Few directions for one transfer function leave less error than as many for all of them."""
+    omega2, D, B = system(n=8, n_u=2, seed=4)
+    C = np.random.default_rng(9).normal(size=(8, 1))
+    chosen, all_ = balance(omega2, D, B[:, :1], C), balance(omega2, D, np.hstack([B, C]))
+    assert_allclose(chosen.T.T @ chosen.T, np.eye(8), rtol=0, atol=1e3 * ROUNDOFF)
+
+    def transfer(T, omega):
+        K = T.T @ (np.diag(omega2) - omega**2 * np.eye(8) + 1j * omega * D) @ T
+        return (C.T @ T @ np.linalg.solve(K, T.T @ B[:, :1]))[0, 0]
+
+    grid = np.linspace(0.0, 8.0, 200)
+    exact = np.array([transfer(np.eye(8), w) for w in grid])
+    error = [np.abs([transfer(s.T[:, :6], w) for w in grid] - exact).max() for s in (chosen, all_)]
+    assert error[0] < 0.5 * error[1]
+
+
+def test_a_set_for_chosen_places_needs_fewer_columns(body):
+    places = {"inputs": ["left uz"], "outputs": ["right uz"]}
+    frequencies = np.linspace(50.0, 1500.0, 60)
+
+    def error(n, **options):
+        modes = balanced_truncation(body, n_modes=n, **options)
+        found = file_response(reduce(body, modes), frequencies, damping=0.01).between("left", "right").H[:, 2, 2]
+        return np.abs(found - exact).max() / np.abs(exact).max()
+
+    unit = ModeSet("unit", np.eye(body.n_dof), tuple(map(str, range(body.n_dof))), np.full(body.n_dof, np.nan))
+    exact = file_response(reduce(body, unit), frequencies, damping=0.01).between("left", "right").H[:, 2, 2]
+    assert error(6, **places) < 1e-4
+    assert error(6) > 1e-3
+    told = balanced_truncation(body, n_modes=4, **places).options
+    assert (told["inputs"], told["outputs"]) == ("left uz", "right uz")
+
+
+@pytest.mark.parametrize(
+    ("places", "text"),
+    [
+        ({"inputs": ["lift"]}, "inputs: 'lift' is no interface; did you mean 'left'"),
+        ({"inputs": ["left"], "outputs": ["right ux", "left uq"]}, "outputs: 'left uq' is no interface"),
+        ({"outputs": "left"}, "outputs: expected a list of interfaces"),
+        ({"inputs": []}, "inputs: expected a list of interfaces"),
+    ],
+)
+def test_places_that_are_none_are_refused(body, places, text):
+    with pytest.raises(ModeSetError, match=text):
+        balanced_truncation(body, n_modes=4, **places)
+
+
+def test_fewer_free_modes_are_taken_where_the_eigensolver_finds_no_more(body, monkeypatch):
+    asked = []
+    find = Families.free_modes
+
+    def at_most_20(self, wanted=None, **options):
+        n = wanted.n if wanted is not None else options["n_modes"]
+        asked.append(n)
+        if n > 20:
+            raise EigenError("eigenmodes: residuals are 3e-4, expected 1e-5")
+        return find(self, wanted, **options) if wanted is not None else find(self, **options)
+
+    monkeypatch.setattr(Families, "free_modes", at_most_20)
+    modes = balanced_truncation(body, n_modes=4)
+    assert asked[0] > 20 >= asked[-1]
+    assert modes.columns.shape[1] == 10
+
+    def none(self, wanted=None, **options):
+        raise EigenError("eigenmodes: residuals are 3e-4, expected 1e-5")
+
+    monkeypatch.setattr(Families, "free_modes", none)
+    with pytest.raises(ModeSetError, match="the rich basis needs free modes, and not even 4 were found"):
+        balanced_truncation(body, n_modes=4)

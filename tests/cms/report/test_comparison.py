@@ -301,6 +301,41 @@ def test_the_page_fits_a_narrow_screen_and_paper(view, tmp_path):
     assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
 
 
+def test_paper_has_full_charts_no_tools_and_headings_beside_them(view):
+    """On A4 nothing is wider than the page, charts fill their column, and no heading stands alone."""
+    shown = view
+    shown.set_viewport_size({"width": 695, "height": 1000})  # 184 mm between the margins
+    shown.emulate_media(media="print")
+    shown.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    shown.wait_for_function(
+        "[...document.querySelectorAll('.chart .main-svg')].every((s) => s.getBoundingClientRect().width <= 696)"
+    )
+    assert shown.evaluate("document.documentElement.scrollWidth") == 695
+    charts = shown.evaluate(
+        "[...document.querySelectorAll('.chart')].filter((c) => c.querySelector('.main-svg')).map((c) => ["
+        "c.querySelector('.main-svg').getBoundingClientRect().width, c.parentElement.getBoundingClientRect().width])"
+    )
+    assert len(charts) > 8
+    for drawn, column in charts:
+        assert 0.96 * column <= drawn <= column + 1
+    style = "(selector, name) => [...document.querySelectorAll(selector)].map((e) => getComputedStyle(e)[name])"
+    for selector in ("h2", "h3", "p.lead", "ul.legend"):
+        assert set(shown.evaluate(f"([s, n]) => ({style})(s, n)", [selector, "breakAfter"])) == {"avoid"}
+    assert set(shown.evaluate(f"([s, n]) => ({style})(s, n)", ["figure", "breakInside"])) == {"avoid"}
+    assert set(shown.evaluate(f"([s, n]) => ({style})(s, n)", [".modebar-container", "display"])) == {"none"}
+
+
+def test_the_tools_of_a_chart_lie_on_no_legend(view):
+    shown = view
+    shown.set_viewport_size({"width": 1360, "height": 900})
+    shown.emulate_media(media="screen")
+    shown.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    shown.wait_for_function("document.querySelector('#response .main-svg').getBoundingClientRect().width > 700")
+    tools = "document.querySelector('#response .modebar').getBoundingClientRect().top"
+    legend = "document.querySelector('#response .legend').getBoundingClientRect().bottom"
+    assert shown.evaluate(f"{tools} > {legend}")
+
+
 def test_a_body_of_beams_is_drawn_by_lines_and_a_browser_without_webgl_is_told(started, tmp_path):
     result = compare(cms.couple(beam(n=6)), ["craig-bampton"], [2], n_reference=2)
     path = tmp_path / "beam.html"

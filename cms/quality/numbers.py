@@ -1,0 +1,38 @@
+"""Numbers without unit as sentences, tables and reports write them: percent, or powers of ten."""
+
+import math
+
+__all__ = ["factor", "share", "superscript"]
+
+
+def share(value: float) -> str:
+    """Return a number without unit: percent where that reads well, powers of ten below, a dash for what is missing."""
+    if math.isnan(value):
+        return "\u2013"
+    if math.isinf(value):
+        return "missing"
+    if value == 0:
+        return "0"
+    if abs(value) >= 9.995:
+        return factor(value) if value > 0 else f"{value:.3g}"
+    if abs(value) >= 1e-4:
+        return f"{100 * value:.2g} %" if abs(value) < 0.0995 else f"{100 * value:.0f} %"
+    mantissa, exponent = f"{value:.0e}".split("e")
+    return f"{mantissa}\u00b710{superscript(int(exponent))}"
+
+
+def factor(value: float) -> str:
+    """Return a number above 1 with two digits, large ones as powers of ten."""
+    if not math.isfinite(value):
+        return "\u221e"
+    if value < 995:
+        return f"{value:.3g}"
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}\u00b710{superscript(int(exponent))}"
+
+
+def superscript(value: int) -> str:
+    """Return a number in superscript digits."""
+    return str(value).translate(
+        str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+    )
