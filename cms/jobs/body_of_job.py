@@ -1,6 +1,7 @@
 """The finite element body of a job: read, checked, assembled, its interfaces coupled."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,15 +70,31 @@ def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
     with stages("read mesh"):
         mesh = part_of_mesh(job, read_mesh(path))
     with stages("check mesh"):
-        report = report_mesh(mesh, materials, units=units)
+        bricks = job.body.incompatible_modes
+        report = report_mesh(mesh, materials, units=units, incompatible_modes=bricks)
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=job.body.accept)
         mesh = drop_unused_nodes(mesh)
+        if bricks and not len(mesh.cells.get("hexahedron", ())):
+            kinds = ", ".join(mesh.cells)
+            raise JobError(
+                f"body.incompatible_modes: the mesh has no bricks of eight nodes, but {kinds}; remove the key"
+            )
         interfaces = () if job.ties else interfaces_of(job, mesh)
     name = str(job.body.name)
     with stages("assemble") as advance:
-        body = solid_body(mesh, materials, name=name, units=units, interfaces=interfaces, progress=advance)
+        body = solid_body(
+            mesh,
+            materials,
+            name=name,
+            units=units,
+            interfaces=interfaces,
+            incompatible_modes=bricks,
+            progress=advance,
+        )
+        if report.first_order is not None:
+            body = replace(body, provenance={**body.provenance, **report.first_order.provenance()})
     if job.ties:
         from cms.jobs.mixed_body import body_of_mixed
 

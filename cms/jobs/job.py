@@ -102,6 +102,7 @@ class BodySection(Table):
     mend_mass: bool | None = Field(
         None, description="true or false, for matrices: whether slightly negative masses are set to zero"
     )
+    incompatible_modes: bool = Field(False, description="true or false: bricks of eight nodes bend by internal modes")
     accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
 
     @field_validator("mesh", "matrices", "nodes", "lines", mode="before")
@@ -291,6 +292,8 @@ class Job(Table):
             raise ValueError("sections: missing; lines need at least one table [sections.NAME]")
         if self.body.matrices and (self.sections or self.body.plane):
             raise ValueError("sections: matrices have their elements inside; remove the tables, and plane")
+        if self.body.incompatible_modes and (self.materials_of_cells == {} or not self.body.mesh):
+            raise ValueError("body.incompatible_modes: belongs to a mesh of solid cells; remove it")
         if self.body.plane and (self.ties or not self.sections):
             raise ValueError("body.plane: belongs to beams alone; remove it")
         if self.body.part and self.ties:

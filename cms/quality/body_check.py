@@ -10,6 +10,7 @@ from cms.quality.of_body.identities import (
     check_modal_mass,
 )
 from cms.quality.of_body.interface_motions import check_interface_motions, check_rigid_interfaces
+from cms.quality.of_body.mesh_order import check_mesh_order
 from cms.quality.of_body.step_size import check_damping, check_dropped_columns, check_step_size
 from cms.quality.of_body.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
 from cms.quality.record import QualityRecord
@@ -30,6 +31,7 @@ BODY_CHECKS = (
     check_energy_shares,
     check_driven_mass,
     check_buckling,
+    check_mesh_order,
     check_step_size,
     check_damping,
     check_dropped_columns,

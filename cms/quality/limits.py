@@ -61,6 +61,10 @@ LIMITS: dict[str, Limit] = {
         "redundant columns that were dropped", None, None,
         "",
     ),
+    "mesh-order": Limit(
+        "lowest frequencies too high by cells of first order", 0.02, None,
+        "mesh with cells of second order, give bricks incompatible modes, or mesh finer",
+    ),
     "step-size": Limit(
         "highest over lowest frequency", 1e4, None,
         "drop the stiffest modes, or take an implicit integrator with numerical damping (rho_inf below 1)",

@@ -9,7 +9,7 @@ from fe_models.meshes.boundary import CORNERS, all_facets, boundary_facets, firs
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.unused_nodes import used_nodes
 
-__all__ = ["Connectivity", "coincident_nodes", "connectivity"]
+__all__ = ["Connectivity", "coincident_nodes", "connectivity", "facet_pairs"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,11 @@ def connectivity(mesh: Mesh) -> Connectivity:
         n_mismatched,
         _transitions(mesh),
     )
+
+
+def facet_pairs(mesh: Mesh) -> IntArray:
+    """Return pairs of cells with a common facet, (n_pairs, 2); cells are counted through all types of `mesh.cells`."""
+    return _facet_pairs(mesh)[0]
 
 
 def _facet_pairs(mesh: Mesh) -> tuple[IntArray, int, int]:

@@ -16,6 +16,7 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.unused_nodes import used_nodes
+from fe_models.reports.first_order import FirstOrderError, first_order_error
 from fe_models.reports.report import Finding, Report
 from fe_models.reports.unit_check import implausible_units
 
@@ -24,6 +25,8 @@ __all__ = ["CellGeometry", "MeshReport", "cell_geometry", "report_mesh"]
 COINCIDENCE = 1e-6  #: distance of coincident nodes over the diagonal of the bounding box
 FLAT = 1e-9  #: volume over the cube of the size of a cell, below which it is degenerate
 ROUNDING = 1e-12  #: Jacobian over its mean, below which it counts as zero
+FIRST_ORDER_NOTED = 0.02  #: error of the lowest frequencies from which cells of first order are a warning
+UNMEASURABLE = {"inverted", "degenerate", "overlap", "transition"}  #: errors of a mesh that has no modes
 _CHUNK = 20_000  #: cells at a time, so that a million dofs need 100 MB
 
 
@@ -59,6 +62,7 @@ class MeshReport(Report):
     degenerate: Mapping[str, IntArray]  #: type -> rows of cells without volume
     distorted: Mapping[str, IntArray]  #: type -> rows of cells with a Jacobian <= 0 at a node only
     findings: tuple[Finding, ...]
+    first_order: FirstOrderError | None = None  #: None: no cells of first order, or not measured
 
     def numbers(self) -> list[tuple[str, str]]:
         """Return label and value of each number, in words."""
@@ -82,7 +86,11 @@ class MeshReport(Report):
 
 
 def report_mesh(
-    mesh: Mesh, materials: Material | Mapping[str, Material] | None = None, *, units: Units | str = "m-kg-s"
+    mesh: Mesh,
+    materials: Material | Mapping[str, Material] | None = None,
+    *,
+    units: Units | str = "m-kg-s",
+    incompatible_modes: bool = False,
 ) -> MeshReport:
     """Measure a mesh and judge whether it is fit for a finite element model.
 
@@ -94,6 +102,8 @@ def report_mesh(
         One material, or cell group -> material; None: no mass, and density and modulus are not judged.
     units
         The unit system the numbers are meant in.
+    incompatible_modes
+        Whether bricks of eight nodes will have them, as in `solid_body`.
 
     Raises
     ------
@@ -124,6 +134,9 @@ def report_mesh(
     if materials is not None:
         given, number = assign_materials(mesh, materials)
         mass, centre = _mass(geometry, given, number)
+    first_order = _first_order(mesh, materials, incompatible_modes, findings)
+    if first_order is not None and first_order.error > FIRST_ORDER_NOTED:
+        findings.append(Finding("first-order", False, first_order.words()))
     size = float(np.linalg.norm(hi - lo))
     findings += [Finding("units", is_error, text) for is_error, text in implausible_units(units, size, given)]
     return MeshReport(
@@ -144,7 +157,20 @@ def report_mesh(
         degenerate=degenerate,
         distorted=distorted,
         findings=tuple(findings),
+        first_order=first_order,
     )
+
+
+def _first_order(
+    mesh: Mesh, materials: Material | Mapping[str, Material] | None, incompatible_modes: bool, findings: list[Finding]
+) -> FirstOrderError | None:
+    """Return the error of cells of first order; None also where cells are too bad for a second order."""
+    if UNMEASURABLE & {finding.kind for finding in findings if finding.is_error}:
+        return None
+    try:
+        return first_order_error(mesh, materials, incompatible_modes=incompatible_modes)
+    except MeshError:
+        return None
 
 
 def cell_geometry(mesh: Mesh, kind: str) -> CellGeometry:

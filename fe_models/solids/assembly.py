@@ -22,6 +22,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.threads import n_threads
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.elements import ReferenceElement, reference_element
+from fe_models.solids.incompatible import KIND, brick_chunks, brick_stiffness
 
 __all__ = ["Progress", "assemble", "expand_scalar_mass"]
 
@@ -47,7 +48,12 @@ class NodeGraph:
 
 
 def assemble(
-    mesh: Mesh, properties: Array, of_cell: Mapping[str, IntArray], *, progress: Progress | None = None
+    mesh: Mesh,
+    properties: Array,
+    of_cell: Mapping[str, IntArray],
+    *,
+    incompatible: bool = False,
+    progress: Progress | None = None,
 ) -> tuple[sp.csc_array, sp.csr_array]:
     """Assemble the stiffness and the scalar mass of all solid cells.
 
@@ -59,6 +65,8 @@ def assemble(
         lam [Pa], mu [Pa], rho [kg/m³] of each material, (n_materials, 3).
     of_cell
         Cell type -> material of each cell, (n_cells,).
+    incompatible
+        Whether bricks of eight nodes have incompatible modes (`fe_models.solids.incompatible`).
     progress
         Called with the finished fraction.
 
@@ -87,7 +95,7 @@ def assemble(
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
     with ThreadPoolExecutor(n_threads()) as pool:
         graph = node_graph(list(lists.values()), len(mesh.nodes), pool)
-        K_data, M_data = assembled_data(mesh.nodes, lists, properties, of_cell, graph, pool, progress)
+        K_data, M_data = assembled_data(mesh.nodes, lists, properties, of_cell, graph, pool, incompatible, progress)
         K = expanded_stiffness(graph, K_data, pool)
     M_s = sp.csr_array((M_data, graph.columns, index_like(graph.row_start, len(M_data))), shape=2 * (graph.n_nodes,))
     return K, M_s
@@ -143,6 +151,7 @@ def assembled_data(
     of_cell: Mapping[str, IntArray],
     graph: NodeGraph,
     pool: ThreadPoolExecutor,
+    incompatible: bool,
     progress: Progress | None,
 ) -> tuple[Array, Array]:
     """Steps (3) and (4): the entries of K, row by row, and of M_s."""
@@ -182,6 +191,10 @@ def assembled_data(
                     for at, rows in shares
                 ],
             )
+            if incompatible and kind == KIND and not is_inverted[begin : begin + len(batch)].any():
+                of_batch = properties[materials[begin : begin + len(batch)]]
+                for rows, _ in brick_chunks(batch):
+                    K_e[rows] = brick_stiffness(nodes[batch[rows]], of_batch[rows, 0], of_batch[rows, 1])
             run(
                 pool,
                 [

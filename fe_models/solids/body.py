@@ -22,6 +22,7 @@ from fe_models.meshes.mesh import Mesh
 from fe_models.solids.assembly import Progress, assemble, expand_scalar_mass
 from fe_models.solids.elements import reference_element
 from fe_models.solids.geometric import internal_forces, projected_geometric_stiffness
+from fe_models.solids.incompatible import KIND
 from fe_models.solids.stress import nodal_stress, stiffest_at_nodes
 
 __all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
@@ -38,6 +39,7 @@ class SolidModel:
     materials: tuple[Material, ...]
     of_cell: Mapping[str, IntArray]  #: cell type -> material of each cell, (n_cells,)
     M_s: sp.csr_array  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
+    incompatible: bool = False  #: whether bricks of eight nodes have incompatible modes
 
     @cached_property
     def of_node(self) -> IntArray:
@@ -59,7 +61,9 @@ class SolidModel:
         Only the elements at `nodes` are visited where these are given; the other nodes show zero.
         """
         require_rows("nodal_stress", u, 3 * len(self.mesh.nodes))
-        return nodal_stress(self.mesh, self.materials, self.of_cell, self.of_node, u, nodes=nodes)
+        return nodal_stress(
+            self.mesh, self.materials, self.of_cell, self.of_node, u, nodes=nodes, incompatible=self.incompatible
+        )
 
     @property
     def has_geometric_stiffness(self) -> bool:
@@ -73,13 +77,15 @@ class SolidModel:
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return ∫ sigma grad N, (3 n_nodes, k) [N], of columns u; only at `nodes` where these are given."""
         require_rows("internal_forces", u, 3 * len(self.mesh.nodes))
-        return internal_forces(self.mesh, self.materials, self.of_cell, u, nodes=nodes)
+        return internal_forces(self.mesh, self.materials, self.of_cell, u, nodes=nodes, incompatible=self.incompatible)
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
         """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); the stress alone makes it."""
         require_rows("geometric_stiffness", u, 3 * len(self.mesh.nodes))
         require_rows("geometric_stiffness", Phi, 3 * len(self.mesh.nodes))
-        return projected_geometric_stiffness(self.mesh, self.materials, self.of_cell, u, Phi)
+        return projected_geometric_stiffness(
+            self.mesh, self.materials, self.of_cell, u, Phi, incompatible=self.incompatible
+        )
 
 
 def solid_body(
@@ -89,6 +95,7 @@ def solid_body(
     name: str,
     units: Units,
     interfaces: Iterable[Interface] = (),
+    incompatible_modes: bool = False,
     progress: Progress | None = None,
 ) -> FEBody:
     """Make the body of a mesh of solid cells: isoparametric elements, consistent mass, dof 3 i + c of every node i.
@@ -105,6 +112,9 @@ def solid_body(
         In which coordinates and materials are.
     interfaces
         Named places, to be coupled later by `cms.couple`.
+    incompatible_modes
+        Whether bricks of eight nodes have internal modes that let them bend (`fe_models.solids.incompatible`); other
+        cells stay as they are.
     progress
         Called with the finished fraction of the assembly, 0 to 1.
 
@@ -122,7 +132,7 @@ def solid_body(
     """
     used, of_cell = assign_materials(mesh, materials)
     properties = np.array([[material.lam, material.mu, material.rho] for material in used])
-    K, M_s = assemble(mesh, properties, of_cell, progress=progress)
+    K, M_s = assemble(mesh, properties, of_cell, incompatible=incompatible_modes, progress=progress)
     n_nodes = len(mesh.nodes)
     return FEBody(
         name=name,
@@ -134,8 +144,8 @@ def solid_body(
         units=units,
         surface=boundary_triangles(mesh),
         node_volumes=node_volumes(mesh),
-        element_model=SolidModel(mesh, used, of_cell, M_s),
-        provenance=provenance(mesh, used, of_cell),
+        element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes),
+        provenance=provenance(mesh, used, of_cell) | _brick_words(mesh, incompatible_modes),
     )
 
 
@@ -192,6 +202,10 @@ def provenance(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str
             f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}, {count} cells"
         )
     return {key: value for key, value in record.items() if value} | {"scikit-fem": version("scikit-fem")}
+
+
+def _brick_words(mesh: Mesh, incompatible_modes: bool) -> dict[str, str]:
+    return {f"cells {KIND} with": "incompatible modes"} if incompatible_modes and len(mesh.cells.get(KIND, ())) else {}
 
 
 def require_rows(where: str, u: Array, n_rows: int) -> None:

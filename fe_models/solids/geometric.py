@@ -16,6 +16,7 @@ from fe_models.foundation.threads import n_threads, one_blas_thread
 from fe_models.material import Material
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.elements import ShapeTable, reference_element
+from fe_models.solids.incompatible import KIND, brick_chunks, brick_operators, brick_stiffness, isotropic_stress
 
 __all__ = ["internal_forces", "projected_geometric_stiffness"]
 
@@ -23,7 +24,13 @@ CHUNK_BYTES = 1.5e6  #: of the products held at once by a thread: they shall sta
 
 
 def projected_geometric_stiffness(
-    mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray], u: Array, Phi: Array
+    mesh: Mesh,
+    materials: tuple[Material, ...],
+    of_cell: Mapping[str, IntArray],
+    u: Array,
+    Phi: Array,
+    *,
+    incompatible: bool = False,
 ) -> Array:
     """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the stress of the states u, (3 n_nodes, k).
 
@@ -35,6 +42,8 @@ def projected_geometric_stiffness(
         Displacements of the states, dof 3 i + c is component c of node i, (3 n_nodes, k).
     Phi
         Columns, (3 n_nodes, n).
+    incompatible
+        Whether bricks of eight nodes have incompatible modes; stress then acts on the gradients of their whole field.
     """
     n_nodes, n = len(mesh.nodes), Phi.shape[1]
     states = np.ascontiguousarray(u).reshape(n_nodes, 3, -1)
@@ -44,6 +53,8 @@ def projected_geometric_stiffness(
     n_parts = n_threads()
     with one_blas_thread(), ThreadPoolExecutor(n_parts) as pool:
         for kind, cells in mesh.cells.items():
+            if incompatible and kind == KIND:
+                continue
             cuts = np.linspace(0, len(cells), n_parts + 1).astype(int)
             futures = [
                 pool.submit(
@@ -58,7 +69,24 @@ def projected_geometric_stiffness(
     row, column = np.triu_indices(n)
     K[:, row, column] = pairs
     K[:, column, row] = pairs
+    if incompatible and len(mesh.cells.get(KIND, ())):
+        K += _of_bricks(mesh.nodes, mesh.cells[KIND], lame[of_cell[KIND]], u, Phi)
     return K
+
+
+def _of_bricks(nodes: Array, cells: IntArray, lame: Array, u: Array, Phi: Array) -> Array:
+    """Return Phiᵀ K_geo Phi of bricks with incompatible modes, (k, n, n); lame: lam, mu of each cell, (n_cells, 2)."""
+    n = Phi.shape[1]
+    K = np.zeros((u.shape[1], n, n))
+    for rows, dofs in brick_chunks(cells):
+        lam, mu = lame[rows].T
+        B, volumes = brick_operators(nodes[cells[rows]], lam, mu)
+        sigma = isotropic_stress(B @ u[dofs][:, None], lam, mu) * volumes[:, :, None, None]
+        sigma = sigma.reshape(*volumes.shape, 1, 3, 3, -1)
+        H = (B @ Phi[dofs][:, None]).reshape(*volumes.shape, 3, 3, n)  # u_c,b
+        for j in range(len(K)):
+            K[j] += H.reshape(-1, n).T @ (sigma[..., j] @ H).reshape(-1, n)
+    return (K + K.transpose(0, 2, 1)) / 2
 
 
 def internal_forces(
@@ -68,6 +96,7 @@ def internal_forces(
     u: Array,
     *,
     nodes: IntArray | None = None,
+    incompatible: bool = False,
 ) -> Array:
     """Return ∫ sigma grad N by the points of the geometric stiffness, (3 n_nodes, k); exact where `nodes` says so."""
     from fe_models.solids.geometric_kernels import add_internal_forces
@@ -84,6 +113,11 @@ def internal_forces(
         if is_wanted.any():
             table = geometric_table(kind)
             cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
+            if incompatible and kind == KIND:
+                for rows, dofs in brick_chunks(cells):
+                    K = brick_stiffness(mesh.nodes[cells[rows]], *lame[material[rows]].T)
+                    np.add.at(forces.reshape(3 * len(mesh.nodes), -1), dofs, K @ np.asarray(u)[dofs])
+                continue
             add_internal_forces(mesh.nodes, cells, material, lame, table.gradients, table.weights, fields, forces)
     forces[~wanted] = 0.0
     return forces.reshape(3 * len(mesh.nodes), -1)

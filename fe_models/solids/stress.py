@@ -11,6 +11,7 @@ from fe_models.foundation.threads import n_threads
 from fe_models.material import Material
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.elements import reference_element
+from fe_models.solids.incompatible import KIND, VOIGT, brick_chunks, brick_operators, isotropic_stress
 
 __all__ = ["nodal_stress", "stiffest_at_nodes"]
 
@@ -23,6 +24,7 @@ def nodal_stress(
     u: Array,
     *,
     nodes: IntArray | None = None,
+    incompatible: bool = False,
 ) -> Array:
     """Return the stress at the nodes, (n_nodes, 6, k) [Pa], of displacement columns u, (3 n_nodes, k) [m].
 
@@ -43,6 +45,8 @@ def nodal_stress(
         Displacement columns, dof 3 i + c is component c of node i, (3 n_nodes, k).
     nodes
         Whose stress is wanted: only their elements are visited, the other nodes show zero; None: all.
+    incompatible
+        Whether bricks of eight nodes have incompatible modes.
     """
     from fe_models.solids.stress_kernels import add_element_stress, volume_at_nodes
 
@@ -65,6 +69,9 @@ def nodal_stress(
             element = reference_element(kind)
             table = element.stress
             volume_at_nodes(mesh.nodes, cells, material, of_node, table.gradients, table.weights, volume)
+            if incompatible and kind == KIND:
+                add_brick_stress(mesh.nodes, cells, lame[material], material[:, None] == of_node[cells], u, stress)
+                continue
             futures = [
                 pool.submit(
                     add_element_stress,
@@ -88,6 +95,31 @@ def nodal_stress(
     np.divide(stress, volume[:, None, None], out=stress, where=volume[:, None, None] > 0)
     stress[~wanted] = 0.0
     return stress
+
+
+def add_brick_stress(nodes: Array, cells: IntArray, lame: Array, shows: Array, u: Array, stress: Array) -> None:
+    """Add volume times stress of bricks with incompatible modes to the nodes that show it.
+
+    Parameters
+    ----------
+    nodes, cells
+        Positions, (n_nodes, 3), and bricks, (n_cells, 8).
+    lame
+        lam and mu of each cell, (n_cells, 2).
+    shows
+        Whether each node of each cell shows the material of the cell, (n_cells, 8).
+    u
+        Displacement columns, (3 n_nodes, k).
+    stress
+        Sums at the nodes, (n_nodes, 6, k); they are added to.
+    """
+    to_nodes = reference_element(KIND).extrapolation
+    for rows, dofs in brick_chunks(cells):
+        lam, mu = lame[rows].T
+        B, volumes = brick_operators(nodes[cells[rows]], lam, mu)
+        sigma = isotropic_stress(B @ u[dofs][:, None], lam, mu)[:, :, VOIGT]
+        at_nodes = np.einsum("ap,npsk,n->nask", to_nodes, sigma, volumes.sum(axis=1), optimize=True)
+        np.add.at(stress, cells[rows][shows[rows]], at_nodes[shows[rows]])
 
 
 def stiffest_at_nodes(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray]) -> IntArray:
