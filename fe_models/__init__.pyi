@@ -46,6 +46,7 @@ from .matrices import body_from_matrices as body_from_matrices
 from .matrices import body_from_npz as body_from_npz
 from .meshes.boundary import boundary_facets as boundary_facets
 from .meshes.boundary import boundary_triangles as boundary_triangles
+from .meshes.divided_lines import divide_lines as divide_lines
 from .meshes.line_mesh import LineMesh as LineMesh
 from .meshes.line_mesh import straight_line as straight_line
 from .meshes.mesh import Mesh as Mesh

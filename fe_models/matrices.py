@@ -227,7 +227,7 @@ def require_units(body: FEBody, *, accept: tuple[str, ...]) -> None:
     mass = float(np.diag(rigid_forces(body.K, body.M, body.nodes, body.dofs).mass)[:3].max())
     for is_error, text in implausible_matrices(body.units, body.nodes, mass, wave_speeds(body)):
         if is_error and "units" not in accept:
-            raise BodyError(f"body {body.name!r}: {text}; or accept = [\"units\"] if it is meant")
+            raise BodyError(f'body {body.name!r}: {text}; or accept = ["units"] if it is meant')
         log.warning("body %r: %s", body.name, text)
 
 

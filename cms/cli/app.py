@@ -94,9 +94,7 @@ def frf_command(
     file: ModalFile,
     excited: Annotated[str, typer.Option("--from", help="Interface the force acts on.")],
     answering: Annotated[str, typer.Option("--to", help="Interface whose motion is shown.")],
-    band: Annotated[
-        str, typer.Option(help="Frequencies [Hz], lowest:highest[:number], and more around resonances.")
-    ],
+    band: Annotated[str, typer.Option(help="Frequencies [Hz], lowest:highest[:number], and more around resonances.")],
     component: Annotated[
         list[str] | None,
         typer.Option("--component", "-c", help="Motion, or motion/force, as uz or uz/ry; repeat for more [ux uy uz]."),

@@ -42,7 +42,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
     from cms.families.families import Families
     from cms.jobs.body_of_job import coupled_body, uncoupled_body
     from cms.jobs.job import read_job
-    from cms.jobs.mode_set_of_job import job_mode_set
+    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.quality.reduction_check import check_reduction, require_same_units
     from cms.quality.reference.full_reference import FullReference, usable_band
 
@@ -54,7 +54,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
             body = coupled_body(job, uncoupled)
         with Families(body) as families:
             with clock(f"mode set {job.reduction.set}"):
-                modes = job_mode_set(families, job.reduction)
+                modes = job_mode_set(families, reduction_of(job, body))
             top = usable_band(modes, reduced) if band is None else band
             with clock("compare"), FullReference(families, band=top) as reference:
                 return check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled)

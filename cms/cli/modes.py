@@ -25,7 +25,7 @@ def list_modes(path: Path, *, as_json: bool) -> None:
     """Make the mode set and the reduced body of a job, and print what they consist of; writes no file."""
     from cms.jobs.body_of_job import job_body
     from cms.jobs.job import read_job
-    from cms.jobs.mode_set_of_job import job_mode_set
+    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.jobs.parts_of_job import frame_of
     from cms.reduction import reduce
 
@@ -33,7 +33,7 @@ def list_modes(path: Path, *, as_json: bool) -> None:
     with stages() as clock:
         body = job_body(job, clock)
         with clock(f"mode set {job.reduction.set}"):
-            modes = job_mode_set(body, job.reduction)
+            modes = job_mode_set(body, reduction_of(job, body))
         with clock("reduce"):
             reduced = reduce(body, modes, frame=frame_of(job, held=body.is_held), stress=False, geometric=False)
     record = mode_record(modes, reduced)

@@ -1,5 +1,6 @@
 """All mode families of one body from one factorisation of its interior stiffness (docs/theory.md §2)."""
 
+import logging
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -32,6 +33,10 @@ from fe_models.foundation.components import MOTION_COMPONENTS
 __all__ = ["Families"]
 
 GROUNDED = 1e-6  #: |K Psi_R| / (|K| |Psi_R|) above which a body is not free
+
+
+log = logging.getLogger(__name__)
+MANY = 600  #: boundary dofs of one interface from which its cost is announced
 
 
 class Families:
@@ -106,6 +111,8 @@ class Families:
         """Interior partition and its factorisation."""
         if not self._is_open:
             raise ModeSetError(f"families of body {self.body.name!r}: closed; make new ones")
+        for words in large_interfaces(self.body):
+            log.warning(words)
         return self._stack.enter_context(fix_interfaces(self.body, self._partition[1]))
 
     # -- static families -------------------------------------------------------------------------------------------
@@ -252,6 +259,21 @@ class Families:
         modes = compute(wanted)
         self._modes[key] = [_Found(modes, wanted.cutoff)]
         return modes
+
+
+def large_interfaces(body: FEBody) -> list[str]:
+    """Say what interfaces with very many boundary dofs cost, one text for each."""
+    texts = []
+    for interface in body.interfaces:
+        n_b = 0 if interface.dofs is None else len(interface.dofs)
+        if n_b >= MANY:
+            texts.append(
+                f"body {body.name!r}: interface {interface.name!r} of {len(interface.nodes)} nodes has {n_b} boundary "
+                f"dofs: as many static solves, {8e-9 * body.n_dof * n_b:.2g} GB of constraint modes, and as many modes "
+                "of the reduced body; interface_modes = 20 in [reduction] (with_characteristic_modes) keeps the "
+                "softest of these modes; kind rigid or distributing has 6"
+            )
+    return texts
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
-from cms.solvers.factorization import Factorization, factorize
+from cms.solvers.factorization import EmptyFactor, Factorization, factorize
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.submatrix import principal_block
 from fe_models.foundation.arrays import Array, IntArray
@@ -51,7 +51,7 @@ def fix_interfaces(body: FEBody, extra: IntArray | None = None) -> FixedInterfac
     Raises
     ------
     ModeSetError
-        If no dof is held (the body has no interface), or no interior dof is left.
+        If no dof is held (the body has no interface).
     BodyError
         If it moves without energy while its interfaces are held: a mechanism; the text says where.
     """
@@ -60,10 +60,10 @@ def fix_interfaces(body: FEBody, extra: IntArray | None = None) -> FixedInterfac
     i = np.setdiff1d(np.arange(body.n_dof), b)
     if len(b) == 0:
         raise ModeSetError(f"body {body.name!r} has no interface; give it at least one, or take free modes")
-    if len(i) == 0:
-        raise ModeSetError(f"body {body.name!r}: all {body.n_dof} dofs are boundary dofs; nothing is left to reduce")
     K_ii = principal_block(body.K, i)
     M_ii = principal_block(body.M, i)
+    if not len(i):
+        return FixedInterfaceBody(body, i, b, K_ii, M_ii, Factorization(EmptyFactor()))
     is_definite = not (body.dofs[:, 1] == MULTIPLIER).any()
     try:
         factorization = factorize(K_ii, definite=is_definite)

@@ -17,6 +17,8 @@ __all__ = ["elastic_modes", "fixed_interface_modes", "no_modes"]
 
 def fixed_interface_modes(fixed: FixedInterfaceBody, wanted: ModeCount) -> EigenResult:
     """Vibration modes with all boundary dofs held: K_II phi = omega² M_II phi, phi over all dofs (n_dof, k)."""
+    if not len(fixed.i):  # every dof is one of an interface
+        return no_modes(fixed.body.n_dof)
     modes = eigenmodes(fixed.K_ii, fixed.M_ii, wanted, factorization=fixed.factorization)
     Phi = np.zeros((fixed.body.n_dof, modes.Phi.shape[1]))
     Phi[fixed.i] = modes.Phi

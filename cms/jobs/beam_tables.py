@@ -170,11 +170,20 @@ class TieSection(Table):
         return self
 
 
+ON_SOLIDS = {
+    "masses": "a mass on a solid or on matrices sits at an interface: remove the tables, reduce with an interface "
+    "there, and add it in the system file, [[bodies.NAME.masses]] (with_masses in Python); or add tables "
+    "[sections.NAME]",
+}  #: what to do instead, where there are no beams
+
+
 def check_beams(sections: Mapping[str, BeamSection], others: Mapping[str, Any], materials: Mapping[str, Any]) -> None:
     """Raise `ValueError` unless every section has a material and its lines, and nothing is attached to no beams."""
     for kind, tables in others.items():
         if tables and not sections:
-            raise ValueError(f"{kind}: belong to beams; add tables [sections.NAME], or remove them")
+            raise ValueError(
+                f"{kind}: belong to beams; {ON_SOLIDS.get(kind, 'add tables [sections.NAME], or remove them')}"
+            )
     for name, section in sections.items():
         if section.material is None and len(materials) != 1:
             raise ValueError(f"sections.{name}.material: missing; there are {len(materials)} materials, name one")

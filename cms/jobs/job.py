@@ -30,7 +30,14 @@ from fe_models.foundation.words import nearest, quoted
 __all__ = ["SELECTIONS", "DampingSection", "Job", "ReductionSection", "mode_set_options", "read_job"]
 
 SELECTIONS = ("faces", "nodes", "plane", "cylinder", "box", "nearest")  #: keys that select the nodes of an interface
-ACCEPTABLE = ("overlap", "parts", "transition", "units", "warped")  #: errors of the mesh report that may be meant
+ACCEPTABLE = (
+    "left-out",
+    "overlap",
+    "parts",
+    "transition",
+    "units",
+    "warped",
+)  #: errors of the mesh report that may be meant
 KEYS_OF_LOADS = {
     "pressure": ("pressure",),
     "gravity": ("acceleration",),

@@ -1,5 +1,6 @@
 """The mode set a job asks for, with its options as the functions take them."""
 
+import logging
 from typing import Any
 
 import numpy as np
@@ -7,16 +8,19 @@ import numpy as np
 from cms.families.families import Families
 from cms.families.interface_loads import InterfaceLoad, condensed_load
 from cms.families.sharing import families_of
+from cms.jobs.job import Job
 from cms.jobs.reduction_table import AUTO, LoadSection, NeighbourSection, ReductionSection, mode_set_options
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
 from cms.mode_sets.characteristic_modes import with_characteristic_modes
 from cms.mode_sets.extra_columns import EXTRA_COLUMNS
 from cms.solvers.mode_count import ModeCount
-from fe_models.body.fe_body import FEBody
+from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.foundation.arrays import Array
 
-__all__ = ["job_mode_set"]
+__all__ = ["job_mode_set", "reduction_of"]
+
+log = logging.getLogger(__name__)
 
 COUNT_KEYS = ("n_modes", "cutoff", "verify")  #: how many modes
 
@@ -57,6 +61,23 @@ def job_mode_set(body: FEBody | Families, reduction: ReductionSection) -> ModeSe
             options=options,
             added=added if has_additions else None,
         ).modes
+
+
+def reduction_of(job: Job, body: FEBody) -> ReductionSection:
+    """Return the table [reduction], for a part of a body with no more modes than the part can have.
+
+    All parts of a body have one number of modes in their jobs; a small one may have fewer interior dofs. Each
+    multiplier of a distributing interface takes one of them.
+    """
+    n_i = body.n_dof - len(body.b) - 2 * int((body.dofs[:, 1] == MULTIPLIER).sum())
+    asked = job.reduction.n_modes
+    if job.body.part is None or not isinstance(asked, int) or asked <= n_i:
+        return job.reduction
+    log.warning(
+        "part %d of the body: n_modes = %d, but it has %d interior dofs: it is reduced with %d modes",
+        job.body.part.number, asked, n_i, n_i,
+    )  # fmt: skip
+    return job.reduction.model_copy(update={"n_modes": n_i})
 
 
 def with_additions(families: Families, modes: ModeSet, reduction: ReductionSection) -> ModeSet:

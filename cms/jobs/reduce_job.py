@@ -69,7 +69,7 @@ def modes_and_states(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSe
     The static states of unit loads are for the geometric stiffness; None where it is left out or not known.
     """
     from cms.families.families import Families
-    from cms.jobs.mode_set_of_job import job_mode_set
+    from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.second_order.unit_states import has_geometric_stiffness, unit_states
 
     wanted = job.reduction.geometric_stiffness
@@ -77,7 +77,7 @@ def modes_and_states(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSe
         wanted = has_geometric_stiffness(coupled)
     with Families(coupled) as families:
         with stages(f"mode set {job.reduction.set}"):
-            modes = job_mode_set(families, job.reduction)
+            modes = job_mode_set(families, reduction_of(job, coupled))
         if not wanted and not job.reduction.quadratic_modes:
             return modes, None
         with stages("static states"):

@@ -56,12 +56,16 @@ def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | N
 
 
 def shell_mesh(job: Job) -> "ShellMesh":
-    """Read the triangles and quads of the job, and the lines of its stiffeners."""
+    """Read all triangles and quads of the mesh, and the lines of its stiffeners; `shell_body` asks all for a thickness.
+
+    Only those of the groups that the job names where it accepts that others are left out.
+    """
     from fe_models.importers.read_mesh import read_shell_mesh
 
     groups = [group for shell in job.shells.values() for group in shell.cells]
     lines = [group for section in job.sections.values() for group in section.lines]
-    return read_shell_mesh(str(job.body.mesh), groups=None if groups == ["all"] else groups, stiffeners=lines)
+    is_part = groups != ["all"] and "left-out" in job.body.accept
+    return read_shell_mesh(str(job.body.mesh), groups=groups if is_part else None, stiffeners=lines)
 
 
 def shell_properties_of(job: Job) -> "dict[str, ShellProperty]":

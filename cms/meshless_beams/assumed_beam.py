@@ -119,6 +119,7 @@ def beam_from_assumed_modes(
     x_station = station_places(where, line, places)
 
     x, weight = gauss_points(line, functions, counts)
+    require_rotary_inertia(where, line, x, counts)
     fields = beam_fields(functions, counts, line, x)
     rigid = rigid_fields(x, np.zeros(3))
     condition = frame_of_beam(where, line, frame or TisserandFrame(), x_station, list(places), (x, weight, rigid))
@@ -181,6 +182,21 @@ def beam_from_assumed_modes(
         columns=columns,
         geometric=stiffening(line, functions, counts, C, T, x_station, condition) if geometric else None,
     )
+
+
+def require_rotary_inertia(where: str, line: BeamLine, x: Array, counts: Mapping[str, int]) -> None:
+    """Raise `BodyError` where torsion or shear would move without mass: the eigenvalues would be infinite."""
+    has_y, has_z = line.at("rho_Iy", x).any(), line.at("rho_Iz", x).any()
+    if counts["torsion"] and not (has_y or has_z):
+        raise BodyError(
+            f"{where}: n_torsion = {counts['torsion']}, but the sections have no moment of inertia about x, so that "
+            "torsion has no mass; give rho_Iy and rho_Iz, or n_torsion = 0 in a nodal frame"
+        )
+    if counts["shear"] and not (has_y and has_z):
+        raise BodyError(
+            f"{where}: n_shear = {counts['shear']}, but the sections have no rotary inertia, so that shear has no "
+            "mass; give rho_Iy and rho_Iz, or leave GAy and GAz infinite"
+        )
 
 
 def stiffening(

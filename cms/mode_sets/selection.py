@@ -48,12 +48,14 @@ def checked_modes(
         If there are fewer dofs than modes, or no mode lies below the cutoff.
     """
     n_i, cutoff = body.n_dof - len(body.b), wanted.cutoff
-    if wanted.n is not None and wanted.n >= n_i:
+    is_fixed = kind == "fixed-interface"
+    if wanted.n is not None and wanted.n > (n_i if is_fixed else body.n_dof):
         raise ModeSetError(
-            f"{name}: n_modes = {wanted.n}, but body {body.name!r} has {n_i} interior dofs; choose 0 <= n_modes < {n_i}"
+            f"{name}: n_modes = {wanted.n}, but body {body.name!r} has {n_i} interior dofs"
+            + (f"; choose 0 <= n_modes <= {n_i}" if is_fixed else f" and {body.n_dof} in all; choose fewer")
         )
     modes = find(wanted)
-    if cutoff is not None and not len(modes.frequencies):
+    if cutoff is not None and not len(modes.frequencies) and (n_i or not is_fixed):
         first = find(ModeCount(1)).frequencies[0]
         in_hertz = f"{cutoff / body.units.time:g} Hz, {first / body.units.time:.6g} Hz"
         raise ModeSetError(

@@ -10,7 +10,7 @@ from cms.solvers.pardiso import PardisoFactor, mkl_runtime
 from cms.solvers.superlu import SuperLuFactor
 from fe_models.foundation.arrays import Array
 
-__all__ = ["Factorization", "Inertia", "factorize"]
+__all__ = ["EmptyFactor", "Factorization", "Inertia", "factorize"]
 
 SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix of condition 1e12 leaves 1e-4
 
@@ -26,10 +26,28 @@ class Inertia:
     n_positive: int
 
 
+class EmptyFactor:
+    """The factor of a matrix without rows: of the interior of a body all of whose dofs are on interfaces."""
+
+    n = n_factor_entries = n_negative = n_perturbed = n_positive = 0
+    description = "nothing to factorise"
+
+    def __init__(self) -> None:
+        self.is_open = True
+
+    def solve(self, b: Array) -> Array:
+        """Return columns without rows, (0, k)."""
+        return np.zeros((0, b.shape[1]), order="F")
+
+    def close(self) -> None:
+        """Free nothing."""
+        self.is_open = False
+
+
 class Factorization:
     """A factorised symmetric matrix; a context manager that frees the factor at its end."""
 
-    def __init__(self, factor: PardisoFactor | SuperLuFactor) -> None:
+    def __init__(self, factor: PardisoFactor | SuperLuFactor | EmptyFactor) -> None:
         self._factor = factor
 
     @property

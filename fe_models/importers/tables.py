@@ -9,12 +9,13 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
+from fe_models.meshes.divided_lines import divide_lines
 from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["read_tables"]
 
 NODE_COLUMNS = ("node", "x", "y", "z", "sets")
-LINE_COLUMNS = ("line", "node1", "node2", "group", "vx", "vy", "vz", "third")
+LINE_COLUMNS = ("line", "node1", "node2", "group", "vx", "vy", "vz", "third", "elements")
 OFFSET_COLUMNS = ("x1", "y1", "z1", "x2", "y2", "z2")
 
 
@@ -28,7 +29,8 @@ def read_tables(nodes: str | Path, lines: str | Path) -> LineMesh:
         free; a blank coordinate is zero.
     lines
         Columns `node1, node2` and optionally `group` (of the section), the orientation vector `vx, vy, vz` or a
-        `third` node in the local x-y plane, and offsets of the axis `x1, y1, z1, x2, y2, z2`. Text from # on is a
+        `third` node in the local x-y plane, offsets of the axis `x1, y1, z1, x2, y2, z2`, and the number of `elements`
+        into which the line is cut (default 1; `divide_lines`). Text from # on is a
         comment. Nodes that only serve as third nodes are no part of the body.
 
     Raises
@@ -69,7 +71,7 @@ def read_tables(nodes: str | Path, lines: str | Path) -> LineMesh:
     keep = np.setdiff1d(np.arange(len(X)), only_third)
     new = np.full(len(X), -1)
     new[keep] = np.arange(len(keep))
-    return LineMesh(
+    mesh = LineMesh(
         nodes=X[keep],
         lines=new[pairs],
         line_sets={name: np.array(rows) for name, rows in line_sets.items()},
@@ -81,6 +83,11 @@ def read_tables(nodes: str | Path, lines: str | Path) -> LineMesh:
         node_numbers=np.array(list(place))[keep],
         notes=(f"{len(only_third)} nodes only orient lines and were left out",) if len(only_third) else (),
     )
+    elements = np.array([_integer(row, "elements") if row.get("elements") else 1 for row in line_rows])
+    if (elements < 1).any():
+        row = line_rows[int(np.argmax(elements < 1))]
+        raise MeshError(f"{row['where']}: column elements: expected a whole number from 1 on, got {row['elements']!r}")
+    return mesh if (elements == 1).all() else divide_lines(mesh, elements)
 
 
 def _table(path: Path, columns: tuple[str, ...], required: tuple[str, ...]) -> tuple[list[dict[str, str]], str]:

@@ -82,5 +82,8 @@ def assign_shell_properties(
             if any(np.isin(missing[kind], by_type[kind]).any() for kind in missing if kind in by_type)
         ]
         where = f"they are in the groups {', '.join(groups)}: give these one" if groups else "they are in no group"
-        raise ShellError(f"shells: cells without a thickness: {counts}; {where}")
+        raise ShellError(
+            f"shells: cells without a thickness: {counts}; {where}; cells not meant to be of the body are left "
+            'out by read_shell_mesh(groups=...), in a job by accept = ["left-out"]'
+        )
     return used, number

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cms.errors import JobError
+from cms.cli.split import SplitRequest, split_job
+from cms.errors import JobError, ModeSetError
 from cms.jobs.beam_tables import SHAPE_KEYS, BeamSection, LinkSection, MassSection, SpringSection, TieSection
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
@@ -274,3 +275,43 @@ def test_every_key_of_beams_is_documented():
     for table in (BeamSection, MassSection, SpringSection, LinkSection, TieSection):
         for key in table.model_fields:
             assert f"`{key}`" in text, f"{table.__name__}: {key}"
+
+
+def test_a_short_part_is_reduced_with_the_modes_it_can_have_and_says_so(tmp_path, caplog):
+    """A rod of four elements in two parts: one node inside each, six modes where twelve are asked for."""
+    (tmp_path / "nodes.csv").write_text("node,x,y,z,sets\n1,0,0,0,pivot\n2,1,0,0,tip\n")
+    (tmp_path / "lines.csv").write_text("node1,node2,group,elements\n1,2,rod,4\n")
+    text = (
+        ROD[: ROD.index("[masses.bob]")]
+        + """
+[interfaces.pivot]
+kind = "rigid"
+nodes = "pivot"
+
+[interfaces.tip]
+kind = "rigid"
+nodes = "tip"
+
+[reduction]
+n_modes = 12
+"""
+    )
+    (tmp_path / "rod.toml").write_text(text)
+    files = split_job(SplitRequest(tmp_path / "rod.toml", 2, None, None, "rigid", None))
+    for number, path in enumerate(files[:2], start=1):
+        caplog.clear()
+        reduced = reduce_job(read_job(path))
+        assert len(reduced.K) == 12 + 6 - 6
+        assert f"part {number} of the body: n_modes = 12, but it has 6 interior dofs" in caplog.text
+    (tmp_path / "rod.toml").write_text(text.replace("n_modes = 12", "n_modes = 99"))
+    with pytest.raises(ModeSetError, match="n_modes = 99, but body 'rod' has 18 interior dofs"):  # no part: refused
+        reduce_job(read_job(tmp_path / "rod.toml"))
+
+
+def test_masses_on_a_solid_are_pointed_to_what_works(tmp_path):
+    (tmp_path / "a.msh").write_text("")
+    text = ROD.replace('nodes = "nodes.csv"\nlines = "lines.csv"', 'mesh = "a.msh"')
+    text = text[: text.index("[sections.rod]")] + text[text.index("[masses.bob]") : text.index("[springs.bearing]")]
+    (tmp_path / "a.toml").write_text(text + "[reduction]\nn_modes = 2\n")
+    with pytest.raises(JobError, match=r"masses: .*sits at an interface: .*\[\[bodies\.NAME\.masses\]\] \(with_masses"):
+        read_job(tmp_path / "a.toml")

@@ -8,6 +8,7 @@ from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
+from cms.jobs.shell_body import shell_mesh
 from cms.jobs.shell_tables import ShellSection
 from fe_models.errors import FeModelsError
 from tests.root import ROOT
@@ -168,7 +169,7 @@ def test_a_bad_job_of_shells_is_refused(job_file, old, new, words):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('cells = "floor"', 'cells = "flor"', "no group of triangles or quads 'flor'; did you mean 'floor'"),
+        ('cells = "floor"', 'cells = "flor"', "the mesh has no group of cells 'flor'; did you mean 'floor'"),
         ('lines = "rib"', 'lines = "ribs"', "no group of lines 'ribs'; did you mean 'rib'"),
         ('faces = "floor"', 'faces = "hinge"', "no group of cells 'hinge' ('hinge' is a node set)"),
     ],
@@ -215,3 +216,15 @@ def test_a_shell_in_parts_has_all_its_mass_and_load(job_file):
     assert_allclose(sum(part.moments.m for part in reduced), whole.moments.m, rtol=1e-12)
     forces = [part.frame.axes @ part.load_case("blow").force for part in (whole, *reduced)]
     assert_allclose(forces[1] + forces[2], forces[0], rtol=0, atol=1e-9 * np.abs(forces[0]).max())
+
+
+def test_cells_without_a_thickness_are_refused_as_in_python_unless_they_are_left_out(job_file):
+    """The wall would vanish, and its mass with it."""
+    begin = TRAY.index("[shells.wall]")
+    without = TRAY[:begin] + TRAY[TRAY.index("[sections.rib]") :]
+    with pytest.raises(
+        FeModelsError, match=r"cells without a thickness: .*they are in the groups wall: give these one"
+    ):
+        reduce_job(read_job(job_file(without)))
+    accepted = without.replace("[body]", '[body]\naccept = ["left-out"]', 1)
+    assert set(shell_mesh(read_job(job_file(accepted))).cell_sets) == {"floor"}

@@ -236,3 +236,17 @@ def test_a_pinned_column_buckles_at_the_load_of_euler():
 
 def test_a_body_without_geometric_stiffness_can_be_had():
     assert made(slender(), 3, geometric=False).geometric is None
+
+
+def test_torsion_and_shear_without_rotary_inertia_are_refused_in_words():
+    plain = slender(rho_Iy=0.0, rho_Iz=0.0)
+    held = cms.NodalFrame("start")
+    with pytest.raises(BodyError, match=r"n_torsion = 3, but the sections have no moment of inertia about x"):
+        made(plain, frame=held)
+    with pytest.raises(BodyError, match=r"n_shear = 9, but the sections have no rotary inertia"):
+        made(slender(rho_Iy=0.0, rho_Iz=0.0, GAy=1e5, GAz=1e5), frame=held, n_torsion=0)
+    with pytest.raises(BodyError, match="a Tisserand frame needs one"):
+        made(plain, n_torsion=0)
+    body = made(plain, frame=held, n_torsion=0)
+    first = CLAMPED_FREE[0] ** 2 * np.sqrt(30.0 / 2.0) / (2 * np.pi)
+    assert_allclose(body.frequencies[0], first, rtol=1e-6)

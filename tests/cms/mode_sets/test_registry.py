@@ -412,7 +412,7 @@ def test_impossible_numbers_of_modes_are_refused_by_every_set(body, families, ma
     name = inspect.unwrap(make).__name__.replace("macneal", "rubin").replace("dual_craig_bampton", "rubin")
     options = options_of(make, body)
     for n_modes, message in [
-        (10**6, "interior dofs; choose 0 <= n_modes <"),
+        (10**6, "interior dofs"),
         (ModeCount(cutoff=1e-3), r"lies below the first .* mode of body 'bar', at \d"),
     ]:
         with pytest.raises(ModeSetError, match=f"{name}: .*{message}"):

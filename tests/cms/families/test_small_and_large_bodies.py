@@ -1,0 +1,77 @@
+"""Bodies without interior dofs, all the modes there are, and interfaces with very many dofs."""
+
+import logging
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+from numpy.testing import assert_allclose
+
+import cms
+import fe_models as fm
+from cms.errors import ModeSetError
+from cms.families import families
+from cms.families.families import large_interfaces
+from tests.bodies import box_mesh
+from tests.fe_models.small_shells import SI, STEEL
+
+SETS = {
+    "craig_bampton": cms.craig_bampton,
+    "rubin": cms.rubin,
+    "craig_chang": cms.craig_chang,
+    "herting": cms.herting,
+}
+
+
+def beam(n):
+    """A bar of n elements with an interface at both ends."""
+    line = fm.straight_line((0, 0, 0), (1, 0, 0), n)
+    ends = [fm.line_interface(line, name, fm.NodeSet(name)) for name in ("start", "end")]
+    return cms.couple(
+        fm.beam_body(line, fm.BeamProperty(fm.Rectangle(0.03, 0.02), STEEL), name="b", units=SI, interfaces=ends)
+    )
+
+
+def free_frequencies(body):
+    omega2 = la.eigh(body.K.toarray(), body.M.toarray(), eigvals_only=True)[6:]
+    return np.sqrt(omega2) / (2 * np.pi)
+
+
+@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_with_all_its_modes_a_reduced_beam_is_the_beam(n, name):
+    """Of one element there is nothing inside; as many modes as interior dofs leave out nothing."""
+    body = beam(n)
+    reduced = cms.reduce(body, SETS[name](body, n_modes=len(body.i)))
+    assert len(reduced.K) == body.n_dof - 6
+    assert_allclose(np.sort(reduced.free_frequencies), free_frequencies(body), rtol=1e-8)
+
+
+def test_more_modes_than_there_are_are_refused_with_the_number():
+    body = beam(2)
+    with pytest.raises(ModeSetError, match=r"has 6 interior dofs; choose 0 <= n_modes <= 6"):
+        cms.craig_bampton(body, n_modes=7)
+    with pytest.raises(ModeSetError, match=r"has 0 interior dofs; choose 0 <= n_modes <= 0"):
+        cms.craig_bampton(beam(1), n_modes=1)
+
+
+def test_a_cutoff_of_a_body_without_interior_dofs_finds_no_modes():
+    body = beam(1)
+    assert len(cms.reduce(body, cms.craig_bampton(body, cms.ModeCount(cutoff=100.0))).K) == 6
+
+
+def test_an_interface_of_very_many_dofs_announces_its_cost_before_the_work(monkeypatch, caplog):
+    mesh = box_mesh(4, 4, 2)
+    left = fm.nodes_interface(mesh, "left", fm.NodeSet("left"))
+    body = cms.couple(fm.solid_body(mesh, STEEL, name="block", units=SI, interfaces=[left]))
+    assert large_interfaces(body) == []
+    monkeypatch.setattr(families, "MANY", 45)
+    (words,) = large_interfaces(body)
+    assert "interface 'left' of 15 nodes has 45 boundary dofs" in words
+    assert "interface_modes = 20" in words
+    assert f"{8e-9 * body.n_dof * 45:.2g} GB" in words
+    order = []
+    monkeypatch.setattr(families, "fix_interfaces", lambda *_: order.append(len(caplog.records)) or 1 / 0)
+    with caplog.at_level(logging.WARNING), pytest.raises(ZeroDivisionError):
+        cms.craig_bampton(body, n_modes=2)
+    assert order == [1]  # told before the factorisation
