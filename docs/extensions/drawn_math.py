@@ -17,6 +17,7 @@ from sphinx.util.math import get_node_equation_number
 from sphinx.writers.html5 import HTML5Translator
 
 log = logging.getLogger(__name__)
+LOST = (r"\mathrel", r"\mathbin", r"\mathop", r"\tilde{\ }")
 INLINE_SIZE, DISPLAY_SIZE = 17.0, 18.0  #: of the letters [px]
 SYMBOL = re.compile(r'<symbol id="([^"]*)"[^>]*?(?:/>|>.*?</symbol>)', re.DOTALL)
 UNIT = 16.0  #: px of one em of the page
@@ -79,7 +80,10 @@ def svg(tex: str, is_display: bool) -> str:
 
 
 def braced(tex: str) -> str:
-    """Return TeX in the words that the drawing library knows."""
+    """Return TeX in the words that the drawing library knows; refuse those it would leave out without a word."""
+    lost = [word for word in LOST if word in tex]
+    if lost:
+        raise ValueError(f"{lost[0]} is left out by the library that draws; write it otherwise")
     return tex.replace(r"\lVert", r"\|").replace(r"\rVert", r"\|")
 
 
