@@ -25,6 +25,7 @@ from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import new_work
 from floatframe.motion.event_steps import EventWatch
 from floatframe.motion.events import require_times_of_events
+from floatframe.motion.jumps import jumps_of_steps, over_jumps
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.motion.step_advice import step_advice
 from floatframe.motion.validity_watch import ValidityWatch
@@ -289,6 +290,7 @@ class Run:
         if self.events is not None:
             self.events.begin(row)
         closed = time.monotonic()
+        jumps = jumps_of_steps(self.system, self.t_start, self.h, self.n_total)
         failure, has_stopped = None, False
         try:
             while n_done < self.n_total and failure is None and not has_stopped:
@@ -298,20 +300,31 @@ class Run:
                         self.writer.close_segment(self.record(carry, n_done))
                         closed = time.monotonic()
                 n_batch = min(batch_steps, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
-                if self.events is None:
+                n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
+                if self.events is None and n_smooth > 0:
+                    n_batch = min(n_batch, n_smooth)
                     carry, rows, n_good, failure = self.integrator.advance(
                         self.system, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
                         every=self.output_every,
                     )  # fmt: skip
                     self.keep(rows)
                 else:
-                    carry, rows, work, failure = self.events.step(
-                        self.integrator, carry, work, t0=self.t_start, h=self.h, k=n_done
-                    )
+                    if n_smooth == 0:
+                        acting = self.system if self.events is None else self.events.system
+                        carry, rows, work, failure = over_jumps(
+                            self.integrator, acting, carry, work, t=self.t_start + n_done * self.h, h=self.h,
+                            jumps=jumps[n_done], events=self.events,
+                        )  # fmt: skip
+                    else:
+                        assert self.events is not None
+                        carry, rows, work, failure = self.events.step(
+                            self.integrator, carry, work, t0=self.t_start, h=self.h, k=n_done
+                        )
                     n_good = int(failure is None)
-                    has_stopped = self.events.has_stopped
-                    for recorded in self.events.taken():
-                        self.keep(recorded)
+                    if self.events is not None:
+                        has_stopped = self.events.has_stopped
+                        for recorded in self.events.taken():
+                            self.keep(recorded)
                     if failure is None and (has_stopped or (n_done + 1) % self.output_every == 0):
                         self.keep(rows)
                 n_done += n_good

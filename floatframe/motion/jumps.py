@@ -1,0 +1,82 @@
+"""Steps over times at which a force jumps: one that ends there and one that begins there, so that no impulse is lost.
+
+A method of steps takes a force from both ends of a step; a jump between them, or at one of them, would count for too
+much or too little of the step (an error of the impulse of order h). So the step is cut just before the jump, and the
+motion begins anew from the state at it, with the accelerations of the force after it.
+"""
+
+from dataclasses import replace
+from math import ceil
+
+import numpy as np
+
+from floatframe.compiling.file_frames import state_of_file
+from floatframe.compiling.system import compiled_system
+from floatframe.functions.time_functions import TimeFunction
+from floatframe.integrators.carry import Carry, Failure, Integrator
+from floatframe.kernels.memory import Rows
+from floatframe.kernels.work import Work
+from floatframe.motion.event_steps import EventWatch
+from floatframe.system import System
+
+__all__ = ["jumps_of_steps", "over_jumps"]
+
+SHORT = 1e-9  #: of a step: what is left out before a jump, and a rest that is none
+
+
+def jumps_of_steps(system: System, t_start: float, h: float, n_steps: int) -> dict[int, list[float]]:
+    """Return the times of jumps in each step k, from t_start + k h (not there) to t_start + (k + 1) h (there too)."""
+    functions = [getattr(force, name, None) for force in system.forces for name in ("amplitude", "motor")]
+    times = {float(t) for f in functions if isinstance(f, TimeFunction) for t in f.jumps(0)[0]}
+    found: dict[int, list[float]] = {}
+    for t in sorted(times):
+        k = ceil((t - t_start) / h - SHORT) - 1
+        if 0 <= k < n_steps:
+            found.setdefault(k, []).append(t)
+    return found
+
+
+def over_jumps(
+    integrator: Integrator,
+    system: System,
+    carry: Carry,
+    work: Work,
+    *,
+    t: float,
+    h: float,
+    jumps: list[float],
+    events: EventWatch | None = None,
+) -> tuple[Carry, Rows, Work, Failure | None]:
+    """Take a step of size h from t, cut at jumps; return the memory and the results at its end, or at the stop."""
+    where, end, begin = t, t + h, carry
+    rows: Rows | None = None
+    for number, until in enumerate([*jumps, end]):
+        is_last = number == len(jumps)
+        size = until - where - (0.0 if is_last else SHORT * h)
+        if size > SHORT * h:
+            if events is None:
+                carry, rows, _, failure = integrator.advance(
+                    system, carry, work, t0=where, h=size, first=0, n_steps=1, every=1
+                )
+            else:
+                carry, rows, work, failure = events.step(integrator, carry, work, t0=where, h=size, k=0)
+                system = events.system
+            if failure is not None:
+                return begin, rows, work, failure
+            if events is not None and events.has_stopped:
+                return carry, rows, work, None
+        if not is_last:
+            carry, rows = begun_anew(integrator, system, carry, work, until)
+        where = until
+    assert rows is not None
+    return carry, rows._replace(t=np.full_like(rows.t, end)), work, None
+
+
+def begun_anew(integrator: Integrator, system: System, carry: Carry, work: Work, t: float) -> tuple[Carry, Rows]:
+    """Return the memory of a motion that begins at t from the state of another memory, and the results there."""
+    fresh = integrator.start(system, t, state_of_file(compiled_system(system), carry.state))
+    carry = replace(
+        fresh, work=carry.work, n_iterations=carry.n_iterations, n_steps=carry.n_steps, n_rejected=carry.n_rejected,
+        h_next=0.0,
+    )  # fmt: skip
+    return integrator.observe(system, t, carry, work)
