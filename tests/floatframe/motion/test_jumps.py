@@ -9,11 +9,13 @@ from numpy.testing import assert_allclose
 from floatframe import (
     GROUND,
     EnergyMomentum,
+    Event,
     FlexibleBody,
     GeneralizedAlpha,
     Ida,
     JointForce,
     Marker,
+    PlaceSensor,
     PointForce,
     RevoluteJoint,
     RigidBody,
