@@ -70,9 +70,7 @@ def convert_frame(reduced: ReducedBody, frame: Frame, *, damping: Damping | None
     return converted(reduced, frame, damping=damping)[0]
 
 
-def converted(
-    reduced: ReducedBody, frame: Frame, *, damping: Damping | None = None
-) -> tuple[ReducedBody, "Change"]:
+def converted(reduced: ReducedBody, frame: Frame, *, damping: Damping | None = None) -> tuple[ReducedBody, "Change"]:
     """Return what `convert_frame` returns, and the change that led there."""
     if reduced.is_held or isinstance(frame, HeldFrame):
         raise BodyError(

@@ -190,7 +190,9 @@ def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, f
         if not 0 < first < last < math.inf:
             raise ValueError
     except ValueError:
-        raise ModelError(f'--band {shortened(text)}: expected "from:to" in Hz, such as 1:500') from None
+        raise ModelError(
+            f'--band {shortened(text)}: expected "from:to" in Hz, a rising band above 0, such as 1:500'
+        ) from None
     return first, last
 
 

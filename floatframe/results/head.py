@@ -36,7 +36,7 @@ class Head:
     bodies: tuple[BodyEntry, ...]
     joints: tuple[str, ...]
     springs: tuple[str, ...]
-    w0: tuple[int, ...]  #: first column in w of each connection (joints, then springs), and the end
+    w0: tuple[int, ...]  #: first column in w of each connection (joints, springs, couplers, user forces), and the end
     run: Mapping[str, Any]  #: integrator and its parameters, h, t_end, version
     #: of a run that has ended: n_steps, n_rejected, n_iterations (of Newton's method), wall_time [s]
     summary: Mapping[str, Any] = field(default_factory=dict)
@@ -70,8 +70,9 @@ def head_of_text(text: Any) -> Head:
     require(is_list(data["bodies"], dict) and data["bodies"], "bodies", "a list of objects", data["bodies"])
     bodies = entries_of(data["bodies"])
     n_connections, w0 = len(data["joints"]) + len(data["springs"]), data["w0"]
-    require(is_list(w0, int) and len(w0) == n_connections + 1 and w0[0] == 0 and w0 == sorted(w0),
-            "w0", f"{n_connections + 1} whole numbers that ascend from 0", w0)  # fmt: skip
+    # couplers and user forces have columns too, behind those of joints and springs, but no names here
+    require(is_list(w0, int) and len(w0) > n_connections and w0[0] == 0 and w0 == sorted(w0),
+            "w0", f"at least {n_connections + 1} whole numbers that ascend from 0", w0)  # fmt: skip
     summary = data.get("summary", {})
     require(isinstance(summary, dict), "summary", "an object", summary)
     check_run(data["run"])

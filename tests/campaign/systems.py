@@ -175,9 +175,7 @@ class Motion:
         if sorted(self.names) != sorted(self.system["bodies"]):
             return f"bodies {self.names}"
         same = len(expected) == len(self.t) and np.allclose(expected, self.t, rtol=1e-9, atol=1e-12 * run["t_end"])
-        return (
-            "" if same else f"times: {len(self.t)} up to {self.t[-1]}, expected {len(expected)} up to {expected[-1]}"
-        )
+        return "" if same else f"times: {len(self.t)} up to {self.t[-1]}, expected {len(expected)} up to {expected[-1]}"
 
     def wrong_start(self) -> str:
         """Bodies begin where the text places them, unless that leaves a joint open."""
@@ -276,9 +274,7 @@ class Motion:
             act(a, F, A)
             act(b, -F, B)
             k = names.index(name)
-            if np.abs(self.data["w"][:, self.head["w0"][k] :][:, :3] - F).max() > BALANCE * max(
-                np.abs(F).max(), 1e-9
-            ):
+            if np.abs(self.data["w"][:, self.head["w0"][k] :][:, :3] - F).max() > BALANCE * max(np.abs(F).max(), 1e-9):
                 return f"force of {name} is not that of its length"
         for name in self.names:
             reason = self.out_of_balance(name, force[name], moment[name], scale)

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from floatframe.kernels import rotation as kernels
 from floatframe.kernels.compiler.compilation import entry
+from floatframe.kernels.vector import put_matrix, vector
 from floatframe.rotations import (
     euler_parameter_rates,
     euler_parameters,
@@ -70,14 +71,13 @@ def test_rates_of_euler_parameters_are_those_of_the_matrix():
 
 
 def all_functions(theta, v, p, out):
-    kernels.exp_matrix(theta, out[0])
-    kernels.right_jacobian(theta, out[1])
-    kernels.left_jacobian(theta, out[2])
-    kernels.left_jacobian_derivative(theta, v[0], v[1], v[2], 1.0, out[3])
-    kernels.left_jacobian_derivative(theta, v[0], v[1], v[2], -1.0, out[4])
-    turned = np.zeros(4)
-    kernels.rotate_euler_parameters(p, theta, turned)
-    kernels.matrix_of_euler_parameters(turned, out[5])
+    th, u = vector(theta), vector(v)
+    put_matrix(out[0], kernels.exp_matrix(th))
+    put_matrix(out[1], kernels.right_jacobian(th))
+    put_matrix(out[2], kernels.left_jacobian(th))
+    put_matrix(out[3], kernels.left_jacobian_derivative(th, u, 1.0))
+    put_matrix(out[4], kernels.left_jacobian_derivative(th, u, -1.0))
+    put_matrix(out[5], kernels.matrix_of_euler_parameters(kernels.rotate_euler_parameters(p, th)))
 
 
 compiled_functions = entry(all_functions, cache=False)  # inner functions have no machine code of their own

@@ -44,8 +44,8 @@ def test_importing_the_package_does_not_load_numba_or_the_command_line():
 def test_instances_of_one_reduced_body_share_its_data():
     one = compiled(bodies=[ROD]).model
     two = compiled(bodies=[ROD, FlexibleBody("other", REDUCED), BOB]).model
-    assert two.blocks.size == one.blocks.size
-    assert list(two.kind) == [0, 0, 1]
+    assert two.body_types.blocks.size == one.body_types.blocks.size
+    assert list(two.bodies.kind) == [0, 0, 1]
 
 
 @pytest.mark.parametrize(
