@@ -44,7 +44,6 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
     shapes = {name: getattr(placed, name).shape for name in STATE}
     shapes |= {
         "u_dot": placed.u.shape,
-        "a": placed.u.shape,
         "w": (int(model.connections.w0[-1]),),
         "work": (2,),
         "power": (2,),
@@ -53,6 +52,8 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
     for name, shape in shapes.items():
         if name not in record or record[name].shape != shape:
             raise ResultsError("restart: the record is of a system with other bodies; resume the system that was run")
+    if "a" not in record or record["a"].ndim != 1:  # accelerations, or multipliers in the conserving schemes
+        raise ResultsError("restart: the record lacks the memory of the method; run the system again")
     values: dict[str, Any] = {name: np.asarray(record[name], dtype=float) for name in ARRAYS}
     values |= {name: float(record[name]) for name in STEPS} | {name: int(record[name]) for name in COUNTS}
     carry = Carry(State(*(np.asarray(record[name], dtype=float) for name in STATE)), **values)
