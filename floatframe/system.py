@@ -79,6 +79,12 @@ class System:
                     f"those of the system: cms.read(file, units={self.units.name!r})"
                 )
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files it was read from: the system file and the modal files of its bodies."""
+        sources = [body.source for body in self.bodies if isinstance(body, FlexibleBody)]
+        return tuple(source for source in (self.source, *sources) if source)
+
     def body(self, name: str) -> Body:
         """Return the body of that name; `ModelError` with the choices if there is none."""
         for body in self.bodies:

@@ -157,8 +157,12 @@ def print_error(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def output_path(given: Any, default: Any, error: type[Exception], *, overwrite_of: Iterable[Any] = ()) -> Any:
+def output_path(
+    given: Any, default: Any, error: type[Exception], *, overwrite_of: Iterable[Any] = (), needs_file: bool = False
+) -> Any:
     """Return where to write, after checking before any work that this is possible.
+
+    A device or a pipe is written to as it stands; with `needs_file`, of what is written in parts, it is refused.
 
     Raises
     ------
@@ -167,7 +171,13 @@ def output_path(given: Any, default: Any, error: type[Exception], *, overwrite_o
     """
     from pathlib import Path
 
+    from fe_models.foundation.paths import is_stream, same_file
+
     path = Path(default if given is None else given)
+    if is_stream(path):
+        if needs_file:
+            raise error(f"--output {path}: this is a device or a pipe; expected the name of a file")
+        return path
     if path.is_dir():
         raise error(f"--output {path}: this is a folder; expected the name of a file")
     if not path.parent.is_dir():
@@ -175,8 +185,8 @@ def output_path(given: Any, default: Any, error: type[Exception], *, overwrite_o
     if not os.access(path.parent, os.W_OK):
         raise error(f"--output {path}: the folder {path.parent} is not writable")
     for source in overwrite_of:
-        if path.exists() and Path(source).exists() and path.samefile(source):
-            raise error(f"--output {path}: this is the input; choose another name")
+        if same_file(path, Path(source)):
+            raise error(f"--output {path}: this is an input; choose another name")
     return path
 
 

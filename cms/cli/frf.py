@@ -1,6 +1,7 @@
 """The command `cms frf`: frequency response between two interfaces of a modal file, with the full model over it."""
 
 import csv
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from cms.quality.reference.port_model import (
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.paths import replace_file
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["FrfRequest", "parse_band", "parse_component", "run_frf"]
@@ -209,10 +211,11 @@ def write_table(
             values = shown(response, is_inertance)[:, motion, force]
             words = f"{source} {pair_words(motion, force)}"
             columns += [(f"{words} real", values.real), (f"{words} imag", values.imag)]
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream)
-        writer.writerow([name for name, _ in columns])
-        writer.writerows(zip(*(map(repr, map(float, values)) for _, values in columns), strict=True))
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream)
+    writer.writerow([name for name, _ in columns])
+    writer.writerows(zip(*(map(repr, map(float, values)) for _, values in columns), strict=True))
+    replace_file(path, stream.getvalue().encode("utf-8"))
 
 
 def draw(
@@ -235,4 +238,6 @@ def draw(
         is_inertance=request.is_inertance,
         title=f"{reduced.name}: {request.excited} to {request.answering}, {own.damping}",
     )
-    figure.savefig(path, dpi=150)
+    picture = io.BytesIO()
+    figure.savefig(picture, format=path.suffix.lower().removeprefix("."), dpi=150)
+    replace_file(path, picture.getvalue())

@@ -43,6 +43,17 @@ def print_times(clock: "Stages") -> None:
     print_table("Time", ("stage", "s>"), [*rows, ("all", f"{sum(clock.seconds.values()):.2f}")])
 
 
+def inputs_of(path: Path, job: "Job") -> "list[Path]":
+    """Return the job file and all files it names: meshes, tables, matrices, columns, and those of neighbours' jobs."""
+    from cms.jobs.job import read_job
+    from fe_models.foundation.toml_file import files_named
+
+    found = [path]
+    for each in files_named(job):
+        found += inputs_of(each, read_job(each)) if each.suffix == ".toml" and each not in found else [each]
+    return found
+
+
 @guarded
 def reduce_command(
     job: Annotated[Path, typer.Argument(help="Job file (TOML), see docs/job_file.md.")],
@@ -58,6 +69,6 @@ def reduce_command(
     from cms.jobs.job import read_job
 
     read = read_job(job)
-    inputs = (job, *(path for path in (read.body.mesh, read.body.matrices) if path is not None))
+    inputs = inputs_of(job, read)
     path = output_path(output, job.with_suffix(".h5"), JobError, overwrite_of=inputs)
     reduce_and_write(read, path)

@@ -36,7 +36,8 @@ def view_command(
     picture = output
     if output is None and animate is None:
         picture = file.with_name(f"{file.stem}_mode{mode}.png")
-    targets = [output_path(path, "", SceneError, overwrite_of=(file,)) for path in (picture, animate) if path]
+    wanted = [path for path in (picture, animate) if path]
+    targets = [output_path(path, "", SceneError, overwrite_of=(file,), needs_file=True) for path in wanted]
     body = read(file)
     with stages() as clock:
         if picture is not None:

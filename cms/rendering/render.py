@@ -18,6 +18,7 @@ from cms.rendering.errors import RenderError, SceneError
 from cms.rendering.film import FILM_SUFFIXES, PICTURE_SUFFIXES, require_suffix
 from cms.rendering.scene import Scene
 from cms.rendering.scene_file import write_scene
+from fe_models.foundation.paths import is_stream
 
 __all__ = ["Drawing", "render_animation", "render_picture"]
 
@@ -94,6 +95,8 @@ def drawn(
     scene: Scene, target: Path, options: tuple[str, ...], fallback: Callable[[Path], None], tell: OnFrame
 ) -> Drawing:
     """Draw under a temporary name beside the target and move into place, so that no half-written file is seen."""
+    if is_stream(target):
+        raise RenderError(f"{target}: this is a device or a pipe; expected the name of a file")
     try:
         with tempfile.TemporaryDirectory(prefix=".drawing-", dir=target.parent) as folder:
             out = Path(folder) / target.name

@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, shortened
 
-__all__ = ["Matrix3", "Range", "Table", "Vector3", "choice", "read_toml", "validated"]
+__all__ = ["Matrix3", "Range", "Table", "Vector3", "choice", "files_named", "read_toml", "validated"]
 
 
 class Table(BaseModel):
@@ -90,6 +90,17 @@ def validated(
     n = len(problems)
     problems = [*problems[:MOST_PROBLEMS], *([f"... and {n - MOST_PROBLEMS} more"] if n > MOST_PROBLEMS else [])]
     raise error("\n".join([f"{path}: {n} problems:", *(f"  {text}" for text in problems)]))
+
+
+def files_named(value: Any) -> tuple[Path, ...]:
+    """Return all files that a checked model names, at whatever depth."""
+    if isinstance(value, Path):
+        return (value,)
+    if isinstance(value, BaseModel):
+        value = [getattr(value, name) for name in type(value).model_fields]
+    elif isinstance(value, Mapping):
+        value = list(value.values())
+    return tuple(path for each in value for path in files_named(each)) if isinstance(value, list | tuple) else ()
 
 
 def describe(model: type[BaseModel], detail: ErrorDetails) -> str:

@@ -22,7 +22,7 @@ from floatframe.errors import ConvergenceError, ModelError
 from floatframe.joints.rows import is_held_velocity
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import Work, new_work
-from floatframe.motion.integration import files_of, head_of, joint_rows
+from floatframe.motion.integration import head_of, joint_rows
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.writer import ResultsPlace, ResultsWriter
@@ -96,7 +96,7 @@ def kinematics(
     spacing = float(t[-1] - t[0]) / (len(t) - 1)
     head = head_of(system, Kinematics(name), float(t[0]), float(t[-1]), spacing, 1)  # type: ignore[arg-type]
     with ExitStack() as held:  # the place of the results, until the end of the work
-        place = None if output is None else held.enter_context(ResultsPlace(output, inputs=files_of(system)))
+        place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         writer = None if place is None else ResultsWriter(place, head)
         kept: list[Rows] = []
         power, done = np.zeros((2, 2)), np.zeros(2)  # powers at the last two times, work up to now

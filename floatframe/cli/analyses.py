@@ -130,9 +130,9 @@ def eig_command(
         raise ModelError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
     if output is not None and len(animate) != 1:
         raise ModelError(f"--output {output}: expected --animate with the number of one mode, got {len(animate)}")
-    films = {k: output_path(output, system.with_suffix(f".mode{k}.gif"), ModelError, overwrite_of=(system,))
-             for k in animate}  # fmt: skip
     model = read(system)
+    films = {k: output_path(output, system.with_suffix(f".mode{k}.gif"), ModelError,
+                            overwrite_of=(system, *model.files), needs_file=True) for k in animate}  # fmt: skip
     linear = linearized(model, speed, axis, center)
     modes = system_modes(linear)
     per_second = 1 / model.units.time
@@ -189,7 +189,7 @@ def campbell_command(
     from floatframe.errors import ModelError
 
     model = read(system)
-    path = output_path(output, system.with_suffix(".png"), ModelError, overwrite_of=(system,))
+    path = output_path(output, system.with_suffix(".png"), ModelError, overwrite_of=(system, *model.files))
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg", "pdf", "csv"):
         raise ModelError(f"--output {path}: expected a file name that ends in .png, .svg, .pdf or .csv")

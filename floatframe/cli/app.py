@@ -37,7 +37,6 @@ def run_command(
 
     Example: floatframe run swing.toml -o swing.h5
     """
-    from floatframe.bodies.flexible_body import FlexibleBody
     from floatframe.errors import ResultsError
     from floatframe.motion.integration import integrate
     from floatframe.system_file.read_system import read_system
@@ -45,8 +44,8 @@ def run_command(
 
     model, given = read_system(system)
     options = required_run(given, system)
-    sources = [Path(body.source) for body in model.bodies if isinstance(body, FlexibleBody) and body.source]
-    path = output_path(output, system.with_suffix(".h5"), ResultsError, overwrite_of=(system, *sources))
+    inputs = (system, *model.files)
+    path = output_path(output, system.with_suffix(".h5"), ResultsError, overwrite_of=inputs, needs_file=True)
     compute(
         model.name,
         path,
@@ -330,7 +329,7 @@ def plot_command(
     from floatframe.results.trajectory import read_results
 
     trajectory = read_results(file)
-    path = output_path(output, file.with_suffix(".png"), ResultsError, overwrite_of=(file,))
+    path = output_path(output, file.with_suffix(".png"), ResultsError, overwrite_of=(file, *trajectory.files))
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg", "pdf"):
         raise ResultsError(f"--output {path}: expected a file name that ends in .png, .svg or .pdf")
@@ -388,7 +387,9 @@ def animate_command(
     if color not in BODY_COLORS:
         raise ResultsError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
     trajectory = read_results(file)
-    path = output_path(output, file.with_suffix(".gif"), ResultsError, overwrite_of=(file,))
+    path = output_path(
+        output, file.with_suffix(".gif"), ResultsError, overwrite_of=(file, *trajectory.files), needs_file=True
+    )
     bodies: dict[str, ReducedBody | RigidBody] = {**bodies_of(trajectory)}
     system = known_system(trajectory)
     if system is not None:  # boxes of the inertia of rigid bodies, instead of cubes
@@ -422,7 +423,7 @@ def export_command(
     from floatframe.results.trajectory import read_results
 
     trajectory = read_results(file)
-    path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file,))
+    path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file, *trajectory.files))
     bodies = bodies_of(trajectory)
     if path.suffix.lower() == ".csv":
         export_csv(trajectory, path, bodies, known_system(trajectory))

@@ -121,7 +121,7 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
         raise ModelError(f"--elastic {elastic}: expected one of {', '.join(choices)}{nearest(elastic, choices)}")
     model, given = read_system(file)
     run = required_run(given, file)
-    path = output_path(output, file.with_suffix(suffix), ResultsError, overwrite_of=(file,))
+    path = output_path(output, file.with_suffix(suffix), ResultsError, overwrite_of=(file, *model.files))
     with stages(remaining=True) as clock, clock(f"{model.name}: motion of the drives") as advance:
         if elastic == "dynamic":
             motion = integrate(

@@ -59,7 +59,7 @@ def linearize_command(
     from floatframe.errors import ModelError
 
     model = read(system)
-    path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system,))
+    path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system, *model.files))
     kind = path.suffix.lower()
     if kind not in WRITERS:
         raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(WRITERS)}")
@@ -116,7 +116,7 @@ def response_command(
     from floatframe.errors import ModelError
 
     model = read(system)
-    path = output_path(output, system.with_suffix(".response.png"), ModelError, overwrite_of=(system,))
+    path = output_path(output, system.with_suffix(".response.png"), ModelError, overwrite_of=(system, *model.files))
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg", "pdf", "csv"):
         raise ModelError(f"--output {path}: expected a file name that ends in .png, .svg, .pdf or .csv")

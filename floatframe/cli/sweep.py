@@ -48,9 +48,10 @@ def sweep_command(
     from floatframe.studies.study import run_study
     from floatframe.studies.study_file import read_study
     from floatframe.studies.study_plots import plot_study
+    from floatframe.system_file.read_system import read_system
 
     described = read_study(study)
-    inputs = (study, Path(described.system))
+    inputs = (study, Path(described.system), *read_system(described.system)[0].files)
     paths = [output_path(path, None, ModelError, overwrite_of=inputs) for path in outputs]
     if not paths and not json:
         paths = [output_path(None, study.with_suffix(".csv"), ModelError, overwrite_of=inputs)]

@@ -135,7 +135,7 @@ def integrate(
     require_times_of_events(system, t_start)
     begun = system if watch is None else watch.system
     with ExitStack() as held:  # the place of the results, from before the work until its end
-        place = None if output is None else held.enter_context(ResultsPlace(output, inputs=files_of(system)))
+        place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         carry = integrator.start(begun, t_start, state)
         work = new_work(compiled_system(begun).model)
         carry, rows = integrator.observe(begun, t_start, carry, work)
@@ -159,12 +159,6 @@ def number_of_steps(t_start: float, t_end: float, h: float) -> int:
             f"{MOST_STEPS:.0e}; take t_end nearer, or a greater h"
         )
     return max(1, ceil(wanted * (1 - 1e-12) - 1e-9))
-
-
-def files_of(system: System) -> list[str]:
-    """Return the files that a system was read from."""
-    sources = [body.source for body in system.bodies if isinstance(body, FlexibleBody)]
-    return [source for source in (system.source, *sources) if source]
 
 
 def require_sensors(system: System, head: Head, rows: Rows) -> None:
@@ -197,7 +191,7 @@ def resume(
     ConvergenceError
         If a step fails.
     """
-    with ResultsPlace(output, inputs=files_of(system), is_begun=True) as place:
+    with ResultsPlace(output, inputs=system.files, is_begun=True) as place:
         head, record = last_restart(place.folder)
         run = dict(head.run)
         kind = CLASSES.get(str(run.get("integrator")))

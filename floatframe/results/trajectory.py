@@ -111,6 +111,12 @@ class Trajectory:
         """Names of the joints, then of the spring-dampers."""
         return self.head.joints + self.head.springs
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files it was computed from, as far as they are on record: system file, modal files."""
+        sources = (self.head.run.get("system_file", ""), *(body.source for body in self.head.bodies))
+        return tuple(str(source) for source in sources if source)
+
     def entry(self, name: str) -> tuple[int, BodyEntry]:
         """Return number and entry of a body; `ResultsError` with the choices if there is none."""
         for i, body in enumerate(self.head.bodies):

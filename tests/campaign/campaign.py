@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
+from tests.campaign.files import prepared
 from tests.campaign.verdict import ACCEPTED, HANG, REFUSED, TRACEBACK, UNCLEAR, WRONG, Verdict
 
 __all__ = ["FAMILIES", "main"]
@@ -32,7 +33,7 @@ FAMILIES: dict[str, tuple[str, int]] = {  # what it is -> the function of a case
     "kills": ("tests.campaign.kills:kill_case", 100),
 }
 LIMIT = 60.0  #: seconds of a case
-FIRST = 600.0  #: of the first one in a worker, which may compile the kernels
+FIRST = 600.0  #: of the first one in a worker, before which it may compile the kernels
 PROCESSES = 2
 
 
@@ -44,6 +45,7 @@ def case_of(family: str) -> Any:
 
 def serve(pipe: Connection, home: str) -> None:
     """Run the cases that are asked for; the main function of a worker."""
+    prepared(Path(home) / "prepared")  # compiles what is compiled at first use
     number = 0
     while True:
         family, seed = pipe.recv()
