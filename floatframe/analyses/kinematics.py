@@ -19,6 +19,7 @@ from floatframe.analyses.observed_state import observed_state
 from floatframe.compiling.file_frames import rows_of_file
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
+from floatframe.integrators.carry import Carry, turned_on, with_angles
 from floatframe.joints.rows import is_held_velocity
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import Work, new_work
@@ -95,6 +96,9 @@ def kinematics(
     guard = SingularityGuard(compiled, now)
     spacing = float(t[-1] - t[0]) / (len(t) - 1)
     head = head_of(system, Kinematics(name), float(t[0]), float(t[-1]), spacing, 1)  # type: ignore[arg-type]
+    head = replace(head, angles=compiled.angles)
+    carry = Carry(now.state, now.u_dot, now.u_dot, 0.0, now.w, np.zeros(2), np.zeros(2))
+    carry = with_angles(system, float(t[0]), carry)
     with ExitStack() as held:  # the place of the results, until the end of the work
         place = None if output is None else held.enter_context(ResultsPlace(output, inputs=system.files))
         writer = None if place is None else ResultsWriter(place, head)
@@ -106,9 +110,11 @@ def kinematics(
                     now = moved_on(compiled, work, now, float(time), elasticity, guard)
                 rows, power[1] = observed_state(compiled, work, now.state, now.u_dot, now.w, now.t)
                 if k:
+                    carry = turned_on(system, replace(carry, state=now.state), float(time - t[k - 1]))
                     done = done + (time - t[k - 1]) / 2 * (power[0] + power[1])
                 power[0] = power[1]
                 rows.diagnostics[0, 10:12] = done
+                rows.angle[0] = carry.angle
                 rows = rows_of_file(compiled, rows)
                 if writer is None:
                     kept.append(rows)

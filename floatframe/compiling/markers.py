@@ -20,6 +20,7 @@ from floatframe.system import System
 
 __all__ = [
     "MarkerData",
+    "find_body",
     "find_marker",
     "joint_markers",
     "marker_bending",

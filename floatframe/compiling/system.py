@@ -12,6 +12,7 @@ from floatframe.compiling.callbacks import Callback
 from floatframe.compiling.connections import Connections as ConnectionLists
 from floatframe.compiling.connections import add_joint, add_spring
 from floatframe.compiling.coordinate_elements import add_networks
+from floatframe.compiling.counted_angles import CountedAngle, angle_records, counted_angles
 from floatframe.compiling.elimination_order import plan_elimination
 from floatframe.compiling.forces import Functions, body_loads, joint_forces
 from floatframe.compiling.lines import Lines, add_sliding
@@ -26,6 +27,7 @@ from floatframe.compiling.markers import (
 from floatframe.compiling.mass_checks import require_inertia
 from floatframe.compiling.pair_forces import add_pair_laws
 from floatframe.forces import Gravity, PointForce, SpringDamper
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.rows import Row, kind_of
 from floatframe.joints.sliding import SlidingJoint
 from floatframe.kernels.model import Bodies, Connections, JointRows, Loads, Markers, Model, Springs
@@ -56,6 +58,8 @@ class CompiledSystem:
     mean_axes: tuple[MeanAxes | None, ...]  #: of bodies that the engine moves in another frame than their file's
     coordinates: tuple[str, ...]  #: name of the joint coordinate to which each row belongs, "" for none, (n_w,)
     length: float  #: size of the system as placed [m]; scales rotations against translations
+    angles: tuple[CountedAngle, ...]  #: between bodies whose turns are counted
+    angle_motions: tuple[TimeFunction | None, ...]  #: that prescribe them
 
     @property
     def connection_names(self) -> tuple[str, ...]:
@@ -122,6 +126,7 @@ def compile_system(system: System) -> CompiledSystem:
     ends_of = [
         [m for m, data in enumerate(markers) if data.body == i and made.connection_of[m] >= 0] for i in range(len(n_q))
     ]
+    angles = counted_angles(system, placed)
     row_motion = [functions.index(row.motion) for row in rows]
     forces, force0 = joint_forces(system, rows, made.owner, functions)
     model = Model(
@@ -175,6 +180,7 @@ def compile_system(system: System) -> CompiledSystem:
         ),
         body_loads=body_loads(system, functions),
         functions=functions.record(),
+        angles=angle_records([angle for angle, _ in angles]),
         elimination=plan_elimination(made.sizes, ends_of, integers(made.connection_of)),
     )
     length = system_length(markers, placed, n_q, model)
@@ -192,6 +198,8 @@ def compile_system(system: System) -> CompiledSystem:
         mean_axes=axes,
         coordinates=tuple(row.coordinate_name for row in rows),
         length=length,
+        angles=tuple(angle for angle, _ in angles),
+        angle_motions=tuple(motion for _, motion in angles),
     )
 
 

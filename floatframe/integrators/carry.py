@@ -1,6 +1,6 @@
 """What an integrator remembers between steps, and what it reports: one type for all of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -13,7 +13,7 @@ from floatframe.kernels.work import Work, new_work
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["Carry", "Failure", "Integrator", "memory_of", "observed", "one_step_of"]
+__all__ = ["Carry", "Failure", "Integrator", "memory_of", "observed", "one_step_of", "turned_on", "with_angles"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +31,9 @@ class Carry:
     h_next: float = 0.0  #: step size that is wanted next
     n_steps: int = 0  #: accepted so far
     n_rejected: int = 0  #: tried in vain so far
+    #: angles of `CompiledSystem.angles`, counted through full turns, (n_angles,) [rad]; empty: not counted
+    angle: Array = field(default_factory=lambda: np.zeros(0))
+    angle_rate: Array = field(default_factory=lambda: np.zeros(0))  #: their rates [rad/s]
 
 
 @dataclass(frozen=True)
@@ -44,8 +47,11 @@ class Failure:
 class Integrator(Protocol):
     """A method with its parameters: a frozen dataclass of plain numbers, all memory in the carry."""
 
-    def start(self, system: System, t: float, state: State | None = None) -> Carry:
-        """Return the memory at the beginning, from a state made consistent."""
+    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+        """Return the memory at the beginning, from a state made consistent.
+
+        Counted angles, angles of couplers and states of user forces go on from those of a memory `before`.
+        """
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory one step of size h later; `ConvergenceError` if it fails."""
@@ -78,12 +84,38 @@ def one_step_of(method: Integrator, system: System, t: float, h: float, carry: C
 
 def memory_of(carry: Carry) -> Memory:
     """Return a copy of the memory that the kernels may overwrite; its algorithmic accelerations are u_dot."""
-    memory = memory_at(carry.state, carry.u_dot, carry.w)
+    memory = memory_at(carry.state, carry.u_dot, carry.w, n_angles=len(carry.angle))
+    memory.angle[:], memory.angle_rate[:] = carry.angle, carry.angle_rate
     memory.work_given[...], memory.work_taken[...] = carry.work
     memory.power_given[...], memory.power_taken[...] = carry.power
     memory.h[...], memory.h_wanted[...] = carry.h, carry.h_next
     memory.n_accepted[...], memory.n_rejected[...] = carry.n_steps, carry.n_rejected
     return memory
+
+
+def with_angles(system: System, t: float, carry: Carry, before: Carry | None = None) -> Carry:
+    """Return the memory at the start of a motion with its angles counted.
+
+    They go on from those of a memory before, else from the motions that prescribe them, or between -pi and pi.
+    """
+    compiled = compiled_system(system)
+    if before is None:
+        start = np.array([0.0 if motion is None else motion(t) for motion in compiled.angle_motions])
+    else:
+        start = before.angle
+    return turned_on(system, replace(carry, angle=start, angle_rate=np.zeros_like(start)), 0.0)
+
+
+def turned_on(system: System, carry: Carry, h: float) -> Carry:
+    """Return the memory with its angles counted on by a step of size h to its state; none if none are counted."""
+    from floatframe.kernels.entry import count_angles
+
+    if not len(carry.angle):
+        return carry
+    model = compiled_system(system).model
+    memory = memory_of(carry)
+    count_angles(model, new_work(model), memory, h)
+    return replace(carry, angle=memory.angle, angle_rate=memory.angle_rate)
 
 
 def observed(system: System, t: float, carry: Carry, work: Work) -> tuple[Array, Rows]:

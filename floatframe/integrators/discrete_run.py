@@ -11,7 +11,7 @@ from floatframe.discrete.constraints import Span
 from floatframe.discrete.newton import StepError
 from floatframe.discrete.system import DiscreteSystem, discrete_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
+from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.work import Work
 from floatframe.start.initial import consistent_motion, solve_accelerations, with_compatible_velocities
@@ -41,13 +41,14 @@ class DiscreteScheme:
         """Return the bodies, multipliers and work after a step; `StepError` if it fails."""
         raise NotImplementedError
 
-    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning, from a state made consistent; `a` holds the multipliers of the joints."""
         consistent = consistent_motion(system, state, t=t)
         n_held = discrete_system(system, type(self).__name__).n_held
-        return Carry(
+        carry = Carry(
             consistent.state, consistent.u_dot, np.zeros(n_held), 0.0, consistent.w, np.zeros(2), np.zeros(2)
         )  # fmt: skip
+        return with_angles(system, t, carry, before)
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory one step of size h later; `ConvergenceError` if it fails."""
@@ -86,6 +87,7 @@ class DiscreteScheme:
                 n_iterations=carry.n_iterations + result.n_iterations,
                 n_steps=carry.n_steps + 1,
             )
+            carry = turned_on(system, carry, h)
             n_good += 1
             if (k + 1) % every == 0:
                 carry, row = self.observe(system, t_1, carry, work)

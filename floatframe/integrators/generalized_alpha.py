@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, memory_of, observed, one_step_of
+from floatframe.integrators.carry import Carry, Failure, memory_of, observed, one_step_of, with_angles
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import MASS, STIFFNESS, Model
 from floatframe.kernels.work import Work
@@ -98,11 +98,12 @@ class GeneralizedAlpha:
         gamma = 0.5 + alpha_f - alpha_m
         return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
 
-    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning: the state made consistent, its accelerations and their rates."""
-        consistent = consistent_motion(system, state, t=t)
+        consistent = consistent_motion(system, state, t=t, known=None if before is None else before.w)
         rates = acceleration_rates(compiled_system(system), consistent, t)
-        return Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
+        carry = Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
+        return with_angles(system, t, carry, before)
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory one step of size h later.
@@ -164,6 +165,8 @@ class GeneralizedAlpha:
             float(memory.h_wanted),
             int(memory.n_accepted),
             int(memory.n_rejected),
+            memory.angle,
+            memory.angle_rate,
         )
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
         failure = None if outcome.status == 0 else self.explain(system, work, outcome, self.least_step(h))
@@ -205,7 +208,7 @@ class GeneralizedAlpha:
         a = carry.u_dot + (alpha_m - alpha_f) * h * rates
         x = h * carry.state.u + h**2 * (0.5 * a + beta * h * rates)
         after = displaced(compiled.model, carry.state, x)
-        shift = velocity_correction(compiled, carry.state, after, h, beta, t)
+        shift = velocity_correction(compiled, carry.state, after, h, beta, t, known=carry.w)
         return replace(carry, state=replace(carry.state, u=carry.state.u + shift), a=a, h=h, h_next=h)
 
     def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:

@@ -7,7 +7,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import FloatframeError, ModelError
-from floatframe.integrators.carry import Carry, Failure, observed, one_step_of
+from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.work import Work, new_work
@@ -46,7 +46,7 @@ class Ida:
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ModelError(f"Ida: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
 
-    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning, from a state made consistent."""
         solver_class()
         compiled = compiled_system(system)
@@ -54,7 +54,8 @@ class Ida:
             if compiled.model.connections.law[c] in (COUPLER, USER_FORCE):
                 raise ModelError(f"Ida: {name!r} has a memory of its own, which this scheme does not know; use another")
         made = consistent_motion(system, state, t=t)
-        return Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
+        carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
+        return with_angles(system, t, carry, before)
 
     def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
         """Return the memory a time h later; `ConvergenceError` if it fails."""
@@ -89,6 +90,7 @@ class Ida:
             state = with_compatible_velocities(compiled, own, state)
             u_dot, w = solve_accelerations(compiled, own, state)
             carry = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
+            carry = turned_on(system, carry, h)
             power, row = observed(system, float(t[k - first]), carry, work)
             carry = replace(carry, power=power, work=carry.work + 0.5 * h * (carry.power + power))
             row.diagnostics[0, 10:12] = carry.work

@@ -53,7 +53,7 @@ class Variational(DiscreteScheme):
     def __post_init__(self) -> None:
         check_options(self)
 
-    def start(self, system: System, t: float, state: State | None = None) -> Carry:
+    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning, from a state made consistent."""
         for force in system.forces:
             if getattr(force, "friction_coefficient", 0.0) > 0:
@@ -61,7 +61,7 @@ class Variational(DiscreteScheme):
                     f"Variational: force {getattr(force, 'name', '')!r} has friction by the normal force, which this "
                     "scheme does not know; use energy-momentum or generalized-alpha"
                 )
-        return super().start(system, t, state)
+        return super().start(system, t, state, before)
 
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """(1), (2): return the bodies, multipliers and work after a step."""

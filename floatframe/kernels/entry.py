@@ -17,17 +17,26 @@ from floatframe.kernels.compiler.structure import converter, table_of
 from floatframe.kernels.connections.connection import constraint_rates
 from floatframe.kernels.diagnostics import power
 from floatframe.kernels.evaluation import evaluate, linearize
-from floatframe.kernels.generalized_alpha import DONE, SINGULAR_BODY, SINGULAR_CONNECTION, advance, write_row
+from floatframe.kernels.generalized_alpha import (
+    DONE,
+    SINGULAR_BODY,
+    SINGULAR_CONNECTION,
+    advance,
+    load_state,
+    write_row,
+)
 from floatframe.kernels.memory import Memory, Rows, new_rows
 from floatframe.kernels.model import Model
 from floatframe.kernels.records import filled, integer, real, zeros
 from floatframe.kernels.schur import correction, factorize_bodies
+from floatframe.kernels.turns import count_turns
 from floatframe.kernels.work import Work
 
 __all__ = [
     "Order",
     "Outcome",
     "advance_steps",
+    "count_angles",
     "evaluate_and_linearize",
     "newton_correction",
     "no_memory",
@@ -38,13 +47,13 @@ __all__ = [
 
 log = logging.getLogger(__name__)
 
-LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE = range(5)
+LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE, COUNT = range(6)
 
 
 class Order(NamedTuple):
     """What an entry is asked for."""
 
-    what: IntArray = integer()  #: LINEARIZE, RATES, CORRECT, OBSERVE or ADVANCE
+    what: IntArray = integer()  #: LINEARIZE, RATES, CORRECT, OBSERVE, ADVANCE or COUNT
     c_m: Array = real()  #: weights of the parts of mass, damping, stiffness
     c_d: Array = real(unit="s")
     c_k: Array = real(unit="s²")
@@ -89,7 +98,10 @@ def make_entry(digest):
         what = order.what
         if what == ADVANCE:
             return advance(model, work, memory, rows, order)
-        if what == OBSERVE:
+        if what == COUNT:
+            load_state(model, work, memory)
+            count_turns(model, work, memory, order.h)
+        elif what == OBSERVE:
             work.counted.rows = 0
             write_row(model, work, memory, order.t0, rows)
             memory.power_given, memory.power_taken = power(model, work)
@@ -119,7 +131,7 @@ run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 
 SIGNATURE = (types.Array(types.int64, 1, "C"),) * 5
 
-NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w"), 0)
+NO_SIZES = dict.fromkeys(("n_t", "n_b", "n_c", "n_q", "n_u", "n_w", "angles"), 0)
 NOTHING = zeros(Order(), {})
 NO_ROWS = zeros(Rows(), NO_SIZES)
 
@@ -171,6 +183,11 @@ def observe_state(model: Model, work: Work, memory: Memory, t: float) -> Rows:
     rows = new_rows(model, 1)
     call(model, work, memory, rows, what=OBSERVE, t0=t)
     return rows
+
+
+def count_angles(model: Model, work: Work, memory: Memory, h: float) -> None:
+    """Take the angles of the state in the memory into it, a step of size h after those that are there."""
+    call(model, work, memory, NO_ROWS, what=COUNT, h=h)
 
 
 def advance_steps(

@@ -10,9 +10,19 @@ from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
 from floatframe.kernels.schur import correction, factorize_bodies
 from floatframe.kernels.step_start import begin_step
+from floatframe.kernels.turns import count_turns
 from floatframe.kernels.vector import product, put_matrix, vector
 
-__all__ = ["DIVERGED", "DONE", "INACCURATE", "SINGULAR_BODY", "SINGULAR_CONNECTION", "advance", "write_row"]
+__all__ = [
+    "DIVERGED",
+    "DONE",
+    "INACCURATE",
+    "SINGULAR_BODY",
+    "SINGULAR_CONNECTION",
+    "advance",
+    "load_state",
+    "write_row",
+]
 
 DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE = 0, 1, 2, 3, 4
 SLOW = 0.2  # ratio of corrections above which the factors are made anew
@@ -235,6 +245,7 @@ def accept(model, work, memory, h, alpha_m, alpha_f):
     for i in range(model.bodies.kind.shape[0]):
         p = memory.p[i]
         p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, vector(work.state.theta[i]))
+    count_turns(model, work, memory, h)
     loads, dissipated = power(model, work)
     memory.work_given += 0.5 * h * (memory.power_given + loads)
     memory.work_taken += 0.5 * h * (memory.power_taken + dissipated)
@@ -257,6 +268,7 @@ def write_row(model, work, memory, t, rows):
     copy(memory.u, rows.u[k])
     copy(memory.u_dot, rows.u_dot[k])
     copy(memory.w, rows.w[k])
+    copy(memory.angle, rows.angle[k])
     diagnose(model, work, rows.diagnostics[k], rows.drift[k])
     rows.diagnostics[k, 10] = memory.work_given
     rows.diagnostics[k, 11] = memory.work_taken

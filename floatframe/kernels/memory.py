@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels.model import Model, n_b, n_c, n_w
+from floatframe.kernels.model import Model, n_angles, n_b, n_c, n_w
 from floatframe.kernels.records import Size, integer, real, zeros
 from floatframe.kernels.work import n_q, n_u, state_sizes
 from floatframe.state import State
@@ -34,6 +34,8 @@ class Memory(NamedTuple):
     h_wanted: Array = real(unit="s")  #: of the next step
     n_accepted: IntArray = integer()  #: steps
     n_rejected: IntArray = integer()
+    angle: Array = real(n_angles, unit="rad")  #: counted through full turns
+    angle_rate: Array = real(n_angles, unit="rad/s")
 
 
 class Rows(NamedTuple):
@@ -48,11 +50,15 @@ class Rows(NamedTuple):
     w: Array = real(n_t, n_w, unit="N, N m")
     diagnostics: Array = real(n_t, N_DIAGNOSTICS, unit="J, kg m/s, kg m²/s, J")
     drift: Array = real(n_t, n_c, N_DRIFTS, unit="m, rad, m/s, rad/s")
+    angle: Array = real(n_t, n_angles, unit="rad")
 
 
-def memory_at(state: State, u_dot: Array, w: Array) -> Memory:
-    """Return the memory at a state, a copy, with algorithmic accelerations equal to u_dot, before any step."""
-    sizes = {"n_b": len(state.r), "n_q": len(state.q), "n_u": len(state.u), "n_w": len(w)}
+def memory_at(state: State, u_dot: Array, w: Array, *, n_angles: int = 0) -> Memory:
+    """Return the memory at a state, a copy, with algorithmic accelerations equal to u_dot, before any step.
+
+    n_angles: how many angles are counted, all of the model or none.
+    """
+    sizes = {"n_b": len(state.r), "n_q": len(state.q), "n_u": len(state.u), "n_w": len(w), "angles": n_angles}
     memory = zeros(Memory(), sizes)
     for name in ("r", "p", "q", "u"):
         getattr(memory, name)[:] = getattr(state, name)
@@ -64,4 +70,5 @@ def memory_at(state: State, u_dot: Array, w: Array) -> Memory:
 
 def new_rows(model: Model, n_t: int) -> Rows:
     """Return room for the results of n_t output times."""
-    return zeros(Rows(), state_sizes(model) | {"n_c": len(model.connections.size), "n_t": n_t})
+    sizes = {"n_c": len(model.connections.size), "n_t": n_t, "angles": len(model.angles.sign)}
+    return zeros(Rows(), state_sizes(model) | sizes)

@@ -29,6 +29,7 @@ __all__ = [
     "STIFFNESS",
     "S_AB",
     "USER_FORCE",
+    "Angles",
     "Bodies",
     "BodyLoads",
     "BodyTypes",
@@ -61,6 +62,7 @@ n_functions, n_pieces, n_springs, n_bushings = (Size(name) for name in ("functio
 n_contacts, n_forces, n_networks, n_ports = (Size(name) for name in ("contacts", "joint forces", "networks", "ports"))
 n_lines, n_stations, n_users, n_states = (Size(name) for name in ("lines", "stations", "user forces", "states"))
 n_tapes, n_operations, n_loads, n_body_loads = (Size(name) for name in ("tapes", "operations", "loads", "body loads"))
+n_angles = Size("angles")
 
 
 class Bodies(NamedTuple):
@@ -293,6 +295,17 @@ class Elimination(NamedTuple):
     update: IntArray = integer(Size("updates"))  #: where block (i, k) begins, over pairs of neighbours
 
 
+class Angles(NamedTuple):
+    """Angles between bodies whose turns are counted, see kernels/turns.py; directions in the frames of their bodies."""
+
+    holder: IntArray = integer(n_angles)  #: body with the axis, -1 for the ground
+    other: IntArray = integer(n_angles)  #: body that turns about it, -1 for the ground
+    x: Array = real(n_angles, 3)  #: direction of the holder, normal to its axis x × z
+    z: Array = real(n_angles, 3)  #: direction of the holder, from which y turns towards -x
+    y: Array = real(n_angles, 3)  #: direction of the other body
+    sign: Array = real(n_angles)  #: -1 where the angle is counted the other way
+
+
 class Model(NamedTuple):
     """A compiled system."""
 
@@ -316,4 +329,5 @@ class Model(NamedTuple):
     tapes: Tapes = Tapes()
     loads: Loads = Loads()
     body_loads: BodyLoads = BodyLoads()
+    angles: Angles = Angles()
     elimination: Elimination = Elimination()

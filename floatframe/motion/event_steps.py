@@ -78,10 +78,9 @@ class EventWatch:
         return np.array(columns).T
 
     def values_after(self, row: Rows) -> Array:
-        """Return what is watched at a later time; angles go on from those of the last time."""
+        """Return what is watched at a later time."""
         assert self.row is not None
-        first, last = self.measured(self.row, row)
-        return np.asarray(last + (self.values - first))
+        return np.asarray(self.measured(self.row, row)[1])
 
     def step(
         self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, k: int
@@ -137,7 +136,8 @@ class EventWatch:
                 self.has_stopped = True
                 return carry, row, work, None
             self.switch((self.off | set(event.switch_off)) - set(event.switch_on))
-            fresh = integrator.start(self.system, t, state_of_file(compiled_system(self.full), carry.state))
+            told = state_of_file(compiled_system(self.full), carry.state)
+            fresh = integrator.start(self.system, t, told, before=carry)
             stored, work_done = float(row.diagnostics[-1, SPRINGS]), carry.work
             carry = replace(
                 fresh, work=work_done, n_iterations=carry.n_iterations, n_steps=carry.n_steps,

@@ -131,6 +131,7 @@ def integrate(
     if advice is not None and advice.n_followed == 0:
         log.warning("system %r: %s", system.name, advice.words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
+    head = replace(head, angles=compiled_system(system).angles)
     watch = EventWatch(system, head) if system.events else None
     require_times_of_events(system, t_start)
     begun = system if watch is None else watch.system
@@ -164,7 +165,8 @@ def number_of_steps(t_start: float, t_end: float, h: float) -> int:
 def require_sensors(system: System, head: Head, rows: Rows) -> None:
     """Raise `ModelError` or `ResultsError` before the run if a sensor of the system cannot measure its start."""
     if system.sensors:
-        measured(system, Trajectory(head, MemorySource(joint_rows(system, [rows])), is_complete=False))
+        told = rows_of_file(compiled_system(system), rows)
+        measured(system, Trajectory(head, MemorySource(joint_rows(system, [told])), is_complete=False))
 
 
 def resume(

@@ -23,7 +23,7 @@ __all__ = ["RESTART_STEPS", "carry_of_record", "restart_record", "system_digest"
 
 RESTART_STEPS = 200
 STATE = ("r", "p", "q", "u")
-ARRAYS = ("u_dot", "a", "w", "work", "power")
+ARRAYS = ("u_dot", "a", "w", "work", "power", "angle", "angle_rate")
 STEPS = ("h", "h_next")
 COUNTS = ("n_iterations", "n_steps", "n_rejected")
 
@@ -47,10 +47,12 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
         "w": (int(model.connections.w0[-1]),),
         "work": (2,),
         "power": (2,),
+        "angle": model.angles.sign.shape,
+        "angle_rate": model.angles.sign.shape,
     }
     shapes |= dict.fromkeys((*STEPS, *COUNTS, "n_done"), ())
     for name, shape in shapes.items():
-        if name not in record or record[name].shape != shape:
+        if name not in record or record[name].shape != shape or np.ndim(record.get("a", 0.0)) != 1:
             raise ResultsError("restart: the record is of a system with other bodies; resume the system that was run")
     if "a" not in record or record["a"].ndim != 1:  # accelerations, or multipliers in the conserving schemes
         raise ResultsError("restart: the record lacks the memory of the method; run the system again")

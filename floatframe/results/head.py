@@ -8,6 +8,7 @@ from typing import Any
 
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import quoted
+from floatframe.compiling.counted_angles import CountedAngle, direction
 
 __all__ = ["BodyEntry", "Head", "head_of_text", "text_of_head"]
 
@@ -40,6 +41,7 @@ class Head:
     run: Mapping[str, Any]  #: integrator and its parameters, h, t_end, version
     #: of a run that has ended: n_steps, n_rejected, n_iterations (of Newton's method), wall_time [s]
     summary: Mapping[str, Any] = field(default_factory=dict)
+    angles: tuple[CountedAngle, ...] | None = None  #: of the columns of `angle`; None: not counted
 
 
 def text_of_head(head: Head) -> str:
@@ -60,7 +62,7 @@ def head_of_text(text: Any) -> Head:
     except (TypeError, ValueError, RecursionError):
         raise ValueError("head: expected JSON text") from None
     known = [part.name for part in fields(Head)]
-    require(isinstance(data, dict) and set(data) <= set(known) and set(known) - set(data) <= {"summary"},
+    require(isinstance(data, dict) and set(data) <= set(known) and set(known) - set(data) <= {"summary", "angles"},
             "head", f"an object with {', '.join(known)}", data)  # fmt: skip
     for name in ("system", "units"):
         require(isinstance(data[name], str), name, "text", data[name])
@@ -77,8 +79,29 @@ def head_of_text(text: Any) -> Head:
     require(isinstance(summary, dict), "summary", "an object", summary)
     check_run(data["run"])
     check_summary(summary)
+    angles = None if data.get("angles") is None else angles_of(data["angles"], len(bodies))
     return Head(data["system"], data["units"], bodies, tuple(data["joints"]), tuple(data["springs"]), tuple(w0),
-                data["run"], summary)  # fmt: skip
+                data["run"], summary, angles)  # fmt: skip
+
+
+def angles_of(tables: Any, n_bodies: int) -> tuple[CountedAngle, ...]:
+    """Return the angles whose turns were counted."""
+    require(is_list(tables, dict), "angles", "a list of objects", tables)
+    keys = [part.name for part in fields(CountedAngle)]
+    angles = []
+    for k, table in enumerate(tables):
+        where = f"angles[{k}]"
+        require(set(table) == set(keys), where, f"an object with {', '.join(keys)}", table)
+        for name in ("holder", "other"):
+            is_body = type(table[name]) is int and -1 <= table[name] < n_bodies
+            require(is_body, f"{where}.{name}", f"a whole number from -1 to {n_bodies - 1}", table[name])
+        for name in ("x", "z", "y"):
+            is_direction = isinstance(table[name], list) and len(table[name]) == 3 and all(map(is_number, table[name]))
+            require(is_direction, f"{where}.{name}", "three numbers", table[name])
+        require(table["sign"] in (-1.0, 1.0), f"{where}.sign", "1 or -1", table["sign"])
+        x, z, y = (direction(table[name]) for name in ("x", "z", "y"))
+        angles.append(CountedAngle(table["holder"], table["other"], x, z, y, float(table["sign"])))
+    return tuple(angles)
 
 
 def entries_of(tables: list[dict[str, Any]]) -> tuple[BodyEntry, ...]:

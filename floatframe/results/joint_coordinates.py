@@ -7,12 +7,14 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.compiling.counted_angles import angle_of
 from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.joints import Joint
 from floatframe.joints.rows import MOMENT, RelativePlace
 from floatframe.joints.sliding import SlidingJoint
+from floatframe.results.full_turns import through_turns
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
 from floatframe.results.sliding_place import sliding_place
 from floatframe.results.trajectory import Trajectory
@@ -27,7 +29,7 @@ class CoordinateMotion:
     """A coordinate of a joint over time."""
 
     t: Array  #: (n_t,) [s]
-    value: Array  #: distance, or angle without jumps, (n_t,) [m, rad]
+    value: Array  #: distance, or angle with all its turns, (n_t,) [m, rad]
     rate: Array  #: (n_t,) [m/s, rad/s]
     force: Array  #: force or torque that acts to increase it: of the drive, or of joint forces, (n_t,) [N, N m]
     is_angle: bool = False  #: an angle [rad], else a distance [m]
@@ -71,7 +73,9 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     slip = b.velocity - a.velocity - cross(a.omega, place.d)
     rate = dot(own.direction(place), own.moves(slip, b.omega - a.omega))
     w = trajectory.source.read("w")[:, trajectory.head.w0[names.index(joint)] :]
-    value = np.unwrap(own.value(place)) if own.is_angle else own.value(place)
+    value = own.value(place)
+    if own.is_angle:
+        value = through_turns(trajectory, f"coordinate {joint}.{coordinate}", angle_of(own, *ends), value, rate)
     return CoordinateMotion(a.t, value, rate, own.force(place, w), own.is_angle)
 
 

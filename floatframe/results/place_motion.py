@@ -20,16 +20,19 @@ from floatframe.bodies.marker_shape import (
 )
 from floatframe.bodies.mean_axes import FrameMotion, mean_axes
 from floatframe.errors import ResultsError
+from floatframe.results.full_turns import followed_angle
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.trajectory import BodyMotion, Trajectory
-from floatframe.rotations import rotation_matrix
+from floatframe.rotations import cross, dot, rotation_matrix
 
 __all__ = [
     "PlaceMotion",
+    "angle_and_rate",
     "interface_motion",
     "largest_von_mises",
     "nodal_stress",
     "node_motion",
+    "normals_of_axis",
     "point_motion",
     "rotation_angle",
     "shape_motion",
@@ -130,20 +133,36 @@ def place_of(motion: BodyMotion, own: MotionInBody) -> PlaceMotion:
 def rotation_angle(a: PlaceMotion, b: PlaceMotion, axis: Array | tuple[float, float, float]) -> Array:
     """Return the angle by which place b has turned against place a about an axis in a, (n_t,) [rad].
 
-    Zero is where the axes of both agree; the angle is followed through full turns from one time to the next.
+    Zero is where the axes of both agree; from one time to the next the angle goes on to where its rate leads.
+
+    Raises
+    ------
+    ResultsError
+        If the axis has no direction, or the times are too far apart to follow the angle.
     """
+    return followed_angle("rotation_angle", a.t, *angle_and_rate(a, b, *normals_of_axis(axis)))
+
+
+def normals_of_axis(axis: Array | tuple[float, float, float]) -> tuple[Array, Array]:
+    """Return two directions x, y normal to an axis, which is along x × y."""
     e = np.asarray(axis, dtype=float)
     size = np.linalg.norm(e)
     if size == 0:
         raise ResultsError("rotation_angle: axis: expected a direction, got the zero vector")
     e = e / size
-    relative = np.einsum("tba,tbc->tac", a.axes, b.axes)  # R_AB
     helper = np.eye(3)[int(np.argmin(np.abs(e)))]
     x = np.cross(e, helper)
     x /= np.linalg.norm(x)
-    y = np.cross(e, x)
-    turned = relative @ x
-    return np.asarray(np.unwrap(np.arctan2(turned @ y, turned @ x)))
+    return x, np.cross(e, x)
+
+
+def angle_and_rate(a: PlaceMotion, b: PlaceMotion, x: Array, y: Array) -> tuple[Array, Array]:
+    """Return the angle of the direction x of b from x of a towards y, between -pi and pi, and its rate, (n_t,) each."""
+    X, Y, D = a.axes @ x, a.axes @ y, b.axes @ x
+    D_dot = cross(b.omega - a.omega, D)
+    C, S = dot(X, D), dot(Y, D)
+    rate = (C * dot(Y, D_dot) - S * dot(X, D_dot)) / np.maximum(C**2 + S**2, np.finfo(float).tiny)
+    return np.arctan2(S, C), rate
 
 
 def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time: int) -> Array:

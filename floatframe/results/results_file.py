@@ -57,6 +57,7 @@ DATASETS = {  # name in the file -> field of Rows, what it is
         "about the ground origin (3), work of point forces, energy taken by damping",
     ),
     "drift": ("drift", "of each joint: distance, angle, their rates, (n_t, n_joints, 4)"),
+    "angle": ("angle", "between the frames of bodies, counted through full turns, (n_t, n_angles)"),
 }
 
 
@@ -103,7 +104,7 @@ def row_shapes(head: Head) -> dict[str, tuple[int, ...]]:
     """Return the shape of one row of each dataset."""
     n_b = len(head.bodies)
     n_q = sum(body.n_q for body in head.bodies)
-    return {
+    shapes: dict[str, tuple[int, ...]] = {
         "t": (),
         "position": (n_b, 3),
         "euler_parameters": (n_b, 4),
@@ -114,6 +115,7 @@ def row_shapes(head: Head) -> dict[str, tuple[int, ...]]:
         "diagnostics": (12,),
         "drift": (len(head.joints), N_DRIFTS),
     }
+    return shapes if head.angles is None else shapes | {"angle": (len(head.angles),)}
 
 
 def segments_folder(path: str | os.PathLike[str]) -> Path:

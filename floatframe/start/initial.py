@@ -79,29 +79,36 @@ class ConsistentState:
     w: Array  #: wrenches of the connections on their markers A, ground axes, (n_w,)
 
 
-def consistent_state(system: System, state: State | None = None, *, t: float = 0.0) -> ConsistentState:
+def consistent_state(
+    system: System, state: State | None = None, *, t: float = 0.0, known: Array | None = None
+) -> ConsistentState:
     """Return a consistent state near a given one, or near the bodies as placed, for prescribed motions at time t.
+
+    known: wrenches and other unknowns from a motion before, (n_w,), whose turned angles of couplers and states of user
+    forces go on.
 
     Raises
     ------
     ModelError
         If the joints cannot be closed from these positions, or some constraints repeat others.
     """
-    made = consistent_motion(system, state, t=t)
+    made = consistent_motion(system, state, t=t, known=known)
     return ConsistentState(*motion_of_file(compiled_system(system), made.state, made.u_dot), made.w)
 
 
-def consistent_motion(system: System, state: State | None = None, *, t: float = 0.0) -> ConsistentState:
+def consistent_motion(
+    system: System, state: State | None = None, *, t: float = 0.0, known: Array | None = None
+) -> ConsistentState:
     """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files."""
     compiled = compiled_system(system)
     given = compiled.placed if state is None else checked(compiled, state)
-    work = new_work(compiled.model)
+    work = work_from(compiled.model, known)
     work.state.time[...] = t
-    state = assembled(compiled, work, given)
+    state = assembled(compiled, work, given, known)
     require_placed_near(compiled, given, state)
     require_independent_constraints(compiled, work, state)
-    state = with_compatible_velocities(compiled, work, state)
-    return ConsistentState(state, *solve_accelerations(compiled, work, state))
+    state = with_compatible_velocities(compiled, work, state, known)
+    return ConsistentState(state, *solve_accelerations(compiled, work, state, known))
 
 
 def checked(compiled: CompiledSystem, state: State) -> State:
@@ -115,7 +122,7 @@ def checked(compiled: CompiledSystem, state: State) -> State:
     return state_of_engine(compiled, State(state.r, p, state.q, state.u))
 
 
-def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
+def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:
     """(1): return the state with all joints closed."""
     model = compiled.model
     holds = is_held_position(model.rows.kind)
@@ -123,7 +130,7 @@ def assembled(compiled: CompiledSystem, work: Work, state: State) -> State:
         return state
     scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)
     for _ in range(MOST_ITERATIONS):
-        set_iterate(work, state, w=start_unknowns(model))
+        set_iterate(work, state, w=start_unknowns(model, known))
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         raise_errors_of(compiled.callbacks)
         error = np.where(holds, work.connections.g, 0.0)
@@ -209,14 +216,16 @@ def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_r
     return int((np.linalg.eigvalsh(rows @ rows.T) < REDUNDANT).sum()) < n_redundant
 
 
-def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: State) -> State:
+def with_compatible_velocities(
+    compiled: CompiledSystem, work: Work, state: State, known: Array | None = None
+) -> State:
     """(2): return the state with velocities that keep the joints closed."""
     from floatframe.kernels.entry import rates_of_constraints
 
     model = compiled.model
     if len(work.state.w) == 0:
         return state
-    set_iterate(work, state, w=start_unknowns(model))
+    set_iterate(work, state, w=start_unknowns(model, known))
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     rate, _ = rates_of_constraints(model, work)
     if not np.any(rate):
@@ -225,12 +234,14 @@ def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: Stat
     return State(state.r, state.p, state.q, state.u + in_ground_axes(model, state, y))
 
 
-def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> tuple[Array, Array]:
+def solve_accelerations(
+    compiled: CompiledSystem, work: Work, state: State, known: Array | None = None
+) -> tuple[Array, Array]:
     """(3): return u_dot, (n_u,), and w, (n_w,), at a state."""
     from floatframe.kernels.entry import rates_of_constraints
 
     model = compiled.model
-    w = start_unknowns(model)
+    w = start_unknowns(model, known)
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, state, w=w)
         parts = linearized(model, work, 1.0, 0.0, 0.0)
@@ -247,10 +258,24 @@ def solve_accelerations(compiled: CompiledSystem, work: Work, state: State) -> t
     return in_ground_axes(model, state, y), w
 
 
-def start_unknowns(model: Model) -> Array:
-    """Return the unknowns of connections before anything is known: the states of user forces at their start, (n_w,)."""
+def work_from(model: Model, known: Array | None) -> Work:
+    """Return working arrays in which the states of user forces are held at what is known of them, or their start."""
+    work = new_work(model)
+    work.states.base[:] = start_unknowns(model, known)[model.states.row]
+    return work
+
+
+def start_unknowns(model: Model, known: Array | None = None) -> Array:
+    """Return the unknowns of connections before anything is known, (n_w,): states of user forces at their start.
+
+    With unknowns that are known from before: these states, and the coordinates of couplers and user forces, whose
+    angles are those next to them.
+    """
     w = np.zeros(int(model.connections.w0[-1]))
     w[model.states.row] = model.states.start
+    if known is not None:
+        w[model.states.row] = known[model.states.row]
+        w[model.ports.row] = known[model.ports.row]
     return w
 
 
@@ -266,7 +291,7 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
     difference is central, but forward in time where motions are prescribed, since they may begin at t.
     """
     model, state, u_dot = compiled.model, consistent.state, consistent.u_dot
-    work = new_work(model)
+    work = work_from(model, consistent.w)
     turning = max((float(np.linalg.norm(state.u[k + 3 : k + 6])) for k in model.bodies.u0[:-1]), default=0.0)
     falling = max(float(np.linalg.norm(u_dot[k : k + 3])) / compiled.length for k in model.bodies.u0[:-1])
     swinging = max(float(np.linalg.norm(u_dot[k + 3 : k + 6])) for k in model.bodies.u0[:-1])
@@ -278,7 +303,8 @@ def acceleration_rates(compiled: CompiledSystem, consistent: ConsistentState, t:
     def u_dot_after(step: float) -> Array:
         moved = displaced(model, state, step * state.u + 0.5 * step**2 * u_dot)
         work.state.time[...] = t + step
-        return solve_accelerations(compiled, work, State(moved.r, moved.p, moved.q, state.u + step * u_dot))[0]
+        after = State(moved.r, moved.p, moved.q, state.u + step * u_dot)
+        return solve_accelerations(compiled, work, after, consistent.w)[0]
 
     if len(model.functions.begin):
         return (-3 * u_dot_after(0.0) + 4 * u_dot_after(s) - u_dot_after(2 * s)) / (2 * s)
@@ -295,29 +321,37 @@ def fastest_motion(model: Model) -> float:
 
 
 def velocity_correction(
-    compiled: CompiledSystem, state: State, after: State, h: float, beta: float, t: float = 0.0
+    compiled: CompiledSystem,
+    state: State,
+    after: State,
+    h: float,
+    beta: float,
+    t: float = 0.0,
+    known: Array | None = None,
 ) -> Array:
     """Return the change of u, (n_u,), with which a step of size h from `state` at t closes the joints open in `after`.
 
     G du = -g(after)/h, with the weights of one step, M + beta h² K.
     """
     model = compiled.model
-    work = new_work(model)
+    work = work_from(model, known)
     holds = is_held_position(model.rows.kind)
     if not holds.any():
         return np.zeros(len(work.state.u))
-    w = start_unknowns(model)
+    w = start_unknowns(model, known)
     if len(model.ports.row):  # angles of couplers and user forces are those next to where their rates lead
         work.state.time[...] = t
         set_iterate(work, state, w=w)
         linearized(model, work, 1.0, 0.0, 0.0)
-        w[model.ports.row] = -work.connections.g[model.ports.row] - h * work.connections.g[model.ports.row + 1]
+        g = work.connections.g
+        w[model.ports.row] -= g[model.ports.row]
+        w[model.ports.row] += h * (w[model.ports.row + 1] - g[model.ports.row + 1])
     work.state.time[...] = t + h
     set_iterate(work, after, w=w)
     linearized(model, work, 1.0, 0.0, 0.0)
     gap = np.where(holds, work.connections.g, 0.0)
     work.state.time[...] = t
-    set_iterate(work, state, w=start_unknowns(model))
+    set_iterate(work, state, w=start_unknowns(model, known))
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     H = []
     for i, block in enumerate(parts.H):

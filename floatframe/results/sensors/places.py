@@ -12,12 +12,16 @@ from scipy.spatial.transform import Rotation
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.marker_shape import MarkerShape
 from floatframe.bodies.markers import Marker, body_name
 from floatframe.checked_values import unit_vector
-from floatframe.compiling.markers import find_marker
+from floatframe.compiling.counted_angles import CountedAngle, angle_of
+from floatframe.compiling.markers import MarkerData, find_body, find_marker
 from floatframe.errors import ModelError
+from floatframe.joints.rows import TWIST, RowCoordinate
+from floatframe.results.full_turns import through_turns
 from floatframe.results.joint_coordinates import end_motion
-from floatframe.results.place_motion import PlaceMotion, node_motion, rotation_angle
+from floatframe.results.place_motion import PlaceMotion, angle_and_rate, node_motion, normals_of_axis
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
 from floatframe.results.trajectory import Trajectory
 from floatframe.system import System
@@ -43,11 +47,28 @@ def place_motion(system: System, trajectory: Trajectory, where: str, marker: Mar
     ModelError
         If the marker names what does not exist.
     """
+    if is_at_node(system, marker):
+        assert marker.position is not None  # so it is
+        body = system.body(body_name(marker.body))
+        assert isinstance(body, FlexibleBody)
+        return node_motion(trajectory, body.name, body.reduced, nearest_node(body, marker.position))
+    return end_motion(system, trajectory, find_marker(system, where, marker))
+
+
+def is_at_node(system: System, marker: Marker) -> bool:
+    """Whether a marker stands for a kept node of a flexible body, with the axes of its frame."""
     name = body_name(marker.body)
     body = next((each for each in system.bodies if each.name == name), None)
-    if isinstance(body, FlexibleBody) and marker.position is not None:
-        return node_motion(trajectory, name, body.reduced, nearest_node(body, marker.position))
-    return end_motion(system, trajectory, find_marker(system, where, marker))
+    return isinstance(body, FlexibleBody) and marker.position is not None
+
+
+def frame_marker(system: System, where: str, marker: Marker) -> MarkerData:
+    """Return a marker with the axes of the file's frame of a flexible body, undeformed, as the engine has the body."""
+    name = body_name(marker.body)
+    body = system.body(name)
+    assert isinstance(body, FlexibleBody)
+    axes = body.moved.frame.axes.T @ body.reduced.frame.axes
+    return MarkerData(find_body(system, where, name), MarkerShape(np.zeros(3), axes))
 
 
 def nearest_node(body: FlexibleBody, position: Array) -> int:
@@ -149,7 +170,11 @@ def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class AngleSensor:
-    """The angle by which marker B has turned against marker A about an axis of A, without jumps."""
+    """The angle by which marker B has turned against marker A about an axis of A, with all its turns.
+
+    A run counts the turns of the sensors that its system has, step by step; a sensor made later goes by the rates at
+    the outputs, and refuses where these are too far apart.
+    """
 
     name: str
     marker_a: Marker
@@ -165,8 +190,21 @@ class AngleSensor:
             place_motion(system, trajectory, f"sensor {self.name!r}: {key}", marker)
             for key, marker in (("marker_a", self.marker_a), ("marker_b", self.marker_b))
         )
-        angle = rotation_angle(a, b, self.axis)
+        value, rate = angle_and_rate(a, b, *normals_of_axis(self.axis))
+        angle = through_turns(trajectory, f"sensor {self.name!r}", self.counted_angle(system), value, rate)
         return Measurement(self.name, trajectory.t, {"angle": angle}, {"angle": "rad"})
+
+    def counted_angle(self, system: System) -> CountedAngle:
+        """Return the angle as a run counts its turns: that of the bodies, undeformed."""
+        ends = [
+            frame_marker(system, where, marker) if is_at_node(system, marker) else find_marker(system, where, marker)
+            for marker, where in (
+                (self.marker_a, f"sensor {self.name!r}: marker_a"),
+                (self.marker_b, f"sensor {self.name!r}: marker_b"),
+            )
+        ]
+        x, y = normals_of_axis(self.axis)
+        return angle_of(RowCoordinate("angle", TWIST, x=-y, z=x, y=x), *ends)
 
 
 @frozen_copies

@@ -1,0 +1,91 @@
+"""Angles whose turns a run counts: those of the joints, and those that sensors of the system ask for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
+from floatframe.functions.time_functions import TimeFunction
+from floatframe.joints.rows import TURN, TURN_B, TWIST_B, RowCoordinate
+from floatframe.joints.sliding import SlidingJoint
+from floatframe.kernels.model import Angles
+from floatframe.kernels.records import filled
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["AngleOfSensor", "CountedAngle", "angle_of", "angle_records", "counted_angles", "direction"]
+
+Direction = tuple[float, float, float]
+SAME = 1e-9  #: difference of directions that are one
+
+
+@dataclass(frozen=True)
+class CountedAngle:
+    """An angle between two bodies, by directions in their frames; see kernels/turns.py."""
+
+    holder: int  #: body with the axis x × z, -1 for the ground
+    other: int
+    x: Direction
+    z: Direction
+    y: Direction  #: of the other body, turns from z towards -x
+    sign: float = 1.0
+
+    def is_same(self, angle: "CountedAngle") -> bool:
+        """Whether another one measures the same."""
+        own, others = ((a.holder, a.other, a.sign) for a in (self, angle))
+        return own == others and bool(
+            np.allclose([self.x, self.y, self.z], [angle.x, angle.y, angle.z], rtol=0.0, atol=SAME)
+        )
+
+
+@runtime_checkable
+class AngleOfSensor(Protocol):
+    """A sensor that measures an angle through full turns."""
+
+    def counted_angle(self, system: System) -> CountedAngle:
+        """Return the angle; `ModelError` if a marker names what does not exist."""
+
+
+def angle_of(coordinate: RowCoordinate, a: MarkerData, b: MarkerData) -> CountedAngle:
+    """Return the angle of a coordinate between two markers."""
+    holder, other = (b, a) if coordinate.kind == TWIST_B else (a, b)
+    x, z = (holder.shape.triad @ each for each in (coordinate.x, coordinate.z))
+    y = other.shape.triad @ coordinate.y
+    sign = -1.0 if coordinate.kind == TWIST_B else 1.0
+    return CountedAngle(holder.body, other.body, direction(x), direction(z), direction(y), sign)
+
+
+def direction(x: Sequence[float] | Array) -> Direction:
+    """Return three numbers."""
+    return float(x[0]), float(x[1]), float(x[2])
+
+
+def counted_angles(system: System, placed: State) -> list[tuple[CountedAngle, TimeFunction | None]]:
+    """Return the angles of a system, each once, with the motion that prescribes it or None."""
+    found: list[tuple[CountedAngle, TimeFunction | None]] = []
+
+    def add(angle: CountedAngle, motion: TimeFunction | None) -> None:
+        if not any(angle.is_same(known) for known, _ in found):
+            found.append((angle, motion))
+
+    for joint in system.joints:
+        if isinstance(joint, SlidingJoint) or not joint.coordinates:
+            continue
+        a, b = joint_markers(system, joint, placed)
+        (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q_of(system)) for end in (a, b))
+        for row in joint.rows(A_a, A_b, r_b - r_a):
+            if row.coordinate is not None and row.coordinate.is_angle:
+                add(angle_of(row.coordinate, a, b), row.motion if row.kind in (TURN, TURN_B) else None)
+    for sensor in system.sensors:
+        if isinstance(sensor, AngleOfSensor):
+            add(sensor.counted_angle(system), None)
+    return found
+
+
+def angle_records(angles: list[CountedAngle]) -> Angles:
+    """Return the angles as the kernels see them."""
+    parts = ("holder", "other", "x", "z", "y", "sign")
+    return filled(Angles(), **{name: [getattr(angle, name) for angle in angles] for name in parts})
