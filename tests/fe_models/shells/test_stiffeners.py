@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import cms
 import fe_models as fm
+from cms.quality.body_check import check_body
 from fe_models.shells.section_rotations import own_axes
 from tests.fe_models.small_shells import SI, STEEL, of_nodes, solved
 
@@ -181,3 +183,31 @@ def test_sections_turn_with_the_node_at_interfaces_masses_and_where_a_line_leave
         line_sets={"rib": np.arange(len(ends) + 1)},
     )
     assert fm.shell_body(beyond, fm.ShellProperty(T, STEEL), **made).n_dof == n + 6 + 6
+
+
+def held_at_its_edge(body, nodes):
+    """The body with a rigid interface, coupled and reduced with geometric stiffness."""
+    root = fm.Interface("root", "rigid", nodes, np.array([0.0, B / 2, 0.0]))
+    coupled = cms.couple(replace(body, interfaces=(root,)))
+    return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=8), frame=cms.NodalFrame("root"), geometric=True)
+
+
+@pytest.mark.parametrize("kind", ["quad", "triangle"])
+def test_a_spinning_ribbed_plate_stiffens_as_with_a_strip_in_place_of_the_rib(kind):
+    """The frequencies at rest, the stiffness of spins about all axes, and a file that passes its checks."""
+    strip = with_strips(*ribbed_plate("quad", 8), (0.0, 0.0, HEIGHT), WIDTH)
+    at_root = np.flatnonzero(strip.nodes[: strip.element_model.n_nodes, 0] < 1e-9)
+    exact = held_at_its_edge(strip, at_root)
+    mesh, (line,) = ribbed_plate(kind, 8)
+    ends = np.stack([line[:-1], line[1:]], axis=1)
+    mesh = replace(mesh, lines=ends, line_sets={"rib": np.arange(len(ends))})
+    root = fm.shell_interface(mesh, "root", fm.NodeSet("u0"), reference=(0.0, B / 2, 0.0))
+    made = {"name": "plate", "units": SI, "stiffeners": {"rib": rib()}, "interfaces": [root]}
+    body = fm.shell_body(mesh, fm.ShellProperty(T, STEEL), **made)
+    coupled = cms.couple(body)
+    found = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=8), frame=cms.NodalFrame("root"), geometric=True)
+    lowest = [np.argsort(np.diag(reduced.K))[:4] for reduced in (found, exact)]
+    assert_allclose(found.frequencies[lowest[0]], exact.frequencies[lowest[1]], rtol=0.01)
+    spins = [reduced.geometric.spin[:3, rows, rows] for reduced, rows in zip((found, exact), lowest, strict=True)]
+    assert_allclose(spins[0], spins[1], rtol=0.02)
+    assert not [record.name for record in check_body(found) if record.verdict == "fail"]
