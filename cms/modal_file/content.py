@@ -167,7 +167,12 @@ class Contents:
 
     def numbered(self, group: str) -> tuple[str, ...]:
         """Return the paths of the groups that a group counts; none if it is not there."""
-        count = self.attribute(group, "count", int) if group in self.content.attributes else 0
+        if group not in self.content.attributes:
+            return ()
+        count = self.attribute(group, "count", int)
+        held = sum(path.startswith(f"{group}/") for path in self.content.attributes)
+        if count != held:  # before as many paths are made
+            raise ModalFileError(f"attribute 'count' of {group}: expected {held}, as many as it holds, got {count:g}")
         return tuple(f"{group}/{k}" for k in range(count))
 
     def has(self, group: str, name: str | None = None) -> bool:

@@ -471,3 +471,19 @@ def test_moments_hold_what_the_point_masses_say(body):
     """The synthetic body itself: M* = 1 and m = sum of masses, so that a round trip of it means something."""
     moments: Moments = body.moments
     np.testing.assert_allclose(moments.M, np.eye(5), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [-1, 1, 3, 10**9, 2**62])
+def test_a_count_that_is_not_that_of_the_groups_is_refused_before_any_work(body, tmp_path, count):
+    content = modal_content.content_of(body, modal_file.VERSION)
+    attributes = {**content.attributes, "/interfaces": {"count": count}}
+    with pytest.raises(ModalFileError, match="attribute 'count' of /interfaces: expected 2, as many as it holds"):
+        written_with(replace(content, attributes=attributes), tmp_path / "a.h5")
+
+
+def test_a_mass_of_several_numbers_is_refused(body, tmp_path):
+    content = modal_content.content_of(body, modal_file.VERSION)
+    for name in ("/moments/m", "/nodal_sums/w"):
+        several = {**content.datasets, name: sealed_hdf5.Dataset(np.ones(2))}
+        with pytest.raises(ModalFileError, match=rf"dataset {name}: expected shape \(\)"):
+            written_with(replace(content, datasets=several), tmp_path / "a.h5")
