@@ -9,7 +9,7 @@ derivative (t: rows of rho, r: rows of th), E = exp(th), T' = left Jacobian at t
     wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_t(q)ᵀ f + (T' Psi_r(q))ᵀ m
 """
 
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import inner, small
 from floatframe.kernels.dense import add_products
 from floatframe.kernels.rotation import exp_matrix, left_jacobian, left_jacobian_derivative
 from floatframe.kernels.vector import (
@@ -50,7 +50,7 @@ def marker_motion(model, work, m):
     pose_on_body(model, work, m)
 
 
-@inner
+@small
 def body_omega(model, work, i):
     """Return the angular velocity of body i, body axes."""
     return vector(work.state.u[model.bodies.u0[i] + 3 :])
@@ -155,13 +155,13 @@ def marker_acceleration_bias(model, work, m, out):
         put(out, 3, turned(R, add(cross(omega, nu), own)))
 
 
-@inner
+@small
 def shape(psi, n, k):
     """Return displacement and rotation by coordinate k of shapes [6, n]."""
     return (psi[k], psi[n + k], psi[2 * n + k]), (psi[3 * n + k], psi[4 * n + k], psi[5 * n + k])
 
 
-@inner
+@small
 def wrench_in_body(work, m, i):
     """Return force and moment on marker m in axes of its body i."""
     R, wrench = work.state.R[i], work.markers.wrench[m]
@@ -237,13 +237,13 @@ def marker_columns(model, work, m, rate, turning, column, row):
                 row[9 + a, 6 + k] -= turn[a]
 
 
-@inner
+@small
 def put_column(matrix, first, k, x):
     """Write a vector into column k of a matrix, from row `first` on."""
     matrix[first, k], matrix[first + 1, k], matrix[first + 2, k] = x[0], x[1], x[2]
 
 
-@inner
+@small
 def take_column(matrix, first, k, x):
     """Subtract a vector from column k of a matrix, from row `first` on."""
     matrix[first, k] -= x[0]

@@ -5,7 +5,7 @@ Where a matrix is only read, an array (3, 3) will do.
 
 import math
 
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import small
 
 __all__ = [
     "add",
@@ -27,73 +27,73 @@ __all__ = [
 ]
 
 
-@inner
+@small
 def vector(x):
     """Return the first three numbers of an array as a vector."""
     return x[0], x[1], x[2]
 
 
-@inner
+@small
 def unit(k):
     """Return the unit vector along axis k."""
     return 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
 
 
-@inner
+@small
 def dot(a, b):
     """Return a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inner
+@small
 def norm(a):
     """Return |a|."""
     return math.sqrt(dot(a, a))
 
 
-@inner
+@small
 def cross(a, b):
     """Return a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@inner
+@small
 def add(a, b):
     """Return a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@inner
+@small
 def sub(a, b):
     """Return a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@inner
+@small
 def scaled(f, a):
     """Return f a."""
     return f * a[0], f * a[1], f * a[2]
 
 
-@inner
+@small
 def matrix(A):
     """Return an array (3, 3) as three rows."""
     return vector(A[0]), vector(A[1]), vector(A[2])
 
 
-@inner
+@small
 def transposed(A):
     """Return Aᵀ."""
     return (A[0][0], A[1][0], A[2][0]), (A[0][1], A[1][1], A[2][1]), (A[0][2], A[1][2], A[2][2])
 
 
-@inner
+@small
 def turned(A, x):
     """Return A x."""
     return dot(A[0], x), dot(A[1], x), dot(A[2], x)
 
 
-@inner
+@small
 def turned_back(A, x):
     """Return Aᵀ x."""
     return (
@@ -103,19 +103,19 @@ def turned_back(A, x):
     )
 
 
-@inner
+@small
 def product(A, B):
     """Return A B."""
     return turned_back(B, A[0]), turned_back(B, A[1]), turned_back(B, A[2])
 
 
-@inner
+@small
 def put(row, first, x):
     """Write a vector into an array."""
     row[first], row[first + 1], row[first + 2] = x[0], x[1], x[2]
 
 
-@inner
+@small
 def put_sum(row, first, x):
     """Add a vector to numbers of an array."""
     row[first] += x[0]
@@ -123,7 +123,7 @@ def put_sum(row, first, x):
     row[first + 2] += x[2]
 
 
-@inner
+@small
 def put_matrix(out, A):
     """Write a matrix into an array (3, 3)."""
     put(out[0], 0, A[0])

@@ -1,7 +1,8 @@
 """How kernels are compiled: the decorators of their functions, and the type of their arrays.
 
 `inner` is for functions that only compiled code calls, `loops` for those of them whose loops run over modes or
-matrices, `matrix_loops` for long ones of these with many callers, `view` for one that returns a part of an array,
+matrices, `matrix_loops` for long ones of these with many callers, `small` for what is written into its
+callers: a few operations, or a part of one function; `view` for one that returns a part of an array,
 `entry` for what Python calls. The lean compiler makes them with a numba that it knows, plain numba with any other, see
 kernels/compiler/choice.py.
 """
@@ -9,8 +10,17 @@ kernels/compiler/choice.py.
 from floatframe.kernels.compiler.choice import is_lean
 
 if is_lean:
-    from floatframe.kernels.compiler.lean import array_type, array_value, entry, inner, loops, matrix_loops, view
+    from floatframe.kernels.compiler.lean import array_type, array_value, entry, inner, loops, matrix_loops, small, view
 else:
-    from floatframe.kernels.compiler.plain import array_type, array_value, entry, inner, loops, matrix_loops, view
+    from floatframe.kernels.compiler.plain import (
+        array_type,
+        array_value,
+        entry,
+        inner,
+        loops,
+        matrix_loops,
+        small,
+        view,
+    )
 
-__all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "view"]
+__all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "small", "view"]

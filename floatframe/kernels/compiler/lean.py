@@ -27,7 +27,7 @@ from floatframe.kernels.compiler.block import Block, make_block
 from floatframe.kernels.compiler.lowering import KernelContext
 from floatframe.kernels.compiler.passes import ENTRY, INNER, pipeline
 
-__all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "view"]
+__all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "small", "view"]
 
 
 class WithoutEngine:
@@ -156,6 +156,12 @@ class LoopCompiler(InnerCompiler):
     attributes = ()
 
 
+class SmallCompiler(InnerCompiler):
+    """The same for a function of a few operations, or with one caller: it is written into its callers."""
+
+    attributes = ("alwaysinline",)
+
+
 class MatrixLoopCompiler(InnerCompiler):
     """The same for such a function that is not written into its callers: it is long, and they are many."""
 
@@ -178,6 +184,7 @@ def decorator(pipeline_class, **options):
 
 
 inner = decorator(InnerCompiler)  #: for functions that only compiled code calls
+small = decorator(SmallCompiler)  #: the same for a few operations
 loops = decorator(LoopCompiler)  #: the same where loops run over modes or matrices (5)
 matrix_loops = decorator(MatrixLoopCompiler)  #: the same for long functions with many callers
 view = decorator(LoopCompiler, _nrt=True)  #: the same for a function that returns a part of an array

@@ -7,12 +7,12 @@ from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
 
-__all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "view"]
+__all__ = ["array_type", "array_value", "entry", "inner", "loops", "matrix_loops", "small", "view"]
 
 WORD = ir.IntType(64)
 BYTES = 8  # of a number
 
-inner = loops = matrix_loops = view = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+inner = small = loops = matrix_loops = view = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def entry(function, *, cache=True):

@@ -7,7 +7,7 @@ of positions, so that redundant ones share their load.
 """
 
 from floatframe.joints.rows.kinds import NOTHING, VELOCITY
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import inner, small
 from floatframe.kernels.connections.coupler import coupler_derivatives, coupler_rates, coupler_rows
 from floatframe.kernels.connections.pair_force import pair_derivatives, pair_rows
 from floatframe.kernels.connections.spring_damper import spring_derivatives, spring_rows
@@ -54,7 +54,7 @@ def connection_rows(model, work, c, c_k):
             joint_row(model, work, k, a, b, w, c_k)
 
 
-@inner
+@small
 def joint_row(model, work, k, a, b, w, c_k):
     """Write the residual of row k of a joint."""
     if model.rows.holds[k] == NOTHING:
@@ -95,7 +95,7 @@ def connection_derivatives(model, work, c, c_k):
             joint_row_derivatives(model, work, w0 + r, r, a, b, w, c_k, P_a, P_b, V)
 
 
-@inner
+@small
 def joint_row_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """Write row r of P and V of row k of a joint.
 

@@ -19,7 +19,7 @@ E as A sees it, omega_A = o, omega_B = p:
 
 import math
 
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import inner, small
 from floatframe.kernels.joints.relative_motion import (
     angle_between,
     axis_between,
@@ -63,7 +63,7 @@ def along_rates(work, a, b, E):
     return dot(turned_twice(omega, E), d) + 2 * dot(cross(omega, E), v)
 
 
-@inner
+@small
 def product(E, D):
     """Return E · D with its derivatives, E fixed in A and D in B."""
     m = cross(E, D)
@@ -78,7 +78,7 @@ def product_rates(o, p, E, E_1, E_2, D):
     return dot(E_1, D), dot(E_ddot, D) + 2 * dot(E_dot, D_dot) + dot(E, cross(p, D_dot))
 
 
-@inner
+@small
 def point_value(model, work, k, a, b):
     """POINT: -x · d, x in ground axes."""
     x = vector(model.rows.x[k])
@@ -92,7 +92,7 @@ def point_rates(model, work, k, a, b):
     return 0.0, 0.0
 
 
-@inner
+@small
 def angle_value(model, work, k, a, b):
     """DOT: E · D - c."""
     g, n, m_a, m_b = product(direction(work, a, model.rows.x[k]), direction(work, b, model.rows.y[k]))
@@ -116,7 +116,7 @@ def turning_direction(model, work, k, a, sense):
     return E, scaled(sense * rate, N), sub(scaled(sense * second, N), scaled(rate * rate, E))
 
 
-@inner
+@small
 def turn_value(model, work, k, a, b):
     """TURN: (E cos f + Z sin f) · D."""
     E, _, _ = turning_direction(model, work, k, a, 1.0)
@@ -147,7 +147,7 @@ def turn_b_rates(model, work, k, a, b):
     return product_rates(vector(work.markers.omega[b]), vector(work.markers.omega[a]), E, E_1, E_2, D)
 
 
-@inner
+@small
 def slide_value(model, work, k, a, b):
     """SLIDE: E · d - f."""
     f, _, _ = prescribed(model, work, k)

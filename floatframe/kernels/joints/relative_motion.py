@@ -3,7 +3,7 @@
 import math
 
 from floatframe.joints.rows.kinds import PUSH, TWIST_B
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import inner, small
 from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
 
@@ -30,19 +30,19 @@ def prescribed(model, work, k):
     return time_function(model, model.rows.motion[k], work.state.time)
 
 
-@inner
+@small
 def direction(work, m, x):
     """Return the direction x of marker m in ground axes."""
     return turned(work.markers.A[m], vector(x))
 
 
-@inner
+@small
 def distance(work, a, b):
     """Return d = r_B - r_A."""
     return sub(vector(work.markers.r[b]), vector(work.markers.r[a]))
 
 
-@inner
+@small
 def relative_velocity(work, a, b):
     """Return v_B - v_A."""
     return sub(vector(work.markers.v[b]), vector(work.markers.v[a]))
@@ -67,7 +67,7 @@ def angle_between(model, work, k, a, b):
     return math.atan2(S, C), t
 
 
-@inner
+@small
 def axis_between(model, work, k, a):
     """Return the axis x × z of row k in A, ground axes."""
     return turned(work.markers.A[a], cross(vector(model.rows.x[k]), vector(model.rows.z[k])))
@@ -107,7 +107,7 @@ def loaded_coordinate(model, work, k, a, b):
     return dot(e, d), dot(e, slip(work, a, b, d))
 
 
-@inner
+@small
 def put_pair(P_a, P_b, r, column, x):
     """Write x into a row of P at A, and its opposite at B."""
     put(P_a[r], column, x)

@@ -6,7 +6,7 @@ before. A direction that turns with a marker changes by dphi × E, so that d(E �
 """
 
 from floatframe.joints.rows.kinds import FORCE, MOMENT, MOMENT_B
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import inner, small
 from floatframe.kernels.joints.relative_motion import direction, distance, put_pair
 from floatframe.kernels.vector import add, cross, dot, put, scaled, sub, vector
 
@@ -24,13 +24,13 @@ __all__ = [
 ]
 
 
-@inner
+@small
 def gauge_value(model, work, k, a, b, w):
     """GAUGE: E · part."""
     return dot(direction(work, a, model.rows.x[k]), vector(w[model.rows.part[k] :]))
 
 
-@inner
+@small
 def gauge_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """GAUGE."""
     part, E = model.rows.part[k], direction(work, a, model.rows.x[k])
@@ -69,7 +69,7 @@ def thread_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     put(V[r], FORCE, scaled(c, E))
 
 
-@inner
+@small
 def arm_value(model, work, k, a, b, w):
     """ARM: x · (M - N - d × F), x in ground axes; N is missing where nothing acts on B but the force."""
     M = sub(vector(w[MOMENT:]), cross(distance(work, a, b), vector(w)))
@@ -78,7 +78,7 @@ def arm_value(model, work, k, a, b, w):
     return dot(vector(model.rows.x[k]), M)
 
 
-@inner
+@small
 def arm_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """ARM: (x × d) · F = d · (F × x)."""
     x, d = vector(model.rows.x[k]), distance(work, a, b)

@@ -12,7 +12,7 @@ from numba.np.arrayobj import make_array
 
 from floatframe.compiling.system import compiled_system
 from floatframe.kernels.compiler.choice import is_lean
-from floatframe.kernels.compiler.compilation import array_type, array_value, entry, inner, loops, matrix_loops
+from floatframe.kernels.compiler.compilation import array_type, array_value, entry, inner, loops, matrix_loops, small
 from floatframe.kernels.compiler.structure import Structure, n_words, table_of
 from floatframe.kernels.entry import no_memory, prepare, run
 from floatframe.kernels.memory import Memory, Rows, new_rows
@@ -114,7 +114,7 @@ def test_an_error_in_a_kernel_names_the_line():
         broken(np.zeros(1))
 
 
-@pytest.mark.parametrize("decorator", [inner, loops, matrix_loops])
+@pytest.mark.parametrize("decorator", [inner, small, loops, matrix_loops])
 def test_kernels_calculate_as_python_does(decorator):
     """Loops, branches, parts, tuples, changes of variables: all that lowering and passes of kernels touch."""
 
