@@ -1,5 +1,6 @@
 """Stress at named points of a reduced body, and what it is compared by."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,9 @@ import numpy as np
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
 
-__all__ = ["PointStress", "von_mises"]
+__all__ = ["PointStress", "stress_of", "von_mises", "von_mises_of"]
+
+AT_ONCE = 2_000_000  #: numbers of stress held at a time
 
 
 @frozen_copies
@@ -40,3 +43,23 @@ def von_mises(stress: Array) -> Array:
     xx, yy, zz, yz, xz, xy = np.moveaxis(np.asarray(stress), 1, 0)
     normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
     return np.asarray(np.sqrt(normal / 2 + 3 * (yz**2 + xz**2 + xy**2)))
+
+
+def stress_of(modes: Array, q: Array) -> Array:
+    """Return the stress of modal coordinates: (n, 6) for q (n_q,), (n, 6, k) for q (k, n_q) [Pa].
+
+    Parameters
+    ----------
+    modes
+        Stress xx yy zz yz xz xy for each mode, (n, 6, n_q) [Pa per unit of q].
+    q
+        All modal coordinates, static ones too.
+    """
+    return np.asarray(modes @ np.asarray(q).T)
+
+
+def von_mises_of(modes: Array, q: Array) -> Iterator[Array]:
+    """Yield the von Mises stress of many modal coordinates q (k, n_q), a block of rows at a time: (rows, n) [Pa]."""
+    rows = max(1, AT_ONCE // max(1, modes[..., 0].size))
+    for first in range(0, len(q), rows):
+        yield von_mises(stress_of(modes, q[first : first + rows])).T

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
-from cms.reduced_body.stress import von_mises
+from cms.reduced_body.stress import von_mises_of
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.units import Units
 from floatframe.results.place_motion import stress_modes
 
 __all__ = ["BODY_COLORS", "DISPLACEMENT", "VON_MISES", "BodyColor", "length_unit", "stress_unit"]
-
-FRAMES_AT_ONCE = 16  #: of which the stress is known at all nodes at a time
 
 
 @dataclass(frozen=True)
@@ -34,11 +32,7 @@ def displacements(body: ReducedBody, q: Array) -> Array:
 def stresses(body: ReducedBody, q: Array) -> Array:
     """Return von Mises' stress, all modes included, (n, n_kept) [Pa]; `ResultsError` without stress modes."""
     modes = stress_modes(body.name, body)
-    found = np.empty((len(q), len(modes)))
-    for k in range(0, len(q), FRAMES_AT_ONCE):
-        part = np.tensordot(modes, q[k : k + FRAMES_AT_ONCE].T, axes=1)  # (n_kept, 6, n)
-        found[k : k + FRAMES_AT_ONCE] = von_mises(part).T
-    return found
+    return np.concatenate([np.zeros((0, len(modes))), *von_mises_of(modes, q)])
 
 
 def length_unit(units: Units, largest: float) -> tuple[str, float]:

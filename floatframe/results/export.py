@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
-from cms.reduced_body.stress import von_mises
+from cms.reduced_body.stress import stress_of, von_mises
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import replace_file
 from floatframe.errors import ResultsError
@@ -140,7 +140,7 @@ def export_vtk(
             points.append(motion.r[i] + (body.nodes + elastic) @ R.T)
             displacement.append(elastic @ R.T)
             if has_stress and body.stress is not None:
-                stress.append(von_mises(body.stress @ motion.q[i]))
+                stress.append(von_mises(stress_of(body.stress, motion.q[i])))
         data = {"elastic displacement": np.concatenate(displacement)}
         if has_stress:
             data["von Mises stress"] = np.concatenate(stress)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
-from cms.reduced_body.stress import von_mises
+from cms.reduced_body.stress import stress_of, von_mises_of
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.marker_shape import (
     BodyFrameMotion,
@@ -177,19 +177,17 @@ def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time
         If the modal file holds no stress modes, or the reduced body is another one.
     """
     require_same_modes(trajectory, body, reduced)
-    return np.asarray(stress_modes(body, reduced) @ trajectory.body(body).q[i_time])
+    return np.asarray(stress_of(stress_modes(body, reduced), trajectory.body(body).q[i_time]))
 
 
 def largest_von_mises(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[Array, IntArray]:
     """Return the largest von Mises stress of the kept nodes over time, (n_t,) [Pa], and where it is, (n_t,) index."""
     require_same_modes(trajectory, body, reduced)
-    modes, q = stress_modes(body, reduced), trajectory.body(body).q
-    largest, where = np.zeros(len(q)), np.zeros(len(q), np.int64)
-    for k, row in enumerate(q):
-        stress = von_mises(modes @ row)
-        where[k] = int(np.argmax(stress))
-        largest[k] = stress[where[k]]
-    return largest, where
+    largest, where = [np.zeros(0)], [np.zeros(0, np.int64)]
+    for stress in von_mises_of(stress_modes(body, reduced), trajectory.body(body).q):
+        where.append(stress.argmax(axis=1))
+        largest.append(stress.max(axis=1))
+    return np.concatenate(largest), np.concatenate(where)
 
 
 def stress_modes(body: str, reduced: ReducedBody) -> Array:

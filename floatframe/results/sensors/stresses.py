@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
-from cms.reduced_body.stress import von_mises
+from cms.reduced_body.stress import stress_of, von_mises
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.copies import frozen_copies
@@ -67,7 +67,8 @@ class StressSensor:
         """Return the components and von Mises' stress over time."""
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
-        stress = trajectory.body(self.body).q @ modes_at(body, self.name, self.position, self.point).T
+        modes = modes_at(body, self.name, self.position, self.point)[None]
+        stress = stress_of(modes, trajectory.body(self.body).q)[0].T
         columns = {component: stress[:, k] for k, component in enumerate(STRESS_COMPONENTS)}
         columns["von Mises"] = von_mises(stress)
         return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, system.units.stress_symbol))
