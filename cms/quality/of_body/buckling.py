@@ -79,6 +79,8 @@ def check_buckling(reduced: ReducedBody) -> QualityRecord:
         return information("buckling", "the body has no modes")
     if reduced.geometric is None:
         return information("buckling", "the file has no geometric stiffness; loads do not stiffen or buckle the body")
+    if not (np.diag(reduced.K) > 0).all():
+        return information("buckling", "not every mode has a stiffness above zero; see the record on definiteness")
     loads = critical_loads(reduced)
     rows = [[load.load, load.along, load.against, load.unit] for load in loads]
     value = max((1 / unit_factor(load, reduced.units) for load in loads), default=0.0)
