@@ -19,10 +19,11 @@ from fe_models.foundation.arrays import require_shape
 from fe_models.foundation.sealed_hdf5 import Attribute, Content, Dataset
 from fe_models.foundation.units import UNIT_SYSTEMS, Units
 
-__all__ = ["FORMAT", "Contents", "body_of", "content_of", "require_same_invariants"]
+__all__ = ["FORMAT", "Contents", "body_of", "content_of", "require_same_frequencies", "require_same_invariants"]
 
 FORMAT = "modal-file"
 SI = UNIT_SYSTEMS["m-kg-s"]
+FREQUENCY_DEFECT = 1e-9  #: largest relative difference of a stored frequency from that of K and M
 INVARIANT_DEFECT = 1e-12  #: largest difference of a stored 1C-5C from that of the moments, over the largest entry
 UNIT_LOADS = ("translation", "rotation", "spin")  #: of the geometric stiffness, beside those of the interfaces
 INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
@@ -288,7 +289,17 @@ def require_same_invariants(content: Content, moments: Moments) -> None:
         stored = Contents(content).array(f"/invariants/{name}")
         expected = getattr(moments, name)
         scale = np.abs(expected).max(initial=0.0)
-        if stored.shape != expected.shape or np.abs(stored - expected).max(initial=0.0) > INVARIANT_DEFECT * scale:
+        if stored.shape != expected.shape or not np.abs(stored - expected).max(initial=0.0) <= INVARIANT_DEFECT * scale:
             raise ModalFileError(
                 f"dataset /invariants/{name} does not follow from the moments; the file was written by a faulty writer"
             )
+
+
+def require_same_frequencies(content: Content, body: ReducedBody) -> None:
+    """Raise unless the stored frequencies, written for other readers, are those of modal mass and stiffness."""
+    stored, own = Contents(content).array("/modes/frequencies"), body.frequencies
+    if stored.shape != own.shape or not np.allclose(stored, own, rtol=FREQUENCY_DEFECT, atol=0.0):
+        raise ModalFileError(
+            "dataset /modes/frequencies does not follow from /modes/K and /modes/M; the file was written by a faulty "
+            "writer"
+        )

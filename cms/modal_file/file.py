@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from cms.errors import CmsError, ModalFileError
-from cms.modal_file.content import FORMAT, body_of, content_of, require_same_invariants
+from cms.modal_file.content import FORMAT, body_of, content_of, require_same_frequencies, require_same_invariants
 from cms.modal_file.entries import in_units
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.seal import Kind
@@ -52,6 +52,7 @@ def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> R
     try:
         body = body_of(content)
         require_same_invariants(content, body.moments)
+        require_same_frequencies(content, body)
     except CmsError as error:
         raise ModalFileError(f"{Path(path)}: {error}") from error
     return body if wanted is None else convert_units(body, wanted)

@@ -9,10 +9,15 @@ from cms.quality.of_body.identities import (
     check_inertia_tensor,
     check_modal_mass,
 )
-from cms.quality.of_body.interface_motions import check_interface_motions, check_rigid_interfaces
+from cms.quality.of_body.interface_motions import (
+    check_interface_motions,
+    check_interface_places,
+    check_rigid_interfaces,
+)
 from cms.quality.of_body.mesh_order import check_mesh_order
 from cms.quality.of_body.step_size import check_damping, check_dropped_columns, check_step_size
 from cms.quality.of_body.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
+from cms.quality.of_body.unit_hints import check_units
 from cms.quality.record import QualityRecord
 from cms.reduced_body.reduced_body import ReducedBody
 
@@ -27,11 +32,13 @@ BODY_CHECKS = (
     check_free_frequencies,
     check_inertia_tensor,
     check_rigid_interfaces,
+    check_interface_places,
     check_interface_motions,
     check_energy_shares,
     check_driven_mass,
     check_buckling,
     check_mesh_order,
+    check_units,
     check_step_size,
     check_damping,
     check_dropped_columns,

@@ -47,6 +47,10 @@ LIMITS: dict[str, Limit] = {
         "members of rigid interfaces move rigidly", 1e-8, 1e-4,
         "the interface motions do not fit the modes at its nodes; reduce again",
     ),
+    "interface-places": Limit(
+        "reference points of interfaces are kept nodes and move with them", 1e-9, 1e-6,
+        "position or motion of the interface are not those of its node; reduce again",
+    ),
     "interface-motions": Limit(
         "independent motions of the interfaces that are missing", 0.0, None,
         "add constraint or attachment modes: joints at these interfaces meet a body that cannot follow",
@@ -64,6 +68,10 @@ LIMITS: dict[str, Limit] = {
     "mesh-order": Limit(
         "lowest frequencies too high by cells of first order", 0.02, None,
         "mesh with cells of second order, give bricks incompatible modes, or mesh finer",
+    ),
+    "units": Limit(
+        "implausible numbers among size, density and first frequency", 0.0, None,
+        "do nodes, masses and stiffness have the units that the file names? If they are meant, nothing is wrong",
     ),
     "step-size": Limit(
         "highest over lowest frequency", 1e4, None,

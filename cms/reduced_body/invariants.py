@@ -40,6 +40,7 @@ class Moments:
             require_finite(f"moments: {name}", array)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "m", float(self.m))
+        require_finite("moments: m", np.array(self.m))
 
     @property
     def n_q(self) -> int:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
 
@@ -27,6 +28,9 @@ class NodalSums:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "w", float(self.w))
+        require_finite("nodal sums: w", np.array(self.w))
+        if not self.w > 0:
+            raise BodyError(f"nodal sums: w: expected a positive sum of weights, got {self.w:g}")
         n = np.asarray(self.U1).shape[-1]
         for name, shape in {"S": (3,), "R": (3, 3), "U1": (3, n), "U2": (3, n)}.items():
             array = frozen(getattr(self, name))

@@ -19,6 +19,15 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["BodyFrame", "ReducedBody", "ReducedInterface"]
 
+ORTHONORMAL = 1e-6  #: defect of axes that is taken for digits of another program
+
+
+def require_orthonormal(where: str, axes: Array) -> None:
+    """Raise `BodyError` unless the columns are orthonormal."""
+    defect = float(np.abs(axes.T @ axes - np.eye(3)).max())
+    if not defect <= ORTHONORMAL:
+        raise BodyError(f"{where}: expected orthonormal axes as columns, they are {defect:.1e} from it")
+
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
@@ -45,6 +54,9 @@ class BodyFrame:
         require_shape("body frame: axes", self.axes, (3, 3))
         require_finite("body frame: origin", self.origin)
         require_finite("body frame: axes", self.axes)
+        require_orthonormal("body frame: axes", self.axes)
+        if np.linalg.det(self.axes) < 0:
+            raise BodyError("body frame: axes: expected right-handed axes as columns")
 
 
 @frozen_copies
@@ -69,6 +81,7 @@ class ReducedInterface:
         object.__setattr__(self, "members", frozen_int(self.members))
         require_shape(f"{where}: position", self.position, (3,))
         require_shape(f"{where}: triad", self.triad, (3, 3))
+        require_orthonormal(f"{where}: triad", self.triad)
 
 
 @frozen_copies

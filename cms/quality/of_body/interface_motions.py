@@ -10,7 +10,7 @@ from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import MOTION_COMPONENTS
 
-__all__ = ["check_interface_motions", "check_rigid_interfaces", "missing_motions"]
+__all__ = ["check_interface_motions", "check_interface_places", "check_rigid_interfaces", "missing_motions"]
 
 MISSING = 1e-7  #: singular value of the scaled interface motions over the largest, below which one is missing
 
@@ -27,6 +27,31 @@ def check_rigid_interfaces(reduced: ReducedBody) -> QualityRecord:
     name = max(defects, key=lambda key: defects[key])
     reason = f"largest departure is {defects[name]:.1e} of a mode's largest displacement, at {name!r}"
     return judge("rigid-interfaces", defects[name], reason, {"defects": defects})
+
+
+def check_interface_places(reduced: ReducedBody) -> QualityRecord:
+    """The reference point of a rigid or distributing interface is a kept node, and moves as that node does.
+
+    Largest distance over the body length, or of the translations over a mode's largest displacement. Other writers may
+    leave reference nodes out; then nothing is judged.
+    """
+    defects: dict[str, float] = {}
+    length, size = body_length(reduced), mode_size(reduced)
+    for interface in reduced.interfaces:
+        if interface.kind == "nodes" or not len(reduced.nodes):
+            continue
+        distance = np.linalg.norm(reduced.nodes - interface.position, axis=1)
+        near = np.flatnonzero(distance <= distance.min() * (1 + 1e-9))
+        moved = np.abs(reduced.Phi[near] - interface.Psi[:3]).max(axis=1)
+        apart = float((moved / size).max(axis=1).min()) if reduced.n_q else 0.0
+        defects[interface.name] = max(float(distance.min()) / length, apart)
+    if not defects:
+        return information("interface-places", "the file keeps no reference nodes of interfaces")
+    name = max(defects, key=lambda key: defects[key])
+    reason = f"largest departure of a reference point from its node is {defects[name]:.1e}, at {name!r}"
+    if "version floatframe" not in reduced.provenance:
+        return information("interface-places", f"{reason}; another program may keep none", {"defects": defects})
+    return judge("interface-places", defects[name], reason, {"defects": defects})
 
 
 def rigid_defect(reduced: ReducedBody, interface: ReducedInterface) -> float:
