@@ -13,10 +13,22 @@ from floatframe.kernels.connections.user_force import user_force_power
 from floatframe.kernels.joints.coordinate_force import coordinate_force, coordinate_power, coordinate_strain
 from floatframe.kernels.joints.loaded_rows import normal_force
 from floatframe.kernels.joints.relative_motion import loaded_axis, loaded_coordinate
-from floatframe.kernels.memory import N_DRIFTS
+from floatframe.kernels.memory import (
+    ANGULAR_MOMENTUM,
+    GRAVITATION,
+    KINETIC,
+    MOMENTUM,
+    N_DRIFTS,
+    OF_ANGLE_RATES,
+    OF_ANGLES,
+    OF_DISTANCE_RATES,
+    OF_DISTANCES,
+    SPRINGS,
+    STRAIN,
+)
 from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, SPRING, STIFFNESS, USER_FORCE
-from floatframe.kernels.scalars import cross, rotate, rotate_back
 from floatframe.kernels.time_function import time_function
+from floatframe.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, turned, turned_back, vector
 
 __all__ = ["diagnose", "power"]
 
@@ -28,7 +40,7 @@ def quadratic(model, work, i, which, x):
     product = work.bodies.modal[:n]
     for k in range(n):
         product[k] = 0.0
-    modal_term(model, i, which, x, product)
+    modal_term(model.body_types, model.bodies.kind[i], n, which, x, product)
     total = 0.0
     for k in range(n):
         total += x[k] * product[k]
@@ -43,42 +55,33 @@ def diagnose(model, work, out, drift):
     """
     for k in range(10):
         out[k] = 0.0
-    g = model.gravity
     for i in range(model.bodies.kind.shape[0]):
         n, u0, q0, R = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i], work.state.R[i]
-        m = model.body_types.mass[model.bodies.kind[i]]
-        v = work.bodies.velocity[: 6 + n]
-        momentum = work.bodies.momentum[: 6 + n]
-        v[0], v[1], v[2] = rotate_back(R, work.state.u[u0], work.state.u[u0 + 1], work.state.u[u0 + 2])
+        m, r, s = model.body_types.mass[model.bodies.kind[i]], vector(work.state.r[i]), turned(R, work.bodies.s[i])
+        v, momentum = work.bodies.velocity[: 6 + n], work.bodies.momentum[: 6 + n]
+        put(v, 0, turned_back(R, work.state.u[u0:]))
         for k in range(3, 6 + n):
             v[k] = work.state.u[u0 + k]
         body_mass_product(model, work, i, v, momentum)
         for k in range(6 + n):
-            out[0] += 0.5 * v[k] * momentum[k]
-        p0, p1, p2 = rotate(R, momentum[0], momentum[1], momentum[2])
-        l0, l1, l2 = rotate(R, momentum[3], momentum[4], momentum[5])
-        r0, r1, r2 = work.state.r[i, 0], work.state.r[i, 1], work.state.r[i, 2]
-        x0, x1, x2 = cross(r0, r1, r2, p0, p1, p2)
-        out[4] += p0
-        out[5] += p1
-        out[6] += p2
-        out[7] += l0 + x0
-        out[8] += l1 + x1
-        out[9] += l2 + x2
-        q = work.state.q[q0 : q0 + n]
-        s0, s1, s2 = rotate(R, work.bodies.s[i, 0], work.bodies.s[i, 1], work.bodies.s[i, 2])
-        out[2] -= g[0] * (m * r0 + s0) + g[1] * (m * r1 + s1) + g[2] * (m * r2 + s2)
+            out[KINETIC] += 0.5 * v[k] * momentum[k]
+        p = turned(R, momentum)
+        put_sum(out, MOMENTUM, p)
+        put_sum(out, ANGULAR_MOMENTUM, add(turned(R, momentum[3:]), cross(r, p)))
+        out[GRAVITATION] -= dot(model.gravity, add(scaled(m, r), s))
         if n > 0:
-            out[1] += 0.5 * quadratic(model, work, i, STIFFNESS, q)
+            out[STRAIN] += 0.5 * quadratic(model, work, i, STIFFNESS, work.state.q[q0 : q0 + n])
     for c in range(model.connections.size.shape[0]):
         for k in range(N_DRIFTS):
             drift[c, k] = 0.0
         if model.connections.law[c] == SPRING:
             i, springs = model.connections.item[c], model.springs
             _, length, _ = spring_tension(model, work, c)
-            out[3] += 0.5 * springs.stiffness[i] * (length - springs.free_length[i]) ** 2 + springs.preload[i] * length
+            out[SPRINGS] += (
+                0.5 * springs.stiffness[i] * (length - springs.free_length[i]) ** 2 + springs.preload[i] * length
+            )
         elif model.connections.law[c] == BUSHING or model.connections.law[c] == CONTACT:
-            out[3] += pair_energy(model, work, c)
+            out[SPRINGS] += pair_energy(model, work, c)
         if model.connections.law[c] != JOINT:
             continue
         a, b = model.connections.a[c], model.connections.b[c]
@@ -86,14 +89,14 @@ def diagnose(model, work, out, drift):
             rows = model.rows
             if rows.is_loaded[k]:
                 x, _ = loaded_coordinate(model, work, k, a, b)
-                out[3] += coordinate_strain(model, k, rows.is_angle[k] != 0, x)
+                out[SPRINGS] += coordinate_strain(model, k, rows.is_angle[k] != 0, x)
             elif rows.holds[k] == VELOCITY:
-                drift[c, 2] += work.connections.g[k] ** 2
+                drift[c, OF_DISTANCE_RATES] += work.connections.g[k] ** 2
             elif rows.holds[k] != NOTHING:
-                which = 0 if rows.is_length[k] else 1
+                of_places, of_rates = (OF_DISTANCES, OF_DISTANCE_RATES) if rows.is_length[k] else (OF_ANGLES, OF_ANGLE_RATES)
                 rate, _ = row_rates(model, work, k, a, b)
-                drift[c, which] += work.connections.g[k] ** 2
-                drift[c, 2 + which] += rate**2
+                drift[c, of_places] += work.connections.g[k] ** 2
+                drift[c, of_rates] += rate**2
         for k in range(N_DRIFTS):
             drift[c, k] = math.sqrt(drift[c, k])
 
@@ -105,14 +108,20 @@ def drive_power(model, work, c):
     is_driven = False
     for k in range(w0, model.connections.w0[c + 1]):
         is_driven = is_driven or model.rows.motion[k] >= 0
-    total = 0.0
-    if is_driven:
-        for k in range(3):
-            total += work.state.w[w0 + k] * (work.markers.v[a, k] - work.markers.v[b, k])
-            if model.markers.moment[a] >= 0:
-                total += work.state.w[w0 + model.markers.moment[a] + k] * work.markers.omega[a, k]
-            if model.markers.moment[b] >= 0:
-                total -= work.state.w[w0 + model.markers.moment[b] + k] * work.markers.omega[b, k]
+    if not is_driven:
+        return 0.0
+    w, v, omega, moment_a, moment_b = (
+        work.state.w[w0:],
+        work.markers.v,
+        work.markers.omega,
+        model.markers.moment[a],
+        model.markers.moment[b],
+    )
+    total = dot(w, sub(v[a], v[b]))
+    if moment_a >= 0:
+        total += dot(w[moment_a:], omega[a])
+    if moment_b >= 0:
+        total -= dot(w[moment_b:], omega[b])
     return total
 
 
@@ -141,8 +150,7 @@ def body_load_power(model, work, d):
     i, first = model.body_loads.body[d], model.body_loads.value0[d]
     u0, R, f = model.bodies.u0[i], work.state.R[i], model.body_loads.values
     factor, _, _ = time_function(model, model.body_loads.factor[d], work.state.time)
-    v0, v1, v2 = rotate_back(R, work.state.u[u0], work.state.u[u0 + 1], work.state.u[u0 + 2])
-    total = f[first] * v0 + f[first + 1] * v1 + f[first + 2] * v2
+    total = dot(f[first:], turned_back(R, work.state.u[u0:]))
     for k in range(3, 6 + model.bodies.n_q[i]):
         total += f[first + k] * work.state.u[u0 + k]
     return factor * total
@@ -154,11 +162,8 @@ def power(model, work):
     loads, dissipated = 0.0, 0.0
     for k in range(model.loads.marker.shape[0]):
         m = model.loads.marker[k]
-        for a in range(3):
-            loads += (
-                work.markers.wrench[m, a] * work.markers.v[m, a]
-                + work.markers.wrench[m, 3 + a] * work.markers.omega[m, a]
-            )
+        wrench = work.markers.wrench[m]
+        loads += dot(wrench, work.markers.v[m]) + dot(wrench[3:], work.markers.omega[m])
     for c in range(model.connections.size.shape[0]):
         law = model.connections.law[c]
         if law == JOINT:

@@ -6,9 +6,8 @@ from floatframe.kernels.connections.connection import connection_derivatives, co
 from floatframe.kernels.joints.deformed_line import slide_marker
 from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, wrench_to_body
 from floatframe.kernels.rotation import right_jacobian
-from floatframe.kernels.scalars import rotate
 from floatframe.kernels.time_function import time_function
-from floatframe.kernels.vector import put_matrix, vector
+from floatframe.kernels.vector import put, put_matrix, put_sum, scaled, turned, turned_back, vector
 
 __all__ = ["evaluate", "linearize", "tangent_of_body"]
 
@@ -39,20 +38,14 @@ def evaluate(model, work, c_k):
 def load_wrench(model, work, k):
     """Write the wrench of load k on its marker, ground axes."""
     m = model.loads.marker[k]
-    F, f, t = work.markers.wrench[m], model.loads.force[k], model.loads.torque[k]
+    f, t = vector(model.loads.force[k]), vector(model.loads.torque[k])
     factor = 1.0
     if model.loads.factor[k] >= 0:
         factor, _, _ = time_function(model, model.loads.factor[k], work.state.time)
     if model.markers.is_follower[m]:
-        A = work.markers.A[m]
-        F[0], F[1], F[2] = rotate(A, f[0], f[1], f[2])
-        F[3], F[4], F[5] = rotate(A, t[0], t[1], t[2])
-    else:
-        for a in range(3):
-            F[a] = f[a]
-            F[3 + a] = t[a]
-    for a in range(6):
-        F[a] *= factor
+        f, t = turned(work.markers.A[m], f), turned(work.markers.A[m], t)
+    put(work.markers.wrench[m], 0, scaled(factor, f))
+    put(work.markers.wrench[m], 3, scaled(factor, t))
 
 
 @inner
@@ -80,8 +73,7 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
         if model.markers.body[m] == i:
             marker_stiffness(model, work, m, c_k, H, turn)
     for r in range(6 + n):
-        for b in range(3):
-            H[r, 3 + b] += c_k * (turn[r, 0] * turning[0, b] + turn[r, 1] * turning[1, b] + turn[r, 2] * turning[2, b])
+        put_sum(H[r], 3, scaled(c_k, turned_back(turning, turn[r])))
 
 
 @inner

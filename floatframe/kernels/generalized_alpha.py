@@ -6,12 +6,13 @@ from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.user_force import resize_states
 from floatframe.kernels.diagnostics import diagnose, power
 from floatframe.kernels.evaluation import evaluate
+from floatframe.kernels.memory import WORK_GIVEN, WORK_TAKEN
 from floatframe.kernels.model import MASS, STIFFNESS
 from floatframe.kernels.rotation import exp_matrix, matrix_of_euler_parameters, rotate_euler_parameters
 from floatframe.kernels.schur import correction, factorize_bodies
 from floatframe.kernels.step_start import begin_step
 from floatframe.kernels.turns import count_turns
-from floatframe.kernels.vector import product, put_matrix, vector
+from floatframe.kernels.vector import dot, product, put_matrix, put_sum, scaled, turned, vector
 
 __all__ = [
     "DIVERGED",
@@ -114,13 +115,11 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
         R, y = work.state.R[i], work.solver.y[u0 : u0 + 6 + n]
         for k in range(6 + n):
             total += work.solver.weight[u0 + k] * y[k] * y[k]
-        x0, x1, x2 = y[0], y[1], y[2]
-        for k in range(3):
-            dx = R[k, 0] * x0 + R[k, 1] * x1 + R[k, 2] * x2
-            work.state.r[i, k] += dx
-            work.state.u[u0 + k] += by_rate * dx
-            work.state.u_dot[u0 + k] += by_acceleration * dx
-            work.state.theta[i, k] += y[3 + k]
+        dx = turned(R, y)
+        put_sum(work.state.r[i], 0, dx)
+        put_sum(work.state.theta[i], 0, y[3:])
+        put_sum(work.state.u, u0, scaled(by_rate, dx))
+        put_sum(work.state.u_dot, u0, scaled(by_acceleration, dx))
         for k in range(3, 6 + n):
             work.state.u[u0 + k] += by_rate * y[k]
             work.state.u_dot[u0 + k] += by_acceleration * y[k]
@@ -178,11 +177,10 @@ def one_step(model, work, memory, order, h):
     c_d = gamma * h
     c_m = (1 - alpha_m) / (1 - alpha_f)
     size, size_x = predict(model, work, memory, h, alpha_f)
-    g = model.gravity
     mass = 0.0
     for i in range(model.bodies.kind.shape[0]):
         mass += model.body_types.mass[model.bodies.kind[i]]
-    size += mass * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    size += mass * dot(model.gravity, model.gravity)
     allowed = order.tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
     allowed += math.sqrt(roundoff_floor(model, work, order.length))
     solver = work.solver
@@ -270,8 +268,8 @@ def write_row(model, work, memory, t, rows):
     copy(memory.w, rows.w[k])
     copy(memory.angle, rows.angle[k])
     diagnose(model, work, rows.diagnostics[k], rows.drift[k])
-    rows.diagnostics[k, 10] = memory.work_given
-    rows.diagnostics[k, 11] = memory.work_taken
+    rows.diagnostics[k, WORK_GIVEN] = memory.work_given
+    rows.diagnostics[k, WORK_TAKEN] = memory.work_taken
 
 
 @inner

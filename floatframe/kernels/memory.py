@@ -8,10 +8,32 @@ from floatframe.kernels.records import Size, integer, real, zeros
 from floatframe.kernels.work import n_q, n_u, state_sizes
 from floatframe.state import State
 
-__all__ = ["N_DIAGNOSTICS", "N_DRIFTS", "Memory", "Rows", "memory_at", "new_rows"]
+__all__ = [
+    "ANGULAR_MOMENTUM",
+    "GRAVITATION",
+    "KINETIC",
+    "MOMENTUM",
+    "N_DIAGNOSTICS",
+    "N_DRIFTS",
+    "OF_ANGLES",
+    "OF_ANGLE_RATES",
+    "OF_DISTANCES",
+    "OF_DISTANCE_RATES",
+    "SPRINGS",
+    "STRAIN",
+    "WORK_GIVEN",
+    "WORK_TAKEN",
+    "Memory",
+    "Rows",
+    "memory_at",
+    "new_rows",
+]
 
-N_DIAGNOSTICS = 12  #: kinetic, strain, gravity, springs, linear momentum (3), angular about the origin (3), work (2)
-N_DRIFTS = 4  #: of a joint: distance, angle, their rates
+N_DIAGNOSTICS = 12
+#: columns of `Rows.diagnostics`: energies; momentum (3), and that about the origin (3); work, as in `Memory`
+KINETIC, STRAIN, GRAVITATION, SPRINGS, MOMENTUM, ANGULAR_MOMENTUM, WORK_GIVEN, WORK_TAKEN = 0, 1, 2, 3, 4, 7, 10, 11
+N_DRIFTS = 4
+OF_DISTANCES, OF_ANGLES, OF_DISTANCE_RATES, OF_ANGLE_RATES = range(N_DRIFTS)  #: columns of `Rows.drift`
 
 n_t = Size("n_t")
 

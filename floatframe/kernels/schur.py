@@ -11,6 +11,7 @@ from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.connection import connection_derivatives
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.evaluation import linearize
+from floatframe.kernels.vector import add, put, put_sum, scaled, turned, turned_back
 
 __all__ = ["correction", "factorize_bodies"]
 
@@ -73,22 +74,17 @@ def assemble(model, work, c_k):
             model.markers.sign[b],
         )
         n_motion = 12 if model.connections.has_rates[c] else 6
-        turned = work.solver.motion
+        row = work.solver.row
         for r in range(rows):
             for part in range(0, n_motion, 3):  # row r of P in body axes
-                for k in range(3):
-                    turned[part + k] = P[r, part] * R[0, k] + P[r, part + 1] * R[1, k] + P[r, part + 2] * R[2, k]
+                put(row, part, turned_back(R, P[r, part:]))
             for part in range(0, 6, 3):
                 w_part = model.markers.force[b] if part == 0 else model.markers.moment[b]
-                if w_part < 0:
-                    continue
-                x0, x1, x2 = 0.0, 0.0, 0.0
-                for k in range(n_motion):
-                    x0 += turned[k] * Z[k, part]
-                    x1 += turned[k] * Z[k, part + 1]
-                    x2 += turned[k] * Z[k, part + 2]
-                for k in range(3):
-                    s[o + r * columns + w_part + k] += sign * (x0 * R[k, 0] + x1 * R[k, 1] + x2 * R[k, 2])
+                if w_part >= 0:
+                    x = (0.0, 0.0, 0.0)
+                    for k in range(n_motion):
+                        x = add(x, scaled(row[k], Z[k, part:]))
+                    put_sum(s, o + r * columns + w_part, scaled(sign, turned(R, x)))
 
 
 @inner
@@ -195,9 +191,7 @@ def correction(model, work, c_k, is_new):
                     total += work.solver.J_row[12 * o + r * n + k] * y[u0 + k]
                 motion[r] = total
             for part in range(0, n_motion, 3):
-                x0, x1, x2 = motion[part], motion[part + 1], motion[part + 2]
-                for k in range(3):
-                    motion[part + k] = R[k, 0] * x0 + R[k, 1] * x1 + R[k, 2] * x2
+                put(motion, part, turned(R, motion[part:]))
             for r in range(model.connections.size[c]):
                 total = 0.0
                 for k in range(n_motion):
@@ -211,18 +205,16 @@ def correction(model, work, c_k, is_new):
             c = model.markers.connection[m]
             o, w0, sign = model.markers.x0[m], model.connections.w0[c], model.markers.sign[m]
             size = 3 if model.markers.moment[m] < 0 else 6
+            wrench = work.solver.wrench  # of the correction on the marker, body axes
             for part in range(0, size, 3):
                 w_part = model.markers.force[m] if part == 0 else model.markers.moment[m]
-                if w_part < 0:
-                    motion[0], motion[1], motion[2] = 0.0, 0.0, 0.0
-                    continue
-                w_part += w0
-                x0, x1, x2 = mu[w_part], mu[w_part + 1], mu[w_part + 2]
-                for k in range(3):
-                    motion[part + k] = sign * (R[0, k] * x0 + R[1, k] * x1 + R[2, k] * x2)
+                if w_part >= 0:
+                    put(wrench, part, scaled(sign, turned_back(R, mu[w0 + w_part :])))
+                else:
+                    put(wrench, part, (0.0, 0.0, 0.0))
             for r in range(n):
                 total = 0.0
                 for k in range(size):
-                    total += work.solver.X[6 * o + r * 6 + k] * motion[k]
+                    total += work.solver.X[6 * o + r * 6 + k] * wrench[k]
                 y[u0 + r] += total
     return -1

@@ -12,17 +12,21 @@ __all__ = [
     "cross",
     "dot",
     "matrix",
+    "matrix_sum",
     "norm",
     "product",
     "put",
     "put_matrix",
     "put_sum",
     "scaled",
+    "scaled_matrix",
     "sub",
+    "tilde",
     "transposed",
     "turned",
     "turned_back",
     "unit",
+    "unit_matrix",
     "vector",
 ]
 
@@ -79,6 +83,30 @@ def scaled(f, a):
 def matrix(A):
     """Return an array (3, 3) as three rows."""
     return vector(A[0]), vector(A[1]), vector(A[2])
+
+
+@small
+def unit_matrix():
+    """Return 1."""
+    return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@small
+def tilde(x):
+    """Return the matrix of x ×."""
+    return (0.0, -x[2], x[1]), (x[2], 0.0, -x[0]), (-x[1], x[0], 0.0)
+
+
+@small
+def matrix_sum(A, B):
+    """Return A + B."""
+    return add(A[0], B[0]), add(A[1], B[1]), add(A[2], B[2])
+
+
+@small
+def scaled_matrix(f, A):
+    """Return f A."""
+    return scaled(f, A[0]), scaled(f, A[1]), scaled(f, A[2])
 
 
 @small
