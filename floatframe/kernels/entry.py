@@ -13,7 +13,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.compiler.choice import is_lean, words
 from floatframe.kernels.compiler.compilation import entry
 from floatframe.kernels.compiler.sources import source_digest
-from floatframe.kernels.compiler.structure import converter, table_of
+from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
 from floatframe.kernels.connections.connection import constraint_rates
 from floatframe.kernels.diagnostics import power
 from floatframe.kernels.evaluation import evaluate, linearize
@@ -154,7 +154,7 @@ def call(model: Model, work: Work, memory: Memory, rows: Rows, **order: float) -
             level = logging.INFO if is_lean else logging.WARNING  # what is not as usual is said
             log.log(level, "compiled the code of the motion in %.0f s, once: %s", time.perf_counter() - began, words())
     ordered = filled(Order(), **(NOTHING._asdict() | order))
-    return Outcome(*run(*(table_of(record) for record in (model, work, memory, rows, ordered))))
+    return Outcome(*run(kept_table_of(model), kept_table_of(work), table_of(memory), table_of(rows), table_of(ordered)))
 
 
 def no_memory() -> Memory:

@@ -6,6 +6,8 @@ is read and written as such, `work.counted.iterations += 1`. Tables and arrays b
 count no references; numbers in a table do not change while a kernel runs, so that they may be kept in registers.
 """
 
+from typing import Any
+
 import numpy as np
 from llvmlite import ir
 from numba import from_dtype, types
@@ -17,9 +19,9 @@ from numba.np.arrayobj import make_array
 
 from fe_models.foundation.arrays import IntArray
 from floatframe.kernels.compiler.compilation import array_type, array_value
-from floatframe.kernels.records import Declared, leaves
+from floatframe.kernels.records import Declared
 
-__all__ = ["Structure", "converter", "n_words", "table_of"]
+__all__ = ["Structure", "converter", "kept_table_of", "n_words", "table_of"]
 
 WORD = ir.IntType(64)
 
@@ -113,10 +115,36 @@ def converter(declaration):
     return convert
 
 
+def add_words(record, words: list[int]) -> None:
+    """Add addresses and shapes of the arrays of a record to the words of a table."""
+    for each in record:
+        if isinstance(each, np.ndarray):
+            words.append(each.__array_interface__["data"][0])
+            words += each.shape
+        else:
+            add_words(each, words)
+
+
 def table_of(record) -> IntArray:
     """Return addresses and shapes of the arrays, which the caller keeps alive."""
     words: list[int] = []
-    for _, array in leaves(record):
-        words.append(array.__array_interface__["data"][0])
-        words += array.shape
+    add_words(record, words)
     return np.array(words, np.int64)
+
+
+KEPT = 4  # tables of as many records
+kept: list[tuple[Any, IntArray]] = []
+
+
+def kept_table_of(record) -> IntArray:
+    """Return `table_of` a record that is used again and again, from what is kept; to make one takes as long as a step.
+
+    A record that is kept stays alive, so that what is found belongs to this very record.
+    """
+    for known, table in kept:
+        if known is record:
+            return table
+    table = table_of(record)
+    kept.insert(0, (record, table))
+    del kept[KEPT:]
+    return table
