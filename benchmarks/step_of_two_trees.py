@@ -51,6 +51,7 @@ class Worker:
         )
 
     def time_per_step(self, n_bodies, n_q, n_steps):
+        """Return the least processor time per step [s]."""
         self.process.stdin.write(f"{n_bodies} {n_q} {n_steps}\n")
         self.process.stdin.flush()
         return float(self.process.stdout.readline())
