@@ -93,7 +93,9 @@ def diagnose(model, work, out, drift):
             elif rows.holds[k] == VELOCITY:
                 drift[c, OF_DISTANCE_RATES] += work.connections.g[k] ** 2
             elif rows.holds[k] != NOTHING:
-                of_places, of_rates = (OF_DISTANCES, OF_DISTANCE_RATES) if rows.is_length[k] else (OF_ANGLES, OF_ANGLE_RATES)
+                of_places, of_rates = (
+                    (OF_DISTANCES, OF_DISTANCE_RATES) if rows.is_length[k] else (OF_ANGLES, OF_ANGLE_RATES)
+                )
                 rate, _ = row_rates(model, work, k, a, b)
                 drift[c, of_places] += work.connections.g[k] ** 2
                 drift[c, of_rates] += rate**2
