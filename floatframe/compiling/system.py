@@ -30,7 +30,7 @@ from floatframe.forces import Gravity, PointForce, SpringDamper
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.rows import Row, kind_of
 from floatframe.joints.sliding import SlidingJoint
-from floatframe.kernels.model import Bodies, Connections, JointRows, Loads, Markers, Model, Springs
+from floatframe.kernels.model import Bodies, BodyTypes, Connections, JointRows, Loads, Markers, Model, Springs
 from floatframe.kernels.records import filled
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
@@ -41,6 +41,8 @@ __all__ = ["CompiledSystem", "compiled_system"]
 KEPT = "_compiled"  #: attribute of a system that keeps what was compiled
 
 SOFT = 1e-9  #: by which redundant constraints give way, relative to what the mass moves in a step
+ROUNDING = 1e3 * np.finfo(float).eps  #: of the mobility of bodies, with room for what elimination adds
+MOST_SOFT = 1e-5  #: as SOFT, for angles of bodies with hardly any moment about an axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +186,7 @@ def compile_system(system: System) -> CompiledSystem:
         elimination=plan_elimination(made.sizes, ends_of, integers(made.connection_of)),
     )
     length = system_length(markers, placed, n_q, model)
-    soft = row_softness(system, rows, model.body_types.mass[kind], length)
+    soft = row_softness(system, rows, model.body_types, kind, length)
     model = model._replace(rows=model.rows._replace(soft=soft))
     return CompiledSystem(
         model=model,
@@ -235,19 +237,31 @@ def marker_record(
     )
 
 
-def row_softness(system: System, rows: list[Row], mass: Array, length: float) -> Array:
+def row_softness(system: System, rows: list[Row], types: BodyTypes, kind_of_body: IntArray, length: float) -> Array:
     """Return the compliance of held rows, relative to c_k, for reactions of least norm; zero if none is asked for.
 
-    SOFT/m for distances and SOFT/(m length²) for angles, m the mean mass of the bodies.
+    SOFT/m for distances and SOFT/(m length²) for angles, m the mean mass of the bodies. A body with a small moment J
+    about an axis turns by 1/J, whose rounding the compliance of angles must stand above: it is at least ROUNDING/J, but
+    no more than MOST_SOFT/(m length²).
     """
     soft = np.zeros(len(rows))
     if system.redundant == "minimum-norm":
-        m = float(mass.mean())
+        m = float(types.mass[kind_of_body].mean())
+        above = ROUNDING * m * length**2 / max(least_moment(types), np.finfo(float).tiny)
+        of_angles = min(max(SOFT, above), MOST_SOFT) / (m * length**2)
         for k, row in enumerate(rows):
             kind = kind_of(row.kind)
             if kind.can_yield and row.motion is None:
-                soft[k] = SOFT / m if kind.is_length else SOFT / (m * length**2)
+                soft[k] = SOFT / m if kind.is_length else of_angles
     return soft
+
+
+def least_moment(types: BodyTypes) -> float:
+    """Return the smallest principal moment of inertia of all types of bodies about their centres of mass."""
+    moments = []
+    for m, S, J0 in zip(types.mass, types.S, types.J0, strict=True):
+        moments.append(np.linalg.eigvalsh(J0 - (S @ S * np.eye(3) - np.outer(S, S)) / m)[0])
+    return float(min(moments))
 
 
 def place(system: System, mean_axes: tuple[MeanAxes | None, ...]) -> State:
