@@ -56,10 +56,21 @@ def run(app: typer.Typer, name: str) -> None:
         if reconfigure is not None:
             reconfigure(errors="replace")
     try:
-        app(prog_name=name)
+        try:
+            app(prog_name=name)
+        finally:
+            sys.stdout.flush()  # what cannot be written is told here, not by the interpreter at its end
     except KeyboardInterrupt:
         print_error("interrupted")
         sys.exit(INTERRUPTED)
+    except OSError as error:
+        if not isinstance(error, BrokenPipeError) and error.errno not in NO_SPACE:
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):  # the reader of our output (head, less) has seen enough
+            sys.exit(0)
+        print_error(f"standard output cannot be written: {error.strerror}; free space on the disk, or lift its limit")
+        sys.exit(USER_ERROR)
 
 
 class Notes(logging.Handler):

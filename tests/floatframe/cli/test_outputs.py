@@ -2,6 +2,8 @@
 
 import os
 import stat
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -12,6 +14,7 @@ from floatframe.cli.app import app
 from tests.campaign.jobs import JOB
 from tests.campaign.plain_mesh import FORMATS, bar
 from tests.campaign.systems import SYSTEM
+from tests.root import ROOT
 
 FLEXIBLE = """
 [system]
@@ -102,6 +105,22 @@ def test_a_table_and_a_modal_file_go_into_a_pipe(folder, tmp_path):
         assert result.exit_code == 0, result.output
         assert got[0].startswith(begin)
         assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
+@pytest.mark.parametrize("words", [
+    ["floatframe.cli", "--help"], ["cms.cli", "--version"],
+    ["cms.cli", "info", str(ROOT / "tests/cms/modal_file/data/version_1.h5"), "--json"],
+])  # fmt: skip
+def test_a_full_standard_output_is_one_message(words):
+    with open("/dev/full", "w") as full:
+        made = subprocess.run(
+            [sys.executable, "-m", *words], stdout=full, stderr=subprocess.PIPE, text=True, cwd=ROOT, check=False
+        )
+    assert made.returncode == 2
+    assert made.stderr.startswith("error: ")
+    assert "No space left on device" in made.stderr
+    assert len(made.stderr.splitlines()) == 1
 
 
 def test_what_is_written_in_parts_refuses_a_pipe(folder, tmp_path):
