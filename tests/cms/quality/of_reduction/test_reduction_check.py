@@ -7,8 +7,6 @@ import scipy.sparse as sp
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from cms.errors import CmsError
-from cms.families.families import Families
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS, craig_bampton, guyan
@@ -405,8 +403,6 @@ def test_checks_refuse_what_does_not_belong_together(body, reference):
         check_reduction(replace(body, units=unit_system("mm-t-s")), modes, reduced)
     with pytest.raises(QualityError, match="expected a frequency above 0"):
         FullReference(body, band=0.0)
-    with Families(replace(body)) as others, pytest.raises(CmsError, match="families are those of another body"):
-        FullReference(others, band=1.0)
 
 
 def test_ritz_shapes_of_independent_columns_are_their_own_pencil(body, reference):
