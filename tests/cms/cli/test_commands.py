@@ -269,7 +269,7 @@ def test_frame_refuses_what_it_cannot_do(modal_file, tmp_path):
         (("--to", "buckens", "--axes", "1,0,0;0,1,0;0,0,-1"), "three orthonormal right-handed axes"),
         (("--to", "buckens", "--damping", "-1"), "ratio = -1.0; expected 0 or more"),
         (("--to", "buckens", "--units", "m-kg"), "did you mean 'm-kg-s'?"),
-        (("--to", "buckens", "-o", path), "this is the input"),
+        (("--to", "buckens", "-o", path), "this is an input; choose another name"),
     ]:
         assert_refused(run("frame", path, *options), words)
         assert contents(tmp_path) == before
@@ -496,7 +496,7 @@ def test_other_and_newer_and_missing_files_are_refused(tmp_path, modal_file):
     (["--mode", "1", "-o", "m.jpg"], "ends in .png"),
     (["--mode", "1", "--animate", "m.png"], ".gif or .mp4"),
     (["--mode", "1", "--scale", "-1"], "scale"),
-    (["--mode", "1", "-o", "bar.h5"], "this is the input"),
+    (["--mode", "1", "-o", "bar.h5"], "this is an input; choose another name"),
     (["--mode", "1", "-o", "nowhere/m.png"], "does not exist"),
 ])  # fmt: skip
 def test_view_refuses_what_it_cannot_draw(modal_file, tmp_path, monkeypatch, options, words):
@@ -510,8 +510,8 @@ def test_the_output_is_checked_before_the_work(folder):
     before = contents(folder)
     for output, words in [
         ("nowhere/out.h5", "does not exist"),
-        ("bar.toml", "this is the input"),
-        ("bar.inp", "this is the input"),
+        ("bar.toml", "this is an input; choose another name"),
+        ("bar.inp", "this is an input; choose another name"),
         (".", "this is a folder"),
     ]:
         assert_refused(run("reduce", folder / "bar.toml", "-o", folder / output), words)
