@@ -161,7 +161,7 @@ def test_plot_goes_without_the_modal_files_and_says_so(folder):
 
 def test_plot_refuses_other_kinds_of_files(results, tmp_path):
     assert_refused(run("plot", results, "-o", tmp_path / "swing.jpg"), ".png, .svg or .pdf")
-    assert_refused(run("plot", results, "-o", results), "this is the input")
+    assert_refused(run("plot", results, "-o", results), "this is an input; choose another name")
     assert contents(tmp_path) == {}
 
 
@@ -249,7 +249,7 @@ def test_bodies_in_other_units_are_converted_with_a_note(folder, caplog):
 
 
 def test_the_output_is_checked_before_the_work(folder):
-    for output, words in [("nowhere/out.h5", "does not exist"), ("swing.toml", "this is the input"), (".", "folder")]:
+    for output, words in [("nowhere/out.h5", "does not exist"), ("swing.toml", "this is an input; choose another name"), (".", "folder")]:
         assert_refused(run("run", folder / "swing.toml", "-o", folder / output), words)
     assert sorted(contents(folder)) == ["swing.toml"]
 
