@@ -216,9 +216,7 @@ def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_r
     return int((np.linalg.eigvalsh(rows @ rows.T) < REDUNDANT).sum()) < n_redundant
 
 
-def with_compatible_velocities(
-    compiled: CompiledSystem, work: Work, state: State, known: Array | None = None
-) -> State:
+def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:
     """(2): return the state with velocities that keep the joints closed."""
     from floatframe.kernels.entry import rates_of_constraints
 

@@ -193,7 +193,8 @@ def test_the_page_holds_all_it_needs(page):
 
 def test_names_cannot_break_the_page(comparison):
     name = "</script><script>alert(1)</script><b>&'\""
-    worse = replace(comparison, name=name, sets=(*comparison.sets[:2], replace(comparison.sets[2], sentence=name)))
+    first, *others = comparison.sets
+    worse = replace(comparison, name=name, sets=(replace(first, sentence=name), *others))
     text = comparison_html(worse, stills=0)
     assert "<script>alert" not in text
     assert "</script><script>" not in text.replace("</script>\n<script>", "").replace("</script>\n", "")
