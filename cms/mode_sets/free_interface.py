@@ -190,4 +190,5 @@ def _pseudo_inverse(G: Array) -> Array:
     values, vectors = la.eigh((scaled + scaled.T) / 2)
     kept = values > DEPENDENT * values[-1]
     half = size[:, None] * vectors[:, kept] / np.sqrt(values[kept])
+    half[diagonal <= 0] = 0.0  # a zero diagonal has a zero row, and so has the inverse: no shapes made of rounding
     return half @ half.T
