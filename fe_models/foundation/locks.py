@@ -6,12 +6,14 @@ import socket
 import time
 from pathlib import Path
 
+from fe_models.foundation.errors import ReportedError
+
 __all__ = ["FileLock", "LockedError"]
 
 log = logging.getLogger(__name__)
 
 
-class LockedError(OSError):
+class LockedError(ReportedError, OSError):
     """Another process (or another call in this one) holds the lock; its text says which."""
 
 

@@ -226,7 +226,7 @@ def test_a_step_size_that_follows_no_mode_is_noted_and_one_that_fails_is_advised
     assert "h = 0.05 follows 0 of 3 modes" in caplog.text
     caplog.clear()
     integrate(vibrating(), GeneralizedAlpha(), 0.01, 0.005)
-    assert not caplog.text
+    assert "follows" not in caplog.text
     with pytest.raises(ConvergenceError, match=r"h = 0.5 follows 0 of 3 modes .* h = 0.01 follows the slowest mode"):
         integrate(vibrating(), GeneralizedAlpha(max_iterations=2), 1.0, 0.5)
 
