@@ -72,7 +72,7 @@ def test_the_pendulum_moves_with_the_oldest_numba(tmp_path):
     assert version.stdout.startswith("0.60.")
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     environment.pop(VARIABLE, None)
-    command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS]
+    command = [python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not long", *TESTS]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-3000:]
     assert "passed" in done.stdout

@@ -19,7 +19,7 @@ def copy_of_sources(root: Path) -> Path:
     """Copy the modules of the project into a folder."""
     for package in PACKAGES:
         shutil.copytree(ROOT / package, root / package, ignore=lambda folder, names: [
-            name for name in names if name == "__pycache__" or ("." in name and not name.endswith(".py"))
+            name for name in names if name == "__pycache__" or ("." in name and not name.endswith((".py", ".pyi")))
         ])  # fmt: skip
     return root
 
