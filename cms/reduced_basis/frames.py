@@ -88,10 +88,6 @@ class FrameCondition:
     W: Array  #: W Psi_R, whose rows the condition is: Psi_Rᵀ W u = 0, (n_dof, 6)
     center: Array  #: the centre of mass, which Psi_R is about, mesh axes, (3,) [m]
 
-    def remove_rigid_part(self, columns: Array) -> Array:
-        """Return columns - Psi_R C, which satisfy the condition of the frame, (n_dof, k)."""
-        return columns - self.Psi_R @ self.rigid_part(columns)
-
 
 def frame_condition(body: FEBody, frame: Frame | HeldFrame) -> FrameCondition:
     """Make the frame ready for a body: the dofs or the mass matrix it rests on, its origin.

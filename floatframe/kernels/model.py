@@ -198,7 +198,7 @@ class Contacts(NamedTuple):
 
 
 class Networks(NamedTuple):
-    """Couplers, then user forces: connections that act along ports, see kernels/connections/port.py."""
+    """Couplers, then user forces: connections that act along ports, see connections/element_coordinate.py."""
 
     port0: IntArray = integer(n_networks + 1)
     core: IntArray = integer(n_networks)  #: row of the multiplier of a coupler, of the first force of a user force

@@ -31,7 +31,6 @@ from floatframe.system_file.place_key import PlaceOnBody
 
 __all__ = ["SENSOR_TYPES", "SensorSection"]
 
-PLACE = ("body", "marker", "relative_to", "relative_marker")
 SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up to "|" are needed
     **dict.fromkeys(PLACE_QUANTITIES, ("body", "|", "marker", "relative_to", "relative_marker")),
     "angle": ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
