@@ -65,6 +65,21 @@ def modes_command(
     list_modes(job, as_json=json)
 
 
+@app.command("formats")
+@guarded
+def formats_command(
+    json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Write the table of docs/formats.md.")] = False,
+) -> None:
+    """List the formats of other programs that are read and written, the versions tried, and what is lost.
+
+    Example: cms formats
+    """
+    from cms.cli.formats import list_formats
+
+    list_formats(as_json=json, as_markdown=markdown)
+
+
 @app.command("check")
 @guarded
 def check_command(

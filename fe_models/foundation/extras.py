@@ -1,0 +1,39 @@
+"""Libraries that only some users need: imported when they are used, named with the extra that installs them."""
+
+from importlib import import_module
+from types import ModuleType
+
+from fe_models.foundation.errors import CmsError, FeModelsError
+
+__all__ = ["MissingExtraError", "extra_module"]
+
+
+class MissingExtraError(FeModelsError, CmsError, ImportError):
+    """A library of an optional extra is not installed."""
+
+
+def extra_module(name: str, *, extra: str, purpose: str) -> ModuleType:
+    """Import a module of an optional library.
+
+    Parameters
+    ----------
+    name
+        Dotted name of the module.
+    extra
+        The extra of this project that installs it.
+    purpose
+        What needs it, as the beginning of the message: "OP2 files".
+
+    Raises
+    ------
+    MissingExtraError
+        If it is not installed, or broken; with the line that installs it.
+    """
+    try:
+        return import_module(name)
+    except (ImportError, OSError) as error:  # OSError: a shared library that the wheel expects is missing
+        missing = isinstance(error, ModuleNotFoundError) and name.startswith(f"{error.name}")
+        reason = "which is not installed" if missing else f"which does not load ({error})"
+        raise MissingExtraError(
+            f"{purpose}: needs {name.partition('.')[0]}, {reason}; pip install \"floatframe[{extra}]\""
+        ) from error

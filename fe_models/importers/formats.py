@@ -1,0 +1,13 @@
+"""The formats of finite element programs that are read: meshes, decks, matrices, geometry."""
+
+from fe_models.foundation.formats import FileFormat
+
+__all__ = ["FORMATS"]
+
+FORMATS = (
+    FileFormat("MSH 2.2, 4.1", "Gmsh", "mesh", (".msh",), reads=True, tried="Gmsh 4.15"),
+    FileFormat("VTK, VTU", "ParaView", "mesh", (".vtk", ".vtu"), reads=True, tried="meshio 5.3, pyvista"),
+    FileFormat("input deck", "Abaqus, CalculiX", "mesh", (".inp",), reads=True, lost="all but the mesh and its sets"),
+    FileFormat("bulk data", "Nastran", "mesh", (".bdf", ".nas", ".dat", ".fem"), reads=True, lost="all but the mesh"),
+    FileFormat("MED", "Salome, code_aster", "mesh", (".med",), reads=True),
+)  #: one line a format; `cms formats` and docs/formats.md list them
