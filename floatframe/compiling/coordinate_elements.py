@@ -1,4 +1,4 @@
-"""Couplers and user forces as the kernels see them: ports on markers, and what couples them."""
+"""Couplers and user forces as the kernels see them: coordinates on markers, and what couples them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,11 +24,11 @@ from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.records import filled, of_items
 from floatframe.system import System
 
-__all__ = ["Networks", "Port", "add_networks", "find_port", "port_value"]
+__all__ = ["CoordinateElements", "PlacedCoordinate", "add_coordinate_elements", "find_coordinate", "placed_value"]
 
 
 @dataclass(frozen=True, eq=False)
-class Port:
+class PlacedCoordinate:
     """A coordinate found in the system: its markers and the directions it is made of."""
 
     a: MarkerData
@@ -48,13 +48,13 @@ class Port:
 
 
 @dataclass
-class Networks:
-    """Lists over ports and connections."""
+class CoordinateElements:
+    """Lists over coordinates and connections."""
 
     names: tuple[str, ...] = ()
-    port0: list[int] = field(default_factory=lambda: [0])
+    coordinate0: list[int] = field(default_factory=lambda: [0])
     core: list[int] = field(default_factory=list)
-    ports: list[dict[str, float]] = field(default_factory=list)
+    coordinates: list[dict[str, float]] = field(default_factory=list)
     users: list[dict[str, int]] = field(default_factory=list)
     state0: list[int] = field(default_factory=lambda: [0])
     states: list[dict[str, float]] = field(default_factory=list)
@@ -65,8 +65,8 @@ class Networks:
         """Return the parts of the model."""
         tapes = self.tapes
         return {
-            "networks": filled(model.Networks(), port0=self.port0, core=self.core),
-            "ports": of_items(model.Ports(), self.ports),
+            "elements": filled(model.Elements(), coordinate0=self.coordinate0, core=self.core),
+            "coordinates": of_items(model.Coordinates(), self.coordinates),
             "users": of_items(model.Users(), self.users, state0=self.state0),
             "states": of_items(model.States(), self.states),
             "tapes": filled(
@@ -80,49 +80,49 @@ class Networks:
         }
 
 
-def add_networks(system: System, made: Connections, functions: Functions) -> Networks:
+def add_coordinate_elements(system: System, made: Connections, functions: Functions) -> CoordinateElements:
     """Add the couplers of a system, then its user forces."""
     forces = [force for force in system.forces if isinstance(force, UserForce)]
-    networks = Networks((*(coupler.name for coupler in system.couplers), *(force.name for force in forces)))
+    elements = CoordinateElements((*(coupler.name for coupler in system.couplers), *(force.name for force in forces)))
     for coupler in system.couplers:
-        add_coupler(system, made, networks, coupler)
+        add_coupler(system, made, elements, coupler)
     for force in forces:
-        add_user_force(system, made, networks, functions, force)
-    return networks
+        add_user_force(system, made, elements, functions, force)
+    return elements
 
 
-def add_coupler(system: System, made: Connections, networks: Networks, coupler: CoordinateCoupler) -> None:
-    """Add a coupler: the rows of its ports, then that of its multiplier."""
+def add_coupler(system: System, made: Connections, elements: CoordinateElements, coupler: CoordinateCoupler) -> None:
+    """Add a coupler: the rows of its coordinates, then that of its multiplier."""
     where = f"coupler {coupler.name!r}"
-    ports = [find_port(system, f"{where}: term {k + 1}", c, made) for k, (c, _) in enumerate(coupler.terms)]
+    coordinates = [find_coordinate(system, f"{where}: term {k + 1}", c, made) for k, (c, _) in enumerate(coupler.terms)]
     factors = [factor for _, factor in coupler.terms]
-    as_placed = sum(f * port_value(port, made) for f, port in zip(factors, ports, strict=True))
+    as_placed = sum(f * placed_value(x, made) for f, x in zip(factors, coordinates, strict=True))
     scale = 1 / max(abs(factor) for factor in factors)
     held = Row(COUPLE, np.array([scale, 0.0, 0.0]), c=as_placed, motion=coupler.constant)  # type: ignore[arg-type]
-    add_ports(made, networks, coupler.name, COUPLER, ports, factors, [True] * len(ports), [held])
+    add_coordinates(made, elements, coupler.name, COUPLER, coordinates, factors, [True] * len(coordinates), [held])
 
 
 def add_user_force(
-    system: System, made: Connections, networks: Networks, functions: Functions, force: UserForce
+    system: System, made: Connections, elements: CoordinateElements, functions: Functions, force: UserForce
 ) -> None:
-    """Add a user force: the rows of its ports, then of its forces, then of its states."""
+    """Add a user force: the rows of its coordinates, then of its forces, then of its states."""
     where = f"force {force.name!r}"
     names, acting = list(force.coordinates), list(force.forces)
-    ports = [find_port(system, f"{where}: coordinates: {k}", c, made) for k, c in force.coordinates.items()]
+    coordinates = [find_coordinate(system, f"{where}: coordinates: {k}", c, made) for k, c in force.coordinates.items()]
     rows = [Row(PART)] * (len(acting) + 3 * len(force.states))
-    has_force = [name in acting for name in names]
-    first = add_ports(made, networks, force.name, USER_FORCE, ports, [1.0] * len(ports), has_force, rows)
-    for port, name in zip(networks.ports[-len(ports) :], names, strict=True):
-        port["core"] = first + acting.index(name) if name in acting else first
+    act = [name in acting for name in names]
+    first = add_coordinates(made, elements, force.name, USER_FORCE, coordinates, [1.0] * len(names), act, rows)
+    for record, name in zip(elements.coordinates[-len(coordinates) :], names, strict=True):
+        record["core"] = first + acting.index(name) if name in acting else first
     starts = enumerate(force.states.values())
-    networks.states += [{"row": first + len(acting) + 3 * k, "start": start} for k, start in starts]
-    networks.state0.append(len(networks.states))
+    elements.states += [{"row": first + len(acting) + 3 * k, "start": start} for k, start in starts]
+    elements.state0.append(len(elements.states))
     address = 0
     if force.function is not None:
-        networks.callbacks.append(callback_of(force, len(ports)))
-        address = networks.callbacks[-1].address
-    networks.users.append(
-        {"n_forces": len(acting), "n_states": len(force.states), "address": address, "tape0": len(networks.tapes)}
+        elements.callbacks.append(callback_of(force, len(coordinates)))
+        address = elements.callbacks[-1].address
+    elements.users.append(
+        {"n_forces": len(acting), "n_states": len(force.states), "address": address, "tape0": len(elements.tapes)}
     )
     if force.function is not None:
         return
@@ -131,43 +131,43 @@ def add_user_force(
     texts = [(f"forces: {name}", text) for name, text in force.forces.items()]
     texts += [(f"rates: {name}", force.rates[name]) for name in force.states]
     for place, text in texts:
-        networks.tapes.append(
+        elements.tapes.append(
             compile_expression(f"{where}: {place}", text, force.inputs, parameters=force.parameters, functions=numbers)
         )
 
 
-def add_ports(
+def add_coordinates(
     made: Connections,
-    networks: Networks,
+    elements: CoordinateElements,
     name: str,
     law: int,
-    ports: list[Port],
+    coordinates: list[PlacedCoordinate],
     factors: list[float],
     has_force: list[bool],
     core: list[Row],
 ) -> int:
-    """Add a connection with the rows of its ports, then those of its core; return the number of the first of these."""
+    """Add a connection: rows of its coordinates, then of its core; return the number of the first of these."""
     rows: list[Row] = []
     ends: list[End] = []
-    starts: list[tuple[int, int, int]] = []  # of each port, in the connection: value, force, arm
-    for port, acts in zip(ports, has_force, strict=True):
+    starts: list[tuple[int, int, int]] = []  # of each coordinate, in the connection: value, force, arm
+    for placed, acts in zip(coordinates, has_force, strict=True):
         value = len(rows)
-        rows += [port.row, Row(PART)]
+        rows += [placed.row, Row(PART)]
         force = arm = NO_MOMENT
         if acts:
             force = len(rows)
             rows += [Row(PART)] * 3
-            if port.has_arm:
+            if placed.has_arm:
                 arm = len(rows)
                 rows += [Row(PART)] * 3
         starts.append((value, force, arm))
-        if port.coordinate.is_angle:
-            ends += [End(port.a, 1.0, NO_MOMENT, force), End(port.b, -1.0, NO_MOMENT, force)]
+        if placed.coordinate.is_angle:
+            ends += [End(placed.a, 1.0, NO_MOMENT, force), End(placed.b, -1.0, NO_MOMENT, force)]
         else:
-            ends += [End(port.a, 1.0, force, arm), End(port.b, -1.0, force)]
+            ends += [End(placed.a, 1.0, force, arm), End(placed.b, -1.0, force)]
     marker, w0 = made.add(name, law, ends, [*rows, *core], has_rates=True)
     for k, (value, force, arm) in enumerate(starts):
-        networks.ports.append(
+        elements.coordinates.append(
             {
                 "a": marker + 2 * k,
                 "b": marker + 2 * k + 1,
@@ -178,33 +178,33 @@ def add_ports(
                 "core": w0 + len(rows),
             }
         )
-    networks.port0.append(len(networks.ports))
-    networks.core.append(w0 + len(rows))
+    elements.coordinate0.append(len(elements.coordinates))
+    elements.core.append(w0 + len(rows))
     return w0 + len(rows)
 
 
-def find_port(system: System, where: str, coordinate: Coordinate, made: Connections) -> Port:
-    """Return the port of a coordinate; `ModelError` with the nearest name if it is not there."""
+def find_coordinate(system: System, where: str, coordinate: Coordinate, made: Connections) -> PlacedCoordinate:
+    """Return a coordinate as placed; `ModelError` with the nearest name if it is not there."""
     if isinstance(coordinate, JointCoordinate):
-        return joint_port(system, where, coordinate, made)
+        return coordinate_of_joint(system, where, coordinate, made)
     a = find_marker(system, f"{where}: marker_a", coordinate.marker_a)
     b = find_marker(system, f"{where}: marker_b", coordinate.marker_b)
     if a.body == b.body:
         raise ModelError(f"{where}: expected markers on two bodies, got both on one")
     (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
     if isinstance(coordinate, AxialDistance):
-        return Port(a, b, RowCoordinate("", PUSH, coordinate.axis))
+        return PlacedCoordinate(a, b, RowCoordinate("", PUSH, coordinate.axis))
     if isinstance(coordinate, AxialAngle):
         axis_b = axis_in_b(coordinate.axis, None, A_a, A_b)
         x, z, y = turning_frame(coordinate.axis, axis_b, A_a, A_b)
-        return Port(a, b, RowCoordinate("", TWIST, x, y, z))
+        return PlacedCoordinate(a, b, RowCoordinate("", TWIST, x, y, z))
     if np.linalg.norm(r_b - r_a) == 0:
         raise ModelError(f"{where}: its markers coincide as placed, so that their line has no direction; move one")
-    return Port(a, b, RowCoordinate("", SPAN))
+    return PlacedCoordinate(a, b, RowCoordinate("", SPAN))
 
 
-def joint_port(system: System, where: str, wanted: JointCoordinate, made: Connections) -> Port:
-    """Return the port of a coordinate of a joint."""
+def coordinate_of_joint(system: System, where: str, wanted: JointCoordinate, made: Connections) -> PlacedCoordinate:
+    """Return a coordinate of a joint as placed."""
     names = [joint.name for joint in system.joints]
     if wanted.joint not in names:
         raise ModelError(f"{where}: no joint {quoted(wanted.joint)}{nearest(wanted.joint, names)}")
@@ -218,12 +218,12 @@ def joint_port(system: System, where: str, wanted: JointCoordinate, made: Connec
     (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (a, b))
     for row in joint.rows(A_a, A_b, r_b - r_a):
         if row.coordinate is not None and row.coordinate.name == wanted.coordinate:
-            return Port(a, b, row.coordinate)
+            return PlacedCoordinate(a, b, row.coordinate)
     raise ModelError(f"{where}: coordinate {wanted.coordinate!r} of joint {joint.name!r} follows a deformed line and "
                      "cannot be coupled or take a user force; take an axial distance between two markers")  # fmt: skip
 
 
-def port_value(port: Port, made: Connections) -> float:
-    """Return the value of a port as placed; angles between -pi and pi."""
-    (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (port.a, port.b))
-    return float(port.coordinate.value(RelativePlace(A_a, A_b, r_b - r_a)))
+def placed_value(placed: PlacedCoordinate, made: Connections) -> float:
+    """Return the value of a coordinate as placed; angles between -pi and pi."""
+    (r_a, A_a), (r_b, A_b) = (marker_pose(m, made.placed, made.n_q) for m in (placed.a, placed.b))
+    return float(placed.coordinate.value(RelativePlace(A_a, A_b, r_b - r_a)))

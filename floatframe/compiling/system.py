@@ -11,7 +11,7 @@ from floatframe.compiling.bodies import body_types, integers, offsets, type_arra
 from floatframe.compiling.callbacks import Callback
 from floatframe.compiling.connections import Connections as ConnectionLists
 from floatframe.compiling.connections import add_joint, add_spring
-from floatframe.compiling.coordinate_elements import add_networks
+from floatframe.compiling.coordinate_elements import add_coordinate_elements
 from floatframe.compiling.counted_angles import CountedAngle, angle_records, counted_angles
 from floatframe.compiling.elimination_order import plan_elimination
 from floatframe.compiling.forces import Functions, body_loads, joint_forces
@@ -53,7 +53,7 @@ class CompiledSystem:
     body_names: tuple[str, ...]
     joint_names: tuple[str, ...]
     spring_names: tuple[str, ...]  #: of spring-dampers, then bushings and contacts
-    network_names: tuple[str, ...]  #: of couplers, then user forces
+    element_names: tuple[str, ...]  #: of couplers, then user forces
     callbacks: tuple[Callback, ...]  #: users' functions that the kernels call
     owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
     placed: State  #: the state as given, before it is made consistent, in the frames of the engine
@@ -66,7 +66,7 @@ class CompiledSystem:
     @property
     def connection_names(self) -> tuple[str, ...]:
         """Names of joints, springs, couplers and user forces: the order of connections in the model."""
-        return self.joint_names + self.spring_names + self.network_names
+        return self.joint_names + self.spring_names + self.element_names
 
 
 def compiled_system(system: System) -> CompiledSystem:
@@ -119,7 +119,7 @@ def compile_system(system: System) -> CompiledSystem:
         table=[functions.index(spring.characteristic) for spring in dampers],
     )
     pairs = add_pair_laws(system, made, functions)
-    networks = add_networks(system, made, functions)
+    elements = add_coordinate_elements(system, made, functions)
     markers, rows = made.markers, made.rows
     loads = [force for force in system.forces if isinstance(force, PointForce)]
     load_marker = []
@@ -171,7 +171,7 @@ def compile_system(system: System) -> CompiledSystem:
         springs=springs,
         bushings=pairs.bushings,
         contacts=pairs.contacts,
-        **networks.records(),
+        **elements.records(),
         **lines.records(),
         loads=filled(
             Loads(),
@@ -193,8 +193,8 @@ def compile_system(system: System) -> CompiledSystem:
         body_names=tuple(body.name for body in system.bodies),
         joint_names=tuple(joint.name for joint in system.joints),
         spring_names=tuple(spring.name for spring in dampers) + pairs.names,
-        network_names=networks.names,
-        callbacks=tuple(networks.callbacks),
+        element_names=elements.names,
+        callbacks=tuple(elements.callbacks),
         owners=tuple(made.owner),
         placed=placed,
         mean_axes=axes,

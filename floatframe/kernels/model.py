@@ -36,6 +36,8 @@ __all__ = [
     "Bushings",
     "Connections",
     "Contacts",
+    "Coordinates",
+    "Elements",
     "Elimination",
     "Functions",
     "JointForces",
@@ -44,8 +46,6 @@ __all__ = [
     "Loads",
     "Markers",
     "Model",
-    "Networks",
-    "Ports",
     "Springs",
     "States",
     "Stations",
@@ -59,7 +59,7 @@ N_BLOCKS = 10
 
 n_b, n_t, n_m, n_c, n_w, n_ends, n_pairs = (Size(name) for name in ("n_b", "n_t", "n_m", "n_c", "n_w", "ends", "pairs"))
 n_functions, n_pieces, n_springs, n_bushings = (Size(name) for name in ("functions", "pieces", "springs", "bushings"))
-n_contacts, n_forces, n_networks, n_ports = (Size(name) for name in ("contacts", "joint forces", "networks", "ports"))
+n_contacts, n_forces, n_elements, n_x = (Size(name) for name in ("contacts", "joint forces", "elements", "coordinates"))
 n_lines, n_stations, n_users, n_states = (Size(name) for name in ("lines", "stations", "user forces", "states"))
 n_tapes, n_operations, n_loads, n_body_loads = (Size(name) for name in ("tapes", "operations", "loads", "body loads"))
 n_angles = Size("angles")
@@ -197,23 +197,23 @@ class Contacts(NamedTuple):
     slow: Array = real(n_contacts, unit="m/s")  #: least speed of approach
 
 
-class Networks(NamedTuple):
-    """Couplers, then user forces: connections that act along ports, see connections/element_coordinate.py."""
+class Elements(NamedTuple):
+    """Couplers, then user forces: connections that act along coordinates, see connections/coordinate.py."""
 
-    port0: IntArray = integer(n_networks + 1)
-    core: IntArray = integer(n_networks)  #: row of the multiplier of a coupler, of the first force of a user force
+    coordinate0: IntArray = integer(n_elements + 1)
+    core: IntArray = integer(n_elements)  #: row of the multiplier of a coupler, of the first force of a user force
 
 
-class Ports(NamedTuple):
+class Coordinates(NamedTuple):
     """Coordinates of couplers and user forces, and the forces along them."""
 
-    a: IntArray = integer(n_ports)  #: marker A
-    b: IntArray = integer(n_ports)  #: marker B
-    row: IntArray = integer(n_ports)  #: of its value, of the kind PUSH, TWIST or SPAN; that of its rate follows
-    force: IntArray = integer(n_ports)  #: first of its three rows of force or torque, -1 for none
-    arm: IntArray = integer(n_ports)  #: first of its three rows of moment on A, -1 for none
-    factor: Array = real(n_ports, unit="that of the coupler by that of the coordinate")  #: coefficient in a coupler
-    core: IntArray = integer(n_ports)  #: row of the unknown that is its force, or of the multiplier
+    a: IntArray = integer(n_x)  #: marker A
+    b: IntArray = integer(n_x)  #: marker B
+    row: IntArray = integer(n_x)  #: of its value, of the kind PUSH, TWIST or SPAN; that of its rate follows
+    force: IntArray = integer(n_x)  #: first of its three rows of force or torque, -1 for none
+    arm: IntArray = integer(n_x)  #: first of its three rows of moment on A, -1 for none
+    factor: Array = real(n_x, unit="that of the coupler by that of the coordinate")  #: coefficient in a coupler
+    core: IntArray = integer(n_x)  #: row of the unknown that is its force, or of the multiplier
 
 
 class Lines(NamedTuple):
@@ -320,8 +320,8 @@ class Model(NamedTuple):
     springs: Springs = Springs()
     bushings: Bushings = Bushings()
     contacts: Contacts = Contacts()
-    networks: Networks = Networks()
-    ports: Ports = Ports()
+    elements: Elements = Elements()
+    coordinates: Coordinates = Coordinates()
     lines: Lines = Lines()
     stations: Stations = Stations()
     users: Users = Users()

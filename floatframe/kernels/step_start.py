@@ -1,7 +1,7 @@
 """What force elements with memory do at the beginning of a step."""
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.element_coordinate import predict_port
+from floatframe.kernels.connections.coordinate import predict_coordinate
 from floatframe.kernels.connections.user_force import begin_states
 
 __all__ = ["begin_step"]
@@ -9,10 +9,10 @@ __all__ = ["begin_step"]
 
 @inner
 def begin_step(model, work, memory, h, alpha_f):
-    """Take the unknowns of the last step as known, move coordinates of ports by their rates, and prepare states."""
+    """Take the unknowns of the last step as known, move coordinates of elements by their rates, and prepare states."""
     for k in range(memory.w.shape[0]):
         work.state.w_start[k] = memory.w[k]
         work.state.w[k] = memory.w[k]
-    for p in range(model.ports.a.shape[0]):
-        predict_port(model, work, p, h)
+    for p in range(model.coordinates.a.shape[0]):
+        predict_coordinate(model, work, p, h)
     begin_states(model, work, memory, h, alpha_f)

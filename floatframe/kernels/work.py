@@ -248,8 +248,8 @@ def sizes_of(model: Model) -> dict[str, int]:
     """Return the sizes of all arrays of a system by name; `ValueError` if those of the model do not fit together."""
     bodies, markers, users = model.bodies, model.markers, model.users
     is_end = (markers.connection >= 0) & (markers.body >= 0)
-    n_ports = np.diff(model.networks.port0)[len(model.networks.core) - len(users.n_states) :]
-    n_in, n_out = 1 + 2 * n_ports + users.n_states, users.n_forces + users.n_states
+    n_coordinates = np.diff(model.elements.coordinate0)[len(model.elements.core) - len(users.n_states) :]
+    n_in, n_out = 1 + 2 * n_coordinates + users.n_states, users.n_forces + users.n_states
     return (
         measured(Model(), model)
         | state_sizes(model)

@@ -13,11 +13,11 @@ from floatframe.forces import UserForce
 from floatframe.results.trajectory import Trajectory
 from floatframe.system import System
 
-__all__ = ["PortMotion", "UserForceMotion", "coupler_motion", "user_force_motion"]
+__all__ = ["CouplerMotion", "UserForceMotion", "coupler_motion", "user_force_motion"]
 
 
 @dataclass(frozen=True, eq=False)
-class PortMotion:
+class CouplerMotion:
     """Coordinates of a coupler over time, in the order of its terms, and the forces along them."""
 
     t: Array  #: (n_t,) [s]
@@ -52,13 +52,13 @@ def user_force_motion(system: System, trajectory: Trajectory, name: str) -> User
     u = names.index(name)
     model, w, force = compiled_system(system).model, unknowns(system, trajectory), forces[u]
     k = len(system.couplers) + u
-    values = model.ports.row[model.networks.port0[k] : model.networks.port0[k + 1]]
+    values = model.coordinates.row[model.elements.coordinate0[k] : model.elements.coordinate0[k + 1]]
     states = model.states.row[model.users.state0[u] : model.users.state0[u + 1]]
     return UserForceMotion(
         trajectory.t,
         {each: w[:, row] for each, row in zip(force.coordinates, values, strict=True)},
         {each: w[:, row + 1] for each, row in zip(force.coordinates, values, strict=True)},
-        {each: w[:, model.networks.core[k] + j] for j, each in enumerate(force.forces)},
+        {each: w[:, model.elements.core[k] + j] for j, each in enumerate(force.forces)},
         {each: w[:, row] for each, row in zip(force.states, states, strict=True)},
     )
 
@@ -71,7 +71,7 @@ def unknowns(system: System, trajectory: Trajectory) -> Array:
     return w
 
 
-def coupler_motion(system: System, trajectory: Trajectory, name: str) -> PortMotion:
+def coupler_motion(system: System, trajectory: Trajectory, name: str) -> CouplerMotion:
     """Return the coordinates and forces of a coupler over a motion of the system.
 
     Raises
@@ -84,7 +84,7 @@ def coupler_motion(system: System, trajectory: Trajectory, name: str) -> PortMot
         raise ResultsError(f"coupler_motion: no coupler {quoted(name)}{nearest(name, names)}")
     model, w = compiled_system(system).model, unknowns(system, trajectory)
     k = names.index(name)
-    ports = slice(int(model.networks.port0[k]), int(model.networks.port0[k + 1]))
-    rows = model.ports.row[ports]
-    force = np.outer(w[:, model.networks.core[k]], model.ports.factor[ports])
-    return PortMotion(trajectory.t, w[:, rows], w[:, rows + 1], force)
+    places = slice(int(model.elements.coordinate0[k]), int(model.elements.coordinate0[k + 1]))
+    rows = model.coordinates.row[places]
+    force = np.outer(w[:, model.elements.core[k]], model.coordinates.factor[places])
+    return CouplerMotion(trajectory.t, w[:, rows], w[:, rows + 1], force)

@@ -273,7 +273,7 @@ def start_unknowns(model: Model, known: Array | None = None) -> Array:
     w[model.states.row] = model.states.start
     if known is not None:
         w[model.states.row] = known[model.states.row]
-        w[model.ports.row] = known[model.ports.row]
+        w[model.coordinates.row] = known[model.coordinates.row]
     return w
 
 
@@ -337,13 +337,13 @@ def velocity_correction(
     if not holds.any():
         return np.zeros(len(work.state.u))
     w = start_unknowns(model, known)
-    if len(model.ports.row):  # angles of couplers and user forces are those next to where their rates lead
+    if len(model.coordinates.row):  # angles of couplers and user forces are those next to where their rates lead
         work.state.time[...] = t
         set_iterate(work, state, w=w)
         linearized(model, work, 1.0, 0.0, 0.0)
         g = work.connections.g
-        w[model.ports.row] -= g[model.ports.row]
-        w[model.ports.row] += h * (w[model.ports.row + 1] - g[model.ports.row + 1])
+        w[model.coordinates.row] -= g[model.coordinates.row]
+        w[model.coordinates.row] += h * (w[model.coordinates.row + 1] - g[model.coordinates.row + 1])
     work.state.time[...] = t + h
     set_iterate(work, after, w=w)
     linearized(model, work, 1.0, 0.0, 0.0)

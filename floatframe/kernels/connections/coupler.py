@@ -1,17 +1,17 @@
-"""Coordinate couplers (gears): Σ a_p x_p - c(t) = 0 over the ports of a connection.
+"""Coordinate couplers (gears): Σ a_p x_p - c(t) = 0 over the coordinates of a connection.
 
-The multiplier lam is the last unknown; the force along port p is Q_p = a_p lam. The held row is divided by its
+The multiplier lam is the last unknown; the force along coordinate p is Q_p = a_p lam. The held row is divided by its
 largest coefficient (`row_x`), so that all rows have numbers of one size.
 """
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.element_coordinate import (
-    port_derivatives,
-    port_gradient,
-    port_motion,
-    port_rows,
-    port_second_rate,
-    port_tangent_rate,
+from floatframe.kernels.connections.coordinate import (
+    coordinate_derivatives,
+    coordinate_gradient,
+    coordinate_motion,
+    coordinate_rows,
+    coordinate_second_rate,
+    coordinate_tangent_rate,
 )
 from floatframe.kernels.joints.relative_motion import prescribed
 
@@ -22,14 +22,14 @@ __all__ = ["coupler_derivatives", "coupler_power", "coupler_rates", "coupler_row
 def coupler_rows(model, work, c, c_k):
     """Write the residual of coupler c, and its wrenches."""
     i = model.connections.item[c]
-    k = model.networks.core[i]
+    k = model.elements.core[i]
     lam = work.state.w[k]
     held, _, _ = prescribed(model, work, k)
     total = -held
-    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
-        factor = model.ports.factor[p]
-        port_rows(model, work, p, factor * lam, c_k)
-        x, _ = port_motion(model, work, p)
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        factor = model.coordinates.factor[p]
+        coordinate_rows(model, work, p, factor * lam, c_k)
+        x, _ = coordinate_motion(model, work, p)
         total += factor * x
     work.connections.g[k] = model.rows.x[k, 0] * total
 
@@ -38,33 +38,33 @@ def coupler_rows(model, work, c, c_k):
 def coupler_derivatives(model, work, c, c_k):
     """Write P at the markers and V of coupler c."""
     i, size = model.connections.item[c], model.connections.size[c]
-    k = model.networks.core[i]
+    k = model.elements.core[i]
     V = work.connections.V[c]
     for r in range(size):
         for j in range(size):
             V[r, j] = 0.0
-        for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
+        for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
             for j in range(12):
-                work.connections.P[model.ports.a[p], r, j] = 0.0
-                work.connections.P[model.ports.b[p], r, j] = 0.0
-    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
-        factor = model.ports.factor[p]
-        port_derivatives(model, work, c, p, factor * work.state.w[k], k, factor, c_k)
-        port_gradient(model, work, p, k - model.connections.w0[c], factor * model.rows.x[k, 0], 0.0)
+                work.connections.P[model.coordinates.a[p], r, j] = 0.0
+                work.connections.P[model.coordinates.b[p], r, j] = 0.0
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        factor = model.coordinates.factor[p]
+        coordinate_derivatives(model, work, c, p, factor * work.state.w[k], k, factor, c_k)
+        coordinate_gradient(model, work, p, k - model.connections.w0[c], factor * model.rows.x[k, 0], 0.0)
 
 
 @inner
 def coupler_rates(model, work, c, rate, bias):
     """Write the rate of the held row of coupler c, and its second rate at zero u_dot."""
     i = model.connections.item[c]
-    k = model.networks.core[i]
+    k = model.elements.core[i]
     _, first, second = prescribed(model, work, k)
     first, second = -first, -second
-    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
-        factor = model.ports.factor[p]
-        first += factor * port_tangent_rate(model, work, p)
-        second += factor * port_second_rate(
-            model, work, p, work.markers.bias[model.ports.a[p]], work.markers.bias[model.ports.b[p]]
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        factor = model.coordinates.factor[p]
+        first += factor * coordinate_tangent_rate(model, work, p)
+        second += factor * coordinate_second_rate(
+            model, work, p, work.markers.bias[model.coordinates.a[p]], work.markers.bias[model.coordinates.b[p]]
         )
     rate[k], bias[k] = model.rows.x[k, 0] * first, model.rows.x[k, 0] * second
 
@@ -72,6 +72,6 @@ def coupler_rates(model, work, c, rate, bias):
 @inner
 def coupler_power(model, work, c):
     """Return the power that enters where the constant of the coupler changes with time: lam dc/dt."""
-    k = model.networks.core[model.connections.item[c]]
+    k = model.elements.core[model.connections.item[c]]
     _, first, _ = prescribed(model, work, k)
     return work.state.w[k] * first

@@ -1,6 +1,6 @@
-"""User forces: Q = f(t, x, v, z) along ports, and states z with z_dot = g(t, x, v, z) integrated with the motion.
+"""User forces: Q = f(t, x, v, z) along coordinates, and states z with z_dot = g(t, x, v, z) integrated with the motion.
 
-Rows after those of the ports: the forces, then for each state its value, its rate and an algorithmic rate a,
+Rows after those of the coordinates: the forces, then for each state its value, its rate and an algorithmic rate a,
 
     Q - f = 0;   z - b - kappa g' = 0,   g' - g = 0,   a - b' - rho g' = 0        (g': the rate as an unknown)
 
@@ -9,7 +9,12 @@ with b, b', kappa and rho of the generalized-alpha method for first-order equati
 
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.compiler.user_call import call_user_function
-from floatframe.kernels.connections.element_coordinate import port_derivatives, port_gradient, port_motion, port_rows
+from floatframe.kernels.connections.coordinate import (
+    coordinate_derivatives,
+    coordinate_gradient,
+    coordinate_motion,
+    coordinate_rows,
+)
 from floatframe.kernels.connections.tape import tape_gradient, tape_value
 
 __all__ = ["begin_states", "resize_states", "user_force_derivatives", "user_force_power", "user_force_rows"]
@@ -19,23 +24,23 @@ LEAST_STEP = 1e-9
 
 
 @inner
-def network_of(model, c):
-    """Return the number of user force c among all networks (couplers come first)."""
-    return model.connections.item[c] + model.networks.port0.shape[0] - 1 - model.users.n_states.shape[0]
+def element_of(model, c):
+    """Return the number of user force c among all elements (couplers come first)."""
+    return model.connections.item[c] + model.elements.coordinate0.shape[0] - 1 - model.users.n_states.shape[0]
 
 
 @inner
 def gather_inputs(model, work, c):
-    """Write t, x, v, z into work.users.inputs; return the numbers of ports and of inputs."""
-    i, u = network_of(model, c), model.connections.item[c]
-    first, last = model.networks.port0[i], model.networks.port0[i + 1]
+    """Write t, x, v, z into work.users.inputs; return the numbers of coordinates and of inputs."""
+    i, u = element_of(model, c), model.connections.item[c]
+    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
     n = last - first
     work.users.inputs[0] = work.state.time
     for p in range(first, last):
-        x, v = port_motion(model, work, p)
+        x, v = coordinate_motion(model, work, p)
         work.users.inputs[1 + p - first] = x
         work.users.inputs[1 + n + p - first] = v
-    row = model.networks.core[i] + model.users.n_forces[u]
+    row = model.elements.core[i] + model.users.n_forces[u]
     for s in range(model.users.n_states[u]):
         work.users.inputs[1 + 2 * n + s] = work.state.w[row + 3 * s]
     return n, 1 + 2 * n + model.users.n_states[u]
@@ -43,7 +48,7 @@ def gather_inputs(model, work, c):
 
 @inner
 def user_values(model, work, c):
-    """Write forces and rates of states into work.users.outputs; return the numbers of ports, inputs and outputs."""
+    """Write forces and rates of states into work.users.outputs; return how many coordinates, inputs and outputs."""
     u = model.connections.item[c]
     n, n_in = gather_inputs(model, work, c)
     n_out = model.users.n_forces[u] + model.users.n_states[u]
@@ -82,11 +87,11 @@ def user_gradients(model, work, c):
 @inner
 def user_force_rows(model, work, c, c_k):
     """Write the residual of user force c, and its wrenches."""
-    i, u = network_of(model, c), model.connections.item[c]
-    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
-        port_rows(model, work, p, work.state.w[model.ports.core[p]], c_k)
+    i, u = element_of(model, c), model.connections.item[c]
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        coordinate_rows(model, work, p, work.state.w[model.coordinates.core[p]], c_k)
     user_values(model, work, c)
-    k = model.networks.core[i]
+    k = model.elements.core[i]
     for j in range(model.users.n_forces[u]):
         work.connections.g[k + j] = c_k * (work.state.w[k + j] - work.users.outputs[j])
     k += model.users.n_forces[u]
@@ -102,27 +107,28 @@ def user_force_rows(model, work, c, c_k):
 @inner
 def user_force_derivatives(model, work, c, c_k):
     """Write P at the markers and V of user force c."""
-    i, u, size, w0 = network_of(model, c), model.connections.item[c], model.connections.size[c], model.connections.w0[c]
-    first, last = model.networks.port0[i], model.networks.port0[i + 1]
+    i, u, size, w0 = element_of(model, c), model.connections.item[c], model.connections.size[c], model.connections.w0[c]
+    first, last = model.elements.coordinate0[i], model.elements.coordinate0[i + 1]
     V = work.connections.V[c]
     for r in range(size):
         for j in range(size):
             V[r, j] = 0.0
         for p in range(first, last):
             for j in range(12):
-                work.connections.P[model.ports.a[p], r, j] = 0.0
-                work.connections.P[model.ports.b[p], r, j] = 0.0
+                work.connections.P[model.coordinates.a[p], r, j] = 0.0
+                work.connections.P[model.coordinates.b[p], r, j] = 0.0
     for p in range(first, last):
-        port_derivatives(model, work, c, p, work.state.w[model.ports.core[p]], model.ports.core[p], 1.0, c_k)
+        k = model.coordinates.core[p]
+        coordinate_derivatives(model, work, c, p, work.state.w[k], k, 1.0, c_k)
     n, n_in, n_out = user_gradients(model, work, c)
     n_forces, n_states = model.users.n_forces[u], model.users.n_states[u]
-    core = model.networks.core[i] - w0
+    core = model.elements.core[i] - w0
     for j in range(n_out):
         r = core + j if j < n_forces else core + n_forces + 3 * (j - n_forces) + 1
         V[r, r] = 1.0
         slopes = work.users.gradients[j * n_in : (j + 1) * n_in]
         for p in range(first, last):
-            port_gradient(model, work, p, r, -c_k * slopes[1 + p - first], -c_k * slopes[1 + n + p - first])
+            coordinate_gradient(model, work, p, r, -c_k * slopes[1 + p - first], -c_k * slopes[1 + n + p - first])
         for s in range(n_states):
             V[r, core + n_forces + 3 * s] -= slopes[1 + 2 * n + s]
     for s in range(n_states):
@@ -134,12 +140,12 @@ def user_force_derivatives(model, work, c, c_k):
 @inner
 def user_force_power(model, work, c):
     """Return the power of user force c on the bodies."""
-    i = network_of(model, c)
+    i = element_of(model, c)
     total = 0.0
-    for p in range(model.networks.port0[i], model.networks.port0[i + 1]):
-        if model.ports.force[p] >= 0:
-            _, v = port_motion(model, work, p)
-            total += work.state.w[model.ports.core[p]] * v
+    for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
+        if model.coordinates.force[p] >= 0:
+            _, v = coordinate_motion(model, work, p)
+            total += work.state.w[model.coordinates.core[p]] * v
     return total
 
 

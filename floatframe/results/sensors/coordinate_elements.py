@@ -36,7 +36,7 @@ class CouplerSensor:
         for k, is_angle in enumerate(angles_of(system, names.index(self.of))):
             own = (f"value {k + 1}", f"rate {k + 1}", f"force {k + 1}")
             columns |= dict(zip(own, (found.value[:, k], found.rate[:, k], found.force[:, k]), strict=True))
-            units |= dict(zip(own, port_units(system, is_angle), strict=True))
+            units |= dict(zip(own, coordinate_units(system, is_angle), strict=True))
         return Measurement(self.name, trajectory.t, columns, units)
 
 
@@ -59,7 +59,7 @@ class ControlSensor:
         columns: dict[str, Array] = {}
         units: dict[str, str] = {}
         for name, is_angle in zip(forces[k].coordinates, angles_of(system, len(system.couplers) + k), strict=True):
-            value, rate, force = port_units(system, is_angle)
+            value, rate, force = coordinate_units(system, is_angle)
             columns |= {name: found.value[name], f"{name}_dot": found.rate[name]}
             units |= {name: value, f"{name}_dot": rate}
             if name in found.force:
@@ -72,11 +72,11 @@ class ControlSensor:
 def angles_of(system: System, k: int) -> list[bool]:
     """Return which coordinates of coupler or user force number k are angles."""
     model = compiled_system(system).model
-    rows = model.ports.row[model.networks.port0[k] : model.networks.port0[k + 1]]
+    rows = model.coordinates.row[model.elements.coordinate0[k] : model.elements.coordinate0[k + 1]]
     return [kind_of(code).is_angle for code in model.rows.kind[rows]]
 
 
-def port_units(system: System, is_angle: bool) -> tuple[str, str, str]:
+def coordinate_units(system: System, is_angle: bool) -> tuple[str, str, str]:
     """Return the units of value, rate and force of a coordinate."""
     words = ("angle", "angular speed", "moment") if is_angle else ("length", "speed", "force")
     value, rate, force = (unit_words(system.units, word) for word in words)

@@ -1,15 +1,15 @@
-"""Ports: coordinates of joints or markers through which couplers and user forces see and move the system.
+"""Coordinates of joints or markers through which couplers and user forces see and move the system.
 
-A port has a value x, its rate v and a force Q that acts to increase x (its power is Q v). With d = r_B - r_A and e an
-axis of A:
+A coordinate has a value x, its rate v and a force Q that acts to increase x (its power is Q v). With d = r_B - r_A and
+e an axis of A:
 
     PUSH     x = e · d             v = e · (v_B - v_A - omega_A × d)     force Q e on B at its point
     TWIST    x angle of B about e  v = e · (omega_B - omega_A)           torque Q e on B
     TWIST_B  the same about an axis of B
     SPAN     x = |d|               v = d · (v_B - v_A)/|d|               force Q d/|d| on B
 
-and the opposite on A. Rows of a port, in this order: x and v as unknowns (angles then go on beyond a turn: the one
-nearest to the value before), the force or torque on A (3), and where a PUSH has A on a body the moment on A (3),
+and the opposite on A. Rows of a coordinate, in this order: x and v as unknowns (angles then go on beyond a turn: the
+one nearest to the value before), the force or torque on A (3), and where a PUSH has A on a body the moment on A (3),
 
     X - x = 0,   v' - v = 0,   F + Q e = 0,   M - d × F = 0.
 """
@@ -29,20 +29,20 @@ from floatframe.kernels.joints.relative_motion import (
 from floatframe.kernels.vector import add, cross, dot, norm, put, put_sum, scaled, sub, unit, vector
 
 __all__ = [
-    "port_derivatives",
-    "port_gradient",
-    "port_motion",
-    "port_rows",
-    "port_second_rate",
-    "port_tangent_rate",
-    "predict_port",
+    "coordinate_derivatives",
+    "coordinate_gradient",
+    "coordinate_motion",
+    "coordinate_rows",
+    "coordinate_second_rate",
+    "coordinate_tangent_rate",
+    "predict_coordinate",
 ]
 
 
 @inner
-def port_line(model, work, p):
-    """Return the direction in which the force of port p acts, ground axes."""
-    a, b, k = model.ports.a[p], model.ports.b[p], model.ports.row[p]
+def force_direction(model, work, p):
+    """Return the direction in which the force of coordinate p acts, ground axes."""
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     if model.rows.kind[k] == SPAN:
         d = distance(work, a, b)
         return scaled(1 / norm(d), d)
@@ -63,11 +63,11 @@ def turning_gradient(model, work, k, a, b):
 
 
 @inner
-def port_motion(model, work, p):
-    """Return value and rate of port p; an angle is the one nearest to the unknown X."""
-    a, b, k = model.ports.a[p], model.ports.b[p], model.ports.row[p]
+def coordinate_motion(model, work, p):
+    """Return value and rate of coordinate p; an angle is the one nearest to the unknown X."""
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     if model.rows.kind[k] == SPAN:
-        e = port_line(model, work, p)
+        e = force_direction(model, work, p)
         return dot(e, distance(work, a, b)), dot(e, relative_velocity(work, a, b))
     x, v = loaded_coordinate(model, work, k, a, b)
     if model.rows.kind[k] != PUSH:
@@ -76,25 +76,25 @@ def port_motion(model, work, p):
 
 
 @inner
-def predict_port(model, work, p, h):
-    """Move the unknown X of port p by its rate, so that a fast angle is followed."""
-    k = model.ports.row[p]
+def predict_coordinate(model, work, p, h):
+    """Move the unknown X of coordinate p by its rate, so that a fast angle is followed."""
+    k = model.coordinates.row[p]
     work.state.w[k] += h * work.state.w[k + 1]
 
 
 @inner
-def port_rows(model, work, p, Q, c_k):
-    """Write the rows of port p with force Q, and its wrench on both markers."""
-    a, b, k = model.ports.a[p], model.ports.b[p], model.ports.row[p]
+def coordinate_rows(model, work, p, Q, c_k):
+    """Write the rows of coordinate p with force Q, and its wrench on both markers."""
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     g, w, wrench = work.connections.g, work.state.w, work.markers.wrench
-    x, v = port_motion(model, work, p)
+    x, v = coordinate_motion(model, work, p)
     g[k] = c_k * (w[k] - x)
     g[k + 1] = c_k * (w[k + 1] - v)
-    f, m = model.ports.force[p], model.ports.arm[p]
+    f, m = model.coordinates.force[p], model.coordinates.arm[p]
     if f < 0:
         return
     F = vector(w[f:])
-    put(g, f, scaled(c_k, add(F, scaled(Q, port_line(model, work, p)))))
+    put(g, f, scaled(c_k, add(F, scaled(Q, force_direction(model, work, p)))))
     first = 0 if model.markers.force[a] >= 0 else 3
     put_sum(wrench[a], first, F)
     put_sum(wrench[b], first, scaled(-1.0, F))
@@ -112,11 +112,11 @@ def add_pair(P_a, P_b, r, column, x):
 
 
 @inner
-def port_gradient(model, work, p, r, by_x, by_v):
-    """Add by_x dx + by_v dv of port p to row r of P at both markers; see kernels/joints/loaded_rows.py."""
-    a, b, k = model.ports.a[p], model.ports.b[p], model.ports.row[p]
+def coordinate_gradient(model, work, p, r, by_x, by_v):
+    """Add by_x dx + by_v dv of coordinate p to row r of P at both markers; see kernels/joints/loaded_rows.py."""
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     P_a, P_b, kind = work.connections.P[a], work.connections.P[b], model.rows.kind[k]
-    e, d = port_line(model, work, p), distance(work, a, b)
+    e, d = force_direction(model, work, p), distance(work, a, b)
     if kind == SPAN:
         v = relative_velocity(work, a, b)
         across = sub(v, scaled(dot(e, v), e))
@@ -137,18 +137,18 @@ def port_gradient(model, work, p, r, by_x, by_v):
 
 
 @inner
-def port_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
-    """Write the rows of P and V of port p, of connection c, whose force is Q = by_unknown w[column]."""
-    a, b, k, w0 = model.ports.a[p], model.ports.b[p], model.ports.row[p], model.connections.w0[c]
+def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
+    """Write the rows of P and V of coordinate p, of connection c, whose force is Q = by_unknown w[column]."""
+    a, b, k, w0 = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p], model.connections.w0[c]
     P_a, P_b, V = work.connections.P[a], work.connections.P[b], work.connections.V[c]
     r = k - w0
     V[r, r], V[r + 1, r + 1] = 1.0, 1.0
-    port_gradient(model, work, p, r, -c_k, 0.0)
-    port_gradient(model, work, p, r + 1, 0.0, -c_k)
-    f, m = model.ports.force[p], model.ports.arm[p]
+    coordinate_gradient(model, work, p, r, -c_k, 0.0)
+    coordinate_gradient(model, work, p, r + 1, 0.0, -c_k)
+    f, m = model.coordinates.force[p], model.coordinates.arm[p]
     if f < 0:
         return
-    e, d, kind = port_line(model, work, p), distance(work, a, b), model.rows.kind[k]
+    e, d, kind = force_direction(model, work, p), distance(work, a, b), model.rows.kind[k]
     P = P_b if kind == TWIST_B else P_a
     for i in range(3):  # row of F + Q e along an axis of the ground
         axis, r = unit(i), f - w0 + i
@@ -169,23 +169,23 @@ def port_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
 
 
 @inner
-def port_tangent_rate(model, work, p):
-    """Return the rate of port p as its gradient gives it; of an angle between axes that are not parallel not v."""
-    a, b, k = model.ports.a[p], model.ports.b[p], model.ports.row[p]
+def coordinate_tangent_rate(model, work, p):
+    """Return the rate of coordinate p as its gradient gives it; of an angle between axes not parallel it is not v."""
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     if model.rows.kind[k] == SPAN or model.rows.kind[k] == PUSH:
-        _, v = port_motion(model, work, p)
+        _, v = coordinate_motion(model, work, p)
         return v
     return -dot(turning_gradient(model, work, k, a, b), relative_rotation(work, a, b))
 
 
 @inner
-def port_second_rate(model, work, p, bias_a, bias_b):
-    """Return the second rate of port p for given accelerations (6) of both markers; angles: of parallel axes."""
-    a, b, k = model.ports.a[p], model.ports.b[p], model.ports.row[p]
+def coordinate_second_rate(model, work, p, bias_a, bias_b):
+    """Return the second rate of coordinate p for given accelerations (6) of both markers; angles: of parallel axes."""
+    a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     kind = model.rows.kind[k]
     if kind != SPAN and kind != PUSH:
         return -dot(turning_gradient(model, work, k, a, b), sub(bias_b[3:], bias_a[3:]))
-    e, d, v = port_line(model, work, p), distance(work, a, b), relative_velocity(work, a, b)
+    e, d, v = force_direction(model, work, p), distance(work, a, b), relative_velocity(work, a, b)
     along = dot(e, sub(bias_b, bias_a))
     if kind == SPAN:
         return along + (dot(v, v) - dot(e, v) ** 2) / dot(e, d)
