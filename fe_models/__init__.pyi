@@ -25,6 +25,7 @@ from .errors import FeModelsError as FeModelsError
 from .errors import InterfaceError as InterfaceError
 from .errors import LoadError as LoadError
 from .errors import MaterialError as MaterialError
+from .errors import MatrixError as MatrixError
 from .errors import MeshError as MeshError
 from .errors import SectionError as SectionError
 from .errors import ShellError as ShellError
@@ -32,6 +33,8 @@ from .errors import UnitsError as UnitsError
 from .foundation.units import UNIT_SYSTEMS as UNIT_SYSTEMS
 from .foundation.units import Units as Units
 from .foundation.units import unit_system as unit_system
+from .importers.matrices.foreign_matrices import ForeignMatrices as ForeignMatrices
+from .importers.matrices.read_matrices import read_matrices as read_matrices
 from .importers.read_mesh import read_line_mesh as read_line_mesh
 from .importers.read_mesh import read_mesh as read_mesh
 from .importers.read_mesh import read_shell_mesh as read_shell_mesh

@@ -9,6 +9,7 @@ __all__ = [
     "InterfaceError",
     "LoadError",
     "MaterialError",
+    "MatrixError",
     "MeshError",
     "SectionError",
     "ShellError",
@@ -18,6 +19,10 @@ __all__ = [
 
 class MeshError(FeModelsError, ValueError):
     """A mesh cannot be read truthfully, or is not fit for a finite element model."""
+
+
+class MatrixError(FeModelsError, ValueError):
+    """Matrices of another program cannot be read truthfully, or lack what a body needs."""
 
 
 class MaterialError(FeModelsError, ValueError):

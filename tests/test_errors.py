@@ -26,6 +26,7 @@ CAUGHT = {
         name: (FeModelsError, ValueError)
         for name in (
             "MeshError", "MaterialError", "SectionError", "BeamError", "ShellError", "InterfaceError", "LoadError",
+            "MatrixError",
         )
     },
     "floatframe.errors": {

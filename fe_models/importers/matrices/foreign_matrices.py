@@ -1,0 +1,206 @@
+"""What the files of another program say of mass and stiffness, before it is judged: one record for all readers."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.errors import MatrixError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
+
+__all__ = ["SCALAR", "ForeignMatrices", "pair_keys"]
+
+SCALAR = -1  #: component of a dof without place: a scalar point, a modal coordinate
+TRIANGLES = ("both", "lower", "upper", "diagonal")
+ROLES = ("K", "M", "D")
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ForeignMatrices:
+    """Matrices, the dofs of their rows and the nodes behind them, as far as files say it.
+
+    A reader of one file fills what that file knows and leaves the rest; `joined` puts the files of a model together.
+    Matrices are full: a reader that meets one stored triangle mirrors it, and says in `triangle` which it was.
+
+    Raises
+    ------
+    MatrixError
+        If shapes do not fit together.
+    """
+
+    K: sp.csc_array | None = None  #: stiffness, (n_dof, n_dof)
+    M: sp.csc_array | None = None  #: mass, (n_dof, n_dof)
+    D: sp.csc_array | None = None  #: viscous damping, (n_dof, n_dof)
+    dofs: IntArray | None = None  #: (node number, component 0-5 or `SCALAR`) of every row, (n_dof, 2); None: not said
+    node_numbers: IntArray | None = None  #: of `nodes`, (n_nodes,)
+    nodes: Array | None = None  #: positions in the basic axes of the model, (n_nodes, 3); None: not said
+    #: node number -> R, (3, 3): columns are the axes, in basic axes, in which its dofs are written; others: basic axes
+    systems: Mapping[int, Array] = field(default_factory=dict)
+    loads: Mapping[str, Array] = field(default_factory=dict)  #: name -> forces over the rows, (n_dof,)
+    others: Mapping[str, Any] = field(default_factory=dict)  #: further matrices of the files by name, as they stand
+    triangle: Mapping[str, str] = field(
+        default_factory=dict
+    )  #: matrix -> what was stored: both, lower, upper, diagonal
+    constrained: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: rows that are held, (n,)
+    removed: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: dofs without rows as they are held
+    program: str = ""  #: that wrote the files, as far as they say
+    files: Mapping[str, str] = field(default_factory=dict)  #: path -> sha256
+    notes: tuple[str, ...] = ()  #: what was left out, changed or assumed, in words
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        n = None
+        for role in ROLES:
+            matrix = getattr(self, role)
+            if matrix is None:
+                continue
+            matrix = sp.csc_array(matrix)
+            put(self, role, matrix)
+            if matrix.shape[0] != matrix.shape[1]:
+                raise MatrixError(f"{role}: expected a square matrix, got {matrix.shape[0]} x {matrix.shape[1]}")
+            if n is not None and matrix.shape[0] != n:
+                raise MatrixError(f"{role}: expected {n} rows as the matrix before it, got {matrix.shape[0]}")
+            n = matrix.shape[0]
+        if self.dofs is not None:
+            put(self, "dofs", frozen_int(self.dofs))
+            if self.dofs.ndim != 2 or self.dofs.shape[1] != 2:
+                raise MatrixError(f"dofs: expected (node, component) of every row, got shape {self.dofs.shape}")
+            if n is not None and len(self.dofs) != n:
+                raise MatrixError(f"dofs: expected {n}, one for each row of the matrices, got {len(self.dofs)}")
+            if len(self.dofs) and not (SCALAR <= self.dofs[:, 1].min() and self.dofs[:, 1].max() <= 5):
+                raise MatrixError(
+                    f"dofs: expected components 0 to 5, got {self.dofs[:, 1].min()} to {self.dofs[:, 1].max()}"
+                )
+            n = len(self.dofs)
+        if (self.nodes is None) != (self.node_numbers is None):
+            raise MatrixError("nodes: expected positions and numbers of the nodes together, got one of them")
+        if self.nodes is not None and self.node_numbers is not None:
+            put(self, "nodes", frozen(self.nodes))
+            put(self, "node_numbers", frozen_int(self.node_numbers))
+            if self.nodes.shape != (len(self.node_numbers), 3):
+                raise MatrixError(
+                    f"nodes: expected ({len(self.node_numbers)}, 3) positions, one for each number, got "
+                    f"{self.nodes.shape}"
+                )
+        for name, load in self.loads.items():
+            if n is not None and np.shape(load) != (n,):
+                raise MatrixError(f"load {name!r}: expected {n} forces, one for each row, got shape {np.shape(load)}")
+        for name in ("loads", "systems"):
+            put(self, name, FrozenMapping({key: frozen(value) for key, value in getattr(self, name).items()}))
+        for name in ("others", "triangle", "files"):
+            put(self, name, FrozenMapping(dict(getattr(self, name))))
+        put(self, "constrained", frozen_int(self.constrained))
+        put(self, "removed", frozen_int(np.reshape(self.removed, (-1, 2))))
+        put(self, "notes", tuple(self.notes))
+
+    @property
+    def n_dof(self) -> int | None:
+        """Number of rows; None where only nodes are known."""
+        for role in ROLES:
+            if (matrix := getattr(self, role)) is not None:
+                return int(matrix.shape[0])
+        return None if self.dofs is None else len(self.dofs)
+
+
+def pair_keys(dofs: IntArray) -> IntArray:
+    """Return one number for each (node number, component), (n,), to find them in each other's lists."""
+    return np.asarray(dofs[:, 0] * 8 + dofs[:, 1], dtype=np.int64)
+
+
+def joined(parts: Iterable[ForeignMatrices], where: str) -> ForeignMatrices:
+    """Put together what several files say of one model.
+
+    (1) each matrix from the one file that has it; rows in the order of the first file that names their dofs
+    (2) rows that another file lacks are zero there (dofs without mass), of which a note tells
+    (3) nodes, systems, loads, notes and files are gathered
+
+    Raises
+    ------
+    MatrixError
+        If two files have the same matrix, or their rows do not fit.
+    """
+    parts = list(parts)
+    dofs = order_of(parts, where)  # (1)
+    matrices: dict[str, sp.csc_array] = {}
+    loads: dict[str, Array] = {}
+    notes: list[str] = []
+    constrained = [np.zeros(0, np.int64)]
+    for part in parts:
+        place = None if dofs is None or part.dofs is None else rows_in(dofs, part.dofs)
+        for role in ROLES:
+            matrix = getattr(part, role)
+            if matrix is None:
+                continue
+            if role in matrices:
+                raise MatrixError(f"{where}: {role} is in two of the files; expected each matrix once")
+            matrices[role] = matrix if place is None else placed(matrix, place, len(dofs))  # type: ignore[arg-type]
+            if place is not None and len(place) < len(dofs):  # type: ignore[arg-type]
+                notes.append(f"{len(dofs) - len(place)} rows that {role} lacks are zero there")  # type: ignore[arg-type] # (2)
+        for name, load in part.loads.items():
+            whole = load if place is None else np.zeros(len(dofs))  # type: ignore[arg-type]
+            if place is not None:
+                whole[place] = load
+            loads[name] = whole
+        constrained.append(part.constrained if place is None else place[part.constrained])
+        notes += part.notes
+    sizes = {role: matrix.shape[0] for role, matrix in matrices.items()}
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{role} {n}" for role, n in sizes.items())
+        raise MatrixError(f"{where}: expected matrices with the same rows, got {listed} rows; are they of one model?")
+    if dofs is not None and sizes and len(dofs) not in sizes.values():
+        raise MatrixError(
+            f"{where}: expected a list of {next(iter(sizes.values()))} dofs, one for each row, got {len(dofs)}; are "
+            "they of one model?"
+        )
+    with_nodes = [part for part in parts if part.nodes is not None]
+    return ForeignMatrices(
+        K=matrices.get("K"),
+        M=matrices.get("M"),
+        D=matrices.get("D"),
+        dofs=dofs,
+        nodes=with_nodes[0].nodes if with_nodes else None,
+        node_numbers=with_nodes[0].node_numbers if with_nodes else None,
+        systems={number: R for part in parts for number, R in part.systems.items()},
+        loads=loads,
+        others={name: value for part in parts for name, value in part.others.items()},
+        triangle={role: stored for part in parts for role, stored in part.triangle.items()},
+        constrained=np.unique(np.concatenate(constrained)),
+        removed=np.unique(np.concatenate([part.removed for part in parts]), axis=0),
+        program=", ".join(dict.fromkeys(part.program for part in parts if part.program)),
+        files={path: digest for part in parts for path, digest in part.files.items()},
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def order_of(parts: list[ForeignMatrices], where: str) -> IntArray | None:
+    """Return the dofs of all files in the order of the file with the most; None if no file names them."""
+    named = [part.dofs for part in parts if part.dofs is not None]
+    if not named:
+        return None
+    order = max(named, key=len)
+    for other in named:
+        if not np.isin(pair_keys(other), pair_keys(order)).all():
+            raise MatrixError(
+                f"{where}: the files name different dofs: {len(other)} in one, {len(order)} in another, and some of "
+                "the first are not in the second; are they of one model?"
+            )
+    return order
+
+
+def rows_in(dofs: IntArray, wanted: IntArray) -> IntArray:
+    """Return the rows of wanted dofs in a list that has all of them."""
+    keys = pair_keys(dofs)
+    order = np.argsort(keys)
+    return np.asarray(order[np.searchsorted(keys[order], pair_keys(wanted))])
+
+
+def placed(matrix: sp.csc_array, rows: IntArray, n: int) -> sp.csc_array:
+    """Return a matrix with its rows and columns at other places of a larger one."""
+    if len(rows) == n and np.array_equal(rows, np.arange(n)):
+        return matrix
+    entries = sp.coo_array(matrix)
+    return sp.csc_array((entries.data, (rows[entries.row], rows[entries.col])), shape=(n, n))

@@ -1,0 +1,115 @@
+"""One door for matrix files: formats by suffix and content, several files that make one model, one error."""
+
+import hashlib
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from fe_models.errors import FeModelsError, MatrixError
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.words import nearest, quoted
+from fe_models.importers.matrices.abaqus_text import is_coordinates, read_coordinates
+from fe_models.importers.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
+from fe_models.importers.matrices.request import MatrixFormat, Request
+
+__all__ = ["MATRIX_FORMATS", "MatrixFiles", "read_matrices"]
+
+HEAD = 4096  #: bytes by which the format of a file is told
+
+MATRIX_FORMATS: tuple[MatrixFormat, ...] = (
+    MatrixFormat("Abaqus matrix (COORDINATE)", (".mtx",), read_coordinates, is_coordinates),
+)  #: every format that is read; of those with one suffix the first that knows the content
+
+MatrixFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]  #: one file, several, or role -> file
+
+
+def read_matrices(files: MatrixFiles, *, names: Mapping[str, str] | None = None) -> ForeignMatrices:
+    """Read mass and stiffness of one model from files of another program.
+
+    Parameters
+    ----------
+    files
+        One path; several, each with a part of the model (stiffness, mass, list of dofs); or role -> path, with roles
+        "K", "M", "D" where a file does not say which matrix it holds, and "dofs" for a list of rows.
+    names
+        Role -> name of its matrix, for files that hold several by name and not under the usual ones.
+
+    Returns
+    -------
+    ForeignMatrices
+        All that the files say, rows in basic axes; what is missing is None.
+
+    Raises
+    ------
+    MatrixError
+        If a file is missing, damaged, of an unknown kind, or could only be read with another meaning than its own
+        program gives it; if the files do not fit together.
+    """
+    if isinstance(files, (str, Path)):
+        listed: list[tuple[str | None, Path]] = [(None, Path(files))]
+    elif isinstance(files, Mapping):
+        listed = [(role, Path(path)) for role, path in files.items()]
+    else:
+        listed = [(None, Path(path)) for path in files]
+    if not listed:
+        raise MatrixError("matrices: expected at least one file, got none")
+    for asked in (names or {}, {role: None for role, _ in listed if role}):
+        for role in asked:
+            if role not in (*ROLES, "dofs"):
+                raise MatrixError(f"matrices: unknown role {quoted(role)}{nearest(role, (*ROLES, 'dofs'))}")
+    parts = [read_part(path, Request(role, dict(names or {}))) for role, path in listed]
+    where = f"matrices {', '.join(path.name for _, path in listed)}"
+    return joined(parts, where)
+
+
+def read_part(path: Path, request: Request) -> ForeignMatrices:
+    """Read what one file says; whatever is wrong with it becomes one message."""
+    where = f"matrices {path}"
+    if not path.exists():
+        raise MatrixError(f"{where}: there is no such file{near_file(path)}")
+    if path.is_dir():
+        raise MatrixError(f"{where}: expected a file, got a directory")
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except OSError as error:
+        raise MatrixError(f"{where}: cannot be read: {error.strerror or error}") from error
+    if not head.strip():
+        raise MatrixError(f"{where}: the file is empty")
+    form = format_of(where, path, head)
+    try:
+        part = form.read(path, request)
+    except FeModelsError:
+        raise
+    except MemoryError as error:
+        size = os.path.getsize(path)
+        raise MatrixError(f"{where}: not enough memory to read {size / 1e6:.0f} MB as {form.name}") from error
+    except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
+        text = str(error).strip().splitlines()
+        raise MatrixError(
+            f"{where}: could not be read as {form.name}: it is damaged or of another kind "
+            f"({type(error).__name__}{': ' + text[0][:200] if text else ''})"
+        ) from error
+    return replace(part, files={**part.files, str(path): digest_of(path)})
+
+
+def format_of(where: str, path: Path, head: bytes) -> MatrixFormat:
+    """Return the format of a file: by its suffix, and by its content where several share one."""
+    suffix = path.suffix.lower()
+    mine = [form for form in MATRIX_FORMATS if suffix in form.suffixes]
+    if not mine:
+        known = sorted({suffix for form in MATRIX_FORMATS for suffix in form.suffixes})
+        raise MatrixError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, known)}")
+    for form in mine:
+        if form.is_it(head):
+            return form
+    raise MatrixError(
+        f"{where}: expected {' or '.join(form.name for form in mine)}, got a file that begins with {quoted(head[:30])}"
+    )
+
+
+def digest_of(path: Path) -> str:
+    """Return the sha256 of a file, read in pieces."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

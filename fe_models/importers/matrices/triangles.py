@@ -1,0 +1,112 @@
+"""Full symmetric matrices from what files store: both triangles, one of them, or each pair once."""
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.errors import MatrixError
+from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, symmetry_defect
+
+__all__ = ["LARGEST", "full_matrix", "require_size", "stored_as"]
+
+LARGEST = 10_000_000  #: rows that are believed without looking; beyond, a file has at least a byte for each
+
+
+def require_size(where: str, n_rows: int, n_bytes: int) -> None:
+    """Raise `MatrixError` if a header speaks of more rows than its file can hold, before any memory is taken."""
+    if n_rows > max(LARGEST, n_bytes):
+        raise MatrixError(
+            f"{where}: expected at most {n_bytes} rows in a file of {n_bytes} bytes, got {n_rows}; it is damaged"
+        )
+
+
+def full_matrix(
+    where: str, rows: IntArray, columns: IntArray, values: Array, n: int, *, declared: str | None = None
+) -> tuple[sp.csc_array, str]:
+    """Return the full matrix of listed entries, (n, n), and which triangle was stored.
+
+    An entry listed once for each pair is mirrored: a matrix with one triangle only is no symmetric matrix, so nothing
+    is guessed. Where both entries of pairs are listed they have to be equal.
+
+    Parameters
+    ----------
+    where
+        File and matrix, for messages.
+    rows, columns, values
+        Entries, indices from 0, (n_entries,).
+    n
+        Number of rows.
+    declared
+        What the file says: "symmetric" (each pair once) or "general" (both); None: nothing.
+
+    Returns
+    -------
+    matrix
+        Both triangles.
+    triangle
+        "both", "lower", "upper", "diagonal", or "each pair once", on either side.
+
+    Raises
+    ------
+    MatrixError
+        If an index is out of range, an entry is listed twice, or the matrix is not symmetric.
+    """
+    if len(rows) and not (rows.min() >= 0 and columns.min() >= 0 and max(rows.max(), columns.max()) < n):
+        largest = max(int(rows.max()), int(columns.max())) + 1
+        raise MatrixError(
+            f"{where}: expected rows and columns 1 to {n}, got {min(rows.min(), columns.min()) + 1} to {largest}"
+        )
+    n_entries = len(values)
+    stored = sp.csc_array(sp.coo_array((values, (rows, columns)), shape=(n, n)))
+    stored.sum_duplicates()
+    if stored.nnz < n_entries:
+        raise MatrixError(
+            f"{where}: {n_entries - stored.nnz} entries are listed twice; expected each once: was the "
+            "file written to twice?"
+        )
+    return mirrored(where, stored, declared=declared)
+
+
+def mirrored(where: str, stored: sp.csc_array, *, declared: str | None = None) -> tuple[sp.csc_array, str]:
+    """Return the full matrix of stored entries, and what was stored, as `full_matrix` does."""
+    kind = stored_as(stored)
+    if kind == "diagonal":
+        return stored, kind
+    if kind in ("lower", "upper"):
+        if declared == "general":
+            raise MatrixError(
+                f"{where}: the file says general, but only the {kind} triangle has entries; expected both triangles, "
+                "or symmetric in its header"
+            )
+        return with_mirror(stored), kind
+    defect = symmetry_defect(stored)
+    if declared == "symmetric" or (declared is None and defect > SYMMETRY_DEFECT):
+        pairs = abs(stored).multiply(abs(stored).T)
+        pairs.setdiag(0)
+        if not pairs.data.any():
+            return with_mirror(stored), "each pair once"
+        if declared == "symmetric":
+            raise MatrixError(
+                f"{where}: the file says symmetric, each pair once, but lists both entries of "
+                f"{np.count_nonzero(pairs.data) // 2} pairs; expected one triangle, or general in its header"
+            )
+    if defect > SYMMETRY_DEFECT:
+        raise MatrixError(
+            f"{where}: expected a symmetric matrix, got |A - A.T| = {defect:.1e} of its largest entry; gyroscopic, "
+            "contact and follower terms are no part of a body; or the file is cut off"
+        )
+    return stored, "both"
+
+
+def stored_as(matrix: sp.csc_array) -> str:
+    """Return which triangle has entries: both, lower, upper or diagonal."""
+    column = np.repeat(np.arange(matrix.shape[1], dtype=matrix.indices.dtype), np.diff(matrix.indptr))
+    below = bool(((matrix.indices > column) & (matrix.data != 0)).any())
+    above = bool(((matrix.indices < column) & (matrix.data != 0)).any())
+    return {(True, True): "both", (True, False): "lower", (False, True): "upper", (False, False): "diagonal"}[
+        below, above
+    ]
+
+
+def with_mirror(stored: sp.csc_array) -> sp.csc_array:
+    """Return A + Aᵀ - diag(A)."""
+    return sp.csc_array(stored + stored.T - sp.diags_array(stored.diagonal()))
