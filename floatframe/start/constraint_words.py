@@ -9,7 +9,7 @@ from floatframe.kernels.work import Work
 from floatframe.start.freedoms import scaled_constraints
 from floatframe.state import State
 
-__all__ = ["conflict_of_drives", "open_joints"]
+__all__ = ["conflict_of_drives", "drive_name", "open_joints"]
 
 SPANNED = 1e-7  #: part of a row of length one that the others leave of it, where they span it
 INVOLVED = 1e-4  #: share of a row of length one in another from which it is named

@@ -24,7 +24,8 @@ from floatframe.errors import ModelError
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.kernels.model import STIFFNESS, Model
 from floatframe.kernels.work import Work, new_work
-from floatframe.start.constraint_words import conflict_of_drives, open_joints
+from floatframe.start.constraint_words import conflict_of_drives, drive_name, open_joints
+from floatframe.start.far_drives import driven_angles, led_by, stages, way_of_drives
 from floatframe.start.freedoms import Mobility, constraint_mobility, scaled_constraints
 from floatframe.start.newton_equations import (
     displaced,
@@ -123,19 +124,41 @@ def checked(compiled: CompiledSystem, state: State) -> State:
 
 
 def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:
-    """(1): return the state with all joints closed."""
+    """(1): return the state with all joints closed, drives of angles at the angle that is meant."""
     model = compiled.model
-    holds = is_held_position(model.rows.kind)
-    if not holds.any():
+    if not is_held_position(model.rows.kind).any():
         return state
+    w, drives, near = start_unknowns(model, known), driven_angles(model), state
+    if len(drives):
+        for left in stages(way_of_drives(model, work, state, w, drives)):
+            near, error = closed(compiled, led_by(model, drives, left), work, near, w)
+            if error.any():  # the way there leads out of reach: the drive may be within reach all the same
+                near = state
+                break
+    end, error = closed(compiled, model, work, near, w)
+    if error.any():
+        refuse_open_joints(compiled, work, end, error)
+    if len(drives):
+        missed = drives[np.abs(way_of_drives(model, work, end, w, drives)) > np.pi / 2]
+        if len(missed):
+            raise ModelError(
+                f"{' and '.join(drive_name(compiled, row) for row in missed)}: closed from the given positions half a "
+                "turn from the prescribed angle; place the bodies nearer to it"
+            )
+    return end
+
+
+def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: Array) -> tuple[State, Array]:
+    """Return the state with the joints of a model closed, and what stays open of its rows: (n_w,), zero if none."""
+    holds = is_held_position(model.rows.kind)
     scale = np.where(is_held_length(model.rows.kind), compiled.length, 1.0)
     for _ in range(MOST_ITERATIONS):
-        set_iterate(work, state, w=start_unknowns(model, known))
+        set_iterate(work, state, w=w)
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         raise_errors_of(compiled.callbacks)
         error = np.where(holds, work.connections.g, 0.0)
         if np.abs(error / scale).max() <= ASSEMBLED:
-            return state
+            return state, np.zeros_like(error)
         try:
             y, _ = solve(with_modal_weight(model, parts.H), parts, np.zeros(len(work.state.u)), -error)
         except RuntimeError:
@@ -143,12 +166,16 @@ def assembled(compiled: CompiledSystem, work: Work, state: State, known: Array |
         if not np.isfinite(y).all():
             break
         state = displaced(model, state, in_ground_axes(model, state, y))
-    if np.abs(error / scale).max() <= 1e-9:
-        return state
+    return state, np.where(np.abs(error / scale).max() <= 1e-9, 0.0, error)
+
+
+def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error: Array) -> None:
+    """Raise `ModelError` naming the joints that stay open, or the drives against each other."""
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
         raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
-    reach = ", and that the drives stay within reach" if (model.rows.motion[holds] >= 0).any() else ""
+    is_driven = (compiled.model.rows.motion[is_held_position(compiled.model.rows.kind)] >= 0).any()
+    reach = ", and that the drives stay within reach" if is_driven else ""
     raise ModelError(
         f"the joints cannot be closed from the given positions: {open_joints(compiled, error)}; place the bodies "
         f"nearer to their joints, or check lengths and axes{reach}"
