@@ -99,6 +99,9 @@ def as_moved(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[B
 def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: int) -> PlaceMotion:
     """Return the motion of a kept node (its index in `ReducedBody.nodes`), with the axes of the body frame.
 
+    In the body it moves as `nodal_displacements` says: by Phi q, and of a stiffened body with quadratic modes by
+    ½ Σ q_k q_l g_kl besides.
+
     Raises
     ------
     ResultsError
@@ -107,12 +110,22 @@ def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: i
     require_same_modes(trajectory, body, reduced)
     if not 0 <= node < len(reduced.nodes):
         raise ResultsError(f"body {body!r}: node: expected 0 to {len(reduced.nodes) - 1}, got {node}")
-    motion, shape = trajectory.body(body), reduced.Phi[node]
-    zero = np.zeros((len(motion.t), 3))
-    local = reduced.nodes[node] + motion.q @ shape.T
-    axes = np.broadcast_to(np.eye(3), (len(motion.t), 3, 3))
-    own = MotionInBody(local, motion.q_dot @ shape.T, motion.q_ddot @ shape.T, axes, zero, zero)
+    motion, zero = trajectory.body(body), np.zeros((len(trajectory.t), 3))
+    is_stiffened = trajectory.entry(body)[1].is_stiffened
+    g = reduced.quadratic[node] if reduced.quadratic is not None and is_stiffened else None
+    shape, q, q_dot, q_ddot = reduced.Phi[node], motion.q, motion.q_dot, motion.q_ddot
+    local, rate, second = reduced.nodes[node] + q @ shape.T, q_dot @ shape.T, q_ddot @ shape.T
+    if g is not None:
+        local = local + 0.5 * of_second_order(g, q, q)
+        rate = rate + of_second_order(g, q, q_dot)
+        second = second + of_second_order(g, q_dot, q_dot) + of_second_order(g, q, q_ddot)
+    own = MotionInBody(local, rate, second, np.broadcast_to(np.eye(3), (len(motion.t), 3, 3)), zero, zero)
     return place_of(motion, own)
+
+
+def of_second_order(g: Array, x: Array, y: Array) -> Array:
+    """Return Σ x_k y_l g_kl over time, (n_t, 3); g (3, n, n) symmetric, x and y (n_t, n)."""
+    return np.asarray(np.einsum("akl,tk,tl->ta", g, x, y, optimize=True))
 
 
 def point_motion(trajectory: Trajectory, body: str, point: Array | tuple[float, float, float]) -> PlaceMotion:
