@@ -1,5 +1,6 @@
 from .compare.mode_selection import select_modes as select_modes
 from .errors import CmsError as CmsError
+from .exporters.export import export_body as export_body
 from .families.families import Families as Families
 from .families.interface_loads import InterfaceLoad as InterfaceLoad
 from .families.interface_loads import condensed_load as condensed_load

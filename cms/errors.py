@@ -7,6 +7,7 @@ __all__ = [
     "CmsError",
     "CompareError",
     "EigenError",
+    "ExportError",
     "FactorizationError",
     "JobError",
     "ModalFileError",
@@ -33,3 +34,7 @@ class EigenError(CmsError, RuntimeError):
 
 class JobError(CmsError, ValueError):
     """A job file is not valid; the text names the key, the value and the choices."""
+
+
+class ExportError(CmsError, ValueError):
+    """A reduced body cannot be written in the format of another program."""

@@ -80,6 +80,30 @@ def formats_command(
     list_formats(as_json=json, as_markdown=markdown)
 
 
+@app.command("export")
+@guarded
+def export_command(
+    file: ModalFile,
+    to: Annotated[str, typer.Option("--to", help="Format, one of those cms formats lists by name: mbsim, exudyn, ...")],
+    units: Annotated[
+        str | None, typer.Option(help="Unit system of the numbers, such as m-kg-s; it has to be said.")
+    ] = None,
+    nodes: Annotated[
+        str, typer.Option(help="Nodes, where the format leaves the choice: interfaces or all.")
+    ] = "default",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
+) -> None:
+    """Write a modal file in the format of another program, and say what that format cannot hold.
+
+    Example: cms export rod.h5 --to exudyn --units m-kg-s -o rod_exudyn.npz
+
+    Example: cms export rod.h5 --to sid_fem --units m-kg-s -o rod.SID_FEM
+    """
+    from cms.cli.exchange.export import ExportRequest, run_export
+
+    run_export(ExportRequest(file, to, units, nodes, output))
+
+
 @app.command("check")
 @guarded
 def check_command(

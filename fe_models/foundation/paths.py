@@ -5,11 +5,12 @@ import re
 import secrets
 import stat
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from fe_models.foundation.words import nearest
 
-__all__ = ["is_stream", "near_file", "replace_file", "same_file", "sync_folder"]
+__all__ = ["is_stream", "near_file", "replace_file", "replace_files", "same_file", "sync_folder"]
 
 OWN_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,6})")
 STANDARD = {"/dev/stdout": 1, "/dev/stderr": 2}
@@ -62,19 +63,57 @@ def replace_file(path: Path, *parts: bytes) -> None:
         write_stream(path, *parts)
         return
     path = path.resolve()  # through a link, so that the link stays one
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    part = part_of(path)
     try:
-        with open(descriptor, "wb") as file:
-            for data in parts:
-                file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
+        write_part(part, *parts)
         os.replace(part, path)
     except BaseException:  # also an interrupt: the half-written file goes, the old one stays
         part.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def replace_files(contents: Mapping[Path, bytes]) -> None:
+    """Write files that belong together: all are complete and durable beside their names before the first gets its name.
+
+    A device or a pipe gets its bytes after the files have their names.
+
+    Raises
+    ------
+    OSError
+        If one cannot be written; then none is changed, and nothing is left beside them.
+    """
+    files = {path.resolve(): data for path, data in contents.items() if not is_stream(path)}
+    parts = {path: part_of(path) for path in files}
+    try:
+        for path, data in files.items():
+            write_part(parts[path], data)
+        for path, part in parts.items():
+            os.replace(part, path)
+    except BaseException:
+        for part in parts.values():
+            part.unlink(missing_ok=True)
+        raise
+    for folder in {path.parent for path in files}:
+        sync_folder(folder)
+    for path, data in contents.items():
+        if is_stream(path):
+            write_stream(path, data)
+
+
+def part_of(path: Path) -> Path:
+    """Return the name beside a file under which its new content is written."""
+    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+
+
+def write_part(part: Path, *parts: bytes) -> None:
+    """Write a new file and make it durable."""
+    descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    with open(descriptor, "wb") as file:
+        for data in parts:
+            file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def write_stream(path: Path, *parts: bytes) -> None:

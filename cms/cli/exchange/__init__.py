@@ -1,0 +1,1 @@
+"""Commands that bring models in from other programs, and bodies out to them."""

@@ -1,0 +1,48 @@
+"""`cms export`: a modal file in the format of another program."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from cms.cli.console import output_path, say
+from cms.errors import ExportError
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["ExportRequest", "run_export"]
+
+
+@dataclass(frozen=True)
+class ExportRequest:
+    """What `cms export` was asked for."""
+
+    file: Path
+    to: str
+    units: str | None
+    nodes: str
+    output: Path | None
+
+
+def run_export(request: ExportRequest) -> None:
+    """Write the files, and say what the format does not hold.
+
+    Raises
+    ------
+    CmsError
+        If the format or the units are unknown or missing, the body does not fit, or the files cannot be written.
+    """
+    from cms.exporters.export import WRITERS, export_body, wanted_units
+    from cms.exporters.formats import FORMATS
+
+    if request.to not in WRITERS:
+        raise ExportError(f"--to {quoted(request.to)}: unknown format{nearest(request.to, WRITERS)}")
+    units = wanted_units(request.units, request.to, WRITERS[request.to])
+    suffix = next(known.suffixes[0] for known in FORMATS if known.key == request.to and known.writes)
+    default = request.file.with_name(f"{request.file.stem}_{request.to}{suffix}")
+    path = output_path(request.output, default, ExportError, overwrite_of=(request.file,))
+    exported = export_body(request.file, path, to=request.to, units=units, nodes=request.nodes)
+    for written in exported.files:
+        say(f"wrote {written} ({written.stat().st_size / 1e6:.2f} MB)")
+    say(f"units: {units.name} ({units.length_symbol}, {units.mass_symbol}, {units.time_symbol})")
+    for note in exported.notes:
+        say(note)
+    if exported.left_out:
+        say(f"not held by this format: {'; '.join(exported.left_out)}")

@@ -1,0 +1,136 @@
+"""A reduced body in the format of another program: the table of writers, and the one way to use it."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from cms.errors import ExportError
+from cms.exporters.exudyn import make_exudyn
+from cms.exporters.mbsim import make_mbsim
+from cms.exporters.writer import Request, Writer, left_out
+from cms.modal_file.file import convert_units, digest, read
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.paths import replace_files
+from fe_models.foundation.seal import reason
+from fe_models.foundation.units import UNIT_SYSTEMS, Units, unit_system
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["WRITERS", "Exported", "export_body"]
+
+WRITERS: dict[str, Writer] = {
+    "mbsim": Writer(
+        make_mbsim,
+        frozenset({"gyroscopic", "damping", "rotation", "stress", "surface"}),
+        needs=("modes",),
+    ),
+    "exudyn": Writer(
+        make_exudyn,
+        frozenset({"gyroscopic", "damping", "interfaces", "stress", "surface"}),
+        needs=("modes", "nodes"),
+    ),
+}  #: by key of `cms.exporters.formats.FORMATS`
+
+NEEDS = {
+    "modes": (lambda body: body.n_q > 0, "has no modes: it is rigid; give the other program its mass and inertia"),
+    "nodes": (lambda body: len(body.nodes) > 0, "has no nodes with shapes, of which the format is made"),
+    "interfaces": (lambda body: len(body.interfaces) > 0, "has no interfaces, whose motion the format is made of"),
+}  #: key of `Writer.needs` -> whether a body has it, and what is said if not
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written, and what the format could not hold."""
+
+    files: tuple[Path, ...]
+    left_out: tuple[str, ...]  #: in words, what the body has and the files do not
+    notes: tuple[str, ...]  #: where the interfaces are, and what else the other program's user has to know
+
+
+def export_body(
+    body: ReducedBody | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    to: str,
+    units: Units | str,
+    nodes: str = "default",
+) -> Exported:
+    """Write a reduced body in the format of another program; files are written whole or not at all.
+
+    Parameters
+    ----------
+    body
+        A reduced body, or its modal file.
+    path
+        The file to write; formats of several files take its stem for the others.
+    to
+        Key of the format, as `cms formats` lists it.
+    units
+        Unit system of the numbers, or its name. It has to be said: most formats do not name their units.
+    nodes
+        Nodes of formats that leave the choice (SID_FEM, MBDyn): "interfaces" or "all"; "default": what is usual there.
+
+    Returns
+    -------
+    exported
+        The files, and in words what the format cannot hold of this body.
+
+    Raises
+    ------
+    ExportError
+        If the format is unknown, the body lacks what it needs, or the files cannot be written.
+    ModalFileError
+        If the body cannot be read.
+    UnitsError
+        If the unit system is unknown.
+    """
+    if to not in WRITERS:
+        raise ExportError(f"export: unknown format {quoted(to)}{nearest(to, WRITERS)}")
+    writer = WRITERS[to]
+    system = wanted_units(units, to, writer)
+    if nodes not in ("default", "interfaces", "all"):
+        raise ExportError(f"export: nodes = {quoted(nodes)}: expected 'interfaces' or 'all'")
+    source = "" if isinstance(body, ReducedBody) else f"{Path(body).name}, digest {digest(body)}"
+    converted = convert_units(body if isinstance(body, ReducedBody) else read(body), system)
+    require_content(converted, to, writer)
+    request = Request(converted, Path(path), source, nodes)
+    made = writer.make(request)
+    try:
+        replace_files(made.files)
+    except OSError as error:
+        raise ExportError(f"{path}: cannot be written: {reason(error)}; nothing was written") from error
+    return Exported(tuple(made.files), left_out(converted, writer.holds), made.notes)
+
+
+def wanted_units(units: Units | str | None, to: str, writer: Writer) -> Units:
+    """Return the unit system that was asked for.
+
+    Raises
+    ------
+    ExportError
+        If none was, or the program behind the format knows another one only.
+    """
+    if units is None:
+        raise ExportError(
+            f"export: units are missing: {to} does not name its own, so say which the numbers shall have; choices: "
+            f"{', '.join(UNIT_SYSTEMS)}"
+        )
+    system = unit_system(units) if isinstance(units, str) else units
+    if writer.units and system.name != writer.units:
+        raise ExportError(
+            f"export: units {system.name}: the program behind {to} knows {writer.units} only; ask for that"
+        )
+    return system
+
+
+def require_content(body: ReducedBody, to: str, writer: Writer) -> None:
+    """Raise `ExportError` unless the body has what the format is made of."""
+    where = f"export to {to}: body {body.name!r}"
+    if body.is_held and not writer.takes_held:
+        raise ExportError(
+            f"{where} is held to the ground, and the format is that of a body in a moving frame; reduce the body free, "
+            "and let the other program hold it by a joint"
+        )
+    for need in writer.needs:
+        has, words = NEEDS[need]
+        if not has(body):
+            raise ExportError(f"{where} {words}")

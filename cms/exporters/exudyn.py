@@ -1,0 +1,174 @@
+"""Exudyn: the archive of its ObjectFFRFreducedOrderInterface, and a script that makes a body of it."""
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cms.exporters.writer import Made, Request
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+
+__all__ = ["make_exudyn"]
+
+FILE_VERSION = 1  #: of the archive, as exudyn 1.9 to 1.13 write it
+
+
+def make_exudyn(request: Request) -> Made:
+    """Return the archive FILE.npz and the script FILE.py beside it."""
+    archive = request.path.with_suffix(".npz")
+    script = request.path.with_suffix(".py")
+    image = io.BytesIO()
+    np.savez(image, **archive_of(request.body), floatframe_header=np.array(request.header()))
+    notes = tuple(f"interface {each.name}: {members_words(each)}" for each in request.body.interfaces)
+    return Made({archive: image.getvalue(), script: script_of(request, archive).encode("utf-8")}, notes)
+
+
+def archive_of(body: ReducedBody) -> dict[str, Any]:
+    """Return the arrays by the names of ObjectFFRFreducedOrderInterface, and those of this project behind a prefix.
+
+    With x~ the skew matrix of a vector, all integrals over mass, and shapes side by side in blocks of one or three
+    columns:
+
+        mPhitTPsi = 1C,  mPhitTPsiTilde = [1C_k~],  mXRefTildePsi = int c~^T phi_k = -2C
+        mXRefTildePsiTilde = int c~^T phi_k~ = 3C_k,  mPsiTildePsi = int phi_k~^T phi_l = 4C_kl,
+        mPsiTildePsiTilde = int phi_k~^T phi_l~ = 5C_kl,  inertiaLocal = J0,  chiU = S / m
+    """
+    moments, n = body.moments, body.n_q
+    stress: dict[str, Any] = {}
+    if body.stress is not None:  # node; six components of the first mode, six of the second, ...
+        rows = np.asarray(body.stress).transpose(0, 2, 1).reshape(len(body.nodes), 6 * n)
+        stress = {"matrix": rows, "outputVariableType": "OutputVariableType.StressLocal"}
+    post = np.empty((), dtype=object)  # a dict, which exudyn takes out with .item()
+    post[()] = stress
+    ours: dict[str, Any] = {
+        "floatframe_damping": body.D,
+        "floatframe_names": np.array([interface.name for interface in body.interfaces], dtype=str),
+        "floatframe_positions": np.array([interface.position for interface in body.interfaces]).reshape(-1, 3),
+        "floatframe_triads": np.array([interface.triad for interface in body.interfaces]).reshape(-1, 3, 3),
+        "floatframe_Psi": np.array([interface.Psi for interface in body.interfaces]).reshape(-1, 6, n),
+    }
+    for k, interface in enumerate(body.interfaces):
+        ours[f"floatframe_members_{k}"] = interface.members
+    return {
+        "modeBasis": body.Phi.reshape(-1, n),
+        "trigList": body.surface,
+        "postProcessingModes": post,
+        "massMatrixReduced": body.M,
+        "stiffnessMatrixReduced": body.K,
+        "infoList": np.array([n, len(body.nodes), 3, 4, 7, 7 + n]),
+        "rigidBodyNodeType": np.array("NodeType.RotationEulerParameters"),
+        "xRef": body.nodes.reshape(-1),
+        "inertiaLocal": moments.J0,
+        "Mtt": moments.m * np.eye(3),
+        "totalMass": np.array(moments.m),
+        "chiU": moments.center_of_mass,
+        "chiUtilde": skew(moments.center_of_mass),
+        "mPsiTildePsi": moments.C4.transpose(0, 2, 1).reshape(3 * n, n),
+        "mPsiTildePsiTilde": moments.C5.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n),
+        "mPhitTPsi": moments.C1,
+        "mPhitTPsiTilde": side_by_side(skew(moments.C1.T)),
+        "mXRefTildePsi": -moments.C2,
+        "mXRefTildePsiTilde": side_by_side(moments.C3),
+        "fileVersion": np.array(FILE_VERSION),
+        "type": np.array("ObjectFFRFreducedOrderInterface"),
+        **ours,
+    }
+
+
+def skew(vectors: Array) -> Array:
+    """Return the matrices v~ with v~ w = v × w, (..., 3, 3), of vectors (..., 3)."""
+    return np.asarray(np.cross(np.asarray(vectors)[..., None, :], np.eye(3)).swapaxes(-1, -2))
+
+
+def side_by_side(matrices: Array) -> Array:
+    """Return (n, 3, 3) as (3, 3 n)."""
+    return np.asarray(matrices).transpose(1, 0, 2).reshape(3, -1)
+
+
+def members_words(interface: Any) -> str:
+    """Return how the script attaches an interface."""
+    return f"marker of {len(interface.members)} mesh nodes"
+
+
+SCRIPT = '''"""{title}
+
+{header}
+
+As a module: `body = add_body(mbs)` adds the body, `marker(mbs, body, "{first}")` a marker of an interface.
+As a script: {seconds} time units of free motion without forces; prints what it finds.
+"""
+
+import os
+
+import exudyn as exu
+import exudyn.itemInterface as eii
+import numpy as np
+from exudyn.FEM import ObjectFFRFreducedOrderInterface
+
+ARCHIVE = os.path.join(os.path.dirname(os.path.abspath(__file__)), {archive!r})
+INTERFACES = {interfaces!r}
+
+
+def add_body(mbs, **options):
+    """Add the body to a MainSystem; options as of AddObjectFFRFreducedOrder (positionRef, gravity, ...)."""
+    cms = ObjectFFRFreducedOrderInterface()
+    cms.LoadFromFile(ARCHIVE, mode="NPZ")
+    body = cms.AddObjectFFRFreducedOrder(mbs, **options)
+    with np.load(ARCHIVE) as archive:
+        damping = archive["floatframe_damping"]
+    if damping.any():
+        matrix = exu.MatrixContainer()
+        matrix.SetWithDenseMatrix(damping, useDenseMatrix=False)
+        mbs.SetObjectParameter(body["oFFRFreducedOrder"], "dampingMatrixReduced", matrix)
+    return body
+
+
+def marker(mbs, body, name, rigid=True):
+    """Add a marker at an interface: the mean place of its members, with their mean rotation if it is rigid."""
+    with np.load(ARCHIVE) as archive:
+        k = archive["floatframe_names"].tolist().index(name)
+        members = archive["floatframe_members_%d" % k].tolist()
+        offset = archive["floatframe_positions"][k] - archive["xRef"].reshape(-1, 3)[members].mean(axis=0)
+    kind = eii.MarkerSuperElementRigid if rigid else eii.MarkerSuperElementPosition
+    place = {{"offset": offset}} if rigid else {{}}
+    weights = np.full(len(members), 1 / len(members))
+    return mbs.AddMarker(kind(
+        bodyNumber=body["oFFRFreducedOrder"], meshNodeNumbers=members, weightingFactors=weights, **place))
+
+
+def main():
+    """Move the free body a little while."""
+    system = exu.SystemContainer()
+    mbs = system.AddSystem()
+    body = add_body(mbs)
+    for name in INTERFACES:
+        marker(mbs, body, name, rigid=False)
+    mbs.Assemble()
+    settings = exu.SimulationSettings()
+    settings.timeIntegration.endTime = {seconds}
+    settings.timeIntegration.numberOfSteps = 10
+    settings.timeIntegration.verboseMode = 0
+    settings.solution.file.write = False
+    mbs.SolveDynamic(settings)
+    q = mbs.GetNodeOutput(body["nGenericODE2"], exu.OutputVariableType.Coordinates)
+    print("modes:", len(np.atleast_1d(q)), "largest coordinate:", np.abs(q).max(initial=0.0))
+
+
+if __name__ == "__main__":
+    main()
+'''
+
+
+def script_of(request: Request, archive: Path) -> str:
+    """Return the script."""
+    body = request.body
+    names = [interface.name for interface in body.interfaces]
+    slowest = body.frequencies[np.isfinite(body.frequencies)].min(initial=np.inf)
+    seconds = float(f"{0.1 / slowest:.3g}") if np.isfinite(slowest) and slowest > 0 else 0.01
+    lines = [line.replace("\\", "/").replace('"""', "'''") for line in request.header()]
+    return SCRIPT.format(
+        title=lines[0], header="\n".join(lines[1:]), first=names[0] if names else "NAME", seconds=seconds,
+        archive=archive.name, interfaces=names,
+    )  # fmt: skip

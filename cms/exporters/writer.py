@@ -1,0 +1,94 @@
+"""What every writer of a foreign format is: bytes by file, what of the body is left out, a header that says whence."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+from cms.reduced_body.reduced_body import ReducedBody
+
+__all__ = ["CONTENT", "Made", "Request", "Writer", "left_out"]
+
+#: what a body may hold beside masses, stiffness and shapes: key -> in words, and whether a body has it
+CONTENT: dict[str, tuple[str, Callable[[ReducedBody], bool]]] = {
+    "gyroscopic": (
+        "inertia of the deformed body beyond its mass matrix (3C, 4C, 5C: Coriolis and centrifugal terms)",
+        lambda body: body.n_q > 0,
+    ),
+    "geometric": ("geometric stiffness", lambda body: body.geometric is not None),
+    "quadratic": ("displacements of second order", lambda body: body.quadratic is not None),
+    "damping": ("modal damping", lambda body: bool(np.any(body.D))),
+    "interfaces": ("names of the interfaces", lambda body: bool(body.interfaces)),
+    "rotation": ("rotations of the interfaces", lambda body: any(each.has_rotation for each in body.interfaces)),
+    "load cases": ("load cases", lambda body: bool(body.load_cases)),
+    "stress": ("stress of the modes", lambda body: body.stress is not None),
+    "point stress": ("stress at named points", lambda body: body.point_stress is not None),
+    "surface": ("surface for drawing", lambda body: len(body.surface) > 0),
+}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be written: a body in the units asked for, where, and whence it comes."""
+
+    body: ReducedBody
+    path: Path  #: the file asked for; further files take its stem
+    source: str = ""  #: the modal file, with its digest
+    nodes: str = "default"  #: "interfaces" or "all" of the kept nodes, where the format leaves the choice
+
+    def header(self) -> tuple[str, ...]:
+        """Return lines of ASCII: body, source, units, frame, and its provenance."""
+        body = self.body
+        origin = " ".join(f"{x:.9g}" for x in body.frame.origin)
+        place = f"{body.frame.kind} at {body.frame.at}" if body.frame.at else body.frame.kind
+        lines = [
+            f"flexible body {body.name!r}, {body.n_q} modes, written by floatframe {own_version()}",
+            f"units {body.units.name}: {body.units.length_symbol}, {body.units.mass_symbol}, {body.units.time_symbol}",
+            f"frame {place}, its origin in the mesh: {origin}",
+        ]
+        if self.source:
+            lines.insert(1, f"from {self.source}")
+        lines += [f"{key}: {value}" for key, value in body.provenance.items()]
+        return tuple(in_ascii(line) for line in lines)
+
+
+@dataclass(frozen=True)
+class Made:
+    """Files as bytes, and what is to be told about them."""
+
+    files: Mapping[Path, bytes]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Writer:
+    """One format: how it is made and what it can hold."""
+
+    make: Callable[[Request], Made]
+    holds: frozenset[str] = field(default_factory=frozenset)  #: keys of `CONTENT`
+    takes_held: bool = False  #: a body that is held to the ground makes sense there
+    units: str = ""  #: the only system its program knows; empty: any
+    needs: tuple[str, ...] = ()  #: "nodes", "interfaces": what a body must have
+
+
+def left_out(body: ReducedBody, holds: Iterable[str]) -> tuple[str, ...]:
+    """Return in words what a body has and a format that holds this much does not."""
+    held = set(holds)
+    return tuple(words for key, (words, has) in CONTENT.items() if key not in held and has(body))
+
+
+def in_ascii(text: str, longest: int = 200) -> str:
+    """Return a text on one line of ASCII, for files of programs that know no other."""
+    line = " ".join(text.split())
+    line = line.encode("ascii", "backslashreplace").decode("ascii")
+    return line if len(line) <= longest else f"{line[: longest - 3]}..."
+
+
+def own_version() -> str:
+    """Return the version of this project."""
+    try:
+        return metadata.version("floatframe")
+    except metadata.PackageNotFoundError:  # a checkout that is not installed
+        return "(not installed)"
