@@ -29,7 +29,7 @@ from cms.reduced_basis.frames import (
     placed,
 )
 from cms.reduced_basis.stress_modes import turned_stress
-from cms.reduced_body.invariants import Moments, moments_from_gram
+from cms.reduced_body.invariants import INERTIA_TERMS, Moments, moments_from_gram
 from cms.reduced_body.nodal_sums import NodalSums
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.reduced_body.source_columns import SourceColumns, share_words
@@ -292,7 +292,11 @@ def changed_body(
 
 
 def changed_moments(moments: Moments, change: Change) -> Moments:
-    """Return the moments in the new frame: L Gram Lᵀ, with a'' = L a for a = [1, c, phi_x, phi_y, phi_z]."""
+    """Return the moments in the new frame: L Gram Lᵀ, with a'' = L a for a = [1, c, phi_x, phi_y, phi_z].
+
+    What is missing stays missing. Taking a rotation off the shapes mixes 3C into 4C and 5C, which are lost with it;
+    mass, 1C, 2C and M* of the new frame follow from those of the old one alone.
+    """
     n = moments.n_q
     L = np.zeros((4 + 3 * n, 4 + 3 * n))
     L[0, 0] = 1.0
@@ -304,7 +308,8 @@ def changed_moments(moments: Moments, change: Change) -> Moments:
     shapes[:, :, 0] = -change.R.T @ off[:3]
     shapes[:, :, 1:4] = -np.einsum("ba,ekb->ake", change.R, cross)
     shapes[:, :, 4:] = np.einsum("ba,lk->akbl", change.R, change.Z).reshape(3, n, 3 * n)
-    return moments_from_gram(L @ moments.gram @ L.T, is_exact=moments.is_exact)
+    missing = INERTIA_TERMS if "3C" in moments.missing else moments.missing
+    return moments_from_gram(L @ moments.gram @ L.T, is_exact=moments.is_exact, missing=missing)
 
 
 def changed_interface(reduced: ReducedBody, interface: ReducedInterface, change: Change) -> ReducedInterface:

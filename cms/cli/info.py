@@ -52,6 +52,11 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("", vector_words(tensor[2], largest)),
         ("principal moments", f"{vector_words(record['principal_moments'])} {inertia}"),
         ("mass moments", "exact" if record["moments_are_exact"] else "approximate (from bare matrices)"),
+        *(
+            [("inertia missing", ", ".join(body.moments.missing)), ("to be trusted", body.moments.trust)]
+            if body.moments.missing
+            else []
+        ),
         ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
         ("stress of modes", stress_words(record["stress"])),
         ("geometric stiffness", "spin, accelerations, interface loads" if record["geometric_stiffness"] else "none"),

@@ -46,6 +46,7 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
         "inertia_about_center_of_mass": central_inertia(moments).tolist(),
         "principal_moments": np.linalg.eigvalsh(central_inertia(moments)).tolist(),
         "moments_are_exact": moments.is_exact,
+        "missing_inertia_terms": list(moments.missing),
         "is_held": body.is_held,
         "frame": {
             "kind": frame.kind,

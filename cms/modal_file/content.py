@@ -26,6 +26,7 @@ SI = UNIT_SYSTEMS["m-kg-s"]
 FREQUENCY_DEFECT = 1e-9  #: largest relative difference of a stored frequency from that of K and M
 INVARIANT_DEFECT = 1e-12  #: largest difference of a stored 1C-5C from that of the moments, over the largest entry
 UNIT_LOADS = ("translation", "rotation", "spin")  #: of the geometric stiffness, beside those of the interfaces
+EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
 INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
 
 
@@ -51,7 +52,8 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
         "/units": {field.name: getattr(body.units, field.name) for field in fields(Units)},
         "/frame": {"kind": body.frame.kind, "at": body.frame.at},
         "/modes": {},
-        "/moments": {"is_exact": int(body.moments.is_exact)},
+        "/moments": {"is_exact": int(body.moments.is_exact)}
+        | ({"missing": " ".join(body.moments.missing)} if body.moments.missing else {}),
         "/invariants": {},
         "/nodes": {},
         "/surface": {},
@@ -100,8 +102,9 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
         "/nodes/Phi": body.Phi,
         "/surface/triangles": body.surface,
     }
-    values |= {f"/moments/{name}": getattr(moments, name) for name in ("S", "R", "C1", "P", "S_kl")}
-    values |= {f"/invariants/{name}": getattr(moments, name) for name in INVARIANTS}
+    values |= {f"/moments/{name}": getattr(moments, name) for name in ("S", "R", "C1")}
+    values |= {f"/moments/{name}": getattr(moments, name) for name in known_products(moments.missing)}
+    values |= {f"/invariants/{name}": getattr(moments, name) for name in known_invariants(moments.missing)}
     for k, interface in enumerate(body.interfaces):
         names = ("position", "triad", "Psi", "members")
         values |= {f"/interfaces/{k}/{name}": getattr(interface, name) for name in names}
@@ -123,6 +126,19 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
         values["/stress/points/names"], values["/stress/points/position"] = points.names, points.positions
         values["/stress/points/modes"] = points.modes
     return values
+
+
+def known_products(missing: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the moments of two factors with a shape that a file holds: none of which a part is missing.
+
+    M* stands for S_kl that is not whole; 2C is among the invariants.
+    """
+    return (() if "3C" in missing else ("P",)) + (("M",) if "5C" in missing else ("S_kl",))
+
+
+def known_invariants(missing: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the invariants that a file holds."""
+    return tuple(name for name in INVARIANTS if name not in {f"C{term[0]}" for term in missing})
 
 
 # Content to body -----------------------------------------------------------------------------------------------------
@@ -192,11 +208,7 @@ def body_of(content: Content) -> ReducedBody:
     contents = Contents(content)
     array, words, attribute = contents.array, contents.words, contents.attribute
     is_1 = content.version < 2  # the version before held dofs, and rotations told apart
-    moments = Moments(
-        m=contents.number("/moments/m"),
-        **contents.arrays("/moments", "S", "R", "C1", "P", "S_kl"),
-        is_exact=bool(attribute("/moments", "is_exact", int)),
-    )
+    moments = moments_of(contents)
     return ReducedBody(
         name=attribute("/", "name", str),
         units=units_of(contents),
@@ -235,6 +247,28 @@ def body_of(content: Content) -> ReducedBody:
         geometric=geometric_of(contents) if contents.has("/geometric") else None,
         quadratic=array("/quadratic/g") if contents.has("/quadratic") else None,
     )  # fmt: skip
+
+
+def moments_of(contents: Contents) -> Moments:
+    """Return the moments; of a body with missing terms made of those invariants that it has."""
+    missing: tuple[str, ...] = ()
+    if "missing" in contents.content.attributes.get("/moments", {}):
+        missing = tuple(contents.attribute("/moments", "missing", str).split())
+    known = contents.arrays("/moments", "S", "R", "C1", *known_products(missing))
+    if "P" not in known:
+        C2 = contents.array("/invariants/C2")
+        require_shape("dataset /invariants/C2", C2, np.shape(known["C1"]))
+        known["P"] = np.einsum("abc,ck->abk", EPSILON, C2) / 2
+    if "S_kl" not in known:
+        M = known.pop("M")
+        S_kl = np.einsum("ab,kl->abkl", np.eye(3), M) / 3
+        if "4C" not in missing:
+            C4 = contents.array("/invariants/C4")
+            require_shape("dataset /invariants/C4", C4, (*M.shape, 3))
+            S_kl -= np.einsum("abc,klc->abkl", EPSILON, C4) / 2
+        known["S_kl"] = S_kl
+    is_exact = bool(contents.attribute("/moments", "is_exact", int))
+    return Moments(m=contents.number("/moments/m"), **known, is_exact=is_exact, missing=missing)
 
 
 def interface_of(contents: Contents, group: str) -> ReducedInterface:
@@ -285,7 +319,7 @@ def units_of(contents: Contents) -> Units:
 
 def require_same_invariants(content: Content, moments: Moments) -> None:
     """Raise unless the stored invariants, written for other readers, are those of the moments."""
-    for name in INVARIANTS:
+    for name in known_invariants(moments.missing):
         stored = Contents(content).array(f"/invariants/{name}")
         expected = getattr(moments, name)
         scale = np.abs(expected).max(initial=0.0)

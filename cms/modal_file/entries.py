@@ -69,6 +69,7 @@ ENTRIES = {
     "/moments/C1": entry("1C, int phi_a,k", Dimensions(0.5)),
     "/moments/P": entry("int c_a phi_b,k; index order a, b, k", Dimensions(0.5, 1)),
     "/moments/S_kl": entry("int phi_a,k phi_b,l; index order a, b, k, l"),
+    "/moments/M": entry("M*, int phi_k . phi_l, of a body whose S_kl is not known"),
     "/invariants/J0": entry("inertia tensor of the undeformed body about the origin of B", Dimensions(1, 2)),
     "/invariants/C1": entry("1C_k, int phi_k; index order a, k", Dimensions(0.5)),
     "/invariants/C2": entry("2C_k, int c x phi_k; index order a, k", Dimensions(0.5, 1)),

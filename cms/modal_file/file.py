@@ -13,8 +13,7 @@ from fe_models.foundation.units import Units, unit_system
 
 __all__ = ["FORMAT", "VERSION", "convert_units", "digest", "read", "write"]
 
-VERSION = 3  #: of the format; a reader refuses greater ones, and reads all that are less
-FREE_VERSION = 2  #: of files of free bodies: what version 3 adds, bodies that are held, is not in them
+VERSION = 4  #: of the format; a reader refuses greater ones, and reads all that are less
 KIND = Kind(FORMAT, VERSION, ModalFileError, "`cms reduce` or `cms.write`")
 
 
@@ -26,7 +25,17 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
     ModalFileError
         If the file cannot be written.
     """
-    write_sealed(content_of(reduced, VERSION if reduced.is_held else FREE_VERSION), path)
+    write_sealed(content_of(reduced, version_of(reduced)), path)
+
+
+def version_of(reduced: ReducedBody) -> int:
+    """Return the least version that says what the body is, so that older readers take all bodies they can.
+
+    4: inertia terms are missing; 3: the body is held to the ground; 2: all others.
+    """
+    if reduced.moments.missing:
+        return 4
+    return 3 if reduced.is_held else 2
 
 
 def read(path: str | os.PathLike[str], *, units: Units | str | None = None) -> ReducedBody:

@@ -7,6 +7,7 @@ from cms.quality.of_body.identities import (
     check_frame_condition,
     check_free_frequencies,
     check_inertia_tensor,
+    check_inertia_terms,
     check_modal_mass,
 )
 from cms.quality.of_body.interface_motions import (
@@ -31,6 +32,7 @@ BODY_CHECKS = (
     check_frame_condition,
     check_free_frequencies,
     check_inertia_tensor,
+    check_inertia_terms,
     check_rigid_interfaces,
     check_interface_places,
     check_interface_motions,

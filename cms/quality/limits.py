@@ -69,6 +69,11 @@ LIMITS: dict[str, Limit] = {
         "lowest frequencies too high by cells of first order", 0.02, None,
         "mesh with cells of second order, give bricks incompatible modes, or mesh finer",
     ),
+    "inertia-terms": Limit(
+        "inertia terms of the motion that are missing", 0.0, None,
+        "import the body again with its full mass matrix, its nodal masses, or its mesh and density beside; or move it "
+        "slowly, with leave_out_missing",
+    ),
     "units": Limit(
         "implausible numbers among size, density and first frequency", 0.0, None,
         "do nodes, masses and stiffness have the units that the file names? If they are meant, nothing is wrong",

@@ -1,14 +1,21 @@
 """Inertia invariants of a body with deformation modes, all from seven canonical moments (docs/theory.md §5)."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, frozen, require_finite, require_shape
 from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["Moments", "moments_from_gram"]
+__all__ = ["INERTIA_TERMS", "Moments", "known_P", "known_S_kl", "moments_from_gram"]
+
+#: what a reduced mass matrix alone does not say: the symmetric part of P; that of S_kl antisymmetric in a, b; that
+#: symmetric in a, b without trace. What is left of P and S_kl is 2C and M*
+INERTIA_TERMS = ("3C", "4C", "5C")
 
 
 @frozen_copies
@@ -18,6 +25,9 @@ class Moments:
 
     c: undeformed position, phi_k: shape k (translation), both in B; integrals over mass. Shapes are without unit
     when q is a length; with M-orthonormal shapes the unit of phi is 1/sqrt(kg) and q has sqrt(kg) m.
+
+    A body that another program has reduced may not say all of them. Then `missing` names the invariants that do not
+    follow; the parts of P and S_kl they stand for are zero, and asking for the invariant raises `BodyError`.
 
     References
     ----------
@@ -31,14 +41,24 @@ class Moments:
     P: Array  #: ∫ c_a phi_b,k, (3, 3, n_q) [kg m]
     S_kl: Array  #: ∫ phi_a,k phi_b,l, (3, 3, n_q, n_q) [kg]
     is_exact: bool = True  #: False: from bare matrices that are not M_s ⊗ 1
+    missing: tuple[str, ...] = ()  #: those of `INERTIA_TERMS` that are not known, in their order
 
     def __post_init__(self) -> None:
         n = np.asarray(self.C1).shape[-1]
+        for term in self.missing:
+            if term not in INERTIA_TERMS:
+                raise BodyError(f"moments: missing: unknown term {quoted(term)}{nearest(term, INERTIA_TERMS)}")
+        lost = {*self.missing, "5C"} if "4C" in self.missing else {*self.missing}  # 4C is part of 5C
+        missing = tuple(term for term in INERTIA_TERMS if term in lost)
+        object.__setattr__(self, "missing", missing)
         for name, shape in {"S": (3,), "R": (3, 3), "C1": (3, n), "P": (3, 3, n), "S_kl": (3, 3, n, n)}.items():
             array = frozen(getattr(self, name))
             require_shape(f"moments: {name}", array, shape)
             require_finite(f"moments: {name}", array)
             object.__setattr__(self, name, array)
+        if missing:
+            object.__setattr__(self, "P", frozen(known_P(self.P, missing)))
+            object.__setattr__(self, "S_kl", frozen(known_S_kl(self.S_kl, missing)))
         object.__setattr__(self, "m", float(self.m))
         require_finite("moments: m", np.array(self.m))
 
@@ -66,19 +86,22 @@ class Moments:
     @cached_property
     def C3(self) -> Array:
         """3C_k = ∫ (c·phi_k 1 - phi_k cᵀ) = tr(P_k) 1 - P_kᵀ, (n_q, 3, 3) [kg m]."""
+        self.require("3C")
         P_k = np.moveaxis(self.P, 2, 0)
         return frozen(np.trace(P_k, axis1=1, axis2=2)[:, None, None] * np.eye(3) - P_k.transpose(0, 2, 1))
 
     @cached_property
     def C4(self) -> Array:
         """4C_kl = ∫ phi_l × phi_k, (n_q, n_q, 3) [kg]; antisymmetric in k, l."""
+        self.require("4C")
         S = self.S_kl
         # (phi_l × phi_k)_x = phi_y,l phi_z,k - phi_z,l phi_y,k, and S[a, b, l, k] = ∫ phi_a,l phi_b,k
         return frozen(np.stack([(S[1, 2] - S[2, 1]).T, (S[2, 0] - S[0, 2]).T, (S[0, 1] - S[1, 0]).T], axis=-1))
 
     @cached_property
     def C5(self) -> Array:
-        """5C_kl = ∫ (phi_k·phi_l 1 - phi_l phi_kᵀ), (n_q, n_q, 3, 3) [kg]."""
+        """5C_kl = ∫ (phi_k·phi_l 1 - phi_l phi_kᵀ), (n_q, n_q, 3, 3) [kg]; half its antisymmetric part is 4C."""
+        self.require("5C")
         S = self.S_kl
         dot = np.einsum("aakl->kl", S)
         return frozen(dot[:, :, None, None] * np.eye(3) - np.einsum("ablk->klab", S))
@@ -88,9 +111,49 @@ class Moments:
         """M*_kl = ∫ phi_k · phi_l, (n_q, n_q) [kg]."""
         return frozen(np.einsum("aakl->kl", self.S_kl))
 
+    def require(self, *terms: str) -> None:
+        """Raise `BodyError` if one of these terms of `INERTIA_TERMS` is missing."""
+        missing = [term for term in terms if term in self.missing]
+        if missing:
+            raise BodyError(
+                f"moments: {', '.join(missing)} of this body {'is' if len(missing) == 1 else 'are'} missing: the "
+                "program that reduced it did not say them, and they do not follow from reduced matrices. Import the body again "
+                "with its full mass matrix, its nodal masses, or its mesh and density beside (cms import)"
+            )
+
+    @property
+    def trust(self) -> str:
+        """Say what a motion can be trusted for with the terms that are here."""
+        if not self.missing:
+            return "every motion"
+        exact = "exact: mass, frequencies, static answers, and motions to first order in speeds and deformation"
+        if "3C" in self.missing:
+            return (
+                f"{exact}; not known: the loads of a spin on the deformation, of the order (speed of rotation / lowest "
+                "angular frequency)² times the size of the body, and how deformation changes the inertia"
+            )
+        return (
+            f"{exact}, and the loads of a spin on the undeformed body; not known: how a spin changes the stiffness, by "
+            "the order (speed of rotation / lowest angular frequency)², and the inertia of second order"
+        )
+
+    @property
+    def left_out(self) -> "Moments":
+        """The moments of a motion without what is missing: with constant inertia where nothing is known.
+
+        Terms that are missing are zero, all of 5C with its trace; M* is then that of `ReducedBody.M` alone.
+        """
+        S_kl = np.array(self.S_kl)
+        if "5C" in self.missing:
+            S_kl = (S_kl - S_kl.swapaxes(0, 1)) / 2
+        return replace(self, S_kl=S_kl, missing=())
+
     @property
     def gram(self) -> Array:
-        """The Gram matrix ∫ a aᵀ, a = [1, c, phi_x, phi_y, phi_z], (4 + 3 n_q, 4 + 3 n_q), of these moments."""
+        """The Gram matrix ∫ a aᵀ, a = [1, c, phi_x, phi_y, phi_z], (4 + 3 n_q, 4 + 3 n_q), of these moments.
+
+        Its parts that are missing are zero.
+        """
         n = self.n_q
         gram = np.zeros((4 + 3 * n, 4 + 3 * n))
         gram[0, 0], gram[0, 1:4], gram[1:4, 1:4] = self.m, self.S, self.R
@@ -106,13 +169,35 @@ class Moments:
         return self.J0 + linear + linear.T + np.einsum("k,l,klab->ab", q, q, self.C5)
 
 
-def moments_from_gram(gram: Array, *, is_exact: bool = True) -> Moments:
+def known_P(P: Array, missing: Iterable[str]) -> Array:
+    """Return P, (3, 3, n_q), without what is missing: its antisymmetric part, which is 2C, always stays."""
+    if "3C" not in missing:
+        return P
+    return np.asarray((P - P.swapaxes(0, 1)) / 2)
+
+
+def known_S_kl(S_kl: Array, missing: Iterable[str]) -> Array:
+    """Return S_kl, (3, 3, n_q, n_q), without what is missing; its trace over a, b, which is M*, always stays."""
+    if "5C" not in missing:  # nor 4C then
+        return S_kl
+    M = np.einsum("aakl->kl", S_kl) / 3
+    known = np.zeros_like(S_kl)
+    for a in range(3):
+        known[a, a] = M
+    if "4C" not in missing:
+        known += (S_kl - S_kl.swapaxes(0, 1)) / 2
+    return known
+
+
+def moments_from_gram(gram: Array, *, is_exact: bool = True, missing: tuple[str, ...] = ()) -> Moments:
     """Cut the canonical moments from the Gram matrix ∫ a aᵀ, a = [1, c, phi_x, phi_y, phi_z].
 
     Parameters
     ----------
     gram
         (4 + 3 n_q, 4 + 3 n_q), components of all shapes grouped: all x, then all y, then all z.
+    is_exact, missing
+        As in `Moments`.
     """
     n = (gram.shape[0] - 4) // 3
     gram = (gram + gram.T) / 2  # symmetric by definition; the product that made it rounds the halves apart
@@ -125,4 +210,5 @@ def moments_from_gram(gram: Array, *, is_exact: bool = True) -> Moments:
         P=np.stack([gram[1:4, block] for block in blocks], axis=1),
         S_kl=np.stack([np.stack([gram[rows, columns] for columns in blocks]) for rows in blocks]),
         is_exact=is_exact,
+        missing=missing,
     )

@@ -35,5 +35,5 @@ def extra_module(name: str, *, extra: str, purpose: str) -> ModuleType:
         missing = isinstance(error, ModuleNotFoundError) and name.startswith(f"{error.name}")
         reason = "which is not installed" if missing else f"which does not load ({error})"
         raise MissingExtraError(
-            f"{purpose}: needs {name.partition('.')[0]}, {reason}; pip install \"floatframe[{extra}]\""
+            f'{purpose}: needs {name.partition(".")[0]}, {reason}; pip install "floatframe[{extra}]"'
         ) from error

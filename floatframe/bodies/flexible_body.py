@@ -43,6 +43,9 @@ class FlexibleBody:
     source: str = ""  #: path of the modal file, for the record and the animation
     #: whether the geometric stiffness counts: loads stiffen or soften the body (theory.md §7); "auto": if it is there
     stiffening: bool | Literal["auto"] = "auto"
+    #: whether inertia terms that the reduced body does not know (`Moments.missing`) are left out of the motion, which
+    #: is then exact to first order in speeds and deformation; False: a body without them is refused
+    leave_out_missing: bool = False
 
     def __post_init__(self) -> None:
         where = f"flexible body {self.name!r}"
@@ -67,6 +70,16 @@ class FlexibleBody:
                 f"{where}: stiffening is asked for, but the reduced body {self.reduced.name!r} holds no geometric "
                 "stiffness; reduce it anew with geometric stiffness from a body with an element model, or leave "
                 "stiffening out"
+            )
+        missing = self.reduced.moments.missing
+        if not isinstance(self.leave_out_missing, bool):
+            raise ModelError(f"{where}: leave_out_missing: expected true or false, got {self.leave_out_missing!r}")
+        if missing and self.reduced.n_q and not self.leave_out_missing:
+            raise ModelError(
+                f"{where}: a motion needs the inertia terms {', '.join(missing)}, which the reduced body "
+                f"{self.reduced.name!r} does not hold: the program that reduced it did not say them. Import it again "
+                "with its full mass matrix, its nodal masses, or its mesh and density beside (cms import); or say "
+                f"leave_out_missing = true: {self.reduced.moments.trust}"
             )
         if self.reduced.moments.m <= 0:
             raise ModelError(f"{where}: expected a mass above zero, got {self.reduced.moments.m:g}")

@@ -65,7 +65,7 @@ def type_arrays(types: list[RigidBody | ReducedBody]) -> BodyTypes:
             S.append(body.mass * body.center_of_mass)
             J0.append(body.inertia_about_origin)
             continue
-        moments = body.moments
+        moments = body.moments.left_out if body.moments.missing else body.moments  # as `FlexibleBody` was told
         mass.append(moments.m)
         S.append(moments.S)
         J0.append(moments.J0)

@@ -27,7 +27,7 @@ from floatframe.joints.rows import is_held
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.model import JOINT, STIFFNESS
 from floatframe.kernels.work import new_work
-from floatframe.results.validity import LINEAR, STIFFENED, Limits, ValidityNote
+from floatframe.results.validity import LEFT_OUT, LINEAR, STIFFENED, Limits, ValidityNote
 from floatframe.start.newton_equations import linearized, modal_matrix, set_iterate
 from floatframe.system import System
 
@@ -124,7 +124,10 @@ class ValidityWatch:
         i, q0, u0 = part.index, int(model.bodies.q0[part.index]), int(model.bodies.u0[part.index])
         q = rows.q[:, q0 : q0 + part.body.reduced.n_q]
         omega = rows.u[:, u0 + 3 : u0 + 6]
-        found = [("speed", np.linalg.norm(omega, axis=1) / part.frequency)]
+        speed = np.linalg.norm(omega, axis=1) / part.frequency
+        found = [("speed", speed)]
+        if part.body.reduced.moments.missing:
+            found.append(("inertia", speed))
         if len(part.Psi_r):
             angles = (q @ part.Psi_r.T).reshape(len(q), -1, 3)
             found.append(("rotation", np.linalg.norm(angles, axis=2).max(axis=1)))
@@ -215,7 +218,9 @@ def watched(index: int, body: FlexibleBody, frequency: float) -> Watched:
     return Watched(
         index=index,
         body=body,
-        limits=STIFFENED if body.is_stiffened else LINEAR,
+        limits=replace(
+            STIFFENED if body.is_stiffened else LINEAR, inertia=LEFT_OUT if reduced.moments.missing else np.inf
+        ),
         frequency=frequency,
         Psi_r=np.concatenate(turning) if turning else np.zeros((0, reduced.n_q)),
         scaled=scaled,

@@ -3,9 +3,10 @@
 import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
+from math import inf
 from typing import Any
 
-__all__ = ["LINEAR", "STIFFENED", "Limits", "ValidityNote", "notes_from_json", "notes_to_json"]
+__all__ = ["LEFT_OUT", "LINEAR", "STIFFENED", "Limits", "ValidityNote", "notes_from_json", "notes_to_json"]
 
 
 @dataclass(frozen=True)
@@ -15,6 +16,7 @@ class Limits:
     rotation: float  #: elastic rotation of an interface in the body frame [rad]
     load: float  #: relative change of the stiffness by the loads; of a stiffened body: loads by the first buckling load
     speed: float  #: angular speed by the lowest angular frequency of the body, held by one of its joints
+    inertia: float = inf  #: the same speed, of a body whose unknown inertia terms are left out
 
 
 #: a linear frame: its strain is wrong by the square of the rotation, its stiffness by what the loads change of it
@@ -22,7 +24,9 @@ LINEAR = Limits(rotation=0.1, load=0.1, speed=0.2)
 #: with the terms of second order what is left goes with the third power of the rotation; near buckling a body bends far
 STIFFENED = Limits(rotation=0.3, load=0.7, speed=3.5)
 
-KINDS = ("rotation", "load", "speed")
+#: the square of it is the deformation by centrifugal loads, in sizes of the body, that a body without 3C does not have
+LEFT_OUT = 0.1
+KINDS = ("rotation", "load", "speed", "inertia")
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class ValidityNote:
     """A body has left the range of its linear frame; one per body and kind."""
 
     body: str
-    kind: str  #: "rotation", "load" or "speed", the field of `Limits`
+    kind: str  #: "rotation", "load", "speed" or "inertia", the field of `Limits`
     limit: float
     largest: float  #: so far; rotation in rad, else a ratio
     t_first: float  #: when the limit was passed [s]
@@ -43,6 +47,11 @@ class ValidityNote:
         """Say what is too large."""
         if self.kind == "rotation":
             return f"an interface turns by {self.largest:.3g} rad against the body frame (limit {self.limit:g})"
+        if self.kind == "inertia":
+            return (
+                f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g}), while "
+                f"inertia terms are left out: by the order of {self.largest**2:.1g} of its size its deformation is not known"
+            )
         if self.kind == "speed":
             return f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g})"
         if self.is_stiffened:
@@ -55,6 +64,8 @@ class ValidityNote:
     @property
     def action(self) -> str:
         """Say what to do."""
+        if self.kind == "inertia":
+            return "import it with its full mass matrix, nodal masses, or mesh and density beside (cms import)"
         if self.is_stiffened:
             more = "reduce it with more modes, or " if self.kind == "speed" else ""
             return f"{more}split it into parts (cms split, [body] part)"

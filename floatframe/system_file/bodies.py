@@ -68,6 +68,9 @@ class BodySection(Table):
     q: Numbers | None = Field(None, description="a list of numbers, the modal coordinates at the start, one a mode")
     q_dot: Numbers | None = Field(None, description="a list of numbers, the rates of the modal coordinates")
     stiffening: bool | None = Field(None, description="true or false: whether geometric stiffness of the file counts")
+    leave_out_missing: bool | None = Field(
+        None, description="true: move a body whose file lacks inertia terms without them"
+    )
 
     @field_validator("file", mode="before")
     @classmethod
@@ -91,6 +94,8 @@ class BodySection(Table):
             raise ValueError("a flexible body has its inertia in its file; remove inertia and center_of_mass")
         if self.mass is not None and self.stiffening is not None:
             raise ValueError("stiffening: a rigid body has none; remove it")
+        if self.mass is not None and self.leave_out_missing is not None:
+            raise ValueError("leave_out_missing: a rigid body has all of its inertia; remove it")
         others = RIGID_KEYS if self.file is not None else FLEXIBLE_KEYS
         for key in others:
             if getattr(self, key) is not None:
@@ -143,6 +148,7 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
                 f"bodies.{name}.{key}: expected {reduced.n_q} numbers, one for each mode of the body, got {len(values)}"
             )
         motion[key] = np.array(values or ())
+    motion["leave_out_missing"] = bool(section.leave_out_missing)
     motion["stiffening"] = "auto" if section.stiffening is None else section.stiffening
     return FlexibleBody(name, reduced, source=str(section.file.resolve()), **motion)
 

@@ -12,6 +12,7 @@ __all__ = [
     "check_frame_condition",
     "check_free_frequencies",
     "check_inertia_tensor",
+    "check_inertia_terms",
     "check_modal_mass",
     "mode_size",
 ]
@@ -28,6 +29,14 @@ def check_modal_mass(reduced: ReducedBody) -> QualityRecord:
     if not reduced.moments.is_exact:
         return information("modal-mass", f"{reason}; the moments are approximate, from bare matrices", data)
     return judge("modal-mass", defect.max(), reason, data)
+
+
+def check_inertia_terms(reduced: ReducedBody) -> QualityRecord:
+    """Count the inertia terms that the program which reduced the body did not say, and say what a motion is worth."""
+    missing = reduced.moments.missing
+    what = f"{', '.join(missing)} missing" if missing else "none is missing"
+    reason = f"{what}; to be trusted: {reduced.moments.trust}"
+    return judge("inertia-terms", float(len(missing)), reason, {"missing": list(missing)})
 
 
 def check_frame_condition(reduced: ReducedBody) -> QualityRecord:

@@ -299,11 +299,11 @@ def test_other_files_are_refused_with_words(tmp_path, path):
 
 
 def test_a_newer_version_is_refused_by_its_number(body, tmp_path, monkeypatch):
-    monkeypatch.setattr(modal_file, "FREE_VERSION", 4)
+    monkeypatch.setattr(modal_file, "version_of", lambda reduced: 5)
     write(body, tmp_path / "new.h5")
     monkeypatch.undo()
     for file in (tmp_path / "new.h5", repacked(tmp_path / "new.h5")):
-        with pytest.raises(ModalFileError, match="format version 4, this program reads versions up to 3"):
+        with pytest.raises(ModalFileError, match="format version 5, this program reads versions up to 4"):
             read(file)
     (tmp_path / "new.h5").write_bytes(b"floatframe modal-file 12\nbytes 9\nof a kind that does not exist yet")
     with pytest.raises(ModalFileError, match="format version 12"):

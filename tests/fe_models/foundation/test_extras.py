@@ -12,7 +12,7 @@ def test_a_library_that_is_there_is_imported():
 
 
 def test_a_missing_library_is_named_with_the_line_that_installs_it():
-    with pytest.raises(FeModelsError, match=r'STEP files: needs no_such_library, which is not installed; .*\[mesh\]'):
+    with pytest.raises(FeModelsError, match=r"STEP files: needs no_such_library, which is not installed; .*\[mesh\]"):
         extra_module("no_such_library.inner", extra="mesh", purpose="STEP files")
 
 
