@@ -117,8 +117,8 @@ class Moments:
         if missing:
             raise BodyError(
                 f"moments: {', '.join(missing)} of this body {'is' if len(missing) == 1 else 'are'} missing: the "
-                "program that reduced it did not say them, and they do not follow from reduced matrices. Import the body again "
-                "with its full mass matrix, its nodal masses, or its mesh and density beside (cms import)"
+                "program that reduced it did not say them, and they do not follow from reduced matrices. Import the "
+                "body again with its full mass matrix, its nodal masses, or its mesh and density beside (cms import)"
             )
 
     @property

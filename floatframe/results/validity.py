@@ -50,7 +50,8 @@ class ValidityNote:
         if self.kind == "inertia":
             return (
                 f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g}), while "
-                f"inertia terms are left out: by the order of {self.largest**2:.1g} of its size its deformation is not known"
+                f"inertia terms are left out: by the order of {self.largest**2:.1g} of its size its "
+                "deformation is not known"
             )
         if self.kind == "speed":
             return f"it turns with {self.largest:.3g} of its lowest frequency as held (limit {self.limit:g})"
