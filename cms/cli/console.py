@@ -16,6 +16,7 @@ from contextvars import ContextVar
 from typing import Any, ParamSpec, TypeVar
 
 import typer
+from typer.core import TyperCommand
 
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
@@ -81,9 +82,28 @@ class Notes(logging.Handler):
         typer.echo(f"note: {record.getMessage()}", err=True)
 
 
+class PlainHelp(TyperCommand):
+    """A command whose help is printed as it is written: words in brackets are tables and units, not markup."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.help = escape(self.help or "")
+        for parameter in self.params:
+            if getattr(parameter, "help", None):
+                parameter.help = escape(parameter.help)  # type: ignore[attr-defined]
+
+
+class Commands(typer.Typer):
+    """An application of such commands."""
+
+    def command(self, name: str | None = None, **options: Any) -> Any:
+        """Register a command."""
+        return super().command(name, cls=options.pop("cls", PlainHelp), **options)
+
+
 def commands(name: str, help: str) -> typer.Typer:
     """Return an application with the options --version and --debug."""
-    app = typer.Typer(
+    app = Commands(
         name=name, help=help, no_args_is_help=True, add_completion=False, rich_markup_mode="rich",
         pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
     )  # fmt: skip
