@@ -128,8 +128,30 @@ def of_second_order(g: Array, x: Array, y: Array) -> Array:
     return np.asarray(np.einsum("akl,tk,tl->ta", g, x, y, optimize=True))
 
 
-def point_motion(trajectory: Trajectory, body: str, point: Array | tuple[float, float, float]) -> PlaceMotion:
-    """Return the motion of a point that is fixed in the frame of a body, with the axes of the frame."""
+def point_motion(
+    trajectory: Trajectory, body: str, point: Array | tuple[float, float, float], *, undeformed: bool = False
+) -> PlaceMotion:
+    """Return the motion of a point that is fixed in the frame of a body, with the axes of the frame.
+
+    Parameters
+    ----------
+    trajectory, body
+        The motion, and a body of it.
+    point
+        Position in the frame of the body, (3,) [m].
+    undeformed
+        Whether the point of a flexible body is meant to move with its frame alone.
+
+    Raises
+    ------
+    ResultsError
+        If there is no such body, or it is flexible: its points deform, as interfaces and nodes do.
+    """
+    if trajectory.entry(body)[1].n_q and not undeformed:
+        raise ResultsError(
+            f"body {body!r} is flexible: a point fixed in its frame does not deform with it; take interface_motion or "
+            "node_motion with its modal file, or, where the frame alone is meant, undeformed=True"
+        )
     motion = trajectory.body(body)
     shape = MarkerShape(np.asarray(point, dtype=float), np.eye(3))
     return place_of(motion, motion_in_body(shape, motion.q, motion.q_dot, motion.q_ddot))

@@ -14,7 +14,6 @@ __all__ = [
     "interface_positions",
     "nodal_displacements",
     "nodal_positions",
-    "point_positions",
 ]
 
 
@@ -76,9 +75,3 @@ def elastic_displacements(trajectory: Trajectory, body_name: str, reduced: Reduc
     _, entry = trajectory.entry(body_name)
     q = trajectory.body(body_name).q
     return interface_shape(reduced, interface, is_stiffened=entry.is_stiffened).deformation(q)[:, :3]
-
-
-def point_positions(trajectory: Trajectory, body_name: str, point: Array) -> Array:
-    """Return positions of a point that is fixed in the frame of a body, ground axes, (n_t, 3) [m]."""
-    motion = trajectory.body(body_name)
-    return motion.r + rotation_matrix(motion.p) @ np.asarray(point, dtype=float)

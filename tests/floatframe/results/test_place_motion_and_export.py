@@ -53,11 +53,17 @@ def differences(values):
     return (values[2:] - values[:-2]) / (2 * H)
 
 
+def test_a_point_of_a_flexible_body_does_not_leave_its_deformation_out_in_silence(swing):
+    with pytest.raises(ResultsError, match=r"'rod' is flexible: .* take interface_motion or node_motion"):
+        point_motion(swing, "rod", (0.3, -0.4, 0.5))
+
+
 @pytest.mark.parametrize("place", ["end_a", "end_b", "point"])
 def test_velocity_and_acceleration_are_the_rates_of_position_and_velocity(swing, place):
-    motion = point_motion(swing, "rod", (0.3, -0.4, 0.5)) if place == "point" else interface_motion(
-        swing, "rod", REDUCED, place
-    )  # fmt: skip
+    if place == "point":
+        motion = point_motion(swing, "rod", (0.3, -0.4, 0.5), undeformed=True)
+    else:
+        motion = interface_motion(swing, "rod", REDUCED, place)
     scale = np.abs(motion.velocity).max() + 1
     assert_allclose(differences(motion.position), motion.velocity[1:-1], rtol=0, atol=2e-5 * scale)
     fastest = np.abs(motion.acceleration).max() + 1

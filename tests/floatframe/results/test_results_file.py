@@ -30,7 +30,8 @@ from floatframe import (
     integrate,
     read_results,
 )
-from floatframe.results.recovery import interface_positions, nodal_positions, point_positions
+from floatframe.results.place_motion import point_motion
+from floatframe.results.recovery import interface_positions, nodal_positions
 from floatframe.results.results_file import KIND
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 
@@ -388,7 +389,7 @@ def test_nodes_follow_the_frame_and_the_modes_and_meet_at_the_joint():
     reduced = SYSTEM.bodies[0].reduced
     tip = interface_positions(motion, "rod", reduced, "end_a")
     assert_allclose(tip, motion.body("bob").r, rtol=0, atol=1e-12)
-    assert_allclose(point_positions(motion, "bob", np.zeros(3)), tip, rtol=0, atol=1e-12)
+    assert_allclose(point_motion(motion, "bob", (0, 0, 0)).position, tip, rtol=0, atol=1e-12)
     node = int(np.argmax(reduced.nodes[:, 0]))
     for k in (0, 100, 200):
         assert_allclose(nodal_positions(motion, "rod", reduced, k)[node], tip[k], rtol=0, atol=1e-12)
