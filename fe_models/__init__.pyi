@@ -33,8 +33,10 @@ from .errors import UnitsError as UnitsError
 from .foundation.units import UNIT_SYSTEMS as UNIT_SYSTEMS
 from .foundation.units import Units as Units
 from .foundation.units import unit_system as unit_system
+from .importers.matrices.body import body_from_foreign as body_from_foreign
 from .importers.matrices.foreign_matrices import ForeignMatrices as ForeignMatrices
 from .importers.matrices.read_matrices import read_matrices as read_matrices
+from .importers.read_mesh import read_geometry as read_geometry
 from .importers.read_mesh import read_line_mesh as read_line_mesh
 from .importers.read_mesh import read_mesh as read_mesh
 from .importers.read_mesh import read_shell_mesh as read_shell_mesh
@@ -53,10 +55,12 @@ from .meshes.divided_lines import divide_lines as divide_lines
 from .meshes.line_mesh import LineMesh as LineMesh
 from .meshes.line_mesh import straight_line as straight_line
 from .meshes.mesh import Mesh as Mesh
+from .meshes.node_cloud import NodeCloud as NodeCloud
 from .meshes.selections import Box as Box
 from .meshes.selections import Cylinder as Cylinder
 from .meshes.selections import FaceGroup as FaceGroup
 from .meshes.selections import NearestNode as NearestNode
+from .meshes.selections import NodeNumbers as NodeNumbers
 from .meshes.selections import NodeSet as NodeSet
 from .meshes.selections import Plane as Plane
 from .meshes.shell_mesh import ShellMesh as ShellMesh

@@ -54,7 +54,9 @@ def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None]
     if job.body.mesh is not None:
         return body_of_mesh(job, job.body.mesh, stages, on_report)
     if job.body.matrices is not None:
-        return body_of_matrices(job, job.body.matrices, stages)
+        from cms.jobs.matrices_of_job import body_of_matrices
+
+        return body_of_matrices(job, stages)
     raise JobError("job: expected either mesh or matrices, got neither")
 
 
@@ -100,15 +102,3 @@ def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
 
         body = body_of_mixed(job, stages, body, mesh, on_report)
     return body.with_load_cases(*load_cases_of(job, body, mesh))
-
-
-def body_of_matrices(job: Job, path: Path, stages: Stages) -> FEBody:
-    """Read a body of bare matrices, which brings its interfaces along."""
-    from fe_models.matrices import body_from_npz
-
-    with stages("read matrices"):
-        body = body_from_npz(
-            path, name=job.body.name, units=unit_system(job.body.units), held=bool(job.body.held),
-            mend_mass=bool(job.body.mend_mass), accept=[word for word in job.body.accept if word == "units"],
-        )  # fmt: skip
-        return body.with_load_cases(*load_cases_of(job, body))

@@ -48,6 +48,28 @@ Name = Annotated[str, StringConstraints(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
 
 
+ROLES = ("K", "M", "D", "dofs")  #: of files of matrices: stiffness, mass, damping, the list of rows
+
+
+def beside_the_job(value: Any, info: ValidationInfo) -> Path:
+    """Return the path of a file that is there, relative to the job file."""
+    if not isinstance(value, str) or not value:
+        raise ValueError("expected the path of a file, text")
+    path = Path(info.context or ".") / value
+    if not path.is_file():
+        raise ValueError(f"no such file: {path}{near_file(path)}")
+    return path
+
+
+def node_names(value: Any) -> Any:
+    """Return the name of a group of nodes, or a list of node numbers as a tuple."""
+    if isinstance(value, list):
+        if not value or any(isinstance(n, bool) or not isinstance(n, int) for n in value):
+            raise ValueError("expected the name of a group of nodes, or a list of node numbers")
+        return tuple(value)
+    return value
+
+
 def accepted(value: Any) -> tuple[str, ...]:
     """Return kinds of findings of the mesh report that the user has looked at and accepts."""
     words = names(value)
@@ -58,6 +80,7 @@ def accepted(value: Any) -> tuple[str, ...]:
 
 
 Names = Annotated[tuple[str, ...], BeforeValidator(names)]
+Nodes = Annotated[Name | tuple[int, ...], BeforeValidator(node_names)]
 Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted)]
 
 
@@ -93,7 +116,18 @@ class BodySection(Table):
 
     name: Name | None = Field(None, description="the name of the body, text; default: the name of the job file")
     mesh: Path | None = Field(None, description="the path of a mesh file, relative to the job file")
-    matrices: Path | None = Field(None, description="the path of an .npz file with M, K, nodes, dofs")
+    matrices: Path | tuple[Path, ...] | dict[str, Path] | None = Field(
+        None,
+        description="the path of a file with mass and stiffness, a list of paths, or a table {K = path, M = path, "
+        "D = path, dofs = path}",
+    )
+    geometry: Path | None = Field(None, description="the path of the deck or mesh that matrices were made of")
+    names: dict[str, str] | None = Field(
+        None, description="a table {K = name, M = name, D = name}: names of the matrices in files that hold several"
+    )
+    remove_supports: bool = Field(
+        False, description="true or false, for matrices: whether supports whose rows exist are taken out of K"
+    )
     nodes: Path | None = Field(None, description="the path of a table of nodes, for beams")
     lines: Path | None = Field(None, description="the path of a table of lines, for beams")
     plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
@@ -112,15 +146,27 @@ class BodySection(Table):
     incompatible_modes: bool = Field(False, description="true or false: bricks of eight nodes bend by internal modes")
     accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
 
-    @field_validator("mesh", "matrices", "nodes", "lines", mode="before")
+    @field_validator("mesh", "geometry", "nodes", "lines", mode="before")
     @classmethod
     def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
-        if not isinstance(value, str) or not value:
-            raise ValueError("expected the path of a file, text")
-        path = Path(info.context or ".") / value
-        if not path.is_file():
-            raise ValueError(f"no such file: {path}{near_file(path)}")
-        return path
+        return beside_the_job(value, info)
+
+    @field_validator("matrices", mode="before")
+    @classmethod
+    def _matrices_beside_the_job(cls, value: Any, info: ValidationInfo) -> Any:
+        if isinstance(value, list) and value:
+            return tuple(beside_the_job(each, info) for each in value)
+        if isinstance(value, dict) and value:
+            for role in value:
+                if role not in ROLES:
+                    raise ValueError(f"unknown role {quoted(role)}{nearest(role, ROLES)}")
+            return {role: beside_the_job(each, info) for role, each in value.items()}
+        return beside_the_job(value, info)
+
+    @property
+    def brings_interfaces(self) -> bool:
+        """Whether the matrices are an .npz file of our own keys, which has nodes and interfaces."""
+        return isinstance(self.matrices, Path) and self.matrices.suffix.lower() == ".npz" and self.geometry is None
 
     @model_validator(mode="after")
     def _one_source(self) -> "BodySection":
@@ -129,6 +175,11 @@ class BodySection(Table):
         for key in ("held", "mend_mass"):
             if getattr(self, key) is not None and self.matrices is None:
                 raise ValueError(f"{key}: belongs to matrices; a body built from a mesh is free, its mass positive")
+        for key in ("geometry", "names", "remove_supports"):
+            if getattr(self, key) and self.matrices is None:
+                raise ValueError(f"{key}: belongs to matrices")
+            if key != "geometry" and getattr(self, key) and self.brings_interfaces:
+                raise ValueError(f"{key}: belongs to matrices of other programs, not to .npz with nodes and dofs")
         if self.part is not None and self.matrices is not None:
             raise ValueError("part: matrices cannot be cut; remove it, or give the mesh")
         given = [key for key in ("mesh", "matrices", "lines") if getattr(self, key) is not None]
@@ -187,7 +238,7 @@ class InterfaceSection(Table):
         description=f"one of {', '.join(INTERFACE_KINDS)}"
     )
     faces: Name | None = Field(None, description="the name of a group of faces")
-    nodes: Name | None = Field(None, description="the name of a group of nodes")
+    nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
     plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
     cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
     box: BoxSection | None = Field(None, description="a table {lo, hi}")
@@ -224,7 +275,7 @@ class LoadCaseSection(Table):
     at: Name | None = Field(None, description="the name of an interface, at whose reference point it acts")
     reference: Vector3 | None = Field(None, description="the point the force acts at, [x, y, z]")
     faces: Name | None = Field(None, description="the name of a group of faces")
-    nodes: Name | None = Field(None, description="the name of a group of nodes")
+    nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
     plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
     cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
     box: BoxSection | None = Field(None, description="a table {lo, hi}")
@@ -313,7 +364,8 @@ class Job(Table):
                 raise ValueError(f"interfaces.{name}.on: {what}")
         if self.body.matrices and self.materials:
             raise ValueError("materials: matrices have their material inside; remove the tables [materials.NAME]")
-        if self.body.matrices and self.interfaces:
+        brings_interfaces = self.body.brings_interfaces
+        if brings_interfaces and self.interfaces:
             raise ValueError(
                 "interfaces: matrices bring their interfaces in the .npz file (interface/NAME/nodes); remove the tables"
             )
@@ -326,14 +378,14 @@ class Job(Table):
                     "name the group of cells of each"
                 )
         for where, name in named_interfaces(self.reduction).items():
-            if not self.body.matrices and name not in self.interfaces:
+            if not brings_interfaces and name not in self.interfaces:
                 raise ValueError(f"reduction.{where}: there is no such interface{nearest(name, self.interfaces)}")
         for name, case in self.load_cases.items():
-            if not self.body.matrices and case.at is not None and case.at not in self.interfaces:
+            if not brings_interfaces and case.at is not None and case.at not in self.interfaces:
                 raise ValueError(
                     f'load_cases.{name}.at = "{case.at}": there is no such interface{nearest(case.at, self.interfaces)}'
                 )
-            if self.body.matrices and case.selection is not None:
+            if brings_interfaces and case.selection is not None:
                 raise ValueError(
                     f"load_cases.{name}.{case.selection}: matrices have no mesh to select on; give at = an interface"
                 )

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fe_models.material import Material
     from fe_models.meshes.line_mesh import LineMesh
     from fe_models.meshes.mesh import Mesh
+    from fe_models.meshes.node_cloud import NodeCloud
     from fe_models.meshes.shell_mesh import ShellMesh
     from fe_models.meshes.split import AnyMesh
 
@@ -79,17 +80,21 @@ def selection_of(key: str, given: Any) -> Any:
         "box": selections.Box,
         "nearest": selections.NearestNode,
     }
+    if isinstance(given, tuple):
+        return selections.NodeNumbers(given)
     selection: Any = types[key]
     return selection(given) if isinstance(given, str) else selection(**given.model_dump())
 
 
-def load_cases_of(job: Job, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | None" = None) -> tuple[LoadCase, ...]:
+def load_cases_of(
+    job: Job, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | NodeCloud | None" = None
+) -> tuple[LoadCase, ...]:
     """Return the load cases of the job on this body, not yet coupled."""
     return tuple(load_case_of(name, section, body, mesh) for name, section in job.load_cases.items())
 
 
 def load_case_of(
-    name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | None"
+    name: str, section: LoadCaseSection, body: FEBody, mesh: "Mesh | LineMesh | ShellMesh | NodeCloud | None"
 ) -> LoadCase:
     """Return one load case; the job has checked that its keys fit its kind."""
     from fe_models import loads

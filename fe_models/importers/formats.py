@@ -10,4 +10,9 @@ FORMATS = (
     FileFormat("input deck", "Abaqus, CalculiX", "mesh", (".inp",), reads=True, lost="all but the mesh and its sets"),
     FileFormat("bulk data", "Nastran", "mesh", (".bdf", ".nas", ".dat", ".fem"), reads=True, lost="all but the mesh"),
     FileFormat("MED", "Salome, code_aster", "mesh", (".med",), reads=True),
-)  #: one line a format; `cms formats` and docs/formats.md list them
+    FileFormat(
+        "*MATRIX GENERATE, COORDINATE", "Abaqus", "matrices", (".mtx",), reads=True, tried="Abaqus 2021",
+        lost="the numbers of nodes: a deck beside it",
+    ),
+)  # fmt: skip
+#: one line a format; `cms formats` and docs/formats.md list them

@@ -8,6 +8,7 @@ from typing import TypeVar
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus import read_abaqus
+from fe_models.importers.geometry import geometry_from_raw
 from fe_models.importers.gmsh import read_gmsh
 from fe_models.importers.line_cells import line_mesh_from_raw
 from fe_models.importers.med import read_med
@@ -17,9 +18,10 @@ from fe_models.importers.shell_cells import shell_mesh_from_raw
 from fe_models.importers.vtk import read_vtk
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.node_cloud import NodeCloud
 from fe_models.meshes.shell_mesh import ShellMesh
 
-__all__ = ["MESH_FORMATS", "read_line_mesh", "read_mesh", "read_shell_mesh"]
+__all__ = ["MESH_FORMATS", "read_geometry", "read_line_mesh", "read_mesh", "read_shell_mesh"]
 
 M = TypeVar("M")
 
@@ -60,6 +62,22 @@ def read_mesh(path: str | Path) -> Mesh:
         another meaning than its own program gives it.
     """
     return _read(path, mesh_from_raw)
+
+
+def read_geometry(path: str | Path) -> Mesh | NodeCloud:
+    """Read nodes, numbers and groups from a deck or mesh beside matrices, by the same readers as `read_mesh`.
+
+    Returns
+    -------
+    Mesh or NodeCloud
+        A mesh where all elements are solids that are known here, else the nodes and what selects them.
+
+    Raises
+    ------
+    MeshError
+        As `read_mesh`, but for elements: they may be of any kind.
+    """
+    return _read(path, geometry_from_raw)
 
 
 def read_line_mesh(path: str | Path, *, groups: Iterable[str] | None = None) -> LineMesh:

@@ -12,14 +12,18 @@ from fe_models.foundation.words import nearest
 from fe_models.meshes.boundary import CORNERS, boundary_facets, boundary_nodes, first_of_equal_rows
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.node_cloud import NodeCloud
 from fe_models.meshes.shell_mesh import ShellMesh
 
-__all__ = ["Box", "Cylinder", "FaceGroup", "NearestNode", "NodeSet", "Plane", "Selection", "selected_facets"]
+__all__ = [
+    "Box", "Cylinder", "FaceGroup", "NearestNode", "NodeNumbers", "NodeSet", "Plane", "Selection",
+    "selected_facets",
+]  # fmt: skip
 
 _WHY_EMPTY = "nodes that belong to no solid cell, such as reference nodes, are dropped: select nodes of the solid"
 
 Vector = tuple[float, float, float]
-AnyMesh = Mesh | LineMesh | ShellMesh
+AnyMesh = Mesh | LineMesh | ShellMesh | NodeCloud
 
 
 class Selection(Protocol):
@@ -54,6 +58,8 @@ class FaceGroup:
                 f"no face group {self.name!r}{_other_kind(mesh, self.name, 'face group')}"
                 f"{nearest(self.name, mesh.face_sets)}"
             )
+        if isinstance(mesh, NodeCloud):
+            return dict(mesh.face_sets[self.name])
         faces = {kind: mesh.faces[kind][rows] for kind, rows in mesh.face_sets[self.name].items() if rows.size}
         if not faces:
             raise InterfaceError(f"face group {self.name!r} is empty; {_WHY_EMPTY}")
@@ -90,6 +96,31 @@ class NodeSet:
         if nodes.size == 0:
             raise InterfaceError(f"node set {self.name!r} is empty; {_WHY_EMPTY}")
         _require_on_solid(mesh, f"node set {self.name!r}", nodes)
+        return nodes
+
+
+@dataclass(frozen=True)
+class NodeNumbers:
+    """Nodes by their numbers in the file they were read from."""
+
+    numbers: tuple[int, ...]
+
+    def members(self, mesh: AnyMesh) -> IntArray:
+        """Return the nodes with these numbers, ascending."""
+        wanted = np.unique(np.asarray(self.numbers, dtype=np.int64))
+        known = mesh.node_numbers
+        if wanted.size == 0:
+            raise InterfaceError("node numbers: expected at least one, got none")
+        if known.size == 0:
+            raise InterfaceError(f"node numbers {_some(wanted)}: the mesh has no numbers; select by geometry")
+        missing = wanted[~np.isin(wanted, known)]
+        if missing.size:
+            raise InterfaceError(
+                f"node numbers {_some(missing)}: {missing.size} of {wanted.size} are not in the mesh, which has "
+                f"{known.size} nodes from {known.min()} to {known.max()}"
+            )
+        nodes = np.flatnonzero(np.isin(known, wanted))
+        _require_on_solid(mesh, f"node numbers {_some(wanted)}", nodes)
         return nodes
 
 
@@ -198,7 +229,7 @@ class NearestNode:
 
 
 def candidates(mesh: AnyMesh) -> IntArray:
-    """Return the nodes that geometry can select: of the surface of a solid, all of a frame or shell; ascending."""
+    """Return the nodes that geometry can select: of the surface of a solid, all of any other mesh; ascending."""
     return boundary_nodes(mesh) if isinstance(mesh, Mesh) else np.arange(len(mesh.nodes))
 
 
@@ -209,7 +240,7 @@ def selected_facets(mesh: AnyMesh, selection: Selection) -> dict[str, IntArray]:
     """
     if isinstance(selection, FaceGroup):
         return selection.facets(mesh)
-    if isinstance(mesh, LineMesh):
+    if isinstance(mesh, (LineMesh, NodeCloud)):
         return {}
     chosen = np.zeros(len(mesh.nodes), dtype=bool)
     chosen[selection.members(mesh)] = True
@@ -256,7 +287,7 @@ def _other_kind(mesh: AnyMesh, name: str, wanted: str) -> str:
     """Say that the name is that of another kind of group."""
     if isinstance(mesh, LineMesh):
         return f" ({name!r} is a group of lines)" if name in mesh.line_sets else ""
-    kinds = {"node set": mesh.node_sets, "cell group": mesh.cell_sets}
+    kinds = {"node set": mesh.node_sets} | ({} if isinstance(mesh, NodeCloud) else {"cell group": mesh.cell_sets})
     kinds |= {"line group": mesh.line_sets} if isinstance(mesh, ShellMesh) else {"face group": mesh.face_sets}
     others = [kind for kind, sets in kinds.items() if kind != wanted and name in sets]
     return f" ({name!r} is a {others[0]})" if others else ""
@@ -291,3 +322,7 @@ def _diagonal(mesh: AnyMesh) -> float:
 
 def _text(vector: Vector | Array) -> str:
     return f"({', '.join(f'{x:.6g}' for x in vector)})"
+
+
+def _some(numbers: IntArray) -> str:
+    return ", ".join(str(n) for n in numbers[:5]) + (", ..." if len(numbers) > 5 else "")

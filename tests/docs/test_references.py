@@ -90,7 +90,8 @@ def is_name(dotted):
 NAME = r"(?:Mac|Mc)?[A-ZÉ][a-zéüø]+(?:-[A-ZÉ]?[a-zéüø]+)*"
 CITED = re.compile(rf"\b({NAME})(?:(?:, | & | and |, & ){NAME})*(?: et al\.?)?(?:,? \(|,? )((?:19|20)\d\d)\b")
 MONTHS = "January February March April May June July August September October November December"
-NOT_NAMES = {"Benchmarks", *MONTHS.split()}
+PROGRAMS = {"Abaqus", "Nastran", "Ansys", "Adams"}  #: whose versions are years
+NOT_NAMES = {"Benchmarks", *MONTHS.split(), *PROGRAMS}
 
 
 @cache

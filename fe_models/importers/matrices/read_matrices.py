@@ -11,6 +11,7 @@ from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.matrices.abaqus_text import is_coordinates, read_coordinates
 from fe_models.importers.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
+from fe_models.importers.matrices.local_systems import in_basic_axes
 from fe_models.importers.matrices.request import MatrixFormat, Request
 
 __all__ = ["MATRIX_FORMATS", "MatrixFiles", "read_matrices"]
@@ -60,7 +61,7 @@ def read_matrices(files: MatrixFiles, *, names: Mapping[str, str] | None = None)
                 raise MatrixError(f"matrices: unknown role {quoted(role)}{nearest(role, (*ROLES, 'dofs'))}")
     parts = [read_part(path, Request(role, dict(names or {}))) for role, path in listed]
     where = f"matrices {', '.join(path.name for _, path in listed)}"
-    return joined(parts, where)
+    return in_basic_axes(joined(parts, where))
 
 
 def read_part(path: Path, request: Request) -> ForeignMatrices:

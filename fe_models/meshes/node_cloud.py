@@ -1,0 +1,37 @@
+"""Nodes of a model whose elements stay with another program: places, numbers, and the groups that select them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.copies import FrozenMapping, frozen_copies
+
+__all__ = ["NodeCloud"]
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class NodeCloud:
+    """Nodes of any elements, solids, shells, beams or unknown ones: all of them can be selected."""
+
+    nodes: Array  #: (n_nodes, 3), in the length unit of the model
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes, those of lines and points too
+    face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> nodes of faces
+    source: str = ""  #: file it was read from
+    digest: str = ""  #: sha256 of that file
+    node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
+    notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "nodes", frozen(self.nodes))
+        put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "notes", tuple(self.notes))
+        put(self, "node_sets", FrozenMapping({group: frozen_int(n) for group, n in self.node_sets.items()}))
+        sets = {
+            group: FrozenMapping({kind: frozen_int(rows) for kind, rows in by_type.items()})
+            for group, by_type in self.face_sets.items()
+        }
+        put(self, "face_sets", FrozenMapping(sets))

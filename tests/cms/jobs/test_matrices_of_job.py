@@ -1,0 +1,109 @@
+"""Jobs whose body is the matrices of another program with a deck beside them: Abaqus' block of C3D10."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+import fe_models
+from cms.errors import JobError
+from cms.jobs.body_of_job import job_body
+from fe_models.errors import FeModelsError
+
+DATA = Path(__file__).parents[2] / "fe_models" / "importers" / "matrices" / "data" / "abaqus"
+JOB = """
+[body]
+matrices = {matrices}
+geometry = "blockC3D10.inp"
+units = "m-kg-s"
+{more}
+[interfaces.left]
+kind = "rigid"
+plane = {{point = [0, 0, 0], normal = [1, 0, 0]}}
+
+[interfaces.corners]
+kind = "nodes"
+nodes = [1, 2, 3, 4]
+
+[load_cases.push]
+kind = "force"
+force = [0, 0, 1]
+nodes = "Set-1"
+
+[reduction]
+n_modes = 3
+"""
+BOTH = '["blockC3D10_STIF1.mtx", "blockC3D10_MASS1.mtx"]'
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("block")
+    for path in DATA.glob("*.mtx.gz"):
+        (folder / path.stem).write_bytes(gzip.decompress(path.read_bytes()))
+    (folder / "blockC3D10.inp").write_bytes((DATA / "blockC3D10.inp").read_bytes())
+    return folder
+
+
+def job_in(folder, matrices=BOTH, more=""):
+    path = folder / "block.toml"
+    path.write_text(JOB.format(matrices=matrices, more=more))
+    return path
+
+
+def test_a_job_of_matrices_reduces_as_that_of_the_mesh(folder):
+    reduced = cms.reduce_job(job_in(folder))
+    mesh = fe_models.read_mesh(folder / "blockC3D10.inp")
+    steel = fe_models.Material("steel", E=2e11, nu=0.3, rho=2900.0)
+    left = fe_models.rigid_interface(mesh, "left", fe_models.Plane((0, 0, 0), (1, 0, 0)))
+    corners = fe_models.nodes_interface(mesh, "corners", fe_models.NodeNumbers((1, 2, 3, 4)))
+    body = fe_models.solid_body(
+        mesh, steel, name="block", units=fe_models.unit_system("m-kg-s"), interfaces=[left, corners]
+    )
+    coupled = fe_models.couple(body)
+    ours = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=3), geometric=False)
+    assert reduced.moments.is_exact
+    assert_allclose(np.diag(reduced.K), np.diag(ours.K), rtol=2e-8, atol=0)
+    assert_allclose(reduced.moments.J0, ours.moments.J0, rtol=0, atol=1e-12 * np.abs(ours.moments.J0).max())
+    # 5C of each mode, whatever its sign
+    for mine, other in ((reduced.moments.S_kl, ours.moments.S_kl),):
+        assert_allclose(np.einsum("abkk->kab", mine), np.einsum("abkk->kab", other), rtol=0, atol=1e-6)
+    assert_allclose(reduced.load_cases[0].force, [0, 0, 1], rtol=0, atol=1e-12)
+
+
+def test_roles_may_be_named_and_one_matrix_is_not_enough(folder):
+    named = job_body(cms.jobs.job.read_job(job_in(folder, '{K = "blockC3D10_STIF1.mtx", M = "blockC3D10_MASS1.mtx"}')))
+    assert named.n_dof > 0
+    with pytest.raises(FeModelsError, match="the mass M is missing"):
+        job_body(cms.jobs.job.read_job(job_in(folder, '"blockC3D10_STIF1.mtx"')))
+
+
+@pytest.mark.parametrize(
+    ("matrices", "more", "words"),
+    [
+        ('["blockC3D10_STIF1.mtx", "blockC3D10_MAS1.mtx"]', "", "did you mean 'blockC3D10_MASS1.mtx'"),
+        ('{stiffness = "blockC3D10_STIF1.mtx"}', "", "unknown role 'stiffness'"),
+        ("3", "", "expected the path of a file"),
+        (BOTH, 'mesh = "blockC3D10.inp"', "expected either mesh or matrices, got both"),
+        (BOTH, "names = 3", "a table {K = name, M = name, D = name}"),
+    ],
+)
+def test_what_a_job_says_wrongly_is_told(folder, matrices, more, words):
+    with pytest.raises(JobError) as caught:
+        cms.jobs.job.read_job(job_in(folder, matrices, more))
+    assert words in str(caught.value)
+
+
+def test_keys_of_matrices_belong_to_matrices(tmp_path, folder):
+    path = folder / "mesh.toml"
+    path.write_text(
+        '[body]\nmesh = "blockC3D10.inp"\nunits = "m-kg-s"\nremove_supports = true\n'
+        "[materials.steel]\nyoung = 2e11\npoisson = 0.3\ndensity = 2900.0\n[reduction]\nn_modes = 3\n"
+    )
+    with pytest.raises(JobError, match="remove_supports: belongs to matrices"):
+        cms.jobs.job.read_job(path)
+    with pytest.raises(FeModelsError, match="node numbers 900: 1 of 2 are not in the mesh"):
+        fe_models.NodeNumbers((1, 900)).members(fe_models.read_geometry(folder / "blockC3D10.inp"))
