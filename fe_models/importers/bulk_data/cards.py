@@ -1,0 +1,117 @@
+"""Cards of Nastran's bulk data: free, small and large fields, continuations joined."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from fe_models.errors import MeshError
+
+__all__ = ["Card", "read_cards"]
+
+SMALL, LARGE = (8, 8), (16, 4)  #: width and number of the data fields of a line
+EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")  #: of a real without its letter, 1.5-3
+
+
+@dataclass(frozen=True)
+class Card:
+    """One card: its name in upper case without '*', and its data fields, which are numbered from 1."""
+
+    name: str
+    fields: tuple[str, ...]
+    where: str  #: file, line and name, for messages
+
+    def text(self, k: int) -> str:
+        """Return field k; empty where it is blank or beyond the last one."""
+        return self.fields[k - 1] if 0 < k <= len(self.fields) else ""
+
+    def integer(self, k: int, default: int | None = None) -> int:
+        """Return field k as an integer.
+
+        Raises
+        ------
+        MeshError
+            If it is none, or blank without a default.
+        """
+        word = self.text(k)
+        if not word and default is not None:
+            return default
+        try:
+            return int(word)
+        except ValueError:
+            raise MeshError(f"{self.where}: field {k + 1}: expected an integer, got {word!r}") from None
+
+    def real(self, k: int, default: float | None = None) -> float:
+        """Return field k as a real; Nastran may leave out the letter of the exponent (1.5-3) or write D.
+
+        Raises
+        ------
+        MeshError
+            If it is none, or blank without a default.
+        """
+        word = self.text(k)
+        if not word and default is not None:
+            return default
+        try:
+            return real_of(word)
+        except ValueError:
+            raise MeshError(f"{self.where}: field {k + 1}: expected a real number, got {word!r}") from None
+
+
+def real_of(word: str) -> float:
+    """Return the number of a field; ValueError if there is none."""
+    word = word.upper().replace("D", "E")
+    return float(word if "E" in word else EXPONENT.sub(r"E\1", word))
+
+
+def read_cards(where: str, text: str) -> Iterator[Card]:
+    """Yield the cards behind the first BEGIN, or from the first line where there is none, up to ENDDATA.
+
+    Raises
+    ------
+    MeshError
+        If a continuation has no card before it, or does not carry the mark that its card asks for.
+    """
+    lines = text.splitlines()
+    begin = next((k for k, line in enumerate(lines) if line.lstrip()[:5].upper() == "BEGIN"), -1)
+    name, here, mark = "", "", ""
+    fields: list[str] = []
+    for number, raw in enumerate(lines[begin + 1 :], start=begin + 2):
+        line = raw.partition("$")[0].rstrip()
+        if not line:
+            continue
+        if line.lstrip()[:7].upper() == "ENDDATA":
+            break
+        first, data, following = _fields(line)
+        if not first.strip("+* ") or first[0] in "+*":  # a continuation
+            if not name:
+                raise MeshError(f"{where}, line {number}: a continuation without a card before it: {line[:40]!r}")
+            own, asked = first.strip("+* "), mark.strip("+* ")
+            if own and asked and own != asked:
+                raise MeshError(
+                    f"{here}: asks for the continuation {asked!r}, but line {number} has {own!r}; write continuations "
+                    "in sequence"
+                )
+            fields += data
+        else:
+            if name:
+                yield Card(name, tuple(fields), here)
+            name = first.rstrip("*").upper()
+            here = f"{where}, line {number}: {name}"
+            fields = data
+        mark = following
+    if name:
+        yield Card(name, tuple(fields), here)
+
+
+def _fields(line: str) -> tuple[str, list[str], str]:
+    """Return the first field, the data fields of a line, and the mark of its continuation."""
+    if "," in line:
+        parts = [part.strip() for part in line.split(",")]
+        count = (LARGE if "*" in parts[0] else SMALL)[1]
+        data = parts[1 : count + 1]
+        return parts[0], data + [""] * (count - len(data)), parts[count + 1] if len(parts) > count + 1 else ""
+    line = line.expandtabs(8)
+    first = line[:8].strip()
+    width, count = LARGE if "*" in first else SMALL
+    data = [line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)]
+    return first, data, line[72:80].strip()
