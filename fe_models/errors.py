@@ -11,6 +11,7 @@ __all__ = [
     "MaterialError",
     "MatrixError",
     "MeshError",
+    "MeshingError",
     "SectionError",
     "ShellError",
     "UnitsError",
@@ -23,6 +24,10 @@ class MeshError(FeModelsError, ValueError):
 
 class MatrixError(FeModelsError, ValueError):
     """Matrices of another program cannot be read truthfully, or lack what a body needs."""
+
+
+class MeshingError(FeModelsError, RuntimeError):
+    """The mesher is missing or cannot be loaded."""
 
 
 class MaterialError(FeModelsError, ValueError):

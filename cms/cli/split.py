@@ -104,8 +104,8 @@ def split_job(request: SplitRequest) -> list[Path]:
 def mesh_of(job: Job) -> Any:
     """Read the mesh of a job that can be cut: of solid cells, of a shell, or of lines."""
     from cms.jobs.attachments_of_job import frame_mesh
+    from cms.jobs.mesh_of_job import solid_mesh_of
     from cms.jobs.shell_body import shell_mesh
-    from fe_models.importers import read_mesh
     from fe_models.meshes.unused_nodes import drop_unused_nodes
 
     if job.body.matrices is not None:
@@ -116,9 +116,7 @@ def mesh_of(job: Job) -> Any:
         return shell_mesh(job)
     if job.sections:
         return frame_mesh(job)
-    if job.body.mesh is None:
-        raise JobError("job: expected a mesh, got none")
-    return drop_unused_nodes(read_mesh(job.body.mesh))
+    return drop_unused_nodes(solid_mesh_of(job))
 
 
 def homes_of(job: Job, mesh: Any, parts: tuple[Any, ...], cuts: list[str]) -> dict[str, int]:
@@ -279,7 +277,7 @@ def loads_on(job: Job, part: Any, inside: list[str], request: SplitRequest) -> l
         if case.kind == "gravity" or (case.at is not None and case.at in inside):
             names.append(name)
         elif case.kind == "pressure" and case.faces is not None:
-            if case.faces in groups:
+            if all(face in groups for face in case.faces):
                 names.append(name)
         elif case.at is None:
             raise JobError(

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cms.errors import JobError
@@ -13,6 +12,7 @@ from fe_models.foundation.units import unit_system
 
 if TYPE_CHECKING:
     pass
+from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
 from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh
 
 __all__ = ["coupled_body", "job_body", "uncoupled_body"]
@@ -52,7 +52,7 @@ def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None]
 
         return body_of_frame(job, stages, on_report)
     if job.body.mesh is not None:
-        return body_of_mesh(job, job.body.mesh, stages, on_report)
+        return body_of_mesh(job, stages, on_report)
     if job.body.matrices is not None:
         from cms.jobs.matrices_of_job import body_of_matrices
 
@@ -60,17 +60,16 @@ def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None]
     raise JobError("job: expected either mesh or matrices, got neither")
 
 
-def body_of_mesh(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
+def body_of_mesh(job: Job, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
     """Read and check the mesh, and assemble it with the materials and interfaces of the job."""
-    from fe_models.importers import read_mesh
     from fe_models.meshes.unused_nodes import drop_unused_nodes
     from fe_models.reports.mesh_report import report_mesh
     from fe_models.solids.body import solid_body
 
     units = unit_system(job.body.units)
     materials = materials_of(job)
-    with stages("read mesh"):
-        mesh = part_of_mesh(job, read_mesh(path))
+    with stages("mesh" if is_cad(job) else "read mesh"):
+        mesh = part_of_mesh(job, solid_mesh_of(job))
     with stages("check mesh"):
         bricks = job.body.incompatible_modes
         report = report_mesh(mesh, materials, units=units, incompatible_modes=bricks)

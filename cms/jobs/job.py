@@ -18,6 +18,7 @@ from cms.jobs.beam_tables import (
     names,
 )
 from cms.jobs.damping_table import DampingSection
+from cms.jobs.mesh_size_table import MeshSizeSection, check_mesh_size
 from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
 from fe_models.body.fe_body import INTERFACE_KINDS
@@ -81,6 +82,7 @@ def accepted(value: Any) -> tuple[str, ...]:
 
 Names = Annotated[tuple[str, ...], BeforeValidator(names)]
 Nodes = Annotated[Name | tuple[int, ...], BeforeValidator(node_names)]
+FACES = "the name of a group of faces, of a CAD file also what they are (cylinder r=12), or a list of these"
 Accepted = Annotated[tuple[str, ...], BeforeValidator(accepted)]
 
 
@@ -115,7 +117,7 @@ class BodySection(Table):
     """[body]: where the model comes from."""
 
     name: Name | None = Field(None, description="the name of the body, text; default: the name of the job file")
-    mesh: Path | None = Field(None, description="the path of a mesh file, relative to the job file")
+    mesh: Path | None = Field(None, description="the path of a mesh or CAD file, relative to the job file")
     matrices: Path | tuple[Path, ...] | dict[str, Path] | None = Field(
         None,
         description="the path of a file with mass and stiffness, a list of paths, or a table {K = path, M = path, "
@@ -237,7 +239,7 @@ class InterfaceSection(Table):
     kind: choice("kind", lambda: INTERFACE_KINDS) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(INTERFACE_KINDS)}"
     )
-    faces: Name | None = Field(None, description="the name of a group of faces")
+    faces: Names | None = Field(None, description=FACES)
     nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
     plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
     cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
@@ -274,7 +276,7 @@ class LoadCaseSection(Table):
     torque: Vector3 | None = Field(None, description="the total torque about the reference point, [x, y, z]")
     at: Name | None = Field(None, description="the name of an interface, at whose reference point it acts")
     reference: Vector3 | None = Field(None, description="the point the force acts at, [x, y, z]")
-    faces: Name | None = Field(None, description="the name of a group of faces")
+    faces: Names | None = Field(None, description=FACES)
     nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
     plane: PlaneSection | None = Field(None, description="a table {point, normal, tolerance}")
     cylinder: CylinderSection | None = Field(None, description="a table {point, axis, radius, span, tolerance}")
@@ -310,6 +312,7 @@ class Job(Table):
 
     body: BodySection = Field(description="a table [body] with mesh and units")
     materials: dict[str, MaterialSection] = Field({}, description="tables [materials.NAME]")
+    mesh_size: MeshSizeSection | None = Field(None, description="a table [mesh_size] with size, for CAD files")
     shells: dict[str, ShellSection] = Field({}, description="tables [shells.NAME]")
     sections: dict[str, BeamSection] = Field({}, description="tables [sections.NAME] of beams")
     masses: dict[str, MassSection] = Field({}, description="tables [masses.NAME]")
@@ -339,6 +342,7 @@ class Job(Table):
     def _fits_together(self) -> "Job":
         if not self.body.matrices and not self.materials:
             raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
+        check_mesh_size(self.mesh_size, self.body.mesh, has_others=bool(self.shells or self.sections))
         attached = {"masses": self.masses, "springs": self.springs, "links": self.links, "ties": self.ties}
         if self.shells:
             check_shells(self.shells, self.sections, self.body, self.materials)

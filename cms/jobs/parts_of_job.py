@@ -83,6 +83,9 @@ def selection_of(key: str, given: Any) -> Any:
     if isinstance(given, tuple):
         return selections.NodeNumbers(given)
     selection: Any = types[key]
+    if key == "faces":
+        first, *more = [given] if isinstance(given, str) else given
+        return selections.FaceGroup(first, tuple(more))
     return selection(given) if isinstance(given, str) else selection(**given.model_dump())
 
 

@@ -14,5 +14,17 @@ FORMATS = (
         "*MATRIX GENERATE, COORDINATE", "Abaqus", "matrices", (".mtx",), reads=True, tried="Abaqus 2021",
         lost="the numbers of nodes: a deck beside it",
     ),
+    FileFormat(
+        "STEP", "CAD programs", "geometry", (".step", ".stp"), reads=True, tried="Gmsh 4.15, OpenCASCADE 7.8",
+        lost="names of faces, assemblies' structure", extra="mesh",
+    ),
+    FileFormat(
+        "IGES", "CAD programs", "geometry", (".iges", ".igs"), reads=True, tried="Gmsh 4.15, OpenCASCADE 7.8",
+        lost="names, bodies with cavities", extra="mesh",
+    ),
+    FileFormat(
+        "BREP", "OpenCASCADE, FreeCAD", "geometry", (".brep",), reads=True, tried="Gmsh 4.15, OpenCASCADE 7.8",
+        lost="it has no unit, names, colours", extra="mesh",
+    ),
 )  # fmt: skip
 #: one line a format; `cms formats` and docs/formats.md list them

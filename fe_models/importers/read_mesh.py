@@ -8,6 +8,7 @@ from typing import TypeVar
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus import read_abaqus
+from fe_models.importers.cad.cad_units import CAD_SUFFIXES
 from fe_models.importers.geometry import geometry_from_raw
 from fe_models.importers.gmsh import read_gmsh
 from fe_models.importers.line_cells import line_mesh_from_raw
@@ -140,6 +141,11 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
         raise MeshError(f"{where}: there is no such file{_neighbours(path)}")
     if path.is_dir():
         raise MeshError(f"{where}: expected a file, got a directory")
+    if suffix in CAD_SUFFIXES:
+        raise MeshError(
+            f"{where}: this is a CAD geometry, which has to be meshed: a table [mesh_size] in a job, or "
+            f"fe_models.mesh_cad(path, fe_models.MeshSize(size), units=...)"
+        )
     if suffix not in MESH_FORMATS:
         raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, MESH_FORMATS)}")
     try:

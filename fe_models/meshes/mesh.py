@@ -30,6 +30,7 @@ class Mesh:
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
     cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
     notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
+    origin: Mapping[str, str] = field(default_factory=dict)  #: label -> what it was made of, such as a geometry's size
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -44,6 +45,7 @@ class Mesh:
                 for group, by_type in getattr(self, name).items()
             }
             put(self, name, FrozenMapping(sets))
+        put(self, "origin", FrozenMapping(self.origin))
         put(self, "node_sets", FrozenMapping({group: frozen_int(n) for group, n in self.node_sets.items()}))
 
     @property

@@ -35,48 +35,54 @@ class Selection(Protocol):
 
 @dataclass(frozen=True)
 class FaceGroup:
-    """The nodes of a named group of faces, or of cells of a shell.
+    """The nodes of a named group of faces, or of cells of a shell; or of several groups together.
 
     Where the faces are facets of the solid, the nodes are those of the complete facets, so that linear triangles
     written over quadratic tetrahedra select the middle nodes too.
     """
 
     name: str
+    also: tuple[str, ...] = ()  #: further groups
 
     def members(self, mesh: AnyMesh) -> IntArray:
-        """Return the nodes of the group, ascending."""
+        """Return the nodes of the groups, ascending."""
         return np.unique(np.concatenate([rows.ravel() for rows in self.facets(mesh).values()]))
 
     def facets(self, mesh: AnyMesh) -> dict[str, IntArray]:
-        """Return face type -> faces of the group, as complete facets of the solid where they are such."""
+        """Return face type -> faces of the groups, as complete facets of the solid where they are such."""
         if isinstance(mesh, LineMesh):
             raise InterfaceError(f"face group {self.name!r}: a mesh of lines has no faces; select nodes")
+        found: dict[str, list[IntArray]] = {}
+        for name in (self.name, *self.also):
+            for kind, rows in _faces_of_group(mesh, name).items():
+                found.setdefault(kind, []).append(rows)
+        if isinstance(mesh, NodeCloud):  # whose groups hold the nodes of the faces themselves
+            return {kind: np.unique(np.concatenate(parts), axis=0) for kind, parts in found.items()}
+        kept = {kind: mesh_faces(mesh)[kind][np.unique(np.concatenate(parts))] for kind, parts in found.items()}
         if isinstance(mesh, ShellMesh):
-            return self._cells(mesh)
-        if self.name not in mesh.face_sets:
-            raise InterfaceError(
-                f"no face group {self.name!r}{_other_kind(mesh, self.name, 'face group')}"
-                f"{nearest(self.name, mesh.face_sets)}"
-            )
-        if isinstance(mesh, NodeCloud):
-            return dict(mesh.face_sets[self.name])
-        faces = {kind: mesh.faces[kind][rows] for kind, rows in mesh.face_sets[self.name].items() if rows.size}
-        if not faces:
-            raise InterfaceError(f"face group {self.name!r} is empty; {_WHY_EMPTY}")
-        _require_on_solid(mesh, f"face group {self.name!r}", np.concatenate([f.ravel() for f in faces.values()]))
-        return _complete(mesh, faces)
+            return kept
+        what = " and ".join(repr(name) for name in (self.name, *self.also))
+        _require_on_solid(mesh, f"face group {what}", np.concatenate([f.ravel() for f in kept.values()]))
+        return _complete(mesh, kept)
 
-    def _cells(self, mesh: ShellMesh) -> dict[str, IntArray]:
-        """Return cell type -> cells of the group of a shell."""
-        if self.name not in mesh.cell_sets:
-            raise InterfaceError(
-                f"no group of cells {self.name!r}{_other_kind(mesh, self.name, 'cell group')}"
-                f"{nearest(self.name, mesh.cell_sets)}"
-            )
-        cells = {kind: mesh.cells[kind][rows] for kind, rows in mesh.cell_sets[self.name].items() if rows.size}
-        if not cells:
-            raise InterfaceError(f"group of cells {self.name!r} is empty")
-        return cells
+
+def mesh_faces(mesh: Mesh | ShellMesh) -> Mapping[str, IntArray]:
+    """Return the faces that groups count: of a solid mesh those beside it, of a shell its cells."""
+    return mesh.cells if isinstance(mesh, ShellMesh) else mesh.faces
+
+
+def _faces_of_group(mesh: Mesh | ShellMesh | NodeCloud, name: str) -> dict[str, IntArray]:
+    """Return face type -> what one group holds."""
+    is_shell = isinstance(mesh, ShellMesh)
+    groups = mesh.cell_sets if isinstance(mesh, ShellMesh) else mesh.face_sets
+    what = "group of cells" if is_shell else "face group"
+    if name not in groups:
+        other = _other_kind(mesh, name, "cell group" if is_shell else "face group")
+        raise InterfaceError(f"no {what} {name!r}{other}{nearest(name, groups)}")
+    rows = {kind: members for kind, members in groups[name].items() if members.size}
+    if not rows:
+        raise InterfaceError(f"{what} {name!r} is empty" + ("" if is_shell else f"; {_WHY_EMPTY}"))
+    return rows
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Errors of the parametric parts."""
 
-from fe_models.errors import FeModelsError, MeshError
+from fe_models.errors import FeModelsError, MeshError, MeshingError
 
 __all__ = ["MeshError", "MeshingError", "PartError"]
 
@@ -8,6 +8,3 @@ __all__ = ["MeshError", "MeshingError", "PartError"]
 class PartError(FeModelsError, ValueError):
     """The dimensions of a part do not fit together."""
 
-
-class MeshingError(FeModelsError, RuntimeError):
-    """The mesher is missing or cannot be loaded."""

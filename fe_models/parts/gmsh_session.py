@@ -1,4 +1,4 @@
-"""One gmsh model at a time: the library is loaded lazily, options are set for repeatable meshes and restored."""
+"""The gmsh model of a parametric part: opened, meshed and written with its groups."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,26 +8,10 @@ from types import ModuleType
 
 import numpy as np
 
-from fe_models.parts.errors import MeshError, MeshingError
+from fe_models.importers.cad.gmsh_model import gmsh_model
+from fe_models.parts.errors import MeshError
 
-__all__ = ["PartMesh", "cylinder_faces", "load_gmsh", "mesh_and_write", "part_model"]
-
-OPTIONS = {
-    "General.Terminal": 0,
-    "General.NumThreads": 1,  # threads change the order of operations, and with it the mesh
-    "Mesh.RandomSeed": 1,
-    "Mesh.Algorithm": 6,
-    "Mesh.Algorithm3D": 10,  # HXT: fewer and better tetrahedra than Delaunay here, and the same ones every time
-    "Mesh.MeshSizeExtendFromBoundary": 1,
-    "Mesh.MshFileVersion": 4.1,
-    "Mesh.Binary": 1,
-    "Mesh.SaveAll": 0,  # only the named groups: curves and unnamed faces would be noise to a reader
-    "Mesh.SecondOrderLinear": 0,
-    "Mesh.HighOrderOptimize": 1,  # mid-side nodes go onto the curved faces, the elements behind them give way
-    "Mesh.Optimize": 1,
-    "Mesh.OptimizeNetgen": 1,
-}
-
+__all__ = ["PartMesh", "cylinder_faces", "mesh_and_write", "part_model"]
 
 @dataclass(frozen=True)
 class PartMesh:
@@ -40,29 +24,6 @@ class PartMesh:
     worst_quality: float  #: smallest scaled inverse condition number of an element, 1 is best, <= 0 is inverted
 
 
-def load_gmsh() -> ModuleType:
-    """Return the module gmsh.
-
-    Raises
-    ------
-    MeshingError
-        If it is not installed, or a system library it needs is missing; the text says how to get it.
-    """
-    try:
-        import gmsh
-    except ModuleNotFoundError as error:
-        raise MeshingError(
-            'meshing a part: expected the package gmsh, found none; install it with pip install "floatframe[mesh]"'
-        ) from error
-    except OSError as error:
-        raise MeshingError(
-            f"meshing a part: gmsh is installed, but a system library it needs cannot be loaded ({error}); "
-            "on Debian or Ubuntu: apt-get install libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
-        ) from error
-    module: ModuleType = gmsh
-    return module
-
-
 @contextmanager
 def part_model(name: str, size: float, order: int) -> Iterator[ModuleType]:
     """Open an empty gmsh model for one part, and close it whatever happens; options come back as they were."""
@@ -70,25 +31,9 @@ def part_model(name: str, size: float, order: int) -> Iterator[ModuleType]:
         raise MeshError(f"part {name!r}: size: expected a positive element size, got {size}")
     if order not in (1, 2):
         raise MeshError(f"part {name!r}: order: expected 1 (tet4) or 2 (tet10), got {order}")
-    gmsh = load_gmsh()
-    was_open = bool(gmsh.isInitialized())
-    if not was_open:
-        gmsh.initialize(interruptible=False)
-    options = OPTIONS | {"Mesh.ElementOrder": order, "Mesh.MeshSizeMax": size, "Mesh.MeshSizeMin": size / 20}
-    before = {option: gmsh.option.getNumber(option) for option in options}
-    try:
-        for option, value in options.items():
-            gmsh.option.setNumber(option, value)
-        gmsh.model.add(name)
-        try:
-            yield gmsh
-        finally:
-            gmsh.model.remove()
-    finally:
-        for option, value in before.items():
-            gmsh.option.setNumber(option, value)
-        if not was_open:
-            gmsh.finalize()
+    options = {"Mesh.ElementOrder": order, "Mesh.MeshSizeMax": size, "Mesh.MeshSizeMin": size / 20}
+    with gmsh_model(name, options) as gmsh:
+        yield gmsh
 
 
 def cylinder_faces(gmsh: ModuleType, low: np.ndarray, high: np.ndarray) -> list[int]:

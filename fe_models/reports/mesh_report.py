@@ -1,8 +1,9 @@
 """The mesh report: what a mesh is and what is wrong with it, in numbers, before any solve."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
+from math import nan
 from types import MappingProxyType
 
 import numpy as np
@@ -12,6 +13,7 @@ from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.units import Units, unit_system
 from fe_models.material import Material, assign_materials
+from fe_models.meshes.cell_angles import face_angles
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
 from fe_models.meshes.mesh import Mesh
@@ -63,6 +65,9 @@ class MeshReport(Report):
     distorted: Mapping[str, IntArray]  #: type -> rows of cells with a Jacobian <= 0 at a node only
     findings: tuple[Finding, ...]
     first_order: FirstOrderError | None = None  #: None: no cells of first order, or not measured
+    origin: Mapping[str, str] = field(default_factory=dict)  #: what the mesh was made of, as it says
+    angles: tuple[float, float] = (nan, nan)  #: smallest and largest between neighbouring faces of a cell [degrees]
+    lowest_jacobian: float = nan  #: least Jacobian of a cell over its mean, at integration points and nodes; 1 is best
 
     def numbers(self) -> list[tuple[str, str]]:
         """Return label and value of each number, in words."""
@@ -70,6 +75,7 @@ class MeshReport(Report):
         cells = ", ".join(f"{count} {kind}" for kind, count in self.n_cells.items())
         rows = [
             ("file", self.source),
+            *self.origin.items(),
             ("nodes", f"{self.n_nodes}" + (f" ({self.n_unused_nodes} unused)" if self.n_unused_nodes else "")),
             ("cells", cells),
             ("bounding box", f"{_vector(self.lo)} to {_vector(self.hi)} {length}"),
@@ -79,6 +85,8 @@ class MeshReport(Report):
         if self.mass is not None and self.mass_centre is not None:
             rows.append(("mass", f"{self.mass:.6g} {mass}"))
             rows.append(("centre of mass", f"{_vector(self.mass_centre)} {length}"))
+        rows.append(("angles of the cells", f"{self.angles[0]:.3g} to {self.angles[1]:.3g} degrees"))
+        rows.append(("least Jacobian over mean", f"{self.lowest_jacobian:.3g}"))
         rows.append(("connected parts", str(self.n_parts)))
         if self.n_coincident:
             rows.append(("coincident nodes", str(self.n_coincident)))
@@ -158,6 +166,9 @@ def report_mesh(
         distorted=distorted,
         findings=tuple(findings),
         first_order=first_order,
+        origin=mesh.origin,
+        angles=face_angles(mesh),
+        lowest_jacobian=min(float(min(g.lowest_inside.min(), g.lowest_at_nodes.min())) for g in geometry.values()),
     )
 
 
