@@ -80,12 +80,12 @@ def selection_of(key: str, given: Any) -> Any:
         "box": selections.Box,
         "nearest": selections.NearestNode,
     }
-    if isinstance(given, tuple):
-        return selections.NodeNumbers(given)
-    selection: Any = types[key]
     if key == "faces":
         first, *more = [given] if isinstance(given, str) else given
         return selections.FaceGroup(first, tuple(more))
+    if isinstance(given, tuple):
+        return selections.NodeNumbers(given)
+    selection: Any = types[key]
     return selection(given) if isinstance(given, str) else selection(**given.model_dump())
 
 
