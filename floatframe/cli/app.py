@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli import analyses, driven, linear, sweep
+from floatframe.cli import analyses, cosimulation, driven, linear, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -442,3 +442,4 @@ analyses.register(app)
 linear.register(app)
 driven.register(app)
 sweep.register(app)
+cosimulation.register(app)

@@ -19,7 +19,7 @@ from floatframe.kernels.work import Work
 from floatframe.motion.event_steps import EventWatch
 from floatframe.system import System
 
-__all__ = ["jumps_of_steps", "over_jumps"]
+__all__ = ["begun_anew", "jumps_of_steps", "over_jumps"]
 
 SHORT = 1e-9  #: of a step: what is left out before a jump, and a rest that is none
 
@@ -74,7 +74,7 @@ def over_jumps(
 
 def begun_anew(integrator: Integrator, system: System, carry: Carry, work: Work, t: float) -> tuple[Carry, Rows]:
     """Return the memory of a motion that begins at t from the state of another memory, and the results there."""
-    fresh = integrator.start(system, t, state_of_file(compiled_system(system), carry.state))
+    fresh = integrator.start(system, t, state_of_file(compiled_system(system), carry.state), before=carry)
     carry = replace(
         fresh, work=carry.work, n_iterations=carry.n_iterations, n_steps=carry.n_steps, n_rejected=carry.n_rejected,
         h_next=0.0,

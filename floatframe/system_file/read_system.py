@@ -34,6 +34,7 @@ from floatframe.system import REDUNDANT, System
 from floatframe.system_file.bodies import BodySection, body_of
 from floatframe.system_file.changed_content import changed
 from floatframe.system_file.channel_section import InputSection, OutputSection
+from floatframe.system_file.cosimulation_section import FmuSection
 from floatframe.system_file.event_section import EventSection
 from floatframe.system_file.forces import ForceSection, force_of
 from floatframe.system_file.joints import CouplerSection, JointSection, coupler_of, joint_of
@@ -72,6 +73,7 @@ class SystemFile(Table):
     inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
     outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
     events: dict[str, EventSection] = Field({}, description="tables [events.NAME]")
+    fmu: FmuSection | None = Field(None, description="a table [fmu] with inputs, outputs and parameters")
     run: RunSection | None = Field(None, description="a table [run] with t_end and h")
 
     @model_validator(mode="after")

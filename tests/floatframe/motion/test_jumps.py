@@ -8,11 +8,14 @@ from numpy.testing import assert_allclose
 
 from floatframe import (
     GROUND,
+    AngleSensor,
+    ControlSensor,
     EnergyMomentum,
     Event,
     FlexibleBody,
     GeneralizedAlpha,
     Ida,
+    JointCoordinate,
     JointForce,
     Marker,
     PlaceSensor,
@@ -20,7 +23,9 @@ from floatframe import (
     RevoluteJoint,
     RigidBody,
     System,
+    UserForce,
     integrate,
+    measured,
 )
 from floatframe.functions.time_functions import constant, piecewise
 from floatframe.motion.jumps import jumps_of_steps
@@ -91,3 +96,16 @@ def test_a_jump_beside_an_event_keeps_its_impulse():
     motion = integrate(system, GeneralizedAlpha(0.8), 0.1, H)
     assert len(motion.t) == 12  # one of the event
     assert_allclose(MASS * motion.body("body").v[-1, 0], FORCE * (0.0456 - 0.0123), rtol=1e-6)
+
+
+def test_states_of_user_forces_and_counted_turns_go_on_over_a_jump():
+    """The state is the time, the body turns at two turns a second: neither begins anew where the force jumps."""
+    body = RigidBody("body", MASS, np.eye(3), omega_B=(0, 0, 4 * np.pi))
+    hinge = RevoluteJoint("hinge", GROUND, Marker("body"), (0, 0, 1))
+    clock = UserForce("clock", {"phi": JointCoordinate("hinge", "angle")}, {}, {"z": "1"}, {"z": 0.0})
+    blow = PointForce("blow", Marker("body"), (FORCE, 0, 0), amplitude=pulse(0.505, 0.6))
+    sensors = [ControlSensor("clock", "clock"), AngleSensor("turn", Marker(GROUND), Marker("body"))]
+    system = System([body], [hinge], [clock, blow], sensors=sensors)
+    found = measured(system, integrate(system, GeneralizedAlpha(), 0.8, H))
+    assert_allclose(found["clock"].columns["z"], found["clock"].t, rtol=0, atol=1e-9)
+    assert_allclose(found["turn"].columns["angle"], 4 * np.pi * found["turn"].t, rtol=0, atol=1e-6)
