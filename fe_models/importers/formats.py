@@ -11,6 +11,20 @@ FORMATS = (
     FileFormat("bulk data", "Nastran", "mesh", (".bdf", ".nas", ".dat", ".fem"), reads=True, lost="all but the mesh"),
     FileFormat("MED", "Salome, code_aster", "mesh", (".med",), reads=True),
     FileFormat(
+        "OUTPUT4", "Nastran", "matrices", (".op4",), reads=True,
+        tried="NX 9.1, Simcenter of 2020, MSC 2017",
+    ),
+    FileFormat(
+        "OUTPUT2, matrix data blocks", "Nastran", "matrices", (".op2",), reads=True, tried="NX 9.1", extra="nastran",
+        lost="tables",
+    ),
+    FileFormat("DMIG, EXTRN", "Nastran", "matrices", (".pch", ".asm"), reads=True, tried="NX 9.1"),
+    FileFormat(
+        "external superelement", "Nastran", "matrices", (".op4", ".pch", ".asm"), reads=True,
+        tried="NX 9.1, Simcenter of 2020, MSC 2017",
+        lost="structural damping (K4)",
+    ),
+    FileFormat(
         "*MATRIX GENERATE, COORDINATE", "Abaqus", "matrices", (".mtx",), reads=True, tried="Abaqus 2021",
         lost="the numbers of nodes: a deck beside it",
     ),

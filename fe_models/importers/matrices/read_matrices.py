@@ -12,13 +12,19 @@ from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.matrices.abaqus_text import is_coordinates, read_coordinates
 from fe_models.importers.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
 from fe_models.importers.matrices.local_systems import in_basic_axes
+from fe_models.importers.matrices.nastran import read_op2_part, read_op4_part, read_punch_part
 from fe_models.importers.matrices.request import MatrixFormat, Request
+from fe_models.importers.nastran_matrices.op2 import is_op2
+from fe_models.importers.nastran_matrices.op4 import is_op4
 
 __all__ = ["MATRIX_FORMATS", "MatrixFiles", "read_matrices"]
 
 HEAD = 4096  #: bytes by which the format of a file is told
 
 MATRIX_FORMATS: tuple[MatrixFormat, ...] = (
+    MatrixFormat("Nastran OP4", (".op4",), read_op4_part, is_op4),
+    MatrixFormat("Nastran OP2", (".op2",), read_op2_part, is_op2),
+    MatrixFormat("Nastran punch", (".pch", ".asm"), read_punch_part),
     MatrixFormat("Abaqus matrix (COORDINATE)", (".mtx",), read_coordinates, is_coordinates),
 )  #: every format that is read; of those with one suffix the first that knows the content
 

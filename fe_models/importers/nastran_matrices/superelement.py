@@ -20,7 +20,7 @@ from fe_models.importers.nastran_matrices.dti import EMPTY, SCALAR, RecoveryRows
 from fe_models.importers.nastran_matrices.op4 import is_op4, read_op4
 from fe_models.importers.nastran_matrices.raw_matrix import NastranMatrix, dense_matrix, matrix_named, real_square
 
-__all__ = ["SCALAR", "ElementRows", "NastranSuperelement", "Recovery", "read_superelement"]
+__all__ = ["SCALAR", "ElementRows", "NastranSuperelement", "Recovery", "extrn_rows", "read_superelement"]
 
 COMPANIONS = (".op4", ".pch", ".asm")  #: that are read with one of them
 STIFFNESS, MASS, DAMPING = ("KXX", "KAA"), ("MXX", "MAA"), ("BXX", "BXX1", "BAA")
@@ -110,7 +110,11 @@ def read_superelement(files: str | Path | Iterable[str | Path]) -> NastranSupere
     n = K.shape[0]
     if M.shape != K.shape:
         raise MatrixError(f"{where}: stiffness has {n} rows, mass {M.shape[0]}; expected the same")
-    dofs = _rows(where, cards, n)  # (2)
+    dofs = extrn_rows(where, cards)  # (2)
+    if len(dofs) != n:
+        raise MatrixError(
+            f"{where}: EXTRN names {len(dofs)} rows, the matrices have {n}; these files do not belong together"
+        )
     points = read_grid_points(cards)  # (3)
     missing = [number for number, component in dofs.tolist() if component != SCALAR and number not in points.positions]
     if missing:
@@ -171,8 +175,14 @@ def _contents(where: str, paths: list[Path]) -> tuple[list[NastranMatrix], list[
     return matrices, cards, digests
 
 
-def _rows(where: str, cards: list[Card], n: int) -> IntArray:
-    """Return the (id, component) of each row from the EXTRN cards."""
+def extrn_rows(where: str, cards: list[Card]) -> IntArray:
+    """Return the (id, component 0-5 or `SCALAR`) of each row from the EXTRN cards, (n_dof, 2).
+
+    Raises
+    ------
+    MatrixError
+        If there is no such card, or it names a row twice or not by components.
+    """
     found = [card for card in cards if card.name == "EXTRN"]
     if not found:
         raise MatrixError(
@@ -197,10 +207,6 @@ def _rows(where: str, cards: list[Card], n: int) -> IntArray:
     if len(set(rows)) < len(rows):
         twice = next(row for k, row in enumerate(rows) if row in rows[:k])
         raise MatrixError(f"{where}: EXTRN names point {twice[0]} twice with the same component")
-    if len(rows) != n:
-        raise MatrixError(
-            f"{where}: EXTRN names {len(rows)} rows, the matrices have {n}; these files do not belong together"
-        )
     return np.array(rows, dtype=np.int64).reshape(-1, 2)
 
 
