@@ -12,12 +12,14 @@ from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.analyses.marker_jacobian import marker_jacobian
-from floatframe.bodies.markers import Marker
+from floatframe.bodies.marker_shape import node_shape
+from floatframe.bodies.markers import Marker, body_name
 from floatframe.checked_values import array_of_shape, unit_vector
-from floatframe.compiling.markers import find_marker
+from floatframe.compiling.markers import MarkerData, find_body, find_marker
 from floatframe.compiling.system import CompiledSystem
 from floatframe.errors import ModelError
 from floatframe.kernels.work import Work
+from floatframe.results.sensors.places import is_at_node, nearest_node
 from floatframe.results.sensors.stresses import flexible_body, modes_at
 from floatframe.rotations import euler_parameters
 from floatframe.state import State
@@ -41,6 +43,8 @@ RATES = ("displacement", "velocity", "acceleration")
 @dataclass(frozen=True, eq=False)
 class Channel:
     """The motion of a marker along a direction: displacement [m], or rotation [rad] about it.
+
+    On a flexible body the marker is an interface, or a position in mesh axes: the kept node nearest to it.
 
     As an input it is the force [N], or moment [N m], that does work on it. With `relative_to`, the motion against
     that marker, and the opposite force on it.
@@ -132,12 +136,28 @@ def channel_rows(system: System, compiled: CompiledSystem, work: Work, channels:
 def marker_row(system: System, compiled: CompiledSystem, work: Work, channel: Channel, marker: Marker) -> Array:
     """Return the row of one marker of a channel, (n_u,)."""
     row = np.zeros(int(compiled.model.bodies.u0[-1]))
-    data = find_marker(system, f"channel {channel.name!r}: marker", marker)
+    data = channel_marker(system, channel, marker)
     if data.body >= 0:
         u = slice(int(compiled.model.bodies.u0[data.body]), int(compiled.model.bodies.u0[data.body + 1]))
         first = 0 if channel.quantity == "translation" else 3
         row[u] = channel.direction @ marker_jacobian(compiled, work, data)[first : first + 3]
     return row
+
+
+def channel_marker(system: System, channel: Channel, marker: Marker) -> MarkerData:
+    """Return a marker of a channel; on a flexible body a position stands for the kept node nearest to it."""
+    where = f"channel {channel.name!r}: marker"
+    if not is_at_node(system, marker):
+        return find_marker(system, where, marker)
+    name = body_name(marker.body)
+    body = flexible_body(system, where, name)
+    if channel.quantity == "rotation":
+        raise ModelError(
+            f"channel {channel.name!r}: nodes keep no rotations: take an interface of flexible body {name!r}, "
+            f"{', '.join(interface.name for interface in body.reduced.interfaces)}, in place of a position"
+        )
+    node = nearest_node(body, np.asarray(marker.position))
+    return MarkerData(find_body(system, where, name), node_shape(body.moved, node, is_stiffened=body.is_stiffened))
 
 
 def coordinate_row(system: System, compiled: CompiledSystem, work: Work, channel: CoordinateChannel) -> Array:

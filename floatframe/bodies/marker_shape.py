@@ -37,6 +37,7 @@ __all__ = [
     "interface_shape",
     "marker_motion",
     "motion_in_body",
+    "node_shape",
 ]
 
 
@@ -109,6 +110,18 @@ def interface_shape(reduced: ReducedBody, name: str, *, is_stiffened: bool) -> M
     interface = reduced.interface(name)
     bend = bending_of(reduced, name) if is_stiffened else None
     return MarkerShape(interface.position, interface.triad, np.asarray(interface.Psi), bend)
+
+
+def node_shape(reduced: ReducedBody, node: int, *, is_stiffened: bool) -> MarkerShape:
+    """Return the marker at a kept node, with the axes of the body frame: nodes keep no rotations.
+
+    Of a stiffened body with quadratic modes its displacement is of second order, Phi q + ½ Σ q_k q_l g_kl.
+    """
+    psi = np.concatenate([reduced.Phi[node], np.zeros((3, reduced.n_q))])
+    bend = None
+    if is_stiffened and reduced.quadratic is not None:
+        bend = np.concatenate([-reduced.quadratic[node], np.zeros((3, reduced.n_q, reduced.n_q))])
+    return MarkerShape(reduced.nodes[node], np.eye(3), psi, bend)
 
 
 class MotionInBody(NamedTuple):

@@ -306,7 +306,7 @@ def plot_command(
     file: ResultsFile,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to write (.png, .svg, .pdf).")] = None,
     sensors: Annotated[
-        list[str], typer.Option("--sensor", "-s", help="Only this sensor or joint.coordinate; repeatable.")
+        list[str], typer.Option("--sensor", "-s", help="Only this sensor, sensor.column or joint.coordinate.")
     ] = [],  # noqa: B006
 ) -> None:
     """Plot the motion: positions, energies, elastic displacement, reactions, energy error, joint drift, sensors.
@@ -325,7 +325,7 @@ def plot_command(
     from floatframe.pictures.animation import bodies_of
     from floatframe.pictures.overview import plot_overview
     from floatframe.pictures.sensor_plots import plot_sensors
-    from floatframe.results.sensors import measured, sensor_of
+    from floatframe.results.sensors import measured, measurement_of
     from floatframe.results.trajectory import read_results
 
     trajectory = read_results(file)
@@ -343,10 +343,8 @@ def plot_command(
     if sensors:
         if system is None:
             raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
-        chosen = [sensor_of(system, name) for name in sensors]
-        figure = plot_sensors(
-            [*measured(system, trajectory, chosen).values()], title=system.name, time_symbol=system.units.time_symbol
-        )
+        chosen = [measurement_of(system, trajectory, name) for name in sensors]
+        figure = plot_sensors(chosen, title=system.name, time_symbol=system.units.time_symbol)
     else:
         found = [] if system is None else [*measured(system, trajectory).values()]
         figure = plot_overview(trajectory, bodies, found)

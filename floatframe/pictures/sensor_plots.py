@@ -39,17 +39,17 @@ def plot_measurement(
         ax = Figure(figsize=(7, 4), layout="constrained").add_subplot()
     panels = dict(panels_of(measurement))
     unit = next(iter(panels)) if unit is None else unit
-    largest = max(float(np.abs(measurement.columns[name]).max(initial=0.0)) for name in panels[unit])
-    for name in panels[unit]:
-        values = measurement.columns[name]
-        # components that stay zero would only crowd the legend
-        if len(panels[unit]) == 1 or np.abs(values).max(initial=0.0) > NOTHING * largest:
-            is_sum = name.split()[-1] in ("size", "total", "von")
-            ax.plot(measurement.t, values, label=name, linewidth=1.0 if is_sum else 1.5, color="k" if is_sum else None)
+    columns = panels[unit]
+    size = {name: float(np.abs(measurement.columns[name]).max(initial=0.0)) for name in columns}
+    # components that stay zero would only crowd the legend; where all do, the last one says so
+    shown = [name for name in columns if size[name] > NOTHING * max(size.values())] or [columns[-1]]
+    for name in columns if len(columns) == 1 else shown:
+        is_sum = name.split()[-1] in ("size", "total", "von")
+        line = {"linewidth": 1.0, "color": "k"} if is_sum else {"linewidth": 1.5}
+        ax.plot(measurement.t, measurement.columns[name], label=name, **line)
     ax.set_xlabel(f"time [{time_symbol}]")
     ax.set_title(measurement.sensor, fontsize="medium")
     ax.grid(alpha=0.3)
-    columns = panels[unit]
     if len(columns) == 1:
         ax.set_ylabel(f"{columns[0]} [{unit}]")
         return ax

@@ -17,6 +17,7 @@ from floatframe.bodies.marker_shape import (
     interface_shape,
     marker_motion,
     motion_in_body,
+    node_shape,
 )
 from floatframe.bodies.mean_axes import FrameMotion, mean_axes
 from floatframe.errors import ResultsError
@@ -110,22 +111,8 @@ def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: i
     require_same_modes(trajectory, body, reduced)
     if not 0 <= node < len(reduced.nodes):
         raise ResultsError(f"body {body!r}: node: expected 0 to {len(reduced.nodes) - 1}, got {node}")
-    motion, zero = trajectory.body(body), np.zeros((len(trajectory.t), 3))
     is_stiffened = trajectory.entry(body)[1].is_stiffened
-    g = reduced.quadratic[node] if reduced.quadratic is not None and is_stiffened else None
-    shape, q, q_dot, q_ddot = reduced.Phi[node], motion.q, motion.q_dot, motion.q_ddot
-    local, rate, second = reduced.nodes[node] + q @ shape.T, q_dot @ shape.T, q_ddot @ shape.T
-    if g is not None:
-        local = local + 0.5 * of_second_order(g, q, q)
-        rate = rate + of_second_order(g, q, q_dot)
-        second = second + of_second_order(g, q_dot, q_dot) + of_second_order(g, q, q_ddot)
-    own = MotionInBody(local, rate, second, np.broadcast_to(np.eye(3), (len(motion.t), 3, 3)), zero, zero)
-    return place_of(motion, own)
-
-
-def of_second_order(g: Array, x: Array, y: Array) -> Array:
-    """Return Σ x_k y_l g_kl over time, (n_t, 3); g (3, n, n) symmetric, x and y (n_t, n)."""
-    return np.asarray(np.einsum("akl,tk,tl->ta", g, x, y, optimize=True))
+    return shape_motion(trajectory.body(body), node_shape(reduced, node, is_stiffened=is_stiffened))
 
 
 def point_motion(

@@ -32,6 +32,7 @@ __all__ = [
     "StressSensor",
     "VonMisesSensor",
     "measured",
+    "measurement_of",
     "sensor_of",
     "sensors_of",
 ]
@@ -114,3 +115,22 @@ def sensor_of(system: System, name: str) -> Sensor:
     coordinates = [f"{each.name}.{c}" for each in system.joints for c in each.coordinates]
     choices = [*(sensor.name for sensor in system.sensors), *coordinates]
     raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {quoted(name)}{nearest(name, choices)}")
+
+
+def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measurement:
+    """Return what "sensor", "joint.coordinate" or one column "sensor.column" measured on a motion of the system.
+
+    Raises
+    ------
+    ModelError
+        With the nearest name if there is no such sensor or coordinate, or the sensor has no such column.
+    """
+    owner, _, column = name.rpartition(".")
+    names = [sensor.name for sensor in system.sensors]
+    if name in names or owner not in names:
+        sensor = sensor_of(system, name)
+        return measured(system, trajectory, [sensor])[sensor.name]
+    whole = measured(system, trajectory, [sensor_of(system, owner)])[owner]
+    if column not in whole.columns:
+        raise ModelError(f"sensor {owner!r}: no column {quoted(column)}{nearest(column, list(whole.columns))}")
+    return Measurement(name, whole.t, {column: whole.columns[column]}, {column: whole.units[column]})

@@ -26,7 +26,15 @@ from floatframe.results.sensors.measurement import Measurement, unit_words, vect
 from floatframe.results.trajectory import Trajectory
 from floatframe.system import System
 
-__all__ = ["PLACE_QUANTITIES", "AngleSensor", "DisplacementSensor", "PlaceSensor", "nearest_node", "place_motion"]
+__all__ = [
+    "PLACE_QUANTITIES",
+    "AngleSensor",
+    "DisplacementSensor",
+    "PlaceSensor",
+    "is_at_node",
+    "nearest_node",
+    "place_motion",
+]
 
 FAR = 0.1  #: of the size of a body: from a node that is meant to stand for a position
 

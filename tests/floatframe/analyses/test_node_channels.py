@@ -1,0 +1,45 @@
+"""Channels at a position of a flexible body: its nearest kept node, as sensors have it."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+from floatframe import GROUND, FixedJoint, FlexibleBody, Gravity, Marker, ModelError, System
+from floatframe.analyses.channels import Channel
+from floatframe.analyses.equilibrium import static_equilibrium
+from floatframe.analyses.linearization import linearize
+from tests.cms.second_order.test_geometric_reduction import bar_of_beams
+
+
+@pytest.fixture(scope="module")
+def body():
+    coupled = cms.couple(bar_of_beams(6))
+    return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=3), quadratic=True)
+
+
+def held(body, weight):
+    held_end = FixedJoint("clamp", Marker(GROUND), Marker("bar", body.interfaces[0].name))
+    return System([FlexibleBody("bar", body)], [held_end], [Gravity((0.0, 0.0, -weight))])
+
+
+@pytest.mark.parametrize("weight", [0.0, 3e4])
+@pytest.mark.parametrize("direction", [(1, 0, 0), (0, 0.6, 0.8)])
+def test_a_node_at_an_interface_moves_and_is_pushed_as_the_interface(body, weight, direction):
+    end = body.interfaces[1]
+    position = body.frame.origin + body.frame.axes @ end.position
+    system = held(body, weight)
+    rest = static_equilibrium(system)
+    if weight:
+        assert np.abs(end.Psi[:3] @ rest.state.q).max() > 1e-3 * np.ptp(body.nodes[:, 0])  # the second order counts
+    at_node, at_interface = (Channel("tip", marker, direction) for marker in (
+        Marker("bar", position=position), Marker("bar", end.name)))  # fmt: skip
+    node, interface = (linearize(system, rest, inputs=[each], outputs=[each]) for each in (at_node, at_interface))
+    size = np.abs(interface.B).max()
+    assert_allclose(node.B, interface.B, rtol=0, atol=1e-9 * size)
+    assert_allclose(node.C, interface.C, rtol=0, atol=1e-9 * np.abs(interface.C).max())
+
+
+def test_nodes_keep_no_rotations(body):
+    with pytest.raises(ModelError, match="nodes keep no rotations: take an interface of flexible body 'bar'"):
+        linearize(held(body, 0.0), outputs=[Channel("turn", Marker("bar", position=(0, 0, 0)), (0, 1, 0), "rotation")])
