@@ -2,11 +2,14 @@
 
 import os
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from cms.errors import ExportError
 from cms.exporters.exudyn import make_exudyn
+from cms.exporters.mbdyn import make_mbdyn
 from cms.exporters.mbsim import make_mbsim
+from cms.exporters.sid_fem import DIALECTS, make_sid_fem
 from cms.exporters.writer import Request, Writer, left_out
 from cms.modal_file.file import convert_units, digest, read
 from cms.reduced_body.reduced_body import ReducedBody
@@ -28,6 +31,17 @@ WRITERS: dict[str, Writer] = {
         frozenset({"gyroscopic", "damping", "interfaces", "stress", "surface"}),
         needs=("modes", "nodes"),
     ),
+    "mbdyn": Writer(
+        make_mbdyn, frozenset({"gyroscopic", "geometric", "damping", "rotation"}), needs=("modes", "interfaces")
+    ),
+    **{
+        dialect: Writer(
+            partial(make_sid_fem, dialect=dialect),
+            frozenset({"gyroscopic", "geometric", "damping", "rotation"}),
+            needs=("modes", "interfaces"),
+        )
+        for dialect in DIALECTS
+    },
 }  #: by key of `cms.exporters.formats.FORMATS`
 
 NEEDS = {

@@ -28,15 +28,7 @@ def make_mbsim(request: Request) -> Made:
             file.attrs.create(f"header {k + 1}", line.encode("ascii"))
         for name, row in all_nodes(body).of_interface.items():
             file.attrs.create(f"interface {name}", row + 1)
-    nodes = all_nodes(body)
-    unknown = int((~nodes.has_rotation).sum())
-    notes = nodes.words()
-    if unknown:
-        notes += (
-            f"rotations are known at interfaces and at members of rigid ones; those of {unknown} other nodes are "
-            "written as zero: attach frames to the nodes of the interfaces",
-        )
-    return Made({request.path: image.getvalue()}, notes)
+    return Made({request.path: image.getvalue()}, all_nodes(body).notes())
 
 
 def datasets(body: ReducedBody) -> dict[str, Array]:

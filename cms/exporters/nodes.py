@@ -21,9 +21,17 @@ class NodeList:
     has_rotation: np.ndarray  #: whether it is known, (n,)
     of_interface: dict[str, int]  #: row of the reference point of each interface
 
-    def words(self) -> tuple[str, ...]:
-        """Return 'interface left: node 17', one for each."""
-        return tuple(f"interface {name}: node {self.numbers[row]}" for name, row in self.of_interface.items())
+    def notes(self) -> tuple[str, ...]:
+        """Return 'interface left: node 17', one for each, and what is not known of the others."""
+        found = tuple(f"interface {name}: node {self.numbers[row]}" for name, row in self.of_interface.items())
+        unknown = int((~self.has_rotation).sum())
+        if not unknown:
+            return found
+        return (
+            *found,
+            f"rotations are known at interfaces and at members of rigid ones; those of {unknown} other nodes are "
+            "written as zero: attach frames to the nodes of the interfaces",
+        )
 
 
 def interface_nodes(body: ReducedBody) -> NodeList:
