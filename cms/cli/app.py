@@ -91,6 +91,9 @@ def export_command(
     nodes: Annotated[
         str, typer.Option(help="Nodes, where the format leaves the choice: interfaces or all.")
     ] = "default",
+    load: Annotated[
+        list[str] | None, typer.Option(help="Load case that acts all the time (ext_ptfm): NAME=AMPLITUDE; repeatable.")
+    ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
 ) -> None:
     """Write a modal file in the format of another program, and say what that format cannot hold.
@@ -101,7 +104,7 @@ def export_command(
     """
     from cms.cli.exchange.export import ExportRequest, run_export
 
-    run_export(ExportRequest(file, to, units, nodes, output))
+    run_export(ExportRequest(file, to, units, nodes, output, tuple(load or ())))
 
 
 @app.command("check")

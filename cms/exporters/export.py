@@ -1,17 +1,24 @@
 """A reduced body in the format of another program: the table of writers, and the one way to use it."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from cms.errors import ExportError
+from cms.errors import CmsError, ExportError
+from cms.exporters.ext_ptfm import make_ext_ptfm
 from cms.exporters.exudyn import make_exudyn
+from cms.exporters.matlab import make_mat5, make_mat73, make_simscape
+from cms.exporters.matrix_market import make_matrix_market
 from cms.exporters.mbdyn import make_mbdyn
 from cms.exporters.mbsim import make_mbsim
+from cms.exporters.nastran import make_dmig, make_op4
 from cms.exporters.sid_fem import DIALECTS, make_sid_fem
+from cms.exporters.vtk import make_vtk
 from cms.exporters.writer import Request, Writer, left_out
 from cms.modal_file.file import convert_units, digest, read
+from cms.reduced_body.invariants import INERTIA_TERMS
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.paths import replace_files
 from fe_models.foundation.seal import reason
@@ -20,6 +27,7 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["WRITERS", "Exported", "export_body"]
 
+OVER_INTERFACES = frozenset({"damping", "rotation", "load cases"})  #: held by all matrices over the interfaces
 WRITERS: dict[str, Writer] = {
     "mbsim": Writer(
         make_mbsim,
@@ -42,6 +50,20 @@ WRITERS: dict[str, Writer] = {
         )
         for dialect in DIALECTS
     },
+    "mat": Writer(make_mat5, OVER_INTERFACES | {"interfaces", "surface"}, takes_held=True, needs=("interfaces",)),
+    "mat73": Writer(make_mat73, OVER_INTERFACES | {"interfaces", "surface"}, takes_held=True, needs=("interfaces",)),
+    "matrix-market": Writer(
+        make_matrix_market, OVER_INTERFACES | {"interfaces"}, takes_held=True, needs=("interfaces",)
+    ),
+    "simscape": Writer(
+        make_simscape, (OVER_INTERFACES | {"interfaces"}) - {"load cases"}, units="m-kg-s", needs=("interfaces",)
+    ),
+    "nastran-op4": Writer(make_op4, OVER_INTERFACES, takes_held=True, needs=("interfaces",)),
+    "nastran-dmig": Writer(make_dmig, OVER_INTERFACES, takes_held=True, needs=("interfaces",)),
+    "ext_ptfm": Writer(
+        make_ext_ptfm, OVER_INTERFACES, takes_held=True, takes_loads=True, units="m-kg-s", needs=("interfaces",)
+    ),
+    "vtk": Writer(make_vtk, frozenset({"surface", "stress"}), takes_held=True, needs=("modes", "nodes")),
 }  #: by key of `cms.exporters.formats.FORMATS`
 
 NEEDS = {
@@ -67,6 +89,7 @@ def export_body(
     to: str,
     units: Units | str,
     nodes: str = "default",
+    loads: Mapping[str, float] | None = None,
 ) -> Exported:
     """Write a reduced body in the format of another program; files are written whole or not at all.
 
@@ -82,6 +105,8 @@ def export_body(
         Unit system of the numbers, or its name. It has to be said: most formats do not name their units.
     nodes
         Nodes of formats that leave the choice (SID_FEM, MBDyn): "interfaces" or "all"; "default": what is usual there.
+    loads
+        Amplitudes of load cases that act all the time, by name, in formats that hold such loads (ext_ptfm).
 
     Returns
     -------
@@ -103,10 +128,12 @@ def export_body(
     system = wanted_units(units, to, writer)
     if nodes not in ("default", "interfaces", "all"):
         raise ExportError(f"export: nodes = {quoted(nodes)}: expected 'interfaces' or 'all'")
+    if loads and not writer.takes_loads:
+        raise ExportError(f"export: loads: {to} holds no constant loads; give them to the other program as forces")
     source = "" if isinstance(body, ReducedBody) else f"{Path(body).name}, digest {digest(body)}"
     converted = convert_units(body if isinstance(body, ReducedBody) else read(body), system)
     require_content(converted, to, writer)
-    request = Request(converted, Path(path), source, nodes)
+    request = Request(converted, Path(path), source, nodes, loads or {})
     made = writer.make(request)
     try:
         replace_files(made.files)
@@ -148,3 +175,8 @@ def require_content(body: ReducedBody, to: str, writer: Writer) -> None:
         has, words = NEEDS[need]
         if not has(body):
             raise ExportError(f"{where} {words}")
+    if "gyroscopic" in writer.holds:
+        try:
+            body.moments.require(*INERTIA_TERMS)
+        except CmsError as error:
+            raise ExportError(f"{where}: {error}") from error

@@ -4,6 +4,8 @@ from fe_models.foundation.formats import FileFormat
 
 __all__ = ["FORMATS"]
 
+BEYOND_MASS = "inertia beyond the mass matrix, geometric stiffness, stress"
+
 FORMATS = (
     FileFormat(
         "ExternalFlexibleFfrBody, HDF5", "MBSim", "reduced body", (".h5",), writes=True, key="mbsim",
@@ -25,5 +27,37 @@ FORMATS = (
     FileFormat(
         "SID_FEM, m1(row, column, q)", "FEMBeam, welib", "reduced body", (".SID_FEM",), writes=True,
         key="sid_fem-fembeam", lost="second order of J(q), load cases, stress",
+    ),
+    FileFormat(
+        "MAT-file of version 5", "MATLAB, Octave", "reduced body", (".mat",), writes=True, key="mat",
+        tried="scipy 1.17", lost=BEYOND_MASS,
+    ),
+    FileFormat(
+        "MAT-file of version 7.3", "MATLAB", "reduced body", (".mat",), writes=True, key="mat73",
+        tried="h5py, by the attributes of MATLAB", lost=BEYOND_MASS,
+    ),
+    FileFormat(
+        "Reduced Order Flexible Solid (P, K, M, C)", "Simscape Multibody", "reduced body", (".mat",), writes=True,
+        key="simscape", tried="scipy 1.17", lost=f"{BEYOND_MASS}, load cases",
+    ),
+    FileFormat(
+        "Matrix Market", "many", "reduced body", (".mtx",), writes=True, key="matrix-market", tried="scipy 1.17",
+        lost=BEYOND_MASS,
+    ),
+    FileFormat(
+        "OUTPUT4 with .asm, .pch", "Nastran", "reduced body", (".op4", ".asm", ".pch"), writes=True, key="nastran-op4",
+        tried="pyYeti 1.5", lost=BEYOND_MASS,
+    ),
+    FileFormat(
+        "DMIG", "Nastran", "reduced body", (".pch",), writes=True, key="nastran-dmig", tried="pyYeti 1.5",
+        lost=f"{BEYOND_MASS}, digits beyond the tenth",
+    ),
+    FileFormat(
+        "ExtPtfm, FlexASCII", "OpenFAST", "reduced body", (".dat",), writes=True, key="ext_ptfm",
+        tried="its documentation", lost=f"{BEYOND_MASS}, all interfaces but one",
+    ),
+    FileFormat(
+        "VTU, PVD", "ParaView", "reduced body", (".pvd", ".vtu"), writes=True, key="vtk", tried="pyvista, meshio",
+        lost="all but shapes and stress",
     ),
 )  #: one line a format; `cms formats` and docs/formats.md list them  # fmt: skip

@@ -1,4 +1,4 @@
-"""MBDyn's modal joint: the .fem file with masses, modes at nodes, invariants and stress stiffening (records 1 to 19)."""
+"""MBDyn's modal joint: the .fem file with masses, modes at nodes, invariants and stress stiffening."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,7 +13,7 @@ __all__ = ["make_mbdyn"]
 
 
 def make_mbdyn(request: Request) -> Made:
-    """Return the file: all record groups but 3, 4 (start) and 11 (lumped masses, from which MBDyn would form invariants).
+    """Return the file: all record groups but 3, 4 (start) and 11 (lumped masses, of which MBDyn would form invariants).
 
     With int over mass, c and phi in the frame of the modal node, x~ the skew matrix:
 
@@ -32,8 +32,8 @@ def make_mbdyn(request: Request) -> Made:
     if body.geometric is not None and body.interfaces:
         names = ", ".join(interface.name for interface in body.interfaces)
         notes += (
-            f"record group 19 counts on all {len(body.interfaces)} interfaces in the modal joint, in this order: {names}; "
-            "it needs `use automatic differentiation`",
+            f"record group 19 counts on all {len(body.interfaces)} interfaces in the modal joint, in this order: "
+            f"{names}; it needs `use automatic differentiation`",
         )
     return Made({request.path: text.encode("ascii")}, notes)
 

@@ -37,6 +37,7 @@ class Request:
     path: Path  #: the file asked for; further files take its stem
     source: str = ""  #: the modal file, with its digest
     nodes: str = "default"  #: "interfaces" or "all" of the kept nodes, where the format leaves the choice
+    loads: Mapping[str, float] = field(default_factory=dict)  #: amplitudes of load cases, where they act all the time
 
     def header(self) -> tuple[str, ...]:
         """Return lines of ASCII: body, source, units, frame, and its provenance."""
@@ -69,6 +70,7 @@ class Writer:
     make: Callable[[Request], Made]
     holds: frozenset[str] = field(default_factory=frozenset)  #: keys of `CONTENT`
     takes_held: bool = False  #: a body that is held to the ground makes sense there
+    takes_loads: bool = False  #: constant loads are part of the file
     units: str = ""  #: the only system its program knows; empty: any
     needs: tuple[str, ...] = ()  #: "nodes", "interfaces": what a body must have
 

@@ -1,6 +1,7 @@
 """`cms export`: a modal file in the format of another program."""
 
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 from cms.cli.console import output_path, say
@@ -19,6 +20,7 @@ class ExportRequest:
     units: str | None
     nodes: str
     output: Path | None
+    loads: tuple[str, ...] = ()  #: "NAME=AMPLITUDE"
 
 
 def run_export(request: ExportRequest) -> None:
@@ -38,7 +40,7 @@ def run_export(request: ExportRequest) -> None:
     suffix = next(known.suffixes[0] for known in FORMATS if known.key == request.to and known.writes)
     default = request.file.with_name(f"{request.file.stem}_{request.to}{suffix}")
     path = output_path(request.output, default, ExportError, overwrite_of=(request.file,))
-    exported = export_body(request.file, path, to=request.to, units=units, nodes=request.nodes)
+    exported = export_body(request.file, path, to=request.to, units=units, nodes=request.nodes, loads=loads_of(request))
     for written in exported.files:
         say(f"wrote {written} ({written.stat().st_size / 1e6:.2f} MB)")
     say(f"units: {units.name} ({units.length_symbol}, {units.mass_symbol}, {units.time_symbol})")
@@ -46,3 +48,17 @@ def run_export(request: ExportRequest) -> None:
         say(note)
     if exported.left_out:
         say(f"not held by this format: {'; '.join(exported.left_out)}")
+
+
+def loads_of(request: ExportRequest) -> dict[str, float]:
+    """Return the amplitudes that were asked for by the names of their load cases."""
+    loads = {}
+    for text in request.loads:
+        name, _, amplitude = text.rpartition("=")
+        try:
+            loads[name] = float(amplitude)
+        except ValueError:
+            name = ""
+        if not name or not isfinite(loads[name]):
+            raise ExportError(f"--load {text}: expected NAME=AMPLITUDE, such as weight=1")
+    return loads

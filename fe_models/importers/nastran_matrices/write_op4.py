@@ -12,7 +12,7 @@ from fe_models.errors import MatrixError
 from fe_models.foundation.paths import replace_file
 from fe_models.importers.nastran_matrices.op4_binary import LARGEST
 
-__all__ = ["write_op4"]
+__all__ = ["op4_parts", "write_op4"]
 
 LARGEST_TEXT = 9_999_998  #: rows or columns that fit the 8 characters of an integer, with a sign
 PER_LINE, WIDTH, DIGITS = 3, 24, 16  #: of numbers as text: 17 significant digits give every double back
@@ -37,7 +37,11 @@ def write_op4(path: str | Path, matrices: Mapping[str, Any], *, text: bool = Fal
     MatrixError
         If a name does not fit or occurs twice, or a matrix is empty, too large, complex or not finite.
     """
-    where = f"OP4 file {path}"
+    replace_file(Path(path), *op4_parts(f"OP4 file {path}", matrices, text=text))
+
+
+def op4_parts(where: str, matrices: Mapping[str, Any], *, text: bool = False) -> list[bytes]:
+    """Return the bytes of an OP4 file, part by part, for `write_op4` and for writers of several files at once."""
     parts: list[bytes] = []
     seen: set[str] = set()
     for given, values in matrices.items():
@@ -51,7 +55,7 @@ def write_op4(path: str | Path, matrices: Mapping[str, Any], *, text: bool = Fal
         if text and max(matrix.shape) > LARGEST_TEXT:
             raise MatrixError(f"{where}: matrix {name}: {matrix.shape} is too large for text; write it binary")
         parts += _text(name, matrix) if text else _binary(name, matrix)
-    replace_file(Path(path), *parts)
+    return parts
 
 
 def _compressed(here: str, values: Any) -> sp.csc_array:

@@ -139,7 +139,9 @@ def test_nodes_turn_with_psi_and_stiffening_enters_as_the_standard_has_it(tmp_pa
     plain = written_terms("sid_fem", tmp_path)[2]
     a, alpha, omega, wrench = (rng.normal(size=size) for size in (3, 3, 3, 6))
     Omega = np.array([omega[i] * omega[j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))])
-    found = (value(terms["Ct"], q) - value(plain["Ct"], q)) @ a + (value(terms["Cr"], q) - value(plain["Cr"], q)) @ alpha
+    found = (value(terms["Ct"], q) - value(plain["Ct"], q)) @ a + (
+        value(terms["Cr"], q) - value(plain["Cr"], q)
+    ) @ alpha
     found += (value(terms["Oe"], q) - value(plain["Oe"], q)) @ Omega
     found -= (value(terms[2, "phi"], q) - terms[2, "phi"][0]).T @ wrench[:3]
     found -= (value(terms[2, "psi"], q) - terms[2, "psi"][0]).T @ wrench[3:]

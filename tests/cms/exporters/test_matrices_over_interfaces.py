@@ -1,0 +1,174 @@
+"""Files of matrices over the interfaces: what other programs' readers, or readers by documentation, find in them."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+import scipy.linalg as la
+from numpy.testing import assert_allclose, assert_array_equal
+
+import cms
+from cms.errors import ExportError
+from cms.exporters.interface_model import interface_model
+from fe_models.body.load_cases import LoadCase
+from tests.bodies import bar, with_interfaces
+from tests.cms.exporters.small_bodies import RUBBER
+
+
+def reduced_bar(*names):
+    """A damped bar with a tip load as load case; interfaces by name, all by default."""
+    body = bar(nx=4, material=RUBBER)
+    keep = [interface for interface in body.interfaces if not names or interface.name in names]
+    f = np.zeros(len(body.dofs))
+    f[np.flatnonzero((body.nodes[body.dofs[:, 0], 0] == 1.0) & (body.dofs[:, 1] == 2))] = 0.5
+    body = cms.couple(with_interfaces(body, *keep).with_load_cases(LoadCase("tip", "force", f)))
+    modes = cms.craig_bampton(body, n_modes=3)
+    return cms.reduce(body, modes, damping=cms.RayleighDamping(0.1, 1e-4), geometric=False)
+
+
+@pytest.fixture(scope="module")
+def reduced():
+    return reduced_bar()
+
+
+@pytest.fixture(scope="module")
+def model(reduced):
+    return interface_model(reduced)
+
+
+def export(body, tmp_path, name, to, **options):
+    return cms.export_body(body, tmp_path / name, to=to, units="m-kg-s", **options)
+
+
+def test_mat_of_version_5(reduced, model, tmp_path):
+    export(reduced, tmp_path, "bar.mat", "mat")
+    found = scipy.io.loadmat(tmp_path / "bar.mat")
+    for name, matrix in {"K": model.K, "M": model.M, "C": model.D, "F": model.loads, "T": model.T}.items():
+        assert_array_equal(found[name], matrix)
+    assert_array_equal(found["dofs"][:7], [[1, 1], [1, 2], [1, 3], [1, 4], [1, 5], [1, 6], [2, 1]])
+    assert [name.strip() for name in found["interfaces"]] == ["left", "right"]
+    assert_array_equal(found["nodes"], [node.position for node in model.nodes])
+    assert_array_equal(found["R"].reshape(-1, 3, len(model.K)), model.recovery())
+    assert b"bar" in found["__header__"]
+    head = (tmp_path / "bar.mat").read_bytes()
+    export(reduced, tmp_path, "again.mat", "mat")
+    assert head == (tmp_path / "again.mat").read_bytes()  # no time in it
+
+
+def test_mat_of_version_7_3(reduced, model, tmp_path):
+    """MATLAB's container: 116 bytes of words, version 0x0200 and IM, HDF5 from byte 512; arrays transposed."""
+    export(reduced, tmp_path, "bar.mat", "mat73")
+    head = (tmp_path / "bar.mat").read_bytes()[:520]
+    assert head.startswith(b"MATLAB 7.3 MAT-file")
+    assert head[116:128] == bytes(8) + b"\x00\x02IM"
+    assert head[512:516] == b"\x89HDF"
+    with h5py.File(tmp_path / "bar.mat") as file:
+        for name, matrix in {"K": model.K, "M": model.M, "F": model.loads, "T": model.T}.items():
+            assert_array_equal(file[name][()].T, matrix)
+            assert file[name].attrs["MATLAB_class"] == b"double"
+        words = file["interfaces"]
+        assert words.attrs["MATLAB_class"] == b"char"
+        assert words.attrs["MATLAB_int_decode"] == 2
+        rows = ["".join(chr(letter) for letter in row) for row in words[()].T]
+    assert [row.strip() for row in rows] == ["left", "right"]
+
+
+def test_simscape_has_frames_and_matrices_of_a_free_solid(reduced, model, tmp_path):
+    export(reduced, tmp_path, "rom.mat", "simscape")
+    rom = scipy.io.loadmat(tmp_path / "rom.mat", simplify_cells=True)["rom"]
+    assert rom["P"].shape == (2, 3)
+    assert_array_equal(rom["K"], model.K)
+    assert_array_equal(rom["C"], model.D)
+    omega2 = la.eigvalsh(rom["K"], rom["M"])  # the block wants six rigid motions
+    assert (np.abs(omega2[:6]) < 1e-8 * omega2[6]).all()
+    assert_allclose(np.sqrt(omega2[6:]) / 2 / np.pi, reduced.free_frequencies, rtol=1e-6)
+
+
+def test_matrix_market_reads_back_bit_for_bit(reduced, model, tmp_path):
+    exported = export(reduced, tmp_path, "bar.mtx", "matrix-market")
+    assert [path.name for path in exported.files] == ["bar_K.mtx", "bar_M.mtx", "bar_C.mtx", "bar_F.mtx"]
+    for letter, matrix in {"K": model.K, "M": model.M, "C": model.D, "F": model.loads}.items():
+        assert_array_equal(scipy.io.mmread(tmp_path / f"bar_{letter}.mtx").toarray(), matrix)
+    text = (tmp_path / "bar_K.mtx").read_text()
+    assert "symmetric" in text.splitlines()[0]
+    assert "row 9: right uz" in text
+
+
+def test_op4_is_read_by_pyyeti_bit_for_bit(reduced, model, tmp_path):
+    op4 = pytest.importorskip("pyyeti.nastran.op4", reason="pyYeti is not installed: pip install 'floatframe[nastran]'")
+    exported = export(reduced, tmp_path, "bar.op4", "nastran-op4")
+    assert [path.suffix for path in exported.files] == [".op4", ".asm", ".pch"]
+    found = {name.lower(): matrix for name, matrix in op4.read(str(tmp_path / "bar.op4")).items()}
+    expected = {"kxx": model.K, "mxx": model.M, "bxx": model.D, "pxx": model.loads}
+    for name, matrix in {**expected, "mug1": model.recovery().reshape(-1, len(model.K))}.items():
+        values = found[name]
+        assert_array_equal(values.toarray() if hasattr(values, "toarray") else values, matrix)
+
+
+def test_asm_and_pch_say_the_order_of_the_rows(reduced, model, tmp_path):
+    bulk = pytest.importorskip(
+        "pyyeti.nastran.bulk", reason="pyYeti is not installed: pip install 'floatframe[nastran]'"
+    )
+    export(reduced, tmp_path, "bar.op4", "nastran-op4")
+    extrn = bulk.rdextrn(str(tmp_path / "bar.pch"))
+    expected = [(k + 1, c + 1) for k in range(2) for c in range(6)] + [(1000001 + k, 0) for k in range(3)]
+    assert_array_equal(extrn, expected)
+    spoints = bulk.rdspoints(str(tmp_path / "bar.asm"))
+    assert_array_equal(np.ravel(spoints), [1000001, 1000002, 1000003])
+    grids = bulk.rdgrids(str(tmp_path / "bar.asm"))
+    assert_allclose(grids[:, 2:5], [node.position for node in model.nodes], rtol=1e-9, atol=1e-12)
+
+
+def test_dmig_is_read_by_pyyeti_to_ten_digits(reduced, model, tmp_path):
+    bulk = pytest.importorskip(
+        "pyyeti.nastran.bulk", reason="pyYeti is not installed: pip install 'floatframe[nastran]'"
+    )
+    export(reduced, tmp_path, "bar.pch", "nastran-dmig")
+    found = bulk.rddmig(str(tmp_path / "bar.pch"))
+    for name, matrix in {"kaax": model.K, "maax": model.M, "baax": model.D}.items():
+        values = found[name].to_numpy()
+        rows = [tuple(row) for row in found[name].index]
+        assert rows == [(k + 1, c + 1) for k in range(2) for c in range(6)] + [(1000001 + k, 0) for k in range(3)]
+        assert_allclose(values, matrix, rtol=1e-9, atol=1e-30)
+
+
+def flex_ascii(text):
+    """A reader of FlexASCII by OpenFAST's documentation: keywords are case insensitive, headers begin with !."""
+    lines = text.splitlines()
+    assert lines[0].startswith("!")
+    assert "flex 5 format" in lines[1].lower()
+    n = int(re.search(r"^!dimension:\s*(\d+)", text.lower(), re.MULTILINE)[1])
+    found = {}
+    for name in ("mass matrix", "stiffness matrix", "damping matrix", "loading"):
+        at = next(k for k, line in enumerate(lines) if line.lower().startswith(f"!{name}"))
+        rows = lines[at + 2 : at + 2 + n] if name != "loading" else lines[at + 2 :]
+        found[name] = np.array([[float(word) for word in row.split()] for row in rows])
+    return found
+
+
+def test_ext_ptfm_has_one_node_and_constant_loads(tmp_path):
+    body = reduced_bar("left")
+    model = interface_model(body)
+    exported = export(body, tmp_path, "bar.dat", "ext_ptfm", loads={"tip": 3.0})
+    found = flex_ascii((tmp_path / "bar.dat").read_text())
+    assert_array_equal(found["mass matrix"], model.M)
+    assert_array_equal(found["stiffness matrix"], model.K)
+    assert_array_equal(found["damping matrix"], model.D)
+    loading = found["loading"]
+    assert loading.shape == (2, len(model.K) + 2)
+    assert_allclose(loading[:, 1:-1], np.tile(3 * model.loads[:, 0], (2, 1)), rtol=1e-15)
+    assert_array_equal(loading[:, 0], [0, 10000])
+    assert any("the body is free" in note for note in exported.notes)
+    assert "static load tip, amplitude 3" in exported.notes
+
+
+def test_ext_ptfm_wants_one_interface_and_known_loads(reduced, tmp_path):
+    with pytest.raises(ExportError, match=r"one interface node, body 'bar' has 2 \(left, right\)"):
+        export(reduced, tmp_path, "bar.dat", "ext_ptfm")
+    with pytest.raises(ExportError, match=r"no load case 'tipp'; did you mean 'tip'"):
+        export(reduced_bar("left"), tmp_path, "bar.dat", "ext_ptfm", loads={"tipp": 1.0})
+    with pytest.raises(ExportError, match="mat holds no constant loads"):
+        export(reduced, tmp_path, "bar.mat", "mat", loads={"tip": 1.0})
+    assert not list(tmp_path.iterdir())
