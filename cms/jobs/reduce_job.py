@@ -81,4 +81,6 @@ def modes_and_states(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSe
         if not wanted and not job.reduction.quadratic_modes:
             return modes, None
         with stages("static states"):
-            return modes, unit_states(families, frame=moving_frame_of(job))
+            return modes, unit_states(
+                families, frame=moving_frame_of(job), spread=job.reduction.spread_loads is not False
+            )

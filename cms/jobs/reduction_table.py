@@ -245,6 +245,9 @@ class ReductionSection(Table):
     geometric_stiffness: bool | None = Field(
         None, description="true or false: whether to add the geometric stiffness; default: where the elements are known"
     )
+    spread_loads: bool | None = Field(
+        None, description="true or false: whether the geometric stiffness can be carried to a Buckens frame"
+    )
     quadratic_modes: bool | None = Field(
         None, description="true or false: whether to add the displacement of second order of the kept nodes"
     )
@@ -282,6 +285,8 @@ class ReductionSection(Table):
         if self.dofs is not None and (self.frame != "nodal" or self.at is not None):
             got = f'at = "{self.at}"' if self.at is not None else f'frame = "{self.frame}"'
             raise ValueError(f'dofs belong to frame = "nodal" without at; got {got}')
+        if self.spread_loads and self.geometric_stiffness is False:
+            raise ValueError("spread_loads = true belongs to the geometric stiffness; got geometric_stiffness = false")
         return self
 
     def _options_of_auto(self) -> tuple[str, ...]:

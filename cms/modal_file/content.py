@@ -8,7 +8,7 @@ import numpy as np
 
 from cms.errors import ModalFileError
 from cms.modal_file.entries import ENTRIES, entry_of, unit_of
-from cms.reduced_body.geometric_stiffness import GeometricStiffness
+from cms.reduced_body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, SpreadLoads, TurnedLoads
 from cms.reduced_body.invariants import Moments
 from cms.reduced_body.nodal_sums import NodalSums
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
@@ -25,7 +25,8 @@ FORMAT = "modal-file"
 SI = UNIT_SYSTEMS["m-kg-s"]
 FREQUENCY_DEFECT = 1e-9  #: largest relative difference of a stored frequency from that of K and M
 INVARIANT_DEFECT = 1e-12  #: largest difference of a stored 1C-5C from that of the moments, over the largest entry
-UNIT_LOADS = ("translation", "rotation", "spin")  #: of the geometric stiffness, beside those of the interfaces
+OF_FRAME = UNIT_LOADS[:3]  #: unit loads of the geometric stiffness beside those of the interfaces, which stand there
+TURNED, SPREAD = "/geometric/turned", "/geometric/spread"  #: groups
 EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
 INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
 
@@ -74,6 +75,8 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
         attributes["/columns"] = {}
     if body.geometric is not None:
         attributes["/geometric"] = {}
+        attributes |= {TURNED: {}} if body.geometric.turned is not None else {}
+        attributes |= {SPREAD: {}} if body.geometric.spread is not None else {}
     if body.quadratic is not None:
         attributes["/quadratic"] = {}
     if body.nodal_sums is not None:
@@ -109,8 +112,7 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
         names = ("position", "triad", "Psi", "members")
         values |= {f"/interfaces/{k}/{name}": getattr(interface, name) for name in names}
     if body.geometric is not None:
-        values |= {f"/geometric/{name}": getattr(body.geometric, name) for name in UNIT_LOADS}
-        values |= {f"/interfaces/{k}/K_geometric": K for k, K in enumerate(body.geometric.interfaces)}
+        values |= geometric_values(body.geometric)
     if body.quadratic is not None:
         values["/quadratic/g"] = body.quadratic
     if columns is not None:
@@ -125,6 +127,18 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
     if points is not None:
         values["/stress/points/names"], values["/stress/points/position"] = points.names, points.positions
         values["/stress/points/modes"] = points.modes
+    return values
+
+
+def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:
+    """Return the values of the geometric stiffness by path; those of the interfaces stand with them."""
+    values: dict[str, Any] = {f"/geometric/{name}": getattr(geometric, name) for name in OF_FRAME}
+    values |= {f"/interfaces/{k}/K_geometric": K for k, K in enumerate(geometric.interfaces)}
+    if geometric.turned is not None:
+        values |= {f"{TURNED}/{name}": getattr(geometric.turned, name) for name in OF_FRAME}
+        values |= {f"/interfaces/{k}/K_turned": K for k, K in enumerate(geometric.turned.interfaces)}
+    if geometric.spread is not None:
+        values |= {f"{SPREAD}/{name}": getattr(geometric.spread, name) for name in ("K", "turned", "turned_rigid")}
     return values
 
 
@@ -299,13 +313,30 @@ def nodal_sums_of(contents: Contents) -> NodalSums:
 
 def geometric_of(contents: Contents) -> GeometricStiffness:
     """Return the geometric stiffness; that of the interfaces stands with them."""
-    of_loads = contents.arrays("/geometric", *UNIT_LOADS)
-    n = of_loads["spin"].shape[-1]
-    groups = contents.numbered("/interfaces")
-    of_interfaces = [contents.array(f"{group}/K_geometric") for group in groups]
-    for group, K in zip(groups, of_interfaces, strict=True):
-        require_shape(f"dataset {group}/K_geometric", K, (6, n, n))
-    return GeometricStiffness(**of_loads, interfaces=np.stack(of_interfaces) if groups else np.zeros((0, 6, n, n)))
+    n = contents.array("/geometric/spin").shape[-1]
+    turned = spread = None
+    if contents.has(TURNED):
+        turned = TurnedLoads(**loads_of(contents, TURNED, "K_turned", (3, n)))
+    if contents.has(SPREAD):
+        shapes = {"K": (6, n, n), "turned": (6, 3, n), "turned_rigid": (6, 3, 3)}
+        spread = SpreadLoads(**{name: shaped(contents, f"{SPREAD}/{name}", shape) for name, shape in shapes.items()})
+    return GeometricStiffness(**loads_of(contents, "/geometric", "K_geometric", (n, n)), turned=turned, spread=spread)
+
+
+def loads_of(contents: Contents, group: str, of_interface: str, shape: tuple[int, int]) -> dict[str, np.ndarray]:
+    """Return the matrices of all unit loads by kind."""
+    of_interfaces = [
+        shaped(contents, f"{path}/{of_interface}", (6, *shape)) for path in contents.numbered("/interfaces")
+    ]
+    loads = contents.arrays(group, *OF_FRAME)
+    return loads | {"interfaces": np.stack(of_interfaces) if of_interfaces else np.zeros((0, 6, *shape))}
+
+
+def shaped(contents: Contents, path: str, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the numbers of a dataset, which is of that shape."""
+    array = contents.array(path)
+    require_shape(f"dataset {path}", array, shape)
+    return array
 
 
 def units_of(contents: Contents) -> Units:

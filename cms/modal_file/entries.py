@@ -87,6 +87,8 @@ ENTRIES = {
     "/interfaces/<i>/K_geometric": entry("geometric stiffness of a unit force (0-2) and moment (3-5) at the reference "
                                          "point, axes of B; index order load, k, l",
                                          Dimensions(-1, -1), Dimensions(-1, -2)),
+    "/interfaces/<i>/K_turned": entry("the same over a rotation about an axis of B and a mode; index order load, "
+                                      "axis, k", Dimensions(-0.5), Dimensions(-0.5, -1)),
     "/columns/labels": entry("one per column of the mode set, in words"),
     "/columns/groups": entry("the source each column belongs to"),
     "/columns/A": entry("coordinates of the modes in the columns, scaled; index order column, mode", RATE),
@@ -101,6 +103,17 @@ ENTRIES = {
     "/geometric/rotation": entry("K_r,a of the loads -rho e_a x c of an angular acceleration; index order a, k, l"),
     "/geometric/spin": entry("K_ab of -rho/2 [e_a x (e_b x c) + e_b x (e_a x c)], products of angular velocities; "
                              "index order ab (xx yy zz xy yz zx), k, l"),
+    "/geometric/turned/translation": entry("K_t,a over a rotation about an axis of B and a mode; index order a, "
+                                           "axis, k", Dimensions(0.5)),
+    "/geometric/turned/rotation": entry("K_r,a likewise", Dimensions(0.5, 1)),
+    "/geometric/turned/spin": entry("K_ab likewise", Dimensions(0.5, 1)),
+    "/geometric/spread/K": entry("geometric stiffness of loads spread over the nodes by their weight, (w_i/w) e_a "
+                                 "(0-2) and (w_i/w) e_a x c_i (3-5); index order load, k, l",
+                                 Dimensions(-1, -1), Dimensions(-1)),
+    "/geometric/spread/turned": entry("the same over a rotation about an axis of B and a mode; index order load, axis, "
+                                      "k", Dimensions(-0.5), Dimensions(-0.5, 1)),
+    "/geometric/spread/turned_rigid": entry("work of these loads, turned about an axis of B, on the rotations e_b x c; "
+                                            "index order load, axis, b", Dimensions(0, 1), Dimensions(0, 2)),
     "/quadratic/g": entry("displacement of second order of the kept nodes in B, 1/2 sum q_k q_l g_kl; index order "
                           "node, component, k, l", Dimensions(-1, -1)),
     "/load_cases/<i>/force": entry("resultant force in B", Dimensions(1, 1, -2)),

@@ -31,9 +31,9 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
 def version_of(reduced: ReducedBody) -> int:
     """Return the least version that says what the body is, so that older readers take all bodies they can.
 
-    4: inertia terms are missing; 3: the body is held to the ground; 2: all others.
+    4: how loads turn with the body is known, or inertia terms are missing; 3: the body is held; 2: others.
     """
-    if reduced.moments.missing:
+    if reduced.moments.missing or (reduced.geometric is not None and reduced.geometric.turned is not None):
         return 4
     return 3 if reduced.is_held else 2
 

@@ -1,6 +1,7 @@
 """Reduced geometric stiffness of a body for unit loads: what a linear floating frame leaves out (docs/theory.md §7)."""
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,9 +10,52 @@ from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, frozen
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units
 
-__all__ = ["SPIN_PAIRS", "GeometricStiffness"]
+__all__ = ["SPIN_PAIRS", "UNIT_LOADS", "GeometricStiffness", "SpreadLoads", "TurnedLoads", "stiffness_of_loads"]
+
+UNIT_LOADS = ("translation", "rotation", "spin", "interfaces")  #: of `GeometricStiffness`, an array each
 
 SPIN_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  #: (a, b) of omega_a omega_b in the order of `spin`
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class TurnedLoads:
+    """K_j over a rotation of the whole body and a mode: the work on mode k of the balanced load j, turned with it.
+
+    (e_x × c)ᵀ K_geo(sigma_j) phi_k for rotations about the axes x of B, with which K_j goes over to the shapes of
+    another frame, phi - Psi_R C. Of translations it is zero, of two rotations it follows from the load.
+    """
+
+    translation: Array  #: (3, 3, n_q) [sqrt(kg) per q]
+    rotation: Array  #: (3, 3, n_q) [sqrt(kg) m per q]
+    spin: Array  #: (6, 3, n_q) [sqrt(kg) m per q]
+    interfaces: Array  #: (n_interfaces, 6, 3, n_q) [1/sqrt(kg) and 1/(sqrt(kg) m) per q]
+
+    def __post_init__(self) -> None:
+        n, n_interfaces = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
+        for name, first in numbers_of_loads(n_interfaces).items():
+            put_array(self, f"turned loads: {name}", name, (*first, 3, n))
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class SpreadLoads:
+    """Six loads spread over the nodes by their weight w_i, w = Σ w_i: the reaction of a Buckens frame (theory.md §7).
+
+    Load a = 0-2 is the force (w_i/w) e_a at every node, load 3 + a the force (w_i/w) e_a × c_i; `NodalSums` has their
+    resultants. What a rotation makes of them these do not tell: a node takes what acts on its followers as a force and
+    a moment on itself, and a moment that is turned counts by half.
+    """
+
+    K: Array  #: as those of `GeometricStiffness`, (6, n_q, n_q) [1/(kg m) and 1/kg per q²]
+    turned: Array  #: as those of `TurnedLoads`, (6, 3, n_q) [1/sqrt(kg) and m/sqrt(kg) per q]
+    turned_rigid: Array  #: work of load j alone, turned about an axis, on the rotations e_b × c, (6, 3, 3) [m and m²]
+
+    def __post_init__(self) -> None:
+        n = np.asarray(self.K).shape[-1]
+        put_array(self, "spread loads: K", "K", (6, n, n), is_symmetric=True)
+        put_array(self, "spread loads: turned", "turned", (6, 3, n))
+        put_array(self, "spread loads: turned_rigid", "turned_rigid", (6, 3, 3))
 
 
 @frozen_copies
@@ -35,17 +79,20 @@ class GeometricStiffness:
     #: unit force (3) and moment (3) at each interface of `ReducedBody.interfaces`, axes of B,
     #: (n_interfaces, 6, n_q, n_q) [1/(kg m) and 1/(kg m²) per q²]
     interfaces: Array
+    #: with which the matrices go to other frames; None: not on record, then a rotation is taken to turn the loads
+    turned: TurnedLoads | None = None
+    spread: SpreadLoads | None = None  #: with which they go to a Buckens frame; None: left out, or not on record
 
     def __post_init__(self) -> None:
-        n = np.asarray(self.translation).shape[-1]
-        n_interfaces = len(np.asarray(self.interfaces))
-        shapes = {"translation": (3,), "rotation": (3,), "spin": (6,), "interfaces": (n_interfaces, 6)}
-        for name, first in shapes.items():
-            where = f"geometric stiffness: {name}"
-            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
-            require_shape(where, array, (*first, n, n))
-            require_finite(where, array)
-            object.__setattr__(self, name, frozen(symmetrized(where, array)))
+        n, n_interfaces = np.asarray(self.translation).shape[-1], len(np.asarray(self.interfaces))
+        for name, first in numbers_of_loads(n_interfaces).items():
+            put_array(self, f"geometric stiffness: {name}", name, (*first, n, n), is_symmetric=True)
+        if self.turned is not None:
+            require_shape("turned loads: interfaces", self.turned.interfaces, (n_interfaces, 6, 3, n))
+        if self.spread is not None:
+            require_shape("spread loads: K", self.spread.K, (6, n, n))
+            if self.turned is None:
+                raise BodyError("spread loads: without the turned loads, with which they go to another frame")
 
     @property
     def n_q(self) -> int:
@@ -59,21 +106,81 @@ class GeometricStiffness:
 
     def transformed(self, Z: Array) -> "GeometricStiffness":
         """Return the matrices over other modes, Zᵀ K_j Z, for shapes Phi Z, Z: (n_q, n_new)."""
-        names = [field.name for field in fields(self)]
-        return replace(self, **{name: np.einsum("lk,...lm,mn->...kn", Z, getattr(self, name), Z) for name in names})
+        return self._changed(lambda K: np.asarray(Z.T @ K @ Z), lambda turned: np.asarray(turned @ Z))
 
     def of_modes(self, modes: IntArray) -> "GeometricStiffness":
         """Return the matrices over some of the modes, in their order."""
         pick = np.asarray(modes, dtype=np.int64)
-        names = [field.name for field in fields(self)]
-        return replace(self, **{name: getattr(self, name)[..., pick[:, None], pick] for name in names})
+        return self._changed(lambda K: K[..., pick[:, None], pick], lambda turned: turned[..., pick])
+
+    def _changed(self, squares: Callable[[Array], Array], rows: Callable[[Array], Array]) -> "GeometricStiffness":
+        """Return what is had from each matrix over two modes, and over a rotation and a mode."""
+        turned, spread = self.turned, self.spread
+        if turned is not None:
+            turned = replace(turned, **{name: rows(getattr(turned, name)) for name in UNIT_LOADS})
+        if spread is not None:
+            spread = replace(spread, K=squares(spread.K), turned=rows(spread.turned))
+        of_loads = {name: squares(getattr(self, name)) for name in UNIT_LOADS}
+        return replace(self, **of_loads, turned=turned, spread=spread)
 
     def in_units(self, old: Units, new: Units) -> "GeometricStiffness":
         """Return the same matrices in other units; qᵀ K_j q times the amplitude of its load is an energy."""
-        length = old.length / new.length
-        mass = old.mass / new.mass
-        by_row = 1 / (mass * length) * np.array([1.0, 1, 1, 1 / length, 1 / length, 1 / length])
-        return replace(self, translation=self.translation / length, interfaces=self.interfaces * by_row[:, None, None])
+        length, mass = old.length / new.length, old.mass / new.mass
+        q = np.sqrt(mass) * length  # what a mode less multiplies by
+        force = 1 / (mass * length)  # of a unit force over two modes
+        of_wrench = force * np.array([1.0, 1, 1, 1 / length, 1 / length, 1 / length])[:, None, None]
+        by_load = {"translation": 1 / length, "rotation": 1.0, "spin": 1.0, "interfaces": of_wrench}
+        turned, spread = self.turned, self.spread
+        if turned is not None:
+            turned = replace(turned, **{name: getattr(turned, name) * by * q for name, by in by_load.items()})
+        if spread is not None:
+            by = force * np.array([1.0, 1, 1, length, length, length])[:, None, None]
+            spread = SpreadLoads(spread.K * by, spread.turned * by * q, spread.turned_rigid * by * q**2)
+        of_loads = {name: getattr(self, name) * by for name, by in by_load.items()}
+        return replace(self, **of_loads, turned=turned, spread=spread)
+
+
+def numbers_of_loads(n_interfaces: int) -> dict[str, tuple[int, ...]]:
+    """Return how many unit loads of each kind there are."""
+    return {"translation": (3,), "rotation": (3,), "spin": (6,), "interfaces": (n_interfaces, 6)}
+
+
+def put_array(record: object, where: str, name: str, shape: tuple[int, ...], *, is_symmetric: bool = False) -> None:
+    """Put a field of a frozen record in form: of that shape, finite, symmetric in the modes if it has to be."""
+    array = np.ascontiguousarray(getattr(record, name), dtype=np.float64)
+    require_shape(where, array, shape)
+    require_finite(where, array)
+    object.__setattr__(record, name, frozen(symmetrized(where, array) if is_symmetric else array))
+
+
+def stiffness_of_loads(
+    K: Array, turned: Array | None, turned_rigid: Array | None, *, n_interfaces: int
+) -> GeometricStiffness:
+    """Return the matrices of all unit loads in a row as a record.
+
+    Parameters
+    ----------
+    K, turned
+        Over two modes, (k, n_q, n_q), and over a rotation and a mode, (k, 3, n_q): 3 translations, 3 rotations, 6
+        products of angular velocities, 6 for each interface, 6 spread over the nodes where `turned_rigid` is given.
+    turned_rigid
+        As that of `SpreadLoads`.
+    """
+    spread = None
+    if turned is not None and turned_rigid is not None:
+        spread = SpreadLoads(K[-6:], turned[-6:], turned_rigid)
+    return GeometricStiffness(
+        **by_kind(K, n_interfaces),
+        turned=None if turned is None else TurnedLoads(**by_kind(turned, n_interfaces)),
+        spread=spread,
+    )
+
+
+def by_kind(K: Array, n_interfaces: int) -> dict[str, Array]:
+    """Return the matrices of the first 12 + 6 n_interfaces loads by kind."""
+    translation, rotation, spin, interfaces, _ = np.split(K, [3, 6, 12, 12 + 6 * n_interfaces])
+    interfaces = interfaces.reshape(n_interfaces, 6, *K.shape[1:])
+    return dict(zip(UNIT_LOADS, (translation, rotation, spin, interfaces), strict=True))
 
 
 def symmetrized(where: str, array: Array) -> Array:

@@ -170,6 +170,10 @@ class ReducedBody:
                     f"{where}: {len(self.interfaces)} interfaces, but geometric stiffness of "
                     f"{self.geometric.n_interfaces}"
                 )
+            if self.geometric.spread is not None and self.nodal_sums is None:
+                raise BodyError(
+                    f"{where}: loads spread over the nodes without the nodal sums that are their resultants"
+                )
         for name, width in widths.items():
             if width != (n,):
                 raise BodyError(f"{where}: {n} modes, but {name} of {width[0]}")

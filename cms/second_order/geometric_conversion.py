@@ -1,12 +1,15 @@
 """The geometric stiffness of a reduced body in another body frame, from what it holds itself (docs/theory.md §7).
 
-A load is a load per mass A c + b and a wrench at each interface. With its reaction it is in balance; the stress of a
-balanced load does not depend on the support: its matrix is the same combination of the matrices of the old unit loads.
+A load is a load per mass A c + b, a wrench at each interface and amounts of six loads spread over the nodes. With its
+reaction it is in balance; the stress of a balanced load does not depend on the support: its matrix is the same
+combination of the matrices of the old unit loads.
 
 (1) the unit loads of the new frame, in old coordinates
-(2) the reaction of the new frame: that of a rigid-body acceleration (Tisserand), a wrench at its interface (nodal)
+(2) the reaction of the new frame: that of a rigid-body acceleration (Tisserand), a wrench at its interface (nodal), a
+    load spread over the nodes (Buckens)
 (3) the matrices of the balanced loads, from the old ones
-(4) over the new shapes (phi - Psi_R C) Z: K over [Psi_R phi] follows from the loads, since a rotation turns them
+(4) over the new shapes (phi - Psi_R C) Z, and over rotations and them: of two rotations K follows from the loads, which
+    a rotation turns; of a rotation and a shape it is on record, where it is not it is taken to follow likewise
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cms.errors import BodyError
-from cms.reduced_body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness
+from cms.reduced_body.geometric_stiffness import SPIN_PAIRS, GeometricStiffness, TurnedLoads, stiffness_of_loads
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody
 from cms.second_order.unit_loads import unit_mass_loads
 from fe_models.body.mass_loads import MassLoads
@@ -29,17 +32,26 @@ class Loads:
 
     mass: MassLoads
     wrenches: Array  #: force and moment at every interface, (k, n_interfaces, 6)
+    spread: Array  #: amounts of the loads spread over the nodes, (k, 6); (k, 0) for a body without
 
 
 def require_convertible(reduced: ReducedBody, frame: BodyFrame) -> None:
-    """Raise `BodyError` where the reaction of the new frame is no combination of unit loads."""
+    """Raise `BodyError` where the reaction of the new frame is no combination of unit loads on record."""
     if reduced.geometric is None or frame.kind == "tisserand":
         return
     if frame.kind == "nodal" and frame.at and is_node(reduced, frame.at):
         return
+    if frame.kind == "buckens" and reduced.geometric.spread is not None:
+        return
+    why = "whose reaction is no load at one node"
+    if frame.kind == "buckens":
+        why = (
+            "whose reaction, loads spread over the nodes, is not on record (a file of a version before 4, or "
+            "spread_loads = false)"
+        )
     raise BodyError(
         f"reduced body {reduced.name!r}: its geometric stiffness can go to a Tisserand frame or to a nodal frame at an "
-        f"interface with one reference node, not to this {frame.kind} frame, whose reaction it does not know; reduce "
+        f"interface with one reference node, not to this {frame.kind} frame, {why}; reduce "
         "the body anew in that frame, or leave the geometric stiffness out (cms frame --no-geometric-stiffness, or "
         "replace(body, geometric=None, quadratic=None))"
     )
@@ -63,30 +75,55 @@ def converted_geometric_stiffness(
     C, Z, p, R
         As `cms.frame_conversion.Change`: rigid part of each shape, new shapes in the old ones, place of the new frame.
     """
-    loads = new_unit_loads(reduced, p, R)  # (1)
-    loads = with_reaction(reduced, loads, frame)  # (2)
-    K = of_balanced(reduced, loads)  # (3)
-    phi = reduced.moments
-    Psi = np.array([interface.Psi for interface in reduced.interfaces]).reshape(-1, 6, reduced.n_q)
-    on_modes = turned_work(loads, phi.C1, phi.P, Psi)
+    old, moments = reduced.geometric, reduced.moments
+    assert old is not None
+    loads = with_reaction(reduced, new_unit_loads(reduced, p, R), frame)  # (1), (2)
+    K = of_balanced(old, loads, None if old.spread is None else old.spread.K)  # (3)
     on_rigid = turned_work(loads, *rotation_moments(reduced))
+    if old.spread is not None:
+        on_rigid = on_rigid + np.tensordot(loads.spread, old.spread.turned_rigid, axes=1)
+    if old.turned is not None:
+        on_modes = of_balanced(old.turned, loads, None if old.spread is None else old.spread.turned)
+    else:
+        Psi = np.array([interface.Psi for interface in reduced.interfaces]).reshape(-1, 6, reduced.n_q)
+        on_modes = turned_work(loads, moments.C1, moments.P, Psi)
     C_theta = C[3:]
     K = K - np.einsum("ak,jal->jkl", C_theta, on_modes) - np.einsum("jak,al->jkl", on_modes, C_theta)  # (4)
     K = K + np.einsum("ak,jab,bl->jkl", C_theta, on_rigid, C_theta, optimize=True)
-    K = np.einsum("lk,jlm,mn->jkn", Z, (K + K.transpose(0, 2, 1)) / 2, Z, optimize=True)
-    if frame.kind == "tisserand":
-        K[:6] = 0.0  # accelerations of mean axes are the reaction itself
-    return GeometricStiffness(K[:3], K[3:6], K[6:12], K[12:].reshape(len(reduced.interfaces), 6, *K.shape[1:]))
+    K = Z.T @ ((K + K.transpose(0, 2, 1)) / 2) @ Z
+    on_modes = R.T @ (on_modes - on_rigid @ C_theta) @ Z
+    for zero in (K, on_modes):  # the loads that are the reaction of the new frame itself
+        if frame.kind == "tisserand":
+            zero[:6] = 0.0
+        if frame.kind == "buckens":
+            zero[12 + 6 * len(reduced.interfaces) :] = 0.0
+    return stiffness_of_loads(
+        K,
+        None if old.turned is None else on_modes,
+        None if old.spread is None else changed_rigid(reduced, old.spread.turned_rigid, p, R),
+        n_interfaces=len(reduced.interfaces),
+    )
 
 
 def new_unit_loads(reduced: ReducedBody, p: Array, R: Array) -> Loads:
-    """Return step (1): loads per mass of the new axes about the new origin, and unit wrenches along the new axes."""
-    n = len(reduced.interfaces)
-    mass, none = unit_mass_loads(BodyFrame("", p, R)), MassLoads.none(6 * n)
-    wrenches = np.zeros((12 + 6 * n, n, 6))
+    """Return step (1): loads of the new axes about the new origin: per mass, unit wrenches, spread over the nodes."""
+    assert reduced.geometric is not None
+    n, n_spread = len(reduced.interfaces), 0 if reduced.geometric.spread is None else 6
+    k = 12 + 6 * n + n_spread
+    mass, none = unit_mass_loads(BodyFrame("", p, R)), MassLoads.none(k - 12)
+    wrenches, spread = np.zeros((k, n, 6)), np.zeros((k, n_spread))
     for i in range(n):
         wrenches[12 + 6 * i : 18 + 6 * i, i] = np.kron(np.eye(2), R).T
-    return Loads(MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), wrenches)
+    if n_spread:
+        spread[12 + 6 * n :] = placed_spread(p, R)
+    return Loads(MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), wrenches, spread)
+
+
+def placed_spread(p: Array, R: Array) -> Array:
+    """Return the spread loads e, e × (c - p) of other axes about another origin in the old ones, (6, 6)."""
+    amounts = np.kron(np.eye(2), R.T)
+    amounts[3:, :3] = -np.cross(R.T, p)
+    return np.asarray(amounts, np.float64)
 
 
 def with_reaction(reduced: ReducedBody, loads: Loads, frame: BodyFrame) -> Loads:
@@ -98,6 +135,9 @@ def with_reaction(reduced: ReducedBody, loads: Loads, frame: BodyFrame) -> Loads
         M_R = np.block([[m * np.eye(3), -S_tilde], [S_tilde, J0]])
         motion = np.linalg.solve(M_R, np.hstack([force, torque]).T)
         return replace(loads, mass=loads.mass.plus_rigid(-motion, np.zeros(3)))
+    if frame.kind == "buckens":
+        amounts = np.linalg.solve(spread_resultants(reduced).T, np.hstack([force, torque]).T).T
+        return replace(loads, spread=loads.spread - amounts)
     index = [interface.name for interface in reduced.interfaces].index(frame.at)
     wrenches = np.array(loads.wrenches)
     wrenches[:, index, :3] -= force
@@ -114,24 +154,45 @@ def resultants(reduced: ReducedBody, loads: Loads) -> tuple[Array, Array]:
     for i, interface in enumerate(reduced.interfaces):
         force = force + loads.wrenches[:, i, :3]
         torque = torque + loads.wrenches[:, i, 3:] + np.cross(interface.position, loads.wrenches[:, i, :3])
+    if loads.spread.size:
+        of_spread = loads.spread @ spread_resultants(reduced)
+        force, torque = force + of_spread[:, :3], torque + of_spread[:, 3:]
     return force, torque
 
 
-def of_balanced(reduced: ReducedBody, loads: Loads) -> Array:
-    """Return step (3): K of balanced loads over the old shapes, (k, n_q, n_q).
+def spread_resultants(reduced: ReducedBody) -> Array:
+    """Return force and torque about the origin of the six loads spread over the nodes, a row each, (6, 6)."""
+    sums = reduced.nodal_sums
+    assert sums is not None
+    center, R = sums.S / sums.w, sums.R / sums.w
+    lever = np.cross(center, np.eye(3))
+    return np.asarray(np.block([[np.eye(3), lever], [lever.T, np.trace(R) * np.eye(3) - R]]), np.float64)
+
+
+def of_balanced(old: GeometricStiffness | TurnedLoads, loads: Loads, spread: Array | None) -> Array:
+    """Return step (3): matrices of balanced loads over the old shapes, (k, ...), from those of the old unit loads.
 
     A c + b is a combination of the unit loads: b of translations, the antisymmetric part of A of rotations, the
-    symmetric one of products of angular velocities, whose A is 1 - e_a e_aᵀ or -½ (e_a e_bᵀ + e_b e_aᵀ).
+    symmetric one of products of angular velocities, whose A is 1 - e_a e_aᵀ or -½ (e_a e_bᵀ + e_b e_aᵀ). `spread` has
+    the matrices of the loads spread over the nodes.
     """
-    old = reduced.geometric
-    assert old is not None
     A, b = loads.mass.A, loads.mass.b
     K = np.tensordot(-b, old.translation, axes=1) + np.tensordot(-axial(A) / 2, old.rotation, axes=1)
     symmetric = (A + A.transpose(0, 2, 1)) / 2
     half_trace = np.trace(A, axis1=1, axis2=2) / 2
     amounts = [half_trace - symmetric[:, a, a] if a == c else -2 * symmetric[:, a, c] for a, c in SPIN_PAIRS]
     K = K + np.tensordot(np.stack(amounts, axis=1), old.spin, axes=1)
+    if spread is not None:
+        K = K + np.tensordot(loads.spread, spread, axes=1)
     return np.asarray(K + np.tensordot(loads.wrenches, old.interfaces, axes=2))
+
+
+def changed_rigid(reduced: ReducedBody, turned_rigid: Array, p: Array, R: Array) -> Array:
+    """Return `turned_rigid` of the spread loads of the new frame, on rotations e_b × c - e_b × p about its origin."""
+    forces = spread_resultants(reduced)[:, :3]
+    turned = -np.cross(forces[:, None], np.eye(3))  # e_x × F of each load, (6, 3, 3): its work on translations
+    work = turned_rigid - turned @ np.cross(np.eye(3), p).T
+    return np.einsum("ji,ixb->jxb", placed_spread(p, R), R.T @ work @ R)
 
 
 def turned_work(loads: Loads, C1: Array, P: Array, Psi: Array) -> Array:

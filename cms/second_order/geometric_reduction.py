@@ -2,7 +2,7 @@
 
 (1) unit loads f_j, balanced by the support of the frame: P f_j (`cms.second_order.unit_loads`)
 (2) static states u_j = G_R P f_j, by the factorisation that gave the modes; only their stress counts
-(3) Phiᵀ K_geo(sigma_j) Phi of the elements
+(3) Phiᵀ K_geo(sigma_j) Phi of the elements, and over the rotations of the body, with which other frames are reached
 (4) rigid links: the forces on followers, internal less applied, on the second order of the rotation they follow
 (5) interfaces that are a mean of their members: the applied loads on the second order of the mean
 """
@@ -10,12 +10,14 @@
 import numpy as np
 
 from cms.families.families import Families
+from cms.families.rigid_modes import geometric_rigid_modes
 from cms.families.sharing import body_of
 from cms.reduced_basis.frames import FrameCondition
 from cms.reduced_basis.node_motion import is_mean, reference_motion, translation_rows
-from cms.reduced_body.geometric_stiffness import GeometricStiffness
+from cms.reduced_body.geometric_stiffness import GeometricStiffness, stiffness_of_loads
 from cms.second_order.link_work import followers, link_work
 from cms.second_order.mean_work import mean_second_order
+from cms.second_order.spread_loads import turned_rigid_work
 from cms.second_order.unit_states import UnitStates, states_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.mass_loads import MassLoads
@@ -47,20 +49,23 @@ def reduced_geometric_stiffness(body: FEBody | Families, Phi: Array, condition: 
 
 
 def stiffness_of_states(body: FEBody, Phi: Array, states: UnitStates) -> GeometricStiffness:
-    """Return steps (3) to (5) of the static states of the unit loads; the factorisation is needed no more."""
-    K = np.zeros((states.mass.k, Phi.shape[1], Phi.shape[1]))
+    """Return steps (3) to (5) of the static states of the unit loads; the factorisation is needed no more.
+
+    Over the rotations about the axes of B and the shapes: what is left over a rotation and a shape is `TurnedLoads`.
+    """
+    frame = states.condition.frame
+    rotations = geometric_rigid_modes(body, origin=frame.origin)[:, 3:] @ frame.axes
+    columns = np.hstack([rotations, Phi])
+    K = np.zeros((states.mass.k, columns.shape[1], columns.shape[1]))
     for first in range(0, len(states.loaded), LOADS_AT_ONCE):
         some = slice(first, first + LOADS_AT_ONCE)
         loads = states.loaded[some]
         mass = MassLoads(states.mass.A[loads], states.mass.b[loads])
-        K[loads] = elastic_part(body, states.u[:, some], mass, Phi)
-    K -= mean_part(body, states.on_dofs, Phi, states.condition.frame.axes)
-    return GeometricStiffness(
-        translation=K[:3],
-        rotation=K[3:6],
-        spin=K[6:12],
-        interfaces=K[12:].reshape(len(body.interfaces), 6, *K.shape[1:]),
-    )
+        K[loads] = elastic_part(body, states.u[:, some], mass, columns)
+    K -= mean_part(body, states.on_dofs, columns, frame.axes)
+    turned = (K[:, :3, 3:] + K[:, 3:, :3].transpose(0, 2, 1)) / 2
+    rigid = None if states.spread is None else turned_rigid_work(body, states.spread, frame)
+    return stiffness_of_loads(K[:, 3:, 3:], turned, rigid, n_interfaces=len(body.interfaces))
 
 
 def elastic_part(body: FEBody, u: Array, mass: MassLoads, Phi: Array) -> Array:

@@ -2,7 +2,8 @@
 
 Per mass, about the origin of the frame B and along its axes: -e_a of the acceleration of its origin, -e_a × c of the
 angular acceleration, -½ [e_a × (e_b × c) + e_b × (e_a × c)] of the products of angular velocities; then a unit force
-and a unit moment at every interface. All are balanced by the same support, W Psi_R of the condition of the frame.
+and a unit moment at every interface; last, where they are wanted, six loads spread over the nodes
+(`cms.second_order.spread_loads`). All are balanced by the same support, W Psi_R of the condition of the frame.
 """
 
 from dataclasses import dataclass
@@ -32,13 +33,13 @@ class UnitLoads:
     is_zero: np.ndarray  #: whether nothing is left of the load, (k,) bool
 
 
-def unit_loads(body: FEBody, frame: BodyFrame) -> UnitLoads:
-    """Return the 12 loads per mass, then six loads for each interface."""
+def unit_loads(body: FEBody, frame: BodyFrame, spread: Array | None = None) -> UnitLoads:
+    """Return the 12 loads per mass, then six loads for each interface, then those given over the dofs, (n_dof, 6)."""
     mass = unit_mass_loads(frame)
-    none = MassLoads.none(6 * len(body.interfaces))
     turn = np.kron(np.eye(2), frame.axes)
     columns = [reference_motion(body, interface)[0].T @ turn for interface in body.interfaces]
-    on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns])
+    on_dofs = np.hstack([np.zeros((body.n_dof, 12)), *columns, *([] if spread is None else [spread])])
+    none = MassLoads.none(on_dofs.shape[1] - 12)
     return together(body, MassLoads(np.concatenate([mass.A, none.A]), np.concatenate([mass.b, none.b])), on_dofs)
 
 

@@ -9,6 +9,7 @@ from cms.errors import BodyError
 from cms.families.families import Families
 from cms.families.sharing import body_of, families_of
 from cms.reduced_basis.frames import Frame, FrameCondition, TisserandFrame, frame_condition
+from cms.second_order.spread_loads import spread_forces
 from cms.second_order.unit_loads import balanced, unit_loads
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
@@ -28,9 +29,10 @@ class UnitStates:
     on_dofs: Array  #: loads on the dofs of the body, (n_dof, k) [N, N m]
     loaded: IntArray  #: which of the k loads leave something, (n_loaded,)
     u: Array  #: their responses, up to a rigid motion, (n_dof, n_loaded)
+    spread: Array | None = None  #: the last six loads before they were balanced, (n_dof, 6); None: left out
 
 
-def unit_states(body: FEBody | Families, *, frame: Frame | None = None) -> UnitStates:
+def unit_states(body: FEBody | Families, *, frame: Frame | None = None, spread: bool = True) -> UnitStates:
     """Return the static states of the unit loads of a body in a frame, for `reduce(..., geometric=states)`.
 
     Made while the factorisation of the mode set is there, they let it be freed before the reduction, which then needs
@@ -42,6 +44,9 @@ def unit_states(body: FEBody | Families, *, frame: Frame | None = None) -> UnitS
         A coupled body with an element model, or its `Families`.
     frame
         Body reference frame of the reduction; Tisserand (mean axis) by default.
+    spread
+        Whether the six loads spread over the nodes are among them, without which the geometric stiffness cannot be
+        carried to a Buckens frame.
 
     Raises
     ------
@@ -49,18 +54,19 @@ def unit_states(body: FEBody | Families, *, frame: Frame | None = None) -> UnitS
         If the body has no element model that knows its geometric stiffness, or the frame cannot be attached.
     """
     require_geometric_stiffness(body_of(body))
-    return states_of(body, frame_condition(body_of(body), frame or TisserandFrame()))
+    return states_of(body, frame_condition(body_of(body), frame or TisserandFrame()), spread=spread)
 
 
-def states_of(source: FEBody | Families, condition: FrameCondition) -> UnitStates:
+def states_of(source: FEBody | Families, condition: FrameCondition, *, spread: bool = True) -> UnitStates:
     """Return the static states for a frame made ready."""
     body = body_of(source)
     require_geometric_stiffness(body)
+    forces = spread_forces(body, condition.frame) if spread else None
     with families_of(source) as families:
-        loads = balanced(body, unit_loads(body, condition.frame), condition)
+        loads = balanced(body, unit_loads(body, condition.frame, forces), condition)
         loaded = np.flatnonzero(~loads.is_zero)
         u = static_states(families, loads.F[:, loaded])
-    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, u)
+    return UnitStates(body, condition, loads.mass, loads.on_dofs, loaded, u, forces)
 
 
 def has_geometric_stiffness(body: FEBody) -> bool:

@@ -107,7 +107,7 @@ def with_masses(body: ReducedBody, masses: Sequence[AddedMass]) -> ReducedBody:
         body,
         M=M,
         moments=moments,
-        geometric=geometric,
+        geometric=None if geometric is None else replace(geometric, turned=None, spread=None),
         free_frequencies=np.zeros(0),
         columns=None,
         nodal_sums=None,

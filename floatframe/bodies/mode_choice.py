@@ -55,7 +55,7 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
         load_cases=tuple(replace(case, h=case.h[k]) for case in body.load_cases),
         stress=None if body.stress is None else body.stress[:, :, k],
         point_stress=None,
-        geometric=None if body.geometric is None else body.geometric.of_modes(k),
+        geometric=None if body.geometric is None else replace(body.geometric, spread=None).of_modes(k),
         quadratic=None if body.quadratic is None else np.asarray(body.quadratic)[:, :, k[:, None], k],
     )
 

@@ -167,6 +167,20 @@ def test_a_job_of_a_mesh_has_geometric_stiffness_unless_it_is_left_out(folder, w
     assert (reduce_job(read_job(folder / "bar.toml")).geometric is None) == wanted.endswith("false")
 
 
+def test_a_job_leaves_the_loads_out_that_lead_to_a_buckens_frame(folder):
+    geometric = []
+    for wanted in ("", "spread_loads = false"):
+        (folder / "bar.toml").write_text(JOB.replace("[reduction]", f"[reduction]\n{wanted}"))
+        geometric.append(reduce_job(read_job(folder / "bar.toml")).geometric)
+    with_them, without = geometric
+    assert with_them.spread is not None
+    assert without.spread is None
+    assert_allclose(without.interfaces, with_them.interfaces, rtol=0, atol=1e-9 * np.abs(with_them.interfaces).max())
+    both = "[reduction]\nspread_loads = true\ngeometric_stiffness = false"
+    (folder / "bar.toml").write_text(JOB.replace("[reduction]", both))
+    assert_refused(run("reduce", folder / "bar.toml"), "spread_loads = true belongs to the geometric stiffness")
+
+
 LOADS = """
 [load_cases.push]
 kind = "pressure"

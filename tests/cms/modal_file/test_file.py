@@ -112,7 +112,7 @@ def test_a_body_in_other_units_is_that_of_the_model_in_those_units(system):
     converted = convert_units(made[0], system)
     assert converted.units == made[1].units
     sign = np.sign(np.einsum("nck,nck->k", converted.Phi, made[1].Phi))
-    assert len(compare(converted, made[1], sign)) == 44
+    assert len(compare(converted, made[1], sign)) == 51
 
 
 def compare(a, b, sign, where="body"):

@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import BodyError
 from cms.modal_file.file import convert_units
-from cms.reduced_body.geometric_stiffness import GeometricStiffness
+from cms.reduced_body.geometric_stiffness import GeometricStiffness, SpreadLoads, TurnedLoads
+from cms.reduced_body.nodal_sums import NodalSums
 from floatframe.bodies.mode_choice import with_modes
 from tests.synthetic import synthetic_reduced_body
 
@@ -23,11 +24,15 @@ def random_stiffness(n_q=N_Q, n_interfaces=2, seed=0):
         A = rng.normal(size=(*shape, n_q, n_q))
         return A + np.swapaxes(A, -1, -2)
 
-    return GeometricStiffness(symmetric(3), symmetric(3), symmetric(6), symmetric(n_interfaces, 6))
+    turned = TurnedLoads(*(rng.normal(size=(*loads, 3, n_q)) for loads in ((3,), (3,), (6,), (n_interfaces, 6))))
+    spread = SpreadLoads(symmetric(6), rng.normal(size=(6, 3, n_q)), rng.normal(size=(6, 3, 3)))
+    return GeometricStiffness(symmetric(3), symmetric(3), symmetric(6), symmetric(n_interfaces, 6), turned, spread)
 
 
 def body():
-    return replace(synthetic_reduced_body(n_q=N_Q), geometric=random_stiffness())
+    reduced = synthetic_reduced_body(n_q=N_Q)
+    sums = NodalSums(1.0, np.zeros(3), np.eye(3), np.zeros((3, N_Q)), np.zeros((3, N_Q)))
+    return replace(reduced, geometric=random_stiffness(), nodal_sums=sums)
 
 
 def test_shapes_that_do_not_fit_are_refused():
@@ -63,6 +68,11 @@ def test_other_modes_are_a_congruence():
         expected = np.einsum("k,...kl,l->...", Z @ x, getattr(K, name), Z @ x)
         found = np.einsum("k,...kl,l->...", x, getattr(other, name), x)
         assert_allclose(found, expected, rtol=0, atol=1e2 * ROUNDOFF * np.abs(expected).max())
+        turned = getattr(K.turned, name) @ Z
+        assert_allclose(getattr(other.turned, name), turned, rtol=0, atol=1e2 * ROUNDOFF * np.abs(turned).max())
+    assert_allclose(other.spread.K, Z.T @ K.spread.K @ Z, rtol=0, atol=1e2 * ROUNDOFF * np.abs(K.spread.K).max())
+    assert_array_equal(other.spread.turned, K.spread.turned @ Z)
+    assert_array_equal(other.spread.turned_rigid, K.spread.turned_rigid)
 
 
 def test_some_of_the_modes_keep_their_entries():
@@ -70,6 +80,11 @@ def test_some_of_the_modes_keep_their_entries():
     chosen = with_modes(reduced, [3, 0])
     assert_array_equal(chosen.geometric.spin, reduced.geometric.spin[:, [[3], [0]], [3, 0]])
     assert_array_equal(chosen.geometric.interfaces, reduced.geometric.interfaces[..., [[3], [0]], [3, 0]])
+    assert_array_equal(chosen.geometric.turned.interfaces, reduced.geometric.turned.interfaces[..., [3, 0]])
+    assert chosen.geometric.spread is None  # their resultants are not those of a body without nodal sums
+    spread = reduced.geometric.of_modes([3, 0]).spread
+    assert_array_equal(spread.K, reduced.geometric.spread.K[:, [[3], [0]], [3, 0]])
+    assert_array_equal(spread.turned, reduced.geometric.spread.turned[..., [3, 0]])
 
 
 def test_the_energy_of_a_load_is_the_same_in_other_units():
@@ -96,3 +111,7 @@ def test_the_energy_of_a_load_is_the_same_in_other_units():
         amplitude = np.array([number(1.0, **row) for row in of_rows])
         expected = number(1.0, mass=1, length=2, time=-2) * work
         assert_allclose(work_new * amplitude, expected, rtol=ROUNDOFF, atol=0)
+        turned = np.einsum("...xk,k->x...", getattr(reduced.geometric.turned, name), q)
+        turned_new = np.einsum("...xk,k->x...", getattr(other.geometric.turned, name), q_new)
+        expected = number(1.0, mass=1, length=2, time=-2) * turned
+        assert_allclose(turned_new * amplitude, expected, rtol=ROUNDOFF, atol=0)

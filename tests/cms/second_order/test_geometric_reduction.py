@@ -13,6 +13,7 @@ from cms.families.rigid_modes import geometric_rigid_modes
 from cms.reduced_basis.frames import BuckensFrame, NodalFrame, TisserandFrame, frame_condition
 from cms.reduced_basis.node_motion import reference_motion
 from cms.second_order.geometric_reduction import reduced_geometric_stiffness
+from cms.second_order.spread_loads import spread_forces
 from cms.second_order.unit_loads import balanced, unit_loads
 from fe_models.beams.attachments import PointMass, RigidLink
 from fe_models.beams.beam_property import BeamProperty
@@ -70,10 +71,9 @@ def test_a_rigid_rotation_turns_the_loads(name, frame):
         phi /= np.abs(phi).max()
         columns = np.hstack([geometric_rigid_modes(body), phi])
         found = reduced_geometric_stiffness(families, columns, condition)
-    K = np.concatenate(
-        [found.translation, found.rotation, found.spin, found.interfaces.reshape(-1, *found.spin.shape[1:])]
-    )
-    loads = balanced(body, unit_loads(body, condition.frame), condition)
+    own = found.interfaces.reshape(-1, *found.spin.shape[1:])
+    K = np.concatenate([found.translation, found.rotation, found.spin, own, found.spread.K])
+    loads = balanced(body, unit_loads(body, condition.frame, spread_forces(body, condition.frame)), condition)
     assert_allclose(K[:, :3], 0, rtol=0, atol=1e-9 * np.abs(K).max())  # translations
     T = np.eye(body.n_dof) if body.recovery is None else body.recovery.matrix
     for a in range(3):

@@ -1,0 +1,50 @@
+"""Six loads spread over the nodes of a body by their weight, what a rotation makes of them (docs/theory.md §7)."""
+
+import numpy as np
+
+from cms.errors import BodyError
+from cms.families.rigid_modes import geometric_rigid_modes
+from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
+from cms.reduced_body.reduced_body import BodyFrame
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array
+
+__all__ = ["spread_forces", "turned_rigid_work"]
+
+
+def spread_forces(body: FEBody, frame: BodyFrame) -> Array | None:
+    """Return the loads (w_i/w) e_a and (w_i/w) e_a × c_i of the axes and the origin of B, over the dofs, (n_dof, 6).
+
+    None where no Buckens frame can be had: nodes on one line, or without translations.
+    """
+    weights = node_weights(body)
+    if not weights.any():
+        return None
+    try:
+        W_Psi_R = weighted_rigid_modes(body, frame.origin)
+    except BodyError:
+        return None
+    return np.asarray(W_Psi_R @ np.kron(np.eye(2), frame.axes) / weights.sum())
+
+
+def turned_rigid_work(body: FEBody, forces: Array, frame: BodyFrame) -> Array:
+    """Return the work of loads, turned about the axes of B, on the rotations about them and its origin, (k, 3, 3).
+
+    Of a node, e_x × f works on its translation and ½ e_x × m on its rotation.
+
+    Parameters
+    ----------
+    forces
+        Over the dofs of the body, (n_dof, k) [N, N m].
+    """
+    node, component = body.dofs.T
+    own = np.flatnonzero(component >= 0)
+    by_node = np.zeros((len(body.nodes), 2, 3, forces.shape[1]))
+    by_node[node[own], component[own] // 3, component[own] % 3] = forces[own]
+    by_node[:, 1] /= 2
+    rotations = geometric_rigid_modes(body, origin=frame.origin)[own, 3:] @ frame.axes
+    work = np.empty((forces.shape[1], 3, 3))
+    for x, axis in enumerate(frame.axes.T):
+        turned = np.cross(axis[:, None], by_node, axisa=0, axisb=2, axisc=2)
+        work[:, x] = turned[node[own], component[own] // 3, component[own] % 3].T @ rotations
+    return work
