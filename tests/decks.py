@@ -4,7 +4,10 @@ from pathlib import Path
 
 from fe_models.meshes.mesh import Mesh
 
-ABAQUS = {"tetra": "C3D4", "tetra10": "C3D10", "hexahedron": "C3D8", "hexahedron20": "C3D20", "wedge": "C3D6"}
+ABAQUS = {
+    "tetra": "C3D4", "tetra10": "C3D10", "hexahedron": "C3D8", "hexahedron20": "C3D20", "wedge": "C3D6",
+    "wedge15": "C3D15",
+}  # fmt: skip
 
 JOB = """
 [body]

@@ -19,7 +19,7 @@ from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus_deck import DeckBlock, mesh_blocks
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
-__all__ = ["read_abaqus"]
+__all__ = ["DeckMesh", "deck_mesh", "raw_mesh_of", "read_abaqus"]
 
 _SOLIDS = {4: "tetra", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
 _SOLID = re.compile(r"C3D(\d+)[A-Z]*$")
@@ -32,7 +32,7 @@ _FACES = {
     "9": ("quad9", 9),
 }
 _FACE = re.compile(r"(?:STRI|S|DS|CPS|CPE|CPEG|M3D|SFM3D|R3D)(\d+)(?:R|RS|RSW|5|R5|H|I|T|RT)?$")
-_LINES = {"B31": 2, "B32": 3, "B33": 2, "T3D2": 2, "T3D3": 3, "T2D2": 2, "B21": 2, "B22": 3, "R2D2": 2}
+_LINES = {"B31": 2, "B31R": 2, "B32": 3, "B32R": 3, "B33": 2, "T3D2": 2, "T3D3": 3, "T2D2": 2, "B21": 2, "B22": 3, "R2D2": 2}
 _IGNORED = ("MASS", "ROTARYI", "SPRING", "DASHPOT", "CONN3D", "DCOUP3D", "GAPUNI", "JOINTC")
 
 
@@ -87,15 +87,36 @@ class _Content:
 
     node_numbers: list[IntArray] = field(default_factory=list)
     coordinates: list[Array] = field(default_factory=list)
-    elements: list[tuple[str, IntArray]] = field(default_factory=list)  #: kind, rows of number and nodes
+    elements: list[tuple[str, str, IntArray]] = field(default_factory=list)  #: type, kind, rows of number and nodes
     ignored: dict[str, int] = field(default_factory=dict)  #: element type -> how many
+
+
+@dataclass(frozen=True)
+class DeckMesh:
+    """Nodes, elements and sets of a deck, by the numbers of the deck; sets by their names in upper case."""
+
+    where: str
+    node_numbers: IntArray  #: (n_nodes,)
+    coordinates: Array  #: (n_nodes, 3)
+    elements: tuple[tuple[str, str, IntArray], ...]  #: type in the deck, kind, rows of number and nodes
+    node_sets: dict[str, IntArray]  #: numbers, ascending, of nodes that are there
+    element_sets: dict[str, IntArray]  #: numbers, ascending
+    spelling: dict[str, str]  #: of sets, as they first appear: by "NSET name" and "ELSET name"
+    ignored: dict[str, int]  #: element type -> how many
+    notes: tuple[str, ...] = ()
+
+    def rows_of(self, numbers: IntArray) -> IntArray:
+        """Return the rows of node numbers, -1 where there is none."""
+        order = np.argsort(self.node_numbers, kind="stable")
+        return _rows(self.node_numbers, order, numbers)
 
 
 def read_abaqus(path: Path, data: bytes) -> RawMesh:
     """Return the nodes, elements and sets of a deck.
 
     Sets keep the spelling of their first appearance; names are compared without regard to case, as Abaqus does.
-    Repeated sets are joined. A deck of one part with one instance that is not moved reads like a flat deck.
+    Repeated sets are joined. A deck of one part with one instance that is not moved reads like a flat deck. Included
+    files are put in; nodes that a set names and that are not there are left out of it, as CalculiX does.
 
     Parameters
     ----------
@@ -110,16 +131,28 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
         If the deck makes or moves nodes or elements in a way that is not understood here, or is damaged.
     """
     where = f"mesh {path}"
-    blocks, notes = mesh_blocks(where, data.decode("utf-8", "replace"))
+    blocks, notes = mesh_blocks(where, data.decode("utf-8", "replace"), path.parent)
+    return raw_mesh_of(deck_mesh(where, blocks), notes)
+
+
+def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:
+    """Return nodes, elements and sets of the blocks of a deck.
+
+    Raises
+    ------
+    MeshError
+        If there are no nodes, numbers repeat, or a set names what is not there.
+    """
     node_sets, element_sets = _Sets(where, "NSET"), _Sets(where, "ELSET")
     content = _Content()
+    notes: list[str] = []
     for block in blocks:
-        _take(f"{where}, line {block.line_number}: *{block.keyword}", block, content, node_sets, element_sets)
+        _take(f"{where}, {block.place}: *{block.keyword}", block, content, node_sets, element_sets)
     if not content.coordinates:
         raise MeshError(f"{where}: expected nodes (*NODE), got none")
     numbers = np.concatenate(content.node_numbers)
     _require_unique(where, "node", numbers)
-    tables = [table for _, table in content.elements]
+    tables = [table for _, _, table in content.elements]
     known = np.concatenate([table[:, 0] for table in tables]) if tables else np.zeros(0, np.int64)
     _require_unique(where, "element", known[known > 0])
     groups = element_sets.resolve(lambda name: np.zeros(0, np.int64))
@@ -135,18 +168,45 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
         members = groups[element_sets.spelling[name]]
         return np.concatenate([table[np.isin(table[:, 0], members), 1:].ravel() for table in tables])
 
-    order = np.argsort(numbers, kind="stable")
     sets = {}
     for name, members in node_sets.resolve(nodes_of).items():
-        sets[name] = _rows(numbers, order, members)
-        _require_known(where, f"NSET {name!r}", "nodes", members[sets[name] < 0])
+        missing = members[~np.isin(members, numbers)]
+        if missing.size:
+            notes.append(
+                f"NSET {name!r} names {missing.size} nodes that are not in the deck, first {missing[0]}: left out of it"
+            )
+        sets[name.upper()] = np.setdiff1d(members, missing)
+    spelling = {f"NSET {key}": name for key, name in node_sets.spelling.items()}
+    spelling |= {f"ELSET {key}": name for key, name in element_sets.spelling.items()}
+    return DeckMesh(
+        where,
+        numbers,
+        np.concatenate(content.coordinates),
+        tuple(content.elements),
+        sets,
+        {name.upper(): members for name, members in groups.items()},
+        spelling,
+        content.ignored,
+        tuple(notes),
+    )
+
+
+def raw_mesh_of(mesh: DeckMesh, notes: list[str]) -> RawMesh:
+    """Return the mesh of a deck as it is judged, sets under the names they have in it."""
+    groups = {mesh.spelling[f"ELSET {name}"]: members for name, members in mesh.element_sets.items()}
+    order = np.argsort(mesh.node_numbers, kind="stable")
     raw_blocks = []
-    for kind, table in content.elements:
+    for _, kind, table in mesh.elements:
         rows = {name: np.flatnonzero(np.isin(table[:, 0], members)) for name, members in groups.items()}
         rows = {name: found for name, found in rows.items() if found.size}
-        raw_blocks.append(RawBlock(kind, _rows(numbers, order, table[:, 1:]), rows, table[:, 0]))
-    notes += [f"{count} {name} elements were left out: no part of the solid" for name, count in content.ignored.items()]
-    return RawMesh(np.concatenate(content.coordinates), tuple(raw_blocks), sets, numbers, notes=tuple(notes))
+        raw_blocks.append(RawBlock(kind, _rows(mesh.node_numbers, order, table[:, 1:]), rows, table[:, 0]))
+    sets = {
+        mesh.spelling[f"NSET {name}"]: _rows(mesh.node_numbers, order, members)
+        for name, members in mesh.node_sets.items()
+    }
+    notes = [*notes, *mesh.notes]
+    notes += [f"{count} {name} elements were left out: no part of the solid" for name, count in mesh.ignored.items()]
+    return RawMesh(mesh.coordinates, tuple(raw_blocks), sets, mesh.node_numbers, notes=tuple(notes))
 
 
 def _take(here: str, block: DeckBlock, content: _Content, node_sets: _Sets, element_sets: _Sets) -> None:
@@ -165,7 +225,9 @@ def _take(here: str, block: DeckBlock, content: _Content, node_sets: _Sets, elem
             content.ignored[name] = content.ignored.get(name, 0) + len(block.lines)
             return
         table = _elements(here, block, kind, n_nodes)
-        content.elements.append((kind, table))
+        if kind == "line3":  # the middle node stands between the ends, here as in meshio it comes last
+            table = table[:, [0, 1, 3, 2]]
+        content.elements.append((name, kind, table))
         element_sets.add(block.parameters.get("ELSET"), table[:, 0])
     elif block.keyword in ("NSET", "ELSET"):
         sets = node_sets if block.keyword == "NSET" else element_sets

@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from fe_models.errors import MeshError
+from fe_models.foundation.paths import near_file
 
-__all__ = ["DeckBlock", "mesh_blocks"]
+__all__ = ["DeckBlock", "deck_blocks", "flat_blocks", "mesh_blocks"]
 
+DEEPEST = 10  #: levels of files that include files
 _REFUSED = {
-    "INCLUDE": "put the included text into this file",
     "SYSTEM": "write the nodes in global coordinates",
     "NGEN": "write the generated nodes out",
     "NFILL": "write the generated nodes out",
@@ -29,6 +31,12 @@ class DeckBlock:
     parameters: dict[str, str]  #: upper-case names; "" for a parameter without value
     lines: list[str]
     line_number: int
+    file: str = ""  #: the included file it stands in; empty: the deck itself
+
+    @property
+    def place(self) -> str:
+        """Where it stands, for messages."""
+        return f"{self.file}, line {self.line_number}" if self.file else f"line {self.line_number}"
 
     @property
     def words(self) -> list[str]:
@@ -36,7 +44,42 @@ class DeckBlock:
         return [word for line in self.lines for word in (w.strip() for w in line.split(",")) if word]
 
 
-def mesh_blocks(where: str, text: str) -> tuple[list[DeckBlock], list[str]]:
+def deck_blocks(where: str, text: str, folder: Path) -> list[DeckBlock]:
+    """Return all blocks of a deck, files that it includes put in (*INCLUDE, and INPUT= of a keyword).
+
+    Parameters
+    ----------
+    where
+        For messages.
+    text
+        Of the deck.
+    folder
+        Against which names of included files are taken.
+
+    Raises
+    ------
+    MeshError
+        If the text is no deck, or an included file is missing or includes itself.
+    """
+    blocks = list(_blocks(where, _lines(where, text, folder, ())))
+    if not blocks:
+        raise MeshError(f"{where}: expected an Abaqus deck (keyword lines such as *NODE), got {text[:30]!r}")
+    return blocks
+
+
+def flat_blocks(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
+    """Return the blocks of a deck without parts, or of its only part and what belongs to the model, and what is left.
+
+    Raises
+    ------
+    MeshError
+        As `mesh_blocks`.
+    """
+    _refuse(where, blocks)
+    return _one_part(where, blocks)
+
+
+def mesh_blocks(where: str, text: str, folder: Path) -> tuple[list[DeckBlock], list[str]]:
     """Return the blocks of a deck that concern its mesh, and in words what was left out.
 
     Raises
@@ -44,60 +87,105 @@ def mesh_blocks(where: str, text: str) -> tuple[list[DeckBlock], list[str]]:
     MeshError
         If the text is no deck, has several parts, moves its instance, or makes nodes or elements by keywords.
     """
-    blocks = list(_blocks(where, text))
-    if not blocks:
-        raise MeshError(f"{where}: expected an Abaqus deck (keyword lines such as *NODE), got {text[:30]!r}")
-    _refuse(where, blocks)
-    blocks, notes = _one_part(where, blocks)
+    blocks, notes = flat_blocks(where, deck_blocks(where, text, folder))
     return blocks, notes + _left_out(blocks)
 
 
-def _blocks(where: str, text: str) -> Iterator[DeckBlock]:
-    """Yield the blocks of a deck; comment lines (**) may stand anywhere."""
-    head, head_line = "", 0
-    lines: list[str] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        stripped = line.strip()
-        if not stripped or stripped.startswith("**"):
+@dataclass(frozen=True)
+class _Line:
+    text: str
+    number: int
+    file: str
+
+
+def _lines(where: str, text: str, folder: Path, files: tuple[Path, ...]) -> Iterator[_Line]:
+    """Yield the lines of a deck that say something, those of included files in their place."""
+    name = files[-1].name if files else ""
+    pending = ""
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.strip()
+        if not line or line.startswith("**"):
             continue
-        if stripped.startswith("*"):
-            if head:
-                yield _block(where, head, head_line, lines)
-            head, head_line, lines = stripped, number, []
-        elif head.endswith(",") and not lines:
-            head += stripped
-        elif head:
-            lines.append(stripped)
+        if line.startswith("*") or pending:
+            head = pending + line
+            if head.endswith(","):  # the keyword line goes on
+                pending = head
+                continue
+            pending = ""
+            yield from _with_input(where, _Line(head, number, name), folder, files)
         else:
-            raise MeshError(f"{where}, line {number}: expected a keyword line (*...), got {stripped[:40]!r}")
-    if head:
-        yield _block(where, head, head_line, lines)
+            yield _Line(line, number, name)
+    if pending:
+        yield from _with_input(where, _Line(pending, number, name), folder, files)
 
 
-def _block(where: str, head: str, line_number: int, lines: list[str]) -> DeckBlock:
-    keyword, *parts = (part.strip() for part in head[1:].split(","))
+def _with_input(where: str, line: _Line, folder: Path, files: tuple[Path, ...]) -> Iterator[_Line]:
+    """Yield a keyword line and, where it names a file, the lines of that."""
+    keyword, parameters = _head(line.text)
+    if keyword != "INCLUDE":
+        yield line
+    given = parameters.get("INPUT", "")
+    if not given or keyword not in (*_WITH_INPUT, "INCLUDE"):
+        if keyword == "INCLUDE":
+            raise MeshError(f"{where}, line {line.number}: *INCLUDE: expected INPUT=file, got none")
+        return
+    path = folder / given
+    if path in files or len(files) >= DEEPEST:
+        raise MeshError(f"{where}, line {line.number}: *{keyword}: {path} includes itself, or files nest too deeply")
+    try:
+        text = path.read_bytes().decode("utf-8", "replace")
+    except OSError as error:
+        raise MeshError(
+            f"{where}, line {line.number}: *{keyword}, INPUT={given}: {path} cannot be read: "
+            f"{error.strerror or error}{near_file(path)}"
+        ) from error
+    yield from _lines(where, text, folder, (*files, path))
+
+
+_WITH_INPUT = ("NODE", "ELEMENT", "NSET", "ELSET", "AMPLITUDE", "BOUNDARY", "CLOAD", "DLOAD", "SURFACE", "EQUATION")
+
+
+def _blocks(where: str, lines: Iterator[_Line]) -> Iterator[DeckBlock]:
+    """Yield the blocks of a deck."""
+    head: _Line | None = None
+    data: list[str] = []
+    for line in lines:
+        if line.text.startswith("*"):
+            if head is not None:
+                yield _block(head, data)
+            head, data = line, []
+        elif head is not None:
+            data.append(line.text)
+        else:
+            raise MeshError(f"{where}, line {line.number}: expected a keyword line (*...), got {line.text[:40]!r}")
+    if head is not None:
+        yield _block(head, data)
+
+
+def _head(text: str) -> tuple[str, dict[str, str]]:
+    """Return keyword and parameters of a keyword line."""
+    keyword, *parts = (part.strip() for part in text[1:].split(","))
     parameters = {}
     for part in parts:
         if part:
             key, _, value = part.partition("=")
-            parameters[key.strip().upper()] = value.strip().strip('"')
-    return DeckBlock(" ".join(keyword.upper().split()), parameters, lines, line_number)
+            parameters[" ".join(key.upper().split())] = value.strip().strip('"')
+    return " ".join(keyword.upper().split()), parameters
+
+
+def _block(head: _Line, lines: list[str]) -> DeckBlock:
+    return DeckBlock(*_head(head.text), lines, head.number, head.file)
 
 
 def _refuse(where: str, blocks: list[DeckBlock]) -> None:
     for block in blocks:
         if block.keyword in _REFUSED:
             raise MeshError(
-                f"{where}, line {block.line_number}: *{block.keyword} is not read: {_REFUSED[block.keyword]}"
-            )
-        if block.keyword in ("NODE", "ELEMENT", "NSET", "ELSET") and "INPUT" in block.parameters:
-            raise MeshError(
-                f"{where}, line {block.line_number}: *{block.keyword}, INPUT=... is not read: put the "
-                f"included text into this file"
+                f"{where}, {block.place}: *{block.keyword} is not read: {_REFUSED[block.keyword]}"
             )
         if block.keyword == "NODE" and block.parameters.get("SYSTEM", "R").upper() != "R":
             raise MeshError(
-                f"{where}, line {block.line_number}: *NODE in a cylindrical or spherical system is not "
+                f"{where}, {block.place}: *NODE in a cylindrical or spherical system is not "
                 f"read: write the nodes in global coordinates"
             )
 

@@ -17,10 +17,11 @@ from fe_models.importers.raw_mesh import RawBlock, RawMesh
 __all__ = ["read_nastran"]
 
 _HEXA20 = [*range(12), *range(16, 20), *range(12, 16)]  # Nastran numbers the upright edges before those of the top
+_PENTA15 = [*range(9), *range(12, 15), *range(9, 12)]
 _TYPES: dict[str, dict[int, tuple[str, list[int] | None]]] = {
     "CTETRA": {4: ("tetra", None), 10: ("tetra10", None)},
     "CHEXA": {8: ("hexahedron", None), 20: ("hexahedron20", _HEXA20)},
-    "CPENTA": {6: ("wedge", None), 15: ("wedge15", None)},
+    "CPENTA": {6: ("wedge", None), 15: ("wedge15", _PENTA15)},
     "CPYRA": {5: ("pyramid", None), 13: ("pyramid13", None)},
     "CPYRAM": {5: ("pyramid", None), 13: ("pyramid13", None)},
     "CTRIA3": {3: ("triangle", None)},

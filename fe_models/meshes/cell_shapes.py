@@ -60,6 +60,9 @@ _QUAD_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
 _TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
 _HEX_EDGES = (*_QUAD_EDGES, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 
+_WEDGE_EDGES = (*_TRI_EDGES, (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
+_WEDGE15 = (*((*e, k) for e in _total(2, 2) for k in (0, 1)), *((*e, 2) for e in _total(2, 1)))
+
 _TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 _HEX_FACETS = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))  # -x +x -y +y -z +z
 _WEDGE_FACETS = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
@@ -79,6 +82,7 @@ CELL_SHAPES = {
         CellShape("hexahedron20", 3, _HEX, _HEX_EDGES, _HEX_FACETS, _serendipity(3)),
         CellShape("hexahedron27", 3, _HEX, (*_HEX_EDGES, *_HEX_CENTRES), _HEX_FACETS, _grid(3, 2)),
         CellShape("wedge", 3, _WEDGE, (), _WEDGE_FACETS, tuple((*e, k) for e in _total(2, 1) for k in (0, 1))),
+        CellShape("wedge15", 3, _WEDGE, _WEDGE_EDGES, _WEDGE_FACETS, _WEDGE15),
     )
 }  #: reference cells are the unit simplex, the unit square and cube, and triangle x interval
 
@@ -156,7 +160,7 @@ def quadrature(kind: str) -> tuple[Array, Array]:
     triangle, weight = np.column_stack([1 - s, s * t]), np.outer(w, w).ravel() * s
     if shape.dim == 2:
         return frozen(triangle), frozen(weight)
-    if kind == "wedge":
+    if kind in ("wedge", "wedge15"):
         points = np.column_stack([np.repeat(triangle, len(x), axis=0), np.tile(x, len(triangle))])
         return frozen(points), frozen(np.outer(weight, w).ravel())
     points = np.column_stack([np.repeat(1 - x, len(triangle)), np.kron(x[:, None], triangle)])

@@ -53,6 +53,8 @@ def assemble(
     of_cell: Mapping[str, IntArray],
     *,
     incompatible: bool = False,
+    integration: str = "full",
+    mass: str = "consistent",
     progress: Progress | None = None,
 ) -> tuple[sp.csc_array, sp.csr_array]:
     """Assemble the stiffness and the scalar mass of all solid cells.
@@ -67,6 +69,9 @@ def assemble(
         Cell type -> material of each cell, (n_cells,).
     incompatible
         Whether bricks of eight nodes have incompatible modes (`fe_models.solids.incompatible`).
+    integration, mass
+        Of `INTEGRATIONS` and `MASSES` of `fe_models.solids.elements`. A lumped mass is the diagonal of the consistent
+        one of each element, scaled to the mass of the element.
     progress
         Called with the finished fraction.
 
@@ -95,7 +100,9 @@ def assemble(
     lists = {kind: np.ascontiguousarray(mesh.cells[kind], dtype=np.int32) for kind in kinds}
     with ThreadPoolExecutor(n_threads()) as pool:
         graph = node_graph(list(lists.values()), len(mesh.nodes), pool)
-        K_data, M_data = assembled_data(mesh.nodes, lists, properties, of_cell, graph, pool, incompatible, progress)
+        K_data, M_data = assembled_data(
+            mesh.nodes, lists, properties, of_cell, graph, pool, incompatible, (integration, mass), progress
+        )
         K = expanded_stiffness(graph, K_data, pool)
     M_s = sp.csr_array((M_data, graph.columns, index_like(graph.row_start, len(M_data))), shape=2 * (graph.n_nodes,))
     return K, M_s
@@ -152,6 +159,7 @@ def assembled_data(
     graph: NodeGraph,
     pool: ThreadPoolExecutor,
     incompatible: bool,
+    rules: tuple[str, str],
     progress: Progress | None,
 ) -> tuple[Array, Array]:
     """Steps (3) and (4): the entries of K, row by row, and of M_s."""
@@ -163,7 +171,7 @@ def assembled_data(
     cursor = graph.start[:-1].copy()
     first_place = 0
     for kind, cells in lists.items():
-        element = reference_element(kind)
+        element = reference_element(kind, *rules)
         tables = kernel_tables(element)
         n_a = element.n_nodes
         n_batch = min(len(cells), max(n_parts, int(BATCH_BYTES / (80 * n_a**2))))  # 9 + 1 numbers for each pair
@@ -195,6 +203,8 @@ def assembled_data(
                 of_batch = properties[materials[begin : begin + len(batch)]]
                 for rows, _ in brick_chunks(batch):
                     K_e[rows] = brick_stiffness(nodes[batch[rows]], of_batch[rows, 0], of_batch[rows, 1])
+            if rules[1] == "lumped":
+                M_e[: len(batch)] = lumped_mass(M_e[: len(batch)])
             run(
                 pool,
                 [
@@ -223,6 +233,13 @@ def assembled_data(
                 progress(first_place / len(graph.places))
         require_upright(kind, is_inverted)
     return K_data, M_data
+
+
+def lumped_mass(M_e: Array) -> Array:
+    """Return diagonal element masses, (n, n_a, n_a): the diagonal of M_e, scaled to the sum of all its entries."""
+    diagonal = np.einsum("eaa->ea", M_e)
+    total = M_e.sum(axis=(1, 2))
+    return np.asarray((diagonal * (total / diagonal.sum(axis=1))[:, None])[:, :, None] * np.eye(M_e.shape[1]))
 
 
 def kernel_tables(element: ReferenceElement) -> tuple[tuple[np.ndarray, ...], ...]:

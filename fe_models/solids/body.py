@@ -15,12 +15,13 @@ from fe_models.foundation.arrays import Array, IntArray, frozen_int
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest, quoted
 from fe_models.material import Material, assign_materials
 from fe_models.meshes.boundary import boundary_triangles
 from fe_models.meshes.cell_shapes import cell_jacobians
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.assembly import Progress, assemble, expand_scalar_mass
-from fe_models.solids.elements import reference_element
+from fe_models.solids.elements import INTEGRATIONS, MASSES, reference_element
 from fe_models.solids.geometric import internal_forces, projected_geometric_stiffness
 from fe_models.solids.incompatible import KIND
 from fe_models.solids.stress import nodal_stress, stiffest_at_nodes
@@ -40,6 +41,7 @@ class SolidModel:
     of_cell: Mapping[str, IntArray]  #: cell type -> material of each cell, (n_cells,)
     M_s: sp.csr_array  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
     incompatible: bool = False  #: whether bricks of eight nodes have incompatible modes
+    integration: str = "full"  #: of the stiffness, of `fe_models.solids.elements.INTEGRATIONS`
 
     @cached_property
     def of_node(self) -> IntArray:
@@ -77,14 +79,28 @@ class SolidModel:
     def internal_forces(self, u: Array, *, nodes: IntArray | None = None) -> Array:
         """Return ∫ sigma grad N, (3 n_nodes, k) [N], of columns u; only at `nodes` where these are given."""
         require_rows("internal_forces", u, 3 * len(self.mesh.nodes))
-        return internal_forces(self.mesh, self.materials, self.of_cell, u, nodes=nodes, incompatible=self.incompatible)
+        return internal_forces(
+            self.mesh,
+            self.materials,
+            self.of_cell,
+            u,
+            nodes=nodes,
+            incompatible=self.incompatible,
+            integration=self.integration,
+        )
 
     def geometric_stiffness(self, u: Array, loads: MassLoads, Phi: Array) -> Array:
         """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the states u, (3 n_nodes, k); the stress alone makes it."""
         require_rows("geometric_stiffness", u, 3 * len(self.mesh.nodes))
         require_rows("geometric_stiffness", Phi, 3 * len(self.mesh.nodes))
         return projected_geometric_stiffness(
-            self.mesh, self.materials, self.of_cell, u, Phi, incompatible=self.incompatible
+            self.mesh,
+            self.materials,
+            self.of_cell,
+            u,
+            Phi,
+            incompatible=self.incompatible,
+            integration=self.integration,
         )
 
 
@@ -96,6 +112,8 @@ def solid_body(
     units: Units,
     interfaces: Iterable[Interface] = (),
     incompatible_modes: bool = False,
+    integration: str = "full",
+    mass: str = "consistent",
     progress: Progress | None = None,
 ) -> FEBody:
     """Make the body of a mesh of solid cells: isoparametric elements, consistent mass, dof 3 i + c of every node i.
@@ -115,6 +133,12 @@ def solid_body(
     incompatible_modes
         Whether bricks of eight nodes have internal modes that let them bend (`fe_models.solids.incompatible`); other
         cells stay as they are.
+    integration
+        Of the stiffness: "full", or "reduced" by the fewest points that finite element programs use
+        (`fe_models.solids.elements.REDUCED`): bricks of 20 nodes by 8 as C3D20R, wedges by 2.
+    mass
+        "consistent", "reduced" by the points of the reduced stiffness, or "lumped" on the diagonal. Reduced integration
+        by too few points leaves motions without mass: the rank of the mass is then less than its size.
     progress
         Called with the finished fraction of the assembly, 0 to 1.
 
@@ -130,9 +154,12 @@ def solid_body(
     MeshError
         If there is no solid cell, a node belongs to none, or an element is inverted.
     """
+    rule_words = _rule_words(integration, mass)
     used, of_cell = assign_materials(mesh, materials)
     properties = np.array([[material.lam, material.mu, material.rho] for material in used])
-    K, M_s = assemble(mesh, properties, of_cell, incompatible=incompatible_modes, progress=progress)
+    K, M_s = assemble(
+        mesh, properties, of_cell, incompatible=incompatible_modes, integration=integration, mass=mass, progress=progress
+    )
     n_nodes = len(mesh.nodes)
     return FEBody(
         name=name,
@@ -144,8 +171,10 @@ def solid_body(
         units=units,
         surface=boundary_triangles(mesh),
         node_volumes=node_volumes(mesh),
-        element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes),
-        provenance=provenance(mesh, used, of_cell) | _brick_words(mesh, incompatible_modes),
+        element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration),
+        provenance=provenance(mesh, used, of_cell)
+        | _brick_words(mesh, incompatible_modes)
+        | rule_words,
     )
 
 
@@ -207,6 +236,15 @@ def provenance(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str
 
 def _brick_words(mesh: Mesh, incompatible_modes: bool) -> dict[str, str]:
     return {f"cells {KIND} with": "incompatible modes"} if incompatible_modes and len(mesh.cells.get(KIND, ())) else {}
+
+
+def _rule_words(integration: str, mass: str) -> dict[str, str]:
+    """Say what differs from full integration and consistent mass; refuse what is neither."""
+    for what, value, choices in (("integration", integration, INTEGRATIONS), ("mass", mass, MASSES)):
+        if value not in choices:
+            raise BodyError(f"solid_body: {what}: unknown {quoted(value)}{nearest(value, choices)}")
+    words = {"integration of the stiffness": integration} if integration != "full" else {}
+    return words | ({"mass of the cells": mass} if mass != "consistent" else {})
 
 
 def require_rows(where: str, u: Array, n_rows: int) -> None:

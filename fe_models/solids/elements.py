@@ -15,10 +15,10 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.words import nearest, quoted
-from fe_models.meshes.cell_shapes import CELL_SHAPES
+from fe_models.meshes.cell_shapes import CELL_SHAPES, shape_values
 from fe_models.meshes.mesh import SOLID_TYPES
 
-__all__ = ["ReferenceElement", "ShapeTable", "reference_element", "shape_table"]
+__all__ = ["INTEGRATIONS", "MASSES", "ReferenceElement", "ShapeTable", "reference_element", "shape_table"]
 
 Degree = int | tuple[int, int]
 
@@ -29,7 +29,7 @@ SKFEM_ELEMENTS = {
     "hexahedron20": "ElementHexS2",
     "hexahedron27": "ElementHex2",
     "wedge": "ElementWedge1",
-}
+}  #: of others the monomials of `fe_models.meshes.cell_shapes` make the shape functions
 # scikit-fem 12 labels its tetrahedron tables 5 to 8 one degree too high (measured; a test holds them to what is used
 # here), so label 8 gives degree 7. Degrees: stiffness, mass; per direction for hexahedra, (triangle, line) for wedges.
 RULES: dict[str, tuple[str, Degree, Degree]] = {
@@ -39,7 +39,20 @@ RULES: dict[str, tuple[str, Degree, Degree]] = {
     "hexahedron20": ("hex", 5, 9),  # mass: 2 + 2 + 5 = 9
     "hexahedron27": ("hex", 5, 9),
     "wedge": ("wedge", (2, 3), (3, 5)),  # mass: triangle 1 + 1 + 1 = 3, line 1 + 1 + 2 = 4
+    # stiffness: triangle 2 (1 + 1), or 3 (0 + 2, along the line) within 4, line 2 + 2; mass: triangle 2 + 2 + 3, line 9
+    "wedge15": ("wedge", (4, 5), (8, 9)),
 }
+REDUCED: dict[str, tuple[str, Degree]] = {
+    "tetra": ("tet", 1),  # 1 point
+    "tetra10": ("tet", 2),  # 4
+    "hexahedron": ("hex", 3),  # 8: fewer would let it move without strain
+    "hexahedron20": ("hex", 3),  # 8, as C3D20R
+    "hexahedron27": ("hex", 3),
+    "wedge": ("wedge", (1, 3)),  # 1 x 2
+    "wedge15": ("wedge", (2, 3)),  # 3 x 2
+}  #: fewest points that programs use; cells with straight edges keep their full stiffness but for the wedges and bricks
+INTEGRATIONS = ("full", "reduced")  #: of the stiffness
+MASSES = ("consistent", "reduced", "lumped")  #: consistent; by the points of the reduced stiffness; diagonal
 # Stress is sampled where it is most accurate (the points of reduced integration for quadratic elements) and carried to
 # the nodes by the shape functions of the low-order element, which fit those points exactly.
 STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
@@ -49,6 +62,7 @@ STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
     "hexahedron20": (("hex", 3), "hexahedron"),
     "hexahedron27": (("hex", 3), "hexahedron"),
     "wedge": (("wedge", (2, 3)), "wedge"),
+    "wedge15": (("wedge", (2, 3)), "wedge"),
 }
 
 
@@ -124,6 +138,8 @@ def shape_table(kind: str, points: Array, weights: Array) -> ShapeTable:
     """Evaluate the shape functions of a cell type, in meshio node order, at points (n_points, 3)."""
     import skfem
 
+    if kind not in SKFEM_ELEMENTS:
+        return ShapeTable(frozen(points), frozen(weights), *shape_values(kind, points))
     element = getattr(skfem, SKFEM_ELEMENTS[kind])()
     order = skfem_node_order(kind)
     values = [element.lbasis(points.T, int(i)) for i in order]
@@ -145,8 +161,15 @@ def skfem_node_order(kind: str) -> IntArray:
 
 
 @cache
-def reference_element(kind: str) -> ReferenceElement:
+def reference_element(kind: str, integration: str = "full", mass: str = "consistent") -> ReferenceElement:
     """Return the reference element of a cell type of `SOLID_TYPES`.
+
+    Parameters
+    ----------
+    kind
+        Cell type.
+    integration, mass
+        Of `INTEGRATIONS` and `MASSES`: by which points stiffness and mass are integrated. Lumping is not done here.
 
     Raises
     ------
@@ -156,6 +179,10 @@ def reference_element(kind: str) -> ReferenceElement:
     if kind not in SOLID_TYPES:
         raise MeshError(f"solid elements: unknown cell type {quoted(kind)}{nearest(kind, SOLID_TYPES)}")
     cell, degree_stiffness, degree_mass = RULES[kind]
+    if integration == "reduced":
+        degree_stiffness = REDUCED[kind][1]
+    if mass == "reduced":
+        degree_mass = REDUCED[kind][1]
     (stress_cell, stress_degree), low_order = STRESS_RULES[kind]
     stress_points, stress_weights = quadrature(stress_cell, stress_degree)
     if low_order is None:

@@ -31,6 +31,7 @@ def projected_geometric_stiffness(
     Phi: Array,
     *,
     incompatible: bool = False,
+    integration: str = "full",
 ) -> Array:
     """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of the stress of the states u, (3 n_nodes, k).
 
@@ -44,6 +45,8 @@ def projected_geometric_stiffness(
         Columns, (3 n_nodes, n).
     incompatible
         Whether bricks of eight nodes have incompatible modes; stress then acts on the gradients of their whole field.
+    integration
+        Of the stiffness, of `fe_models.solids.elements.INTEGRATIONS`.
     """
     n_nodes, n = len(mesh.nodes), Phi.shape[1]
     states = np.ascontiguousarray(u).reshape(n_nodes, 3, -1)
@@ -58,7 +61,8 @@ def projected_geometric_stiffness(
             cuts = np.linspace(0, len(cells), n_parts + 1).astype(int)
             futures = [
                 pool.submit(
-                    _pairs_of, mesh.nodes, cells[a:b], of_cell[kind][a:b], lame, geometric_table(kind), states, columns
+                    _pairs_of, mesh.nodes, cells[a:b], of_cell[kind][a:b], lame,
+                    geometric_table(kind, integration), states, columns
                 )
                 for a, b in pairwise(cuts)
                 if b > a
@@ -97,6 +101,7 @@ def internal_forces(
     *,
     nodes: IntArray | None = None,
     incompatible: bool = False,
+    integration: str = "full",
 ) -> Array:
     """Return ∫ sigma grad N by the points of the geometric stiffness, (3 n_nodes, k); exact where `nodes` says so."""
     from fe_models.solids.geometric_kernels import add_internal_forces
@@ -111,7 +116,7 @@ def internal_forces(
     for kind, all_cells in mesh.cells.items():
         is_wanted = wanted[all_cells].any(axis=1)
         if is_wanted.any():
-            table = geometric_table(kind)
+            table = geometric_table(kind, integration)
             cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
             if incompatible and kind == KIND:
                 for rows, dofs in brick_chunks(cells):
@@ -123,13 +128,13 @@ def internal_forces(
     return forces.reshape(3 * len(mesh.nodes), -1)
 
 
-def geometric_table(kind: str) -> ShapeTable:
+def geometric_table(kind: str, integration: str = "full") -> ShapeTable:
     """Return the quadrature of the geometric stiffness.
 
     sigma · grad N must be exact where the cell is affine, so that a rigid rotation meets the nodal forces K u to
     rounding. The four stress points of a quadratic tetrahedron do (degree 2); bricks need the points of the stiffness.
     """
-    element = reference_element(kind)
+    element = reference_element(kind, integration)
     return element.stress if kind == "tetra10" else element.stiffness
 
 

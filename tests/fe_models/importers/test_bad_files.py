@@ -12,6 +12,7 @@ from numpy.testing import assert_array_equal
 
 from fe_models.errors import MeshError
 from fe_models.importers import MESH_FORMATS, read_mesh
+from fe_models.importers.read_mesh import read_line_mesh
 from tests.fe_models.small_meshes import faced_box, nastran_deck
 
 TETRA = """*NODE
@@ -440,8 +441,10 @@ def test_abaqus_part_with_one_instance_reads_like_a_flat_deck(tmp_path):
             part_deck("*INSTANCE, NAME=a, PART=p\n*END INSTANCE\n*INSTANCE, NAME=b, PART=p\n*END INSTANCE\n"),
             "1 parts and 2 instances",
         ),
-        (TETRA + "*INCLUDE, INPUT=more.inp\n", "*INCLUDE is not read"),
-        (TETRA + "*ELEMENT, TYPE=C3D4, INPUT=more.inp\n", "*ELEMENT, INPUT=... is not read"),
+        (TETRA + "*INCLUDE, INPUT=more.inp\n", "more.inp cannot be read: No such file"),
+        (TETRA + "*ELEMENT, TYPE=C3D4, INPUT=more.inp\n", "*ELEMENT, INPUT=more.inp"),
+        (TETRA + "*INCLUDE, INPUT=rod.inp\n", "includes itself"),
+        (TETRA + "*INCLUDE\n", "*INCLUDE: expected INPUT=file"),
         ("*SYSTEM\n1,0,0\n" + TETRA, "*SYSTEM is not read"),
         (TETRA.replace("*NODE", "*NODE, SYSTEM=C"), "cylindrical or spherical"),
         (TETRA + "*NGEN\n1, 4, 1\n", "*NGEN is not read"),
@@ -450,7 +453,6 @@ def test_abaqus_part_with_one_instance_reads_like_a_flat_deck(tmp_path):
         (TETRA.replace("TYPE=C3D4", "TYPE=C3D10"), "expected a multiple of 11 numbers below, got 5"),
         (TETRA.replace(", TYPE=C3D4", ""), "expected TYPE="),
         (TETRA.replace("2, 1, 0, 0", "2, one, 0, 0"), "expected number, x, y, z"),
-        (TETRA + "*NSET, NSET=a\n99\n", "NSET 'a' names 1 nodes that are not in the deck, first 99"),
         (TETRA + "*ELSET, ELSET=a\n99\n", "ELSET 'a' names 1 elements that are not in the deck, first 99"),
         (TETRA + "*NSET, NSET=a\nb\n", "names an unknown set 'B'"),
         (TETRA + "*NSET, NSET=a\nb\n*NSET, NSET=b\na\n", "contains itself"),
@@ -461,6 +463,23 @@ def test_abaqus_part_with_one_instance_reads_like_a_flat_deck(tmp_path):
 )
 def test_abaqus_decks_that_cannot_be_read_truthfully(text, words, tmp_path, capsys):
     assert words in refusal(tmp_path, "rod.inp", text, capsys)
+
+
+def test_abaqus_includes_are_put_in_and_sets_may_name_missing_nodes(tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "sets.inp").write_text("*NSET, NSET=a\n1, 99\n")
+    (tmp_path / "more.inp").write_text("*INCLUDE, INPUT=parts/sets.inp\n*NSET, NSET=b\n2\n")
+    (tmp_path / "nodes.txt").write_text("4, 0, 0, 1\n")
+    text = TETRA.replace("4, 0, 0, 1\n", "*NODE, INPUT=nodes.txt\n") + "*INCLUDE, INPUT=more.inp\n*NSET, NSET=c\n3\n"
+    mesh = read_text(tmp_path, "rod.inp", text)
+    assert {name: list(nodes) for name, nodes in mesh.node_sets.items()} == {"a": [0], "b": [1], "c": [2]}
+    assert mesh.notes == ("NSET 'a' names 1 nodes that are not in the deck, first 99: left out of it",)
+
+
+def test_abaqus_middle_nodes_of_lines_stand_between_their_ends(tmp_path):
+    path = tmp_path / "rod.inp"
+    path.write_text("*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 2, 0, 0\n*ELEMENT, TYPE=B32R\n1, 1, 2, 3\n")
+    assert_array_equal(read_line_mesh(path).lines, [[0, 1], [1, 2]])
 
 
 # --- Nastran -------------------------------------------------------------------------------------------------------

@@ -1,0 +1,153 @@
+"""Whole decks of Abaqus and CalculiX: what `DeckMesh` is to the mesh, `Deck` is to the model."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.importers.abaqus import DeckMesh, deck_mesh, raw_mesh_of
+from fe_models.importers.abaqus_deck import DeckBlock, deck_blocks, flat_blocks
+from fe_models.importers.decks.abaqus_couplings import read_coupling
+from fe_models.importers.decks.abaqus_elements import read_element
+from fe_models.importers.decks.abaqus_loads import read_boundary, read_load
+from fe_models.importers.decks.abaqus_sections import read_material, read_section
+from fe_models.importers.decks.deck import Deck
+from fe_models.importers.decks.draft import Draft
+from fe_models.importers.decks.ledger import Ledger
+
+__all__ = ["PROGRAMS", "read_abaqus_deck"]
+
+PROGRAMS = ("calculix", "abaqus")  #: whose rules of integration and mass a deck may be read by
+_MESH = ("NODE", "ELEMENT", "NSET", "ELSET", "HEADING", "PREPRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY")
+_MESH += ("INSTANCE", "END INSTANCE", "INCLUDE", "SYSTEM")
+_MATERIAL = ("MATERIAL", "ELASTIC", "DENSITY", "EXPANSION", "CONDUCTIVITY", "SPECIFIC HEAT", "DAMPING", "DEPVAR")
+_SECTIONS = ("SOLID SECTION", "SHELL SECTION", "BEAM SECTION", "BEAM GENERAL SECTION", "MASS", "ROTARY INERTIA")
+_SECTIONS += ("SPRING", "DASHPOT", "MEMBRANE SECTION", "NODAL THICKNESS", "ORIENTATION", "TRANSFORM", "NORMAL")
+_SECTIONS += ("DISTRIBUTION", "DISTRIBUTION TABLE")
+_COUPLINGS = ("EQUATION", "MPC", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTING COUPLING", "TIE")
+_LOADS = ("CLOAD", "DLOAD", "DSLOAD", "GRAVITY")
+_SURFACES = ("SURFACE", "SURFACE INTERACTION", "SURFACE BEHAVIOR", "FRICTION")
+_NONLINEAR = {
+    "PLASTIC": "the material is plastic",
+    "CYCLIC HARDENING": "the material is plastic",
+    "HYPERELASTIC": "the material is hyperelastic",
+    "HYPERFOAM": "the material is hyperelastic",
+    "CREEP": "the material creeps",
+    "USER MATERIAL": "the law of the material is not in the deck",
+    "DEFORMATION PLASTICITY": "the material is plastic",
+    "CONTACT PAIR": "contact is not linear; reduced bodies touch in the multibody program",
+    "CONTACT": "contact is not linear; reduced bodies touch in the multibody program",
+    "GAP": "a gap is not linear",
+    "PRE-TENSION SECTION": "the cut by which a bolt is tightened",
+    "CYCLIC SYMMETRY MODEL": "the deck is a sector; the body would be the sector alone",
+    "SUBMODEL": "the deck is driven by another model",
+    "MODEL CHANGE": "elements come and go between steps",
+    "CHANGE MATERIAL": "a material changes between steps",
+    "CHANGE SOLID SECTION": "a section changes between steps",
+    "CONNECTOR SECTION": "a connector",
+    "BUSHING": "a connector",
+    "EMBEDDED ELEMENT": "elements embedded in others",
+    "ADD": "mass that is not at nodes",
+    "NONSTRUCTURAL MASS": "mass that is not at nodes",
+    "FLUID SECTION": "fluid elements",
+}  #: keyword -> why it cannot be taken over: these carry mass, stiffness or constraints
+_SILENT = ("STEP", "END STEP", "ENDSTEP", "NO ANALYSIS")
+
+
+def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> Deck:
+    """Return what a deck of Abaqus or CalculiX says.
+
+    Parameters
+    ----------
+    path, data
+        File name and content.
+    program
+        "calculix" or "abaqus": whose elements these are, which integrate stiffness and mass by other points.
+
+    Raises
+    ------
+    MeshError
+        If the deck is damaged. What cannot be taken over is in the ledger.
+    """
+    where = f"deck {path}"
+    if program not in PROGRAMS:
+        raise MeshError(f"{where}: unknown program {program!r}; expected one of {', '.join(PROGRAMS)}")
+    blocks, notes = flat_blocks(where, deck_blocks(where, data.decode("utf-8", "replace"), path.parent))
+    mesh = deck_mesh(where, blocks)
+    draft = Draft(where, program, mesh, Ledger(where))
+    for note in (*notes, *mesh.notes):
+        draft.ledger.note("*NSET" if note.startswith("NSET") else "*ASSEMBLY", note)
+    step, steps = 0, ""
+    for block in blocks:
+        here = f"{where}, {block.place}: *{block.keyword}"
+        try:
+            if block.keyword == "STEP":
+                step += 1
+                steps = f"step{step}"
+            elif block.keyword == "MATERIAL":
+                draft.material = block.parameters.get("NAME", "")
+                read_material(here, block, draft)
+            else:
+                _take(here, block, draft, steps)
+        except (ValueError, IndexError) as error:
+            if isinstance(error, MeshError):
+                raise
+            raise MeshError(f"{here}: cannot be understood ({error}); first line below: {block.lines[:1]}") from error
+    return _finished(path, draft)
+
+
+def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
+    """Hand one block to its reader, or count it in the ledger."""
+    keyword = block.keyword
+    if keyword == "ELEMENT":
+        read_element(here, block, draft)
+    elif keyword in _MATERIAL:
+        read_material(here, block, draft)
+    elif keyword in _SECTIONS:
+        read_section(here, block, draft)
+    elif keyword in _COUPLINGS:
+        read_coupling(here, block, draft)
+    elif keyword == "BOUNDARY":
+        read_boundary(here, block, draft, step)
+    elif keyword in _LOADS:
+        read_load(here, block, draft, step)
+    elif keyword == "SURFACE":
+        draft.surfaces[block.parameters.get("NAME", "").upper()] = block
+    elif keyword in _NONLINEAR:
+        draft.ledger.refuse(f"*{keyword}", _NONLINEAR[keyword], line=block.line_number)
+    elif keyword == "INITIAL CONDITIONS":
+        draft.ledger.note(f"*{keyword}", "the body starts free of stress and at the temperature of its material")
+    elif keyword not in _MESH and keyword not in _SILENT and keyword not in _SURFACES:
+        draft.ledger.note(f"*{keyword}", "belongs to the analysis, not to the body", line=block.line_number)
+
+
+def _finished(path: Path, draft: Draft) -> Deck:
+    """Return the deck of a draft whose blocks are all taken."""
+    draft.close()
+    mesh = raw_mesh_of(draft.mesh, [])
+    names = {**mesh.node_sets, **draft.node_groups}
+    groups = draft.cell_groups
+    blocks = []
+    for block in mesh.blocks:
+        assert block.numbers is not None
+        own = {name: np.flatnonzero(np.isin(block.numbers, members)) for name, members in groups.items()}
+        blocks.append(replace(block, groups={**block.groups, **{name: rows for name, rows in own.items() if rows.size}}))
+    blocks += draft.face_blocks
+    return Deck(
+        path,
+        draft.program,
+        replace(mesh, blocks=tuple(blocks), node_sets=names, notes=()),
+        draft.ledger,
+        draft.materials,
+        tuple(draft.solids),
+        tuple(draft.shells),
+        tuple(draft.lines),
+        tuple(draft.masses),
+        tuple(draft.springs),
+        tuple(draft.rigid),
+        tuple(draft.couplings),
+        tuple(draft.equations),
+        tuple(draft.supports_of_groups()),
+        tuple(draft.loads),
+    )

@@ -1,0 +1,158 @@
+"""Couplings of Abaqus and CalculiX: equations, rigid bodies, kinematic and distributing couplings."""
+
+import numpy as np
+
+from fe_models.foundation.arrays import IntArray
+from fe_models.importers.abaqus_deck import DeckBlock
+from fe_models.importers.decks.abaqus_elements import faces_of
+from fe_models.importers.decks.deck import Coupling, Equation, RigidGroup
+from fe_models.importers.decks.draft import Draft
+
+__all__ = ["read_coupling", "surface_nodes"]
+
+
+def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
+    """Take one block that couples nodes."""
+    keyword, given = block.keyword, block.parameters
+    if keyword == "EQUATION":
+        _equations(here, block, draft)
+    elif keyword == "RIGID BODY":
+        _rigid_body(here, block, draft)
+    elif keyword == "COUPLING":
+        draft.pending = dict(given)
+    elif keyword in ("KINEMATIC", "DISTRIBUTING") and draft.pending:
+        _coupling(here, block, draft)
+        draft.pending = {}
+    elif keyword == "DISTRIBUTING COUPLING":
+        _distributing_coupling(here, block, draft)
+    elif keyword == "MPC":
+        _mpcs(here, block, draft)
+    else:
+        draft.ledger.refuse(f"*{keyword}", "this coupling is not known here", line=block.line_number)
+
+
+def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
+    """Lines: number of terms; then node, component, coefficient of each, up to four a line."""
+    words = [word.strip() for line in block.lines for word in line.rstrip(", ").split(",")]
+    at = 0
+    while at < len(words):
+        n = int(words[at])
+        rows = [words[at + 1 + 3 * k : at + 4 + 3 * k] for k in range(n)]
+        at += 1 + 3 * n
+        terms = []
+        for node, component, coefficient in rows:
+            nodes = draft.nodes_of(here, node)
+            if len(nodes) != 1 or not 1 <= int(component) <= 6 or int(nodes[0]) in draft.transformed:
+                why = "equations of sets, of nodes with axes of their own, or of other components than 1 to 6"
+                draft.ledger.refuse("*EQUATION", why, line=block.line_number)
+                break
+            terms.append((draft.node_group(here, nodes), int(component) - 1, float(coefficient)))
+        else:
+            draft.equations.append(Equation(tuple(terms)))
+
+
+def _rigid_body(here: str, block: DeckBlock, draft: Draft) -> None:
+    given = block.parameters
+    if "NSET" in given:
+        members = draft.nodes_of(here, given["NSET"])
+    elif "ELSET" in given:
+        members = _nodes_of_elements(draft, draft.elements_of(here, given["ELSET"]))
+    else:
+        members = np.zeros(0, np.int64)
+    if not members.size or "REF NODE" not in given:
+        draft.ledger.refuse("*RIGID BODY", "without NSET or ELSET, or without REF NODE", line=block.line_number)
+        return
+    if "ROT NODE" in given:
+        draft.ledger.note("*RIGID BODY, ROT NODE", "its rotations are those of the reference node", line=block.line_number)
+    _rigid_group(here, draft, int(draft.nodes_of(here, given["REF NODE"])[0]), members)
+
+
+def _rigid_group(
+    here: str, draft: Draft, leader: int, members: IntArray, components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+) -> None:
+    name = f"rigid_{len(draft.rigid) + 1}"
+    followers = draft.node_group(here, np.setdiff1d(members, [leader]), f"{name}_nodes")
+    draft.rigid.append(RigidGroup(name, draft.node_group(here, [leader]), followers, components))
+
+
+def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
+    given = draft.pending
+    leader = int(draft.nodes_of(here, given.get("REF NODE", ""))[0])
+    members = surface_nodes(here, draft, given.get("SURFACE", ""))
+    if block.keyword == "KINEMATIC":
+        held: set[int] = set()
+        for line in block.lines:
+            limits = [int(word) for word in line.rstrip(", ").split(",")]
+            held |= set(range(limits[0] - 1, limits[-1]))
+        _rigid_group(here, draft, leader, members, tuple(sorted(held)) or (0, 1, 2, 3, 4, 5))
+        return
+    name = given.get("CONSTRAINT NAME", f"coupling_{len(draft.couplings) + 1}")
+    draft.ledger.note("*DISTRIBUTING", "every node of the surface has the same weight", line=block.line_number)
+    group = draft.node_group(here, np.setdiff1d(members, [leader]), f"{name}_nodes")
+    draft.couplings.append(Coupling(name, draft.node_group(here, [leader]), ((group, 1.0),)))
+
+
+def _distributing_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
+    of_set = draft.points.pop(block.parameters.get("ELSET", "").upper(), None)
+    if of_set is None or len(of_set.rows) != 1:
+        draft.ledger.refuse("*DISTRIBUTING COUPLING", "expected one element DCOUP3D", line=block.line_number)
+        return
+    members = []
+    for line in block.lines:
+        word, weight = [part.strip() for part in line.rstrip(", ").split(",")][:2]
+        members.append((draft.node_group(here, draft.nodes_of(here, word), word), float(weight)))
+    name = f"coupling_{len(draft.couplings) + 1}"
+    draft.couplings.append(Coupling(name, draft.node_group(here, of_set.rows[0]), tuple(members)))
+
+
+def _mpcs(here: str, block: DeckBlock, draft: Draft) -> None:
+    for line in block.lines:
+        kind, *words = [word.strip() for word in line.rstrip(", ").split(",")]
+        if kind.upper() in ("BEAM", "TIE", "PIN") and len(words) >= 2:
+            leader = int(draft.nodes_of(here, words[1])[0])
+            components = (0, 1, 2) if kind.upper() == "PIN" else (0, 1, 2, 3, 4, 5)
+            _rigid_group(here, draft, leader, draft.nodes_of(here, words[0]), components)
+        else:
+            draft.ledger.refuse(f"*MPC, {kind.upper()}", "this constraint is not known here", line=block.line_number)
+
+
+def surface_nodes(here: str, draft: Draft, name: str) -> IntArray:
+    """Return the numbers of the nodes of a surface: of element faces or of nodes."""
+    block = draft.surfaces.get(name.upper())
+    if block is None:
+        return draft.nodes_of(here, name)
+    found = [np.zeros(0, np.int64)]
+    for line in block.lines:
+        word, _, face = (part.strip() for part in line.partition(","))
+        if block.parameters.get("TYPE", "ELEMENT").upper() == "NODE":
+            found.append(draft.nodes_of(here, word))
+        else:
+            elements = draft.elements_of(here, word)
+            label = face.upper().split(",")[0].strip()
+            if label in ("SPOS", "SNEG", "") or not label[1:].isdigit():
+                found.append(_nodes_of_elements(draft, elements))
+                continue
+            rows = faces_of(draft, elements, int(label[1:]))
+            corners = np.unique(np.concatenate([np.zeros(0, np.int64), *(r.ravel() for r in rows.values())]))
+            found.append(_with_middles(draft, elements, draft.mesh.node_numbers[corners]))
+    return np.unique(np.concatenate(found))
+
+
+def _with_middles(draft: Draft, elements: IntArray, corners: IntArray) -> IntArray:
+    """Return the corner nodes of faces with the middle nodes of edges between two of them."""
+    from fe_models.meshes.cell_shapes import CELL_SHAPES
+
+    found = [corners]
+    for _, kind, table in draft.mesh.elements:
+        if kind in CELL_SHAPES and CELL_SHAPES[kind].middles:
+            cells = table[np.isin(table[:, 0], elements), 1:]
+            n = len(CELL_SHAPES[kind].corners)
+            for k, parents in enumerate(CELL_SHAPES[kind].middles):
+                both = np.isin(cells[:, list(parents)], corners).all(axis=1)
+                found.append(cells[both, n + k])
+    return np.unique(np.concatenate(found))
+
+
+def _nodes_of_elements(draft: Draft, elements: IntArray) -> IntArray:
+    parts = [table[np.isin(table[:, 0], elements), 1:].ravel() for _, _, table in draft.mesh.elements]
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *parts]))

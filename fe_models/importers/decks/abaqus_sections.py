@@ -1,0 +1,207 @@
+"""Materials and sections of Abaqus and CalculiX, masses and springs."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import IntArray
+from fe_models.importers.abaqus_deck import DeckBlock
+from fe_models.importers.decks.abaqus_elements import PLANE, SOLID_RULES
+from fe_models.importers.decks.deck import DeckMass, DeckMaterial, DeckSpring, LineSection, ShellSection, SolidSection
+from fe_models.importers.decks.draft import Draft
+
+__all__ = ["read_material", "read_section"]
+
+_SHELLS = ("triangle", "triangle6", "quad", "quad8", "quad9")
+_LINES = ("line", "line3")
+
+
+def numbers(line: str) -> list[float]:
+    """Return the numbers of a data line; fields left empty are zero."""
+    return [float(word.strip().upper().replace("D", "E") or 0) for word in line.rstrip(", ").split(",")]
+
+
+def read_material(here: str, block: DeckBlock, draft: Draft) -> None:
+    """Take the elastic constants and the density; count the rest."""
+    name = draft.material
+    if block.keyword == "MATERIAL":
+        draft.materials[name] = DeckMaterial(name)
+    elif block.keyword == "ELASTIC" and name in draft.materials:
+        kind = block.parameters.get("TYPE", "ISO").upper()
+        if not kind.startswith("ISO"):
+            draft.ledger.refuse(f"*ELASTIC, TYPE={kind}", "only isotropic materials", line=block.line_number)
+            return
+        if len(block.lines) > 1:
+            draft.ledger.note("*ELASTIC", "of several temperatures the first line is taken", line=block.line_number)
+        young, poisson = numbers(block.lines[0])[:2]
+        draft.materials[name] = replace(draft.materials[name], young=young, poisson=poisson)
+    elif block.keyword == "DENSITY" and name in draft.materials:
+        draft.materials[name] = replace(draft.materials[name], density=numbers(block.lines[0])[0])
+    elif block.keyword == "DAMPING":
+        draft.ledger.note("*DAMPING", "say it in the table [damping] of the job", line=block.line_number)
+    else:
+        draft.ledger.note(f"*{block.keyword}", "heat is not part of the body", line=block.line_number)
+
+
+def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
+    """Take one block that gives elements or nodes their properties."""
+    makers = {
+        "SOLID SECTION": _solid_section,
+        "SHELL SECTION": _shell_section,
+        "BEAM SECTION": _beam_section,
+        "MASS": _masses,
+        "SPRING": _springs,
+        "DASHPOT": _dashpots,
+    }
+    if block.keyword in makers:
+        makers[block.keyword](here, block, draft)
+    elif block.keyword == "TRANSFORM":
+        draft.transformed |= set(draft.nodes_of(here, block.parameters.get("NSET", "")).tolist())
+    elif block.keyword == "ORIENTATION":
+        draft.ledger.note("*ORIENTATION", "axes of materials; isotropic ones need none", line=block.line_number)
+    elif block.keyword == "NORMAL":
+        draft.ledger.note("*NORMAL", "normals follow from the mesh", line=block.line_number)
+    else:
+        draft.ledger.refuse(f"*{block.keyword}", "not known here", line=block.line_number)
+        if "ELSET" in block.parameters:  # told once
+            draft.sectioned.append(draft.elements_of(here, block.parameters["ELSET"]))
+
+
+def _of_set(here: str, block: DeckBlock, draft: Draft) -> tuple[str, dict[tuple[str, str], IntArray]]:
+    """Return the spelling of the element set of a section, and its elements by type."""
+    word = block.parameters.get("ELSET", "")
+    elements = draft.elements_of(here, word)
+    draft.sectioned.append(elements)
+    key = word.strip().upper() if word.strip().upper() in draft.mesh.element_sets else word.rpartition(".")[2].upper()
+    return draft.mesh.spelling.get(f"ELSET {key}", word), draft.types_of(elements)
+
+
+def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
+    name, types = _of_set(here, block, draft)
+    material = _material_of(block, draft)
+    rules: dict[tuple[str, str], list[IntArray]] = {}
+    for (kind_name, kind), elements in types.items():
+        rule = SOLID_RULES[draft.program].get(kind_name)
+        if rule is None:
+            why = "no solid, shell or beam in space" if kind_name.startswith(PLANE) else "this element is not known here"
+            draft.ledger.refuse(kind_name, why, count=len(elements), line=block.line_number)
+            continue
+        if rule[2]:
+            draft.ledger.note(kind_name, rule[2], count=len(elements), line=block.line_number)
+        rules.setdefault(_common_rule(kind, rule), []).append(elements)
+    for (integration, mass), parts in rules.items():
+        own = name if len(rules) == 1 else f"{name}_{integration}_{mass}"
+        draft.solids.append(SolidSection(draft.cell_group(own, np.concatenate(parts)), material, integration, mass))
+
+
+def _common_rule(kind: str, rule: tuple[str, str, str]) -> tuple[str, str]:
+    return rule[0], rule[1]
+
+
+def _shell_section(here: str, block: DeckBlock, draft: Draft) -> None:
+    name, types = _of_set(here, block, draft)
+    n = sum(len(elements) for elements in types.values())
+    if "COMPOSITE" in block.parameters or "NODAL THICKNESS" in block.parameters:
+        what = "COMPOSITE" if "COMPOSITE" in block.parameters else "NODAL THICKNESS"
+        draft.ledger.refuse(f"*SHELL SECTION, {what}", "only shells of one thickness and material", count=n)
+        return
+    kept = _known(draft, types, _SHELLS, "S", block)
+    thickness = numbers(block.lines[0])[0]
+    offset = block.parameters.get("OFFSET", "0").upper()
+    share = {"SPOS": 0.5, "SNEG": -0.5}.get(offset)
+    share = float(offset) if share is None else share
+    if kept.size:
+        # the reference surface lies share x thickness from the middle one, along the normal
+        draft.shells.append(
+            ShellSection(draft.cell_group(name, kept), _material_of(block, draft), thickness, -share * thickness + 0.0)
+        )
+
+
+def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
+    name, types = _of_set(here, block, draft)
+    kept = _known(draft, types, _LINES, "B", block)
+    kind = block.parameters.get("SECTION", "").upper()
+    size = numbers(block.lines[0])
+    shapes = {
+        "RECT": lambda: {"shape": "rectangle", "width": size[0], "height": size[1]},
+        "CIRC": lambda: {"shape": "circle", "radius": size[0]},
+        "PIPE": lambda: {"shape": "tube", "radius": size[0], "thickness": size[1]},
+        "BOX": lambda: {"shape": "box", "width": size[0], "height": size[1], "web": size[2], "flange": size[3]},
+    }
+    is_even = kind != "BOX" or (size[2] == size[4] and size[3] == size[5])
+    is_round = kind != "CIRC" or draft.program == "abaqus" or len(size) < 2 or size[1] in (0.0, size[0])
+    offsets = [float(block.parameters.get(key, 0)) for key in ("OFFSET1", "OFFSET2")]
+    if kind not in shapes or not is_even or not is_round:
+        draft.ledger.refuse(f"*BEAM SECTION, SECTION={kind}", "this shape is not known here", count=len(kept))
+        return
+    n1 = numbers(block.lines[1])[:3] if len(block.lines) > 1 else [0.0, 0.0, -1.0]
+    shape = shapes[kind]()
+    scale = (shape["width"], shape["height"]) if "width" in shape else (2 * size[0],) * 2
+    offset = (offsets[0] * float(scale[0]), offsets[1] * float(scale[1]))
+    if kept.size:
+        group = draft.cell_group(name, kept)
+        draft.lines.append(LineSection(group, _material_of(block, draft), shape, (n1[0], n1[1], n1[2]), offset))
+
+
+def _known(
+    draft: Draft, types: dict[tuple[str, str], IntArray], kinds: tuple[str, ...], first: str, block: DeckBlock
+) -> IntArray:
+    """Return the numbers of elements of these kinds; count the others."""
+    kept = [np.zeros(0, np.int64)]
+    for (name, kind), elements in types.items():
+        if kind in kinds and name.startswith(first):
+            kept.append(elements)
+        else:
+            draft.ledger.refuse(name, f"not an element of *{block.keyword}", count=len(elements))
+    return np.concatenate(kept)
+
+
+def _material_of(block: DeckBlock, draft: Draft) -> str:
+    """Return the name of the material of a section as its own table spells it."""
+    wanted = block.parameters.get("MATERIAL", "")
+    return next((name for name in draft.materials if name.upper() == wanted.upper()), wanted)
+
+
+def _masses(here: str, block: DeckBlock, draft: Draft) -> None:
+    of_set = draft.points.pop(block.parameters.get("ELSET", "").upper(), None)
+    if of_set is not None:
+        mass = numbers(block.lines[0])[0]
+        for row in of_set.rows:
+            draft.masses.append(DeckMass(draft.node_group(here, row), mass))
+
+
+def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
+    of_set = draft.points.pop(block.parameters.get("ELSET", "").upper(), None)
+    if of_set is None:
+        return
+    n = len(of_set.rows)
+    if "NONLINEAR" in block.parameters:
+        draft.ledger.refuse("*SPRING, NONLINEAR", "springs here are linear", count=n, line=block.line_number)
+        return
+    if of_set.kind == "SPRINGA":
+        k = numbers(block.lines[-1])[0]
+        for row in of_set.rows:
+            draft.springs.append(_axial(here, draft, row, k))
+    else:
+        why = "a spring to the ground" if of_set.kind == "SPRING1" else "a spring between single components"
+        draft.ledger.refuse(of_set.kind, f"{why}; put it between bodies in the system file", count=n)
+
+
+def _axial(here: str, draft: Draft, row: tuple[int, ...], k: float) -> DeckSpring:
+    """Return a spring along the line of its nodes."""
+    ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
+    x = ends[1] - ends[0]
+    x = x / np.linalg.norm(x)
+    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
+    y = y / np.linalg.norm(y)
+    rows = (x, y, np.cross(x, y))
+    triad = tuple((float(axis[0]), float(axis[1]), float(axis[2])) for axis in rows)
+    names = tuple(draft.node_group(here, [number]) for number in row)
+    return DeckSpring((names[0], names[1]), (k, 0.0, 0.0, 0.0, 0.0, 0.0), triad=(triad[0], triad[1], triad[2]))
+
+
+def _dashpots(here: str, block: DeckBlock, draft: Draft) -> None:
+    of_set = draft.points.pop(block.parameters.get("ELSET", "").upper(), None)
+    if of_set is not None:
+        why = "dampers stand in the system file, or in [damping]"
+        draft.ledger.note(of_set.kind, why, count=len(of_set.rows), line=block.line_number)

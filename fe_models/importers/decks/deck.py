@@ -1,0 +1,162 @@
+"""What a deck says, whatever its program: mesh, materials, sections, attachments, couplings, supports, loads, ledger.
+
+Nodes are named by groups of the mesh (`RawMesh.node_sets`): readers add the groups that a deck leaves unnamed, such as
+`node_17` or `rbe2_5`, so that a job can name whatever the deck names by number.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fe_models.importers.decks.ledger import Ledger
+from fe_models.importers.raw_mesh import RawMesh
+
+__all__ = [
+    "Coupling",
+    "Deck",
+    "DeckMaterial",
+    "DeckMass",
+    "DeckSpring",
+    "Equation",
+    "LineSection",
+    "Load",
+    "RigidGroup",
+    "ShellSection",
+    "SolidSection",
+    "Support",
+]
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class DeckMaterial:
+    """An isotropic linear material; what the deck does not say is None."""
+
+    name: str
+    young: float | None = None
+    poisson: float | None = None
+    density: float | None = None
+
+
+@dataclass(frozen=True)
+class SolidSection:
+    """Solid cells of one material and one formulation."""
+
+    group: str  #: of cells
+    material: str
+    integration: str = "full"  #: one of `fe_models.solids.elements.INTEGRATIONS`, or "incompatible"
+    mass: str = "consistent"
+
+
+@dataclass(frozen=True)
+class ShellSection:
+    """Shell cells of one thickness."""
+
+    group: str
+    material: str
+    thickness: float
+    offset: float = 0.0  #: of the middle surface from the nodes, along the normal
+    added_mass: float = 0.0  #: mass per area without stiffness
+
+
+@dataclass(frozen=True)
+class LineSection:
+    """Lines of one cross-section."""
+
+    group: str
+    material: str
+    shape: Mapping[str, object]  #: keys of a table [sections.NAME] of a job: shape and its dimensions
+    orientation: Vector | None = None  #: towards the local y axis; None: each line has its own in the mesh, or none
+    offset: tuple[float, float] = (0.0, 0.0)
+    shear: bool = True
+    rotary_inertia: bool = True
+    added_mass: float = 0.0  #: per length
+
+
+@dataclass(frozen=True)
+class DeckMass:
+    """A rigid piece on each node of a group."""
+
+    nodes: str
+    mass: float
+    inertia: tuple[tuple[float, float, float], ...] = ((0.0,) * 3,) * 3  #: about its centre of mass, basic axes
+    offset: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class DeckSpring:
+    """A spring between two nodes, each named by a group of one."""
+
+    nodes: tuple[str, str]
+    stiffness: tuple[float, ...]  #: along and about x, y, z of the triad
+    damping: tuple[float, ...] | None = None
+    triad: tuple[Vector, Vector, Vector] | None = None  #: rows: its axes in basic axes; None: basic axes
+
+
+@dataclass(frozen=True)
+class RigidGroup:
+    """Nodes that move rigidly with one node (RBE2, *RIGID BODY, *KINEMATIC COUPLING, *MPC BEAM)."""
+
+    name: str
+    node: str  #: group of the node that leads
+    followers: str
+    components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A node that follows the weighted mean motion of others (RBE3, *DISTRIBUTING COUPLING)."""
+
+    name: str
+    node: str
+    members: tuple[tuple[str, float], ...]  #: groups of nodes, and the weight of each of their nodes
+    components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  #: of the node that follow
+
+
+@dataclass(frozen=True)
+class Equation:
+    """Σ coefficient × component of a node = 0; the first term gives way (*EQUATION, MPC)."""
+
+    terms: tuple[tuple[str, int, float], ...]  #: group of one node, component 0-5, coefficient
+
+
+@dataclass(frozen=True)
+class Support:
+    """Components that the deck holds at the nodes of a group."""
+
+    name: str
+    nodes: str
+    components: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Load:
+    """One load: forces at nodes, a pressure on faces, or gravity; each has the keys of its kind and no others."""
+
+    name: str
+    forces: Mapping[str, tuple[float, ...]] | None = None  #: group -> force and moment at each of its nodes, (6,)
+    faces: str | None = None
+    pressure: float | None = None
+    acceleration: Vector | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Deck:
+    """A whole deck, and the ledger of what is not in it."""
+
+    path: Path
+    program: str
+    mesh: RawMesh
+    ledger: Ledger
+    materials: Mapping[str, DeckMaterial] = field(default_factory=dict)
+    solids: tuple[SolidSection, ...] = ()
+    shells: tuple[ShellSection, ...] = ()
+    lines: tuple[LineSection, ...] = ()
+    masses: tuple[DeckMass, ...] = ()
+    springs: tuple[DeckSpring, ...] = ()
+    rigid: tuple[RigidGroup, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    equations: tuple[Equation, ...] = ()
+    supports: tuple[Support, ...] = ()
+    loads: tuple[Load, ...] = ()

@@ -1,0 +1,157 @@
+"""A deck of Abaqus or CalculiX while it is read: what its blocks have said so far."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.words import nearest, quoted
+from fe_models.importers.abaqus import DeckMesh
+from fe_models.importers.abaqus_deck import DeckBlock
+from fe_models.importers.decks.deck import (
+    Coupling,
+    DeckMass,
+    DeckMaterial,
+    DeckSpring,
+    Equation,
+    LineSection,
+    Load,
+    RigidGroup,
+    ShellSection,
+    SolidSection,
+    Support,
+)
+from fe_models.importers.decks.ledger import Ledger
+from fe_models.importers.raw_mesh import RawBlock
+
+__all__ = ["Draft", "PointElements"]
+
+COMPONENTS = "123456"
+
+
+@dataclass
+class PointElements:
+    """Elements of points: masses, springs, dashpots."""
+
+    kind: str
+    rows: list[tuple[int, ...]] = field(default_factory=list)  #: numbers of their nodes
+
+
+@dataclass
+class Draft:
+    """What the blocks of a deck have said so far."""
+
+    where: str
+    program: str
+    mesh: DeckMesh
+    ledger: Ledger
+    material: str = ""  #: whose properties are being read
+    materials: dict[str, DeckMaterial] = field(default_factory=dict)
+    solids: list[SolidSection] = field(default_factory=list)
+    shells: list[ShellSection] = field(default_factory=list)
+    lines: list[LineSection] = field(default_factory=list)
+    masses: list[DeckMass] = field(default_factory=list)
+    springs: list[DeckSpring] = field(default_factory=list)
+    rigid: list[RigidGroup] = field(default_factory=list)
+    couplings: list[Coupling] = field(default_factory=list)
+    equations: list[Equation] = field(default_factory=list)
+    loads: list[Load] = field(default_factory=list)
+    points: dict[str, PointElements] = field(default_factory=dict)  #: by set in upper case
+    surfaces: dict[str, DeckBlock] = field(default_factory=dict)  #: by name in upper case
+    pending: dict[str, str] = field(default_factory=dict)  #: parameters of a *COUPLING whose kind comes below
+    transformed: set[int] = field(default_factory=set)  #: numbers of nodes with axes of their own
+    node_groups: dict[str, IntArray] = field(default_factory=dict)  #: groups added here, rows
+    cell_groups: dict[str, IntArray] = field(default_factory=dict)  #: groups added here, element numbers
+    face_blocks: list[RawBlock] = field(default_factory=list)
+    held: dict[int, dict[str, set[int]]] = field(default_factory=dict)  #: node number -> set name -> components
+    sectioned: list[IntArray] = field(default_factory=list)  #: numbers of elements that have a section
+
+    # --- names of nodes ------------------------------------------------------------------------------------------
+
+    def nodes_of(self, here: str, word: str) -> IntArray:
+        """Return the numbers of the nodes of a node number or of a set (of nodes, or of the nodes of elements)."""
+        word = word.strip().strip('"')
+        if word.lstrip("+").isdigit():
+            return np.array([int(word)], dtype=np.int64)
+        key = word.rpartition(".")[2].upper() if word.upper() not in self.mesh.node_sets else word.upper()
+        if key not in self.mesh.node_sets:
+            raise MeshError(f"{here}: unknown node set {quoted(word)}{nearest(word, self.mesh.node_sets)}")
+        return self.mesh.node_sets[key]
+
+    def elements_of(self, here: str, word: str) -> IntArray:
+        """Return the numbers of the elements of an element number or set."""
+        word = word.strip().strip('"')
+        if word.lstrip("+").isdigit():
+            return np.array([int(word)], dtype=np.int64)
+        key = word.rpartition(".")[2].upper() if word.upper() not in self.mesh.element_sets else word.upper()
+        if key not in self.mesh.element_sets:
+            raise MeshError(f"{here}: unknown element set {quoted(word)}{nearest(word, self.mesh.element_sets)}")
+        return self.mesh.element_sets[key]
+
+    def node_group(self, here: str, numbers: Iterable[int], name: str = "") -> str:
+        """Return the name of a group of these nodes: a set of the deck that is the same, or one made here."""
+        wanted = np.unique(np.asarray(list(numbers), dtype=np.int64))
+        if name and name.upper() in self.mesh.node_sets and np.array_equal(self.mesh.node_sets[name.upper()], wanted):
+            return self.mesh.spelling[f"NSET {name.upper()}"]
+        rows = self.mesh.rows_of(wanted)
+        if (rows < 0).any():
+            raise MeshError(f"{here}: names node {wanted[rows < 0][0]}, which is not in the deck")
+        made = f"node_{wanted[0]}" if len(wanted) == 1 else name or f"nodes_{wanted[0]}_and_{len(wanted) - 1}_more"
+        taken = {spelt for key, spelt in self.mesh.spelling.items() if key.startswith("NSET ")}
+        while made in taken or (made in self.node_groups and not np.array_equal(self.node_groups[made], rows)):
+            made += "_"
+        self.node_groups[made] = rows
+        return made
+
+    def types_of(self, elements: IntArray) -> dict[tuple[str, str], IntArray]:
+        """Return (type in the deck, kind) -> numbers of these elements."""
+        found: dict[tuple[str, str], IntArray] = {}
+        for name, kind, table in self.mesh.elements:
+            mine = table[np.isin(table[:, 0], elements), 0]
+            if mine.size:
+                found[name, kind] = np.concatenate([found.get((name, kind), np.zeros(0, np.int64)), mine])
+        return found
+
+    def cell_group(self, name: str, elements: IntArray) -> str:
+        """Return the name of a group of these cells: the set of that name if it is the same, or one made here."""
+        key = name.upper()
+        if key in self.mesh.element_sets and np.array_equal(self.mesh.element_sets[key], np.unique(elements)):
+            return self.mesh.spelling[f"ELSET {key}"]
+        made = name
+        taken = {spelt for key, spelt in self.mesh.spelling.items() if key.startswith("ELSET ")}
+        while made in taken or made in self.cell_groups:
+            made += "_"
+        self.cell_groups[made] = elements
+        return made
+
+    # --- at the end ----------------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Count elements without a section, materials without numbers, and couplings left open."""
+        with_section = np.concatenate(self.sectioned) if self.sectioned else np.zeros(0, np.int64)
+        counts: dict[str, int] = {}
+        for name, _, table in self.mesh.elements:
+            n = int((~np.isin(table[:, 0], with_section)).sum())
+            if n:
+                counts[name] = counts.get(name, 0) + n
+        for name, n in counts.items():
+            self.ledger.refuse(name, "elements without a section: neither material nor thickness is known", count=n)
+        if self.pending:
+            self.ledger.refuse("*COUPLING", "neither *KINEMATIC nor *DISTRIBUTING stands below it")
+
+    def supports_of_groups(self) -> list[Support]:
+        """Return the supports: nodes held in the same components under the same names together."""
+        found: dict[tuple[tuple[str, ...], tuple[int, ...]], list[int]] = {}
+        for node, by_name in self.held.items():
+            components = tuple(sorted(set().union(*by_name.values())))
+            found.setdefault((tuple(sorted(by_name)), components), []).append(node)
+        supports = []
+        for (names, components), nodes in found.items():
+            letters = "".join(COMPONENTS[c] for c in components)
+            name = names[0] if names != ("",) and names[0] else f"support_{letters}"
+            group = self.node_group(self.where, nodes, name)
+            label = group if group not in {s.name for s in supports} else f"{group}_{letters}"
+            supports.append(Support(label, group, components))
+        return supports

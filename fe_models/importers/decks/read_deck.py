@@ -1,0 +1,59 @@
+"""One door for whole decks: the program by the suffix, one error for everything that can be wrong with a file."""
+
+from collections.abc import Callable
+from hashlib import sha256
+from pathlib import Path
+
+from fe_models.errors import FeModelsError, MeshError
+from fe_models.foundation.paths import near_file
+from fe_models.foundation.words import nearest, quoted
+from fe_models.importers.decks.abaqus import read_abaqus_deck
+from fe_models.importers.decks.deck import Deck
+
+__all__ = ["DECK_FORMATS", "read_deck"]
+
+DECK_FORMATS: dict[str, Callable[..., Deck]] = {
+    ".inp": read_abaqus_deck,
+}  #: suffix -> reader (path, content, program)
+
+
+def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
+    """Read a whole deck: mesh, materials, sections, attachments, couplings, supports, loads, and the ledger of the rest.
+
+    Parameters
+    ----------
+    path
+        The file; its suffix names the program (`DECK_FORMATS`).
+    program
+        "calculix" (the default) or "abaqus" for decks (.inp) that both read, but integrate differently.
+
+    Raises
+    ------
+    MeshError
+        If the file is missing, of another kind, or damaged. What it holds and is not taken over is in the ledger.
+    """
+    path = Path(path)
+    where = f"deck {path}"
+    suffix = path.suffix.lower()
+    if suffix not in DECK_FORMATS:
+        raise MeshError(f"{where}: unknown suffix {quoted(suffix)}{nearest(suffix, DECK_FORMATS)}")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"{where}: cannot be read: {error.strerror or error}{near_file(path)}") from error
+    reader = DECK_FORMATS[suffix]
+    try:
+        return reader(path, data) if program is None else reader(path, data, program=program)
+    except FeModelsError:
+        raise
+    except Exception as error:  # whatever a damaged file does to a reader, the user gets one message
+        text = str(error).strip().splitlines()
+        raise MeshError(
+            f"{where}: could not be read: it is damaged or of another kind "
+            f"({type(error).__name__}{': ' + text[0][:200] if text else ''})"
+        ) from error
+
+
+def digest_of(path: Path) -> str:
+    """Return the sha256 of a file."""
+    return sha256(path.read_bytes()).hexdigest()
