@@ -16,7 +16,7 @@ from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 
-__all__ = ["WeldedModel", "weld"]
+__all__ = ["WeldedModel", "WeldedPoints", "mesh_rows", "weld"]
 
 Place = tuple[str, str]  #: name of a body, name of its interface
 

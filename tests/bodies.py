@@ -33,7 +33,9 @@ def box_mesh(nx=2, ny=2, nz=2, lx=1.0, ly=1.0, lz=1.0, kind="hexahedron") -> Mes
             tet = np.vstack([[0, 0, 0], steps])
             parts.append(tet if np.linalg.det(tet[1:]) > 0 else tet[[0, 2, 1, 3]])
     reference = CELL_SHAPES[kind].nodes
-    low_order = {"tetra10": "tetra", "hexahedron20": "hexahedron", "hexahedron27": "hexahedron", "wedge15": "wedge"}.get(kind, kind)
+    low_order = {
+        "tetra10": "tetra", "hexahedron20": "hexahedron", "hexahedron27": "hexahedron", "wedge15": "wedge"
+    }.get(kind, kind)  # fmt: skip
     to_nodes = shape_values(low_order, reference)[0]
     inside = np.rint(2 * np.array([to_nodes @ part for part in parts])).astype(int)  # on the half-step lattice
     bricks = np.array(list(itertools.product(range(nx), range(ny), range(nz))))

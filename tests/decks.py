@@ -47,7 +47,8 @@ def write_deck(path: Path, mesh: Mesh) -> Path:
         for row, cell in enumerate(cells):
             number += 1
             numbers[kind, row] = number
-            lines.append(", ".join(str(n) for n in [number, *(cell + 1)]))
+            words = [str(n) for n in [number, *(cell + 1)]]
+            lines += [", ".join(words[k : k + 10]) + "," * (k + 10 < len(words)) for k in range(0, len(words), 10)]
     for name, by_type in mesh.cell_sets.items():
         lines += [f'*ELSET, ELSET="{name}"']
         lines += [str(numbers[kind, row]) for kind, rows in by_type.items() for row in rows.tolist()]

@@ -20,6 +20,39 @@ app.command("info")(info_command)
 app.command("view")(view_command)
 
 
+@app.command("job")
+@guarded
+def job_command(
+    deck: Annotated[Path, typer.Argument(help="Deck of a finite element program: Abaqus, CalculiX (.inp).")],
+    units: Annotated[
+        str | None, typer.Option(help="Unit system of its numbers, such as mm-t-s; decks do not say it.")
+    ] = None,
+    program: Annotated[
+        str | None, typer.Option(help="Whose elements a deck (.inp) has: calculix (default) or abaqus.")
+    ] = None,
+    density: Annotated[
+        list[str] | None, typer.Option(help="Density of materials without one: NAME=NUMBER, or a number; repeatable.")
+    ] = None,
+    leave_out: Annotated[
+        list[str] | None,
+        typer.Option(help="Cards that carry mass or stiffness and are to be left out, by name; repeatable."),
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Job file to write.")] = None,
+) -> None:
+    """Write the complete job of a deck: materials, sections, masses, springs, couplings, supports, loads.
+
+    Prints every card that is not taken over, with its consequence; a mass or coupling is never dropped unasked.
+    Without -o the job stands beside the deck: rod.inp gives rod.toml.
+
+    Example: cms job rod.inp --units mm-t-s -o rod.toml
+
+    Example: cms job rod.inp --units mm-t-s --density steel=7.85e-9 --leave-out "CONTACT PAIR"
+    """
+    from cms.cli.job import DeckRequest, write_job
+
+    write_job(DeckRequest(deck, output, units, program, tuple(density or ()), tuple(leave_out or ())))
+
+
 @app.command("frame")
 @guarded
 def frame_command(

@@ -5,8 +5,9 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
+from fe_models.foundation.components import MOTION_COMPONENTS as COMPONENTS
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
-from fe_models.foundation.words import nearest
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["PLANES", "SHAPE_KEYS", "BeamSection", "LinkSection", "MassSection", "SpringSection", "TieSection"]
 
@@ -43,6 +44,15 @@ def names(value: Any) -> Any:
     if not isinstance(words, list | tuple) or not words or not all(isinstance(w, str) and w for w in words):
         raise ValueError('expected the name of a group, or a list of names: "a" or ["a", "b"]')
     return tuple(words)
+
+
+def component_numbers(value: Any) -> tuple[int, ...]:
+    """Return names of components as numbers 0-5."""
+    words = names(value)
+    for word in words:
+        if word not in COMPONENTS:
+            raise ValueError(f"unknown component {quoted(word)}{nearest(word, COMPONENTS)}")
+    return tuple(COMPONENTS.index(word) for word in words)
 
 
 def polygon(value: Any) -> tuple[Pair, ...]:
@@ -150,6 +160,9 @@ class LinkSection(Table):
     node: Name = Field(description="the name of a group that holds one node, which leads")
     followers: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
         description="the name of a group of nodes, or a list of names"
+    )
+    components: Annotated[tuple[int, ...], BeforeValidator(component_numbers)] = Field(
+        tuple(range(6)), description="with a deck: components that follow, ux to rz; default: all"
     )
 
 

@@ -43,6 +43,10 @@ def coupled_body(job: Job, body: FEBody) -> FEBody:
 
 def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
     """Run a job up to the body whose interfaces are still to be coupled."""
+    if job.body.deck is not None:
+        from cms.jobs.deck_body import body_of_deck
+
+        return body_of_deck(job, job.body.deck, stages, on_report)
     if job.shells:
         from cms.jobs.shell_body import body_of_shell
 

@@ -16,9 +16,11 @@ from cms.jobs.beam_tables import (
     TieSection,
     check_beams,
     names,
+    numbers,
 )
 from cms.jobs.damping_table import DampingSection
 from cms.jobs.mesh_size_table import MeshSizeSection, check_mesh_size
+from cms.jobs.deck_tables import CouplingSection, EquationSection, SolidSection, check_deck
 from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
 from fe_models.body.fe_body import INTERFACE_KINDS
@@ -42,7 +44,7 @@ ACCEPTABLE = (
 KEYS_OF_LOADS = {
     "pressure": ("pressure",),
     "gravity": ("acceleration",),
-    "force": ("force", "torque", "at", "reference"),
+    "force": ("force", "torque", "at", "reference", "each"),
 }  #: keys of a load case by its kind, beside the selections of pressure and force
 
 Name = Annotated[str, StringConstraints(min_length=1)]
@@ -130,6 +132,7 @@ class BodySection(Table):
     remove_supports: bool = Field(
         False, description="true or false, for matrices: whether supports whose rows exist are taken out of K"
     )
+    deck: Path | None = Field(None, description="the path of a whole deck, as cms job writes it")
     nodes: Path | None = Field(None, description="the path of a table of nodes, for beams")
     lines: Path | None = Field(None, description="the path of a table of lines, for beams")
     plane: choice("plane", lambda: tuple(PLANES)) | None = Field(  # type: ignore[valid-type]
@@ -148,7 +151,7 @@ class BodySection(Table):
     incompatible_modes: bool = Field(False, description="true or false: bricks of eight nodes bend by internal modes")
     accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
 
-    @field_validator("mesh", "geometry", "nodes", "lines", mode="before")
+    @field_validator("mesh", "deck", "geometry", "nodes", "lines", mode="before")
     @classmethod
     def _beside_the_job(cls, value: Any, info: ValidationInfo) -> Path:
         return beside_the_job(value, info)
@@ -184,7 +187,7 @@ class BodySection(Table):
                 raise ValueError(f"{key}: belongs to matrices of other programs, not to .npz with nodes and dofs")
         if self.part is not None and self.matrices is not None:
             raise ValueError("part: matrices cannot be cut; remove it, or give the mesh")
-        given = [key for key in ("mesh", "matrices", "lines") if getattr(self, key) is not None]
+        given = [key for key in ("mesh", "deck", "matrices", "lines") if getattr(self, key) is not None]
         if len(given) != 1:
             got = "both" if given == ["mesh", "matrices"] else " and ".join(given) or "neither"
             raise ValueError(
@@ -275,6 +278,9 @@ class LoadCaseSection(Table):
     force: Vector3 | None = Field(None, description="the total force, [x, y, z]")
     torque: Vector3 | None = Field(None, description="the total torque about the reference point, [x, y, z]")
     at: Name | None = Field(None, description="the name of an interface, at whose reference point it acts")
+    each: dict[str, numbers(6)] | None = Field(  # type: ignore[valid-type]
+        None, description="with a deck: a table {group = [force and moment at each of its nodes]}"
+    )
     reference: Vector3 | None = Field(None, description="the point the force acts at, [x, y, z]")
     faces: Names | None = Field(None, description=FACES)
     nodes: Nodes | None = Field(None, description="the name of a group of nodes, or a list of node numbers")
@@ -295,6 +301,10 @@ class LoadCaseSection(Table):
         for key in given:
             if key not in allowed:
                 raise ValueError(f"a load case of kind {self.kind!r} has no key {key}{nearest(key, allowed)}")
+        if self.each is not None:
+            if given != ["each"]:
+                raise ValueError("each: says place and amount; remove the other keys")
+            return self
         places = [key for key in given if key in (*SELECTIONS, "at")]
         if self.kind != "gravity" and len(places) != 1:
             choices = ", ".join(("at", *SELECTIONS) if self.kind == "force" else SELECTIONS)
@@ -319,6 +329,9 @@ class Job(Table):
     springs: dict[str, SpringSection] = Field({}, description="tables [springs.NAME]")
     links: dict[str, LinkSection] = Field({}, description="tables [links.NAME]")
     ties: dict[str, TieSection] = Field({}, description="tables [ties.NAME] of beams to a solid")
+    solids: dict[str, SolidSection] = Field({}, description="tables [solids.NAME] of a deck")
+    couplings: dict[str, CouplingSection] = Field({}, description="tables [couplings.NAME] of a deck")
+    equations: dict[str, EquationSection] = Field({}, description="tables [equations.NAME] of a deck")
     interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")
     load_cases: dict[str, LoadCaseSection] = Field({}, description="tables [load_cases.NAME]")
     reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
@@ -343,6 +356,9 @@ class Job(Table):
         if not self.body.matrices and not self.materials:
             raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
         check_mesh_size(self.mesh_size, self.body.mesh, has_others=bool(self.shells or self.sections))
+        check_deck(self)
+        if self.body.deck:
+            return self._names_of_interfaces()
         attached = {"masses": self.masses, "springs": self.springs, "links": self.links, "ties": self.ties}
         if self.shells:
             check_shells(self.shells, self.sections, self.body, self.materials)
@@ -381,6 +397,9 @@ class Job(Table):
                     f'materials.{everywhere[0]}: cells = "all", but there are {len(of_cells)} materials; '
                     "name the group of cells of each"
                 )
+        return self._names_of_interfaces()
+
+    def _names_of_interfaces(self) -> "Job":
         for where, name in named_interfaces(self.reduction).items():
             if not brings_interfaces and name not in self.interfaces:
                 raise ValueError(f"reduction.{where}: there is no such interface{nearest(name, self.interfaces)}")

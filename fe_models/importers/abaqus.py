@@ -32,7 +32,19 @@ _FACES = {
     "9": ("quad9", 9),
 }
 _FACE = re.compile(r"(?:STRI|S|DS|CPS|CPE|CPEG|M3D|SFM3D|R3D)(\d+)(?:R|RS|RSW|5|R5|H|I|T|RT)?$")
-_LINES = {"B31": 2, "B31R": 2, "B32": 3, "B32R": 3, "B33": 2, "T3D2": 2, "T3D3": 3, "T2D2": 2, "B21": 2, "B22": 3, "R2D2": 2}
+_LINES = {
+    "B31": 2,
+    "B31R": 2,
+    "B32": 3,
+    "B32R": 3,
+    "B33": 2,
+    "T3D2": 2,
+    "T3D3": 3,
+    "T2D2": 2,
+    "B21": 2,
+    "B22": 3,
+    "R2D2": 2,
+}
 _IGNORED = ("MASS", "ROTARYI", "SPRING", "DASHPOT", "CONN3D", "DCOUP3D", "GAPUNI", "JOINTC")
 
 
@@ -89,6 +101,7 @@ class _Content:
     coordinates: list[Array] = field(default_factory=list)
     elements: list[tuple[str, str, IntArray]] = field(default_factory=list)  #: type, kind, rows of number and nodes
     ignored: dict[str, int] = field(default_factory=dict)  #: element type -> how many
+    notes: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -145,7 +158,7 @@ def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:
     """
     node_sets, element_sets = _Sets(where, "NSET"), _Sets(where, "ELSET")
     content = _Content()
-    notes: list[str] = []
+    notes = content.notes
     for block in blocks:
         _take(f"{where}, {block.place}: *{block.keyword}", block, content, node_sets, element_sets)
     if not content.coordinates:
@@ -158,7 +171,12 @@ def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:
     groups = element_sets.resolve(lambda name: np.zeros(0, np.int64))
     if not content.ignored:
         for name, members in groups.items():
-            _require_known(where, f"ELSET {name!r}", "elements", members[~np.isin(members, known)])
+            missing = members[~np.isin(members, known)]
+            if missing.size:
+                notes.append(
+                    f"ELSET {name!r} names {missing.size} elements that are not in the deck, first {missing[0]}: left "
+                    "out of it"
+                )
 
     def nodes_of(name: str) -> IntArray:
         if name not in element_sets.spelling:
@@ -223,8 +241,11 @@ def _take(here: str, block: DeckBlock, content: _Content, node_sets: _Sets, elem
         kind, n_nodes = _element_type(name)
         if kind == "ignored":
             content.ignored[name] = content.ignored.get(name, 0) + len(block.lines)
+            first = [line.split(",")[0].strip() for line in block.lines]
+            numbers = np.array([int(word) for word in first if word.isdigit()], dtype=np.int64)
+            element_sets.add(block.parameters.get("ELSET"), numbers)
             return
-        table = _elements(here, block, kind, n_nodes)
+        table = _elements(here, block, kind, n_nodes, content.notes)
         if kind == "line3":  # the middle node stands between the ends, here as in meshio it comes last
             table = table[:, [0, 1, 3, 2]]
         content.elements.append((name, kind, table))
@@ -272,19 +293,30 @@ def _element_type(name: str) -> tuple[str, int]:
     return upper, 0
 
 
-def _elements(here: str, block: DeckBlock, kind: str, n_nodes: int) -> IntArray:
+def _elements(here: str, block: DeckBlock, kind: str, n_nodes: int, notes: list[str]) -> IntArray:
+    """Return rows of number and nodes; numbers that follow an element on its line are dropped, as CalculiX does."""
     if n_nodes == 0:  # unknown type: counted by its lines, and refused by name later
         return np.zeros((len(block.lines), 2), dtype=np.int64)
     try:
-        values = np.array(",".join(line.rstrip(", ") for line in block.lines).split(","), dtype=np.int64)
+        lines = [np.array(line.rstrip(", ").split(","), dtype=np.int64) for line in block.lines]
     except ValueError as error:
         raise MeshError(f"{here}: expected element and node numbers below; {error}") from error
-    if values.size % (n_nodes + 1):
+    rows, row, surplus = [], np.zeros(0, np.int64), 0
+    for numbers in lines:
+        row = np.concatenate([row, numbers]) if row.size else numbers
+        while row.size > n_nodes:
+            rows.append(row[: n_nodes + 1])
+            row = row[n_nodes + 1 :]
+            if 0 < row.size <= n_nodes:
+                surplus, row = surplus + 1, row[:0]
+    if row.size:
         raise MeshError(
             f"{here}: {kind} elements have {n_nodes} nodes: expected a multiple of {n_nodes + 1} numbers "
-            f"below, got {values.size}"
+            f"below, got {sum(len(numbers) for numbers in lines)}"
         )
-    return values.reshape(-1, n_nodes + 1)
+    if surplus:
+        notes.append(f"{surplus} {kind} elements have more numbers on their line than nodes: these were dropped")
+    return np.array(rows, dtype=np.int64).reshape(-1, n_nodes + 1)
 
 
 def _set_entries(here: str, block: DeckBlock) -> Iterator[_Entry]:
@@ -314,11 +346,6 @@ def _require_unique(where: str, what: str, numbers: IntArray) -> None:
             f"{where}: {(count > 1).sum()} {what} numbers are defined twice, first "
             f"{values[count > 1][0]}; keep one of each"
         )
-
-
-def _require_known(where: str, name: str, what: str, missing: IntArray) -> None:
-    if missing.size:
-        raise MeshError(f"{where}: {name} names {missing.size} {what} that are not in the deck, first {missing[0]}")
 
 
 def _rows(numbers: IntArray, order: IntArray, wanted: IntArray) -> IntArray:

@@ -180,9 +180,7 @@ def _block(head: _Line, lines: list[str]) -> DeckBlock:
 def _refuse(where: str, blocks: list[DeckBlock]) -> None:
     for block in blocks:
         if block.keyword in _REFUSED:
-            raise MeshError(
-                f"{where}, {block.place}: *{block.keyword} is not read: {_REFUSED[block.keyword]}"
-            )
+            raise MeshError(f"{where}, {block.place}: *{block.keyword} is not read: {_REFUSED[block.keyword]}")
         if block.keyword == "NODE" and block.parameters.get("SYSTEM", "R").upper() != "R":
             raise MeshError(
                 f"{where}, {block.place}: *NODE in a cylindrical or spherical system is not "

@@ -7,7 +7,25 @@ __all__ = ["FORMATS"]
 FORMATS = (
     FileFormat("MSH 2.2, 4.1", "Gmsh", "mesh", (".msh",), reads=True, tried="Gmsh 4.15"),
     FileFormat("VTK, VTU", "ParaView", "mesh", (".vtk", ".vtu"), reads=True, tried="meshio 5.3, pyvista"),
-    FileFormat("input deck", "Abaqus, CalculiX", "mesh", (".inp",), reads=True, lost="all but the mesh and its sets"),
+    FileFormat(
+        "input deck",
+        "Abaqus, CalculiX",
+        "mesh",
+        (".inp",),
+        reads=True,
+        tried="decks of ccx 2.20",
+        lost="all but the mesh and its sets",
+    ),
+    FileFormat(
+        "input deck",
+        "Abaqus, CalculiX",
+        "deck",
+        (".inp",),
+        reads=True,
+        key="cms job",
+        tried="decks of ccx 2.20",
+        lost="contact, nonlinear and anisotropic materials, layers, steps: each listed with its count",
+    ),
     FileFormat("bulk data", "Nastran", "mesh", (".bdf", ".nas", ".dat", ".fem"), reads=True, lost="all but the mesh"),
     FileFormat("MED", "Salome, code_aster", "mesh", (".med",), reads=True),
     FileFormat(

@@ -35,7 +35,7 @@ _TYPES = {
     "PY5": "pyramid",
     "P13": "pyramid13",
     "PE6": "wedge",
-    "P15": "wedge15",
+    "P15": "P15",  # no file has shown the order of its middle nodes
 }
 
 

@@ -1,7 +1,7 @@
 """What a file says, before it is judged: blocks of cells of any type with their groups; and the judgement."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from fe_models.importers.node_order import require_node_order
 from fe_models.meshes.boundary import first_of_equal_rows
 from fe_models.meshes.mesh import FACE_TYPES, SOLID_TYPES, Mesh
 
-__all__ = ["RawBlock", "RawMesh", "collect_cells", "mesh_from_raw", "require_nodes"]
+__all__ = ["RawBlock", "RawMesh", "chosen_cells", "collect_cells", "mesh_from_raw", "require_nodes"]
 
 LINES = ("vertex", "line", "line3", "line4")  #: cells below two dimensions: they select nodes
 
@@ -90,6 +90,33 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
         cell_numbers=numbers,
         notes=tuple(notes),
     )
+
+
+def chosen_cells(raw: RawMesh, kinds: tuple[str, ...], groups: tuple[str, ...] | None) -> RawMesh:
+    """Return a mesh with the cells of some kinds and groups only, beside faces that select; its nodes all stay.
+
+    Parameters
+    ----------
+    kinds
+        That are kept; of other kinds, faces stay where `kinds` are solid.
+    groups
+        Whose cells are kept; None: all of these kinds.
+    """
+    selecting = FACE_TYPES if set(kinds) <= set(SOLID_TYPES) else ()
+    blocks = []
+    for block in raw.blocks:
+        if block.kind in selecting:
+            blocks.append(block)
+        elif block.kind in kinds:
+            inside = np.full(len(block.nodes), groups is None)
+            for group in groups or ():
+                inside[block.groups.get(group, np.zeros(0, np.int64))] = True
+            place = np.cumsum(inside) - 1
+            kept = {group: place[rows[inside[rows]]] for group, rows in block.groups.items()}
+            numbers = None if block.numbers is None else block.numbers[inside]
+            own = {group: rows for group, rows in kept.items() if rows.size}
+            blocks.append(RawBlock(block.kind, block.nodes[inside], own, numbers))
+    return replace(raw, blocks=tuple(block for block in blocks if len(block.nodes)), notes=())
 
 
 def require_nodes(where: str, raw: RawMesh) -> tuple[Array, list[RawBlock]]:

@@ -1,5 +1,6 @@
 """The triangles and quads of a mesh file as the mesh of a shell."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ from fe_models.importers.line_cells import collect_lines
 from fe_models.importers.raw_mesh import RawBlock, RawMesh, collect_cells, require_nodes
 from fe_models.meshes.shell_mesh import FLAT_TYPES, ShellMesh
 
-__all__ = ["shell_mesh_from_raw"]
+__all__ = ["SHELL_TYPES", "shell_mesh_from_raw", "with_centres"]
+
+SHELL_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")  #: cells that can be shells
 
 _PARTS: dict[str, tuple[str, list[tuple[int, ...]]]] = {
     "triangle": ("triangle", [(0, 1, 2)]),
@@ -44,9 +47,10 @@ def shell_mesh_from_raw(
         If there are no triangles or quads, a group is unknown, or a cell names a node that is not there.
     """
     where = f"mesh {path}"
+    require_nodes(where, raw)
+    raw = with_centres(raw)
     nodes, blocks = require_nodes(where, raw)
     notes = list(raw.notes)
-    _require_linear(where, blocks)
     flat = [_flat_parts(block) for block in blocks if block.kind in _PARTS]
     split = sum(len(block.nodes) for block in blocks if block.kind in ("triangle6", "quad9"))
     if split:
@@ -98,13 +102,26 @@ def shell_mesh_from_raw(
     )
 
 
-def _require_linear(where: str, blocks: list[RawBlock]) -> None:
-    quad8 = sum(len(block.nodes) for block in blocks if block.kind == "quad8")
-    if quad8:
-        raise MeshError(
-            f"{where}: {quad8} cells of type quad8: they cannot be split into flat cells; export quads of four or nine "
-            "nodes"
-        )
+def with_centres(raw: RawMesh) -> RawMesh:
+    """Return a mesh whose quads of eight nodes have a ninth, where the quadratic field has its middle.
+
+    The new nodes come last; their numbers follow the largest of the file.
+    """
+    nodes, numbers = [raw.nodes], [raw.node_numbers]
+    blocks, n = [], len(raw.nodes)
+    next_number = 0 if raw.node_numbers is None or not len(raw.node_numbers) else int(raw.node_numbers.max()) + 1
+    for block in raw.blocks:
+        if block.kind != "quad8" or not len(block.nodes):
+            blocks.append(block)
+            continue
+        X = raw.nodes[block.nodes]
+        nodes.append(X[:, 4:].sum(axis=1) / 2 - X[:, :4].sum(axis=1) / 4)
+        numbers.append(next_number + np.arange(len(X)))
+        centres = n + np.arange(len(X))
+        n, next_number = n + len(X), next_number + len(X)
+        blocks.append(RawBlock("quad9", np.column_stack([block.nodes, centres]), block.groups, block.numbers))
+    given = None if raw.node_numbers is None else np.concatenate([each for each in numbers if each is not None])
+    return replace(raw, nodes=np.concatenate(nodes), blocks=tuple(blocks), node_numbers=given)
 
 
 def _flat_parts(block: RawBlock) -> RawBlock:

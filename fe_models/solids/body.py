@@ -158,7 +158,13 @@ def solid_body(
     used, of_cell = assign_materials(mesh, materials)
     properties = np.array([[material.lam, material.mu, material.rho] for material in used])
     K, M_s = assemble(
-        mesh, properties, of_cell, incompatible=incompatible_modes, integration=integration, mass=mass, progress=progress
+        mesh,
+        properties,
+        of_cell,
+        incompatible=incompatible_modes,
+        integration=integration,
+        mass=mass,
+        progress=progress,
     )
     n_nodes = len(mesh.nodes)
     return FEBody(
@@ -172,9 +178,7 @@ def solid_body(
         surface=boundary_triangles(mesh),
         node_volumes=node_volumes(mesh),
         element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration),
-        provenance=provenance(mesh, used, of_cell)
-        | _brick_words(mesh, incompatible_modes)
-        | rule_words,
+        provenance=provenance(mesh, used, of_cell) | _brick_words(mesh, incompatible_modes) | rule_words,
     )
 
 

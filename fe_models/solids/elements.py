@@ -127,6 +127,8 @@ def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
     if cell == "wedge":
         degree_triangle, degree_line = degree  # type: ignore[misc]
         triangle, w_triangle = get_quadrature(RefTri, degree_triangle)
+        if degree_triangle == 1:  # one point does; scikit-fem takes three
+            triangle, w_triangle = np.full((2, 1), 1 / 3), np.array([1 / 2])
         line, w_line = get_quadrature(RefLine, degree_line)
         points = np.vstack([np.repeat(triangle, line.size, axis=1), np.tile(line, triangle.shape[1])])
         return points.T.copy(), np.outer(w_triangle, w_line).ravel()

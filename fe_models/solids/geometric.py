@@ -61,8 +61,14 @@ def projected_geometric_stiffness(
             cuts = np.linspace(0, len(cells), n_parts + 1).astype(int)
             futures = [
                 pool.submit(
-                    _pairs_of, mesh.nodes, cells[a:b], of_cell[kind][a:b], lame,
-                    geometric_table(kind, integration), states, columns
+                    _pairs_of,
+                    mesh.nodes,
+                    cells[a:b],
+                    of_cell[kind][a:b],
+                    lame,
+                    geometric_table(kind, integration),
+                    states,
+                    columns,
                 )
                 for a, b in pairwise(cuts)
                 if b > a

@@ -43,10 +43,11 @@ def joined(first, second):
 def nastran_deck(mesh, style="small"):
     """A bulk data deck; style "small" or "large" fields of fixed width, or "free" ones."""
     cards = [("GRID", [k + 1, "", *(f"{x:.5f}" for x in node)]) for k, node in enumerate(mesh.nodes)]
+    penta15 = [*range(9), *range(12, 15), *range(9, 12)]
     hexa20 = [*range(12), *range(16, 20), *range(12, 16)]  # Nastran numbers upright edges before those of the top
     for kind, cells in mesh.cells.items():
         name = {"tet": "CTETRA", "hex": "CHEXA", "wed": "CPENTA"}[kind[:3]]
-        for k, cell in enumerate(cells[:, hexa20] if kind == "hexahedron20" else cells):
+        for k, cell in enumerate(cells[:, {"hexahedron20": hexa20, "wedge15": penta15}.get(kind, slice(None))]):
             cards.append((name, [k + 1, 7, *(cell + 1)]))
     per_line, width = (4, 16) if style == "large" else (8, 8)
     lines = ["SOL 101", "CEND", "BEGIN BULK"]

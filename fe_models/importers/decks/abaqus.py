@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.errors import MeshError
-from fe_models.importers.abaqus import DeckMesh, deck_mesh, raw_mesh_of
+from fe_models.importers.abaqus import deck_mesh, raw_mesh_of
 from fe_models.importers.abaqus_deck import DeckBlock, deck_blocks, flat_blocks
 from fe_models.importers.decks.abaqus_couplings import read_coupling
 from fe_models.importers.decks.abaqus_elements import read_element
@@ -19,12 +19,16 @@ from fe_models.importers.decks.ledger import Ledger
 __all__ = ["PROGRAMS", "read_abaqus_deck"]
 
 PROGRAMS = ("calculix", "abaqus")  #: whose rules of integration and mass a deck may be read by
-_MESH = ("NODE", "ELEMENT", "NSET", "ELSET", "HEADING", "PREPRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY")
-_MESH += ("INSTANCE", "END INSTANCE", "INCLUDE", "SYSTEM")
+_MESH = (
+    "NODE", "ELEMENT", "NSET", "ELSET", "HEADING", "PREPRINT", "PART", "END PART", "ASSEMBLY", "END ASSEMBLY",
+    "INSTANCE", "END INSTANCE", "INCLUDE", "SYSTEM",
+)  # fmt: skip
 _MATERIAL = ("MATERIAL", "ELASTIC", "DENSITY", "EXPANSION", "CONDUCTIVITY", "SPECIFIC HEAT", "DAMPING", "DEPVAR")
-_SECTIONS = ("SOLID SECTION", "SHELL SECTION", "BEAM SECTION", "BEAM GENERAL SECTION", "MASS", "ROTARY INERTIA")
-_SECTIONS += ("SPRING", "DASHPOT", "MEMBRANE SECTION", "NODAL THICKNESS", "ORIENTATION", "TRANSFORM", "NORMAL")
-_SECTIONS += ("DISTRIBUTION", "DISTRIBUTION TABLE")
+_SECTIONS = (
+    "SOLID SECTION", "SHELL SECTION", "BEAM SECTION", "BEAM GENERAL SECTION", "MASS", "ROTARY INERTIA", "SPRING",
+    "DASHPOT", "MEMBRANE SECTION", "NODAL THICKNESS", "ORIENTATION", "TRANSFORM", "NORMAL", "DISTRIBUTION",
+    "DISTRIBUTION TABLE",
+)  # fmt: skip
 _COUPLINGS = ("EQUATION", "MPC", "RIGID BODY", "COUPLING", "KINEMATIC", "DISTRIBUTING", "DISTRIBUTING COUPLING", "TIE")
 _LOADS = ("CLOAD", "DLOAD", "DSLOAD", "GRAVITY")
 _SURFACES = ("SURFACE", "SURFACE INTERACTION", "SURFACE BEHAVIOR", "FRICTION")
@@ -77,7 +81,10 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
     mesh = deck_mesh(where, blocks)
     draft = Draft(where, program, mesh, Ledger(where))
     for note in (*notes, *mesh.notes):
-        draft.ledger.note("*NSET" if note.startswith("NSET") else "*ASSEMBLY", note)
+        word = note.split()[0]
+        draft.ledger.note(
+            f"*{word}" if word in ("NSET", "ELSET") else "*ELEMENT" if "elements" in note else "*PART", note
+        )
     step, steps = 0, ""
     for block in blocks:
         here = f"{where}, {block.place}: *{block.keyword}"
@@ -125,14 +132,20 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 def _finished(path: Path, draft: Draft) -> Deck:
     """Return the deck of a draft whose blocks are all taken."""
     draft.close()
+    supports = tuple(draft.supports_of_groups())
     mesh = raw_mesh_of(draft.mesh, [])
+    spelt = {name.upper(): name for name in draft.materials}
+    for kind in (draft.solids, draft.shells, draft.lines):
+        kind[:] = [replace(each, material=spelt.get(each.material.upper(), each.material)) for each in kind]  # type: ignore
     names = {**mesh.node_sets, **draft.node_groups}
     groups = draft.cell_groups
     blocks = []
     for block in mesh.blocks:
         assert block.numbers is not None
         own = {name: np.flatnonzero(np.isin(block.numbers, members)) for name, members in groups.items()}
-        blocks.append(replace(block, groups={**block.groups, **{name: rows for name, rows in own.items() if rows.size}}))
+        blocks.append(
+            replace(block, groups={**block.groups, **{name: rows for name, rows in own.items() if rows.size}})
+        )
     blocks += draft.face_blocks
     return Deck(
         path,
@@ -148,6 +161,6 @@ def _finished(path: Path, draft: Draft) -> Deck:
         tuple(draft.rigid),
         tuple(draft.couplings),
         tuple(draft.equations),
-        tuple(draft.supports_of_groups()),
+        supports,
         tuple(draft.loads),
     )

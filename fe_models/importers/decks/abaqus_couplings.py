@@ -14,7 +14,9 @@ __all__ = ["read_coupling", "surface_nodes"]
 def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     """Take one block that couples nodes."""
     keyword, given = block.keyword, block.parameters
-    if keyword == "EQUATION":
+    if keyword == "EQUATION" and "REMOVE" in given:
+        draft.ledger.note("*EQUATION, REMOVE", "constraints change between steps; those of the model are taken")
+    elif keyword == "EQUATION":
         _equations(here, block, draft)
     elif keyword == "RIGID BODY":
         _rigid_body(here, block, draft)
@@ -63,7 +65,9 @@ def _rigid_body(here: str, block: DeckBlock, draft: Draft) -> None:
         draft.ledger.refuse("*RIGID BODY", "without NSET or ELSET, or without REF NODE", line=block.line_number)
         return
     if "ROT NODE" in given:
-        draft.ledger.note("*RIGID BODY, ROT NODE", "its rotations are those of the reference node", line=block.line_number)
+        draft.ledger.note(
+            "*RIGID BODY, ROT NODE", "its rotations are those of the reference node", line=block.line_number
+        )
     _rigid_group(here, draft, int(draft.nodes_of(here, given["REF NODE"])[0]), members)
 
 

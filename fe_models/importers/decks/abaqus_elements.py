@@ -37,10 +37,21 @@ SOLID_RULES: dict[str, dict[str, tuple[str, str, str]]] = {
 PLANE = ("CPS", "CPE", "CAX", "SAX", "MAX", "M3D", "DC", "F3D", "F2D", "AC", "D", "COH", "GK", "R3D", "SFM3D")
 _POINTS = {"MASS": 1, "ROTARYI": 1, "SPRINGA": 2, "SPRING1": 1, "SPRING2": 2, "DASHPOTA": 2, "DASHPOT1": 1}
 _POINTS |= {"DASHPOT2": 2, "DCOUP3D": 1}
-_QUADS = {1: (0, 1, 2, 3), 2: (4, 7, 6, 5), 3: (0, 4, 5, 1), 4: (1, 5, 6, 2), 5: (2, 6, 7, 3), 6: (3, 7, 4, 0)}
-_TETS = {1: (0, 1, 2), 2: (0, 3, 1), 3: (1, 3, 2), 4: (2, 3, 0)}
-_WEDGES = {1: (0, 1, 2), 2: (3, 5, 4), 3: (0, 3, 4, 1), 4: (1, 4, 5, 2), 5: (2, 5, 3, 0)}
-_FACES = {"hexa": _QUADS, "tetr": _TETS, "wedg": _WEDGES}  #: first letters of the kind -> face -> local corner nodes
+_QUADS: dict[int, tuple[int, ...]] = {
+    1: (0, 1, 2, 3),
+    2: (4, 7, 6, 5),
+    3: (0, 4, 5, 1),
+    4: (1, 5, 6, 2),
+    5: (2, 6, 7, 3),
+    6: (3, 7, 4, 0),
+}
+_TETS: dict[int, tuple[int, ...]] = {1: (0, 1, 2), 2: (0, 3, 1), 3: (1, 3, 2), 4: (2, 3, 0)}
+_WEDGES: dict[int, tuple[int, ...]] = {1: (0, 1, 2), 2: (3, 5, 4), 3: (0, 3, 4, 1), 4: (1, 4, 5, 2), 5: (2, 5, 3, 0)}
+_FACES: dict[str, dict[int, tuple[int, ...]]] = {
+    "hexa": _QUADS,
+    "tetr": _TETS,
+    "wedg": _WEDGES,
+}  #: first letters of the kind -> face -> local corner nodes
 
 
 def read_element(here: str, block: DeckBlock, draft: Draft) -> None:

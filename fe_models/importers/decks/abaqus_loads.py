@@ -37,7 +37,9 @@ def read_boundary(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
             last = int(words[2]) if len(words) > 2 and words[2] else first
             components = {c - 1 for c in range(first, last + 1) if 1 <= c <= 6}
         if len(words) > 3 and float(words[3] or 0) != 0:
-            draft.ledger.note("*BOUNDARY", "prescribed displacements: the place is an interface, the motion is not taken")
+            draft.ledger.note(
+                "*BOUNDARY", "prescribed displacements: the place is an interface, the motion is not taken"
+            )
         known = draft.mesh.rows_of(nodes) >= 0
         if not known.all():
             draft.ledger.note("*BOUNDARY", "nodes that are not in the deck", count=int((~known).sum()))

@@ -1,6 +1,8 @@
 """Materials and sections of Abaqus and CalculiX, masses and springs."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +51,7 @@ def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
         "SOLID SECTION": _solid_section,
         "SHELL SECTION": _shell_section,
         "BEAM SECTION": _beam_section,
+        "BEAM GENERAL SECTION": _beam_section,
         "MASS": _masses,
         "SPRING": _springs,
         "DASHPOT": _dashpots,
@@ -83,7 +86,9 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
     for (kind_name, kind), elements in types.items():
         rule = SOLID_RULES[draft.program].get(kind_name)
         if rule is None:
-            why = "no solid, shell or beam in space" if kind_name.startswith(PLANE) else "this element is not known here"
+            why = (
+                "no solid, shell or beam in space" if kind_name.startswith(PLANE) else "this element is not known here"
+            )
             draft.ledger.refuse(kind_name, why, count=len(elements), line=block.line_number)
             continue
         if rule[2]:
@@ -122,8 +127,9 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
     kept = _known(draft, types, _LINES, "B", block)
     kind = block.parameters.get("SECTION", "").upper()
     size = numbers(block.lines[0])
-    shapes = {
-        "RECT": lambda: {"shape": "rectangle", "width": size[0], "height": size[1]},
+    shapes: dict[str, Callable[[], dict[str, Any]]] = {
+        "RECTANGULAR": lambda: {"shape": "rectangle", "width": size[0], "height": (size + size)[1]},
+        "RECT": lambda: {"shape": "rectangle", "width": size[0], "height": (size + size)[1]},
         "CIRC": lambda: {"shape": "circle", "radius": size[0]},
         "PIPE": lambda: {"shape": "tube", "radius": size[0], "thickness": size[1]},
         "BOX": lambda: {"shape": "box", "width": size[0], "height": size[1], "web": size[2], "flange": size[3]},
@@ -132,7 +138,7 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
     is_round = kind != "CIRC" or draft.program == "abaqus" or len(size) < 2 or size[1] in (0.0, size[0])
     offsets = [float(block.parameters.get(key, 0)) for key in ("OFFSET1", "OFFSET2")]
     if kind not in shapes or not is_even or not is_round:
-        draft.ledger.refuse(f"*BEAM SECTION, SECTION={kind}", "this shape is not known here", count=len(kept))
+        draft.ledger.refuse(f"*{block.keyword}, SECTION={kind}", "this shape is not known here", count=len(kept))
         return
     n1 = numbers(block.lines[1])[:3] if len(block.lines) > 1 else [0.0, 0.0, -1.0]
     shape = shapes[kind]()
@@ -158,7 +164,7 @@ def _known(
 
 def _material_of(block: DeckBlock, draft: Draft) -> str:
     """Return the name of the material of a section as its own table spells it."""
-    wanted = block.parameters.get("MATERIAL", "")
+    wanted = block.parameters.get("MATERIAL", "").strip('"')
     return next((name for name in draft.materials if name.upper() == wanted.upper()), wanted)
 
 

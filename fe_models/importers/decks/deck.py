@@ -14,8 +14,8 @@ from fe_models.importers.raw_mesh import RawMesh
 __all__ = [
     "Coupling",
     "Deck",
-    "DeckMaterial",
     "DeckMass",
+    "DeckMaterial",
     "DeckSpring",
     "Equation",
     "LineSection",

@@ -126,6 +126,23 @@ class Draft:
         self.cell_groups[made] = elements
         return made
 
+    def used_nodes(self) -> IntArray:
+        """Return the numbers of nodes that have a motion of their own: those of elements, and leaders of others."""
+        sectioned = np.concatenate(self.sectioned) if self.sectioned else np.zeros(0, np.int64)
+        parts = [table[np.isin(table[:, 0], sectioned), 1:].ravel() for _, _, table in self.mesh.elements]
+        groups = [mass.nodes for mass in self.masses] + [name for spring in self.springs for name in spring.nodes]
+        groups += [link.node for link in self.rigid] + [coupling.node for coupling in self.couplings]
+        parts += [self.numbers_of_group(name) for name in groups]
+        followers = [self.numbers_of_group(link.followers) for link in self.rigid]
+        nodes = np.unique(np.concatenate([np.zeros(0, np.int64), *parts]))
+        return np.setdiff1d(nodes, np.concatenate([np.zeros(0, np.int64), *followers]))
+
+    def numbers_of_group(self, name: str) -> IntArray:
+        """Return the numbers of the nodes of a group, made here or of the deck."""
+        if name in self.node_groups:
+            return self.mesh.node_numbers[self.node_groups[name]]
+        return self.mesh.node_sets[name.upper()]
+
     # --- at the end ----------------------------------------------------------------------------------------------
 
     def close(self) -> None:
@@ -144,10 +161,17 @@ class Draft:
     def supports_of_groups(self) -> list[Support]:
         """Return the supports: nodes held in the same components under the same names together."""
         found: dict[tuple[tuple[str, ...], tuple[int, ...]], list[int]] = {}
+        used = set(self.used_nodes().tolist())
+        loose = [node for node in self.held if node not in used]
+        if loose:
+            why = "supports of nodes that belong to no element, or follow others"
+            self.ledger.note("*BOUNDARY", why, count=len(loose))
         for node, by_name in self.held.items():
+            if node not in used:
+                continue
             components = tuple(sorted(set().union(*by_name.values())))
             found.setdefault((tuple(sorted(by_name)), components), []).append(node)
-        supports = []
+        supports: list[Support] = []
         for (names, components), nodes in found.items():
             letters = "".join(COMPONENTS[c] for c in components)
             name = names[0] if names != ("",) and names[0] else f"support_{letters}"

@@ -67,7 +67,9 @@ class Ledger:
                 for entry in missing
             )
             names_missing = list(dict.fromkeys(entry.name.lstrip("*") for entry in missing))
-            options = " ".join(f'--leave-out "{name}"' if " " in name else f"--leave-out {name}" for name in names_missing)
+            options = " ".join(
+                f'--leave-out "{name}"' if " " in name else f"--leave-out {name}" for name in names_missing
+            )
             raise MeshError(
                 f"{self.where}: these carry mass or stiffness and cannot be taken over: {listed}. Change the deck, or "
                 f"leave them out knowingly: {options}"

@@ -18,7 +18,7 @@ DECK_FORMATS: dict[str, Callable[..., Deck]] = {
 
 
 def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
-    """Read a whole deck: mesh, materials, sections, attachments, couplings, supports, loads, and the ledger of the rest.
+    """Read a whole deck: mesh, materials, sections, couplings, supports, loads, and the ledger of the rest.
 
     Parameters
     ----------

@@ -207,8 +207,15 @@ def test_plane_mesh_is_refused(tmp_path):
     assert "got 2 coordinates per node" in refusal(tmp_path, "plane.med", content)
 
 
-@pytest.mark.parametrize(("kind", "n_nodes"), [("pyramid", 5), ("wedge15", 15), ("pyramid13", 13)])
-@pytest.mark.parametrize("suffix", [".msh", ".inp", ".bdf", ".med", ".vtk"])
+UNSUPPORTED = [
+    (kind, n_nodes, suffix)
+    for kind, n_nodes in (("pyramid", 5), ("wedge15", 15), ("pyramid13", 13))
+    for suffix in (".msh", ".inp", ".bdf", ".med", ".vtk")
+    if kind != "wedge15" or suffix not in (".inp", ".bdf", ".msh")  # which have quadratic wedges
+]
+
+
+@pytest.mark.parametrize(("kind", "n_nodes", "suffix"), UNSUPPORTED)
 def test_unsupported_cells_are_named_and_counted(kind, n_nodes, suffix, tmp_path, capsys):
     codes = {
         "pyramid": (7, "C3D5", "CPYRAM", "PY5", 14),
@@ -251,7 +258,7 @@ def test_unsupported_cells_are_named_and_counted(kind, n_nodes, suffix, tmp_path
             + f"\nCELL_TYPES 1\n{codes[4]}\n"
         )
     text = refusal(tmp_path, f"rod{suffix}", content, capsys)
-    name = {".inp": codes[1]}.get(suffix, kind) if kind != "wedge15" else kind
+    name = {".inp": codes[1]}.get(suffix, kind) if kind != "wedge15" else {".med": "P15"}.get(suffix, kind)
     assert "unsupported cells" in text
     assert f"of type {name}" in text
     if not (suffix == ".vtk" and kind != "pyramid"):  # meshio stops before it can count
@@ -453,7 +460,6 @@ def test_abaqus_part_with_one_instance_reads_like_a_flat_deck(tmp_path):
         (TETRA.replace("TYPE=C3D4", "TYPE=C3D10"), "expected a multiple of 11 numbers below, got 5"),
         (TETRA.replace(", TYPE=C3D4", ""), "expected TYPE="),
         (TETRA.replace("2, 1, 0, 0", "2, one, 0, 0"), "expected number, x, y, z"),
-        (TETRA + "*ELSET, ELSET=a\n99\n", "ELSET 'a' names 1 elements that are not in the deck, first 99"),
         (TETRA + "*NSET, NSET=a\nb\n", "names an unknown set 'B'"),
         (TETRA + "*NSET, NSET=a\nb\n*NSET, NSET=b\na\n", "contains itself"),
         (TETRA + "*NSET, NSET=a, GENERATE\n1, 4, 0\n", "expected first, last, increment"),

@@ -14,6 +14,7 @@ from fe_models.importers.node_order import mirrored_order
 from fe_models.reports.mesh_report import report_mesh
 from tests.fe_models.small_meshes import SOLID_TYPES, cell_mesh, faced_box, nastran_deck
 
+OF_MESHIO = [kind for kind in SOLID_TYPES if kind != "wedge15"]  #: formats whose quadratic wedges are not read
 WITHOUT_HEX27 = tuple(kind for kind in SOLID_TYPES if kind != "hexahedron27")
 
 
@@ -29,7 +30,7 @@ def write(path, mesh, **options):
     return path
 
 
-@pytest.mark.parametrize("kind", SOLID_TYPES)
+@pytest.mark.parametrize("kind", OF_MESHIO)
 @pytest.mark.parametrize(
     ("suffix", "options"),
     [
@@ -52,7 +53,7 @@ def test_reading_returns_what_meshio_wrote(kind, suffix, options, tmp_path):
     assert_allclose(read.nodes, mesh.nodes, rtol=1e-9, atol=0)
 
 
-@pytest.mark.parametrize("kind", WITHOUT_HEX27)
+@pytest.mark.parametrize("kind", [kind for kind in WITHOUT_HEX27 if kind in OF_MESHIO])
 def test_reading_returns_the_abaqus_deck_meshio_wrote(kind, tmp_path):
     mesh = faced_box(kind)
     sets = {"left": mesh.node_sets["left"]}
@@ -111,7 +112,7 @@ def test_linear_wedges_of_vtk_are_right_way_round_in_both_conventions(tmp_path):
         assert_array_equal(read_mesh(file).cells["wedge"], mesh.cells["wedge"])
 
 
-@pytest.mark.parametrize("kind", WITHOUT_HEX27)
+@pytest.mark.parametrize("kind", [kind for kind in WITHOUT_HEX27 if kind in OF_MESHIO])
 def test_med_in_its_own_orientation_and_in_that_of_meshio(kind, tmp_path):
     mesh = faced_box(kind)
     path = write(tmp_path / "box.med", meshio_mesh(mesh))

@@ -3,7 +3,7 @@
 import meshio
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 import fe_models as fm
@@ -84,13 +84,19 @@ def test_quadratic_cells_become_four_flat_ones_of_the_same_area(tmp_path, kind, 
     assert "1 quadratic cells were split into four flat ones each" in mesh.notes
 
 
-def test_files_without_shells_and_eight_node_quads_are_refused(tmp_path):
+def test_files_without_shells_are_refused(tmp_path):
     line = meshio.Mesh(np.eye(3), [("line", np.array([[0, 1], [1, 2]]))])
     meshio.write(tmp_path / "a.vtu", line)
     with pytest.raises(fm.MeshError, match=r"expected triangles or quads \(shells\), got 2 line; export the surfaces"):
         fm.read_shell_mesh(tmp_path / "a.vtu")
-    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], dtype=float)
-    nodes = np.concatenate([corners, (corners + np.roll(corners, -1, axis=0)) / 2])
-    meshio.write(tmp_path / "b.vtu", meshio.Mesh(nodes, [("quad8", np.arange(8)[None])]))
-    with pytest.raises(fm.MeshError, match="1 cells of type quad8: they cannot be split"):
-        fm.read_shell_mesh(tmp_path / "b.vtu")
+
+
+def test_quads_of_eight_nodes_get_their_middle_from_the_quadratic_field(tmp_path):
+    """On a cylinder z = 1 - x² the serendipity field is exact: the ninth node stands on it."""
+    corners = np.array([(0, 0, 1), (1, 0, 0), (1, 1, 0), (0, 1, 1)], dtype=float)
+    middles = (corners + np.roll(corners, -1, axis=0)) / 2
+    middles[:, 2] = 1 - middles[:, 0] ** 2
+    meshio.write(tmp_path / "b.vtu", meshio.Mesh(np.concatenate([corners, middles]), [("quad8", np.arange(8)[None])]))
+    mesh = fm.read_shell_mesh(tmp_path / "b.vtu")
+    assert_allclose(mesh.nodes[8], [0.5, 0.5, 0.75], rtol=0, atol=1e-15)
+    assert_array_equal(np.sort(mesh.cells["quad"], axis=1), [[0, 4, 7, 8], [1, 4, 5, 8], [2, 5, 6, 8], [3, 6, 7, 8]])

@@ -1,0 +1,58 @@
+"""`cms job`: a whole deck of a finite element program becomes a job file."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from cms.cli.console import output_path, print_table, say
+from cms.errors import JobError
+from cms.jobs.deck_job import JobRequest, job_text
+from fe_models.foundation.units import UNIT_SYSTEMS
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["DeckRequest", "write_job"]
+
+
+@dataclass(frozen=True)
+class DeckRequest:
+    """The arguments of the command."""
+
+    deck: Path
+    output: Path | None
+    units: str | None
+    program: str | None
+    densities: tuple[str, ...]
+    leave_out: tuple[str, ...]
+
+
+def write_job(request: DeckRequest) -> None:
+    """Read the deck, print what is not taken over, write the job."""
+    from fe_models.importers.decks.read_deck import read_deck
+
+    if request.units is None or request.units not in UNIT_SYSTEMS:
+        what = "missing; a deck does not say its units" if request.units is None else f"unknown {quoted(request.units)}"
+        raise JobError(f"--units: {what}{nearest(request.units or '', UNIT_SYSTEMS)}")
+    path = output_path(request.output, request.deck.with_suffix(".toml"), JobError, overwrite_of=[request.deck])
+    deck = read_deck(request.deck, program=request.program)
+    rows = deck.ledger.rows()
+    if rows:
+        print_table("Not taken over from the deck", ("name", "count>", "consequence"), rows)
+    asked = JobRequest(request.units, densities_of(request.densities), request.leave_out)
+    relative = os.path.relpath(request.deck.resolve(), path.resolve().parent)
+    text = job_text(deck, asked, Path(relative).as_posix())
+    path.write_text(text, encoding="utf-8")
+    say(f"wrote {path}")
+
+
+def densities_of(words: tuple[str, ...]) -> dict[str, float]:
+    """Return material -> density of words NAME=NUMBER; a number alone holds for all materials without one."""
+    found = {}
+    for word in words:
+        name, _, number = word.rpartition("=")
+        try:
+            found[name] = float(number)
+        except ValueError:
+            found[name] = 0.0
+        if not 0 < found[name] < float("inf"):
+            raise JobError(f"--density {quoted(word)}: expected NAME=NUMBER or a number above 0, as steel=7.85e-9")
+    return found

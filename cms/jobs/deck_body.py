@@ -1,0 +1,353 @@
+"""The body of a whole deck: solids, shells and lines on shared nodes, with what is attached to them and their links."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cms.errors import JobError
+from cms.jobs.job import InterfaceSection, Job
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.stages import Stages
+from fe_models.foundation.units import unit_system
+from fe_models.foundation.words import nearest
+
+if TYPE_CHECKING:
+    from fe_models.assemblies.constraints import Constraint
+    from fe_models.assemblies.join import Joined, Part
+    from fe_models.importers.raw_mesh import RawMesh
+    from fe_models.material import Material
+    from fe_models.meshes.mesh import Mesh
+
+__all__ = ["body_of_deck"]
+
+
+def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
+    """Read the deck, make a body of each kind of elements, join them, and put loads and interfaces on the whole."""
+    from fe_models.assemblies.join import join
+    from fe_models.importers.decks.read_deck import read_deck
+    from fe_models.importers.shell_cells import with_centres
+
+    with stages("read deck"):
+        raw = read_deck(path).mesh
+        raw = with_centres(raw)
+        raw = replace(raw, node_numbers=np.arange(len(raw.nodes)))  # rows of the deck are the numbers of the parts
+    with stages("assemble"):
+        parts, meshes = _parts(job, path, raw, on_report)
+        joined = join(str(job.body.name), parts, raw.nodes, _constraints(job, raw))
+        body = joined.body
+        _require_used_groups(job, raw, joined)
+        body = body.with_load_cases(*_load_cases(job, raw, joined, meshes))
+        return body.with_interfaces(*[_interface(name, each, raw, joined) for name, each in job.interfaces.items()])
+
+
+def _parts(
+    job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None
+) -> "tuple[list[Part], list[Mesh]]":
+    """Return the bodies of solids, shells and lines, and of what is attached to nodes alone; meshes of the solids."""
+    from fe_models.assemblies.join import Part
+
+    parts: list[Part] = []
+    meshes = []
+    for body, mesh in _solids(job, path, raw, on_report):
+        parts.append(Part(body, np.asarray(mesh.node_numbers)))
+        meshes.append(mesh)
+    for made in (_shells(job, path, raw, on_report), _lines(job, path, raw, on_report), _attached(job, raw)):
+        if made is not None:
+            parts.append(made)
+    return parts, meshes
+
+
+def _materials(job: Job) -> "dict[str, Material]":
+    from fe_models.material import Material
+
+    return {
+        name: Material(name, E=each.young, nu=each.poisson, rho=each.density) for name, each in job.materials.items()
+    }
+
+
+def _solids(
+    job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None
+) -> "Iterable[tuple[FEBody, Mesh]]":
+    """Yield one body for each formulation of the solids, and its mesh."""
+    from fe_models.importers.raw_mesh import chosen_cells, mesh_from_raw
+    from fe_models.meshes.mesh import SOLID_TYPES
+    from fe_models.meshes.unused_nodes import drop_unused_nodes
+    from fe_models.reports.mesh_report import report_mesh
+    from fe_models.solids.body import solid_body
+
+    materials = _materials(job)
+    rules: dict[tuple[str, str], dict[str, Material]] = {}
+    for name, table in job.solids.items():
+        material = materials[table.material or next(iter(materials))]
+        for group in table.cells:
+            if group != "all":
+                _require_group(raw, f"solids.{name}.cells", group)
+            rules.setdefault((table.integration, table.mass), {})[group] = material
+    units = unit_system(job.body.units)
+    is_alone = len(rules) == 1 and not job.shells and not job.sections
+    for (integration, mass), of_group in rules.items():
+        groups = None if "all" in of_group else tuple(of_group)
+        piece = chosen_cells(raw, SOLID_TYPES, groups)
+        mesh = mesh_from_raw(piece, path, "")
+        has_bricks = bool(len(mesh.cells.get("hexahedron", ())))
+        incompatible = integration == "incompatible" and has_bricks
+        given: Any = of_group["all"] if groups is None else of_group
+        report = report_mesh(mesh, given, units=units, incompatible_modes=incompatible)
+        if on_report is not None:
+            on_report(report)
+        joined_elsewhere = () if is_alone and not _is_linked(job) else ("parts", "transition")
+        report.raise_for_errors(accept=(*job.body.accept, *joined_elsewhere))
+        mesh = drop_unused_nodes(mesh)
+        body = solid_body(
+            mesh,
+            given,
+            name=f"{job.body.name} solids" if len(rules) == 1 else f"{job.body.name} solids {integration} {mass}",
+            units=units,
+            incompatible_modes=incompatible,
+            integration="full" if integration == "incompatible" else integration,
+            mass=mass,
+        )
+        yield body, mesh
+
+
+def _is_linked(job: Job) -> bool:
+    return bool(job.links or job.couplings or job.equations or job.springs)
+
+
+def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Part | None":
+    from cms.jobs.shell_body import shell_properties_of
+    from fe_models.assemblies.join import Part
+    from fe_models.importers.raw_mesh import chosen_cells
+    from fe_models.importers.shell_cells import SHELL_TYPES, shell_mesh_from_raw
+    from fe_models.reports.shell_report import report_shell
+    from fe_models.shells.body import shell_body
+    from fe_models.shells.quality import WARP_LIMIT
+
+    if not job.shells:
+        return None
+    properties = shell_properties_of(job)
+    for group in properties:
+        if group != "all":
+            _require_group(raw, "shells.cells", group)
+    groups = None if "all" in properties else tuple(properties)
+    mesh = shell_mesh_from_raw(chosen_cells(raw, SHELL_TYPES, groups), path, "", groups, ())
+    materials = {item.material: None for item in properties.values()}
+    report = report_shell(mesh, materials, units=unit_system(job.body.units))
+    if on_report is not None:
+        on_report(report)
+    is_alone = not job.solids and not job.sections and not _is_linked(job)
+    report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts", "transition"))
+    body = shell_body(
+        mesh,
+        properties["all"] if groups is None else properties,
+        name=f"{job.body.name} shells",
+        units=unit_system(job.body.units),
+        warp_limit=180.0 if "warped" in job.body.accept else WARP_LIMIT,
+    )
+    return Part(body, np.asarray(mesh.node_numbers))
+
+
+def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Part | None":
+    from cms.jobs.attachments_of_job import properties_of
+    from fe_models.assemblies.join import Part
+    from fe_models.beams.body import beam_body
+    from fe_models.importers.line_cells import line_mesh_from_raw
+    from fe_models.importers.raw_mesh import chosen_cells
+    from fe_models.reports.frame_report import report_frame
+
+    if not job.sections:
+        return None
+    properties = properties_of(job)
+    for group in properties:
+        if group != "all":
+            _require_group(raw, "sections.lines", group)
+    groups = None if "all" in properties else tuple(properties)
+    mesh = line_mesh_from_raw(chosen_cells(raw, ("line", "line3"), groups), path, "", groups)
+    materials = {item.material: None for item in properties.values()}
+    report = report_frame(mesh, materials, units=unit_system(job.body.units))
+    if on_report is not None:
+        on_report(report)
+    is_alone = not job.solids and not job.shells and not _is_linked(job)
+    report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts"))
+    body = beam_body(
+        mesh,
+        properties["all"] if groups is None else properties,
+        name=f"{job.body.name} beams",
+        units=unit_system(job.body.units),
+    )
+    return Part(body, np.asarray(mesh.node_numbers))
+
+
+def _attached(job: Job, raw: "RawMesh") -> "Part | None":
+    """Return point masses and springs as a body of their nodes alone."""
+    from fe_models.assemblies.join import Part
+    from fe_models.beams.attachments import PointMass, Spring
+    from fe_models.beams.body import beam_body
+    from fe_models.meshes.line_mesh import LineMesh
+
+    if not job.masses and not job.springs:
+        return None
+    at_masses = [(name, _group(raw, f"masses.{name}.node", table.node)) for name, table in job.masses.items()]
+    at_springs = [
+        (name, [_one(raw, f"springs.{name}.nodes", group) for group in table.nodes])
+        for name, table in job.springs.items()
+    ]
+    ends = np.array([node for _, pair in at_springs for node in pair], dtype=np.int64)
+    nodes = np.unique(np.concatenate([ends, *(members for _, members in at_masses)]))
+    place = {int(node): k for k, node in enumerate(nodes)}
+    masses = [
+        PointMass(place[node], job.masses[name].mass, job.masses[name].inertia, job.masses[name].offset or (0, 0, 0))
+        for name, members in at_masses
+        for node in members.tolist()
+    ]
+    springs = []
+    for name, pair in at_springs:
+        table = job.springs[name]
+        triad = np.eye(3) if table.triad is None else np.array(table.triad).T
+        springs.append(
+            Spring(
+                (place[pair[0]], place[pair[1]]), table.stiffness, damping=table.damping, point=table.point, triad=triad
+            )
+        )
+    body = beam_body(
+        LineMesh(raw.nodes[nodes], np.zeros((0, 2), np.int64)),
+        {},
+        name=f"{job.body.name} attached",
+        units=unit_system(job.body.units),
+        point_masses=masses,
+        springs=springs,
+    )
+    return Part(body, nodes)
+
+
+def _constraints(job: Job, raw: "RawMesh") -> "list[Constraint]":
+    from fe_models.assemblies.constraints import MeanMotion, NodeEquation, RigidNodes
+
+    made: list[Constraint] = []
+    for name, link in job.links.items():
+        where = f"links.{name}"
+        followers = np.unique(np.concatenate([_group(raw, f"{where}.followers", group) for group in link.followers]))
+        made.append(RigidNodes(where, _one(raw, f"{where}.node", link.node), followers, link.components))
+    for name, coupling in job.couplings.items():
+        where = f"couplings.{name}"
+        members = [(_group(raw, f"{where}.members", group), weight) for group, weight in coupling.members.items()]
+        nodes = np.concatenate([group for group, _ in members])
+        weights = np.concatenate([np.full(len(group), weight) for group, weight in members])
+        node = _one(raw, f"{where}.node", coupling.node)
+        made.append(MeanMotion(where, node, nodes, weights, coupling.components))
+    for name, equation in job.equations.items():
+        where = f"equations.{name}"
+        terms = tuple((_one(raw, f"{where}.terms", node), c, a) for node, c, a in equation.terms)
+        made.append(NodeEquation(where, terms))
+    return made
+
+
+def _load_cases(job: Job, raw: "RawMesh", joined: "Joined", meshes: "list[Mesh]") -> "list[Any]":
+    from cms.jobs.parts_of_job import load_case_of
+    from fe_models import loads
+
+    body, made = joined.body, []
+    for name, table in job.load_cases.items():
+        where = f"load_cases.{name}"
+        if table.each is not None:
+            forces: dict[int, Any] = {}
+            for group, force in table.each.items():
+                for node in _placed(joined, _group(raw, f"{where}.each", group), f"{where}.each = {group}").tolist():
+                    forces[node] = forces.get(node, np.zeros(6)) + np.array(force)
+            made.append(loads.nodal_load(body, name, forces))
+        elif table.kind == "pressure" and table.faces is not None:
+            mesh = next((each for each in meshes if set(table.faces) <= set(each.face_sets)), None)
+            if mesh is None:
+                raise JobError(f'{where}.faces = "{", ".join(table.faces)}": no solid of the deck has such faces')
+            made.append(_pressure(body, joined, mesh, name, table))
+        elif table.kind == "gravity":
+            made.append(load_case_of(name, table, body, None))
+        else:
+            raise JobError(f"{where}: with a deck, expected kind gravity, pressure on faces, or force with each")
+    return made
+
+
+def _pressure(body: FEBody, joined: "Joined", mesh: "Mesh", name: str, table: Any) -> Any:
+    """Return the load case of a pressure on faces of one of the solids."""
+    from fe_models.loads import nodal_load, pressure_load
+    from fe_models.meshes.selections import FaceGroup
+
+    dofs = np.stack([np.repeat(np.arange(len(mesh.nodes)), 3), np.tile(np.arange(3), len(mesh.nodes))], axis=1)
+    alone = replace(
+        body, M=_empty(len(dofs)), K=_empty(len(dofs)), D=None, nodes=mesh.nodes, dofs=dofs,
+        surface=np.zeros((0, 3), np.int64), element_model=None, recovery=None, load_cases=(), stress_points=None,
+        node_volumes=None, interfaces=(),
+    )  # fmt: skip
+    f = pressure_load(alone, mesh, name, FaceGroup(table.faces[0], tuple(table.faces[1:])), table.pressure).f.reshape(-1, 3)
+    place = joined.place[np.asarray(mesh.node_numbers)]
+    case = nodal_load(body, name, {int(n): row for n, row in zip(place, f, strict=True) if row.any()})
+    return replace(case, kind="pressure")
+
+
+def _empty(n: int) -> Any:
+    import scipy.sparse as sp
+
+    return sp.csc_array((n, n))
+
+
+def _interface(name: str, table: InterfaceSection, raw: "RawMesh", joined: "Joined") -> Interface:
+    """Return an interface on a group of nodes of the deck."""
+    if not isinstance(table.nodes, str):
+        raise JobError(f"interfaces.{name}: with a deck, expected nodes = a group of nodes, got {table.selection}")
+    nodes = _placed(joined, _group(raw, f"interfaces.{name}.nodes", table.nodes), f"interfaces.{name}")
+    points = joined.body.nodes[nodes]
+    triad = np.eye(3) if table.triad is None else np.array(table.triad).T  # the job lists axes, columns are axes
+    reference = points.mean(axis=0) if table.reference is None else np.array(table.reference)
+    return Interface(name, table.kind, nodes, reference, triad)
+
+
+def _placed(joined: "Joined", nodes: IntArray, where: str) -> IntArray:
+    """Return the nodes of the body for rows of the deck; those that no element has are refused."""
+    place = joined.place[nodes]
+    if (place < 0).any():
+        raise JobError(f"{where}: {int((place < 0).sum())} of its nodes belong to no element of the body")
+    return np.asarray(place)
+
+
+def _group(raw: "RawMesh", where: str, group: str) -> IntArray:
+    """Return the rows of a group of nodes."""
+    if group not in raw.node_sets:
+        raise JobError(f'{where} = "{group}": the deck has no such group of nodes{nearest(group, raw.node_sets)}')
+    return np.asarray(raw.node_sets[group])
+
+
+def _one(raw: "RawMesh", where: str, group: str) -> int:
+    nodes = _group(raw, where, group)
+    if len(nodes) != 1:
+        raise JobError(f'{where} = "{group}": expected a group of one node, got {len(nodes)} nodes')
+    return int(nodes[0])
+
+
+def _require_group(raw: "RawMesh", where: str, group: str) -> None:
+    groups = {name for block in raw.blocks for name in block.groups}
+    if group not in groups:
+        raise JobError(f'{where} = "{group}": the deck has no such group of cells{nearest(group, groups)}')
+
+
+def _require_used_groups(job: Job, raw: "RawMesh", joined: "Joined") -> None:
+    """Refuse cells of the deck that are in no table: their mass would be lost in silence."""
+    tables = [*(t.cells for t in job.solids.values()), *(t.cells for t in job.shells.values())]
+    groups = {group for names in (*tables, *(t.lines for t in job.sections.values())) for group in names}
+    if "all" in groups or "left-out" in job.body.accept:
+        return
+    faces = {group for table in job.load_cases.values() for group in table.faces or ()}
+    for block in raw.blocks:
+        if set(block.groups) & faces:
+            continue
+        inside = np.zeros(len(block.nodes), dtype=bool)
+        for group in groups & set(block.groups):
+            inside[block.groups[group]] = True
+        if not inside.all():
+            raise JobError(
+                f"body.deck: {int((~inside).sum())} {block.kind} cells are in no table [solids], [shells] or "
+                '[sections]; add one, or accept = ["left-out"]'
+            )

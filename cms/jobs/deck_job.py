@@ -1,0 +1,247 @@
+"""A whole deck as a job file: every table written out, and on top what was not taken over."""
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cms.errors import JobError
+from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.words import nearest, quoted
+from fe_models.importers.decks.deck import Deck, LineSection, ShellSection, SolidSection, Support
+
+__all__ = ["JobRequest", "job_text"]
+
+FEW_NODES = 50  #: of a support held in part, above which the job says what they cost
+N_MODES = 10
+COLLINEAR = 1e-6
+
+
+@dataclass(frozen=True)
+class JobRequest:
+    """What the user adds to a deck."""
+
+    units: str  #: unit system of its numbers
+    densities: Mapping[str, float]  #: of materials that have none; "" for all of them
+    leave_out: tuple[str, ...] = ()  #: entries of the ledger that carry mass or stiffness and are left out knowingly
+
+
+def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
+    """Return the text of a complete job.
+
+    Parameters
+    ----------
+    deck
+        The deck.
+    request
+        Units, densities, what to leave out.
+    deck_path
+        Of the deck, relative to the job file.
+
+    Raises
+    ------
+    MeshError
+        If the deck holds mass or stiffness that cannot be taken over and is not left out by name.
+    JobError
+        If a material lacks a constant, a support or a section names nothing.
+    """
+    deck.ledger.require_whole(request.leave_out)
+    if not (deck.solids or deck.shells or deck.lines):
+        raise JobError(f"deck {deck.path}: expected solids, shells or lines with a section, got none")
+    tables: dict[str, Any] = {
+        "body": {"name": deck.path.stem, "deck": deck_path, "units": request.units},
+        "materials": _materials(deck, request),
+    }
+    tables |= _sections(deck) | _attached(deck)
+    left_out = [name for name in request.leave_out]
+    if _has_cells_without_table(deck):
+        tables["body"]["accept"] = ["left-out"]
+    interfaces = {support.name: _interface(deck, support) for support in deck.supports}
+    tables["interfaces"] = interfaces
+    tables["load_cases"] = {load.name: _load(load) for load in deck.loads}
+    tables["reduction"] = {"set": "craig-bampton" if interfaces else "normal", "n_modes": N_MODES}
+    head = [f"# Written by cms job from {deck_path}, read as a deck of {deck.program}."]
+    if deck.ledger.entries:
+        head.append("# Not taken over from the deck (count, name: consequence):")
+        left = {name.upper().lstrip("*") for name in left_out}
+        for entry in deck.ledger.entries.values():
+            mark = "LEFT OUT ON REQUEST: " if entry.is_body and entry.name.upper().lstrip("*") in left else ""
+            head.append(f"#   {entry.count} {entry.name}: {mark}{entry.consequence}")
+    for support in deck.supports:
+        held = " ".join(MOTION_COMPONENTS[c] for c in support.components)
+        head.append(f"# The deck holds {held} at the interface {support.name}; here the body is free.")
+    return "\n".join(head) + "\n\n" + toml_text({key: value for key, value in tables.items() if value})
+
+
+def sections_of(deck: Deck) -> list[SolidSection | ShellSection | LineSection]:
+    """Return all sections of a deck."""
+    return [*deck.solids, *deck.shells, *deck.lines]
+
+
+def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
+    """Return the materials in use; a density that the deck lacks comes from the request."""
+    used = dict.fromkeys(each.material for each in sections_of(deck))
+    for name in request.densities:
+        if name and name not in used:
+            raise JobError(f"--density {quoted(name)}: the deck has no such material in use{nearest(name, used)}")
+    made, without = {}, []
+    for name in used:
+        material = deck.materials.get(name)
+        if material is None:
+            raise JobError(
+                f"deck {deck.path}: a section names the material {quoted(name)}{nearest(name, deck.materials)}"
+            )
+        density = material.density or request.densities.get(name, request.densities.get(""))
+        if material.young is None or material.poisson is None:
+            raise JobError(f"deck {deck.path}: material {quoted(name)} has no elastic constants (isotropic, linear)")
+        if not density:
+            without.append(name)
+            continue
+        made[name] = {"young": material.young, "poisson": material.poisson, "density": density}
+    if without:
+        raise JobError(
+            f"deck {deck.path}: {len(without)} materials have no density: {', '.join(without)}; give it, as "
+            f"--density {without[0]}=7.85e-9"
+        )
+    return made
+
+
+def _sections(deck: Deck) -> dict[str, Any]:
+    """Return the tables of solids, shells and lines."""
+    tables: dict[str, dict[str, Any]] = {"solids": {}, "shells": {}, "sections": {}}
+    for solid in deck.solids:
+        table = {"cells": solid.group, "material": solid.material}
+        if (solid.integration, solid.mass) != ("full", "consistent"):
+            table |= {"integration": solid.integration, "mass": solid.mass}
+        tables["solids"][_free(tables["solids"], solid.group)] = table
+    for shell in deck.shells:
+        row = {"cells": shell.group, "material": shell.material, "thickness": shell.thickness}
+        row |= {"offset": shell.offset} if shell.offset else {}
+        row |= {"added_mass": shell.added_mass} if shell.added_mass else {}
+        tables["shells"][_free(tables["shells"], shell.group)] = row
+    for line in deck.lines:
+        given: dict[str, Any] = {"lines": line.group, "material": line.material, **line.shape}
+        given |= {"orientation": list(line.orientation)} if line.orientation is not None else {}
+        given |= {"offset": list(line.offset)} if any(line.offset) else {}
+        given |= {} if line.shear else {"shear": False}
+        given |= {} if line.rotary_inertia else {"rotary_inertia": False}
+        given |= {"added_mass": line.added_mass} if line.added_mass else {}
+        tables["sections"][_free(tables["sections"], line.group)] = given
+    return tables
+
+
+def _attached(deck: Deck) -> dict[str, Any]:
+    """Return the tables of masses, springs, links, couplings and equations."""
+    tables: dict[str, dict[str, Any]] = {"masses": {}, "springs": {}, "links": {}, "couplings": {}, "equations": {}}
+    for k, mass in enumerate(deck.masses, start=1):
+        row: dict[str, Any] = {"node": mass.nodes, "mass": mass.mass}
+        if np.any(mass.inertia):
+            row["inertia"] = [list(axis) for axis in mass.inertia]
+        if any(mass.offset):
+            row["offset"] = list(mass.offset)
+        tables["masses"][f"mass_{k}"] = row
+    for k, spring in enumerate(deck.springs, start=1):
+        row = {"nodes": list(spring.nodes), "stiffness": list(spring.stiffness)}
+        row |= {"damping": list(spring.damping)} if spring.damping else {}
+        row |= {"triad": [list(axis) for axis in spring.triad]} if spring.triad else {}
+        tables["springs"][f"spring_{k}"] = row
+    for link in deck.rigid:
+        row = {"node": link.node, "followers": link.followers}
+        if link.components != tuple(range(6)):
+            row["components"] = [MOTION_COMPONENTS[c] for c in link.components]
+        tables["links"][link.name] = row
+    for coupling in deck.couplings:
+        row = {"node": coupling.node, "members": dict(coupling.members)}
+        if coupling.components != tuple(range(6)):
+            row["components"] = [MOTION_COMPONENTS[c] for c in coupling.components]
+        tables["couplings"][coupling.name] = row
+    for k, equation in enumerate(deck.equations, start=1):
+        tables["equations"][f"equation_{k}"] = {
+            "terms": [[node, MOTION_COMPONENTS[c], a] for node, c, a in equation.terms]
+        }
+    return tables
+
+
+def _interface(deck: Deck, support: Support) -> dict[str, Any]:
+    """Return the interface of a support: rigid where all of its motions are held, else node by node."""
+    nodes = deck.mesh.node_sets[support.nodes]
+    points = deck.mesh.nodes[nodes]
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    is_spread = len(nodes) >= 3 and spread[1] > COLLINEAR * spread[0]
+    turns = np.isin(nodes, _nodes_with_rotations(deck))
+    all_held = set(support.components) >= set(range(6)) if turns.any() else set(support.components) >= {0, 1, 2}
+    is_rigid = all_held and (turns.any() or is_spread)
+    return {"kind": "rigid" if is_rigid else "nodes", "nodes": support.nodes}
+
+
+def _nodes_with_rotations(deck: Deck) -> Any:
+    """Return the rows of nodes of shells, lines and leaders of rigid groups."""
+    groups = {each.group for each in sections_of(deck) if not isinstance(each, SolidSection)}
+    found = [
+        block.nodes[block.groups[group]].ravel() for block in deck.mesh.blocks for group in groups & set(block.groups)
+    ]
+    found += [deck.mesh.node_sets[link.node] for link in deck.rigid]
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
+
+
+def _has_cells_without_table(deck: Deck) -> bool:
+    """Whether cells of the deck were left out on request."""
+    groups = {each.group for each in sections_of(deck)}
+    faces = {load.faces for load in deck.loads}
+    for block in deck.mesh.blocks:
+        if faces & set(block.groups):
+            continue
+        inside = np.zeros(len(block.nodes), dtype=bool)
+        for group in groups & set(block.groups):
+            inside[block.groups[group]] = True
+        if not inside.all():
+            return True
+    return False
+
+
+def _load(load: Any) -> dict[str, Any]:
+    if load.forces is not None:
+        return {"kind": "force", "each": {group: list(force) for group, force in load.forces.items()}}
+    if load.faces is not None:
+        return {"kind": "pressure", "faces": load.faces, "pressure": load.pressure}
+    return {"kind": "gravity", "acceleration": list(load.acceleration)}
+
+
+def _free(taken: Iterable[str], name: str) -> str:
+    made, k = name, 1
+    while made in taken:
+        k += 1
+        made = f"{name}_{k}"
+    return made
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """Return tables as TOML: [a.b] for tables of tables, one key a line, inner tables in braces."""
+    lines: list[str] = []
+    for name, table in tables.items():
+        if all(isinstance(value, Mapping) for value in table.values()):
+            for inner, rows in table.items():
+                lines += [f"[{name}.{_key(inner)}]", *(f"{_key(k)} = {_value(v)}" for k, v in rows.items()), ""]
+        else:
+            lines += [f"[{name}]", *(f"{_key(k)} = {_value(v)}" for k, v in table.items()), ""]
+    return "\n".join(lines)
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(each) for each in value) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str | Path):
+        return json.dumps(str(value), ensure_ascii=False)
+    return repr(int(value)) if isinstance(value, int | np.integer) else repr(float(value))

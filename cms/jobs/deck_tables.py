@@ -1,0 +1,100 @@
+"""The tables of a reduction job that only a whole deck has (docs/job_file.md): solids, couplings, equations."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, StringConstraints
+
+from cms.jobs.beam_tables import component_numbers, names
+from fe_models.foundation.components import MOTION_COMPONENTS as COMPONENTS
+from fe_models.foundation.toml_file import Table, choice
+from fe_models.foundation.words import nearest, quoted
+from fe_models.solids.elements import INTEGRATIONS, MASSES
+
+__all__ = ["CouplingSection", "EquationSection", "SolidSection", "check_deck"]
+
+Name = Annotated[str, StringConstraints(min_length=1)]
+
+
+def equation_terms(value: Any) -> tuple[tuple[str, int, float], ...]:
+    """Return the terms of an equation: [group of one node, component, coefficient]."""
+    is_list = isinstance(value, list | tuple) and len(value) >= 2
+    if not is_list or not all(isinstance(term, list | tuple) and len(term) == 3 for term in value):
+        raise ValueError('expected two or more terms such as ["node_7", "ux", 1.0]')
+    made = []
+    for node, component, coefficient in value:
+        if component not in COMPONENTS:
+            raise ValueError(f"unknown component {quoted(component)}{nearest(str(component), COMPONENTS)}")
+        if not isinstance(node, str) or isinstance(coefficient, bool) or not isinstance(coefficient, int | float):
+            raise ValueError('expected terms such as ["node_7", "ux", 1.0]')
+        made.append((node, COMPONENTS.index(component), float(coefficient)))
+    return tuple(made)
+
+
+Components = Annotated[tuple[int, ...], BeforeValidator(component_numbers)]
+ALL = tuple(range(6))
+
+
+class SolidSection(Table):
+    """[solids.NAME]: material and formulation of a group of solid cells."""
+
+    cells: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
+        ("all",), description='"all", the name of a group of cells, or a list of names'
+    )
+    material: Name | None = Field(None, description="the name of a material; default: the only one")
+    integration: choice("integration", lambda: (*INTEGRATIONS, "incompatible")) = Field(  # type: ignore[valid-type]
+        "full", description=f"of the stiffness, one of {', '.join((*INTEGRATIONS, 'incompatible'))}"
+    )
+    mass: choice("mass", lambda: MASSES) = Field(  # type: ignore[valid-type]
+        "consistent", description=f"one of {', '.join(MASSES)}"
+    )
+
+
+class CouplingSection(Table):
+    """[couplings.NAME]: a node that follows the weighted mean motion of others (RBE3)."""
+
+    node: Name = Field(description="the name of a group that holds one node, which follows")
+    members: dict[str, float] = Field(description="a table {group = weight of each of its nodes}")
+    components: Components = Field(ALL, description="components of the node that follow, ux to rz; default: all")
+
+
+class EquationSection(Table):
+    """[equations.NAME]: Σ coefficient × component = 0."""
+
+    terms: Annotated[tuple[tuple[str, int, float], ...], BeforeValidator(equation_terms)] = Field(
+        description='two or more terms [group of one node, component, coefficient], as ["node_7", "ux", 1.0]'
+    )
+
+
+def check_deck(job: Any) -> None:
+    """Raise `ValueError` unless tables of a deck stand beside a deck, and name materials and cells that are there.
+
+    Parameters
+    ----------
+    job
+        The job, its tables read.
+    """
+    tables: Mapping[str, Any] = {"solids": job.solids, "couplings": job.couplings, "equations": job.equations}
+    if job.body.deck is None:
+        for name, given in tables.items():
+            if given:
+                raise ValueError(f"{name}: belong to a whole deck; give [body] deck, or remove the tables")
+        return
+    if job.ties or job.body.part or job.body.plane or job.body.incompatible_modes:
+        raise ValueError("body.deck: ties, part, plane and incompatible_modes belong to a mesh; remove them")
+    if not (job.solids or job.shells or job.sections):
+        raise ValueError("body.deck: expected tables [solids.NAME], [shells.NAME] or [sections.NAME], got none")
+    for kind in ("solids", "shells", "sections"):
+        for name, table in getattr(job, kind).items():
+            if table.material is None and len(job.materials) != 1:
+                raise ValueError(f"{kind}.{name}.material: missing; there are {len(job.materials)} materials, name one")
+            if table.material is not None and table.material not in job.materials:
+                raise ValueError(
+                    f'{kind}.{name}.material = "{table.material}": there is no such material'
+                    f"{nearest(table.material, job.materials)}"
+                )
+    for name, material in job.materials.items():
+        if "cells" in material.model_fields_set:
+            raise ValueError(
+                f"materials.{name}.cells: with a deck the tables of solids, shells, sections name the cells"
+            )

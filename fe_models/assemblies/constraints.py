@@ -1,0 +1,162 @@
+"""Linear constraints between components of nodes: rigid groups, mean motions, equations; and their elimination."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.body.couplings import mean_motion
+from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
+
+__all__ = ["MeanMotion", "NodeEquation", "RigidNodes", "eliminated"]
+
+ALL = (0, 1, 2, 3, 4, 5)
+NEGLIGIBLE = 1e-14  #: part of the largest coefficient of an equation below which its first one does not give way
+
+
+@dataclass(frozen=True, eq=False)
+class RigidNodes:
+    """Nodes that move rigidly with one node, in the components given."""
+
+    name: str
+    node: int
+    followers: IntArray  #: (n_followers,)
+    components: tuple[int, ...] = ALL
+
+
+@dataclass(frozen=True, eq=False)
+class MeanMotion:
+    """A node that follows the weighted mean motion of others (docs/theory.md §1)."""
+
+    name: str
+    node: int
+    members: IntArray  #: (n_members,)
+    weights: Array  #: (n_members,)
+    components: tuple[int, ...] = ALL
+
+
+@dataclass(frozen=True)
+class NodeEquation:
+    """Σ coefficient × component = 0; the first term gives way."""
+
+    name: str
+    terms: tuple[tuple[int, int, float], ...]  #: node, component, coefficient
+
+
+Constraint = RigidNodes | MeanMotion | NodeEquation
+Row = tuple[int, list[int], list[float], str]  #: dof that follows, dofs it follows, coefficients, name
+
+
+def eliminated(
+    constraints: Iterable[Constraint], points: Array, dof_of: IntArray, n_dof: int
+) -> tuple[IntArray, sp.csr_array]:
+    """Return the dofs that follow others, and their rows over all dofs.
+
+    (1) every constraint says which dofs follow which: u_s = C u
+    (2) dofs that follow dofs that follow are put in until none is left: T = C + C_s C + ..., C_s its followers' columns
+
+    Parameters
+    ----------
+    constraints
+        In any order.
+    points
+        Of the nodes, (n_nodes, 3) [m].
+    dof_of
+        Dof of each component of each node, -1 where there is none, (n_nodes, 6).
+    n_dof
+        Number of dofs.
+
+    Returns
+    -------
+    tuple
+        Followers, (n_s,), and T_s, (n_s, n_dof), zero in the columns of followers.
+
+    Raises
+    ------
+    BodyError
+        If a dof follows two constraints, constraints follow each other round, or a node lacks a dof.
+    """
+    rows = [row for constraint in constraints for row in _rows(constraint, points, dof_of)]
+    by: dict[int, str] = {}
+    for slave, _, _, name in rows:
+        if slave in by:
+            node, component = (int(i[0]) for i in np.nonzero(dof_of == slave))
+            raise BodyError(
+                f"constraints: component {component + 1} of node {node} follows two of them, {by[slave]} and {name}; "
+                "take it out of one"
+            )
+        by[slave] = name
+    slaves = np.array([row[0] for row in rows], dtype=np.int64)
+    index = np.repeat(np.arange(len(rows)), [len(row[1]) for row in rows])
+    columns = np.array([c for row in rows for c in row[1]], dtype=np.int64)
+    values = np.array([v for row in rows for v in row[2]])
+    T = sp.csr_array((values, (index, columns)), shape=(len(rows), n_dof))
+    for _ in range(len(rows) + 1):  # (2)
+        inner = sp.csr_array(T[:, slaves])
+        inner.eliminate_zeros()
+        if not inner.nnz:
+            return slaves, T
+        is_slave = np.zeros(n_dof, dtype=bool)
+        is_slave[slaves] = True
+        outer = sp.csr_array(T @ sp.diags_array((~is_slave).astype(float)))
+        T = sp.csr_array(outer + inner @ T)
+        T.eliminate_zeros()
+        if abs(T).max() > 1e8:
+            break
+    raise BodyError(f"constraints: some follow each other round a ring, such as {rows[0][3]}; open the ring")
+
+
+def _rows(constraint: Constraint, points: Array, dof_of: IntArray) -> list[Row]:
+    """Step (1) for one constraint."""
+    makers = {RigidNodes: _rigid, MeanMotion: _mean, NodeEquation: _equation}
+    made: list[Row] = makers[type(constraint)](constraint, points, dof_of)  # type: ignore[operator]
+    return made
+
+
+def _rigid(group: RigidNodes, points: Array, dof_of: IntArray) -> list[Row]:
+    rows = []
+    for node in group.followers.tolist():
+        motion = np.eye(6)
+        motion[:3] = rigid_motion_of_points(points[node][None], points[group.node])[0]
+        for c in group.components:
+            if dof_of[node, c] < 0:
+                continue
+            used = np.flatnonzero(motion[c])
+            _require(group.name, group.node, dof_of[group.node, used], used)
+            rows.append((int(dof_of[node, c]), dof_of[group.node, used].tolist(), motion[c, used].tolist(), group.name))
+    return rows
+
+
+def _mean(coupling: MeanMotion, points: Array, dof_of: IntArray) -> list[Row]:
+    A = mean_motion(points[coupling.members], coupling.weights, points[coupling.node])
+    members = dof_of[coupling.members, :3].ravel()
+    _require(coupling.name, int(coupling.members[0]), members, np.arange(3))
+    if not np.isfinite(A).all() or np.abs(A).max() > 1e12:
+        raise BodyError(f"{coupling.name}: its members cannot carry a rotation; take nodes that are not on one line")
+    return [
+        (int(dof_of[coupling.node, c]), members.tolist(), A[c].tolist(), coupling.name)
+        for c in coupling.components
+        if dof_of[coupling.node, c] >= 0
+    ]
+
+
+def _equation(equation: NodeEquation, points: Array, dof_of: IntArray) -> list[Row]:
+    dofs = [int(dof_of[node, component]) for node, component, _ in equation.terms]
+    for (node, component, _), dof in zip(equation.terms, dofs, strict=True):
+        _require(equation.name, node, np.array([dof]), np.array([component]))
+    a = np.array([coefficient for _, _, coefficient in equation.terms])
+    if abs(a[0]) <= NEGLIGIBLE * np.abs(a).max():
+        raise BodyError(f"{equation.name}: the first coefficient is {a[0]:g}; it must not vanish")
+    return [(dofs[0], dofs[1:], (-a[1:] / a[0]).tolist(), equation.name)]
+
+
+def _require(name: str, node: int, dofs: IntArray, components: Sequence[int] | IntArray) -> None:
+    missing = np.flatnonzero(np.asarray(dofs) < 0)
+    if missing.size:
+        component = int(np.asarray(components)[missing[0] % len(components)])
+        raise BodyError(
+            f"{name}: node {node} has no dof for component {component + 1}; nodes of solids have no rotations"
+        )

@@ -1,0 +1,162 @@
+"""Bodies that share nodes become one: translations and rotations of a shared node are one and the same.
+
+(1) matrices of the parts side by side; every node of the whole has the components that any part gives it, and all six
+    where it leads others
+(2) u_parts = S u, S a selection: K = Sᵀ diag(K_parts) S
+(3) constraints are eliminated, u = T u_rest (`fe_models.assemblies.constraints`)
+(4) rotations that nothing holds and that have no mass are no dofs of the whole
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.assemblies.constraints import Constraint, MeanMotion, RigidNodes, eliminated
+from fe_models.body.elimination import eliminate_dofs
+from fe_models.body.fe_body import FEBody, Recovery
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.errors import BodyError
+from fe_models.weld import WeldedModel, WeldedPoints, mesh_rows
+
+__all__ = ["Joined", "Part", "join"]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A body without interfaces, and which nodes of the whole its first nodes are."""
+
+    body: FEBody
+    nodes: IntArray  #: numbers in the whole, (n,); nodes of the body beyond n are its own (skin)
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """The whole, and where its nodes are among those of the body."""
+
+    body: FEBody
+    place: IntArray  #: node of the body for each node of the whole, -1 where it has none, (n_nodes,)
+
+
+def join(name: str, parts: Sequence[Part], points: Array, constraints: Iterable[Constraint] = ()) -> Joined:
+    """Make one body of parts that share nodes.
+
+    Parameters
+    ----------
+    name
+        Of the whole.
+    parts
+        In one unit system and the same axes.
+    points
+        Of all nodes of the whole, used or not, (n_nodes, 3) [m].
+    constraints
+        Between nodes of the whole.
+
+    Raises
+    ------
+    BodyError
+        If there is no part, or a constraint is impossible.
+    """
+    constraints = list(constraints)
+    if not parts:
+        raise BodyError(f"body {name!r}: expected parts, got none")
+    first_node = np.cumsum([0, *(len(part.body.nodes) for part in parts)])
+    place = np.full(len(points), -1)
+    for part, begin in zip(reversed(parts), reversed(first_node[:-1].tolist()), strict=True):
+        place[part.nodes] = begin + np.arange(len(part.nodes))
+    leaders = _leaders(constraints)
+    added = leaders[place[leaders] < 0]
+    place[added] = first_node[-1] + np.arange(len(added))
+    dofs, S, dof_of = _shared_dofs(parts, first_node, place, leaders)
+    bodies = [part.body for part in parts]
+    whole = _side_by_side(name, bodies, S, dofs, np.concatenate([b.nodes for b in bodies] + [points[added]]))
+    slaves, T_s = eliminated(constraints, points, dof_of, whole.n_dof)
+    if len(slaves):
+        whole = eliminate_dofs(whole, slaves, T_s)
+    return Joined(_without_idle_rotations(whole), place)
+
+
+def _leaders(constraints: list[Constraint]) -> IntArray:
+    """Return the nodes that need six dofs: those that lead rigid groups or follow mean motions."""
+    return np.unique([c.node for c in constraints if isinstance(c, RigidNodes | MeanMotion)]).astype(np.int64)
+
+
+def _shared_dofs(
+    parts: Sequence[Part], first_node: IntArray, place: IntArray, leaders: IntArray
+) -> tuple[IntArray, sp.csr_array, IntArray]:
+    """Steps (1) and (2): dofs of the whole, S, and the dof of each component of each node, (n_nodes, 6)."""
+    keys, own = [], []
+    for part, begin in zip(parts, first_node[:-1], strict=True):
+        node, component = part.body.dofs.T
+        is_shared = node < len(part.nodes)
+        at = np.where(is_shared, place[part.nodes[np.minimum(node, len(part.nodes) - 1)]], begin + node)
+        keys.append(6 * at + component)
+        own.append(is_shared)
+    asked = (6 * place[leaders][:, None] + np.arange(6)).ravel()
+    side = np.concatenate(keys)
+    found = np.unique(np.concatenate([side, asked]))
+    S = sp.csr_array(
+        (np.ones(len(side)), (np.arange(len(side)), np.searchsorted(found, side))), shape=(len(side), len(found))
+    )
+    dofs = np.stack([found // 6, found % 6], axis=1)
+    dof_of = np.full((len(place), 6), -1)
+    wanted = 6 * place[:, None] + np.arange(6)
+    at = np.minimum(np.searchsorted(found, wanted), len(found) - 1)
+    has = (found[at] == wanted) & (place >= 0)[:, None]
+    dof_of[has] = at[has]
+    return dofs, S, dof_of
+
+
+def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArray, nodes: Array) -> FEBody:
+    first = np.cumsum([0, *(len(body.nodes) for body in bodies)])
+    recoveries = [
+        Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
+        for body in bodies
+    ]
+    n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
+    models = [body.element_model for body in bodies]
+    volumes = [np.zeros(len(b.nodes)) if b.node_volumes is None else b.node_volumes for b in bodies]
+    points = tuple(
+        (body.name, body.stress_points, rows)
+        for body, rows in zip(bodies, mesh_rows(n_mesh_dof), strict=True)
+        if body.stress_points is not None
+    )
+    n_added = len(nodes) - int(first[-1])
+    has_volumes = any(volume.any() for volume in volumes)
+    counts = tuple(len(body.nodes) for body in bodies)
+    return FEBody(
+        name=name,
+        M=S.T @ sp.block_diag([body.M for body in bodies], format="csc") @ S,
+        K=S.T @ sp.block_diag([body.K for body in bodies], format="csc") @ S,
+        D=None
+        if all(body.D is None for body in bodies)
+        else S.T @ sp.block_diag([sp.csc_array(b.K.shape) if b.D is None else b.D for b in bodies], format="csc") @ S,
+        nodes=nodes,
+        dofs=dofs,
+        units=bodies[0].units,
+        surface=np.concatenate([body.surface + begin for body, begin in zip(bodies, first, strict=False)]),
+        element_model=None
+        if any(model is None for model in models)
+        else WeldedModel(tuple(model for model in models if model is not None), n_mesh_dof, counts),
+        recovery=Recovery(
+            sp.csr_array(sp.block_diag([recovery.matrix for recovery in recoveries], format="csr") @ S),
+            np.concatenate([r.dofs + np.array([n, 0]) for r, n in zip(recoveries, first, strict=False)]),
+        ),
+        stress_points=WeldedPoints(points) if points else None,
+        node_volumes=np.concatenate([*volumes, np.zeros(n_added)]) if has_volumes else None,
+        provenance={
+            f"{body.name}: {key}" if len(bodies) > 1 else key: value
+            for body in bodies
+            for key, value in body.provenance.items()
+        },
+    )
+
+
+def _without_idle_rotations(body: FEBody) -> FEBody:
+    """Step (4); a rotation with mass and no stiffness stays, and shows as a motion without frequency."""
+    is_idle = body.dofs[:, 1] >= 3
+    for A in (body.K, body.M):
+        is_idle &= np.asarray(abs(A).sum(axis=0)).ravel() == 0
+    idle = np.flatnonzero(is_idle)
+    return eliminate_dofs(body, idle, sp.csr_array((len(idle), body.n_dof))) if len(idle) else replace(body)

@@ -1,0 +1,135 @@
+"""Bodies on shared nodes: the whole is the whole, constraints are congruences, rigid motions stay free."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fe_models.assemblies.constraints import MeanMotion, NodeEquation, RigidNodes
+from fe_models.assemblies.join import Part, join
+from fe_models.beams.attachments import PointMass
+from fe_models.beams.body import beam_body
+from fe_models.body.couplings import couple, mean_motion
+from fe_models.body.fe_body import Interface
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.units import unit_system
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.unused_nodes import drop_unused_nodes
+from fe_models.solids.body import solid_body
+from tests.bodies import STEEL, box_mesh
+
+UNITS = unit_system("m-kg-s")
+
+
+def solid_part(mesh, rows):
+    kind = next(iter(mesh.cells))
+    piece = drop_unused_nodes(Mesh(mesh.nodes, {kind: mesh.cells[kind][rows]}, node_numbers=np.arange(len(mesh.nodes))))
+    return Part(solid_body(piece, STEEL, name=f"part {rows[0]}", units=UNITS), piece.node_numbers)
+
+
+def rigid_motions(body):
+    motion = np.zeros((body.n_dof, 6))
+    for k, (node, component) in enumerate(body.dofs):
+        r = body.nodes[node]
+        spin = np.array([[0, r[2], -r[1]], [-r[2], 0, r[0]], [r[1], -r[0], 0]])
+        motion[k] = [*np.eye(3)[component], *spin[component]] if component < 3 else np.eye(6)[component]
+    return motion
+
+
+def test_two_halves_on_shared_nodes_are_the_whole():
+    mesh = box_mesh(4, 2, 1, kind="hexahedron20")
+    whole = solid_body(mesh, STEEL, name="whole", units=UNITS)
+    joined = join("joined", [solid_part(mesh, np.arange(4)), solid_part(mesh, np.arange(4, 8))], mesh.nodes)
+    place = np.zeros((len(mesh.nodes), 3), np.int64)
+    for k, (node, component) in enumerate(joined.body.dofs):
+        place[np.flatnonzero(joined.place == node)[0], component] = k
+    order = place.ravel()
+    assert joined.body.n_dof == whole.n_dof
+    for ours, theirs in ((joined.body.K, whole.K), (joined.body.M, whole.M)):
+        ours, theirs = ours.toarray()[np.ix_(order, order)], theirs.toarray()
+        assert_allclose(ours, theirs, rtol=0, atol=1e-13 * np.abs(theirs).max())
+    u = np.random.default_rng(0).normal(size=(whole.n_dof, 2))
+    v = np.zeros_like(u)
+    v[order] = u
+    gram = joined.body.element_model.mass_gram(joined.body.mesh_displacement(v))
+    assert_allclose(gram, whole.element_model.mass_gram(u), rtol=0, atol=1e-12 * np.abs(gram).max())
+
+
+def test_a_rigid_group_is_the_rigid_interface_of_the_same_nodes():
+    mesh = box_mesh(3, 1, 1)
+    body = solid_body(mesh, STEEL, name="b", units=UNITS)
+    members, point = mesh.node_sets["right"], np.array([1.3, 0.5, 0.5])
+    coupled = couple(body.with_interfaces(Interface("right", "rigid", members, point)))
+    points = np.vstack([mesh.nodes, point])
+    leader = len(mesh.nodes)
+    part = Part(body, np.arange(len(mesh.nodes)))
+    joined = join("j", [part], points, [RigidNodes("right", leader, members)]).body
+    for ours, theirs in ((joined.K, coupled.K), (joined.M, coupled.M)):
+        assert_allclose(ours.toarray(), theirs.toarray(), rtol=0, atol=1e-12 * np.abs(theirs.toarray()).max())
+
+
+def test_mass_on_the_leader_of_a_group_and_rotations_without_stiffness():
+    """A mass at a node of a solid has no rotation there; on the leader of a rigid group its inertia counts."""
+    mesh = box_mesh(3, 1, 1)
+    body = solid_body(mesh, STEEL, name="b", units=UNITS)
+    members, leader = mesh.node_sets["right"], len(mesh.nodes)
+    points = np.vstack([mesh.nodes, [1.3, 0.5, 0.5]])
+    at = np.array([0, leader])
+    attached = beam_body(
+        LineMesh(points[at], np.zeros((0, 2), np.int64)), {}, name="masses", units=UNITS,
+        point_masses=[PointMass(0, 7.0), PointMass(1, 11.0, (1.0, 2.0, 3.0))],
+    )  # fmt: skip
+    parts = [Part(body, np.arange(leader)), Part(attached, at)]
+    joined = join("j", parts, points, [RigidNodes("right", leader, members)]).body
+    rotations = joined.dofs[joined.dofs[:, 1] >= 3]
+    assert len(rotations) == 3  # of the leader alone
+    R = rigid_motions(joined)
+    assert np.abs(joined.K @ R).max() < 1e-12 * np.abs(joined.K.toarray()).max()
+    mass = R.T @ joined.M @ R
+    assert_allclose(mass[0, 0], STEEL.rho + 18.0, rtol=1e-12)
+    solid = rigid_motions(body)
+    arms = [np.array([0.0, 0.0, 0.0]), points[leader]]
+    inertia = (solid.T @ body.M @ solid)[3:, 3:] + np.diag([1.0, 2.0, 3.0])
+    inertia += sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip((7.0, 11.0), arms, strict=True))
+    assert_allclose(mass[3:, 3:], inertia, rtol=0, atol=1e-11 * np.abs(inertia).max())
+
+
+def test_a_mean_motion_follows_its_members_and_leaves_rigid_motions_free():
+    mesh = box_mesh(3, 1, 1)
+    body = solid_body(mesh, STEEL, name="b", units=UNITS)
+    members, node = mesh.node_sets["right"], len(mesh.nodes)
+    points = np.vstack([mesh.nodes, [1.3, 0.5, 0.5]])
+    attached = beam_body(
+        LineMesh(points[[node]], np.zeros((0, 2), np.int64)), {}, name="m", units=UNITS,
+        point_masses=[PointMass(0, 11.0, (1.0, 2.0, 3.0))],
+    )  # fmt: skip
+    weights = np.array([1.0, 2.0, 3.0, 4.0])
+    coupling = MeanMotion("c", node, members, weights)
+    joined = join("j", [Part(body, np.arange(node)), Part(attached, np.array([node]))], points, [coupling]).body
+    assert joined.n_dof == body.n_dof
+    dofs = (3 * members[:, None] + np.arange(3)).ravel()
+    A = mean_motion(points[members], weights, points[node])
+    expected = body.M.toarray()
+    expected[np.ix_(dofs, dofs)] += A.T @ np.diag([11.0, 11.0, 11.0, 1.0, 2.0, 3.0]) @ A
+    assert_allclose(joined.M.toarray(), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    assert_array_equal(joined.K.toarray(), body.K.toarray())
+
+
+def test_equations_are_resolved_along_their_chain_and_rings_are_refused():
+    mesh = box_mesh(1, 1, 1)
+    body = solid_body(mesh, STEEL, name="b", units=UNITS)
+    part = [Part(body, np.arange(8))]
+    first = NodeEquation("first", ((0, 0, 2.0), (1, 0, -1.0)))  # u_0 = u_1 / 2
+    second = NodeEquation("second", ((1, 0, 1.0), (2, 1, 3.0)))  # u_1 = -3 v_2
+    joined = join("j", part, mesh.nodes, [first, second]).body
+    T = np.delete(np.eye(24), [0, 3], axis=1)
+    v_2 = 7 - 2
+    T[0, v_2], T[3, v_2] = -1.5, -3.0
+    assert_allclose(joined.K.toarray(), T.T @ body.K @ T, rtol=0, atol=1e-12 * np.abs(body.K.toarray()).max())
+    ring = NodeEquation("ring", ((2, 1, 1.0), (0, 0, 1.0)))
+    with pytest.raises(BodyError, match="round a ring"):
+        join("j", part, mesh.nodes, [first, second, ring])
+    with pytest.raises(BodyError, match="component 1 of node 0 follows two of them, first and again"):
+        join("j", part, mesh.nodes, [first, NodeEquation("again", ((0, 0, 1.0), (2, 0, 1.0)))])
+    with pytest.raises(BodyError, match="node 1 has no dof for component 4; nodes of solids have no rotations"):
+        join("j", part, mesh.nodes, [NodeEquation("turn", ((0, 0, 1.0), (1, 3, 1.0)))])

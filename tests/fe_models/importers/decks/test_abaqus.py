@@ -1,0 +1,174 @@
+"""Decks of Abaqus and CalculiX: what is in the record, what is in the ledger, what is refused."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from fe_models.errors import MeshError
+from fe_models.importers.decks.deck import DeckMaterial, LineSection, ShellSection, SolidSection
+from fe_models.importers.decks.read_deck import read_deck
+
+DECK = """*HEADING
+*NODE, NSET=NALL
+1, 0, 0, 0
+2, 1, 0, 0
+3, 1, 1, 0
+4, 0, 1, 0
+5, 0, 0, 1
+6, 1, 0, 1
+7, 1, 1, 1
+8, 0, 1, 1
+20, 3, 0, 0
+21, 4, 0, 0
+22, 5, 0, 0
+30, 0, 0, 5
+*ELEMENT, TYPE=C3D8I, ELSET=block
+1, 1, 2, 3, 4, 5, 6, 7, 8
+*ELEMENT, TYPE=S4R, ELSET=skin
+2, 5, 6, 7, 8
+*ELEMENT, TYPE=B32R, ELSET=arm
+3, 20, 21, 22
+*ELEMENT, TYPE=MASS, ELSET=lead
+4, 30
+*ELEMENT, TYPE=SPRINGA, ELSET=coil
+5, 7, 20
+*MASS, ELSET=lead
+2.5
+*SPRING, ELSET=coil
+
+1000.
+*NSET, NSET=foot
+1, 2, 3, 4
+*NSET, NSET=top
+5, 6, 7, 8
+*RIGID BODY, NSET=top, REF NODE=30
+*EQUATION
+2
+20, 2, 1., 7, 2, -1.
+*SOLID SECTION, ELSET=block, MATERIAL=Steel
+*SHELL SECTION, ELSET=skin, MATERIAL=STEEL, OFFSET=0.5
+0.1
+*BEAM SECTION, ELSET=arm, MATERIAL=STEEL, SECTION=RECT
+0.2, 0.3
+0., 1., 0.
+*MATERIAL, NAME=STEEL
+*ELASTIC
+210., .25
+*DENSITY
+7.8
+*EXPANSION
+1e-5
+*BOUNDARY
+foot, 1, 3
+22, 2
+*STEP
+*STATIC
+*CLOAD
+20, 3, -4.
+top, 1, 1.
+*DLOAD
+block, P1, 9.
+block, GRAV, 9.81, 0., 0., -2.
+*END STEP
+"""
+
+
+def deck_of(tmp_path, text=DECK, **options):
+    path = tmp_path / "model.inp"
+    path.write_text(text)
+    return read_deck(path, **options)
+
+
+def numbers(deck, group):
+    return sorted(deck.mesh.node_numbers[deck.mesh.node_sets[group]].tolist())
+
+
+def test_a_deck_is_read_whole(tmp_path):
+    deck = deck_of(tmp_path)
+    assert deck.materials == {"STEEL": DeckMaterial("STEEL", 210.0, 0.25, 7.8)}
+    assert deck.solids == (SolidSection("block", "STEEL", "incompatible", "consistent"),)
+    assert deck.shells == (ShellSection("skin", "STEEL", 0.1, -0.05),)
+    shape = {"shape": "rectangle", "width": 0.2, "height": 0.3}
+    assert deck.lines == (LineSection("arm", "STEEL", shape, (0.0, 1.0, 0.0)),)
+    assert [(numbers(deck, mass.nodes), mass.mass) for mass in deck.masses] == [([30], 2.5)]
+    spring = deck.springs[0]
+    assert [numbers(deck, group) for group in spring.nodes] == [[7], [20]]
+    assert spring.stiffness == (1000.0, 0, 0, 0, 0, 0)
+    assert_allclose(spring.triad[0], np.array([2, -1, -1]) / np.sqrt(6), rtol=1e-14)
+    link = deck.rigid[0]
+    assert (numbers(deck, link.node), numbers(deck, link.followers)) == ([30], [5, 6, 7, 8])
+    terms = [(numbers(deck, group), component, a) for group, component, a in deck.equations[0].terms]
+    assert terms == [([20], 1, 1.0), ([7], 1, -1.0)]
+    supports = {support.name: (numbers(deck, support.nodes), support.components) for support in deck.supports}
+    assert supports == {"foot": ([1, 2, 3, 4], (0, 1, 2)), "node_22": ([22], (1,))}
+
+
+def test_loads_of_a_step_are_forces_pressures_and_gravity(tmp_path):
+    forces, pressure, gravity = deck_of(tmp_path).loads
+    assert forces.forces == {"node_20": (0, 0, -4.0, 0, 0, 0), "top": (1.0, 0, 0, 0, 0, 0)}
+    deck = deck_of(tmp_path)
+    faces = next(block for block in deck.mesh.blocks if pressure.faces in block.groups)
+    assert (pressure.pressure, faces.kind) == (9.0, "quad")
+    assert_array_equal(deck.mesh.node_numbers[faces.nodes], [[1, 2, 3, 4]])
+    assert_allclose(gravity.acceleration, [0, 0, -9.81], rtol=1e-15)
+
+
+def test_the_ledger_counts_what_is_not_taken_over_and_why(tmp_path):
+    rows = deck_of(tmp_path).ledger.rows()
+    assert ("*STATIC", "1", "belongs to the analysis, not to the body") in rows
+    assert ("*EXPANSION", "1", "heat is not part of the body") in rows
+    assert ("*DLOAD, GRAV", "1", "acts on the whole body, not on a set of elements") in rows
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("*STEP", "*CONTACT PAIR, INTERACTION=I\na, b\n*STEP", r"1 \*CONTACT PAIR \(first: line"),
+        ("*EXPANSION", "*PLASTIC", r"1 \*PLASTIC \(first: line 4\d\): the material is plastic"),
+        ("*SHELL SECTION, ELSET=skin, MATERIAL=STEEL, OFFSET=0.5\n0.1\n", "", "1 S4R: elements without a section"),
+        ("TYPE=S4R", "TYPE=CPS4R", "1 CPS4R: not an element of"),
+        ("TYPE=C3D8I", "TYPE=C3D8X", "1 C3D8X .*: this element is not known here"),
+        ("*ELASTIC\n", "*ELASTIC, TYPE=ORTHO\n", r"1 \*ELASTIC, TYPE=ORTHO"),
+        ("SPRING, ELSET=coil", "SPRING, NONLINEAR, ELSET=coil", r"1 \*SPRING, NONLINEAR"),
+        ("*RIGID BODY, NSET=top, REF NODE=30", "*TIE, NAME=t\na, b", r"1 \*TIE"),
+        ("SECTION=RECT", "SECTION=TRAPEZOID", "SECTION=TRAPEZOID: this shape is not known here"),
+    ],
+)
+def test_mass_and_stiffness_are_never_left_out_unasked(tmp_path, old, new, words):
+    assert old in DECK
+    deck = deck_of(tmp_path, DECK.replace(old, new, 1))
+    with pytest.raises(MeshError, match=words) as caught:
+        deck.ledger.require_whole()
+    assert "--leave-out" in str(caught.value)
+    entry = next(each for each in deck.ledger.entries.values() if each.is_body)
+    deck.ledger.require_whole([entry.name])
+    with pytest.raises(MeshError, match="the deck has no such thing to be left out"):
+        deck.ledger.require_whole([entry.name, "NOTHING"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("foot, 1, 3", "feet, 1, 3", r"\*BOUNDARY: unknown node set 'feet'; choices: FOOT, NALL, TOP"),
+        ("ELSET=block, MAT", "ELSET=blok, MAT", r"\*SOLID SECTION: unknown element set 'blok'"),
+        ("210., .25", "soft", r"\*ELASTIC: cannot be understood .*first line below: \['soft'\]"),
+        ("20, 2, 1., 7, 2, -1.", "20, 2, 1., 99, 2, -1.", "names node 99, which is not in the deck"),
+    ],
+)
+def test_damaged_decks_are_refused_with_place_and_reason(tmp_path, old, new, words):
+    assert old in DECK
+    with pytest.raises(MeshError, match=words):
+        deck_of(tmp_path, DECK.replace(old, new, 1))
+
+
+def test_the_same_deck_of_abaqus_has_other_masses(tmp_path):
+    assert deck_of(tmp_path, program="abaqus").solids[0].mass == "lumped"
+    with pytest.raises(MeshError, match="unknown program 'ansys'; expected one of calculix, abaqus"):
+        deck_of(tmp_path, program="ansys")
+
+
+def test_suffixes_that_are_no_deck_and_missing_files_are_refused(tmp_path):
+    with pytest.raises(MeshError, match=r"unknown suffix '\.xyz'"):
+        read_deck(tmp_path / "a.xyz")
+    with pytest.raises(MeshError, match="cannot be read: No such file"):
+        read_deck(tmp_path / "a.inp")
