@@ -282,7 +282,9 @@ def _pressure(body: FEBody, joined: "Joined", mesh: "Mesh", name: str, table: An
         surface=np.zeros((0, 3), np.int64), element_model=None, recovery=None, load_cases=(), stress_points=None,
         node_volumes=None, interfaces=(),
     )  # fmt: skip
-    f = pressure_load(alone, mesh, name, FaceGroup(table.faces[0], tuple(table.faces[1:])), table.pressure).f.reshape(-1, 3)
+    f = pressure_load(alone, mesh, name, FaceGroup(table.faces[0], tuple(table.faces[1:])), table.pressure).f.reshape(
+        -1, 3
+    )
     place = joined.place[np.asarray(mesh.node_numbers)]
     case = nodal_load(body, name, {int(n): row for n, row in zip(place, f, strict=True) if row.any()})
     return replace(case, kind="pressure")

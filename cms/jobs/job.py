@@ -19,8 +19,8 @@ from cms.jobs.beam_tables import (
     numbers,
 )
 from cms.jobs.damping_table import DampingSection
-from cms.jobs.mesh_size_table import MeshSizeSection, check_mesh_size
 from cms.jobs.deck_tables import CouplingSection, EquationSection, SolidSection, check_deck
+from cms.jobs.mesh_size_table import MeshSizeSection, check_mesh_size
 from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
 from fe_models.body.fe_body import INTERFACE_KINDS
@@ -384,8 +384,7 @@ class Job(Table):
                 raise ValueError(f"interfaces.{name}.on: {what}")
         if self.body.matrices and self.materials:
             raise ValueError("materials: matrices have their material inside; remove the tables [materials.NAME]")
-        brings_interfaces = self.body.brings_interfaces
-        if brings_interfaces and self.interfaces:
+        if self.body.brings_interfaces and self.interfaces:
             raise ValueError(
                 "interfaces: matrices bring their interfaces in the .npz file (interface/NAME/nodes); remove the tables"
             )
@@ -400,6 +399,8 @@ class Job(Table):
         return self._names_of_interfaces()
 
     def _names_of_interfaces(self) -> "Job":
+        """Refuse names of interfaces that are not there."""
+        brings_interfaces = self.body.brings_interfaces
         for where, name in named_interfaces(self.reduction).items():
             if not brings_interfaces and name not in self.interfaces:
                 raise ValueError(f"reduction.{where}: there is no such interface{nearest(name, self.interfaces)}")
