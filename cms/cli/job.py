@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cms.cli.console import output_path, print_table, say
+from cms.decks.job_text import JobRequest, job_text
 from cms.errors import JobError
-from cms.jobs.deck_job import JobRequest, job_text
 from fe_models.foundation.units import UNIT_SYSTEMS
 from fe_models.foundation.words import nearest, quoted
 

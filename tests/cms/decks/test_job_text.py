@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 import cms
 from cms.cli.app import app
+from cms.decks.job_text import JobRequest, job_text
 from cms.errors import JobError
 from cms.jobs.body_of_job import job_body, uncoupled_body
-from cms.jobs.deck_job import JobRequest, job_text
 from cms.jobs.job import read_job
 from fe_models.foundation.stages import Stages
 from fe_models.importers.decks.read_deck import read_deck

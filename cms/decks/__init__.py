@@ -1,0 +1,1 @@
+"""Jobs written from whole decks of finite element programs."""
