@@ -15,6 +15,10 @@ from .fe_names import Units as Units
 from .fe_names import couple as couple
 from .fe_names import unit_system as unit_system
 from .frame_conversion import convert_frame as convert_frame
+from .importers.import_body import import_body as import_body
+from .importers.inertia import FullMass as FullMass
+from .importers.inertia import MeshMass as MeshMass
+from .importers.inertia import NodalMasses as NodalMasses
 from .jobs.reduce_job import reduce_job as reduce_job
 from .meshless_beams.assumed_beam import beam_from_assumed_modes as beam_from_assumed_modes
 from .modal_file.file import convert_units as convert_units

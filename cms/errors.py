@@ -9,6 +9,7 @@ __all__ = [
     "EigenError",
     "ExportError",
     "FactorizationError",
+    "ForeignBodyError",
     "JobError",
     "ModalFileError",
     "ModeSetError",
@@ -22,6 +23,10 @@ class ModeSetError(CmsError, ValueError):
 
 class FactorizationError(CmsError, RuntimeError):
     """A sparse matrix could not be factorised: singular, indefinite or too large."""
+
+
+class ForeignBodyError(CmsError, ValueError):
+    """A body that another program has reduced cannot be read truthfully, or lacks what a reduced body needs."""
 
 
 class CompareError(CmsError, ValueError):

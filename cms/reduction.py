@@ -2,6 +2,7 @@
 
 import platform
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import metadata
 
 import numpy as np
@@ -13,7 +14,7 @@ from cms.families.sharing import body_of
 from cms.mode_set import ModeSet
 from cms.reduced_basis.damping import Damping, modal_damping
 from cms.reduced_basis.finishing import FinishedBasis, finish
-from cms.reduced_basis.frames import Frame, HeldFrame, TisserandFrame, frame_condition
+from cms.reduced_basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
 from cms.reduced_basis.matrix_moments import gram_from_matrices
 from cms.reduced_basis.node_motion import reference_motion
 from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
@@ -28,7 +29,7 @@ from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase, ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["reduce"]
+__all__ = ["assembled", "reduce"]
 
 
 def reduce(
@@ -93,6 +94,36 @@ def reduce(
     finished = finish(body, modes, condition)
     kept = kept_nodes(body)
     axes, origin = condition.frame.axes, condition.frame.origin
+    moments = reduced_moments(body, finished.Phi, condition.frame)
+    return replace(
+        assembled(body, modes, finished, condition, kept=kept, moments=moments, damping=damping),
+        stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
+        point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
+        geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
+        quadratic=quadratic_modes(source, finished.Phi, condition, kept) if quadratic else None,
+    )
+
+
+def assembled(
+    body: FEBody,
+    modes: ModeSet,
+    finished: FinishedBasis,
+    condition: FrameCondition,
+    *,
+    kept: IntArray,
+    moments: Moments,
+    damping: Damping | None = None,
+) -> ReducedBody:
+    """Return the reduced body of a finished basis at the nodes that are kept, without stress and second order.
+
+    Parameters
+    ----------
+    kept
+        Nodes of the body, ascending; among them surface and members of interfaces, (n_kept,).
+    moments
+        Of the shapes in the frame of `condition`.
+    """
+    axes, origin = condition.frame.axes, condition.frame.origin
     # components in B; exact zeros of aligned axes stay exact
     Phi_kept = np.einsum("ba,nbk->nak", axes, body.translations(finished.Phi)[kept])
     index_of = np.full(len(body.nodes), -1, np.int64)
@@ -107,7 +138,7 @@ def reduce(
         labels=finished.columns.mode_labels(),
         energy_shares=finished.columns.group_shares(),
         sources=finished.columns.sources,
-        moments=reduced_moments(body, finished.Phi, condition.frame),
+        moments=moments,
         free_frequencies=np.sqrt(np.maximum(finished.free_omega2, 0.0)) / (2 * np.pi),
         nodes=(body.nodes[kept] - origin) @ axes,
         node_ids=kept,
@@ -120,10 +151,6 @@ def reduce(
         columns=finished.columns,
         nodal_sums=reduced_nodal_sums(body, finished.Phi, condition.frame),
         load_cases=tuple(reduced_load_case(body, case, finished.Phi, condition.frame) for case in body.load_cases),
-        stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
-        point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
-        geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
-        quadratic=quadratic_modes(source, finished.Phi, condition, kept) if quadratic else None,
     )
 
 

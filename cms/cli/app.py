@@ -140,6 +140,72 @@ def export_command(
     run_export(ExportRequest(file, to, units, nodes, output, tuple(load or ())))
 
 
+@app.command("import")
+@guarded
+def import_command(
+    files: Annotated[list[str], typer.Argument(help="Files of one body, or of its matrices as K=FILE M=FILE.")],
+    units: Annotated[
+        str | None, typer.Option(help="Unit system of the files, such as mm-t-s; it has to be said.")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the body; default: of the first file.")] = None,
+    form: Annotated[
+        str | None, typer.Option("--format", help="Format, by the name in cms formats; default: told by the content.")
+    ] = None,
+    nodes: Annotated[Path | None, typer.Option(help="Deck or mesh with the places that the files lack.")] = None,
+    boundary: Annotated[
+        str | None, typer.Option(help="Of bare matrices: boundary nodes in the order of the rows, 3,11,19.")
+    ] = None,
+    interface: Annotated[
+        list[str] | None, typer.Option("--interface", help="An interface by its nodes, NAME=3,11; repeatable.")
+    ] = None,
+    full_mass: Annotated[
+        list[str] | None, typer.Option("--full-mass", help="Mass of the full model, for 3C to 5C; repeatable.")
+    ] = None,
+    nodal_masses: Annotated[Path | None, typer.Option(help="Table of node and mass, instead of the full mass.")] = None,
+    mesh: Annotated[Path | None, typer.Option(help="Mesh behind the body, with --density, instead.")] = None,
+    density: Annotated[float | None, typer.Option(help="Of the mesh, in the units of the files.")] = None,
+    to: Annotated[str, typer.Option("--frame", help="Body frame: tisserand, buckens or nodal.")] = "tisserand",
+    at: Annotated[str | None, typer.Option("--at", help="Interface that carries a nodal frame.")] = None,
+    damping: Annotated[float | None, typer.Option(help="Ratio of every mode, beside the damping of the files.")] = None,
+    mend_mass: Annotated[bool, typer.Option("--mend-mass", help="Set slightly negative masses to zero.")] = False,
+    accept: Annotated[list[str] | None, typer.Option(help="Findings to accept: units.")] = None,
+    output: Output = None,
+) -> None:
+    """Make a modal file of a body that another program has reduced, and say what that program did not say.
+
+    Example: cms import outboard.op4 --units mm-kg-s -o outboard.h5
+
+    Example: cms import K=k.mtx M=m.mtx dofs=rows.txt --nodes model.inp --units mm-t-s -o part.h5
+
+    Example: cms import part.op4 --units mm-t-s --nodal-masses masses.csv --interface hub=11
+    """
+    from cms.cli.exchange.import_body import ImportRequest, run_import
+
+    print_body(
+        run_import(
+            ImportRequest(
+                tuple(files),
+                units,
+                output,
+                name,
+                form,
+                nodes,
+                boundary,
+                tuple(interface or ()),
+                tuple(full_mass or ()),
+                nodal_masses,
+                mesh,
+                density,
+                to,
+                at,
+                damping,
+                mend_mass,
+                tuple(accept or ()),
+            )
+        )
+    )
+
+
 @app.command("check")
 @guarded
 def check_command(

@@ -22,10 +22,10 @@ NOTHING = 1e-13  #: entry of such a vector, of its largest, that is left out so 
 
 
 def scales(M: sp.csc_array, dofs: IntArray) -> Array:
-    """Return the root of the largest mass of a translation, and of the largest inertia of a rotation, one per dof."""
+    """Return the root of the largest mass of a translation and of a modal coordinate, and inertia of a rotation."""
     diagonal = np.abs(M.diagonal())
     size = np.ones(len(dofs))
-    for is_kind in (dofs[:, 1] < 3, dofs[:, 1] >= 3):
+    for is_kind in (dofs[:, 1] < 0, (dofs[:, 1] >= 0) & (dofs[:, 1] < 3), dofs[:, 1] >= 3):
         largest = diagonal[is_kind].max(initial=0.0)
         size[is_kind] = np.sqrt(largest) if largest > 0 else 1.0
     return size
