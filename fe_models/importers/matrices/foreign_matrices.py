@@ -1,7 +1,7 @@
 """What the files of another program say of mass and stiffness, before it is judged: one record for all readers."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ class ForeignMatrices:
     M: sp.csc_array | None = None  #: mass, (n_dof, n_dof)
     D: sp.csc_array | None = None  #: viscous damping, (n_dof, n_dof)
     dofs: IntArray | None = None  #: (node number, component 0-5 or `SCALAR`) of every row, (n_dof, 2); None: not said
+    row_nodes: IntArray | None = None  #: instead of dofs: the nodes of the rows in their order, 3 or 6 rows to each
     node_numbers: IntArray | None = None  #: of `nodes`, (n_nodes,)
     nodes: Array | None = None  #: positions in the basic axes of the model, (n_nodes, 3); None: not said
     #: node number -> R, (3, 3): columns are the axes, in basic axes, in which its dofs are written; others: basic axes
@@ -76,6 +77,12 @@ class ForeignMatrices:
                     f"dofs: expected components 0 to 5, got {self.dofs[:, 1].min()} to {self.dofs[:, 1].max()}"
                 )
             n = len(self.dofs)
+        if self.row_nodes is not None:
+            put(self, "row_nodes", frozen_int(self.row_nodes))
+            if n is not None and n not in (3 * len(self.row_nodes), 6 * len(self.row_nodes)):
+                raise MatrixError(
+                    f"row_nodes: expected 3 or 6 of {n} rows to each node, got a list of {len(self.row_nodes)} nodes"
+                )
         if (self.nodes is None) != (self.node_numbers is None):
             raise MatrixError("nodes: expected positions and numbers of the nodes together, got one of them")
         if self.nodes is not None and self.node_numbers is not None:
@@ -123,7 +130,7 @@ def joined(parts: Iterable[ForeignMatrices], where: str) -> ForeignMatrices:
     MatrixError
         If two files have the same matrix, or their rows do not fit.
     """
-    parts = list(parts)
+    parts = with_dofs(list(parts), where)
     dofs = order_of(parts, where)  # (1)
     matrices: dict[str, sp.csc_array] = {}
     loads: dict[str, Array] = {}
@@ -174,6 +181,22 @@ def joined(parts: Iterable[ForeignMatrices], where: str) -> ForeignMatrices:
         files={path: digest for part in parts for path, digest in part.files.items()},
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def with_dofs(parts: list[ForeignMatrices], where: str) -> list[ForeignMatrices]:
+    """Return the parts with a list of nodes, 3 or 6 rows to each, as a list of dofs."""
+    sizes = [part.n_dof or 0 for part in parts if part.K is not None or part.M is not None or part.D is not None]
+    made = []
+    for part in parts:
+        if part.row_nodes is not None:
+            n, n_nodes = max(sizes, default=0), len(part.row_nodes)
+            if n not in (3 * n_nodes, 6 * n_nodes):
+                raise MatrixError(f"{where}: expected 3 or 6 of {n} rows to each node of the list, got {n_nodes} nodes")
+            k = n // n_nodes
+            dofs = np.stack([np.repeat(part.row_nodes, k), np.tile(np.arange(k), n_nodes)], axis=1)
+            part = replace(part, dofs=dofs, row_nodes=None)
+        made.append(part)
+    return made
 
 
 def order_of(parts: list[ForeignMatrices], where: str) -> IntArray | None:

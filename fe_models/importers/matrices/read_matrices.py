@@ -9,13 +9,20 @@ from pathlib import Path
 from fe_models.errors import FeModelsError, MatrixError
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import nearest, quoted
+from fe_models.importers.matrices.abaqus_labels import is_labelled, read_labelled
 from fe_models.importers.matrices.abaqus_text import is_coordinates, read_coordinates
+from fe_models.importers.matrices.calculix import read_calculix_dofs, read_calculix_matrix
 from fe_models.importers.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
 from fe_models.importers.matrices.local_systems import in_basic_axes
 from fe_models.importers.matrices.nastran import read_op2_part, read_op4_part, read_punch_part
 from fe_models.importers.matrices.request import MatrixFormat, Request
 from fe_models.importers.nastran_matrices.op2 import is_op2
 from fe_models.importers.nastran_matrices.op4 import is_op4
+from fe_models.importers.matrices.matlab import is_matlab_5, is_matlab_7, read_matlab_5, read_matlab_7
+from fe_models.importers.matrices.matrix_market import is_matrix_market, read_matrix_market
+from fe_models.importers.matrices.request import MatrixFormat, Request
+from fe_models.importers.matrices.scipy_files import is_harwell_boeing, read_harwell_boeing, read_npz
+from fe_models.importers.matrices.user_element import is_user_element, read_user_element
 
 __all__ = ["MATRIX_FORMATS", "MatrixFiles", "read_matrices"]
 
@@ -25,6 +32,15 @@ MATRIX_FORMATS: tuple[MatrixFormat, ...] = (
     MatrixFormat("Nastran OP4", (".op4",), read_op4_part, is_op4),
     MatrixFormat("Nastran OP2", (".op2",), read_op2_part, is_op2),
     MatrixFormat("Nastran punch", (".pch", ".asm"), read_punch_part),
+    MatrixFormat("Matrix Market", (".mtx", ".mm", ".mmf", ".txt"), read_matrix_market, is_matrix_market),
+    MatrixFormat("Abaqus matrix (MATRIX INPUT)", (".mtx",), read_labelled, is_labelled),
+    MatrixFormat("substructure text", (".mtx",), read_user_element, is_user_element),
+    MatrixFormat("CalculiX matrix", (".sti", ".mas"), read_calculix_matrix, is_coordinates),
+    MatrixFormat("CalculiX list of dofs", (".dof",), read_calculix_dofs),
+    MatrixFormat("MATLAB 7.3", (".mat",), read_matlab_7, is_matlab_7),
+    MatrixFormat("MATLAB", (".mat",), read_matlab_5, is_matlab_5),
+    MatrixFormat("SciPy or NumPy archive", (".npz",), read_npz),
+    MatrixFormat("Harwell-Boeing", (".hb", ".rb", ".rsa", ".rua", ".matrix"), read_harwell_boeing, is_harwell_boeing),
     MatrixFormat("Abaqus matrix (COORDINATE)", (".mtx",), read_coordinates, is_coordinates),
 )  #: every format that is read; of those with one suffix the first that knows the content
 

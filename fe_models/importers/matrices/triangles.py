@@ -109,4 +109,8 @@ def stored_as(matrix: sp.csc_array) -> str:
 
 def with_mirror(stored: sp.csc_array) -> sp.csc_array:
     """Return A + Aᵀ - diag(A)."""
-    return sp.csc_array(stored + stored.T - sp.diags_array(stored.diagonal()))
+    entries = sp.coo_array(stored)
+    off = np.flatnonzero(entries.row != entries.col)
+    rows = np.concatenate([entries.row, entries.col[off]])
+    columns = np.concatenate([entries.col, entries.row[off]])
+    return sp.csc_array((np.concatenate([entries.data, entries.data[off]]), (rows, columns)), shape=stored.shape)

@@ -1,0 +1,52 @@
+"""Matrices of CalculiX, `*FREQUENCY, SOLVER=MATRIXSTORAGE`: .sti, .mas, and the list of dofs .dof."""
+
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.errors import MatrixError
+from fe_models.importers.matrices.foreign_matrices import ForeignMatrices
+from fe_models.importers.matrices.request import Request
+from fe_models.importers.matrices.triangles import full_matrix, require_size
+from fe_models.importers.matrices.triplet_text import parsed_triplets
+
+__all__ = ["read_calculix_dofs", "read_calculix_matrix"]
+
+ROLES_OF_SUFFIXES = {".sti": "K", ".mas": "M"}
+
+
+def read_calculix_matrix(path: Path, request: Request) -> ForeignMatrices:
+    """Read lines `row column value` of the upper triangle, numbered from 1; the rows are those of the .dof beside it.
+
+    Raises
+    ------
+    MatrixError
+        If a line is something else, or an entry is listed twice.
+    """
+    where = f"matrices {path}"
+    role = request.role_of(where, ROLES_OF_SUFFIXES.get(path.suffix.lower()))
+    data = path.read_bytes()
+    rows, columns, values = parsed_triplets(where, data)
+    n = max(int(rows.max(initial=-1)), int(columns.max(initial=-1))) + 1
+    require_size(where, n, len(data))
+    del data
+    matrix, triangle = full_matrix(f"{where}: {role}", rows, columns, values, n)
+    return ForeignMatrices(**{role: matrix}, triangle={role: triangle}, program="CalculiX")
+
+
+def read_calculix_dofs(path: Path, request: Request) -> ForeignMatrices:
+    """Read lines `node.component`, one for each row, components from 1.
+
+    Raises
+    ------
+    MatrixError
+        If a line is something else.
+    """
+    where = f"matrices {path}"
+    lines = path.read_text("ascii", "replace").split()
+    parts = [line.partition(".") for line in lines]
+    for k, (node, dot, component) in enumerate(parts):
+        if not (dot and node.isdigit() and component in "123456" and len(component) == 1):
+            raise MatrixError(f"{where}, line {k + 1}: expected node.component such as 12.3, got {lines[k][:40]!r}")
+    dofs = np.array([(int(node), int(component) - 1) for node, _, component in parts], dtype=np.int64)
+    return ForeignMatrices(dofs=dofs.reshape(-1, 2), program="CalculiX")

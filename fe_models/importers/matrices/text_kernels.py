@@ -1,0 +1,83 @@
+"""Compiled look at every byte of a text of numbers; imported where it is used, since numba takes half a second."""
+
+import numpy as np
+from numba import njit
+
+from fe_models.foundation.arrays import IntArray
+
+__all__ = ["FORBIDDEN", "LINE", "judged_bytes"]
+
+jit = njit(cache=True, nogil=True, error_model="numpy")
+
+BLANK, DIGIT, SIGN, DOT, EXPONENT, LINE, OTHER = range(7)  #: kinds of bytes
+FOLLOWS = {
+    BLANK: (BLANK, DIGIT, SIGN, DOT, LINE),
+    LINE: (BLANK, DIGIT, SIGN, DOT, LINE),
+    DIGIT: (DIGIT, DOT, EXPONENT, BLANK, LINE),
+    SIGN: (DIGIT, DOT),
+    DOT: (DIGIT, EXPONENT, BLANK, LINE),
+    EXPONENT: (SIGN, DIGIT),
+}  #: kind -> kinds that may follow it
+FORBIDDEN, FINE, WORD, FULL_LINE = range(4)  #: no number has such a pair; it may stand; a word begins; a line ends
+
+
+def kinds_of_bytes() -> np.ndarray:
+    """Return the kind of every byte, (256,) uint8."""
+    kinds = np.full(256, OTHER, np.uint8)
+    for letters, kind in ((b" \t\r", BLANK), (b"0123456789", DIGIT), (b"+-", SIGN), (b".", DOT), (b"eE", EXPONENT)):
+        kinds[np.frombuffer(letters, np.uint8)] = kind
+    kinds[ord("\n")] = LINE
+    return kinds
+
+
+def judgement_of_pairs() -> np.ndarray:
+    """Return what it says that one kind follows another, (8, 8) uint8."""
+    judgement = np.full((8, 8), FORBIDDEN, np.uint8)
+    for first, seconds in FOLLOWS.items():
+        judgement[first, list(seconds)] = FINE
+        if first in (BLANK, LINE):
+            judgement[first, [DIGIT, SIGN, DOT]] = WORD
+        else:
+            judgement[first, [second for second in seconds if second == LINE]] = FULL_LINE
+    judgement[BLANK, LINE] = FULL_LINE
+    return judgement
+
+
+KINDS, JUDGEMENT = kinds_of_bytes(), judgement_of_pairs()
+
+
+def judged_bytes(data: np.ndarray) -> tuple[int, int, int]:
+    """Return the number of words, of lines that are not empty, and the place of the first byte that no number has.
+
+    Parameters
+    ----------
+    data
+        Bytes, uint8, (n,).
+
+    Returns
+    -------
+    n_words, n_lines
+        Up to that place.
+    bad
+        -1 if there is none.
+    """
+    count, bad = judged_pairs(data, KINDS, JUDGEMENT)
+    return int(count[WORD]), int(count[FULL_LINE]), int(bad)
+
+
+@jit
+def judged_pairs(data: np.ndarray, kinds: np.ndarray, judgement: np.ndarray) -> tuple[IntArray, int]:
+    """Count the judgements of all pairs of neighbouring bytes, the first after a line; stop at a forbidden one."""
+    count = np.zeros(4, np.int64)
+    words = lines = 0
+    before = np.uint8(LINE)
+    for at in range(len(data)):
+        kind = kinds[data[at]]
+        said = judgement[before, kind]
+        if said == FORBIDDEN:
+            return count, at
+        words += said == WORD
+        lines += said == FULL_LINE
+        before = kind
+    count[WORD], count[FULL_LINE] = words, lines
+    return count, -1
