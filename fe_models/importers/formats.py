@@ -46,6 +46,20 @@ FORMATS = (
         "*MATRIX GENERATE, COORDINATE", "Abaqus", "matrices", (".mtx",), reads=True, tried="Abaqus 2021",
         lost="the numbers of nodes: a deck beside it",
     ),
+    FileFormat("*MATRIX GENERATE, MATRIX INPUT", "Abaqus", "matrices", (".mtx",), reads=True, tried="by its layout"),
+    FileFormat(
+        "*SUBSTRUCTURE MATRIX OUTPUT", "Abaqus, CalculiX", "matrices", (".mtx",), reads=True, tried="CalculiX 2.20",
+        lost="modes that are retained",
+    ),
+    FileFormat("MATRIXSTORAGE", "CalculiX", "matrices", (".sti", ".mas", ".dof"), reads=True, tried="CalculiX 2.20"),
+    FileFormat(
+        "Matrix Market, with nodes of its rows", "Ansys, SciPy", "matrices", (".mtx", ".mm", ".mmf", ".txt"),
+        reads=True, tried="SciPy 1.17",
+    ),
+    FileFormat("MAT 5, 7.3", "MATLAB, Octave", "matrices", (".mat",), reads=True, tried="SciPy 1.17, h5py 3"),
+    FileFormat("sparse and dense npz", "SciPy, NumPy", "matrices", (".npz",), reads=True, tried="SciPy 1.17"),
+    FileFormat("Harwell-Boeing RSA, RUA", "Ansys", "matrices", (".hb", ".rb", ".rsa", ".rua"), reads=True,
+               tried="by its layout"),
     FileFormat(
         "STEP", "CAD programs", "geometry", (".step", ".stp"), reads=True, tried="Gmsh 4.15, OpenCASCADE 7.8",
         lost="names of faces, assemblies' structure", extra="mesh",
@@ -58,19 +72,5 @@ FORMATS = (
         "BREP", "OpenCASCADE, FreeCAD", "geometry", (".brep",), reads=True, tried="Gmsh 4.15, OpenCASCADE 7.8",
         lost="it has no unit, names, colours", extra="mesh",
     ),
-    FileFormat("*MATRIX GENERATE, MATRIX INPUT", "Abaqus", "matrices", (".mtx",), reads=True, tried="by its layout"),
-    FileFormat(
-        "*SUBSTRUCTURE MATRIX OUTPUT", "Abaqus, CalculiX", "matrices", (".mtx",), reads=True, tried="CalculiX 2.20",
-        lost="modes that are retained",
-    ),
-    FileFormat("MATRIXSTORAGE", "CalculiX", "matrices", (".sti", ".mas", ".dof"), reads=True, tried="CalculiX 2.20"),
-    FileFormat(
-        "Matrix Market, with nodes of its rows", "Ansys, SciPy", "matrices", (".mtx", ".mm", ".mmf", ".txt"), reads=True,
-        tried="SciPy 1.17",
-    ),
-    FileFormat("MAT 5, 7.3", "MATLAB, Octave", "matrices", (".mat",), reads=True, tried="SciPy 1.17, h5py 3"),
-    FileFormat("sparse and dense npz", "SciPy, NumPy", "matrices", (".npz",), reads=True, tried="SciPy 1.17"),
-    FileFormat("Harwell-Boeing RSA, RUA", "Ansys", "matrices", (".hb", ".rb", ".rsa", ".rua"), reads=True,
-               tried="by its layout"),
 )  # fmt: skip
 #: one line a format; `cms formats` and docs/formats.md list them
