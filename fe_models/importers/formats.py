@@ -43,6 +43,11 @@ FORMATS = (
         lost="structural damping (K4)",
     ),
     FileFormat(
+        ".full", "ANSYS", "matrices", (".full",), reads=True, tried="2017 to 2019 (100033)",
+        lost="positions: a deck beside it; lumped masses and constraint equations are refused",
+    ),
+    FileFormat(".sub, superelement", "ANSYS", "matrices", (".sub",), reads=True, tried="2019 to 2020 (121656)"),
+    FileFormat(
         "*MATRIX GENERATE, COORDINATE", "Abaqus", "matrices", (".mtx",), reads=True, tried="Abaqus 2021",
         lost="the numbers of nodes: a deck beside it",
     ),

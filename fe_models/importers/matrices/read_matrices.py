@@ -9,8 +9,10 @@ from pathlib import Path
 from fe_models.errors import FeModelsError, MatrixError
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import nearest, quoted
+from fe_models.importers.ansys_matrices.records import is_ansys_binary
 from fe_models.importers.matrices.abaqus_labels import is_labelled, read_labelled
 from fe_models.importers.matrices.abaqus_text import is_coordinates, read_coordinates
+from fe_models.importers.matrices.ansys import read_full_part, read_sub_part
 from fe_models.importers.matrices.calculix import read_calculix_dofs, read_calculix_matrix
 from fe_models.importers.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
 from fe_models.importers.matrices.local_systems import in_basic_axes
@@ -40,6 +42,8 @@ MATRIX_FORMATS: tuple[MatrixFormat, ...] = (
     MatrixFormat("MATLAB", (".mat",), read_matlab_5, is_matlab_5),
     MatrixFormat("SciPy or NumPy archive", (".npz",), read_npz),
     MatrixFormat("Harwell-Boeing", (".hb", ".rb", ".rsa", ".rua", ".matrix"), read_harwell_boeing, is_harwell_boeing),
+    MatrixFormat("ANSYS full", (".full",), read_full_part, is_ansys_binary),
+    MatrixFormat("ANSYS superelement", (".sub",), read_sub_part, is_ansys_binary),
     MatrixFormat("Abaqus matrix (COORDINATE)", (".mtx",), read_coordinates, is_coordinates),
 )  #: every format that is read; of those with one suffix the first that knows the content
 

@@ -1,0 +1,1 @@
+"""Matrices and superelements of ANSYS: binary .full and .sub files."""
