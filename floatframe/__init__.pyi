@@ -5,6 +5,7 @@ from .analyses import FrequencyResponse as FrequencyResponse
 from .analyses import InverseDynamics as InverseDynamics
 from .analyses import LinearSystem as LinearSystem
 from .analyses import Locus as Locus
+from .analyses import NamedStateSpace as NamedStateSpace
 from .analyses import StressChannel as StressChannel
 from .analyses import SystemModes as SystemModes
 from .analyses import campbell as campbell
@@ -14,6 +15,7 @@ from .analyses import frozen_bodies as frozen_bodies
 from .analyses import inverse_dynamics as inverse_dynamics
 from .analyses import kinematics as kinematics
 from .analyses import linearize as linearize
+from .analyses import named_state_space as named_state_space
 from .analyses import quasi_static_bodies as quasi_static_bodies
 from .analyses import resolved_frequencies as resolved_frequencies
 from .analyses import root_locus as root_locus
@@ -23,6 +25,7 @@ from .analyses import steady_rotation as steady_rotation
 from .analyses import sweep as sweep
 from .analyses import system_modes as system_modes
 from .analyses import with_motors as with_motors
+from .analyses import write_state_space as write_state_space
 from .bodies.added_mass import AddedMass as AddedMass
 from .bodies.added_mass import with_masses as with_masses
 from .bodies.coordinates import AxialAngle as AxialAngle

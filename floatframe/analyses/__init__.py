@@ -9,6 +9,7 @@ from floatframe.analyses.kinematics import kinematics
 from floatframe.analyses.linearization import LinearSystem, linearize
 from floatframe.analyses.parameter_study import Locus, campbell, root_locus
 from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.state_space import NamedStateSpace, named_state_space, write_state_space
 from floatframe.analyses.sweep import sweep
 from floatframe.analyses.system_modes import SystemModes, system_modes
 
@@ -20,6 +21,7 @@ __all__ = [
     "InverseDynamics",
     "LinearSystem",
     "Locus",
+    "NamedStateSpace",
     "StressChannel",
     "SystemModes",
     "campbell",
@@ -29,6 +31,7 @@ __all__ = [
     "inverse_dynamics",
     "kinematics",
     "linearize",
+    "named_state_space",
     "quasi_static_bodies",
     "resolved_frequencies",
     "root_locus",
@@ -38,4 +41,5 @@ __all__ = [
     "sweep",
     "system_modes",
     "with_motors",
+    "write_state_space",
 ]

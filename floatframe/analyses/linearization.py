@@ -18,22 +18,36 @@ import scipy.linalg as la
 from fe_models.foundation.arrays import Array, frozen
 from floatframe.analyses.channels import AnyChannel, StressChannel, channel_rows, channel_units, channels_of
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
+from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.analyses.system_matrices import tangents, turning_matrices
+from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
 from floatframe.kernels.work import new_work
+from floatframe.results.sensors.measurement import unit_words
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.system import System
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace
 
-__all__ = ["LinearSystem", "linearize"]
+__all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which one repeats others
 MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion has no mass
+
+
+@dataclass(frozen=True, eq=False)
+class NamedMotions:
+    """Motions that have a name, as rows over the independent motions z."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: Array  #: (n_names, n_z)
+    ranks: tuple[int, ...]  #: joint coordinates 0, modal coordinates 1, motions of body frames 2
+    time_unit: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +68,7 @@ class LinearSystem:
     rates: tuple[int, ...] = ()  #: r of each output: 0 displacement, 1 velocity, 2 acceleration; (): all 0
     input_units: tuple[str, ...] = ()
     output_units: tuple[str, ...] = ()
+    motions: NamedMotions | None = None  #: of which states can be made, see `state_space`
 
     def __post_init__(self) -> None:
         for name in ("M", "C", "K", "B", "L", "N"):
@@ -80,7 +95,8 @@ class LinearSystem:
             return self, np.eye(self.n_z)
         T = dynamic - static @ la.solve(static.T @ self.K @ static, static.T @ self.K @ dynamic)
         parts = {name: T.T @ getattr(self, name) @ T for name in ("M", "C", "K")}
-        return replace(self, **parts, B=T.T @ self.B, L=self.L @ T, N=self.N @ T), T
+        motions = None if self.motions is None else replace(self.motions, rows=self.motions.rows @ T)
+        return replace(self, **parts, B=T.T @ self.B, L=self.L @ T, N=self.N @ T, motions=motions), T
 
     def motions_with_and_without_mass(self) -> tuple[Array, Array]:
         """Return bases of z: motions with mass (orthonormal by it), and those without, (n_z, n) each."""
@@ -181,6 +197,7 @@ def linearize(
     N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.bodies.u0[:-1]])
     if N.shape[1] == 0:
         raise ModelError(f"system {system.name!r}: its joints and drives allow no motion; nothing can be linearised")
+    by_bodies = la.block_diag(*shown) @ N
     return LinearSystem(
         about,
         M=N.T @ parts.M @ N,
@@ -188,7 +205,7 @@ def linearize(
         K=N.T @ (parts.K + parts.C @ Omega + parts.M @ Omega_t @ Omega) @ N,
         B=(channel_rows(system, compiled, work, inputs) @ N).T,
         L=channel_rows(system, compiled, work, outputs) @ N,
-        N=la.block_diag(*shown) @ N,
+        N=by_bodies,
         inputs=tuple(channel.name for channel in inputs),
         outputs=tuple(channel.name for channel in outputs),
         body_names=compiled.body_names,
@@ -198,7 +215,27 @@ def linearize(
         rates=tuple(getattr(channel, "rate", 0) for channel in outputs),
         input_units=tuple(channel_units(system, channel)[1] for channel in inputs),
         output_units=tuple(channel_units(system, channel)[0] for channel in outputs),
+        motions=named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N),
     )
+
+
+def named_motions(system: System, by_bodies: Array, of_joints: dict[str, Array], N: Array) -> NamedMotions:
+    """Return the joint coordinates that move, the modal coordinates and the motions of body frames, over z."""
+    length, found = system.units.length_symbol, []
+    for name, row in of_joints.items():
+        unit = "rad" if name.rpartition(".")[2].startswith("angle") else length
+        found.append((name, unit, row @ N, 0))
+    first = 0
+    for body in system.bodies:
+        n_q = body.reduced.n_q if isinstance(body, FlexibleBody) else 0
+        rows = by_bodies[first : first + 6 + n_q]
+        unit = unit_words(system.units, "modal")
+        found += [(f"{body.name} mode {k + 1}", unit, rows[6 + k], 1) for k in range(n_q)]
+        frame = zip(("x", "y", "z", "rx", "ry", "rz"), (length,) * 3 + ("rad",) * 3, rows[:6], strict=True)
+        found += [(f"{body.name} {name}", symbol, row, 2) for name, symbol, row in frame]
+        first += 6 + n_q
+    names, units, over_z, ranks = zip(*found, strict=True)
+    return NamedMotions(names, units, np.array(over_z), ranks, system.units.time_symbol)
 
 
 def seen_from(T: Array, mass: Array) -> Array:

@@ -1,7 +1,6 @@
 """The commands of the linearised system with inputs and outputs: linearize, response."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -46,7 +45,7 @@ def linearize_command(
     axis: Axis = "z",
     center: Center = "0,0,0",
 ) -> None:
-    """Linearise a system: M, C, K of its independent motions, and the state space A, B, C, D, into a file.
+    """Linearise a system: the state space A, B, C, D with names, and M, C, K of its independent motions, into a file.
 
     Inputs and outputs are those of the tables [inputs] and [outputs] of the system, unless named here; a place is
     written body/interface:component, with x, y, z, rx, ry, rz. Without -o crane.toml gives crane.npz.
@@ -55,13 +54,12 @@ def linearize_command(
 
     Example: floatframe linearize crane.toml --input jib/tip:z --out jib/tip:z
     """
-    from fe_models.foundation.paths import replace_file
+    from floatframe.analyses.state_space import WRITERS, write_state_space
     from floatframe.errors import ModelError
 
     model = read(system)
     path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system, *model.files))
-    kind = path.suffix.lower()
-    if kind not in WRITERS:
+    if path.suffix.lower() not in WRITERS:
         raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(WRITERS)}")
     linear = linearized(
         model,
@@ -71,20 +69,12 @@ def linearize_command(
         inputs=chosen(model, inputs, model.inputs),
         outputs=chosen(model, outputs, model.outputs),
     )
-    space = linear.state_space()
-    arrays = {
-        "A": space.A, "B": space.B, "C": space.C, "D": space.D, "M_z": linear.M, "C_z": linear.C, "K_z": linear.K,
-        "B_z": linear.B, "L": linear.L, "N": linear.N,
-    }  # fmt: skip
-    words = {
-        "inputs": linear.inputs, "input_units": linear.input_units, "outputs": linear.outputs,
-        "output_units": linear.output_units,
-    }  # fmt: skip
-    replace_file(path, WRITERS[kind](arrays, words))
+    space = write_state_space(linear, path)
     say(f"{linear.n_z} independent motions, {len(space.A)} states, {len(linear.inputs)} inputs, "
         f"{len(linear.outputs)} outputs")  # fmt: skip
     if not linear.inputs or not linear.outputs:
         say("name inputs and outputs in tables [inputs.NAME] and [outputs.NAME], or with --input and --out")
+    say(f"states: {', '.join(space.states[: len(space.states) // 2])}, and their rates")
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
@@ -229,50 +219,3 @@ def csv_of(response: "FrequencyResponse", seconds: float) -> str:
         row = [value for o, i in pairs for value in (amplitudes[k, o, i], phases[k, o, i])]
         writer.writerow([repr(float(f)), *(repr(float(value)) for value in row)])
     return text.getvalue()
-
-
-def npz_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return an .npz file."""
-    import io
-
-    import numpy as np
-
-    data = io.BytesIO()
-    named: dict[str, Any] = {name: np.array(texts, dtype=str) for name, texts in words.items()}
-    np.savez(data, **arrays, **named)
-    return data.getvalue()
-
-
-def mat_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return a .mat file (MATLAB 5): matrices, and cell arrays of texts."""
-    import io
-
-    import numpy as np
-    from scipy.io import savemat
-
-    cells = {name: np.array([*texts, ""], dtype=object)[:-1] for name, texts in words.items()}
-    data = io.BytesIO()
-    savemat(data, {**{name: np.array(array) for name, array in arrays.items()}, **cells})
-    return data.getvalue()
-
-
-def h5_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
-    """Return an HDF5 file: matrices as datasets, names and units as attributes of the root."""
-    import io
-
-    import h5py
-
-    data = io.BytesIO()
-    with h5py.File(data, "w") as file:
-        for name, array in arrays.items():
-            file.create_dataset(name, data=array)
-        for name, texts in words.items():
-            file.attrs[name] = list(texts) if texts else h5py.Empty("S1")
-    return data.getvalue()
-
-
-WRITERS: dict[str, Callable[[dict[str, Any], dict[str, Any]], bytes]] = {
-    ".npz": npz_bytes,
-    ".mat": mat_bytes,
-    ".h5": h5_bytes,
-}

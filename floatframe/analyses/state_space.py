@@ -1,0 +1,196 @@
+"""The state space of a linearised system in states that have names: joint coordinates, modes, motions of bodies.
+
+x = R z with as many rows of R as there are independent motions; with the state space of `LinearSystem.state_space` over
+(z, z_dot) and T = diag(R, R)
+
+    A = T A_z T⁻¹,  B = T B_z,  C = C_z T⁻¹,  D = D_z.
+"""
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.extras import extra_module
+from fe_models.foundation.paths import replace_file
+from floatframe.analyses.linearization import LinearSystem, NamedMotions
+from floatframe.errors import ModelError
+
+if TYPE_CHECKING:
+    from scipy.signal import StateSpace
+
+__all__ = ["WRITERS", "NamedStateSpace", "named_state_space", "write_state_space"]
+
+CLEAR = 0.02  #: part of a motion that must be new to those already chosen; a smaller one makes states that nearly agree
+NEW = 1e-9  #: part that tells rounding from a motion, where nothing clearer is left
+
+
+@dataclass(frozen=True, eq=False)
+class NamedStateSpace:
+    """x_dot = A x + B u,  y = C x + D u, with the name and unit of each state, input and output."""
+
+    A: Array  #: (n_x, n_x)
+    B: Array  #: (n_x, n_inputs)
+    C: Array  #: (n_outputs, n_x)
+    D: Array  #: (n_outputs, n_inputs)
+    states: tuple[str, ...]
+    state_units: tuple[str, ...]
+    inputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    outputs: tuple[str, ...]
+    output_units: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for name in "ABCD":
+            object.__setattr__(self, name, frozen(np.array(getattr(self, name), dtype=float)))
+
+    def scipy(self) -> "StateSpace":
+        """Return it as `scipy.signal.StateSpace`, which keeps no names."""
+        from scipy.signal import StateSpace
+
+        return StateSpace(self.A, self.B, self.C, self.D)
+
+    def control(self) -> Any:
+        """Return it as `control.StateSpace` of python-control, with names; "." in them, not allowed there, is " ".
+
+        Raises
+        ------
+        MissingExtraError
+            If python-control is not installed.
+        """
+        control = extra_module("control", extra="control", purpose="a state space of python-control")
+        names = {
+            kind: [name.replace(".", " ") for name in getattr(self, kind)] for kind in ("states", "inputs", "outputs")
+        }
+        return control.ss(self.A, self.B, self.C, self.D, **names)
+
+
+def named_state_space(linear: LinearSystem) -> NamedStateSpace:
+    """Return the state space of a linearised system in named states.
+
+    (1) motions without mass are taken out, which follow the others
+    (2) joint coordinates are chosen, then modal coordinates, then motions of body frames, each time the one of which
+        most is new to those chosen before, by the mass matrix, until there are as many as independent motions
+    (3) they and their rates are the states.
+
+    Raises
+    ------
+    ModelError
+        If the system was not made by `linearize`, and knows no names.
+    """
+    if linear.motions is None:
+        raise ModelError(
+            "named_state_space: expected a system as linearize returns it; this one has no names of motions"
+        )
+    system, T_mass = linear.with_mass()
+    motions = linear.motions
+    rows = motions.rows @ T_mass  # (1)
+    chosen = independent_rows(rows, system.M, motions)  # (2)
+    R = rows[chosen]
+    space, n = linear.state_space(), len(chosen)
+    T = la.block_diag(R, R)  # (3)
+    backward = np.linalg.inv(T)  # well conditioned by (2)
+    A = T @ space.A @ backward
+    A[:n] = np.eye(n, 2 * n, k=n)  # as it is but for rounding
+    names = [motions.names[k] for k in chosen]
+    units = [motions.units[k] for k in chosen]
+    return NamedStateSpace(
+        A=A,
+        B=T @ space.B,
+        C=space.C @ backward,
+        D=space.D,
+        states=(*names, *(f"{name} rate" for name in names)),
+        state_units=(*units, *(f"{unit}/{motions.time_unit}" for unit in units)),
+        inputs=linear.inputs,
+        input_units=linear.input_units,
+        outputs=linear.outputs,
+        output_units=linear.output_units,
+    )
+
+
+def independent_rows(rows: Array, M: Array, motions: NamedMotions) -> list[int]:
+    """Return the numbers of the rows that are states, in their order; see `named_state_space` (2)."""
+    n = rows.shape[1]
+    scaled = la.solve_triangular(la.cholesky(M, lower=True), rows.T, lower=True).T
+    size = np.linalg.norm(scaled, axis=1)
+    scaled = np.divide(scaled, size[:, None], out=np.zeros_like(scaled), where=size[:, None] > 0)
+    chosen: list[int] = []
+    for least in (CLEAR, NEW):
+        for rank in sorted(set(motions.ranks)):
+            candidates = [k for k, of in enumerate(motions.ranks) if of == rank and k not in chosen]
+            while len(chosen) < n and candidates:
+                best = max(candidates, key=lambda k: float(np.linalg.norm(scaled[k])))
+                if np.linalg.norm(scaled[best]) < least:
+                    break
+                direction = scaled[best] / np.linalg.norm(scaled[best])
+                for _ in range(2):  # twice: what rounding left the first time
+                    scaled = scaled - np.outer(scaled @ direction, direction)
+                candidates.remove(best)
+                chosen.append(best)
+    if len(chosen) < n:
+        raise ModelError(f"named_state_space: found {len(chosen)} independent named motions, expected {n}")
+    return sorted(chosen)
+
+
+def write_state_space(linear: LinearSystem, path: Path) -> NamedStateSpace:
+    """Write a linearised system to .npz, .mat (MATLAB 5) or .h5: A, B, C, D with names and units, and M, C, K over z.
+
+    Raises
+    ------
+    ModelError
+        If the name of the file ends otherwise.
+    """
+    kind = path.suffix.lower()
+    if kind not in WRITERS:
+        raise ModelError(f"{path}: expected a file name that ends in {', '.join(WRITERS)}")
+    space = named_state_space(linear)
+    arrays = {
+        "A": space.A, "B": space.B, "C": space.C, "D": space.D, "M_z": linear.M, "C_z": linear.C, "K_z": linear.K,
+        "B_z": linear.B, "L": linear.L, "N": linear.N,
+    }  # fmt: skip
+    parts = ("states", "state_units", "inputs", "input_units", "outputs", "output_units")
+    replace_file(path, WRITERS[kind](arrays, {part: getattr(space, part) for part in parts}))
+    return space
+
+
+def npz_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
+    """Return an .npz file."""
+    data = io.BytesIO()
+    named: dict[str, Any] = {name: np.array(texts, dtype=str) for name, texts in words.items()}
+    np.savez(data, **arrays, **named)
+    return data.getvalue()
+
+
+def mat_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
+    """Return a .mat file (MATLAB 5): matrices, and cell arrays of texts."""
+    from scipy.io import savemat
+
+    cells = {name: np.array([*texts, ""], dtype=object)[:-1] for name, texts in words.items()}
+    data = io.BytesIO()
+    savemat(data, {**{name: np.array(array) for name, array in arrays.items()}, **cells})
+    return data.getvalue()
+
+
+def h5_bytes(arrays: dict[str, Any], words: dict[str, Any]) -> bytes:
+    """Return an HDF5 file: matrices as datasets, names and units as attributes of the root."""
+    import h5py
+
+    data = io.BytesIO()
+    with h5py.File(data, "w") as file:
+        for name, array in arrays.items():
+            file.create_dataset(name, data=array)
+        for name, texts in words.items():
+            file.attrs[name] = list(texts) if texts else h5py.Empty("S1")
+    return data.getvalue()
+
+
+WRITERS: dict[str, Callable[[dict[str, Any], dict[str, Any]], bytes]] = {
+    ".npz": npz_bytes,
+    ".mat": mat_bytes,
+    ".h5": h5_bytes,
+}
