@@ -6,6 +6,7 @@ import numpy as np
 
 from cms.errors import ExportError
 from cms.exporters.interface_model import InterfaceModel, interface_model
+from cms.exporters.nodes import all_nodes
 from cms.exporters.writer import Made, Request
 from fe_models.foundation.arrays import Array
 from fe_models.importers.nastran_matrices.write_op4 import op4_parts
@@ -18,19 +19,20 @@ SYMMETRIC, RECTANGULAR, DOUBLE = 6, 9, 2  #: IFO and TIN of DMIG
 
 
 def make_op4(request: Request) -> Made:
-    """Return FILE.op4 (KXX, MXX, BXX, PXX, MUG1) and FILE.asm, FILE.pch with the order of its rows.
+    """Return FILE.op4 (KXX, MXX, BXX, PX, MUG1) and FILE.asm, FILE.pch with the order of its rows.
 
     Rows: six (three) of each interface node, then the modes as SPOINTs, as EXTRN in the .pch lists them; all in the
-    basic system. MUG1: translations of the kept nodes.
+    basic system. MUG1: six rows of each kept node, in the order of the table TUG1 in the .pch; rotations where they are
+    known, zero elsewhere, as of nodes of solid elements.
     """
     model = interface_model(request.body)
     matrices = {"KXX": model.K, "MXX": model.M}
     if np.any(model.D):
         matrices["BXX"] = model.D
     if model.body.load_cases:
-        matrices["PXX"] = model.loads
+        matrices["PX"] = model.loads
     if len(model.body.nodes):
-        matrices["MUG1"] = model.recovery().reshape(-1, len(model.K))
+        matrices["MUG1"] = six_rows(model)
     path = request.path.with_suffix(".op4")
     asm, pch = (
         "\n".join([*comments(request), *lines]) + "\n" for lines in (assembly_lines(model), superelement_lines(model))
@@ -41,7 +43,7 @@ def make_op4(request: Request) -> Made:
         path.with_suffix(".pch"): pch.encode("ascii"),
     }
     notes = [f"interface {node.interface}: GRID {k + 1}" for k, node in enumerate(model.nodes)]
-    return Made(files, (*notes, *load_notes(model, "PXX")))
+    return Made(files, (*notes, *load_notes(model, "PX")))
 
 
 def make_dmig(request: Request) -> Made:
@@ -109,6 +111,35 @@ def superelement_lines(model: InterfaceModel) -> Iterator[str]:
     yield from grid_lines(model)
     yield from aset_lines(pairs)
     yield from spoint_lines(model)
+    if len(model.body.nodes):
+        for k, position in enumerate(model.mesh_positions()):
+            yield from grid(FIRST_NODE + k, position)
+        yield from recovery_table(len(model.body.nodes), len(model.K))
+
+
+def six_rows(model: InterfaceModel) -> Array:
+    """Return translations and rotations of the kept nodes in mesh axes for each row, (6 n_kept, n)."""
+    body = model.body
+    n = len(body.nodes)
+    nodes = all_nodes(body)
+    rotation = nodes.Psi[:n]
+    if not body.is_held:  # the rigid motion turns what turns at all
+        rigid = np.zeros((n, 3, 6))
+        rigid[nodes.has_rotation[:n], :, 3:] = np.eye(3)
+        rotation = np.concatenate([rigid, rotation], axis=2)
+    turned = body.frame.axes @ rotation @ model.T
+    return np.concatenate([model.recovery(), turned], axis=1).reshape(6 * n, -1)
+
+
+def recovery_table(n_nodes: int, n_columns: int) -> Iterator[str]:
+    """Yield the table TUG1: head, columns, and the first of six rows of MUG1 for each kept node."""
+    yield from continued("DTI", [f"{word:<8}" for word in ("TUG1", 0, 6 * n_nodes, n_columns, 32767, 0, 7, 0)])
+    yield from continued("", [f"{word:<8}" for word in ("", "PHIP", 7, "", "", "REAL", "", 1, "ENDREC")][1:])
+    columns = [f"{word:<8}" for k in range(n_columns) for word in (k + 1, "0.00000")]
+    yield from continued("DTI", [f"{'TUG1':8}", f"{1:<8}", *columns, "ENDREC"])
+    entries = [f"{word:<8}" for k in range(n_nodes) for word in (1, FIRST_NODE + k, 6, 6 * k + 1)]
+    yield from continued("DTI", [f"{'TUG1':8}", f"{2:<8}", *[" " * 8] * 6])
+    yield from continued("", [f"{word:<8}" for word in ("TYPE", "ID", "COMP", "ROW") * 2] + [*entries, "ENDREC"])
 
 
 def assembly_lines(model: InterfaceModel) -> Iterator[str]:

@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.importers.nastran_matrices.op4 import read_op4
 from fe_models.importers.nastran_matrices.write_op4 import write_op4
@@ -40,3 +40,41 @@ def test_pynastran_reads_what_is_written_bit_for_bit(tmp_path, text):
             assert_array_equal(theirs[name], matrix)
     for matrix in read_op4(tmp_path / "a.op4"):
         assert_array_equal(matrix.matrix.toarray(), matrices[matrix.name])
+
+
+READ_DMIG = """
+import sys
+import numpy as np
+from pyNastran.bdf.bdf import BDF
+model = BDF(debug=None)
+model.read_bdf(sys.argv[1], xref=False, punch=True)
+found = {}
+for name, matrix in model.dmig.items():
+    dense, rows, columns = matrix.get_matrix(is_sparse=False)
+    found[name] = dense
+    found[name + "_rows"] = np.array([rows[k] for k in range(len(rows))])
+np.savez(sys.argv[2], **found)
+"""
+
+
+@pytest.mark.skipif(not PYTHON, reason="FLOATFRAME_PYNASTRAN is not set")
+def test_pynastran_reads_exported_superelements(tmp_path):
+    """OP4 bit for bit, DMIG to the ten digits of its fields, rows sorted by their point and component."""
+    import cms
+    from cms.exporters.interface_model import interface_model
+    from tests.cms.exporters.test_matrices_over_interfaces import reduced_bar
+
+    body = reduced_bar()
+    model = interface_model(body)
+    cms.export_body(body, tmp_path / "bar.op4", to="nastran-op4", units="m-kg-s")
+    subprocess.run([PYTHON, "-c", READ, tmp_path / "bar.op4", tmp_path / "bar.npz"], check=True, timeout=100)
+    with np.load(tmp_path / "bar.npz") as theirs:
+        for name, matrix in {"KXX": model.K, "MXX": model.M, "BXX": model.D, "PX": model.loads}.items():
+            assert_array_equal(theirs[name], matrix)
+    cms.export_body(body, tmp_path / "dmig.bdf", to="nastran-dmig", units="m-kg-s")
+    subprocess.run([PYTHON, "-c", READ_DMIG, tmp_path / "dmig.bdf", tmp_path / "dmig.npz"], check=True, timeout=100)
+    with np.load(tmp_path / "dmig.npz") as theirs:
+        rows = [(k + 1, c + 1) for k in range(2) for c in range(6)] + [(1000001 + k, 0) for k in range(3)]
+        for name, matrix in {"KAAX": model.K, "MAAX": model.M, "BAAX": model.D}.items():
+            at = [rows.index(tuple(row)) for row in theirs[f"{name}_rows"].tolist()]
+            assert_allclose(theirs[name], matrix[np.ix_(at, at)], rtol=1e-9, atol=1e-30)
