@@ -83,6 +83,32 @@ def frame_command(
     print_body(run_frame(FrameRequest(file, to, at, origin, axes, damping, units, output, geometric)))
 
 
+@app.command("faces")
+@guarded
+def faces_command(
+    file: Annotated[Path, typer.Argument(help="CAD file: .step .stp .iges .igs .brep.")],
+    units: Annotated[str, typer.Option(help="Unit system the lengths are shown in.")] = "mm-t-s",
+    select: Annotated[
+        list[str] | None, typer.Option("--select", "-s", help="Only faces such as 'cylinder r=12'; repeatable.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Picture with the numbers of the faces (.png).")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the list as JSON, for other programs.")] = False,
+) -> None:
+    """List the faces of a CAD file: kind, area, centre, normal, radius, name, colour; needs the extra mesh.
+
+    What it is can be written in a job: faces = ["cylinder r=12"].
+
+    Example: cms faces part.step -o faces.png
+
+    Example: cms faces part.step --select "cylinder r=12 hole" --json
+    """
+    from cms.cli.geometry.faces import FacesRequest, run_faces
+
+    run_faces(FacesRequest(file, units, tuple(select or ()), output, json))
+
+
 @app.command("modes")
 @guarded
 def modes_command(

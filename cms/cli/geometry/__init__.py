@@ -1,0 +1,1 @@
+"""Commands that look at CAD files and their meshes."""
