@@ -42,6 +42,9 @@ from .importers.cad.cad_model import read_cad as read_cad
 from .importers.matrices.body import body_from_foreign as body_from_foreign
 from .importers.matrices.foreign_matrices import ForeignMatrices as ForeignMatrices
 from .importers.matrices.read_matrices import read_matrices as read_matrices
+from .importers.objects.as_mesh import as_line_mesh as as_line_mesh
+from .importers.objects.as_mesh import as_mesh as as_mesh
+from .importers.objects.as_mesh import as_shell_mesh as as_shell_mesh
 from .importers.read_mesh import read_geometry as read_geometry
 from .importers.read_mesh import read_line_mesh as read_line_mesh
 from .importers.read_mesh import read_mesh as read_mesh
@@ -87,6 +90,7 @@ from .shells.interfaces import shell_interface as shell_interface
 from .shells.normals import orient_normals as orient_normals
 from .shells.shell_points import shell_points as shell_points
 from .shells.shell_property import ShellProperty as ShellProperty
+from .skfem_body import body_from_skfem as body_from_skfem
 from .solids.body import solid_body as solid_body
 from .solids.interfaces import check_overlap as check_overlap
 from .solids.interfaces import distributing_interface as distributing_interface

@@ -6,7 +6,7 @@ from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians
 
-__all__ = ["mirrored_cells", "mirrored_order", "require_node_order"]
+__all__ = ["mirrored_cells", "mirrored_order", "require_node_order", "turned_upright"]
 
 _REFLECTED_CORNERS = {
     "tetra": (0, 2, 1, 3),
@@ -72,5 +72,19 @@ def mirrored_order(kind: str) -> IntArray:
 
 def mirrored_cells(kind: str, nodes: Array, cells: IntArray) -> bool:
     """Whether every cell is numbered inside out: a negative Jacobian at the middle of all of them."""
+    return bool(_is_mirrored(kind, nodes, cells).all())
+
+
+def turned_upright(kind: str, nodes: Array, cells: IntArray) -> IntArray:
+    """Return the cells, each that is numbered inside out turned: for programs to which both senses are one."""
+    upright = cells.copy()
+    for start in range(0, len(cells), _CHUNK):
+        rows = start + np.flatnonzero(_is_mirrored(kind, nodes, cells[start : start + _CHUNK]))
+        upright[rows] = cells[rows][:, mirrored_order(kind)]
+    return upright
+
+
+def _is_mirrored(kind: str, nodes: Array, cells: IntArray) -> np.ndarray:
+    """Whether the Jacobian at the middle of each cell is negative, (n_cells,) bool."""
     middle = CELL_SHAPES[kind].nodes[: len(CELL_SHAPES[kind].corners)].mean(axis=0)[None]
-    return bool((cell_jacobians(kind, nodes[cells], middle) < 0).all())
+    return np.asarray(cell_jacobians(kind, nodes[cells], middle)[:, 0] < 0)

@@ -5,18 +5,14 @@ import io
 import re
 from pathlib import Path
 
-import numpy as np
-
 from fe_models.errors import MeshError
-from fe_models.foundation.arrays import IntArray
-from fe_models.importers.node_order import mirrored_cells, mirrored_order
-from fe_models.importers.raw_mesh import RawBlock, RawMesh
+from fe_models.importers.objects.meshio_mesh import raw_from_meshio
+from fe_models.importers.raw_mesh import RawMesh
 
 __all__ = ["read_vtk"]
 
 _SUPPORTED = "supported are linear and quadratic tetrahedra and hexahedra, and linear wedges; mesh the part again"
 _WITHOUT_SIZE = ("wedge12", "wedge15", "wedge18", "pyramid13", "hexahedron24", "quad6", "triangle7")  # in meshio
-_MOST_GROUPS = 1000  #: cell data with more distinct values are numbers of cells, not groups
 
 
 def read_vtk(path: Path, data: bytes) -> RawMesh:
@@ -66,34 +62,4 @@ def read_vtk(path: Path, data: bytes) -> RawMesh:
             f"{where}: could not be read as a VTK file: it is damaged or of another kind "
             f"({' '.join(reason.split())[:200] or type(failure).__name__})"
         ) from failure
-    nodes = np.asarray(mesh.points, dtype=float)
-    blocks = []
-    for k, block in enumerate(mesh.cells):
-        cells = np.asarray(block.data, dtype=np.int64)
-        inside = cells.size and cells.min() >= 0 and cells.max() < len(nodes)
-        if block.type == "wedge" and inside and np.isfinite(nodes).all() and mirrored_cells("wedge", nodes, cells):
-            cells = cells[:, mirrored_order("wedge")]
-        groups: dict[str, IntArray] = {}
-        for name, values in mesh.cell_data.items():
-            groups |= _groups(name, np.asarray(values[k]))
-        blocks.append(RawBlock(block.type, cells, groups))
-    node_sets = {
-        name: np.flatnonzero(values)
-        for name, values in mesh.point_data.items()
-        if np.ndim(values) == 1 and np.asarray(values).dtype.kind in "iub" and set(np.unique(values)) == {0, 1}
-    }
-    return RawMesh(nodes, tuple(blocks), node_sets)
-
-
-def _groups(name: str, values: np.ndarray) -> dict[str, IntArray]:
-    """Return group -> rows for whole-number data, one group for each value."""
-    if values.ndim == 2 and values.shape[1] == 1:
-        values = values[:, 0]
-    if values.ndim != 1 or values.dtype.kind not in "iub":
-        return {}
-    found, which = np.unique(values, return_inverse=True)
-    if len(found) > _MOST_GROUPS:
-        return {}
-    order = np.argsort(which, kind="stable")
-    parts = np.split(order, np.cumsum(np.bincount(which))[:-1])
-    return {f"{name}_{int(value)}": rows for value, rows in zip(found, parts, strict=True)}
+    return raw_from_meshio(mesh)

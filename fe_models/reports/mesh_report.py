@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from math import nan
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.units import Units, unit_system
+from fe_models.importers.objects.as_mesh import as_mesh
 from fe_models.material import Material, assign_materials
 from fe_models.meshes.cell_angles import face_angles
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
@@ -94,7 +96,7 @@ class MeshReport(Report):
 
 
 def report_mesh(
-    mesh: Mesh,
+    mesh: Any,
     materials: Material | Mapping[str, Material] | None = None,
     *,
     units: Units | str = "m-kg-s",
@@ -105,7 +107,7 @@ def report_mesh(
     Parameters
     ----------
     mesh
-        The mesh.
+        The mesh, ours or of another library (`fe_models.as_mesh`).
     materials
         One material, or cell group -> material; None: no mass, and density and modulus are not judged.
     units
@@ -118,6 +120,7 @@ def report_mesh(
     MaterialError
         If a material names an unknown group, or cells have no material or two.
     """
+    mesh = as_mesh(mesh)
     units = unit_system(units) if isinstance(units, str) else units
     used = used_nodes(mesh)
     if not used.any():

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -9,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from fe_models.beams.attachments import RigidLink, Spring
 from fe_models.foundation.units import Units
+from fe_models.importers.objects.as_mesh import as_shell_mesh
 from fe_models.material import Material
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.reports.report import Finding, Report
@@ -54,7 +56,7 @@ class ShellReport(Report):
 
 
 def report_shell(
-    mesh: ShellMesh,
+    mesh: Any,
     materials: Iterable[Material],
     *,
     units: Units,
@@ -74,6 +76,7 @@ def report_shell(
     springs, links
         They join parts too.
     """
+    mesh = as_shell_mesh(mesh)
     findings, area, warp = _judge_cells(mesh)
     edges = cell_edges(tuple(mesh.cells.values()))
     pairs = [edges.nodes, mesh.lines, *[np.array([spring.nodes]) for spring in springs]]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +16,7 @@ from fe_models.body.fe_body import FEBody, Interface, Recovery
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Units
+from fe_models.importers.objects.as_mesh import as_shell_mesh
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.elements import ShellCells, shell_cells
@@ -29,7 +31,7 @@ __all__ = ["shell_body"]
 
 
 def shell_body(
-    mesh: ShellMesh,
+    mesh: Any,
     properties: ShellProperty | Mapping[str, ShellProperty],
     *,
     name: str,
@@ -76,6 +78,7 @@ def shell_body(
     SectionError, BeamError
         As `beam_body` for the stiffeners and what is attached.
     """
+    mesh = as_shell_mesh(mesh)
     used, of_cell = assign_shell_properties(mesh, properties)
     _require_cells(mesh, warp_limit)
     groups = tuple(

@@ -1,11 +1,14 @@
 """Interfaces of a shell: nodes made rigid, distributing, or kept node by node."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fe_models.beams.interfaces import node_interface
 from fe_models.body.fe_body import Interface
 from fe_models.foundation.arrays import Array
+from fe_models.importers.objects.as_mesh import as_shell_mesh
 from fe_models.meshes.boundary import facet_weights
 from fe_models.meshes.selections import Selection, selected_facets
 from fe_models.meshes.shell_mesh import ShellMesh
@@ -15,7 +18,7 @@ __all__ = ["shell_interface"]
 
 
 def shell_interface(
-    mesh: ShellMesh,
+    mesh: Any,
     name: str,
     selection: Selection,
     *,
@@ -48,6 +51,7 @@ def shell_interface(
     InterfaceError
         If nothing is selected, or reference or triad do not do.
     """
+    mesh = as_shell_mesh(mesh)
     weights = _weights(mesh, selection) if kind == "distributing" else np.ones(len(mesh.nodes))
     return node_interface(mesh, name, selection, kind, reference, triad, weights)
 

@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +17,7 @@ from fe_models.foundation.errors import BodyError
 from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
+from fe_models.importers.objects.as_mesh import as_mesh
 from fe_models.material import Material, assign_materials
 from fe_models.meshes.boundary import boundary_triangles
 from fe_models.meshes.cell_shapes import cell_jacobians
@@ -105,7 +107,7 @@ class SolidModel:
 
 
 def solid_body(
-    mesh: Mesh,
+    mesh: Any,
     materials: Material | Mapping[str, Material],
     *,
     name: str,
@@ -121,7 +123,8 @@ def solid_body(
     Parameters
     ----------
     mesh
-        Tetrahedra, hexahedra and wedges, mixed as they come; faces and lines do not enter.
+        Tetrahedra, hexahedra and wedges, mixed as they come; faces and lines do not enter. A `fe_models.Mesh`, or a
+        mesh of meshio, pyvista or scikit-fem (`fe_models.as_mesh`).
     materials
         One for all cells, or group name -> material (`assign_materials`), in the units of the mesh.
     name
@@ -155,6 +158,7 @@ def solid_body(
         If there is no solid cell, a node belongs to none, or an element is inverted.
     """
     rule_words = _rule_words(integration, mass)
+    mesh = as_mesh(mesh)
     used, of_cell = assign_materials(mesh, materials)
     properties = np.array([[material.lam, material.mu, material.rho] for material in used])
     K, M_s = assemble(

@@ -17,19 +17,12 @@ from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.cell_shapes import CELL_SHAPES, shape_values
 from fe_models.meshes.mesh import SOLID_TYPES
+from fe_models.meshes.skfem_cells import SKFEM_ELEMENTS, skfem_node_order
 
 __all__ = ["INTEGRATIONS", "MASSES", "ReferenceElement", "ShapeTable", "reference_element", "shape_table"]
 
 Degree = int | tuple[int, int]
 
-SKFEM_ELEMENTS = {
-    "tetra": "ElementTetP1",
-    "tetra10": "ElementTetP2",
-    "hexahedron": "ElementHex1",
-    "hexahedron20": "ElementHexS2",
-    "hexahedron27": "ElementHex2",
-    "wedge": "ElementWedge1",
-}  #: of others the monomials of `fe_models.meshes.cell_shapes` make the shape functions
 # scikit-fem 12 labels its tetrahedron tables 5 to 8 one degree too high (measured; a test holds them to what is used
 # here), so label 8 gives degree 7. Degrees: stiffness, mass; per direction for hexahedra, (triangle, line) for wedges.
 RULES: dict[str, tuple[str, Degree, Degree]] = {
@@ -148,18 +141,6 @@ def shape_table(kind: str, points: Array, weights: Array) -> ShapeTable:
     N = np.stack([np.broadcast_to(value, len(points)) for value, _ in values], axis=1)
     dN = np.stack([np.broadcast_to(gradient, (3, len(points))).T for _, gradient in values], axis=1)
     return ShapeTable(frozen(points), frozen(weights), frozen(N), frozen(dN))
-
-
-def skfem_node_order(kind: str) -> IntArray:
-    """Return, for each meshio node of a cell type, the local number of the same node in scikit-fem, (n_nodes,)."""
-    import skfem
-
-    positions = np.asarray(getattr(skfem, SKFEM_ELEMENTS[kind])().doflocs)
-    distance = np.abs(CELL_SHAPES[kind].nodes[:, None] - positions[None]).max(axis=2)
-    order = distance.argmin(axis=1)
-    if (distance.min(axis=1) > 1e-12).any() or np.unique(order).size != len(positions):
-        raise MeshError(f"{kind}: the installed scikit-fem places its nodes elsewhere; expected scikit-fem 10 to 12")
-    return order
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +11,7 @@ from fe_models.body.couplings import RANK_TOLERANCE
 from fe_models.body.fe_body import Interface
 from fe_models.errors import InterfaceError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.importers.objects.as_mesh import selectable
 from fe_models.meshes.boundary import area_centroid, facet_weights
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.selections import Selection, selected_facets
@@ -18,7 +20,7 @@ __all__ = ["check_overlap", "distributing_interface", "nodes_interface", "rigid_
 
 
 def rigid_interface(
-    mesh: Mesh,
+    mesh: Any,
     name: str,
     selection: Selection,
     *,
@@ -30,7 +32,7 @@ def rigid_interface(
     Parameters
     ----------
     mesh
-        Mesh of the body.
+        Mesh of the body, ours or of another library, or a basis of scikit-fem (`fe_models.as_mesh`).
     name
         Name of the interface.
     selection
@@ -46,13 +48,14 @@ def rigid_interface(
     InterfaceError
         If nothing is selected, or fewer than three nodes, or nodes on one line: they would leave a rotation free.
     """
+    mesh = selectable(mesh)
     nodes = _members(name, mesh, selection)
     _require_spread(name, "rigid", mesh.nodes[nodes], np.ones(len(nodes)))
     return _interface(mesh, name, "rigid", nodes, selection, reference, triad)
 
 
 def distributing_interface(
-    mesh: Mesh,
+    mesh: Any,
     name: str,
     selection: Selection,
     *,
@@ -75,6 +78,7 @@ def distributing_interface(
     InterfaceError
         If no facet is selected, or the weighted nodes lie on one line.
     """
+    mesh = selectable(mesh)
     facets = _facets(name, mesh, selection)
     if not facets:
         count = len(_members(name, mesh, selection))
@@ -94,7 +98,7 @@ def distributing_interface(
 
 
 def nodes_interface(
-    mesh: Mesh,
+    mesh: Any,
     name: str,
     selection: Selection,
     *,
@@ -113,6 +117,7 @@ def nodes_interface(
     InterfaceError
         If nothing is selected.
     """
+    mesh = selectable(mesh)
     return _interface(mesh, name, "nodes", _members(name, mesh, selection), selection, reference, triad)
 
 

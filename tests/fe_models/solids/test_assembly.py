@@ -14,8 +14,9 @@ import fe_models.solids.assembly as assembly
 from fe_models.errors import MeshError
 from fe_models.meshes.cell_shapes import shape_values
 from fe_models.meshes.mesh import SOLID_TYPES, Mesh
+from fe_models.meshes.skfem_cells import skfem_node_order
 from fe_models.solids.assembly import assemble, expand_scalar_mass
-from fe_models.solids.elements import quadrature, reference_element, skfem_node_order
+from fe_models.solids.elements import quadrature, reference_element
 from tests.bodies import ALUMINIUM, STEEL, box_mesh, distorted
 
 ROUNDOFF = 1e-12

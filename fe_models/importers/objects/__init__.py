@@ -1,0 +1,1 @@
+"""Meshes of other Python libraries, taken as objects: meshio, pyvista, scikit-fem."""

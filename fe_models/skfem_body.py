@@ -1,0 +1,96 @@
+"""A body from scikit-fem: a vector basis with the stiffness and mass that its user assembled."""
+
+from collections.abc import Iterable
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from fe_models.body.fe_body import FEBody, Interface
+from fe_models.errors import MeshError
+from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.units import Units, unit_system
+from fe_models.importers.objects.as_mesh import as_mesh
+from fe_models.importers.objects.skfem_basis import nodes_of_basis
+from fe_models.matrices import body_from_matrices
+from fe_models.meshes.boundary import boundary_triangles
+
+__all__ = ["body_from_skfem"]
+
+
+def body_from_skfem(
+    basis: Any,
+    K: Any,
+    M: Any,
+    *,
+    name: str,
+    units: Units | str,
+    interfaces: Iterable[Interface] = (),
+    D: Any = None,
+    held: bool = False,
+    accept: Iterable[str] = (),
+) -> FEBody:
+    """Make a body of matrices over a vector basis of scikit-fem, from whatever forms they were assembled.
+
+    The basis may be of any element whose dofs are values of a component at a point (`ElementVector` of P1, P2, Q1, Q2,
+    serendipity, wedges, Crouzeix-Raviart, higher orders): this is checked by its shape functions. Where
+    M is M_s ⊗ 1₃, as a density makes it, all inertia invariants are exact. The matrices have no stress and no
+    geometric stiffness; `solid_body(basis, material)` has both, with orthotropic materials too.
+
+    Parameters
+    ----------
+    basis
+        `skfem.Basis` of all cells of a mesh in space.
+    K, M, D
+        Stiffness, mass and optional damping over the dofs of the basis, before any boundary condition, (N, N).
+    name
+        Of the body.
+    units
+        In which mesh and matrices are.
+    interfaces
+        Made on the same basis: `rigid_interface(basis, "end", Plane(...))`.
+    held, accept
+        As for `body_from_matrices`.
+
+    Raises
+    ------
+    MeshError
+        If the basis is none of space, or its dofs are not values at points.
+    BodyError
+        If matrices do not fit, or are not those of a free body (`body_from_matrices`).
+
+    Examples
+    --------
+    >>> body = body_from_skfem(basis, K, M, name="part", units="m-kg-s")                         # doctest: +SKIP
+    """
+    where = f"body {name!r}"
+    found = nodes_of_basis(basis)
+    for key, matrix in (("K", K), ("M", M), ("D", D)):
+        shape = getattr(matrix, "shape", (basis.N, basis.N) if matrix is None else None)
+        if shape != (basis.N, basis.N):
+            raise BodyError(
+                f"{where}: {key}: expected a matrix over the {basis.N} dofs of the basis, got {shape}; pass it as "
+                "assembled, not condensed"
+            )
+    mesh = basis.mesh
+    record = {
+        "mesh": f"skfem.{type(mesh).__name__}",
+        "nodes": str(len(found.nodes)),
+        "element": f"skfem.{type(getattr(basis.elem, 'elem', basis.elem)).__name__}, {mesh.t.shape[1]} cells",
+        "matrices": "assembled by the user",
+        "scikit-fem": version("scikit-fem"),
+    }
+    return body_from_matrices(
+        M, K, found.nodes, found.dofs,
+        name=name, units=unit_system(units) if isinstance(units, str) else units, interfaces=interfaces, D=D,
+        surface=_surface(basis), provenance=record, held=held, accept=accept,
+    )  # fmt: skip
+
+
+def _surface(basis: Any) -> IntArray:
+    """Return triangles for drawing; none where no cell type here has the nodes of the element."""
+    try:
+        return boundary_triangles(as_mesh(basis))
+    except MeshError:
+        return np.zeros((0, 3), np.int64)
