@@ -9,6 +9,7 @@ from pathlib import Path
 from cms.errors import CmsError, ExportError
 from cms.exporters.ext_ptfm import make_ext_ptfm
 from cms.exporters.exudyn import make_exudyn
+from cms.exporters.formats import FORMATS
 from cms.exporters.matlab import make_mat5, make_mat73, make_simscape
 from cms.exporters.matrix_market import make_matrix_market
 from cms.exporters.mbdyn import make_mbdyn
@@ -20,7 +21,7 @@ from cms.exporters.writer import Request, Writer, left_out
 from cms.modal_file.file import convert_units, digest, read
 from cms.reduced_body.invariants import INERTIA_TERMS
 from cms.reduced_body.reduced_body import ReducedBody
-from fe_models.foundation.paths import replace_files
+from fe_models.foundation.paths import is_stream, replace_files
 from fe_models.foundation.seal import reason
 from fe_models.foundation.units import UNIT_SYSTEMS, Units, unit_system
 from fe_models.foundation.words import nearest, quoted
@@ -98,7 +99,8 @@ def export_body(
     body
         A reduced body, or its modal file.
     path
-        The file to write; formats of several files take its stem for the others.
+        The file to write, with the suffix of the format where it has none; formats of several files take its stem for
+        the others.
     to
         Key of the format, as `cms formats` lists it.
     units
@@ -133,7 +135,7 @@ def export_body(
     source = "" if isinstance(body, ReducedBody) else f"{Path(body).name}, digest {digest(body)}"
     converted = convert_units(body if isinstance(body, ReducedBody) else read(body), system)
     require_content(converted, to, writer)
-    request = Request(converted, Path(path), source, nodes, loads or {})
+    request = Request(converted, with_suffix(Path(path), to), source, nodes, loads or {})
     made = writer.make(request)
     try:
         replace_files(made.files)
@@ -161,6 +163,12 @@ def wanted_units(units: Units | str | None, to: str, writer: Writer) -> Units:
             f"export: units {system.name}: the program behind {to} knows {writer.units} only; ask for that"
         )
     return system
+
+
+def with_suffix(path: Path, to: str) -> Path:
+    """Return the path with the suffix of the format where it has none."""
+    suffix = next(known.suffixes[0] for known in FORMATS if known.key == to)
+    return path if path.suffix or is_stream(path) else path.with_suffix(suffix)
 
 
 def require_content(body: ReducedBody, to: str, writer: Writer) -> None:

@@ -12,6 +12,8 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["make_exudyn"]
 
+SPEED = 0.05  #: angular velocity of the script about each axis, times 1, 2, 3, over the lowest frequency
+BENT = 0.01  #: displacement at its start over the size of the body
 FILE_VERSION = 1  #: of the archive, as exudyn 1.9 to 1.13 write it
 
 
@@ -44,6 +46,8 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
     post[()] = stress
     ours: dict[str, Any] = {
         "floatframe_damping": body.D,
+        "floatframe_origin": body.frame.origin,
+        "floatframe_axes": body.frame.axes,
         "floatframe_names": np.array([interface.name for interface in body.interfaces], dtype=str),
         "floatframe_positions": np.array([interface.position for interface in body.interfaces]).reshape(-1, 3),
         "floatframe_triads": np.array([interface.triad for interface in body.interfaces]).reshape(-1, 3, 3),
@@ -97,7 +101,13 @@ SCRIPT = '''"""{title}
 {header}
 
 As a module: `body = add_body(mbs)` adds the body, `marker(mbs, body, "{first}")` a marker of an interface.
-As a script: {seconds} time units of free motion without forces; prints what it finds.
+As a script: the free body, placed as its mesh, bent into its first mode by Q_0, turns about the mesh origin with the
+angular velocity OMEGA. In floatframe the same motion is
+
+    body = ff.FlexibleBody("body", cms.read(FILE, units="{units}"), omega_B=OMEGA, q=Q_0, stiffening=False)
+    system = ff.System([body], units=body.reduced.units)
+    motion = ff.integrate(system, ff.GeneralizedAlpha(0.9), t_end=END, h=END / STEPS)
+    motion.body("body").r[-1], motion.body("body").q[-1]
 """
 
 import os
@@ -109,6 +119,9 @@ from exudyn.FEM import ObjectFFRFreducedOrderInterface
 
 ARCHIVE = os.path.join(os.path.dirname(os.path.abspath(__file__)), {archive!r})
 INTERFACES = {interfaces!r}
+OMEGA = np.array([1.0, 2.0, 3.0]) * {speed!r}
+Q_0 = np.array([{start!r}] + [0.0] * {others})
+END, STEPS = {end!r}, 400
 
 
 def add_body(mbs, **options):
@@ -139,21 +152,31 @@ def marker(mbs, body, name, rigid=True):
 
 
 def main():
-    """Move the free body a little while."""
+    """Let the free body turn and swing, and print where its frame and its modal coordinates are at the end."""
+    with np.load(ARCHIVE) as archive:
+        origin, axes = archive["floatframe_origin"], archive["floatframe_axes"]
     system = exu.SystemContainer()
     mbs = system.AddSystem()
-    body = add_body(mbs)
+    body = add_body(mbs, positionRef=origin, rotationMatrixRef=axes, initialVelocity=np.cross(OMEGA, origin),
+                    initialAngularVelocity=OMEGA)
+    mbs.SetNodeParameter(body["nGenericODE2"], "initialCoordinates", Q_0.tolist())
     for name in INTERFACES:
         marker(mbs, body, name, rigid=False)
     mbs.Assemble()
     settings = exu.SimulationSettings()
-    settings.timeIntegration.endTime = {seconds}
-    settings.timeIntegration.numberOfSteps = 10
+    settings.timeIntegration.endTime = END
+    settings.timeIntegration.numberOfSteps = STEPS
     settings.timeIntegration.verboseMode = 0
+    settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9
+    settings.timeIntegration.generalizedAlpha.computeInitialAccelerations = True
+    settings.timeIntegration.newton.relativeTolerance = 1e-10
     settings.solution.file.write = False
     mbs.SolveDynamic(settings)
-    q = mbs.GetNodeOutput(body["nGenericODE2"], exu.OutputVariableType.Coordinates)
-    print("modes:", len(np.atleast_1d(q)), "largest coordinate:", np.abs(q).max(initial=0.0))
+    r = mbs.GetNodeOutput(body["nRigidBody"], exu.OutputVariableType.Position)
+    q = np.atleast_1d(mbs.GetNodeOutput(body["nGenericODE2"], exu.OutputVariableType.Coordinates))
+    print("time:", END)
+    print("position of the body frame:", *r)
+    print("modal coordinates:", *q)
 
 
 if __name__ == "__main__":
@@ -165,10 +188,13 @@ def script_of(request: Request, archive: Path) -> str:
     """Return the script."""
     body = request.body
     names = [interface.name for interface in body.interfaces]
-    slowest = body.frequencies[np.isfinite(body.frequencies)].min(initial=np.inf)
-    seconds = float(f"{0.1 / slowest:.3g}") if np.isfinite(slowest) and slowest > 0 else 0.01
+    slowest = body.frequencies[np.isfinite(body.frequencies) & (body.frequencies > 0)].min(initial=np.inf)
+    slowest = float(f"{slowest:.3g}") if np.isfinite(slowest) else 1.0
+    size, largest = np.linalg.norm(np.ptp(body.nodes, axis=0)), np.linalg.norm(body.Phi[:, :, 0], axis=1).max()
+    start = float(f"{BENT * size / largest:.3g}") if largest > 0 else 0.0
     lines = [line.replace("\\", "/").replace('"""', "'''") for line in request.header()]
     return SCRIPT.format(
-        title=lines[0], header="\n".join(lines[1:]), first=names[0] if names else "NAME", seconds=seconds,
-        archive=archive.name, interfaces=names,
+        title=lines[0], header="\n".join(lines[1:]), first=names[0] if names else "NAME", units=body.units.name,
+        archive=archive.name, interfaces=names, speed=float(f"{SPEED * slowest:.3g}"), start=start, others=body.n_q - 1,
+        end=float(f"{0.7 / slowest:.3g}"),
     )  # fmt: skip

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
+from unicodedata import combining, normalize
 
 import numpy as np
 
@@ -27,6 +28,10 @@ CONTENT: dict[str, tuple[str, Callable[[ReducedBody], bool]]] = {
     "point stress": ("stress at named points", lambda body: body.point_stress is not None),
     "surface": ("surface for drawing", lambda body: len(body.surface) > 0),
 }
+#: signs of formulas and units as they are typed where there are no others
+IN_ASCII = str.maketrans(
+    {"ᵀ": "^T", "²": "^2", "³": "^3", "·": "*", "×": "x", "≤": "<=", "≥": ">=", "−": "-", "–": "-", "ß": "ss", "µ": "u"}
+)
 
 
 @dataclass(frozen=True)
@@ -82,9 +87,10 @@ def left_out(body: ReducedBody, holds: Iterable[str]) -> tuple[str, ...]:
 
 
 def in_ascii(text: str, longest: int = 200) -> str:
-    """Return a text on one line of ASCII, for files of programs that know no other."""
-    line = " ".join(text.split())
-    line = line.encode("ascii", "backslashreplace").decode("ascii")
+    """Return a text on one line of ASCII, for files of programs that know no other; letters lose their accents."""
+    line = " ".join(text.split()).translate(IN_ASCII)
+    line = "".join(letter for letter in normalize("NFKD", line) if not combining(letter)).translate(IN_ASCII)
+    line = line.encode("ascii", "replace").decode("ascii")
     return line if len(line) <= longest else f"{line[: longest - 3]}..."
 
 

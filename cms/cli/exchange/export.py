@@ -42,7 +42,7 @@ def run_export(request: ExportRequest) -> None:
     path = output_path(request.output, default, ExportError, overwrite_of=(request.file,))
     exported = export_body(request.file, path, to=request.to, units=units, nodes=request.nodes, loads=loads_of(request))
     for written in exported.files:
-        say(f"wrote {written} ({written.stat().st_size / 1e6:.2f} MB)")
+        say(f"wrote {written} ({written.stat().st_size / 1e6:.2f} MB)" if written.is_file() else f"wrote {written}")
     say(f"units: {units.name} ({units.length_symbol}, {units.mass_symbol}, {units.time_symbol})")
     for note in exported.notes:
         say(note)

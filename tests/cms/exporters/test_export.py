@@ -63,6 +63,17 @@ def test_two_exports_are_equal_byte_for_byte(to, tmp_path):
         assert first.read_bytes() == second.read_bytes()
 
 
+def test_a_name_without_suffix_gets_that_of_the_format(body, tmp_path):
+    assert cms.export_body(body, tmp_path / "a", to="mbdyn", units="m-kg-s").files == (tmp_path / "a.fem",)
+    assert cms.export_body(body, tmp_path / "a.x", to="mbdyn", units="m-kg-s").files == (tmp_path / "a.x",)
+
+
+def test_the_header_is_ascii(body, tmp_path):
+    told = replace(body, provenance={"solver": "L Lᵀ, 2·10⁻⁶ ≤ größe", "mesh": "rod.msh"})
+    cms.export_body(told, tmp_path / "a.fem", to="mbdyn", units="m-kg-s")
+    assert "** solver: L L^T, 2*10-6 <= grosse" in (tmp_path / "a.fem").read_text(encoding="ascii")
+
+
 def test_numbers_are_those_of_the_units_asked_for(body, tmp_path):
     import h5py
 

@@ -132,11 +132,19 @@ def test_the_archive_holds_what_exudyn_computes_from_the_points():
         assert_allclose(archive[name], values, rtol=0, atol=1e-12 * np.abs(values).max(), err_msg=name)
 
 
-def test_the_script_runs_as_it_stands(exported):
-    _, path, _ = exported
+def test_the_script_runs_as_it_stands_and_prints_our_motion(exported):
+    reduced, path, script = exported
     done = subprocess.run(
         [sys.executable, "-W", "error", path.with_suffix(".py")], capture_output=True, text=True, timeout=120,
         cwd=path.parent, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "modes: 4" in done.stdout
+    said = dict(line.split(": ", 1) for line in done.stdout.splitlines() if ": " in line)
+    body = ff.FlexibleBody("body", reduced, omega_B=script.OMEGA, q=script.Q_0, stiffening=False)
+    system, h = ff.System([body], units=reduced.units), script.END / script.STEPS
+    motion = ff.integrate(system, ff.GeneralizedAlpha(0.9), t_end=script.END, h=h)
+    r = np.array(said["position of the body frame"].split(), dtype=float)
+    q = np.array(said["modal coordinates"].split(), dtype=float)
+    assert np.abs(q).max() > 1e-5
+    assert_allclose(r, motion.body("body").r[-1], rtol=0, atol=1e-6)
+    assert_allclose(q, motion.body("body").q[-1], rtol=0, atol=1e-5 * np.abs(q).max())
