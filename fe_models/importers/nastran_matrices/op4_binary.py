@@ -52,14 +52,15 @@ def read_binary(where: str, path: Path) -> Iterator[NastranMatrix]:
         n_columns, n_rows, form, kind = numbers
         here = f"{where}: matrix {name or len(names) + 1}"
         require_sizes(here, n_columns, n_rows, kind, size)
-        real_size = 1 if kind in (1, 3) and step == 1 else 2
-        word_size = real_size * (1 if kind < 3 else 2)
+        reals = 1 if kind < 3 else 2
+        is_single = kind in (1, 3) and step == 1
         at += n_head + 2
-        capacity = (len(words) - at) // word_size
+        capacity = (len(words) - at) // (reals if is_single else 2 * reals)
         index = np.int32 if capacity < LARGEST else np.int64
         indptr = np.zeros(n_columns + 1, index)
         indices = np.empty(capacity, index)  # more than needed, never touched, given back
-        values = np.empty(capacity * word_size, np.int32)
+        values = np.empty(capacity * reals, np.int32 if is_single else np.int64)
+        none = np.empty(0, np.int64 if is_single else np.int32)
         status, at, count, column = op4_kernels.read_columns(
             words,
             at,
@@ -68,11 +69,11 @@ def read_binary(where: str, path: Path) -> Iterator[NastranMatrix]:
             abs(n_rows),
             n_columns,
             n_rows < 0 or n_rows >= NOT_BIGMAT,
-            real_size,
-            word_size,
+            reals,
             indptr,
             indices,
-            values,
+            values if is_single else none,
+            none if is_single else values,
         )
         if status != op4_kernels.COMPLETE:
             raise MatrixError(
@@ -80,10 +81,10 @@ def read_binary(where: str, path: Path) -> Iterator[NastranMatrix]:
                 "write the file again"
             )
         indices.resize(count, refcheck=False)
-        values.resize(count * word_size, refcheck=False)
+        values.resize(count * reals, refcheck=False)
         yield NastranMatrix(
             name=name or f"M{len(names) + 1}",
-            matrix=_compressed(_numbers(values, kind, step), indices, indptr, abs(n_rows)),
+            matrix=_compressed(_numbers(values, kind), indices, indptr, abs(n_rows)),
             form=form,
             kind=kind,
             where=here,
@@ -113,9 +114,10 @@ def _name(words: np.ndarray, step: int, swapped: bool) -> str:
     return text.decode("latin-1").replace("\0", " ").strip().upper()
 
 
-def _numbers(values: np.ndarray, kind: int, step: int) -> np.ndarray:
+def _numbers(values: np.ndarray, kind: int) -> np.ndarray:
     """Return the words as float64 or complex128."""
-    real = values.view(np.float32).astype(np.float64) if kind in (1, 3) and step == 1 else values.view(np.float64)
+    is_single = values.dtype == np.int32
+    real = values.view(np.float32).astype(np.float64) if is_single else values.view(np.float64)
     return real if kind < 3 else real.view(np.complex128)
 
 

@@ -20,6 +20,8 @@ FAULTS = {
     ORDER: "strings of a column overlap or are not in the order of the rows",
 }  #: status of `read_columns` -> what is wrong
 
+LOW = np.int64(0xFFFFFFFF)
+
 jit = njit(cache=True, nogil=True, error_model="numpy")
 
 
@@ -29,13 +31,11 @@ def integer(words, at, step, is_swapped):
     if step == 1:
         return np.int64(words[at])
     low, high = (words[at + 1], words[at]) if is_swapped else (words[at], words[at + 1])
-    return (np.int64(high) << np.int64(32)) | (np.int64(low) & np.int64(0xFFFFFFFF))
+    return (np.int64(high) << np.int64(32)) | (np.int64(low) & LOW)
 
 
 @jit
-def read_columns(
-    words, at, step, is_swapped, n_rows, n_columns, is_bigmat, real_size, word_size, indptr, indices, values
-):
+def read_columns(words, at, step, is_swapped, n_rows, n_columns, is_bigmat, reals, indptr, indices, singles, doubles):
     """Read the columns of one matrix from its first record behind the header.
 
     (1) a record: its length in bytes, column, row (0: strings), words that follow, these words, its length again
@@ -45,10 +45,13 @@ def read_columns(
 
     Parameters
     ----------
-    real_size, word_size
-        Words of 4 bytes of a real, and of one entry of the matrix.
-    indptr, indices, values
-        Filled: compressed columns; values as words in the order of this machine, (capacity word_size,).
+    reals
+        Of one entry of the matrix: 2 if it is complex.
+    indptr, indices
+        Filled: compressed columns, (n_columns + 1,), (capacity,).
+    singles, doubles
+        Filled, as words of this machine: reals of 4 bytes in the first, (capacity reals,), or of 8 bytes in the second,
+        (capacity reals,) of 64 bits; the other one is empty.
 
     Returns
     -------
@@ -62,6 +65,8 @@ def read_columns(
         The column at fault, from 1.
     """
     last, count = 0, 0
+    real_size = 1 if singles.size else 2
+    is_plain = real_size == 2 and reals == 1 and not is_swapped
     n_words = words.size
     while True:
         if at + 2 + 3 * step > n_words:  # (1)
@@ -104,24 +109,29 @@ def read_columns(
                 size = ((head >> 16) - 1) * step
                 first = head & 0xFFFF
                 here += step
-            if size < 0 or size > end - here or size % word_size:
+            if size < 0 or size > end - here or size % (reals * real_size):
                 return LENGTH, at, count, column
-            n = size // word_size
+            n = size // (reals * real_size)
             if first < 1 or first - 1 + n > n_rows:
                 return ROWS, at, count, column
             if first <= above:
                 return ORDER, at, count, column
             above = first - 1 + n
-            for k in range(n):
-                indices[count + k] = first - 1 + k
-            to = count * word_size
-            if is_swapped and real_size == 2:
-                for k in range(0, size, 2):
-                    values[to + k] = words[here + k + 1]
-                    values[to + k + 1] = words[here + k]
+            to = count * reals
+            if is_plain:  # one loop without branches: most strings are short
+                for k in range(n):
+                    indices[count + k] = first - 1 + k
+                    doubles[count + k] = (np.int64(words[here + 2 * k + 1]) << 32) | (
+                        np.int64(words[here + 2 * k]) & LOW
+                    )
             else:
-                for k in range(size):
-                    values[to + k] = words[here + k]
+                for k in range(n):
+                    indices[count + k] = first - 1 + k
+                for k in range(n * reals):
+                    if real_size == 1:
+                        singles[to + k] = words[here + k]
+                    else:
+                        doubles[to + k] = integer(words, here + 2 * k, 2, is_swapped)
             count += n
             here += size
         at = end + 1
