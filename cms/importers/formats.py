@@ -15,4 +15,28 @@ FORMATS = (
         key="matrices", tried="our own Craig-Bampton matrices",
         lost="3C, 4C, 5C unless masses are beside; stress; rows say their dofs, or --boundary does",
     ),
+    FileFormat(
+        "ExternalFlexibleFfrBody, HDF5", "MBSim", "reduced body", (".h5",), reads=True, key="mbsim",
+        tried="files of our writer; names and orders of its source",
+    ),
+    FileFormat(
+        "ObjectFFRFreducedOrder, npz", "Exudyn", "reduced body", (".npz",), reads=True, key="exudyn",
+        tried="files of our writer, which exudyn 1.13.6 runs", lost="stress (a pickled object, which is never opened)",
+    ),
+    FileFormat(
+        "modal joint, FEM data", "MBDyn", "reduced body", (".fem",), reads=True, key="mbdyn",
+        tried="files of our writer", lost="stress stiffening (record group 19)",
+    ),
+    FileFormat(
+        "SID_FEM, m1(row, q, column)", "PY_SID, EMBSlib", "reduced body", (".SID_FEM",), reads=True, key="sid_fem",
+        tried="files of our writer", lost="geometric stiffness",
+    ),
+    FileFormat(
+        "SID_FEM, m1(row, column, q)", "FEMBeam, welib", "reduced body", (".SID_FEM",), reads=True,
+        key="sid_fem-fembeam", tried="files of our writer", lost="geometric stiffness",
+    ),
+    FileFormat(
+        "ExtPtfm, FlexASCII", "OpenFAST", "reduced body", (".dat",), reads=True, key="ext_ptfm",
+        tried="files of our writer", lost="3C, 4C, 5C; loads that change with time; the place of the node",
+    ),
 )  #: one line a format; `cms formats` and docs/formats.md list them  # fmt: skip

@@ -8,10 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from cms.errors import CmsError, ForeignBodyError
+from cms.importers.ext_ptfm import is_ext_ptfm, read_ext_ptfm
+from cms.importers.exudyn import is_exudyn, read_exudyn
 from cms.importers.inertia import Inertia
+from cms.importers.mbdyn import is_mbdyn, read_mbdyn
+from cms.importers.mbsim import is_mbsim, read_mbsim
 from cms.importers.modal_body import ModalBody
 from cms.importers.modal_route import body_of_modes
 from cms.importers.nastran import is_nastran, read_nastran
+from cms.importers.sid_fem import is_sid_fem, read_sid_fem, read_sid_fem_fembeam
 from cms.importers.superelement import Superelement, superelement_of_matrices
 from cms.importers.superelement_body import ImportOptions, body_of_superelement
 from cms.reduced_basis.damping import Damping
@@ -34,6 +39,11 @@ Places = Mapping[int, Array]  #: number of a node -> its place
 ForeignFiles = str | Path | Iterable[str | Path] | Mapping[str, str | Path]  #: a file, several, or role -> file
 
 
+def never(path: Path, head: bytes) -> bool:
+    """Return that no content tells a format, which then has to be named."""
+    return False
+
+
 @dataclass(frozen=True)
 class BodyFormat:
     """A format of reduced bodies: how its files are told, and what reads them."""
@@ -44,6 +54,12 @@ class BodyFormat:
 
 BODY_FORMATS: dict[str, BodyFormat] = {
     "nastran": BodyFormat(is_nastran, read_nastran),
+    "mbsim": BodyFormat(is_mbsim, read_mbsim),
+    "exudyn": BodyFormat(is_exudyn, read_exudyn),
+    "mbdyn": BodyFormat(is_mbdyn, read_mbdyn),
+    "sid_fem": BodyFormat(is_sid_fem, read_sid_fem),
+    "sid_fem-fembeam": BodyFormat(never, read_sid_fem_fembeam),
+    "ext_ptfm": BodyFormat(is_ext_ptfm, read_ext_ptfm),
 }  #: by the name of `format`; the first that knows a file reads it, other files are matrices (`read_matrices`)
 
 

@@ -31,6 +31,7 @@ __all__ = ["ImportOptions", "body_of_superelement", "fe_body_of_superelement"]
 
 RIGID = 1e-5  #: of the size of a motion: by how much recovered nodes may miss a rigid motion, digits of a file
 UNCOUPLED = 1e-9  #: coupling of modal coordinates and boundary in K, scaled, that is rounding
+NOTHING = 1e-13  #: stiffness of a boundary dof over the largest entry, that is rounding
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
@@ -112,7 +113,7 @@ def fe_body_of_superelement(element: Superelement, options: ImportOptions) -> FE
     node[element.is_modal] = node[physical][0]
     dofs = np.stack([node, element.dofs[:, 1]], axis=1)
     T = static_part(element, where)
-    K, M = T.T @ element.K @ T, T.T @ element.M @ T
+    K, M = T.T @ without_rounding(element) @ T, T.T @ element.M @ T
     D = None if element.D is None else T.T @ element.D @ T
     own = np.flatnonzero(physical)
     rows, matrix = [dofs[own]], [np.eye(len(dofs))[own]]
@@ -133,6 +134,17 @@ def fe_body_of_superelement(element: Superelement, options: ImportOptions) -> FE
         provenance=element.provenance,
     )
     return replace(body, interfaces=interfaces_of(body, element, options.interfaces))
+
+
+def without_rounding(element: Superelement) -> Array:
+    """Return the stiffness with zeros in rows that are rounding alone, as of the one interface of a free body."""
+    K = np.array(element.K)
+    length = float(np.linalg.norm(np.ptp(element.nodes, axis=0))) or 1.0
+    size = np.where(element.dofs[:, 1] >= 3, length, 1.0)
+    scaled = np.abs(K) / np.outer(size, size)
+    nothing = ~element.is_modal & (scaled.max(axis=1) <= NOTHING * scaled.max())
+    K[nothing], K[:, nothing] = 0.0, 0.0
+    return K
 
 
 def static_part(element: Superelement, where: str) -> Array:

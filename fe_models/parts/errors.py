@@ -7,4 +7,3 @@ __all__ = ["MeshError", "MeshingError", "PartError"]
 
 class PartError(FeModelsError, ValueError):
     """The dimensions of a part do not fit together."""
-

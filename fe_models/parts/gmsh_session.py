@@ -13,6 +13,7 @@ from fe_models.parts.errors import MeshError
 
 __all__ = ["PartMesh", "cylinder_faces", "mesh_and_write", "part_model"]
 
+
 @dataclass(frozen=True)
 class PartMesh:
     """A meshed part: the file, and what its geometry and its worst element are."""

@@ -128,9 +128,7 @@ def _parsed(text: str, slack: float) -> _Selector:
             raise InterfaceError(f"faces {quoted(text)}: unknown word {quoted(word)}{nearest(word, WORDS)}")
         k += 1
     if not tests and near is None:
-        raise InterfaceError(
-            f'faces {quoted(text)}: expected a condition beside "box", such as x=0..10 y=0..10 z=0..2'
-        )
+        raise InterfaceError(f'faces {quoted(text)}: expected a condition beside "box", such as x=0..10 y=0..10 z=0..2')
     return _Selector(tuple(tests), near)
 
 

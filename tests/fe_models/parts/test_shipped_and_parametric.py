@@ -237,8 +237,10 @@ def test_another_file_format_is_refused(gmsh, tmp_path):
 @pytest.mark.parametrize(
     ("error", "words"),
     [
-        (ModuleNotFoundError("No module named 'gmsh'", name="gmsh"),
-         r'not installed; pip install "floatframe\[mesh\]"$'),
+        (
+            ModuleNotFoundError("No module named 'gmsh'", name="gmsh"),
+            r'not installed; pip install "floatframe\[mesh\]"$',
+        ),
         (OSError("libGLU.so.1: cannot open shared object file"), "libGLU.so.1.*apt-get install libglu1-mesa"),
     ],
 )
