@@ -236,7 +236,8 @@ def _constraints(job: Job, raw: "RawMesh") -> "list[Constraint]":
         where = f"couplings.{name}"
         members = [(_group(raw, f"{where}.members", group), weight) for group, weight in coupling.members.items()]
         nodes = np.concatenate([group for group, _ in members])
-        weights = np.concatenate([np.full(len(group), weight) for group, weight in members])
+        each = [(weight,) * 3 + (0.0,) * 3 if isinstance(weight, float) else weight for _, weight in members]
+        weights = np.concatenate([np.tile(six, (len(group), 1)) for (group, _), six in zip(members, each, strict=True)])
         node = _one(raw, f"{where}.node", coupling.node)
         made.append(MeanMotion(where, node, nodes, weights, coupling.components))
     for name, equation in job.equations.items():

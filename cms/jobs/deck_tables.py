@@ -50,11 +50,16 @@ class SolidSection(Table):
     )
 
 
+SixWeights = tuple[float, float, float, float, float, float]  #: of ux uy uz rx ry rz
+
+
 class CouplingSection(Table):
     """[couplings.NAME]: a node that follows the weighted mean motion of others (RBE3)."""
 
     node: Name = Field(description="the name of a group that holds one node, which follows")
-    members: dict[str, float] = Field(description="a table {group = weight of each of its nodes}")
+    members: dict[str, float | SixWeights] = Field(
+        description="a table {group = weight of each of its nodes}: one number, for translations, or a list of six"
+    )
     components: Components = Field(ALL, description="components of the node that follow, ux to rz; default: all")
 
 

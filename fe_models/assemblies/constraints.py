@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.body.couplings import mean_motion
 from fe_models.body.rigid_motion import rigid_motion_of_points
+from fe_models.body.weighted_motion import weighted_motion
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 
@@ -34,7 +34,7 @@ class MeanMotion:
     name: str
     node: int
     members: IntArray  #: (n_members,)
-    weights: Array  #: (n_members,)
+    weights: Array  #: of translations, (n_members,), or of each component, mesh axes, (n_members, 6)
     components: tuple[int, ...] = ALL
 
 
@@ -131,14 +131,23 @@ def _rigid(group: RigidNodes, points: Array, dof_of: IntArray) -> list[Row]:
 
 
 def _mean(coupling: MeanMotion, points: Array, dof_of: IntArray) -> list[Row]:
-    A = mean_motion(points[coupling.members], coupling.weights, points[coupling.node])
-    members = dof_of[coupling.members, :3].ravel()
-    _require(coupling.name, int(coupling.members[0]), members, np.arange(3))
-    if not np.isfinite(A).all() or np.abs(A).max() > 1e12:
-        raise BodyError(f"{coupling.name}: its members cannot carry a rotation; take nodes that are not on one line")
+    given = np.asarray(coupling.weights, dtype=float)
+    each = given[:, None] * [1.0, 1.0, 1.0, 0.0, 0.0, 0.0] if given.ndim == 1 else given
+    members, at = np.unique(coupling.members, return_inverse=True)  # a node may be listed once for each weight
+    weights = np.zeros((len(members), 6))
+    np.add.at(weights, at, each)
+    for node, weight in zip(members.tolist(), weights, strict=True):
+        used = np.flatnonzero(weight)
+        _require(coupling.name, node, dof_of[node, used], used)
+    try:
+        A = weighted_motion(points[members], weights, points[coupling.node], components=coupling.components)
+    except BodyError as error:
+        raise BodyError(f"{coupling.name}: {error}") from error
+    is_used = weights.ravel() > 0
+    columns = dof_of[members].ravel()[is_used].tolist()
     return [
-        (int(dof_of[coupling.node, c]), members.tolist(), A[c].tolist(), coupling.name)
-        for c in coupling.components
+        (int(dof_of[coupling.node, c]), columns, row[is_used].tolist(), coupling.name)
+        for c, row in zip(coupling.components, A, strict=True)
         if dof_of[coupling.node, c] >= 0
     ]
 

@@ -110,7 +110,8 @@ class Coupling:
 
     name: str
     node: str
-    members: tuple[tuple[str, float], ...]  #: groups of nodes, and the weight of each of their nodes
+    #: groups of nodes, and the weight of each of their nodes: one number for translations, or six
+    members: tuple[tuple[str, float | tuple[float, ...]], ...]
     components: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  #: of the node that follow
 
 

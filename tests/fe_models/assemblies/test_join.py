@@ -7,9 +7,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.assemblies.constraints import MeanMotion, NodeEquation, RigidNodes
 from fe_models.assemblies.join import Part, join
 from fe_models.beams.attachments import PointMass
+from fe_models.beams.beam_property import BeamProperty
 from fe_models.beams.body import beam_body
+from fe_models.beams.sections import Circle
 from fe_models.body.couplings import couple, mean_motion
 from fe_models.body.fe_body import Interface
+from fe_models.body.weighted_motion import weighted_motion
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import unit_system
 from fe_models.meshes.line_mesh import LineMesh
@@ -19,6 +22,7 @@ from fe_models.solids.body import solid_body
 from tests.bodies import STEEL, box_mesh
 
 UNITS = unit_system("m-kg-s")
+STEEL_BEAM = BeamProperty(Circle(0.05), STEEL)
 
 
 def solid_part(mesh, rows):
@@ -133,3 +137,25 @@ def test_equations_are_resolved_along_their_chain_and_rings_are_refused():
         join("j", part, mesh.nodes, [first, NodeEquation("again", ((0, 0, 1.0), (2, 0, 1.0)))])
     with pytest.raises(BodyError, match="node 1 has no dof for component 4; nodes of solids have no rotations"):
         join("j", part, mesh.nodes, [NodeEquation("turn", ((0, 0, 1.0), (1, 3, 1.0)))])
+
+
+def test_a_mean_motion_with_weights_per_component_holds_rotations_too():
+    """A mass on a node that follows two nodes of a beam by translations and rotations: T'MT with the rows of both."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]])
+    frame = beam_body(LineMesh(points[:3], np.array([[0, 1], [1, 2]])), STEEL_BEAM, name="f", units=UNITS)
+    attached = beam_body(
+        LineMesh(points[3:], np.zeros((0, 2), np.int64)), {}, name="a", units=UNITS, point_masses=[PointMass(0, 7.0)]
+    )
+    weights = np.array([[1.0, 1, 1, 0, 0, 0], [2, 0, 2, 0.5, 0.5, 0], [1, 1, 1, 0, 0, 1], [0, 1, 0, 0, 0, 0]])
+    members = np.array([0, 1, 2, 1])  # node 1 is there twice, its weights add up
+    coupling = MeanMotion("c", 3, members, weights)
+    parts = [Part(frame, np.arange(3)), Part(attached, np.array([3]))]
+    joined = join("j", parts, points, [coupling]).body
+    summed = weights[:3].copy()
+    summed[1] += weights[3]
+    A = weighted_motion(points[:3], summed, points[3])
+    expected = frame.M.toarray()
+    expected[:18, :18] += A.T @ np.diag([7.0, 7, 7, 0, 0, 0]) @ A
+    assert_allclose(joined.M.toarray(), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    with pytest.raises(BodyError, match="c: weighted motion"):
+        join("j", parts, points, [MeanMotion("c", 3, members[:3], np.ones(3))])
