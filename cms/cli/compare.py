@@ -83,7 +83,7 @@ def run_compare(request: CompareRequest) -> None:
                 written = write_report(folder, comparison, request.stills)
     finally:
         for report in reports:
-            print_table("Mesh", ("", ""), report.rows())
+            print_table(report.title, ("", ""), report.rows())
     print_comparison(comparison)
     for path in written:
         say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")

@@ -30,7 +30,7 @@ def reduce_and_write(job: "Job", path: Path) -> "ReducedBody":
                 write(reduced, path)
     finally:  # a mesh that is refused is better understood with its numbers
         for report in reports:
-            print_table("Mesh", ("", ""), report.rows())
+            print_table(report.title, ("", ""), report.rows())
     print_body(reduced)
     print_times(clock)
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")

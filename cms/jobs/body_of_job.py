@@ -60,7 +60,7 @@ def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None]
     if job.body.matrices is not None:
         from cms.jobs.matrices_of_job import body_of_matrices
 
-        return body_of_matrices(job, stages)
+        return body_of_matrices(job, stages, on_report)
     raise JobError("job: expected either mesh or matrices, got neither")
 
 

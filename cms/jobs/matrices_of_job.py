@@ -1,6 +1,7 @@
 """Bodies of a job whose elements stay with another program: matrices, the geometry beside them, interfaces on it."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,15 +19,16 @@ if TYPE_CHECKING:
 __all__ = ["body_of_matrices"]
 
 
-def body_of_matrices(job: Job, stages: Stages) -> FEBody:
+def body_of_matrices(job: Job, stages: Stages, on_report: Callable[[Any], None] | None = None) -> FEBody:
     """Read mass and stiffness, and make a body with the interfaces and load cases of the job.
 
     An .npz file of our own keys brings nodes and interfaces along; all others need a deck or mesh beside them unless
-    they say where the nodes are.
+    they say where the nodes are. `on_report` is called with the `MatrixReport` before they are judged.
     """
     if job.body.brings_interfaces:
         return body_with_its_interfaces(job, stages)
-    from fe_models.importers.matrices.body import body_from_foreign, nodes_of
+    from fe_models.importers.matrices.body import body_from_foreign, nodes_of, with_geometry
+    from fe_models.importers.matrices.matrix_report import MatrixReport
     from fe_models.importers.matrices.read_matrices import read_matrices
     from fe_models.importers.read_mesh import read_geometry
 
@@ -36,6 +38,9 @@ def body_of_matrices(job: Job, stages: Stages) -> FEBody:
         read = read_matrices(job.body.matrices, names=job.body.names)
     with stages("read geometry"):
         geometry = nodes_of(read) if job.body.geometry is None else read_geometry(job.body.geometry)
+        read = with_geometry(read, geometry)
+        if on_report is not None:
+            on_report(MatrixReport(read))
         interfaces = interfaces_on(job, geometry)
     with stages("check matrices"):
         body = body_from_foreign(

@@ -71,7 +71,7 @@ def symmetry_defect(csc: sp.csc_array) -> float:
     """
     if csc.nnz == 0:
         return 0.0
-    scale = np.abs(csc.data).max()
+    scale = max(csc.data.max(), -csc.data.min())  # the largest in size, without an array of sizes
     x = np.random.default_rng(0).uniform(0.5, 1.5, csc.shape[0])
     defect = np.abs(csc @ x - csc.T @ x).max()
     return float(defect / scale) if scale else 0.0

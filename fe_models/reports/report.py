@@ -41,6 +41,11 @@ class Report(ABC):
         if errors:
             raise MeshError(f"mesh {self.source}: " + "; ".join(errors))
 
+    @property
+    def title(self) -> str:
+        """Head of the table."""
+        return "Mesh"
+
     @abstractmethod
     def numbers(self) -> list[tuple[str, str]]:
         """Return label and value of each number, in words."""

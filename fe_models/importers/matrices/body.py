@@ -133,9 +133,9 @@ def body_from_foreign(
         matrices["K"], note = without_supports(where, matrices["K"], matrices["M"], nodes, dofs)
         notes.append(note)
     files = dict(read.files)
-    if geometry is not None and geometry.source:
+    if geometry is not None and geometry.digest:
         files[geometry.source] = geometry.digest
-    record = {"mesh": ", ".join(files), "digest": " ".join(files.values())}
+    record = {"mesh": ", ".join(files)} | {f"file {path}": digest for path, digest in files.items()}
     record |= {"program": read.program} if read.program else {}
     record |= (
         {"triangles": ", ".join(f"{role} {kind}" for role, kind in read.triangle.items())} if read.triangle else {}

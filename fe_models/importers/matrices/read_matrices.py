@@ -3,6 +3,7 @@
 import hashlib
 import os
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -105,7 +106,9 @@ def read_part(path: Path, request: Request) -> ForeignMatrices:
         raise MatrixError(f"{where}: the file is empty")
     form = format_of(where, path, head)
     try:
-        part = form.read(path, request)
+        with ThreadPoolExecutor(1) as beside:  # the digest takes a core of its own
+            digest = beside.submit(digest_of, path)
+            part = form.read(path, request)
     except FeModelsError:
         raise
     except MemoryError as error:
@@ -117,7 +120,7 @@ def read_part(path: Path, request: Request) -> ForeignMatrices:
             f"{where}: could not be read as {form.name}: it is damaged or of another kind "
             f"({type(error).__name__}{': ' + text[0][:200] if text else ''})"
         ) from error
-    return replace(part, files={**part.files, str(path): digest_of(path)})
+    return replace(part, files={**part.files, str(path): digest.result()})
 
 
 def format_of(where: str, path: Path, head: bytes) -> MatrixFormat:

@@ -8,6 +8,7 @@ from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray, symmet
 
 __all__ = ["LARGEST", "full_matrix", "require_size", "stored_as"]
 
+COLUMNS = 4096  #: that are looked at together
 LARGEST = 10_000_000  #: rows that are believed without looking; beyond, a file has at least a byte for each
 
 
@@ -98,13 +99,19 @@ def mirrored(where: str, stored: sp.csc_array, *, declared: str | None = None) -
 
 
 def stored_as(matrix: sp.csc_array) -> str:
-    """Return which triangle has entries: both, lower, upper or diagonal."""
-    column = np.repeat(np.arange(matrix.shape[1], dtype=matrix.indices.dtype), np.diff(matrix.indptr))
-    below = bool(((matrix.indices > column) & (matrix.data != 0)).any())
-    above = bool(((matrix.indices < column) & (matrix.data != 0)).any())
-    return {(True, True): "both", (True, False): "lower", (False, True): "upper", (False, False): "diagonal"}[
-        below, above
-    ]
+    """Return which triangle has entries: both, lower, upper or diagonal; ends where both were seen."""
+    below = above = False
+    n = matrix.shape[1]
+    for first in range(0, n, COLUMNS):
+        last = min(first + COLUMNS, n)
+        part = slice(matrix.indptr[first], matrix.indptr[last])
+        rows, is_there = matrix.indices[part], matrix.data[part] != 0
+        column = np.repeat(np.arange(first, last, dtype=rows.dtype), np.diff(matrix.indptr[first : last + 1]))
+        below = below or bool(((rows > column) & is_there).any())
+        above = above or bool(((rows < column) & is_there).any())
+        if below and above:
+            return "both"
+    return "lower" if below else "upper" if above else "diagonal"
 
 
 def with_mirror(stored: sp.csc_array) -> sp.csc_array:

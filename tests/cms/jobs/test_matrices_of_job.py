@@ -74,6 +74,19 @@ def test_a_job_of_matrices_reduces_as_that_of_the_mesh(folder):
     assert_allclose(reduced.load_cases[0].force, [0, 0, 1], rtol=0, atol=1e-12)
 
 
+def test_the_user_is_told_what_was_read_before_it_is_judged(folder):
+    reports = []
+    job = cms.jobs.job.read_job(job_in(folder))
+    job_body(job, on_report=reports.append)
+    (report,) = reports
+    assert report.title == "Matrices"
+    rows = dict(report.rows())
+    assert rows["files"] == "blockC3D10_STIF1.mtx, blockC3D10_MASS1.mtx"
+    assert rows["rows"] == "771 of 257 nodes"
+    assert rows["K"] == "50729 entries, stored: both"
+    assert rows["note"].startswith("rows taken as 3 to a node")
+
+
 def test_roles_may_be_named_and_one_matrix_is_not_enough(folder):
     named = job_body(cms.jobs.job.read_job(job_in(folder, '{K = "blockC3D10_STIF1.mtx", M = "blockC3D10_MASS1.mtx"}')))
     assert named.n_dof > 0

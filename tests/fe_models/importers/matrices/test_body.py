@@ -88,7 +88,7 @@ def test_the_record_of_the_body_names_files_triangles_and_what_was_assumed(block
     record = block.provenance
     assert "blockC3D10_STIF1.mtx" in record["mesh"]
     assert "blockC3D10.inp" in record["mesh"]
-    assert len(record["digest"].split()) == 3
+    assert len([value for key, value in record.items() if key.startswith("file ") and len(value) == 64]) == 3
     assert record["triangles"] == "K both, M both"
     assert "rows taken as 3 to a node" in record["notes"]
     assert record["mass moments"].startswith("exact")
