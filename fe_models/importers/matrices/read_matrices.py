@@ -11,18 +11,18 @@ from fe_models.errors import FeModelsError, MatrixError
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.ansys_matrices.records import is_ansys_binary
-from fe_models.importers.matrices.abaqus_labels import is_labelled, read_labelled
-from fe_models.importers.matrices.abaqus_text import is_coordinates, read_coordinates
 from fe_models.importers.matrices.ansys import read_full_part, read_sub_part
-from fe_models.importers.matrices.calculix import read_calculix_dofs, read_calculix_matrix
 from fe_models.importers.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
 from fe_models.importers.matrices.local_systems import in_basic_axes
 from fe_models.importers.matrices.matlab import is_matlab_5, is_matlab_7, read_matlab_5, read_matlab_7
-from fe_models.importers.matrices.matrix_market import is_matrix_market, read_matrix_market
 from fe_models.importers.matrices.nastran import read_op2_part, read_op4_part, read_punch_part
 from fe_models.importers.matrices.request import MatrixFormat, Request
 from fe_models.importers.matrices.scipy_files import is_harwell_boeing, read_harwell_boeing, read_npz
-from fe_models.importers.matrices.user_element import is_user_element, read_user_element
+from fe_models.importers.matrices.text_files.abaqus_labels import is_labelled, read_labelled
+from fe_models.importers.matrices.text_files.abaqus_text import is_coordinates, read_coordinates
+from fe_models.importers.matrices.text_files.calculix import read_calculix_dofs, read_calculix_matrix
+from fe_models.importers.matrices.text_files.matrix_market import is_matrix_market, read_matrix_market
+from fe_models.importers.matrices.text_files.user_element import is_user_element, read_user_element
 from fe_models.importers.nastran_matrices.op2 import is_op2
 from fe_models.importers.nastran_matrices.op4 import is_op4
 

@@ -11,8 +11,8 @@ import scipy.sparse as sp
 from fe_models.errors import MatrixError
 from fe_models.importers.matrices.foreign_matrices import ForeignMatrices
 from fe_models.importers.matrices.matlab import MOST_INFLATED, from_named, real_matrix
-from fe_models.importers.matrices.matrix_market import role_by_stem
 from fe_models.importers.matrices.request import Request
+from fe_models.importers.matrices.text_files.matrix_market import role_by_stem
 from fe_models.importers.matrices.triangles import mirrored
 
 __all__ = ["is_harwell_boeing", "read_harwell_boeing", "read_npz"]

@@ -7,8 +7,8 @@ import numpy as np
 from fe_models.errors import MatrixError
 from fe_models.importers.matrices.foreign_matrices import ForeignMatrices
 from fe_models.importers.matrices.request import Request
+from fe_models.importers.matrices.text_files.triplet_text import parsed_triplets
 from fe_models.importers.matrices.triangles import full_matrix, require_size
-from fe_models.importers.matrices.triplet_text import parsed_triplets
 
 __all__ = ["read_calculix_dofs", "read_calculix_matrix"]
 

@@ -59,7 +59,7 @@ def parsed_triplets(where: str, data: bytes, *, first_line: int = 1) -> tuple[In
 
 def judged(where: str, data: bytes, first_line: int) -> tuple[int, int]:
     """Return the numbers of lines that are not empty and of words, after a look at every pair of neighbouring bytes."""
-    from fe_models.importers.matrices.text_kernels import judged_bytes
+    from fe_models.importers.matrices.text_files.text_kernels import judged_bytes
 
     n_words, n_lines, bad = judged_bytes(np.frombuffer(data, np.uint8))
     if bad >= 0:

@@ -12,8 +12,8 @@ from fe_models.errors import MatrixError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.matrices.foreign_matrices import ForeignMatrices
 from fe_models.importers.matrices.request import Request
+from fe_models.importers.matrices.text_files.triplet_text import HeadAndData, judged, parsed_triplets
 from fe_models.importers.matrices.triangles import full_matrix, mirrored, require_size
-from fe_models.importers.matrices.triplet_text import HeadAndData, judged, parsed_triplets
 
 __all__ = ["is_matrix_market", "read_matrix_market"]
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from fe_models.errors import MatrixError
 from fe_models.foundation.arrays import IntArray
-from fe_models.importers.matrices.abaqus_text import role_by_name
 from fe_models.importers.matrices.foreign_matrices import ForeignMatrices
 from fe_models.importers.matrices.request import Request
+from fe_models.importers.matrices.text_files.abaqus_text import role_by_name
+from fe_models.importers.matrices.text_files.triplet_text import parsed_triplets
 from fe_models.importers.matrices.triangles import full_matrix
-from fe_models.importers.matrices.triplet_text import parsed_triplets
 
 __all__ = ["is_labelled", "read_labelled"]
 
