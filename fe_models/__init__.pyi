@@ -56,6 +56,7 @@ from .loads import nodal_load as nodal_load
 from .loads import pressure_load as pressure_load
 from .loads import selection_load as selection_load
 from .material import Material as Material
+from .material import OrthotropicMaterial as OrthotropicMaterial
 from .matrices import body_from_matrices as body_from_matrices
 from .matrices import body_from_npz as body_from_npz
 from .meshes.boundary import boundary_facets as boundary_facets

@@ -1,17 +1,24 @@
-"""Isotropic linear elastic materials, and which cell has which."""
+"""Linear elastic materials, isotropic and orthotropic, and which cell has which."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fe_models.errors import MaterialError
-from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.mesh import Mesh
 
-__all__ = ["Material", "assign_materials"]
+__all__ = [
+    "AnyMaterial",
+    "Material",
+    "OrthotropicMaterial",
+    "assign_materials",
+    "isotropic_tensor",
+    "require_isotropic",
+]
 
 
 @dataclass(frozen=True)
@@ -58,10 +65,134 @@ class Material:
         """Shear modulus, second Lamé constant [Pa]."""
         return self.E / (2 * (1 + self.nu))
 
+    @property
+    def stiffness(self) -> Array:
+        """Stress by strain, (6, 6) [Pa], rows xx yy zz yz xz xy, shear strains doubled."""
+        return isotropic_tensor(self.lam, self.mu)
+
+
+@dataclass(frozen=True)
+class OrthotropicMaterial:
+    """Orthotropic, linear elastic: three planes of symmetry across its axes 1, 2, 3.
+
+    Pairs are in the order 12, 13, 23. nu_12 is the contraction along 2 under stress along 1, so that
+    nu_12 / E_1 = nu_21 / E_2.
+
+    Raises
+    ------
+    MaterialError
+        Unless all numbers are finite, moduli and density above zero, the axes orthonormal and right-handed, and the
+        stiffness positive definite.
+    """
+
+    name: str
+    young: tuple[float, float, float]  #: E_1, E_2, E_3 [Pa]
+    shear: tuple[float, float, float]  #: G_12, G_13, G_23 [Pa]
+    poisson: tuple[float, float, float]  #: nu_12, nu_13, nu_23 [-]
+    rho: float  #: density [kg/m³]
+    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  #: rows 1, 2, 3
+
+    def __post_init__(self) -> None:
+        where = f"material {self.name!r}"
+        for key in ("young", "shear", "poisson"):
+            object.__setattr__(self, key, _three(f"{where}: {key}", getattr(self, key)))
+        object.__setattr__(self, "axes", tuple(_three(f"{where}: axes", row) for row in self.axes))
+        if isinstance(self.rho, bool) or not isinstance(self.rho, int | float | np.number) or not self.rho > 0:
+            raise MaterialError(f"{where}: rho: expected a density above zero, got {self.rho!r}")
+        object.__setattr__(self, "rho", float(self.rho))
+        for key in ("young", "shear"):
+            if min(getattr(self, key)) <= 0:
+                raise MaterialError(f"{where}: {key}: expected moduli above zero, got {_listed(getattr(self, key))}")
+        axes = np.array(self.axes)
+        is_triad = axes.shape == (3, 3) and np.abs(axes @ axes.T - np.eye(3)).max() < 1e-6 and np.linalg.det(axes) > 0
+        if not is_triad:
+            raise MaterialError(
+                f"{where}: axes: expected three rows, orthonormal and right-handed, got "
+                f"{np.array2string(axes, precision=4)}"
+            )
+        least = np.linalg.eigvalsh(_normalised(self.compliance[:3, :3])).min()
+        if not least > 0:
+            nu_12, nu_13, nu_23 = self.poisson
+            raise MaterialError(
+                f"{where}: poisson: with E = {_listed(self.young)} and nu_12, nu_13, nu_23 = {nu_12:g}, {nu_13:g}, "
+                f"{nu_23:g} some strains would have negative energy; expected |nu_ij| < sqrt(E_i / E_j) and more. Is "
+                "nu_12 the contraction along 2 under stress along 1?"
+            )
+
+    @property
+    def E(self) -> float:
+        """The largest Young's modulus [Pa]."""
+        return max(self.young)
+
+    @property
+    def compliance(self) -> Array:
+        """Strain by stress in its own axes, (6, 6) [1/Pa], rows 11 22 33 23 13 12, shear strains doubled."""
+        (E_1, E_2, E_3), (nu_12, nu_13, nu_23) = self.young, self.poisson
+        S = np.diag([1 / E_1, 1 / E_2, 1 / E_3, 1 / self.shear[2], 1 / self.shear[1], 1 / self.shear[0]])
+        S[0, 1] = S[1, 0] = -nu_12 / E_1
+        S[0, 2] = S[2, 0] = -nu_13 / E_1
+        S[1, 2] = S[2, 1] = -nu_23 / E_2
+        return np.asarray(S)
+
+    @property
+    def stiffness(self) -> Array:
+        """Stress by strain in mesh axes, (6, 6) [Pa], rows xx yy zz yz xz xy, shear strains doubled."""
+        C = np.linalg.inv(self.compliance)
+        T = _stress_turn(np.array(self.axes).T)
+        C = T @ ((C + C.T) / 2) @ T.T
+        return np.asarray((C + C.T) / 2)
+
+
+AnyMaterial = Material | OrthotropicMaterial
+
+
+def isotropic_tensor(lam: float, mu: float) -> Array:
+    """Return stress by strain, (6, 6) [Pa], rows xx yy zz yz xz xy, shear strains doubled."""
+    C = np.diag([2 * mu, 2 * mu, 2 * mu, mu, mu, mu])
+    C[:3, :3] += lam
+    return np.asarray(C)
+
+
+def require_isotropic(where: str, material: object) -> None:
+    """Raise `MaterialError` for an orthotropic material: what is here has no stiffness for it."""
+    if isinstance(material, OrthotropicMaterial):
+        raise MaterialError(f"{where}: material {material.name!r} is orthotropic; expected an isotropic one (Material)")
+
+
+def _three(where: str, values: Sequence[float]) -> tuple[float, float, float]:
+    array = np.asarray(values)
+    if array.shape != (3,) or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        raise MaterialError(f"{where}: expected three finite numbers, got {values!r}")
+    x, y, z = (float(value) for value in array)
+    return x, y, z
+
+
+def _listed(values: tuple[float, ...]) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
+
+def _normalised(S: Array) -> Array:
+    """Return a symmetric matrix scaled to ones on the diagonal."""
+    d = np.sqrt(np.diag(S))
+    return np.asarray(S / np.outer(d, d))
+
+
+def _stress_turn(R: Array) -> Array:
+    """Return T, (6, 6): stress in mesh axes by stress in the axes that are the columns of R, rows xx yy zz yz xz xy.
+
+    sigma_ij = R_ik R_jl s_kl; the strain energy then gives C in mesh axes as T C Tᵀ.
+    """
+    pairs = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+    T = np.empty((6, 6))
+    for row, (i, j) in enumerate(pairs):
+        for column, (k, m) in enumerate(pairs):
+            T[row, column] = R[i, k] * R[j, m] + (R[i, m] * R[j, k] if k != m else 0.0)
+    return T
+
 
 def assign_materials(
-    mesh: Mesh, materials: Material | Mapping[str, Material]
-) -> tuple[tuple[Material, ...], dict[str, IntArray]]:
+    mesh: Mesh, materials: AnyMaterial | Mapping[str, AnyMaterial]
+) -> tuple[tuple[AnyMaterial, ...], dict[str, IntArray]]:
     """Return the materials in use and, by cell type, the number of the material of every cell.
 
     Parameters
@@ -81,7 +212,7 @@ def assign_materials(
     MaterialError
         If a group is unknown, or cells have no material or two.
     """
-    if isinstance(materials, Material):
+    if isinstance(materials, AnyMaterial):
         return (materials,), {kind: np.zeros(len(cells), np.int64) for kind, cells in mesh.cells.items()}
     if not materials:
         raise MaterialError("materials: expected one material, or one for each group of cells; got none")

@@ -7,6 +7,7 @@ import numpy as np
 from cms.errors import JobError
 from cms.jobs.beam_tables import BeamSection
 from cms.jobs.job import Job
+from cms.jobs.material_table import isotropic_of
 from fe_models.body.fe_body import Interface
 from fe_models.foundation.words import nearest
 
@@ -43,7 +44,6 @@ def frame_mesh(job: Job) -> "LineMesh":
 def properties_of(job: Job) -> "dict[str, BeamProperty]":
     """Return group of lines -> its section, material and theory."""
     from fe_models.beams.beam_property import BeamProperty
-    from fe_models.material import Material
 
     made: dict[str, BeamProperty] = {}
     for section in job.sections.values():
@@ -51,7 +51,7 @@ def properties_of(job: Job) -> "dict[str, BeamProperty]":
         table = job.materials[name]
         item = BeamProperty(
             shape_of(section),
-            Material(name, E=table.young, nu=table.poisson, rho=table.density),
+            isotropic_of(name, table, "beams"),
             offset=section.offset or (0.0, 0.0),
             orientation=section.orientation,
             shear=section.shear,

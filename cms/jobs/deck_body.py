@@ -9,6 +9,7 @@ import numpy as np
 
 from cms.errors import JobError
 from cms.jobs.job import InterfaceSection, Job
+from cms.jobs.material_table import isotropic_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.stages import Stages
@@ -62,11 +63,7 @@ def _parts(
 
 
 def _materials(job: Job) -> "dict[str, Material]":
-    from fe_models.material import Material
-
-    return {
-        name: Material(name, E=each.young, nu=each.poisson, rho=each.density) for name, each in job.materials.items()
-    }
+    return {name: isotropic_of(name, each, "decks") for name, each in job.materials.items()}
 
 
 def _solids(

@@ -20,6 +20,7 @@ from cms.jobs.beam_tables import (
 )
 from cms.jobs.damping_table import DampingSection
 from cms.jobs.deck_tables import CouplingSection, EquationSection, SolidSection, check_deck
+from cms.jobs.material_table import MaterialSection
 from cms.jobs.mesh_size_table import MeshSizeSection, check_mesh_size
 from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
@@ -194,15 +195,6 @@ class BodySection(Table):
                 f"expected either mesh or matrices, got {got}; beams may have tables of nodes and lines instead"
             )
         return self
-
-
-class MaterialSection(Table):
-    """[materials.NAME]: an isotropic material and the cells that have it."""
-
-    young: Positive = Field(description="a number above 0, Young's modulus [stress unit]")
-    poisson: Annotated[float, Field(gt=-1, lt=0.5)] = Field(description="a number between -1 and 0.5, Poisson's ratio")
-    density: Positive = Field(description="a number above 0, the density [mass / length^3]")
-    cells: Names = Field(("all",), description='"all", the name of a group of cells, or a list of names')
 
 
 class PlaneSection(Table):

@@ -6,12 +6,13 @@ import numpy as np
 
 from cms.errors import JobError
 from cms.jobs.job import InterfaceSection, Job, LoadCaseSection
+from cms.jobs.material_table import material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase
 
 if TYPE_CHECKING:
     from cms.reduced_basis.frames import Frame, HeldFrame
-    from fe_models.material import Material
+    from fe_models.material import AnyMaterial
     from fe_models.meshes.line_mesh import LineMesh
     from fe_models.meshes.mesh import Mesh
     from fe_models.meshes.node_cloud import NodeCloud
@@ -32,14 +33,9 @@ def part_of_mesh(job: Job, mesh: "AnyMesh") -> "AnyMesh":
     return mesh if part is None else split_mesh(mesh, part.of, at=part.at, axis=part.axis).parts[part.number - 1]
 
 
-def materials_of(job: Job) -> "Material | dict[str, Material]":
+def materials_of(job: Job) -> "AnyMaterial | dict[str, AnyMaterial]":
     """Return one material for all cells, or group of cells -> material."""
-    from fe_models.material import Material
-
-    made = {
-        name: Material(name, E=section.young, nu=section.poisson, rho=section.density)
-        for name, section in job.materials_of_cells.items()
-    }
+    made = {name: material_of(name, section) for name, section in job.materials_of_cells.items()}
     if [section.cells for section in job.materials_of_cells.values()] == [("all",)]:
         return next(iter(made.values()))
     return {group: made[name] for name, section in job.materials_of_cells.items() for group in section.cells}

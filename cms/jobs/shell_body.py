@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cms.jobs.job import InterfaceSection, Job
+from cms.jobs.material_table import isotropic_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
@@ -70,14 +71,13 @@ def shell_mesh(job: Job) -> "ShellMesh":
 
 def shell_properties_of(job: Job) -> "dict[str, ShellProperty]":
     """Return group of cells -> its thickness and material."""
-    from fe_models.material import Material
     from fe_models.shells.shell_property import ShellProperty
 
     made: dict[str, ShellProperty] = {}
     for shell in job.shells.values():
         name = shell.material or next(iter(job.materials))
         table = job.materials[name]
-        material = Material(name, E=table.young, nu=table.poisson, rho=table.density)
+        material = isotropic_of(name, table, "shells")
         item = ShellProperty(shell.thickness, material, offset=shell.offset, added_mass=shell.added_mass)
         made |= dict.fromkeys(shell.cells, item)
     return made

@@ -10,7 +10,7 @@ from fe_models.beams.sections import Section
 from fe_models.errors import SectionError
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.words import nearest, quoted
-from fe_models.material import Material
+from fe_models.material import Material, require_isotropic
 from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["BeamProperty", "assign_properties", "section_of"]
@@ -29,6 +29,7 @@ class BeamProperty:
     added_mass: float = 0.0  #: per length, without stiffness [kg/m]
 
     def __post_init__(self) -> None:
+        require_isotropic("beam property", self.material)
         for name, size in (("offset", 2), ("orientation", 3)):
             value = getattr(self, name)
             if value is not None and (np.shape(value) != (size,) or not np.isfinite(value).all()):

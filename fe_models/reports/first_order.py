@@ -20,13 +20,13 @@ import scipy.sparse.linalg as spla
 
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.material import Material, assign_materials
+from fe_models.material import AnyMaterial, Material, assign_materials
 from fe_models.meshes.boundary import boundary_nodes
 from fe_models.meshes.connectivity import facet_pairs
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.raised import FIRST_ORDER, raised_mesh, tetrahedra_of
 from fe_models.meshes.unused_nodes import drop_unused_nodes
-from fe_models.solids.assembly import assemble, expand_scalar_mass
+from fe_models.solids.assembly import assemble, elastic_properties, expand_scalar_mass
 
 __all__ = ["PROVENANCE", "FirstOrderError", "first_order_error"]
 
@@ -75,7 +75,7 @@ class FirstOrderError:
 
 
 def first_order_error(
-    mesh: Mesh, materials: Material | Mapping[str, Material] | None = None, *, incompatible_modes: bool = False
+    mesh: Mesh, materials: AnyMaterial | Mapping[str, AnyMaterial] | None = None, *, incompatible_modes: bool = False
 ) -> FirstOrderError | None:
     """Measure how much too high the lowest frequencies are for want of order.
 
@@ -99,8 +99,8 @@ def first_order_error(
     given, of_cell = assign_materials(mesh, STEEL if materials is None else materials)
     piece, chosen = piece_of(mesh)  # (1)
     number = np.concatenate([of_cell[kind] for kind in mesh.cells])[chosen]
-    properties = np.array([[material.lam, material.mu, material.rho] for material in given])
-    K, M_s = assemble(piece, properties, by_type(piece, number), incompatible=incompatible_modes)
+    properties, tensors = elastic_properties(given)
+    K, M_s = assemble(piece, properties, by_type(piece, number), incompatible=incompatible_modes, tensors=tensors)
     coarse = LowestModes(K, expand_scalar_mass(M_s))  # (2)
     if set(piece.cells) in ({"tetra"}, {"hexahedron"}):  # (3)
         finer, P = raised_mesh(piece)
@@ -108,7 +108,7 @@ def first_order_error(
         cut, P, owner = tetrahedra_of(piece)
         finer, P_2 = raised_mesh(cut)
         P, number = sp.csr_array(P_2 @ P), number[owner]
-    K, M_s = assemble(finer, properties, by_type(finer, number))
+    K, M_s = assemble(finer, properties, by_type(finer, number), tensors=tensors)
     second = coarse.improved(K, expand_scalar_mass(M_s), finer.nodes, P)
     error = np.sqrt(coarse.omega2[:N_MODES] / second[:N_MODES]).max() - 1  # (4)
     return FirstOrderError(float(max(error, 0.0)), len(chosen), len(chosen) == mesh.n_cells, kinds)

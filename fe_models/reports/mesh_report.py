@@ -14,7 +14,7 @@ from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.units import Units, unit_system
 from fe_models.importers.objects.as_mesh import as_mesh
-from fe_models.material import Material, assign_materials
+from fe_models.material import AnyMaterial, assign_materials
 from fe_models.meshes.cell_angles import face_angles
 from fe_models.meshes.cell_shapes import CELL_SHAPES, cell_jacobians, quadrature, shape_values
 from fe_models.meshes.connectivity import Connectivity, coincident_nodes, connectivity
@@ -97,7 +97,7 @@ class MeshReport(Report):
 
 def report_mesh(
     mesh: Any,
-    materials: Material | Mapping[str, Material] | None = None,
+    materials: AnyMaterial | Mapping[str, AnyMaterial] | None = None,
     *,
     units: Units | str = "m-kg-s",
     incompatible_modes: bool = False,
@@ -141,7 +141,7 @@ def report_mesh(
         findings.append(Finding("unused", False, f"{n_unused} nodes belong to no solid cell and will be dropped"))
     findings += [Finding("reader", False, note) for note in mesh.notes]
     mass = centre = None
-    given: tuple[Material, ...] = ()
+    given: tuple[AnyMaterial, ...] = ()
     if materials is not None:
         given, number = assign_materials(mesh, materials)
         mass, centre = _mass(geometry, given, number)
@@ -176,7 +176,10 @@ def report_mesh(
 
 
 def _first_order(
-    mesh: Mesh, materials: Material | Mapping[str, Material] | None, incompatible_modes: bool, findings: list[Finding]
+    mesh: Mesh,
+    materials: AnyMaterial | Mapping[str, AnyMaterial] | None,
+    incompatible_modes: bool,
+    findings: list[Finding],
 ) -> FirstOrderError | None:
     """Return the error of cells of first order; None also where cells are too bad for a second order."""
     if UNMEASURABLE & {finding.kind for finding in findings if finding.is_error}:
@@ -234,7 +237,7 @@ def _select(
 
 
 def _mass(
-    geometry: Mapping[str, CellGeometry], materials: tuple[Material, ...], number: Mapping[str, IntArray]
+    geometry: Mapping[str, CellGeometry], materials: tuple[AnyMaterial, ...], number: Mapping[str, IntArray]
 ) -> tuple[float, Array]:
     """Return mass and its centre."""
     rho = np.array([material.rho for material in materials])

@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.words import nearest, quoted
-from fe_models.material import Material
+from fe_models.material import Material, require_isotropic
 from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = ["ShellProperty", "assign_shell_properties"]
@@ -30,6 +30,7 @@ class ShellProperty:
     added_mass: float = 0.0  #: per area, without stiffness, spread through the thickness [kg/m²]
 
     def __post_init__(self) -> None:
+        require_isotropic("shell property", self.material)
         for name in ("thickness", "offset", "added_mass"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):

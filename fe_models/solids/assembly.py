@@ -20,11 +20,12 @@ import scipy.sparse as sp
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.threads import n_threads
+from fe_models.material import AnyMaterial, Material, isotropic_tensor
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.elements import ReferenceElement, reference_element
 from fe_models.solids.incompatible import KIND, brick_chunks, brick_stiffness
 
-__all__ = ["Progress", "assemble", "expand_scalar_mass"]
+__all__ = ["Progress", "assemble", "elastic_properties", "expand_scalar_mass"]
 
 Progress = Callable[[float], None]  #: is told the finished fraction, 0 to 1
 
@@ -47,6 +48,22 @@ class NodeGraph:
         return len(self.row_start) - 1
 
 
+@dataclass(frozen=True, eq=False)
+class Elasticity:
+    """What the materials of a mesh are to its elements."""
+
+    properties: Array  #: lam, mu, rho of each material, (n_materials, 3); of general ones without meaning but for rho
+    tensors: Array  #: stress by strain of each material, (n_materials, 6, 6)
+    is_general: np.ndarray  #: whether a material is not isotropic, (n_materials,) bool
+
+    @staticmethod
+    def of(properties: Array, tensors: Mapping[int, Array] | None) -> "Elasticity":
+        """Return it from lam, mu, rho and the tensors of the materials that are not isotropic."""
+        given = dict(tensors or {})
+        every = [given.get(k, isotropic_tensor(lam, mu)) for k, (lam, mu, _) in enumerate(properties)]
+        return Elasticity(properties, np.array(every), np.isin(np.arange(len(properties)), list(given)))
+
+
 def assemble(
     mesh: Mesh,
     properties: Array,
@@ -55,6 +72,7 @@ def assemble(
     incompatible: bool = False,
     integration: str = "full",
     mass: str = "consistent",
+    tensors: Mapping[int, Array] | None = None,
     progress: Progress | None = None,
 ) -> tuple[sp.csc_array, sp.csr_array]:
     """Assemble the stiffness and the scalar mass of all solid cells.
@@ -72,6 +90,9 @@ def assemble(
     integration, mass
         Of `INTEGRATIONS` and `MASSES` of `fe_models.solids.elements`. A lumped mass is the diagonal of the consistent
         one of each element, scaled to the mass of the element.
+    tensors
+        Of materials that are not isotropic: number of the material -> stress by strain, (6, 6) [Pa], rows xx yy zz yz
+        xz xy; their lam and mu are not used.
     progress
         Called with the finished fraction.
 
@@ -101,11 +122,18 @@ def assemble(
     with ThreadPoolExecutor(n_threads()) as pool:
         graph = node_graph(list(lists.values()), len(mesh.nodes), pool)
         K_data, M_data = assembled_data(
-            mesh.nodes, lists, properties, of_cell, graph, pool, incompatible, (integration, mass), progress
+            mesh.nodes, lists, Elasticity.of(properties, tensors), of_cell, graph, pool, incompatible,
+            (integration, mass), progress,
         )
         K = expanded_stiffness(graph, K_data, pool)
     M_s = sp.csr_array((M_data, graph.columns, index_like(graph.row_start, len(M_data))), shape=2 * (graph.n_nodes,))
     return K, M_s
+
+
+def elastic_properties(materials: tuple[AnyMaterial, ...]) -> tuple[Array, dict[int, Array]]:
+    """Return lam, mu, rho of each material, (n, 3), and number -> tensor of those that are not isotropic."""
+    rows = [(m.lam, m.mu, m.rho) if isinstance(m, Material) else (0.0, 0.0, m.rho) for m in materials]
+    return np.array(rows), {k: m.stiffness for k, m in enumerate(materials) if not isinstance(m, Material)}
 
 
 def expand_scalar_mass(M_s: sp.csr_array) -> sp.csc_array:
@@ -154,7 +182,7 @@ def node_graph(lists: list[np.ndarray], n_nodes: int, pool: ThreadPoolExecutor) 
 def assembled_data(
     nodes: Array,
     lists: Mapping[str, np.ndarray],
-    properties: Array,
+    elasticity: "Elasticity",
     of_cell: Mapping[str, IntArray],
     graph: NodeGraph,
     pool: ThreadPoolExecutor,
@@ -164,6 +192,7 @@ def assembled_data(
 ) -> tuple[Array, Array]:
     """Steps (3) and (4): the entries of K, row by row, and of M_s."""
     from fe_models.solids.assembly_kernels import element_matrices, scatter_elements
+    from fe_models.solids.tensor_kernels import tensor_stiffness
 
     n_parts = n_threads()
     K_data, M_data = np.zeros(9 * len(graph.columns)), np.zeros(len(graph.columns))
@@ -189,7 +218,7 @@ def assembled_data(
                         element_matrices,
                         nodes,
                         cells[rows],
-                        properties,
+                        elasticity.properties,
                         materials[rows],
                         *tables,
                         K_e[at],
@@ -200,9 +229,18 @@ def assembled_data(
                 ],
             )
             if incompatible and kind == KIND and not is_inverted[begin : begin + len(batch)].any():
-                of_batch = properties[materials[begin : begin + len(batch)]]
+                of_batch = elasticity.tensors[materials[begin : begin + len(batch)]]
                 for rows, _ in brick_chunks(batch):
-                    K_e[rows] = brick_stiffness(nodes[batch[rows]], of_batch[rows, 0], of_batch[rows, 1])
+                    K_e[rows] = brick_stiffness(nodes[batch[rows]], of_batch[rows])
+            elif elasticity.is_general[materials[begin : begin + len(batch)]].any():
+                run(
+                    pool,
+                    [
+                        (tensor_stiffness, nodes, cells[rows], elasticity.tensors, elasticity.is_general,
+                         materials[rows], *tables[1], K_e[at])
+                        for at, rows in shares
+                    ],
+                )  # fmt: skip
             if rules[1] == "lumped":
                 M_e[: len(batch)] = lumped_mass(M_e[: len(batch)])
             run(

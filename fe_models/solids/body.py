@@ -18,11 +18,11 @@ from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.objects.as_mesh import as_mesh
-from fe_models.material import Material, assign_materials
+from fe_models.material import AnyMaterial, Material, assign_materials
 from fe_models.meshes.boundary import boundary_triangles
 from fe_models.meshes.cell_shapes import cell_jacobians
 from fe_models.meshes.mesh import Mesh
-from fe_models.solids.assembly import Progress, assemble, expand_scalar_mass
+from fe_models.solids.assembly import Progress, assemble, elastic_properties, expand_scalar_mass
 from fe_models.solids.elements import INTEGRATIONS, MASSES, reference_element
 from fe_models.solids.geometric import internal_forces, projected_geometric_stiffness
 from fe_models.solids.incompatible import KIND
@@ -39,7 +39,7 @@ class SolidModel:
     """The elements behind a solid body (`fe_body.ElementModel`): mass moments, stress, geometric stiffness."""
 
     mesh: Mesh
-    materials: tuple[Material, ...]
+    materials: tuple[AnyMaterial, ...]
     of_cell: Mapping[str, IntArray]  #: cell type -> material of each cell, (n_cells,)
     M_s: sp.csr_array  #: scalar consistent mass, (n_nodes, n_nodes) [kg]
     incompatible: bool = False  #: whether bricks of eight nodes have incompatible modes
@@ -108,7 +108,7 @@ class SolidModel:
 
 def solid_body(
     mesh: Any,
-    materials: Material | Mapping[str, Material],
+    materials: AnyMaterial | Mapping[str, AnyMaterial],
     *,
     name: str,
     units: Units,
@@ -126,7 +126,8 @@ def solid_body(
         Tetrahedra, hexahedra and wedges, mixed as they come; faces and lines do not enter. A `fe_models.Mesh`, or a
         mesh of meshio, pyvista or scikit-fem (`fe_models.as_mesh`).
     materials
-        One for all cells, or group name -> material (`assign_materials`), in the units of the mesh.
+        One for all cells, or group name -> material (`assign_materials`), in the units of the mesh; isotropic or
+        orthotropic.
     name
         Of the body.
     units
@@ -160,7 +161,7 @@ def solid_body(
     rule_words = _rule_words(integration, mass)
     mesh = as_mesh(mesh)
     used, of_cell = assign_materials(mesh, materials)
-    properties = np.array([[material.lam, material.mu, material.rho] for material in used])
+    properties, tensors = elastic_properties(used)
     K, M_s = assemble(
         mesh,
         properties,
@@ -168,6 +169,7 @@ def solid_body(
         incompatible=incompatible_modes,
         integration=integration,
         mass=mass,
+        tensors=tensors,
         progress=progress,
     )
     n_nodes = len(mesh.nodes)
@@ -229,7 +231,7 @@ def node_volumes(mesh: Mesh) -> Array:
     return volumes
 
 
-def provenance(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
+def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
     """Say where the body came from: mesh, digest, elements, materials and the version of scikit-fem."""
     record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
     record |= dict(mesh.origin)
@@ -237,9 +239,18 @@ def provenance(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str
     for number, material in enumerate(materials):
         count = sum(int((index == number).sum()) for index in of_cell.values())
         record[f"material {material.name}"] = (
-            f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}, {count} cells"
+            f"{_material_words(material)}, {count} cells"
         )
     return {key: value for key, value in record.items() if value} | {"scikit-fem": version("scikit-fem")}
+
+
+def _material_words(material: AnyMaterial) -> str:
+    if isinstance(material, Material):
+        return f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}"
+    return (
+        f"orthotropic, E = {list(material.young)}, G_12, G_13, G_23 = {list(material.shear)}, nu_12, nu_13, nu_23 = "
+        f"{list(material.poisson)}, rho = {material.rho!r}, axes {[list(row) for row in material.axes]}"
+    )
 
 
 def _brick_words(mesh: Mesh, incompatible_modes: bool) -> dict[str, str]:

@@ -13,10 +13,10 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.threads import n_threads, one_blas_thread
-from fe_models.material import Material
+from fe_models.material import AnyMaterial
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.elements import ShapeTable, reference_element
-from fe_models.solids.incompatible import KIND, brick_chunks, brick_operators, brick_stiffness, isotropic_stress
+from fe_models.solids.incompatible import KIND, brick_chunks, brick_operators, brick_stiffness, gradient_stress
 
 __all__ = ["internal_forces", "projected_geometric_stiffness"]
 
@@ -25,7 +25,7 @@ CHUNK_BYTES = 1.5e6  #: of the products held at once by a thread: they shall sta
 
 def projected_geometric_stiffness(
     mesh: Mesh,
-    materials: tuple[Material, ...],
+    materials: tuple[AnyMaterial, ...],
     of_cell: Mapping[str, IntArray],
     u: Array,
     Phi: Array,
@@ -51,7 +51,7 @@ def projected_geometric_stiffness(
     n_nodes, n = len(mesh.nodes), Phi.shape[1]
     states = np.ascontiguousarray(u).reshape(n_nodes, 3, -1)
     columns = np.ascontiguousarray(Phi).reshape(n_nodes, 3, -1)
-    lame = np.array([[material.lam, material.mu] for material in materials])
+    tensors = np.array([material.stiffness for material in materials])
     pairs = np.zeros((states.shape[2], n * (n + 1) // 2))
     n_parts = n_threads()
     with one_blas_thread(), ThreadPoolExecutor(n_parts) as pool:
@@ -65,7 +65,7 @@ def projected_geometric_stiffness(
                     mesh.nodes,
                     cells[a:b],
                     of_cell[kind][a:b],
-                    lame,
+                    tensors,
                     geometric_table(kind, integration),
                     states,
                     columns,
@@ -80,18 +80,17 @@ def projected_geometric_stiffness(
     K[:, row, column] = pairs
     K[:, column, row] = pairs
     if incompatible and len(mesh.cells.get(KIND, ())):
-        K += _of_bricks(mesh.nodes, mesh.cells[KIND], lame[of_cell[KIND]], u, Phi)
+        K += _of_bricks(mesh.nodes, mesh.cells[KIND], tensors[of_cell[KIND]], u, Phi)
     return K
 
 
-def _of_bricks(nodes: Array, cells: IntArray, lame: Array, u: Array, Phi: Array) -> Array:
-    """Return Phiᵀ K_geo Phi of bricks with incompatible modes, (k, n, n); lame: lam, mu of each cell, (n_cells, 2)."""
+def _of_bricks(nodes: Array, cells: IntArray, tensors: Array, u: Array, Phi: Array) -> Array:
+    """Return Phiᵀ K_geo Phi of bricks with incompatible modes, (k, n, n); tensors: of each cell, (n_cells, 6, 6)."""
     n = Phi.shape[1]
     K = np.zeros((u.shape[1], n, n))
     for rows, dofs in brick_chunks(cells):
-        lam, mu = lame[rows].T
-        B, volumes = brick_operators(nodes[cells[rows]], lam, mu)
-        sigma = isotropic_stress(B @ u[dofs][:, None], lam, mu) * volumes[:, :, None, None]
+        B, volumes = brick_operators(nodes[cells[rows]], tensors[rows])
+        sigma = gradient_stress(B @ u[dofs][:, None], tensors[rows]) * volumes[:, :, None, None]
         sigma = sigma.reshape(*volumes.shape, 1, 3, 3, -1)
         H = (B @ Phi[dofs][:, None]).reshape(*volumes.shape, 3, 3, n)  # u_c,b
         for j in range(len(K)):
@@ -101,7 +100,7 @@ def _of_bricks(nodes: Array, cells: IntArray, lame: Array, u: Array, Phi: Array)
 
 def internal_forces(
     mesh: Mesh,
-    materials: tuple[Material, ...],
+    materials: tuple[AnyMaterial, ...],
     of_cell: Mapping[str, IntArray],
     u: Array,
     *,
@@ -114,7 +113,7 @@ def internal_forces(
 
     fields = np.ascontiguousarray(u).reshape(len(mesh.nodes), 3, -1)
     forces = np.zeros(fields.shape)
-    lame = np.array([[material.lam, material.mu] for material in materials])
+    tensors = np.array([material.stiffness for material in materials])
     wanted = np.ones(len(mesh.nodes), dtype=bool)
     if nodes is not None:
         wanted[:] = False
@@ -126,10 +125,10 @@ def internal_forces(
             cells, material = all_cells[is_wanted], of_cell[kind][is_wanted]
             if incompatible and kind == KIND:
                 for rows, dofs in brick_chunks(cells):
-                    K = brick_stiffness(mesh.nodes[cells[rows]], *lame[material[rows]].T)
+                    K = brick_stiffness(mesh.nodes[cells[rows]], tensors[material[rows]])
                     np.add.at(forces.reshape(3 * len(mesh.nodes), -1), dofs, K @ np.asarray(u)[dofs])
                 continue
-            add_internal_forces(mesh.nodes, cells, material, lame, table.gradients, table.weights, fields, forces)
+            add_internal_forces(mesh.nodes, cells, material, tensors, table.gradients, table.weights, fields, forces)
     forces[~wanted] = 0.0
     return forces.reshape(3 * len(mesh.nodes), -1)
 
@@ -145,7 +144,7 @@ def geometric_table(kind: str, integration: str = "full") -> ShapeTable:
 
 
 def _pairs_of(
-    nodes: Array, cells: IntArray, material: IntArray, lame: Array, table: ShapeTable, states: Array, columns: Array
+    nodes: Array, cells: IntArray, material: IntArray, tensors: Array, table: ShapeTable, states: Array, columns: Array
 ) -> Array:
     """Sum over the points of these cells, (n_states, n_pairs)."""
     from fe_models.solids.geometric_kernels import stress_and_products
@@ -160,7 +159,7 @@ def _pairs_of(
         rows = slice(begin, min(begin + n_chunk, len(cells)))
         n_rows = rows.stop - begin
         stress_and_products(
-            nodes, cells[rows], material[rows], lame, table.gradients, table.weights, states, columns,
+            nodes, cells[rows], material[rows], tensors, table.gradients, table.weights, states, columns,
             sigma[:n_rows], products[:n_rows],
         )  # fmt: skip
         total += sigma[:n_rows].reshape(-1, n_states).T @ products[:n_rows].reshape(-1, n_pairs)

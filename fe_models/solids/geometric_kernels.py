@@ -28,15 +28,24 @@ def add_gradient(field, cell, dN, Q, det, H):
 
 
 @jit
-def write_stress(H, lam, mu, factor, sigma):
-    """Write factor times the stress, (6, k), of the gradients H, (3, 3, k)."""
-    for k in range(H.shape[2]):
-        pressure = lam * (H[0, 0, k] + H[1, 1, k] + H[2, 2, k])
-        for c in range(3):
-            sigma[c, k] = factor * (pressure + 2.0 * mu * H[c, c, k])
-        for c in range(3, 6):
-            i, j = FIRST[c], SECOND[c]
-            sigma[c, k] = factor * mu * (H[i, j, k] + H[j, i, k])
+def write_stress(H, C, factor, sigma):
+    """Write factor times the stress C eps, (6, k), of the gradients H, (3, 3, k); zeros of C, (6, 6), cost nothing."""
+    sigma[:] = 0.0
+    for c in range(6):
+        row = sigma[c]
+        for d in range(6):
+            stiffness = factor * C[c, d]
+            if stiffness == 0.0:
+                continue
+            i, j = FIRST[d], SECOND[d]
+            if i == j:
+                strain = H[i, i]
+                for k in range(row.size):
+                    row[k] += stiffness * strain[k]
+            else:
+                half, other = H[i, j], H[j, i]
+                for k in range(row.size):
+                    row[k] += stiffness * (half[k] + other[k])
 
 
 @jit_fast
@@ -66,45 +75,45 @@ def write_products(G, P):
 
 
 @jit
-def stress_and_products(nodes, cells, of_cell, lame, dN, w, u, phi, sigma, products):
+def stress_and_products(nodes, cells, of_cell, tensors, dN, w, u, phi, sigma, products):
     """Stress of the states times its share of volume, and products of gradients, at the points of some elements.
 
     u: states, (n_nodes, 3, n_states); phi: columns, (n_nodes, 3, n); sigma: (n_cells, n_points, 6, n_states);
-    products: (n_cells, n_points, 6, n_pairs).
+    products: (n_cells, n_points, 6, n_pairs); tensors: stress by strain of every material, (n_materials, 6, 6).
     """
     n_a = cells.shape[1]
     x = np.empty((n_a, 3))
     J, Q = np.empty((3, 3)), np.empty((3, 3))
     H, G = np.empty((3, 3, u.shape[2])), np.empty((3, 3, phi.shape[2]))
     for e in range(cells.shape[0]):
-        lam, mu = lame[of_cell[e], 0], lame[of_cell[e], 1]
+        C = tensors[of_cell[e]]
         for a in range(n_a):
             for i in range(3):
                 x[a, i] = nodes[cells[e, a], i]
         for q in range(w.size):
             det = jacobian(x, dN[q], J, Q)
             add_gradient(u, cells[e], dN[q], Q, det, H)
-            write_stress(H, lam, mu, w[q] * det, sigma[e, q])
+            write_stress(H, C, w[q] * det, sigma[e, q])
             add_gradient(phi, cells[e], dN[q], Q, det, G)
             write_products(G, products[e, q])
 
 
 @jit
-def add_internal_forces(nodes, cells, of_cell, lame, dN, w, u, forces):
-    """Add ∫ sigma grad N_a of some elements to the forces at the nodes, (n_nodes, 3, k), as u."""
+def add_internal_forces(nodes, cells, of_cell, tensors, dN, w, u, forces):
+    """Add ∫ sigma grad N_a of some elements to the forces at the nodes, (n_nodes, 3, k), as u; tensors: (n, 6, 6)."""
     n_a, n_k = cells.shape[1], u.shape[2]
     x = np.empty((n_a, 3))
     J, Q = np.empty((3, 3)), np.empty((3, 3))
     H, sigma = np.empty((3, 3, n_k)), np.empty((6, n_k))
     for e in range(cells.shape[0]):
-        lam, mu = lame[of_cell[e], 0], lame[of_cell[e], 1]
+        C = tensors[of_cell[e]]
         for a in range(n_a):
             for i in range(3):
                 x[a, i] = nodes[cells[e, a], i]
         for q in range(w.size):
             det = jacobian(x, dN[q], J, Q)
             add_gradient(u, cells[e], dN[q], Q, det, H)
-            write_stress(H, lam, mu, w[q] * det, sigma)
+            write_stress(H, C, w[q] * det, sigma)
             for a in range(n_a):
                 for c in range(6):
                     for turn in range(1 if c < 3 else 2):

@@ -27,22 +27,24 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.solids.elements import reference_element, shape_table
 
-__all__ = ["KIND", "VOIGT", "brick_chunks", "brick_operators", "brick_stiffness", "isotropic_stress"]
+__all__ = ["KIND", "VOIGT", "brick_chunks", "brick_operators", "brick_stiffness", "gradient_stress"]
 
 KIND = "hexahedron"
 CELLS_AT_ONCE = 1000  #: whose operators are held at once, 14 kB each
 VOIGT = np.array([0, 4, 8, 5, 2, 1])  #: rows of xx yy zz yz xz xy in a tensor, 3 i + j
+TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  #: the other way: component of xx yy zz yz xz xy in row 3 i + j
+TRANSPOSED = np.array([0, 3, 6, 1, 4, 7, 2, 5, 8])  #: row 3 j + i in row 3 i + j
 
 
-def brick_operators(x: Array, lam: Array, mu: Array) -> tuple[Array, Array]:
+def brick_operators(x: Array, C: Array) -> tuple[Array, Array]:
     """Return the gradient operators at the points of the stiffness and their volumes.
 
     Parameters
     ----------
     x
         Positions of the nodes, (n, 8, 3) [m].
-    lam, mu
-        Lamé's constants of each cell, (n,) [Pa].
+    C
+        Stress by strain of each cell, (n, 6, 6) [Pa], rows xx yy zz yz xz xy.
 
     Returns
     -------
@@ -59,28 +61,25 @@ def brick_operators(x: Array, lam: Array, mu: Array) -> tuple[Array, Array]:
     added *= (np.linalg.det(J_0)[:, None] / det)[:, :, None, None]
     B, G = _of_components(grad), _of_components(added)
     volumes = det * weights
-    work = (isotropic_stress(G, lam, mu) * volumes[:, :, None, None]).reshape(n, 9 * p, 9).transpose(0, 2, 1)
+    work = (gradient_stress(G, C) * volumes[:, :, None, None]).reshape(n, 9 * p, 9).transpose(0, 2, 1)
     a = -np.linalg.solve(work @ G.reshape(n, 9 * p, 9), work @ B.reshape(n, 9 * p, 24))  # (2)
     return B + G @ a[:, None], volumes  # (3)
 
 
-def brick_stiffness(x: Array, lam: Array, mu: Array) -> Array:
+def brick_stiffness(x: Array, C: Array) -> Array:
     """Return ∫ Bᵀ C B, (n, 24, 24) [N/m], symmetric."""
-    B, volumes = brick_operators(x, lam, mu)
+    B, volumes = brick_operators(x, C)
     n, p = volumes.shape
-    stress = isotropic_stress(B, lam, mu) * volumes[:, :, None, None]
+    stress = gradient_stress(B, C) * volumes[:, :, None, None]
     K = B.reshape(n, 9 * p, 24).transpose(0, 2, 1) @ stress.reshape(n, 9 * p, 24)
     return np.asarray((K + K.transpose(0, 2, 1)) / 2)
 
 
-def isotropic_stress(H: Array, lam: Array, mu: Array) -> Array:
-    """Return sigma_ij = lam tr H δ_ij + mu (H_ij + H_ji), rows 3 i + j, of gradients, (n, p, 9, k)."""
-    tensor = H.reshape(*H.shape[:2], 3, 3, H.shape[3])
-    sigma = mu[:, None, None, None, None] * (tensor + tensor.swapaxes(2, 3))
-    pressure = lam[:, None, None] * tensor.trace(axis1=2, axis2=3)
-    for i in range(3):
-        sigma[:, :, i, i] += pressure
-    return np.asarray(sigma.reshape(H.shape))
+def gradient_stress(H: Array, C: Array) -> Array:
+    """Return the stress, rows 3 i + j, of gradients H_ij, likewise, (n, p, 9, k), by C of each cell, (n, 6, 6)."""
+    strain = (H + H[:, :, TRANSPOSED])[:, :, VOIGT]  # twice the strain: shear strains doubled,
+    strain[:, :, :3] /= 2  # normal strains as they are
+    return np.asarray((C[:, None] @ strain)[:, :, TENSOR])
 
 
 def brick_chunks(cells: IntArray) -> Iterator[tuple[slice, IntArray]]:

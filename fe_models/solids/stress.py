@@ -8,17 +8,17 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.threads import n_threads
-from fe_models.material import Material
+from fe_models.material import AnyMaterial
 from fe_models.meshes.mesh import Mesh
 from fe_models.solids.elements import reference_element
-from fe_models.solids.incompatible import KIND, VOIGT, brick_chunks, brick_operators, isotropic_stress
+from fe_models.solids.incompatible import KIND, VOIGT, brick_chunks, brick_operators, gradient_stress
 
 __all__ = ["nodal_stress", "stiffest_at_nodes"]
 
 
 def nodal_stress(
     mesh: Mesh,
-    materials: tuple[Material, ...],
+    materials: tuple[AnyMaterial, ...],
     of_cell: Mapping[str, IntArray],
     of_node: IntArray,
     u: Array,
@@ -28,7 +28,7 @@ def nodal_stress(
 ) -> Array:
     """Return the stress at the nodes, (n_nodes, 6, k) [Pa], of displacement columns u, (3 n_nodes, k) [m].
 
-    (1) sigma = lam tr(eps) 1 + 2 mu eps at the sampling points of each element;
+    (1) sigma = C eps, of isotropic materials lam tr(eps) 1 + 2 mu eps, at the sampling points of each element;
     (2) carried to the element's nodes by the shape functions of its low-order relative (`ReferenceElement`);
     (3) at each node the mean, weighted by element volume, over the elements of the node's material.
     The result is linear in u. Components xx, yy, zz, yz, xz, xy.
@@ -50,7 +50,7 @@ def nodal_stress(
     """
     from fe_models.solids.stress_kernels import add_element_stress, volume_at_nodes
 
-    lame = np.array([[material.lam, material.mu] for material in materials])
+    tensors = np.array([material.stiffness for material in materials])
     volume = np.zeros(len(mesh.nodes))
     wanted = np.ones(len(mesh.nodes), dtype=bool)
     if nodes is not None:
@@ -70,7 +70,7 @@ def nodal_stress(
             table = element.stress
             volume_at_nodes(mesh.nodes, cells, material, of_node, table.gradients, table.weights, volume)
             if incompatible and kind == KIND:
-                add_brick_stress(mesh.nodes, cells, lame[material], material[:, None] == of_node[cells], u, stress)
+                add_brick_stress(mesh.nodes, cells, tensors[material], material[:, None] == of_node[cells], u, stress)
                 continue
             futures = [
                 pool.submit(
@@ -79,7 +79,7 @@ def nodal_stress(
                     cells,
                     material,
                     of_node,
-                    lame,
+                    tensors,
                     table.gradients,
                     table.weights,
                     element.extrapolation,
@@ -97,15 +97,15 @@ def nodal_stress(
     return stress
 
 
-def add_brick_stress(nodes: Array, cells: IntArray, lame: Array, shows: Array, u: Array, stress: Array) -> None:
+def add_brick_stress(nodes: Array, cells: IntArray, tensors: Array, shows: Array, u: Array, stress: Array) -> None:
     """Add volume times stress of bricks with incompatible modes to the nodes that show it.
 
     Parameters
     ----------
     nodes, cells
         Positions, (n_nodes, 3), and bricks, (n_cells, 8).
-    lame
-        lam and mu of each cell, (n_cells, 2).
+    tensors
+        Stress by strain of each cell, (n_cells, 6, 6).
     shows
         Whether each node of each cell shows the material of the cell, (n_cells, 8).
     u
@@ -115,14 +115,13 @@ def add_brick_stress(nodes: Array, cells: IntArray, lame: Array, shows: Array, u
     """
     to_nodes = reference_element(KIND).extrapolation
     for rows, dofs in brick_chunks(cells):
-        lam, mu = lame[rows].T
-        B, volumes = brick_operators(nodes[cells[rows]], lam, mu)
-        sigma = isotropic_stress(B @ u[dofs][:, None], lam, mu)[:, :, VOIGT]
+        B, volumes = brick_operators(nodes[cells[rows]], tensors[rows])
+        sigma = gradient_stress(B @ u[dofs][:, None], tensors[rows])[:, :, VOIGT]
         at_nodes = np.einsum("ap,npsk,n->nask", to_nodes, sigma, volumes.sum(axis=1), optimize=True)
         np.add.at(stress, cells[rows][shows[rows]], at_nodes[shows[rows]])
 
 
-def stiffest_at_nodes(mesh: Mesh, materials: tuple[Material, ...], of_cell: Mapping[str, IntArray]) -> IntArray:
+def stiffest_at_nodes(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray]) -> IntArray:
     """Return for each node the material with the largest modulus among its elements, (n_nodes,); ties: the first.
 
     Stress jumps where materials meet; one number a node can show one side only. The stiffer side carries the larger

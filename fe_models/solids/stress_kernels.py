@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 
 from fe_models.solids.assembly_kernels import jacobian
+from fe_models.solids.geometric_kernels import write_stress
 
 __all__ = ["add_element_stress", "volume_at_nodes"]
 
@@ -29,11 +30,12 @@ def volume_at_nodes(nodes, cells, of_cell, of_node, dN, w, volume):
 
 
 @jit
-def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolation, u, first, last, stress):
+def add_element_stress(nodes, cells, of_cell, of_node, tensors, dN, w, extrapolation, u, first, last, stress):
     """Add to the columns first..last of stress, (n_nodes, 6, k), volume times stress of every element at its nodes.
 
-    u: displacement columns, (n_nodes, 3, k); lame: lam and mu of every material, (n_materials, 2); of_cell, of_node:
-    materials of elements and nodes. Columns are the inner loop: the geometry is worked out once for all of them.
+    u: displacement columns, (n_nodes, 3, k); tensors: stress by strain of every material, (n_materials, 6, 6);
+    of_cell, of_node: materials of elements and nodes. Columns are the inner loop: the geometry is worked out once for
+    all of them.
     """
     n_a = cells.shape[1]
     n_k = last - first
@@ -42,7 +44,6 @@ def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolatio
     H = np.empty((3, 3, n_k))
     sigma = np.empty((w.size, 6, n_k))
     for e in range(cells.shape[0]):
-        lam, mu = lame[of_cell[e], 0], lame[of_cell[e], 1]
         for a in range(n_a):
             for i in range(3):
                 x[a, i] = nodes[cells[e, a], i]
@@ -58,14 +59,7 @@ def add_element_stress(nodes, cells, of_cell, of_node, lame, dN, w, extrapolatio
                         row, column = H[i, j], u[cells[e, a], i, first:last]
                         for k in range(n_k):
                             row[k] += column[k] * g
-            for k in range(n_k):
-                pressure = lam * (H[0, 0, k] + H[1, 1, k] + H[2, 2, k])
-                sigma[q, 0, k] = pressure + 2.0 * mu * H[0, 0, k]
-                sigma[q, 1, k] = pressure + 2.0 * mu * H[1, 1, k]
-                sigma[q, 2, k] = pressure + 2.0 * mu * H[2, 2, k]
-                sigma[q, 3, k] = mu * (H[1, 2, k] + H[2, 1, k])
-                sigma[q, 4, k] = mu * (H[0, 2, k] + H[2, 0, k])
-                sigma[q, 5, k] = mu * (H[0, 1, k] + H[1, 0, k])
+            write_stress(H, tensors[of_cell[e]], 1.0, sigma[q])
         for a in range(n_a):
             node = cells[e, a]
             if of_cell[e] != of_node[node]:

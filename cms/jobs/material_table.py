@@ -1,0 +1,111 @@
+"""The tables [materials.NAME] of a reduction job: isotropic and orthotropic materials (docs/job_file.md)."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from cms.errors import JobError
+from cms.jobs.beam_tables import names
+from fe_models.foundation.toml_file import Matrix3, Table, is_no_number
+
+if TYPE_CHECKING:
+    from fe_models.material import AnyMaterial, Material
+
+__all__ = ["MaterialSection", "isotropic_of", "material_of"]
+
+Three = tuple[float, float, float]
+
+YOUNG = "a number above 0, Young's modulus [stress unit], or three along the axes 1, 2, 3 of the material"
+POISSON = "a number between -1 and 0.5, Poisson's ratio, or three: nu_12, nu_13, nu_23"
+SHEAR = "three numbers above 0, the shear moduli G_12, G_13, G_23, where young has three"
+
+
+def moduli(value: Any) -> float | Three:
+    """Return a modulus or three, above zero."""
+    return _one_or_three(value, YOUNG, lambda x: x > 0, lambda x: x > 0)
+
+
+def ratios(value: Any) -> float | Three:
+    """Return one of Poisson's ratios within its limits, or three, whose limits depend on the moduli."""
+    return _one_or_three(value, POISSON, lambda x: -1 < x < 0.5, lambda x: True)
+
+
+def shear_moduli(value: Any) -> Three:
+    """Return three moduli above zero."""
+    found = _one_or_three(value, SHEAR, lambda x: False, lambda x: x > 0)
+    assert isinstance(found, tuple)  # one number is refused
+    return found
+
+
+def _one_or_three(value: Any, expected: str, one: Any, each: Any) -> Any:
+    if isinstance(value, list | tuple) and len(value) == 3 and not any(is_no_number(x) or not each(x) for x in value):
+        return tuple(float(x) for x in value)
+    if isinstance(value, list | tuple) or is_no_number(value) or not one(value):
+        raise ValueError(f"expected {expected}")
+    return float(value)
+
+
+class MaterialSection(Table):
+    """[materials.NAME]: a material and the cells that have it."""
+
+    young: Annotated[float | Three, BeforeValidator(moduli)] = Field(description=YOUNG)
+    poisson: Annotated[float | Three, BeforeValidator(ratios)] = Field(description=POISSON)
+    shear: Annotated[Three, BeforeValidator(shear_moduli)] | None = Field(None, description=SHEAR)
+    axes: Matrix3 | None = Field(
+        None, description="the axes 1, 2, 3 of the material in mesh axes, three rows; default: the mesh axes"
+    )
+    density: Annotated[float, Field(gt=0)] = Field(description="a number above 0, the density [mass / length^3]")
+    cells: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
+        ("all",), description='"all", the name of a group of cells, or a list of names'
+    )
+
+    @property
+    def is_orthotropic(self) -> bool:
+        """Whether it has three moduli."""
+        return isinstance(self.young, tuple)
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> "MaterialSection":
+        if self.is_orthotropic != isinstance(self.poisson, tuple):
+            three, one = ("young", "poisson") if self.is_orthotropic else ("poisson", "young")
+            raise ValueError(f"{one}: {three} has three numbers; an orthotropic material needs three here too")
+        if self.is_orthotropic and self.shear is None:
+            raise ValueError(f"shear: missing; expected {SHEAR}")
+        if not self.is_orthotropic and (self.shear is not None or self.axes is not None):
+            key = "shear" if self.shear is not None else "axes"
+            raise ValueError(f"{key}: belongs to an orthotropic material, young = [E_1, E_2, E_3]; remove it")
+        return self
+
+
+def material_of(name: str, table: MaterialSection) -> "AnyMaterial":
+    """Return the material of a table.
+
+    Raises
+    ------
+    MaterialError
+        If some strain would have negative energy, or the axes are none.
+    """
+    from fe_models.material import Material, OrthotropicMaterial
+
+    if isinstance(table.young, tuple) and isinstance(table.poisson, tuple) and table.shear is not None:
+        axes = {} if table.axes is None else {"axes": table.axes}
+        return OrthotropicMaterial(name, table.young, table.shear, table.poisson, table.density, **axes)
+    assert isinstance(table.young, float)  # the table has checked it
+    assert isinstance(table.poisson, float)
+    return Material(name, E=table.young, nu=table.poisson, rho=table.density)
+
+
+def isotropic_of(name: str, table: MaterialSection, what: str) -> "Material":
+    """Return the material of a table for `what`, such as beams, that take isotropic ones only.
+
+    Raises
+    ------
+    JobError
+        If it is orthotropic.
+    """
+    from fe_models.material import Material
+
+    made = material_of(name, table)
+    if not isinstance(made, Material):
+        raise JobError(f"materials.{name}: it is orthotropic; {what} take isotropic materials only: young = one number")
+    return made
