@@ -7,7 +7,7 @@ import numpy as np
 from cms.errors import JobError
 from cms.jobs.beam_tables import BeamSection
 from cms.jobs.job import Job
-from cms.jobs.material_table import isotropic_of
+from cms.jobs.tables.material_table import isotropic_of
 from fe_models.body.fe_body import Interface
 from fe_models.foundation.words import nearest
 

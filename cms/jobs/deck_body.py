@@ -9,7 +9,7 @@ import numpy as np
 
 from cms.errors import JobError
 from cms.jobs.job import InterfaceSection, Job
-from cms.jobs.material_table import isotropic_of
+from cms.jobs.tables.material_table import isotropic_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.stages import Stages

@@ -20,10 +20,10 @@ from cms.jobs.beam_tables import (
 )
 from cms.jobs.damping_table import DampingSection
 from cms.jobs.deck_tables import CouplingSection, EquationSection, SolidSection, check_deck
-from cms.jobs.material_table import MaterialSection
-from cms.jobs.mesh_size_table import MeshSizeSection, check_mesh_size
 from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
+from cms.jobs.tables.material_table import MaterialSection
+from cms.jobs.tables.mesh_size_table import MeshSizeSection, check_mesh_size
 from fe_models.body.fe_body import INTERFACE_KINDS
 from fe_models.body.load_cases import LOAD_CASE_KINDS
 from fe_models.foundation.paths import near_file

@@ -6,7 +6,7 @@ import numpy as np
 
 from cms.errors import JobError
 from cms.jobs.job import InterfaceSection, Job, LoadCaseSection
-from cms.jobs.material_table import material_of
+from cms.jobs.tables.material_table import material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cms.jobs.job import InterfaceSection, Job
-from cms.jobs.material_table import isotropic_of
+from cms.jobs.tables.material_table import isotropic_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
