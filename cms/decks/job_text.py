@@ -73,6 +73,9 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
             head.append(f"#   {entry.count} {entry.name}: {mark}{entry.consequence}")
     for support in deck.supports:
         held = " ".join(MOTION_COMPONENTS[c] for c in support.components)
+        if support.is_boundary:
+            head.append(f"# The deck keeps {held} of {support.name} as the boundary of a superelement.")
+            continue
         head.append(f"# The deck holds {held} at the interface {support.name}; here the body is free.")
     return "\n".join(head) + "\n\n" + toml_text({key: value for key, value in tables.items() if value})
 
@@ -174,7 +177,7 @@ def _interface(deck: Deck, support: Support) -> dict[str, Any]:
     is_spread = len(nodes) >= 3 and spread[1] > COLLINEAR * spread[0]
     turns = np.isin(nodes, _nodes_with_rotations(deck))
     all_held = set(support.components) >= set(range(6)) if turns.any() else set(support.components) >= {0, 1, 2}
-    is_rigid = all_held and (turns.any() or is_spread)
+    is_rigid = all_held and (turns.any() or is_spread) and not support.is_boundary
     return {"kind": "rigid" if is_rigid else "nodes", "nodes": support.nodes}
 
 

@@ -14,11 +14,11 @@ from fe_models.errors import MeshError
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
-__all__ = ["read_nastran"]
+__all__ = ["ELEMENT_TYPES", "nodes_of", "read_nastran"]
 
 _HEXA20 = [*range(12), *range(16, 20), *range(12, 16)]  # Nastran numbers the upright edges before those of the top
 _PENTA15 = [*range(9), *range(12, 15), *range(9, 12)]
-_TYPES: dict[str, dict[int, tuple[str, list[int] | None]]] = {
+ELEMENT_TYPES: dict[str, dict[int, tuple[str, list[int] | None]]] = {
     "CTETRA": {4: ("tetra", None), 10: ("tetra10", None)},
     "CHEXA": {8: ("hexahedron", None), 20: ("hexahedron20", _HEXA20)},
     "CPENTA": {6: ("wedge", None), 15: ("wedge15", _PENTA15)},
@@ -79,10 +79,10 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
                 without_cp.append(number)
             grid_numbers.append(number)
             coordinates.append((_real(here, fields, 3), _real(here, fields, 4), _real(here, fields, 5)))
-        elif card in _TYPES:
-            n_fields = 2 + max(_TYPES[card])
+        elif card in ELEMENT_TYPES:
+            n_fields = 2 + max(ELEMENT_TYPES[card])
             given = [*fields[3 : n_fields + 1], *[""] * (n_fields + 1 - len(fields))]
-            count, nodes = _nodes_of(here, card, given)
+            count, nodes = nodes_of(here, card, given)
             number = _integer(here, fields, 1)
             numbers, rows = cells.setdefault((card, count, fields[2]), ([], []))
             numbers.append(number)
@@ -108,7 +108,7 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
         raise MeshError(f"{where}: {twice.size} grid points are defined twice, first {twice[0]}; keep one of each")
     blocks = []
     for (card, count, pid), (element_numbers, rows) in cells.items():
-        kind, local = _TYPES[card][count]
+        kind, local = ELEMENT_TYPES[card][count]
         try:
             wanted = np.array(rows, dtype=np.int64)
         except ValueError as error:
@@ -184,9 +184,9 @@ def _fields(line: str) -> tuple[list[str], str, str]:
     return [first, *data], first, line[72:80].strip()
 
 
-def _nodes_of(here: str, card: str, given: list[str]) -> tuple[int, list[str]]:
+def nodes_of(here: str, card: str, given: list[str]) -> tuple[int, list[str]]:
     """Return the number of nodes of an element and their numbers."""
-    counts = sorted(_TYPES[card])
+    counts = sorted(ELEMENT_TYPES[card])
     filled = [bool(word) for word in given[: counts[-1]]]
     for count in reversed(counts):
         if all(filled[:count]) and (card not in _SOLID_CARDS or not any(filled[count:])):

@@ -42,7 +42,7 @@ REDUCED: dict[str, tuple[str, Degree]] = {
     "hexahedron20": ("hex", 3),  # 8, as C3D20R
     "hexahedron27": ("hex", 3),
     "wedge": ("wedge", (1, 3)),  # 1 x 2
-    "wedge15": ("wedge", (2, 3)),  # 3 x 2
+    "wedge15": ("wedge", (2, 5)),  # 3 x 3
 }  #: fewest points that programs use; cells with straight edges keep their full stiffness but for the wedges and bricks
 INTEGRATIONS = ("full", "reduced")  #: of the stiffness
 MASSES = ("consistent", "reduced", "lumped")  #: consistent; by the points of the reduced stiffness; diagonal

@@ -44,7 +44,8 @@ def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
         terms = []
         for node, component, coefficient in rows:
             nodes = draft.nodes_of(here, node)
-            if len(nodes) != 1 or not 1 <= int(component) <= 6 or int(nodes[0]) in draft.transformed:
+            is_one = len(nodes) == 1 and int(nodes[0]) not in {*draft.transformed, *draft.rotations}
+            if not is_one or not 1 <= int(component) <= 6:
                 why = "equations of sets, of nodes with axes of their own, or of other components than 1 to 6"
                 draft.ledger.refuse("*EQUATION", why, line=block.line_number)
                 break
@@ -65,9 +66,8 @@ def _rigid_body(here: str, block: DeckBlock, draft: Draft) -> None:
         draft.ledger.refuse("*RIGID BODY", "without NSET or ELSET, or without REF NODE", line=block.line_number)
         return
     if "ROT NODE" in given:
-        draft.ledger.note(
-            "*RIGID BODY, ROT NODE", "its rotations are those of the reference node", line=block.line_number
-        )
+        leader = int(draft.nodes_of(here, given["REF NODE"])[0])
+        draft.rotations[int(draft.nodes_of(here, given["ROT NODE"])[0])] = leader
     _rigid_group(here, draft, int(draft.nodes_of(here, given["REF NODE"])[0]), members)
 
 

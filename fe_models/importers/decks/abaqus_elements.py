@@ -18,7 +18,7 @@ SOLID_RULES: dict[str, dict[str, tuple[str, str, str]]] = {
         "C3D8I": ("incompatible", "consistent", ""),
         "C3D8R": ("incompatible", "consistent", "stiffness by incompatible modes instead of one point and hourglasses"),
         "C3D10": ("reduced", "reduced", ""),
-        "C3D15": ("full", "consistent", ""),
+        "C3D15": ("reduced", "reduced", ""),
         "C3D20": ("full", "consistent", ""),
         "C3D20R": ("reduced", "reduced", ""),
     },

@@ -86,10 +86,12 @@ def _nodal(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
         nodes = draft.nodes_of(here, words[0])
         nodes = nodes[draft.mesh.rows_of(nodes) >= 0]
         component = int(words[1]) - 1
+        if len(nodes) == 1 and int(nodes[0]) in draft.rotations:  # its components are rotations of the reference node
+            nodes, component = np.array([draft.rotations[int(nodes[0])]]), component + 3
         if any(node in draft.transformed for node in nodes.tolist()) or not 0 <= component < 6 or not nodes.size:
             draft.ledger.note("*CLOAD", "along axes of their own (*TRANSFORM), or at no node", line=block.line_number)
             continue
-        group = draft.node_group(here, nodes, words[0] if not words[0].isdigit() else "")
+        group = draft.node_group(here, nodes, words[0] if len(nodes) > 1 else "")
         forces.setdefault(group, np.zeros(6))[component] += float(words[2])
     if forces:
         name = f"{step}_load{len(draft.loads) + 1}"

@@ -130,7 +130,8 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
     shapes: dict[str, Callable[[], dict[str, Any]]] = {
         "RECTANGULAR": lambda: {"shape": "rectangle", "width": size[0], "height": (size + size)[1]},
         "RECT": lambda: {"shape": "rectangle", "width": size[0], "height": (size + size)[1]},
-        "CIRC": lambda: {"shape": "circle", "radius": size[0]},
+        # Abaqus gives the radius, CalculiX the thickness in both directions
+        "CIRC": lambda: {"shape": "circle", "radius": size[0] if draft.program == "abaqus" else size[0] / 2},
         "PIPE": lambda: {"shape": "tube", "radius": size[0], "thickness": size[1]},
         "BOX": lambda: {"shape": "box", "width": size[0], "height": size[1], "web": size[2], "flange": size[3]},
     }
@@ -142,7 +143,7 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
         return
     n1 = numbers(block.lines[1])[:3] if len(block.lines) > 1 else [0.0, 0.0, -1.0]
     shape = shapes[kind]()
-    scale = (shape["width"], shape["height"]) if "width" in shape else (2 * size[0],) * 2
+    scale = (shape["width"], shape["height"]) if "width" in shape else (2 * float(shape["radius"]),) * 2
     offset = (offsets[0] * float(scale[0]), offsets[1] * float(scale[1]))
     if kept.size:
         group = draft.cell_group(name, kept)

@@ -124,11 +124,12 @@ class Equation:
 
 @dataclass(frozen=True)
 class Support:
-    """Components that the deck holds at the nodes of a group."""
+    """Components that the deck holds at the nodes of a group, or keeps as the boundary of a superelement."""
 
     name: str
     nodes: str
     components: tuple[int, ...]
+    is_boundary: bool = False
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,7 @@ class Draft:
     loads: list[Load] = field(default_factory=list)
     points: dict[str, PointElements] = field(default_factory=dict)  #: by set in upper case
     surfaces: dict[str, DeckBlock] = field(default_factory=dict)  #: by name in upper case
+    rotations: dict[int, int] = field(default_factory=dict)  #: *RIGID BODY: number of ROT NODE -> of REF NODE
     pending: dict[str, str] = field(default_factory=dict)  #: parameters of a *COUPLING whose kind comes below
     transformed: set[int] = field(default_factory=set)  #: numbers of nodes with axes of their own
     node_groups: dict[str, IntArray] = field(default_factory=dict)  #: groups added here, rows
@@ -161,6 +162,10 @@ class Draft:
     def supports_of_groups(self) -> list[Support]:
         """Return the supports: nodes held in the same components under the same names together."""
         found: dict[tuple[tuple[str, ...], tuple[int, ...]], list[int]] = {}
+        for turned, leader in self.rotations.items():
+            for name, components in self.held.pop(turned, {}).items():
+                turns = {c + 3 for c in components if c < 3}
+                self.held.setdefault(leader, {}).setdefault(name, set()).update(turns)
         used = set(self.used_nodes().tolist())
         loose = [node for node in self.held if node not in used]
         if loose:

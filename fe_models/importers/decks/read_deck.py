@@ -9,11 +9,20 @@ from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.decks.abaqus import read_abaqus_deck
 from fe_models.importers.decks.deck import Deck
+from fe_models.importers.decks.nastran import read_nastran_deck
 
 __all__ = ["DECK_FORMATS", "read_deck"]
 
 DECK_FORMATS: dict[str, Callable[..., Deck]] = {
     ".inp": read_abaqus_deck,
+    ".bdf": read_nastran_deck,
+    ".nas": read_nastran_deck,
+    ".dat": read_nastran_deck,
+    ".fem": read_nastran_deck,
+    ".blk": read_nastran_deck,
+    ".bulk": read_nastran_deck,
+    ".asm": read_nastran_deck,
+    ".pch": read_nastran_deck,
 }  #: suffix -> reader (path, content, program)
 
 
@@ -42,6 +51,8 @@ def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
     except OSError as error:
         raise MeshError(f"{where}: cannot be read: {error.strerror or error}{near_file(path)}") from error
     reader = DECK_FORMATS[suffix]
+    if program is not None and reader is not read_abaqus_deck:
+        raise MeshError(f"{where}: program = {program!r} belongs to decks of Abaqus and CalculiX (.inp); leave it out")
     try:
         return reader(path, data) if program is None else reader(path, data, program=program)
     except FeModelsError:

@@ -15,14 +15,17 @@ from tests.bodies import STEEL, box_mesh, distorted
 THIRDS = (np.array([[1 / 6, 1 / 6], [2 / 3, 1 / 6], [1 / 6, 2 / 3]]), np.full(3, 1 / 6))
 GAUSS_2 = (np.array([0.5 - 0.5 / np.sqrt(3), 0.5 + 0.5 / np.sqrt(3)]), np.array([0.5, 0.5]))
 
+GAUSS_3 = (np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)]), np.array([5, 8, 5]) / 18)
+
 
 def points_of(kind):
-    """Points and weights of the reduced rule: 2 x 2 x 2, one point x 2, three x 2, or the four of a tetrahedron."""
+    """Points and weights of the reduced rule: 2 x 2 x 2, one point x 2, three x 3, or the four of a tetrahedron."""
     x, w = GAUSS_2
     if kind.startswith("hex"):
         return np.array(list(itertools.product(x, x, x))), np.full(8, 1 / 8)
     if kind.startswith("wedge"):
         triangle, area = THIRDS if kind == "wedge15" else (np.array([[1 / 3, 1 / 3]]), np.array([0.5]))
+        x, w = (GAUSS_3 if kind == "wedge15" else GAUSS_2)
         return np.array([[*p, z] for p in triangle for z in x]), np.array([a * b for a in area for b in w])
     a, b = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
     return np.full((4, 3), a) + (b - a) * np.vstack([np.zeros(3), np.eye(3)]), np.full(4, 1 / 24)

@@ -1,0 +1,149 @@
+"""Whole decks of Nastran: bulk data with their includes, by the cards of `fe_models.importers.bulk_data`."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.foundation.paths import near_file
+from fe_models.importers.bulk_data.cards import Card, read_cards
+from fe_models.importers.bulk_data.coordinate_systems import SYSTEM_CARDS, read_grid_points
+from fe_models.importers.decks.deck import Deck
+from fe_models.importers.decks.ledger import Ledger
+from fe_models.importers.decks.nastran_attached import read_attached
+from fe_models.importers.decks.nastran_model import NastranModel
+from fe_models.importers.decks.nastran_sections import BARS, SHELLS, SOLIDS, read_sections
+from fe_models.importers.nastran import ELEMENT_TYPES, nodes_of
+from fe_models.importers.raw_mesh import RawBlock, RawMesh
+
+__all__ = ["bulk_text", "read_nastran_deck"]
+
+DEEPEST = 10  #: levels of files that include files
+_BODY = re.compile(r"(C(?!ORD)[A-Z]|RBE|RBAR|RROD|RTRPLT|RJOINT|RSPLINE|MPC|DMIG|GENEL|PLOTEL|NSM|SLOAD|MAT[2-9]|P(?!ARAM|LOAD))")
+_HARMLESS = ("CORD", "CSET", "CREEP", "CHACAB", "PLOTEL", "CAMPBLL", "CYJOIN")
+
+
+def bulk_text(where: str, path: Path, text: str, files: tuple[Path, ...] = ()) -> str:
+    """Return a deck with its includes put in, and without the BEGIN BULK and ENDDATA of these.
+
+    Raises
+    ------
+    MeshError
+        If a file is missing or includes itself.
+    """
+    out, is_first = [], not files
+    lines = text.splitlines()
+    k = 0
+    while k < len(lines):
+        line = lines[k]
+        head = line.lstrip().upper()
+        if head.startswith("INCLUDE"):
+            statement = line.partition("$")[0].strip()
+            while statement.count("'") % 2 and k + 1 < len(lines):  # names may go on over lines
+                k += 1
+                statement += lines[k].partition("$")[0].strip()
+            name = statement[7:].strip().strip("'\" =")
+            other = path.parent / name
+            if other in files or other == path or len(files) >= DEEPEST:
+                raise MeshError(f"{where}: INCLUDE {name}: includes itself, or files nest too deeply")
+            try:
+                inner = other.read_bytes().decode("utf-8", "replace")
+            except OSError as error:
+                raise MeshError(
+                    f"{where}: INCLUDE {name}: {other} cannot be read: {error.strerror or error}{near_file(other)}"
+                ) from error
+            out.append(bulk_text(where, other, inner, (*files, path)))
+        elif head.startswith("ENDDATA") and not is_first:
+            break
+        elif head.startswith("BEGIN") and "SUPER" in head:
+            raise MeshError(f"{where}: {line.strip()}: a deck of several superelements; expected one body")
+        elif head.startswith("BEGIN") and (not is_first or any(_is_begin(each) for each in out)):
+            pass  # a second BEGIN BULK says nothing
+        else:
+            out.append(line)
+        k += 1
+    return "\n".join(out)
+
+
+def _is_begin(line: str) -> bool:
+    return any(each.lstrip().upper().startswith("BEGIN") for each in line.splitlines())
+
+
+def read_nastran_deck(path: Path, data: bytes) -> Deck:
+    """Return what a deck of Nastran says.
+
+    Raises
+    ------
+    MeshError
+        If the deck is damaged. What cannot be taken over is in the ledger.
+    """
+    where = f"deck {path}"
+    text = bulk_text(where, path, data.decode("utf-8", "replace"))
+    cards: dict[str, list[Card]] = {}
+    for card in read_cards(where, text):
+        cards.setdefault(card.name, []).append(card)
+    if "GRID" not in cards:
+        raise MeshError(f"{where}: expected grid points (GRID), got none; is this a Nastran bulk data file?")
+    points = read_grid_points([card for found in cards.values() for card in found])
+    parameters = {card.text(1).upper(): card.text(2) for card in cards.get("PARAM", ())}
+    model = NastranModel(where, cards, points, Ledger(where), _chosen(text))
+    model.wtmass = next((card.real(2) for card in cards.get("PARAM", ()) if card.text(1).upper() == "WTMASS"), 1.0)
+    model.is_lumped = parameters.get("COUPMASS", "-1").startswith("-")
+    model.of("PARAM", *SYSTEM_CARDS)
+    read_sections(model)
+    read_attached(model)
+    for name, found in cards.items():
+        if name in model.done:
+            continue
+        if _BODY.match(name) and not name.startswith(_HARMLESS):
+            model.ledger.refuse(name, "this card is not known here", count=len(found))
+        else:
+            model.ledger.note(name, "belongs to the analysis, not to the body", count=len(found))
+    return Deck(
+        path, "nastran", _mesh(model), model.ledger, model.materials, tuple(model.solids), tuple(model.shells),
+        tuple(model.lines), tuple(model.masses), tuple(model.springs), tuple(model.rigid), tuple(model.couplings),
+        tuple(model.equations), tuple(model.supports), tuple(model.loads),
+    )  # fmt: skip
+
+
+def _chosen(text: str) -> dict[str, int]:
+    """Return the sets that the case control selects once and for all: SPC, MPC."""
+    head = re.split(r"(?im)^\s*BEGIN", text, maxsplit=1)
+    found: dict[str, set[int]] = {}
+    if len(head) > 1:
+        for key, number in re.findall(r"(?im)^\s*(SPC|MPC)\s*=\s*(\d+)", head[0]):
+            found.setdefault(key.upper(), set()).add(int(number))
+    return {key: numbers.pop() for key, numbers in found.items() if len(numbers) == 1}
+
+
+def _mesh(model: NastranModel) -> RawMesh:
+    """Return grid points, the elements that have a section, and groups."""
+    numbers = np.array(list(model.points.positions), dtype=np.int64)
+    place = {int(number): row for row, number in enumerate(numbers)}
+    positions = np.array([model.points.positions[int(number)] for number in numbers])
+    cells: dict[tuple[str, int, str], tuple[list[int], list[list[int]]]] = {}
+    for name in (*SOLIDS, *SHELLS, *BARS):
+        for card in model.cards.get(name, ()):
+            number = card.integer(1)
+            group = model.elements.get(number, (name, ""))[1]
+            widest = max(ELEMENT_TYPES[name])
+            given = [card.text(k) for k in range(3, 3 + widest)]
+            if name in SHELLS and widest == 4:
+                given = given[:4]
+            count, words = nodes_of(card.where, name, given)
+            rows = [place.get(int(word), -1) for word in words]
+            if -1 in rows:
+                raise MeshError(f"{card.where} {number}: names a grid point that is not defined")
+            listed = cells.setdefault((name, count, group), ([], []))
+            listed[0].append(number)
+            listed[1].append(rows)
+    blocks = []
+    for (name, count, group), (own_numbers, rows) in cells.items():
+        kind, order = ELEMENT_TYPES[name][count]
+        table = np.array(rows, dtype=np.int64)
+        table = table if order is None else table[:, order]
+        groups = {group: np.arange(len(table))} if group else {}
+        blocks.append(RawBlock(kind, table, groups, np.array(own_numbers, dtype=np.int64)))
+    sets = {name: np.array([place[node] for node in nodes], dtype=np.int64) for name, nodes in model.groups.items()}
+    return RawMesh(positions, tuple(blocks), sets, numbers)

@@ -1,0 +1,276 @@
+"""Masses, springs, rigid elements, constraints, supports and loads of Nastran."""
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.importers.bulk_data.cards import Card
+from fe_models.importers.decks.deck import Coupling, DeckMass, DeckSpring, Equation, Load, RigidGroup, Support
+from fe_models.importers.decks.nastran_model import NastranModel, components_of, numbers_of
+
+__all__ = ["read_attached"]
+
+TRANSLATIONS, ALL = (0, 1, 2), (0, 1, 2, 3, 4, 5)
+
+
+def read_attached(model: NastranModel) -> None:
+    """Take what is attached to grid points, what couples them, what holds and what loads them."""
+    for card in model.of("CONM2"):
+        _mass(model, card)
+    for card in model.of("CBUSH"):
+        _bush(model, card)
+    for card in model.of("CELAS1", "CELAS2"):
+        _scalar_spring(model, card)
+    model.of("PBUSH", "PELAS")
+    for card in model.of("RBE2", "RBAR"):
+        _rigid(model, card)
+    for card in model.of("RBE3"):
+        _mean(model, card)
+    for card in model.of("MPC"):
+        _equation(model, card)
+    _supports(model)
+    _loads(model)
+
+
+def _mass(model: NastranModel, card: Card) -> None:
+    node, cid = card.integer(2), card.integer(3, 0)
+    at = model.point(card, node)
+    x = np.array([card.real(k, 0.0) for k in (5, 6, 7)])
+    axes = np.eye(3) if cid <= 0 else model.system(card, cid, at)
+    offset = x - at if cid == -1 else axes @ x
+    I11, I21, I22, I31, I32, I33 = (card.real(k, 0.0) for k in range(9, 15))
+    inertia = axes @ np.array([[I11, -I21, -I31], [-I21, I22, -I32], [-I31, -I32, I33]]) @ axes.T * model.wtmass
+    rows = tuple((float(a[0]), float(a[1]), float(a[2])) for a in inertia)
+    where = (float(offset[0]), float(offset[1]), float(offset[2]))
+    model.masses.append(DeckMass(model.group(card, [node]), card.real(4, 0.0) * model.wtmass, rows, where))
+
+
+def _bush(model: NastranModel, card: Card) -> None:
+    known = next((each for each in model.cards.get("PBUSH", ()) if each.integer(1) == card.integer(2, card.integer(1))), None)
+    if known is None or not card.text(4) or card.text(4) == "0":
+        model.ledger.refuse("CBUSH", "without PBUSH, or to the ground: put it into the system file")
+        return
+    k, b = [0.0] * 6, [0.0] * 6
+    keys = {"K": k, "B": b}
+    words = list(known.fields)
+    for place in range(1, len(words), 8):
+        key = words[place].upper()
+        if key in keys:
+            keys[key][:] = [known.real(place + 2 + j, 0.0) for j in range(6)]
+        elif key:
+            model.ledger.note(f"PBUSH, {key}", "not taken over")
+    ends = [model.point(card, card.integer(n)) for n in (3, 4)]
+    triad = _bush_axes(model, card, ends)
+    names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
+    damping = tuple(b) if any(b) else None
+    rows = tuple((float(a[0]), float(a[1]), float(a[2])) for a in triad.T)
+    model.springs.append(DeckSpring((names[0], names[1]), tuple(k), damping, (rows[0], rows[1], rows[2])))
+
+
+def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array:
+    """Return the axes of a bush, (3, 3), columns: of CID, else x along the element and y towards the vector."""
+    if card.text(8):
+        return model.system(card, card.integer(8), ends[0])
+    x = ends[1] - ends[0]
+    if not np.linalg.norm(x) or not card.text(5):
+        return model.axes(card.integer(3)) if not np.linalg.norm(x) else _any_axes(x)
+    word = card.text(5)
+    is_grid = word.isdigit() and not card.text(6)
+    v = model.point(card, int(word)) - ends[0] if is_grid else np.array([card.real(k, 0.0) for k in (5, 6, 7)])
+    v = v if is_grid else model.axes(card.integer(3)) @ v
+    x = x / np.linalg.norm(x)
+    z = np.cross(x, v)
+    z = z / np.linalg.norm(z)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _any_axes(x: Array) -> Array:
+    x = x / np.linalg.norm(x)
+    y = np.cross(x, np.eye(3)[int(np.argmin(np.abs(x)))])
+    y = y / np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def _scalar_spring(model: NastranModel, card: Card) -> None:
+    """A spring between the same component of two grid points at one place."""
+    if card.name == "CELAS2":
+        k, (a, ca, b, cb) = card.real(2), (card.text(n) for n in (3, 4, 5, 6))
+    else:
+        known = next((e for e in model.cards.get("PELAS", ()) if e.integer(1) == card.integer(2, card.integer(1))), None)
+        k = 0.0 if known is None else known.real(2)
+        a, ca, b, cb = (card.text(n) for n in (3, 4, 5, 6))
+    is_pair = a.isdigit() and b.isdigit() and int(a) in model.points.positions and int(b) in model.points.positions
+    if not is_pair or ca != cb or not ca.isdigit() or not 1 <= int(ca) <= 6:
+        model.ledger.refuse(card.name, "to the ground, to a scalar point, or between different components")
+        return
+    axes = [model.axes(int(n)) for n in (a, b)]
+    apart = np.abs(model.point(card, int(a)) - model.point(card, int(b))).max()
+    if apart > 0 or np.abs(axes[0] - axes[1]).max() > 1e-9:
+        model.ledger.refuse(card.name, "between grid points at different places, or of different axes")
+        return
+    names = [model.group(card, [int(n)]) for n in (a, b)]
+    stiffness = tuple(k if c == int(ca) - 1 else 0.0 for c in range(6))
+    rows = tuple((float(v[0]), float(v[1]), float(v[2])) for v in axes[0].T)
+    model.springs.append(DeckSpring((names[0], names[1]), stiffness, triad=(rows[0], rows[1], rows[2])))
+
+
+def _in_basic(model: NastranModel, nodes: list[int], components: tuple[int, ...]) -> bool:
+    """Whether components along the axes of these points are those along basic axes."""
+    whole = all(set(part) <= set(components) or not set(part) & set(components) for part in (ALL[:3], ALL[3:]))
+    return whole or all(node not in model.points.axes for node in nodes)
+
+
+def _rigid(model: NastranModel, card: Card) -> None:
+    if card.name == "RBE2":
+        last = len(card.fields)
+        words = [word for word in card.fields[3:last] if word]
+        if words and "." in words[-1]:  # the coefficient of thermal expansion
+            words = words[:-1]
+        leader, components = card.integer(2), components_of(card, card.text(3))
+        followers = [int(word) for word in _written_out(words)]
+    else:
+        leader, followers = card.integer(2), [card.integer(3)]
+        independent = components_of(card, card.text(4) or "0")
+        dependent = components_of(card, card.text(7) or ("123456" if independent == ALL else "0"))
+        if independent != ALL or not dependent:
+            model.ledger.refuse("RBAR", "only with all six components of its first grid point independent")
+            return
+        components = dependent
+    if not _in_basic(model, followers, components):
+        model.ledger.refuse(card.name, "single components of grid points with axes of their own (CD)")
+        return
+    name = f"{card.name.lower()}_{card.text(1)}"
+    group = model.group(card, followers, f"{name}_nodes")
+    model.rigid.append(RigidGroup(name, model.group(card, [leader]), group, components))
+
+
+def _written_out(words: list[str]) -> list[str]:
+    out: list[str] = []
+    k = 0
+    while k < len(words):
+        if k + 2 < len(words) and words[k + 1].upper() == "THRU":
+            out += [str(n) for n in range(int(words[k]), int(words[k + 2]) + 1)]
+            k += 3
+        else:
+            out.append(words[k])
+            k += 1
+    return out
+
+
+def _mean(model: NastranModel, card: Card) -> None:
+    """RBE3: reference grid, its components, then sets of weight, components and grids."""
+    node, components = card.integer(3), components_of(card, card.text(4))
+    words = [word for word in card.fields[4:] if word]
+    members: list[tuple[float, str, list[int]]] = []
+    k = 0
+    while k < len(words) and words[k].upper() not in ("UM", "ALPHA"):
+        if "." in words[k]:
+            members.append((float(words[k]), words[k + 1], []))
+            k += 2
+        else:
+            members[-1][2].append(int(words[k]))
+            k += 1
+    has_um = any(word.upper() == "UM" for word in words)
+    if has_um or any(c != "123" for _, c, _ in members) or not _in_basic(model, [node], components):
+        why = "with UM, with components of the members other than 123, or axes of its own (CD)"
+        model.ledger.refuse("RBE3", why)
+        return
+    name = f"rbe3_{card.text(1)}"
+    groups = tuple(
+        (model.group(card, nodes, f"{name}_nodes_{n}"), weight) for n, (weight, _, nodes) in enumerate(members, start=1)
+    )
+    model.couplings.append(Coupling(name, model.group(card, [node]), groups, components))
+
+
+def _equation(model: NastranModel, card: Card) -> None:
+    if "MPC" in model.chosen and card.integer(1) != model.chosen["MPC"]:
+        model.ledger.note("MPC", "of a set that the case control does not select")
+        return
+    terms, nodes = [], []
+    for first in range(2, len(card.fields), 8):
+        for k in (first, first + 3):
+            if card.text(k):
+                nodes.append(card.integer(k))
+                terms.append((card.integer(k), card.integer(k + 1, 0) - 1, card.real(k + 2)))
+    is_basic = all(n in model.points.positions and n not in model.points.axes for n in nodes)
+    if not is_basic or any(not 0 <= c < 6 for _, c, _ in terms):
+        model.ledger.refuse("MPC", "of scalar points, or of grid points with axes of their own (CD)")
+        return
+    model.equations.append(Equation(tuple((model.group(card, [n]), c, a) for n, c, a in terms)))
+
+
+def _supports(model: NastranModel) -> None:
+    """SPC, SPC1 and permanent constraints of grid points; BSET and ASET as interfaces."""
+    held: dict[int, set[int]] = {}
+    chosen = {model.chosen["SPC"]} if "SPC" in model.chosen else set()
+    for card in model.of("SPCADD"):
+        if card.integer(1) in chosen:
+            chosen |= set(numbers_of(card, 2))
+    last: Card | None = None
+    for card in model.of("SPC1", "SPC"):
+        if chosen and card.integer(1) not in chosen:
+            model.ledger.note(card.name, "of a set that the case control does not select")
+            continue
+        last = card
+        if card.name == "SPC1":
+            for node in numbers_of(card, 3):
+                held.setdefault(node, set()).update(components_of(card, card.text(2)))
+        else:
+            for k in (2, 5):
+                if card.text(k):
+                    held.setdefault(card.integer(k), set()).update(components_of(card, card.text(k + 1)))
+    default = next((card.text(7) for card in model.of("GRDSET")), "")
+    for card in model.of("GRID"):
+        word = card.text(7) or default
+        if word and word != "0":
+            held.setdefault(card.integer(1), set()).update(components_of(card, word))
+            last = card
+    if last is not None:
+        _groups_of(model, last, held, "support")
+    boundary: dict[int, set[int]] = {}
+    for card in model.of("BSET1", "BNDFIX1", "ASET1"):
+        for node in numbers_of(card, 2):
+            boundary.setdefault(node, set()).update(components_of(card, card.text(1)))
+        last = card
+    for card in model.of("BSET", "BNDFIX", "ASET"):
+        for k in range(1, len(card.fields), 2):
+            if card.text(k):
+                boundary.setdefault(card.integer(k), set()).update(components_of(card, card.text(k + 1)))
+        last = card
+    if boundary and last is not None:
+        _groups_of(model, last, {n: c for n, c in boundary.items() if n not in held}, "boundary")
+
+
+def _groups_of(model: NastranModel, card: Card, held: dict[int, set[int]], what: str) -> None:
+    """Make one support for each set of components, each grid point in one."""
+    followers = {node for link in model.rigid for node in model.groups[link.followers]}
+    by: dict[tuple[int, ...], list[int]] = {}
+    for node, components in held.items():
+        if node not in model.points.positions or node in followers:
+            model.ledger.note("SPC", "of scalar points, or of grid points that follow others")
+        elif not _in_basic(model, [node], tuple(sorted(components))):
+            model.ledger.note("SPC", "along axes of their own (CD): left out of the interfaces")
+        else:
+            by.setdefault(tuple(sorted(components)), []).append(node)
+    for components, nodes in by.items():
+        name = f"{what}_{''.join(str(c + 1) for c in components)}"
+        group = model.group(card, nodes, name)
+        model.supports.append(Support(name, group, components, what == "boundary"))
+
+
+def _loads(model: NastranModel) -> None:
+    """Forces and moments by their set, gravity; other loads are counted."""
+    forces: dict[int, dict[str, Array]] = {}
+    for card in model.of("FORCE", "MOMENT"):
+        node = card.integer(2)
+        direction = np.array([card.real(k, 0.0) for k in (5, 6, 7)])
+        vector = card.real(4) * (model.system(card, card.integer(3, 0), model.point(card, node)) @ direction)
+        six = forces.setdefault(card.integer(1), {}).setdefault(model.group(card, [node]), np.zeros(6))
+        six[slice(0, 3) if card.name == "FORCE" else slice(3, 6)] += vector
+    for sid, by_group in forces.items():
+        given = {group: tuple(six.tolist()) for group, six in by_group.items()}
+        model.loads.append(Load(f"load_{sid}", forces=given))
+    for card in model.of("GRAV"):
+        axes = model.system(card, card.integer(2, 0), np.zeros(3))
+        g = card.real(3) * axes @ np.array([card.real(k, 0.0) for k in (4, 5, 6)])
+        acceleration = (float(g[0]), float(g[1]), float(g[2]))
+        model.loads.append(Load(f"gravity_{card.text(1)}", acceleration=acceleration))

@@ -1,0 +1,111 @@
+"""A deck of Nastran while it is read: its cards by name, its grid points, and what has been made of them so far."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array
+from fe_models.importers.bulk_data.cards import Card
+from fe_models.importers.bulk_data.coordinate_systems import GridPoints
+from fe_models.importers.decks.deck import (
+    Coupling,
+    DeckMass,
+    DeckMaterial,
+    DeckSpring,
+    Equation,
+    LineSection,
+    Load,
+    RigidGroup,
+    ShellSection,
+    SolidSection,
+    Support,
+)
+from fe_models.importers.decks.ledger import Ledger
+
+__all__ = ["NastranModel"]
+
+
+@dataclass
+class NastranModel:
+    """What the cards of a deck have said so far."""
+
+    where: str
+    cards: dict[str, list[Card]]  #: by name
+    points: GridPoints
+    ledger: Ledger
+    chosen: dict[str, int]  #: what the case control selects: "SPC", "MPC", "LOAD" -> set
+    wtmass: float = 1.0  #: PARAM,WTMASS: all masses are multiplied by it
+    is_lumped: bool = True  #: unless PARAM,COUPMASS
+    materials: dict[str, DeckMaterial] = field(default_factory=dict)
+    solids: list[SolidSection] = field(default_factory=list)
+    shells: list[ShellSection] = field(default_factory=list)
+    lines: list[LineSection] = field(default_factory=list)
+    masses: list[DeckMass] = field(default_factory=list)
+    springs: list[DeckSpring] = field(default_factory=list)
+    rigid: list[RigidGroup] = field(default_factory=list)
+    couplings: list[Coupling] = field(default_factory=list)
+    equations: list[Equation] = field(default_factory=list)
+    supports: list[Support] = field(default_factory=list)
+    loads: list[Load] = field(default_factory=list)
+    groups: dict[str, tuple[int, ...]] = field(default_factory=dict)  #: of nodes, by their numbers
+    elements: dict[int, tuple[str, str]] = field(default_factory=dict)  #: number -> card, group of cells
+    done: set[str] = field(default_factory=set)  #: names of cards that are taken over or counted
+
+    def of(self, *names: str) -> list[Card]:
+        """Return the cards of these names, in their order by name, and mark them as taken."""
+        self.done.update(names)
+        return [card for name in names for card in self.cards.get(name, ())]
+
+    def point(self, card: Card, number: int) -> Array:
+        """Return the position of a grid point in basic axes, (3,)."""
+        if number not in self.points.positions:
+            raise MeshError(f"{card.where} {card.text(1)}: names grid point {number}, which is not defined")
+        return self.points.positions[number]
+
+    def axes(self, number: int) -> Array:
+        """Return the displacement axes of a grid point, (3, 3), columns in basic axes."""
+        return self.points.axes.get(number, np.eye(3))
+
+    def system(self, card: Card, number: int, at: Array) -> Array:
+        """Return the axes of a coordinate system at a point, (3, 3), columns in basic axes."""
+        if number not in self.points.systems:
+            raise MeshError(f"{card.where} {card.text(1)}: names coordinate system {number}, which is not defined")
+        return self.points.systems[number].axes_at(at)
+
+    def group(self, card: Card, numbers: Iterable[int], name: str = "") -> str:
+        """Return the name of a group of these grid points, made here."""
+        nodes = tuple(sorted(set(numbers)))
+        for number in nodes:
+            self.point(card, number)
+        made = f"node_{nodes[0]}" if len(nodes) == 1 else name
+        while self.groups.get(made, nodes) != nodes:
+            made += "_"
+        self.groups[made] = nodes
+        return made
+
+
+def components_of(card: Card, word: str) -> tuple[int, ...]:
+    """Return the components of a field such as 123456."""
+    if not word.isdigit() or not set(word) <= set("0123456"):
+        raise MeshError(f"{card.where} {card.text(1)}: expected components such as 123, got {word!r}")
+    return tuple(sorted({int(letter) - 1 for letter in word if letter != "0"}))
+
+
+def numbers_of(card: Card, first: int) -> list[int]:
+    """Return the numbers from a field on, ranges (a THRU b, with BY c) written out."""
+    words = [word for word in card.fields[first - 1 :] if word]
+    found: list[int] = []
+    k = 0
+    while k < len(words):
+        if k + 2 < len(words) and words[k + 1].upper() == "THRU":
+            step, used = (int(words[k + 4]), 5) if k + 4 < len(words) and words[k + 3].upper() == "BY" else (1, 3)
+            if int(words[k + 2]) - int(words[k]) > 10_000_000 or step < 1:
+                raise MeshError(f"{card.where}: {words[k]} THRU {words[k + 2]}: not a range of grid points")
+            found += range(int(words[k]), int(words[k + 2]) + 1, step)
+            k += used
+        else:
+            found.append(int(words[k]))
+            k += 1
+    return found
