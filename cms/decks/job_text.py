@@ -50,8 +50,8 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
         If a material lacks a constant, a support or a section names nothing.
     """
     deck.ledger.require_whole(request.leave_out)
-    if not (deck.solids or deck.shells or deck.lines):
-        raise JobError(f"deck {deck.path}: expected solids, shells or lines with a section, got none")
+    if not (deck.solids or deck.shells or deck.lines or deck.springs):
+        raise JobError(f"deck {deck.path}: expected solids, shells, lines or springs, got none")
     tables: dict[str, Any] = {
         "body": {"name": deck.path.stem, "deck": deck_path, "units": request.units},
         "materials": _materials(deck, request),

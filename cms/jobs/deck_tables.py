@@ -87,8 +87,8 @@ def check_deck(job: Any) -> None:
         return
     if job.ties or job.body.part or job.body.plane or job.body.incompatible_modes:
         raise ValueError("body.deck: ties, part, plane and incompatible_modes belong to a mesh; remove them")
-    if not (job.solids or job.shells or job.sections):
-        raise ValueError("body.deck: expected tables [solids.NAME], [shells.NAME] or [sections.NAME], got none")
+    if not (job.solids or job.shells or job.sections or job.springs):
+        raise ValueError("body.deck: expected tables [solids.NAME], [shells.NAME], [sections.NAME] or [springs.NAME]")
     for kind in ("solids", "shells", "sections"):
         for name, table in getattr(job, kind).items():
             if table.material is None and len(job.materials) != 1:

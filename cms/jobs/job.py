@@ -345,7 +345,7 @@ class Job(Table):
 
     @model_validator(mode="after")
     def _fits_together(self) -> "Job":
-        if not self.body.matrices and not self.materials:
+        if not self.body.matrices and not self.body.deck and not self.materials:
             raise ValueError("materials: missing; a mesh needs at least one table [materials.NAME]")
         check_mesh_size(self.mesh_size, self.body.mesh, has_others=bool(self.shells or self.sections))
         check_deck(self)

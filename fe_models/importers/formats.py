@@ -17,6 +17,16 @@ FORMATS = (
         lost="all but the mesh and its sets",
     ),
     FileFormat(
+        "bulk data",
+        "Nastran",
+        "deck",
+        (".bdf", ".nas", ".dat", ".fem", ".blk", ".bulk", ".asm", ".pch"),
+        reads=True,
+        key="cms job",
+        tried="decks of MSC Nastran 2020",
+        lost="layers, tapered beams, released ends, RBE1, scalar points: each listed with its count",
+    ),
+    FileFormat(
         "input deck",
         "Abaqus, CalculiX",
         "deck",

@@ -1,8 +1,8 @@
 """CalculiX and its own test decks, as they are installed: the decks of linear bodies, and their frequencies by ccx.
 
-`python -m tests.external.calculix` writes the table of docs/formats.md: decks read, refused, and the difference of their
-frequencies. Every deck is given to ccx as the model it describes: its steps are cut off, what they hold is held, a
-material without density gets 1, and one frequency step is added.
+`python -m tests.external.calculix` gives the figures of docs/formats.md: decks read, refused, and the difference of
+their frequencies. Every deck is given to ccx as the model it describes: its steps are cut off, what they hold is held,
+a material without density gets 1, and one frequency step is added.
 """
 
 import gzip
@@ -39,7 +39,7 @@ WITHOUT_MEANING = (
     "DESIGNVARIABLES", "DAMPING", "RESTART", "PHYSICAL CONSTANTS", "EXPANSION", "CONDUCTIVITY", "SPECIFIC HEAT",
     "OBJECTIVE",
 )  # fmt: skip
-N_FREQUENCIES = 5
+N_FREQUENCIES = 8
 
 
 def text_of(name):
@@ -146,7 +146,7 @@ def frequencies_of_ccx(path):
 def difference(name, folder):
     """Kinds of sections of a deck, and the largest relative difference of its frequencies, None where ccx has none.
 
-    Frequencies below a thousandth of the fifth are rigid motions.
+    Frequencies below a thousandth of the greatest of them are rigid motions.
     """
     path = Path(folder) / name
     path.write_text(frequency_deck(text_of(name)))

@@ -163,8 +163,8 @@ class Draft:
         """Return the supports: nodes held in the same components under the same names together."""
         found: dict[tuple[tuple[str, ...], tuple[int, ...]], list[int]] = {}
         for turned, leader in self.rotations.items():
-            for name, components in self.held.pop(turned, {}).items():
-                turns = {c + 3 for c in components if c < 3}
+            for name, about in self.held.pop(turned, {}).items():
+                turns = {c + 3 for c in about if c < 3}
                 self.held.setdefault(leader, {}).setdefault(name, set()).update(turns)
         used = set(self.used_nodes().tolist())
         loose = [node for node in self.held if node not in used]

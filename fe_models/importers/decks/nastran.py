@@ -20,7 +20,9 @@ from fe_models.importers.raw_mesh import RawBlock, RawMesh
 __all__ = ["bulk_text", "read_nastran_deck"]
 
 DEEPEST = 10  #: levels of files that include files
-_BODY = re.compile(r"(C(?!ORD)[A-Z]|RBE|RBAR|RROD|RTRPLT|RJOINT|RSPLINE|MPC|DMIG|GENEL|PLOTEL|NSM|SLOAD|MAT[2-9]|P(?!ARAM|LOAD))")
+_BODY = re.compile(
+    r"(C(?!ORD)[A-Z]|RBE|RBAR|RROD|RTRPLT|RJOINT|RSPLINE|MPC|DMIG|GENEL|PLOTEL|NSM|SLOAD|MAT[2-9]|P(?!ARAM|LOAD))"
+)
 _HARMLESS = ("CORD", "CSET", "CREEP", "CHACAB", "PLOTEL", "CAMPBLL", "CYJOIN")
 
 
@@ -139,9 +141,9 @@ def _mesh(model: NastranModel) -> RawMesh:
             listed[0].append(number)
             listed[1].append(rows)
     blocks = []
-    for (name, count, group), (own_numbers, rows) in cells.items():
+    for (name, count, group), (own_numbers, rows_of_nodes) in cells.items():
         kind, order = ELEMENT_TYPES[name][count]
-        table = np.array(rows, dtype=np.int64)
+        table = np.array(rows_of_nodes, dtype=np.int64)
         table = table if order is None else table[:, order]
         groups = {group: np.arange(len(table))} if group else {}
         blocks.append(RawBlock(kind, table, groups, np.array(own_numbers, dtype=np.int64)))

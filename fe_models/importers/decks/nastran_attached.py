@@ -45,7 +45,9 @@ def _mass(model: NastranModel, card: Card) -> None:
 
 
 def _bush(model: NastranModel, card: Card) -> None:
-    known = next((each for each in model.cards.get("PBUSH", ()) if each.integer(1) == card.integer(2, card.integer(1))), None)
+    known = next(
+        (each for each in model.cards.get("PBUSH", ()) if each.integer(1) == card.integer(2, card.integer(1))), None
+    )
     if known is None or not card.text(4) or card.text(4) == "0":
         model.ledger.refuse("CBUSH", "without PBUSH, or to the ground: put it into the system file")
         return
@@ -95,7 +97,9 @@ def _scalar_spring(model: NastranModel, card: Card) -> None:
     if card.name == "CELAS2":
         k, (a, ca, b, cb) = card.real(2), (card.text(n) for n in (3, 4, 5, 6))
     else:
-        known = next((e for e in model.cards.get("PELAS", ()) if e.integer(1) == card.integer(2, card.integer(1))), None)
+        known = next(
+            (e for e in model.cards.get("PELAS", ()) if e.integer(1) == card.integer(2, card.integer(1))), None
+        )
         k = 0.0 if known is None else known.real(2)
         a, ca, b, cb = (card.text(n) for n in (3, 4, 5, 6))
     is_pair = a.isdigit() and b.isdigit() and int(a) in model.points.positions and int(b) in model.points.positions
@@ -251,10 +255,10 @@ def _groups_of(model: NastranModel, card: Card, held: dict[int, set[int]], what:
             model.ledger.note("SPC", "along axes of their own (CD): left out of the interfaces")
         else:
             by.setdefault(tuple(sorted(components)), []).append(node)
-    for components, nodes in by.items():
-        name = f"{what}_{''.join(str(c + 1) for c in components)}"
+    for same, nodes in by.items():
+        name = f"{what}_{''.join(str(c + 1) for c in same)}"
         group = model.group(card, nodes, name)
-        model.supports.append(Support(name, group, components, what == "boundary"))
+        model.supports.append(Support(name, group, same, what == "boundary"))
 
 
 def _loads(model: NastranModel) -> None:

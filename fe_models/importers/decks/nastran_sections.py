@@ -16,8 +16,7 @@ SOLIDS = ("CTETRA", "CHEXA", "CPENTA")
 SHELLS = ("CTRIA3", "CTRIAR", "CTRIA6", "CQUAD4", "CQUADR", "CQUAD8")
 BARS = ("CBAR", "CBEAM")
 _OFFSET_FIELD = {"CTRIA3": 7, "CTRIAR": 7, "CTRIA6": 10, "CQUAD4": 8, "CQUADR": 8, "CQUAD8": 16}
-_THICKNESS_FIELDS = {"CTRIA3": (10, 11, 12), "CTRIAR": (10, 11, 12), "CTRIA6": (11, 12, 13)}
-_THICKNESS_FIELDS |= {"CQUAD4": (11, 12, 13, 14), "CQUADR": (11, 12, 13, 14), "CQUAD8": (11, 12, 13, 14)}
+_THICKNESS_FIELDS = (11, 12, 13, 14)  #: T1 to T4
 
 
 def read_sections(model: NastranModel) -> None:
@@ -82,7 +81,7 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     thickness = known.real(3)
     offsets: dict[float, list[Card]] = {}
     for card in cards:
-        own = {card.real(k) for k in _THICKNESS_FIELDS[card.name] if card.text(k)}
+        own = {card.real(k) for k in _THICKNESS_FIELDS if card.text(k)}
         if own - {thickness}:
             model.ledger.refuse(card.name, "thickness of its own at the corners")
         else:
@@ -126,7 +125,9 @@ def _bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
         )
     model.ledger.note(cards[0].name, "inertia of torsion is that of the section; Nastran's has none", count=len(cards))
     if model.is_lumped:
-        model.ledger.note(cards[0].name, "mass is consistent here, the deck lumps it (no PARAM,COUPMASS)", count=len(cards))
+        model.ledger.note(
+            cards[0].name, "mass is consistent here, the deck lumps it (no PARAM,COUPMASS)", count=len(cards)
+        )
 
 
 def _orientation(model: NastranModel, card: Card, defaults: list[Card], start: Array) -> Array:

@@ -25,7 +25,7 @@ def points_of(kind):
         return np.array(list(itertools.product(x, x, x))), np.full(8, 1 / 8)
     if kind.startswith("wedge"):
         triangle, area = THIRDS if kind == "wedge15" else (np.array([[1 / 3, 1 / 3]]), np.array([0.5]))
-        x, w = (GAUSS_3 if kind == "wedge15" else GAUSS_2)
+        x, w = GAUSS_3 if kind == "wedge15" else GAUSS_2
         return np.array([[*p, z] for p in triangle for z in x]), np.array([a * b for a in area for b in w])
     a, b = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
     return np.full((4, 3), a) + (b - a) * np.vstack([np.zeros(3), np.eye(3)]), np.full(4, 1 / 24)

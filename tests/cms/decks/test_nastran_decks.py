@@ -1,0 +1,163 @@
+"""Decks of Nastran become bodies: a frame of bars beside the superelement that Nastran made of it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
+
+from cms.decks.job_text import JobRequest, job_text
+from cms.jobs.body_of_job import job_body, uncoupled_body
+from cms.jobs.job import read_job
+from fe_models.foundation.stages import Stages
+from fe_models.importers.decks.read_deck import read_deck
+from fe_models.importers.nastran_matrices.superelement import read_superelement
+from tests.root import ROOT
+
+DATA = ROOT / "tests" / "fe_models" / "importers" / "data" / "nastran"
+HEAD = "SOL 103\nCEND\nMETHOD=1\nBEGIN BULK\nBSET1,123456,3,11,19,27\ninclude 'outboard.blk'\nENDDATA\n"
+
+
+def job_of(path: Path, units="m-kg-s", **options):
+    text = job_text(read_deck(path), JobRequest(units, **{"densities": {}, **options}), path.name)
+    path.with_suffix(".toml").write_text(text)
+    return read_job(path.with_suffix(".toml"))
+
+
+def test_the_frame_of_bars_has_the_frequencies_of_nastrans_superelement(tmp_path):
+    """With its boundary held. Nastran's bars have no inertia of torsion, ours have: they lie below, by 1e-3 at most."""
+    (tmp_path / "outboard.blk").write_bytes((DATA / "outboard.blk").read_bytes())
+    deck = tmp_path / "frame.dat"
+    deck.write_text(HEAD)
+    job = job_of(deck, "mm-kg-s")
+    assert {name: table.kind for name, table in job.interfaces.items()} == {"boundary_123456": "nodes"}
+    body = job_body(job)
+    i = body.i
+    ours = np.sqrt(eigh(body.K[i][:, i].toarray(), body.M[i][:, i].toarray(), eigvals_only=True))[:10]
+    theirs = read_superelement([DATA / f"outboard.{suffix}" for suffix in ("op4", "pch", "blk")])
+    held = np.sqrt(np.sort(theirs.K.diagonal()[24:] / theirs.M.diagonal()[24:]))[:10]
+    assert_allclose(ours, held, rtol=1e-3)
+    assert (ours < held).all()
+    b = np.concatenate([body.interfaces[0].dofs])
+    order = np.lexsort((body.dofs[b, 1], body.dofs[b, 0]))
+    b = b[order]
+    K = body.K.toarray()
+    condensed = K[np.ix_(b, b)] - K[np.ix_(b, i)] @ np.linalg.solve(K[np.ix_(i, i)], K[np.ix_(i, b)])
+    assert_allclose(theirs.K.toarray()[:24, :24], condensed, rtol=0, atol=1e-7 * abs(condensed).max())
+
+
+DECK = """SOL 103
+CEND
+SPC = 7
+BEGIN BULK
+INCLUDE 'nodes.bulk'
+BEGIN BULK
+CORD2R,5,,10.,0.,0.,10.,0.,1.
+,11.,0.,0.
+GRDSET,,5,,,,5
+CHEXA,1,1,1,2,3,4,5,6
+,7,8
+PSOLID,1,9
+MAT1,9,2.1+11,,.3,7850.
+PARAM,COUPMASS,1
+PARAM,WTMASS,2.
+CONM2,50,9,,3.,.1,.2,.3
+,1.,.1,2.,.2,.3,3.
+RBE2,60,9,123456,5,6,7,8
+SPC1,7,123,1,THRU,4
+SPC1,8,123,5
+FORCE,3,9,5,2.,0.,0.,1.
+MOMENT,3,9,,4.,1.,0.,0.
+GRAV,4,,9.81,0.,0.,-1.
+CELAS2,70,5.+3,1,1,2,1
+"""
+NODES = "\n".join(
+    f"GRID,{k + 1},,{x}.,{y}.,{z}."
+    for k, (x, y, z) in enumerate(
+        [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    )
+)
+NODES += "\nGRID,9,,.5,.5,2.,0\n"
+
+
+def deck_of(folder, text=DECK):
+    (folder / "nodes.bulk").write_text(f"BEGIN BULK\n{NODES}\nENDDATA\n")
+    path = folder / "model.bdf"
+    path.write_text(text)
+    return path
+
+
+def test_a_deck_of_nastran_is_read_whole(tmp_path):
+    deck = read_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,1,2,1\n", "")))
+    deck.ledger.require_whole()
+    assert_allclose(deck.mesh.nodes[0], [10, 0, 0], atol=1e-14)
+    assert deck.materials["9"].density == 2 * 7850.0
+    assert (deck.solids[0].group, deck.solids[0].mass) == ("pid_1", "consistent")
+    mass = deck.masses[0]
+    assert (mass.nodes, mass.mass, mass.offset) == ("node_9", 6.0, (0.1, 0.2, 0.3))
+    assert_allclose(mass.inertia, 2 * np.array([[1, -0.1, -0.2], [-0.1, 2, -0.3], [-0.2, -0.3, 3]]), rtol=1e-14)
+    link = deck.rigid[0]
+    assert (link.node, list(deck.mesh.node_numbers[deck.mesh.node_sets[link.followers]])) == ("node_9", [5, 6, 7, 8])
+    support = deck.supports[0]
+    assert list(deck.mesh.node_numbers[deck.mesh.node_sets[support.nodes]]) == [1, 2, 3, 4]
+    assert deck.loads[0].forces == {"node_9": (0.0, 0.0, 2.0, 4.0, 0.0, 0.0)}
+    assert_allclose(deck.loads[1].acceleration, [0, 0, -9.81], rtol=1e-14)
+    assert ("SPC1", "1", "of a set that the case control does not select") in deck.ledger.rows()
+
+
+def test_the_job_of_a_deck_of_nastran_has_its_mass_and_its_loads(tmp_path):
+    path = deck_of(tmp_path)
+    body = job_body(job_of(path, leave_out=("CELAS2",)))
+    up = np.where(body.dofs[:, 1] == 2, 1.0, 0.0)
+    assert_allclose(up @ body.M @ up, 2 * 7850.0 + 6.0, rtol=1e-12)
+    assert_allclose(body.load_cases[0].f @ up, 2.0, rtol=1e-12)
+    text = path.with_suffix(".toml").read_text()
+    assert "#   1 CELAS2: LEFT OUT ON REQUEST: between grid points at different places" in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("CELAS2,70,5.+3,1,1,2,1", "PCOMP,1,,,,,,,", "1 PCOMP: this card is not known here"),
+        ("RBE2,60,9,123456,5,6,7,8", "RBE1,60,9,123456", "1 RBE1: this card is not known here"),
+        ("PSOLID,1,9", "PSOLID,2,9", "1 CHEXA: property 1 is not known here"),
+        ("CONM2", "CONM1", "1 CONM1: this card is not known here"),
+        ("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456,1.,123456,5,6,7,8", "1 RBE3: .* components of the members"),
+    ],
+)
+def test_cards_with_mass_or_stiffness_are_refused_by_name(tmp_path, old, new, words):
+    assert old in DECK
+    deck = read_deck(deck_of(tmp_path, DECK.replace(old, new)))
+    with pytest.raises(ValueError, match=words):
+        deck.ledger.require_whole()
+
+
+def test_a_missing_include_and_a_ring_of_them_are_refused(tmp_path):
+    path = deck_of(tmp_path)
+    (tmp_path / "nodes.bulk").write_text("INCLUDE 'nodes.bulk'\n")
+    with pytest.raises(ValueError, match=r"INCLUDE nodes\.bulk: includes itself"):
+        read_deck(path)
+    (tmp_path / "nodes.bulk").unlink()
+    with pytest.raises(ValueError, match=r"INCLUDE nodes.bulk: .* cannot be read: No such file"):
+        read_deck(path)
+
+
+def test_rods_are_axial_springs_with_half_of_their_mass_at_each_end(tmp_path):
+    """A tripod of rods: the frequency of its tip, K = Σ EA/L x xᵀ and a third of all mass at it."""
+    feet = [(1.0, 0.0, 0.0), (-0.5, 0.8, 0.0), (-0.4, -0.9, 0.0)]
+    cards = ["BEGIN BULK", "GRID,9,,0.,0.,1.5,,456", "MAT1,1,2.+11,,.3,7800.", "PROD,1,1,1.-4"]
+    for k, (x, y, z) in enumerate(feet, start=1):
+        cards += [f"GRID,{k},,{x},{y},{z},,456", f"CROD,{k},1,{k},9"]
+    cards += ["SPC1,1,123,1,2,3"]
+    path = tmp_path / "tripod.nas"
+    path.write_text("\n".join(cards) + "\n")
+    job = job_of(path)
+    body = uncoupled_body(job, Stages())
+    tip = np.flatnonzero((body.nodes == [0, 0, 1.5]).all(axis=1))
+    at = [k for k, (node, c) in enumerate(body.dofs) if node in tip and c < 3]
+    arms = [np.array(foot) - [0, 0, 1.5] for foot in feet]
+    K = sum(2e11 * 1e-4 / np.linalg.norm(a) ** 3 * np.outer(a, a) for a in arms)
+    assert_allclose(body.K[at][:, at].toarray(), K, rtol=0, atol=1e-12 * K.max())
+    mass = sum(7800 * 1e-4 * np.linalg.norm(a) for a in arms) / 2
+    assert_allclose(body.M[at][:, at].toarray(), mass * np.eye(3), rtol=0, atol=1e-12 * mass)
