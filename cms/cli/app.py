@@ -23,7 +23,7 @@ app.command("view")(view_command)
 @app.command("job")
 @guarded
 def job_command(
-    deck: Annotated[Path, typer.Argument(help="Deck of a finite element program: Abaqus, CalculiX (.inp).")],
+    deck: Annotated[Path, typer.Argument(help="Deck: Abaqus, CalculiX (.inp), Nastran (.bdf), ANSYS (.cdb).")],
     units: Annotated[
         str | None, typer.Option(help="Unit system of its numbers, such as mm-t-s; decks do not say it.")
     ] = None,

@@ -27,6 +27,16 @@ FORMATS = (
         lost="layers, tapered beams, released ends, RBE1, scalar points: each listed with its count",
     ),
     FileFormat(
+        "CDB",
+        "ANSYS",
+        "deck",
+        (".cdb",),
+        reads=True,
+        key="cms job",
+        tried="ANSYS 2019 R2",
+        lost="all but SOLID185, 186, 187, materials, components, supports, forces: each listed with its count",
+    ),
+    FileFormat(
         "input deck",
         "Abaqus, CalculiX",
         "deck",

@@ -141,7 +141,8 @@ def solid_body(
         Of the stiffness: "full", or "reduced" by the fewest points that finite element programs use
         (`fe_models.solids.elements.REDUCED`): bricks of 20 nodes by 8 as C3D20R, wedges by 2.
     mass
-        "consistent", "reduced" by the points of the reduced stiffness, or "lumped" on the diagonal. Reduced integration
+        "consistent", "reduced" by the points of the reduced stiffness, "14-point" as ANSYS has it for bricks of 20
+        nodes, or "lumped" on the diagonal. Reduced integration
         by too few points leaves motions without mass: the rank of the mass is then less than its size.
     progress
         Called with the finished fraction of the assembly, 0 to 1.

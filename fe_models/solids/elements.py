@@ -45,7 +45,8 @@ REDUCED: dict[str, tuple[str, Degree]] = {
     "wedge15": ("wedge", (2, 5)),  # 3 x 3
 }  #: fewest points that programs use; cells with straight edges keep their full stiffness but for the wedges and bricks
 INTEGRATIONS = ("full", "reduced")  #: of the stiffness
-MASSES = ("consistent", "reduced", "lumped")  #: consistent; by the points of the reduced stiffness; diagonal
+#: consistent; by the points of the reduced stiffness; bricks of 20 nodes by 14 points (others consistent); diagonal
+MASSES = ("consistent", "reduced", "14-point", "lumped")
 # Stress is sampled where it is most accurate (the points of reduced integration for quadratic elements) and carried to
 # the nodes by the shape functions of the low-order element, which fit those points exactly.
 STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
@@ -129,6 +130,20 @@ def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
     return points.T.copy(), weights
 
 
+def fourteen_points() -> tuple[Array, Array]:
+    """Return the rule of 14 points on the unit cube that is exact to degree 5, as ANSYS has it for its bricks.
+
+    On -1..1: six points ±a e_i of weight w_a and eight (±b, ±b, ±b) of weight w_b. Exact for 1, x², x⁴ and x² y²:
+    6 w_a + 8 w_b = 8, 2 w_a a² + 8 w_b b² = 8/3, 2 w_a a⁴ + 8 w_b b⁴ = 8/5, 8 w_b b⁴ = 8/9.
+    Hence w_a a⁴ = 16/45, b⁴ = 1/(9 w_b), and a² = 19/30, b² = 19/33.
+    """
+    a, b = np.sqrt(19 / 30), np.sqrt(19 / 33)
+    w_a, w_b = 16 / 45 / a**4, 1 / 9 / b**4
+    corners = np.stack([axis.ravel() for axis in np.meshgrid(*3 * [[-b, b]], indexing="ij")], axis=1)
+    points = np.concatenate([a * np.eye(3), -a * np.eye(3), corners])
+    return (points + 1) / 2, np.concatenate([np.full(6, w_a), np.full(8, w_b)]) / 8
+
+
 def shape_table(kind: str, points: Array, weights: Array) -> ShapeTable:
     """Evaluate the shape functions of a cell type, in meshio node order, at points (n_points, 3)."""
     import skfem
@@ -164,6 +179,7 @@ def reference_element(kind: str, integration: str = "full", mass: str = "consist
     cell, degree_stiffness, degree_mass = RULES[kind]
     if integration == "reduced":
         degree_stiffness = REDUCED[kind][1]
+    has_fourteen = mass == "14-point" and kind == "hexahedron20"
     if mass == "reduced":
         degree_mass = REDUCED[kind][1]
     (stress_cell, stress_degree), low_order = STRESS_RULES[kind]
@@ -177,7 +193,7 @@ def reference_element(kind: str, integration: str = "full", mass: str = "consist
     return ReferenceElement(
         kind=kind,
         stiffness=shape_table(kind, *quadrature(cell, degree_stiffness)),
-        mass=shape_table(kind, *quadrature(cell, degree_mass)),
+        mass=shape_table(kind, *(fourteen_points() if has_fourteen else quadrature(cell, degree_mass))),
         stress=shape_table(kind, stress_points, stress_weights),
         extrapolation=frozen(extrapolation),
     )

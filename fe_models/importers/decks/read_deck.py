@@ -8,6 +8,7 @@ from fe_models.errors import FeModelsError, MeshError
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.decks.abaqus import read_abaqus_deck
+from fe_models.importers.decks.cdb import read_cdb_deck
 from fe_models.importers.decks.deck import Deck
 from fe_models.importers.decks.nastran import read_nastran_deck
 
@@ -15,6 +16,7 @@ __all__ = ["DECK_FORMATS", "read_deck"]
 
 DECK_FORMATS: dict[str, Callable[..., Deck]] = {
     ".inp": read_abaqus_deck,
+    ".cdb": read_cdb_deck,
     ".bdf": read_nastran_deck,
     ".nas": read_nastran_deck,
     ".dat": read_nastran_deck,
