@@ -121,6 +121,11 @@ def real_matrix(where: str, value: Any) -> tuple[sp.csc_array, str]:
     """Return a real, symmetric matrix with both triangles, and what was stored."""
     if sp.issparse(value):
         kind = value.dtype
+        if value.format in ("csc", "csr"):
+            try:
+                value.check_format(full_check=True)
+            except ValueError as error:
+                raise MatrixError(f"{where}: its parts do not make a matrix ({error}); the file is damaged") from error
     else:
         value = np.asarray(value)
         kind = value.dtype

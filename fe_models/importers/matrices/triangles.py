@@ -69,6 +69,10 @@ def full_matrix(
 
 def mirrored(where: str, stored: sp.csc_array, *, declared: str | None = None) -> tuple[sp.csc_array, str]:
     """Return the full matrix of stored entries, and what was stored, as `full_matrix` does."""
+    try:
+        stored.check_format(full_check=True)  # an index beyond the matrix would be read from anywhere in memory
+    except ValueError as error:
+        raise MatrixError(f"{where}: its columns do not make a matrix ({error}); the file is damaged") from error
     kind = stored_as(stored)
     if kind == "diagonal":
         return stored, kind

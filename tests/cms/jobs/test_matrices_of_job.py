@@ -5,12 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from numpy.testing import assert_allclose
 
 import cms
 import fe_models
 from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
+from cms.jobs.matrices_of_job import interfaces_on
 from fe_models.errors import FeModelsError
 
 DATA = Path(__file__).parents[2] / "fe_models" / "importers" / "matrices" / "data" / "abaqus"
@@ -120,3 +122,65 @@ def test_keys_of_matrices_belong_to_matrices(tmp_path, folder):
         cms.jobs.job.read_job(path)
     with pytest.raises(FeModelsError, match="node numbers 900: 1 of 2 are not in the mesh"):
         fe_models.NodeNumbers((1, 900)).members(fe_models.read_geometry(folder / "blockC3D10.inp"))
+
+
+FRAME = """
+[body]
+matrices = "frame.mat"
+units = "m-kg-s"
+
+[interfaces.foot]
+kind = "rigid"
+nodes = [30]
+
+[interfaces.tip]
+kind = "nodes"
+box = {lo = [0.9, -0.1, 1.9], hi = [1.1, 0.1, 2.1]}
+
+[reduction]
+n_modes = 4
+"""
+
+
+def test_matrices_that_bring_their_nodes_need_no_geometry(tmp_path):
+    """A bent frame of our beams, its nodes renumbered: elements with rotations, interfaces by number and by box."""
+    points = np.array([[0, 0, 0], [0, 0, 0.7], [0, 0, 1.3], [0, 0, 2], [0.5, 0, 2], [1, 0, 2]], dtype=float)
+    lines = fe_models.LineMesh(points, np.array([[k, k + 1] for k in range(5)]))
+    steel = fe_models.Material("steel", E=2.1e11, nu=0.3, rho=7850.0)
+    frame = fe_models.beam_body(
+        lines,
+        fe_models.BeamProperty(fe_models.Circle(0.02), steel),
+        name="frame",
+        units=fe_models.unit_system("m-kg-s"),
+    )
+    numbers = np.array([30, 10, 60, 20, 50, 40])
+    dofs = np.column_stack([numbers[frame.dofs[:, 0]], frame.dofs[:, 1] + 1])
+    nodes = np.column_stack([numbers, points])
+    scipy.io.savemat(tmp_path / "frame.mat", {"K": frame.K, "M": frame.M, "dofs": dofs, "nodes": nodes})
+    job = tmp_path / "frame.toml"
+    job.write_text(FRAME)
+    reduced = cms.reduce_job(job)
+    foot = fe_models.line_interface(lines, "foot", fe_models.NodeIndices((0,)))
+    tip = fe_models.line_interface(lines, "tip", fe_models.NodeIndices((5,)), kind="nodes")
+    coupled = fe_models.couple(frame.with_interfaces(foot, tip))
+    ours = cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=4), geometric=False)
+    assert_allclose(np.diag(reduced.K), np.diag(ours.K), rtol=1e-9, atol=0)
+    assert not reduced.moments.is_exact  # rotations have mass: labelled approximate
+    assert_allclose(reduced.interfaces[0].position, ours.interfaces[0].position, rtol=0, atol=1e-9)
+
+
+def test_distributing_interfaces_and_faces_on_a_geometry_of_shells(tmp_path, folder):
+    """A deck of shells is a cloud of nodes with face groups: their area weighs a distributing interface."""
+    geometry = fe_models.NodeCloud(
+        np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [4, 0, 0], [4, 1, 0]], dtype=float),
+        face_sets={"web": {"quad": np.array([[0, 1, 2, 3], [1, 4, 5, 2]])}, "left": {"quad": np.array([[0, 1, 2, 3]])}},
+        node_numbers=np.arange(1, 7),
+    )
+    job = cms.jobs.job.read_job(job_in(folder))
+    table = {"kind": "distributing", "faces": "web"}
+    interfaces = {"web": cms.jobs.job.InterfaceSection.model_validate(table)}
+    (web,) = interfaces_on(job.model_copy(update={"interfaces": interfaces}), geometry)
+    assert_allclose(web.weights, np.array([1, 2, 2, 1, 1, 1]) / 8, rtol=1e-12, atol=0)
+    assert fe_models.FaceGroup("left").members(geometry).tolist() == [0, 1, 2, 3]
+    with pytest.raises(FeModelsError, match="no face group 'right'"):
+        fe_models.FaceGroup("right").members(geometry)
