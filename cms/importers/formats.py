@@ -11,6 +11,15 @@ FORMATS = (
         lost="3C, 4C, 5C unless masses are beside; rows of element forces and stresses; structural damping",
     ),
     FileFormat(
+        "CMS superelement", "ANSYS", "reduced body", (".sub",), reads=True, key="matrices",
+        tried="example-data of PyMAPDL (cp56.sub)", lost="3C, 4C, 5C unless masses are beside",
+    ),
+    FileFormat(
+        "*SUBSTRUCTURE MATRIX OUTPUT, *USER ELEMENT", "Abaqus, CalculiX", "reduced body", (".mtx",), reads=True,
+        key="matrices", tried="our own matrices in its layout",
+        lost="3C, 4C, 5C unless masses are beside; retained modes; places: a deck beside it",
+    ),
+    FileFormat(
         "reduced matrices", "any of the matrix formats", "reduced body", (".mtx", ".op4", ".npz", ".mat"), reads=True,
         key="matrices", tried="our own Craig-Bampton matrices",
         lost="3C, 4C, 5C unless masses are beside; stress; rows say their dofs, or --boundary does",

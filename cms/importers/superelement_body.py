@@ -187,7 +187,18 @@ def further_rows(element: Superelement, where: str) -> RecoveryRows:
             )
     if len(np.unique(keys)) != len(keys):
         raise ForeignBodyError(f"{where}: recovery: a dof has two rows")
-    return RecoveryRows(recovery.dofs[~is_own], recovery.matrix[~is_own])
+    taken = ~is_own & ~has_no_rotation(recovery)
+    return RecoveryRows(recovery.dofs[taken], recovery.matrix[taken])
+
+
+def has_no_rotation(recovery: RecoveryRows) -> np.ndarray:
+    """Whether a row is a rotation of a node whose rotations are all zero: one of solid elements, held by its program.
+
+    A node that has rotations turns with a rigid motion of the boundary, so that none of its rows is zero.
+    """
+    rotation = recovery.dofs[:, 1] >= 3
+    moving = np.unique(recovery.dofs[rotation & recovery.matrix.any(axis=1), 0])
+    return np.asarray(rotation & ~np.isin(recovery.dofs[:, 0], moving))
 
 
 def interfaces_of(

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import cms
 from cms.cli.app import app
-from cms.errors import ForeignBodyError, UnitsError
+from cms.errors import BodyError, ForeignBodyError, UnitsError
 from cms.importers.inertia import FullMass
 from fe_models.errors import MatrixError
 from floatframe import GeneralizedAlpha, System, integrate
@@ -192,3 +192,51 @@ def test_a_table_of_nodal_masses_completes_a_superelement(outboard, tmp_path):
     table.write_text("node,mass\n3,1.0\nx\n")
     result = CliRunner().invoke(app, words)
     assert "masses.csv, line 3: expected node, mass" in " ".join(result.output.split())
+
+
+def test_a_superelement_of_ansys_has_its_mass_and_the_frequencies_of_its_matrices():
+    """A cube of 30 mm with a density in kg/m³: its numbers are those of metres, and another system is refused."""
+    from fe_models.importers.matrices.read_matrices import read_matrices
+
+    path = ROOT / "tests" / "fe_models" / "importers" / "data" / "ansys" / "cp56.sub"
+    body = cms.import_body(path, units="m-kg-s")
+    assert_allclose(body.moments.m, 30.0**3 * 7850.0, rtol=1e-9)
+    assert_allclose(
+        body.moments.J0, body.moments.m * 30.0**2 / 6 * np.eye(3), rtol=0, atol=2e-3 * body.moments.J0[0, 0]
+    )
+    assert [(i.name, i.kind, len(i.members)) for i in body.interfaces] == [("boundary", "nodes", 80)]
+    raw = read_matrices(path)
+    omega2 = la.eigh(raw.K.toarray(), raw.M.toarray(), eigvals_only=True)
+    assert_allclose(body.free_frequencies[:20], np.sqrt(omega2[6:26]) / (2 * np.pi), rtol=1e-6)
+    with pytest.raises(BodyError, match="the mass is"):
+        cms.import_body(path, units="mm-t-s")
+
+
+def test_a_substructure_of_abaqus_finds_its_places_in_a_deck(tmp_path):
+    """Element matrices as *SUBSTRUCTURE MATRIX OUTPUT writes them, nodes from the deck beside."""
+    part = cms.couple(bar(nx=4))
+    element, _ = craig_bampton_matrices(part, 0)
+    numbers = list(dict.fromkeys(element.dofs[:, 0].tolist()))
+    lines = [
+        "** ELEMENT NODES",
+        f"** {', '.join(map(str, numbers))}",
+        "*USER ELEMENT, NODES=2, LINEAR",
+        "1, 2, 3, 4, 5, 6",
+    ]
+    for kind, matrix in (("STIFFNESS", element.K), ("MASS", element.M)):
+        lines.append(f"*MATRIX, TYPE={kind}")
+        values = [f"{matrix[i, j]:.16e}" for j in range(len(matrix)) for i in range(j + 1)]
+        lines += [", ".join(values[k : k + 4]) + "," for k in range(0, len(values), 4)]
+    (tmp_path / "part.mtx").write_text("\n".join(lines) + "\n")
+    places = {int(n): element.nodes[element.places(np.array([n]))[0]] for n in numbers}
+    deck = ["*NODE", *(f"{n}, {', '.join(f'{x:.12g}' for x in place)}" for n, place in places.items())]
+    (tmp_path / "part.inp").write_text("\n".join(deck) + "\n")
+    own = cms.reduce(part, cms.guyan(part), geometric=False)
+    body = cms.import_body(
+        tmp_path / "part.mtx", units="m-kg-s", nodes=places, interfaces={"a": numbers[:1], "b": numbers[1:]}
+    )
+    assert_allclose(body.free_frequencies, own.free_frequencies, rtol=1e-8)
+    from_deck = cms.import_body(tmp_path / "part.mtx", units="m-kg-s", nodes=tmp_path / "part.inp")
+    assert_allclose(from_deck.free_frequencies, own.free_frequencies, rtol=1e-8)
+    with pytest.raises(ForeignBodyError, match="have dofs and no place"):
+        cms.import_body(tmp_path / "part.mtx", units="m-kg-s")

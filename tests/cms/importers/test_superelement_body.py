@@ -267,6 +267,19 @@ def test_the_gates_of_bare_matrices_stand_before_it(element):
         body_of_superelement(element, in_mm)
 
 
+def test_rotations_that_solid_elements_do_not_have_are_no_rows_of_the_recovery(element, own):
+    """As Nastran writes them: six rows a node, the rotations zero."""
+    numbers = np.unique(element.recovery.dofs[:, 0])
+    turns = np.stack([np.repeat(numbers, 3), np.tile([3, 4, 5], len(numbers))], axis=1)
+    dofs = np.concatenate([element.recovery.dofs, turns])
+    matrix = np.concatenate([element.recovery.matrix, np.zeros((len(turns), len(element.dofs)))])
+    body = body_of_superelement(spoilt(element, recovery=RecoveryRows(dofs, matrix)), options())
+    assert_allclose(body.free_frequencies, own.free_frequencies, rtol=1e-9)
+    matrix[-1, 0] = 1.0
+    with pytest.raises(ForeignBodyError, match="misses a rigid motion of the boundary"):
+        body_of_superelement(spoilt(element, recovery=RecoveryRows(dofs, matrix)), options())
+
+
 def test_slightly_negative_mass_is_mended_when_asked(element, own):
     M = np.array(element.M)
     values, vectors = la.eigh(M)
