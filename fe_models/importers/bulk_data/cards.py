@@ -69,7 +69,8 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
     Raises
     ------
     MeshError
-        If a continuation has no card before it, or does not carry the mark that its card asks for.
+        If a continuation has no card before it, or does not carry the mark that its card asks for, or a line has too
+        many fields.
     """
     lines = text.splitlines()
     begin = next((k for k, line in enumerate(lines) if line.lstrip()[:5].upper() == "BEGIN"), -1)
@@ -81,7 +82,11 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
             continue
         if line.lstrip()[:7].upper() == "ENDDATA":
             break
-        first, data, following = _fields(line)
+        first, data, following, beyond = _fields(line)
+        if beyond:
+            raise MeshError(
+                f"{where}, line {number}: expected no more than nine fields and a mark, got also {beyond!r}"
+            )
         if not first.strip("+* ") or first[0] in "+*":  # a continuation
             if not name:
                 raise MeshError(f"{where}, line {number}: a continuation without a card before it: {line[:40]!r}")
@@ -103,15 +108,16 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
         yield Card(name, tuple(fields), here)
 
 
-def _fields(line: str) -> tuple[str, list[str], str]:
-    """Return the first field, the data fields of a line, and the mark of its continuation."""
+def _fields(line: str) -> tuple[str, list[str], str, str]:
+    """Return the first field, the data fields of a line, the mark of its continuation, and what stands behind it."""
     if "," in line:
         parts = [part.strip() for part in line.split(",")]
         count = (LARGE if "*" in parts[0] else SMALL)[1]
         data = parts[1 : count + 1]
-        return parts[0], data + [""] * (count - len(data)), parts[count + 1] if len(parts) > count + 1 else ""
+        mark = parts[count + 1] if len(parts) > count + 1 else ""
+        return parts[0], data + [""] * (count - len(data)), mark, ",".join(parts[count + 2 :]).strip(",")
     line = line.expandtabs(8)
     first = line[:8].strip()
     width, count = LARGE if "*" in first else SMALL
     data = [line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)]
-    return first, data, line[72:80].strip()
+    return first, data, line[72:80].strip(), ""

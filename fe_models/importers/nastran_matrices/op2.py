@@ -13,6 +13,8 @@ from fe_models.importers.nastran_matrices.raw_matrix import NastranMatrix
 __all__ = ["is_op2", "read_op2"]
 
 MOST_BYTES = 2_000_000_000  #: of a matrix in full, as pyYeti reads it
+SMALL_BYTES = 50_000_000  #: of a matrix in full that is read from any file
+FULLNESS = 200  #: bytes of a matrix in full for each byte of the file: beyond, the file is damaged or nearly empty
 
 
 def is_op2(content: bytes) -> bool:
@@ -43,7 +45,7 @@ def read_op2(path: str | Path) -> tuple[NastranMatrix, ...]:
         with op2.OP2(str(path)) as file:
             blocks = [block for block in file.dblist if block.dbtype > 0]
             for block in blocks:
-                _require_size(where, block.name, block.trailer)
+                _require_size(where, block.name, block.trailer, path.stat().st_size)
             found = []
             for block in blocks:
                 file.set_position(block.start)
@@ -71,13 +73,15 @@ def read_op2(path: str | Path) -> tuple[NastranMatrix, ...]:
     )
 
 
-def _require_size(where: str, name: str, trailer: tuple[int, ...]) -> None:
+def _require_size(where: str, name: str, trailer: tuple[int, ...], size: int) -> None:
     """Refuse a matrix whose header says more than memory should be taken for."""
     n_columns, n_rows, kind = trailer[1], trailer[2], trailer[4]
     if kind not in (1, 2, 3, 4) or n_columns < 1 or n_rows < 1:
         raise MatrixError(f"{where}: matrix {name}: {n_rows} rows, {n_columns} columns of type {kind}: it is damaged")
-    if 8 * n_rows * n_columns * (2 if kind > 2 else 1) > MOST_BYTES:
+    limit = min(MOST_BYTES, max(SMALL_BYTES, FULLNESS * size))
+    if 8 * n_rows * n_columns * (2 if kind > 2 else 1) > limit:
         raise MatrixError(
             f"{where}: matrix {name}: {n_rows} rows and {n_columns} columns are read in full here, which is more than "
-            f"{MOST_BYTES // 10**9} GB; write it into an OP4 file, which is read sparse"
+            f"{limit / 1e6:.0f} MB for a file of {size} bytes; it is damaged, or write it into an OP4 file, "
+            "which is read sparse"
         )

@@ -91,6 +91,7 @@ def test_a_rectangular_matrix_has_the_columns_of_its_header():
         (HEAD + "DMIG,K,1,7,,1,1,1.0", "component 0 to 6"),
         (HEAD + "DMIG,K,1,1,,1,1,1.0,2.0", "imaginary part"),
         (HEAD + "DMIG,K,1,1,,1,1,one", "expected a real number, got 'one'"),
+        (HEAD + "DMIG,K,1,1,,1,1,1.0,,+,2", "more than nine fields"),
         (HEAD + "DMIG,K,1,1,,1,1", "expected a real number, got ''"),
     ],
 )
@@ -132,7 +133,7 @@ def test_an_op2_matrix_too_large_in_full_takes_no_memory(tmp_path):
     rows = np.array([31, 25], ">i4").tobytes()  # columns, rows of a trailer
     path = tmp_path / "huge.op2"
     path.write_bytes(content.replace(rows, np.array([31, 2_000_000_000], ">i4").tobytes(), 1))
-    with pytest.raises(MatrixError, match=r"more than 2 GB|damaged"):
+    with pytest.raises(MatrixError, match="2000000000 rows and 31 columns"):
         read_op2(path)
 
 
