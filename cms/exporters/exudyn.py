@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cms.exporters.nodes import reference_row
 from cms.exporters.writer import Made, Request
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
@@ -51,6 +52,7 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
         "floatframe_names": np.array([interface.name for interface in body.interfaces], dtype=str),
         "floatframe_positions": np.array([interface.position for interface in body.interfaces]).reshape(-1, 3),
         "floatframe_triads": np.array([interface.triad for interface in body.interfaces]).reshape(-1, 3, 3),
+        "floatframe_reference": np.array([-1 if at is None else at for at in references(body)], dtype=np.int64),
         "floatframe_Psi": np.array([interface.Psi for interface in body.interfaces]).reshape(-1, 6, n),
     }
     for k, interface in enumerate(body.interfaces):
@@ -79,6 +81,11 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
         "type": np.array("ObjectFFRFreducedOrderInterface"),
         **ours,
     }
+
+
+def references(body: ReducedBody) -> list[int | None]:
+    """Return the kept node that is the reference point of each interface, None where there is none."""
+    return [reference_row(body, k) for k in range(len(body.interfaces))]
 
 
 def skew(vectors: Array) -> Array:
@@ -139,10 +146,14 @@ def add_body(mbs, **options):
 
 
 def marker(mbs, body, name, rigid=True):
-    """Add a marker at an interface: the mean place of its members, with their mean rotation if it is rigid."""
+    """Add a marker at an interface: its reference point, or mean place and rotation of its members if it is rigid."""
     with np.load(ARCHIVE) as archive:
         k = archive["floatframe_names"].tolist().index(name)
         members = archive["floatframe_members_%d" % k].tolist()
+        if not rigid and archive["floatframe_reference"][k] >= 0:
+            members = [int(archive["floatframe_reference"][k])]
+        if rigid and len(members) < 3:
+            raise ValueError("marker: %s has %d nodes, a rigid one needs 3: rigid=False" % (name, len(members)))
         offset = archive["floatframe_positions"][k] - archive["xRef"].reshape(-1, 3)[members].mean(axis=0)
     kind = eii.MarkerSuperElementRigid if rigid else eii.MarkerSuperElementPosition
     place = {{"offset": offset}} if rigid else {{}}

@@ -7,7 +7,7 @@ import numpy as np
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["NodeList", "all_nodes", "interface_nodes"]
+__all__ = ["NodeList", "all_nodes", "interface_nodes", "reference_row"]
 
 
 @dataclass(frozen=True, eq=False)
