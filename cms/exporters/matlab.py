@@ -13,6 +13,7 @@ from fe_models.foundation.arrays import Array
 
 __all__ = ["make_mat5", "make_mat73", "make_simscape"]
 
+FIRST_MODE = 1000001  #: number of the first mode in the list of dofs
 TEXT_OF_HEADER = 116  #: bytes of words at the beginning of every .mat file
 USER_BLOCK = 512  #: of version 7.3: the header, then HDF5
 
@@ -50,11 +51,13 @@ def make_simscape(request: Request) -> Made:
 def variables(model: InterfaceModel, request: Request) -> dict[str, Any]:
     """Return the variables by name; docs/formats.md has the list."""
     body = model.body
+    rows = [(k + 1, c + 1) for k, node in enumerate(model.nodes) for c in node.components]
+    rows += [(FIRST_MODE + k, 0) for k in range(model.n_modes)]
     values: dict[str, Any] = {
         "K": model.K,
         "M": model.M,
-        "C": model.D,
-        "dofs": np.array([[k + 1, c + 1] for k, node in enumerate(model.nodes) for c in node.components], dtype=float),
+        "D": model.D,
+        "dofs": np.array(rows, dtype=float),
         "nodes": np.array([node.position for node in model.nodes]),
         "interfaces": rows_of_text([node.interface for node in model.nodes]),
         "omega": model.omega[:, None],

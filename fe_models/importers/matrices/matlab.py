@@ -87,8 +87,8 @@ def array_of(where: str, name: str, entry: Any) -> np.ndarray:
 def from_named(where: str, content: Mapping[str, Any], request: Request, program: str) -> ForeignMatrices:
     """Return the record of named arrays: matrices, and `dofs` and `nodes` as they count from 1.
 
-    `dofs`: (node number, component 1-6) of every row, (n_dof, 2); `nodes`: (number, x, y, z) or, numbered 1, 2, ...,
-    (x, y, z), one row each.
+    `dofs`: (node number, component 1-6) of every row, or (number, 0) of a modal coordinate, (n_dof, 2); `nodes`:
+    (number, x, y, z) or, numbered 1, 2, ..., (x, y, z), one row each.
 
     Raises
     ------
@@ -105,8 +105,14 @@ def from_named(where: str, content: Mapping[str, Any], request: Request, program
     dofs = node_numbers = nodes = None
     if "dofs" in lower:
         table = table_of(f"{where}: dofs", lower["dofs"], (2,))
-        if not np.array_equal(table, np.rint(table)) or table[:, 1].min() < 1 or table[:, 1].max() > 6:
+        if not np.array_equal(table, np.rint(table)) or table[:, 1].min() < 0 or table[:, 1].max() > 6:
             raise MatrixError(f"{where}: dofs: expected whole numbers (node, component 1 to 6) of every row")
+        modal = table[:, 1] == 0
+        if np.isin(table[modal, 0], table[~modal, 0]).any():
+            raise MatrixError(
+                f"{where}: dofs: expected whole numbers (node, component 1 to 6) of every row, got component 0 of "
+                "nodes that have others too; 0 is a modal coordinate, with a number of its own"
+            )
         dofs = np.stack([table[:, 0], table[:, 1] - 1], axis=1).astype(np.int64)
     if "nodes" in lower:
         table = table_of(f"{where}: nodes", lower["nodes"], (3, 4))

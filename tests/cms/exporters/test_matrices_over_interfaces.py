@@ -45,7 +45,7 @@ def export(body, tmp_path, name, to, **options):
 def test_mat_of_version_5(reduced, model, tmp_path):
     export(reduced, tmp_path, "bar.mat", "mat")
     found = scipy.io.loadmat(tmp_path / "bar.mat")
-    for name, matrix in {"K": model.K, "M": model.M, "C": model.D, "F": model.loads, "T": model.T}.items():
+    for name, matrix in {"K": model.K, "M": model.M, "D": model.D, "F": model.loads, "T": model.T}.items():
         assert_array_equal(found[name], matrix)
     assert_array_equal(found["dofs"][:7], [[1, 1], [1, 2], [1, 3], [1, 4], [1, 5], [1, 6], [2, 1]])
     assert [name.strip() for name in found["interfaces"]] == ["left", "right"]
@@ -193,3 +193,20 @@ def test_our_own_reader_of_superelements_finds_the_same(reduced, model, tmp_path
     left = reduced.interface("left").members[0]
     turn = found.recovery.matrix[(rows[:, 0] == 2000001 + left) & (rows[:, 1] >= 3)]
     assert_allclose(turn, np.eye(6, len(model.K))[3:], rtol=0, atol=1e-9)
+
+
+WITHOUT_NAMES = {"mat": "bar.mat", "mat73": "bar.mat", "nastran-dmig": "bar.pch"}
+
+
+@pytest.mark.parametrize("to", WITHOUT_NAMES)
+def test_superelements_come_back_with_their_frequencies(to, reduced, tmp_path):
+    """Through `cms.import_body`: its own modes and frame, the same free body; ten digits of DMIG."""
+    exported = export(reduced, tmp_path, WITHOUT_NAMES[to], to)
+    back = cms.import_body(exported.files, units="m-kg-s")
+    assert back.n_q == reduced.n_q
+    assert_allclose(back.free_frequencies, reduced.free_frequencies, rtol=1e-6 if to == "nastran-dmig" else 1e-8)
+    assert_allclose(back.moments.m, reduced.moments.m, rtol=1e-8)
+    assert back.moments.missing == ("3C", "4C", "5C")
+    places = [back.frame.origin + back.frame.axes @ each.position for each in back.interfaces]
+    expected = [reduced.frame.origin + reduced.frame.axes @ each.position for each in reduced.interfaces]
+    assert_allclose(places, expected, rtol=0, atol=1e-9)
