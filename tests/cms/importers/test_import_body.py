@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import cms
 from cms.cli.app import app
 from cms.errors import BodyError, ForeignBodyError, UnitsError
+from cms.exporters.export import export_body
 from cms.importers.inertia import FullMass
 from fe_models.errors import MatrixError
 from floatframe import GeneralizedAlpha, System, integrate
@@ -240,3 +241,13 @@ def test_a_substructure_of_abaqus_finds_its_places_in_a_deck(tmp_path):
     assert_allclose(from_deck.free_frequencies, own.free_frequencies, rtol=1e-8)
     with pytest.raises(ForeignBodyError, match="have dofs and no place"):
         cms.import_body(tmp_path / "part.mtx", units="m-kg-s")
+
+
+def test_a_superelement_that_we_wrote_for_nastran_comes_back(tmp_path):
+    part = cms.couple(bar(nx=4, length=0.8, width=0.06, height=0.05))
+    own = cms.reduce(part, cms.craig_bampton(part, n_modes=3), geometric=False, stress=False)
+    export_body(own, tmp_path / "part.op4", to="nastran-op4", units=own.units)
+    body = cms.import_body(tmp_path / "part.op4", units=own.units)
+    assert_allclose(body.free_frequencies, own.free_frequencies, rtol=1e-8)
+    assert_allclose(body.moments.J0, own.moments.J0, rtol=0, atol=1e-8 * np.abs(own.moments.J0).max())
+    assert body.moments.missing == ("3C", "4C", "5C")
