@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from fe_models.errors import FeModelsError, MeshError
+from fe_models.foundation.digest import file_digest
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus import read_abaqus
 from fe_models.importers.cad.cad_units import CAD_SUFFIXES
@@ -66,7 +67,7 @@ def read_mesh(path: str | Path) -> Mesh:
 
 
 def read_geometry(path: str | Path) -> Mesh | NodeCloud:
-    """Read nodes, numbers and groups from a deck or mesh beside matrices, by the same readers as `read_mesh`.
+    """Read nodes, numbers and groups from a deck or mesh beside matrices, by the readers of meshes and whole decks.
 
     Returns
     -------
@@ -78,6 +79,12 @@ def read_geometry(path: str | Path) -> Mesh | NodeCloud:
     MeshError
         As `read_mesh`, but for elements: they may be of any kind.
     """
+    from fe_models.importers.decks.read_deck import DECK_FORMATS, read_deck
+
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix in DECK_FORMATS and (suffix not in MESH_FORMATS or MESH_FORMATS[suffix][1] is read_nastran):
+        return geometry_from_raw(read_deck(path).mesh, path, file_digest(str(path)))  # coordinate systems, INCLUDE
     return _read(path, geometry_from_raw)
 
 

@@ -158,7 +158,7 @@ def rows_of_nodes(where: str, read: ForeignMatrices) -> IntArray:
     if len(scalars):
         raise MatrixError(
             f"{where}: {len(scalars)} rows have no place (scalar points, modal coordinates), first "
-            f"{read.dofs[scalars[0], 0]}: these are the matrices of a reduced body; import it as such"
+            f"{read.dofs[scalars[0], 0]}: these are the matrices of a reduced body, which `cms import` takes"
         )
     order = np.argsort(read.node_numbers)
     ordered = read.node_numbers[order]

@@ -6,14 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
+import scipy.linalg as la
 from numpy.testing import assert_allclose
 
 import cms
 import fe_models
 from cms.errors import JobError
-from cms.jobs.body_of_job import job_body
+from cms.jobs.body_of_job import job_body, uncoupled_body
 from cms.jobs.matrices_of_job import interfaces_on
 from fe_models.errors import FeModelsError
+from fe_models.foundation.stages import Stages
 
 DATA = Path(__file__).parents[2] / "fe_models" / "importers" / "matrices" / "data" / "abaqus"
 JOB = """
@@ -184,3 +186,23 @@ def test_distributing_interfaces_and_faces_on_a_geometry_of_shells(tmp_path, fol
     assert fe_models.FaceGroup("left").members(geometry).tolist() == [0, 1, 2, 3]
     with pytest.raises(FeModelsError, match="no face group 'right'"):
         fe_models.FaceGroup("right").members(geometry)
+
+
+def test_a_full_file_of_ansys_with_its_deck_has_the_printed_frequency(tmp_path):
+    """SOLID186, one end held: rows without the held dofs, nodes from the .cdb; Ansys printed 1283.2004 Hz."""
+    for name in ("HexBeam_clamped.full", "HexBeam.cdb"):
+        (source,) = Path(__file__).parents[2].rglob(name)
+        (tmp_path / name).write_bytes(source.read_bytes())
+    job = tmp_path / "beam.toml"
+    job.write_text(
+        '[body]\nmatrices = "HexBeam_clamped.full"\ngeometry = "HexBeam.cdb"\nunits = "in-slinch-s"\nheld = true\n'
+        '[interfaces.tip]\nkind = "rigid"\nplane = {point = [0, 0, 5], normal = [0, 0, 1]}\n[reduction]\nn_modes = 2\n'
+    )
+    body = uncoupled_body(cms.jobs.job.read_job(job), Stages())
+    flexible = la.eigh(body.M.toarray(), body.K.toarray(), eigvals_only=True)[-1]  # M has no full rank
+    assert_allclose(1 / np.sqrt(flexible) / (2 * np.pi), 1283.2004, rtol=0, atol=1e-4)
+    assert body.is_held
+    assert len(body.interfaces[0].nodes) == 21
+    job.write_text(job.read_text().replace("held = true\n", ""))
+    with pytest.raises(FeModelsError, match="say that the body is held"):
+        uncoupled_body(cms.jobs.job.read_job(job), Stages())
