@@ -109,6 +109,23 @@ def faces_command(
     run_faces(FacesRequest(file, units, tuple(select or ()), output, json))
 
 
+@app.command("converge")
+@guarded
+def converge_command(
+    job: Annotated[Path, typer.Argument(help="Job file (TOML) of a CAD file with [mesh_size].")],
+    ratio: Annotated[float, typer.Option(help="Size of the coarser mesh over that of the job.")] = 1.5,
+    modes: Annotated[int, typer.Option(help="Elastic free modes that are compared.")] = 10,
+    json: Annotated[bool, typer.Option("--json", help="Write the numbers as JSON, for other programs.")] = False,
+) -> None:
+    """Mesh a CAD job at its own size and a coarser one: free frequencies, and the estimated error of the mesh.
+
+    Example: cms converge part.toml
+    """
+    from cms.cli.geometry.converge import run_converge
+
+    run_converge(job, ratio=ratio, n_modes=modes, as_json=json)
+
+
 @app.command("modes")
 @guarded
 def modes_command(

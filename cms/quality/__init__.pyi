@@ -2,6 +2,8 @@ from .body_check import check_body as check_body
 from .errors import QualityError as QualityError
 from .limits import LIMITS as LIMITS
 from .limits import Limit as Limit
+from .mesh_convergence import MeshConvergence as MeshConvergence
+from .mesh_convergence import mesh_convergence as mesh_convergence
 from .of_body.effective_mass import EffectiveMass as EffectiveMass
 from .of_body.effective_mass import effective_mass as effective_mass
 from .of_reduction.completeness import StaticCompleteness as StaticCompleteness
