@@ -88,7 +88,7 @@ def diagnose(model, work, out, drift):
         for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
             rows = model.rows
             if rows.is_loaded[k]:
-                x, _ = loaded_coordinate(model, work, k, a, b)
+                x, _ = loaded_coordinate(rows, work.markers, k, a, b)
                 out[SPRINGS] += coordinate_strain(model, k, rows.is_angle[k] != 0, x)
             elif rows.holds[k] == VELOCITY:
                 drift[c, OF_DISTANCE_RATES] += work.connections.g[k] ** 2
@@ -130,14 +130,15 @@ def drive_power(model, work, c):
 @inner
 def loaded_power(model, work, c):
     """Return the power that enters by forces along coordinates of joint c, that taken by them, and their total."""
+    rows, markers = model.rows, work.markers
     loads, dissipated, total = 0.0, 0.0, 0.0
     w0, a, b = model.connections.w0[c], model.connections.a[c], model.connections.b[c]
     w = work.state.w[w0 : model.connections.w0[c + 1]]
     for k in range(w0, model.connections.w0[c + 1]):
-        if model.rows.is_loaded[k]:
-            is_angle = model.rows.is_angle[k] != 0
-            x, v = loaded_coordinate(model, work, k, a, b)
-            normal, _ = normal_force(w, loaded_axis(model, work, k, a, b))
+        if rows.is_loaded[k]:
+            is_angle = rows.is_angle[k] != 0
+            x, v = loaded_coordinate(rows, markers, k, a, b)
+            normal, _ = normal_force(w, loaded_axis(rows, markers, k, a, b))
             Q, _, _, _ = coordinate_force(model, work, k, is_angle, x, v, normal)
             given, taken = coordinate_power(model, work, k, is_angle, x, v, Q)
             loads += given
@@ -151,7 +152,7 @@ def body_load_power(model, work, d):
     """Return the power of load case d on its body."""
     i, first = model.body_loads.body[d], model.body_loads.value0[d]
     u0, R, f = model.bodies.u0[i], work.state.R[i], model.body_loads.values
-    factor, _, _ = time_function(model, model.body_loads.factor[d], work.state.time)
+    factor, _, _ = time_function(model.functions, model.body_loads.factor[d], work.state.time)
     total = dot(f[first:], turned_back(R, work.state.u[u0:]))
     for k in range(3, 6 + model.bodies.n_q[i]):
         total += f[first + k] * work.state.u[u0 + k]
@@ -188,7 +189,7 @@ def power(model, work):
             _, length, rate = spring_tension(model, work, c)
             dissipated += springs.damping[i] * rate * rate
             if springs.table[i] >= 0:
-                value, _, _ = time_function(model, springs.table[i], length - springs.free_length[i])
+                value, _, _ = time_function(model.functions, springs.table[i], length - springs.free_length[i])
                 loads -= value * rate
     for d in range(model.body_loads.body.shape[0]):
         loads += body_load_power(model, work, d)

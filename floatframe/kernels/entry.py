@@ -99,7 +99,7 @@ def make_entry(digest):
         if what == ADVANCE:
             return advance(model, work, memory, rows, order)
         if what == COUNT:
-            load_state(model, work, memory)
+            load_state(work.state, memory)
             count_turns(model, work, memory, order.h)
         elif what == OBSERVE:
             work.counted.rows = 0

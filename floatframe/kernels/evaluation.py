@@ -41,7 +41,7 @@ def load_wrench(model, work, k):
     f, t = vector(model.loads.force[k]), vector(model.loads.torque[k])
     factor = 1.0
     if model.loads.factor[k] >= 0:
-        factor, _, _ = time_function(model, model.loads.factor[k], work.state.time)
+        factor, _, _ = time_function(model.functions, model.loads.factor[k], work.state.time)
     if model.markers.is_follower[m]:
         f, t = turned(work.markers.A[m], f), turned(work.markers.A[m], t)
     put(work.markers.wrench[m], 0, scaled(factor, f))
@@ -52,7 +52,7 @@ def load_wrench(model, work, k):
 def body_load(model, work, d):
     """Subtract load case d, fixed in the axes of its body, from the residual."""
     i, first = model.body_loads.body[d], model.body_loads.value0[d]
-    factor, _, _ = time_function(model, model.body_loads.factor[d], work.state.time)
+    factor, _, _ = time_function(model.functions, model.body_loads.factor[d], work.state.time)
     for k in range(6 + model.bodies.n_q[i]):
         work.bodies.residual[model.bodies.u0[i] + k] -= factor * model.body_loads.values[first + k]
 

@@ -60,25 +60,25 @@ def copy(source, target):
 
 
 @inner
-def load_state(model, work, memory):
+def load_state(state, memory):
     """Copy the memory of the integrator into the iterate; rotation since the beginning of the step is zero."""
-    copy(memory.r.reshape(memory.r.size), work.state.r.reshape(memory.r.size))
-    copy(memory.q, work.state.q)
-    copy(memory.u, work.state.u)
-    copy(memory.u_dot, work.state.u_dot)
-    copy(memory.w, work.state.w)
-    for i in range(model.bodies.kind.shape[0]):
+    copy(memory.r.reshape(memory.r.size), state.r.reshape(memory.r.size))
+    copy(memory.q, state.q)
+    copy(memory.u, state.u)
+    copy(memory.u_dot, state.u_dot)
+    copy(memory.w, state.w)
+    for i in range(memory.p.shape[0]):
         for k in range(3):
-            work.state.theta[i, k] = 0.0
-    for i in range(model.bodies.kind.shape[0]):
-        put_matrix(work.state.R[i], matrix_of_euler_parameters(memory.p[i]))
+            state.theta[i, k] = 0.0
+    for i in range(memory.p.shape[0]):
+        put_matrix(state.R[i], matrix_of_euler_parameters(memory.p[i]))
 
 
 @inner
-def turn_body(work, memory, i):
+def turn_body(state, memory, i):
     """Write R of body i: that of the beginning of the step, turned by theta."""
     R_start = matrix_of_euler_parameters(memory.p[i])
-    put_matrix(work.state.R[i], product(R_start, exp_matrix(vector(work.state.theta[i]))))
+    put_matrix(state.R[i], product(R_start, exp_matrix(vector(state.theta[i]))))
 
 
 @inner
@@ -102,7 +102,7 @@ def predict(model, work, memory, h, alpha_f):
                 work.state.theta[i, j - 3] = x
             else:
                 work.state.q[q0 + j - 6] = memory.q[q0 + j - 6] + x
-        turn_body(work, memory, i)
+        turn_body(work.state, memory, i)
     return size, size_x
 
 
@@ -125,7 +125,7 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
             work.state.u_dot[u0 + k] += by_acceleration * y[k]
         for k in range(n):
             work.state.q[q0 + k] += y[6 + k]
-        turn_body(work, memory, i)
+        turn_body(work.state, memory, i)
     for k in range(work.solver.mu.shape[0]):
         work.state.w[k] += work.solver.mu[k] / c_k
     return total
@@ -257,7 +257,7 @@ def write_row(model, work, memory, t, rows):
     k = work.counted.rows
     work.state.time = t
     work.counted.rows += 1
-    load_state(model, work, memory)
+    load_state(work.state, memory)
     evaluate(model, work, 1.0)
     rows.t[k] = t
     copy(memory.r.reshape(memory.r.size), rows.r[k].reshape(memory.r.size))
@@ -278,7 +278,7 @@ def resize(model, memory, h):
     ratio = h / memory.h
     for k in range(memory.a.shape[0]):
         memory.a[k] = memory.u_dot[k] + ratio * (memory.a[k] - memory.u_dot[k])
-    resize_states(model, memory, ratio)
+    resize_states(model.states.row, memory, ratio)
     memory.h = h
 
 

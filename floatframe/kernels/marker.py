@@ -51,16 +51,16 @@ def marker_motion(model, work, m):
 
 
 @small
-def body_omega(model, work, i):
+def body_omega(bodies, state, i):
     """Return the angular velocity of body i, body axes."""
-    return vector(work.state.u[model.bodies.u0[i] + 3 :])
+    return vector(state.u[bodies.u0[i] + 3 :])
 
 
 @inner
 def pose_on_body(model, work, m):
     """Write place, axes and velocities of marker m in ground axes from its motion in its body."""
     i, markers, triad = model.markers.body[m], work.markers, model.markers.triad[m]
-    R, omega = work.state.R[i], body_omega(model, work, i)
+    R, omega = work.state.R[i], body_omega(model.bodies, work.state, i)
     if model.markers.psi0[m] >= 0:
         put_matrix(markers.A[m], product(R, product(exp_matrix(vector(markers.angle[m])), triad)))
     else:
@@ -135,7 +135,7 @@ def marker_acceleration_bias(model, work, m, out):
     i = model.markers.body[m]
     if i < 0:
         return
-    R, u0, omega = work.state.R[i], model.bodies.u0[i], body_omega(model, work, i)
+    R, u0, omega = work.state.R[i], model.bodies.u0[i], body_omega(model.bodies, work.state, i)
     rho, rho_dot = vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
     n = model.bodies.n_q[i]
     b_t, b_r = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -197,7 +197,7 @@ def marker_columns(model, work, m, rate, turning, column, row):
     domega = rate dtheta, dq_dot = rate dq, and the body turns by `turning` dtheta, (3, 3).
     """
     i = model.markers.body[m]
-    n, omega = model.bodies.n_q[i], body_omega(model, work, i)
+    n, omega = model.bodies.n_q[i], body_omega(model.bodies, work.state, i)
     rho, spin = vector(work.markers.rho[m]), add(omega, vector(work.markers.spin[m]))
     arm_dot = add(cross(omega, rho), vector(work.markers.rho_dot[m]))
     column[:, :] = 0.0

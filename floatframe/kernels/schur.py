@@ -88,31 +88,29 @@ def assemble(model, work, c_k):
 
 
 @inner
-def factorize_connections(model, work):
+def factorize_connections(elimination, connections, solver):
     """Block LU of the connections in the planned order. Return the connection with a singular block, or -1."""
-    s = work.solver.blocks
-    for step in range(model.elimination.order.shape[0]):
-        j = model.elimination.order[step]
-        n, o = model.connections.size[j], model.elimination.diagonal[j]
+    s = solver.blocks
+    for step in range(elimination.order.shape[0]):
+        j = elimination.order[step]
+        n, o = connections.size[j], elimination.diagonal[j]
         D = s[o : o + n * n].reshape((n, n))
-        pivot = work.solver.block_pivot[model.connections.w0[j] : model.connections.w0[j + 1]]
+        pivot = solver.block_pivot[connections.w0[j] : connections.w0[j + 1]]
         if not lu_factor(D, pivot):
             return j
-        first, last = model.elimination.after0[step], model.elimination.after0[step + 1]
+        first, last = elimination.after0[step], elimination.after0[step + 1]
         for e in range(first, last):
-            m = model.connections.size[model.elimination.after[e]]
-            o = model.elimination.after_upper[e]
+            m = connections.size[elimination.after[e]]
+            o = elimination.after_upper[e]
             lu_solve_columns(D, pivot, s[o : o + n * m].reshape((n, m)))
-        target = model.elimination.update0[step]
+        target = elimination.update0[step]
         for e in range(first, last):
-            rows = model.connections.size[model.elimination.after[e]]
-            L = s[model.elimination.after_lower[e] : model.elimination.after_lower[e] + rows * n].reshape((rows, n))
+            rows = connections.size[elimination.after[e]]
+            L = s[elimination.after_lower[e] : elimination.after_lower[e] + rows * n].reshape((rows, n))
             for f in range(first, last):
-                columns = model.connections.size[model.elimination.after[f]]
-                U = s[model.elimination.after_upper[f] : model.elimination.after_upper[f] + n * columns].reshape(
-                    (n, columns)
-                )
-                o = model.elimination.update[target]
+                columns = connections.size[elimination.after[f]]
+                U = s[elimination.after_upper[f] : elimination.after_upper[f] + n * columns].reshape((n, columns))
+                o = elimination.update[target]
                 target += 1
                 for r in range(rows):
                     for k in range(columns):
@@ -124,32 +122,32 @@ def factorize_connections(model, work):
 
 
 @inner
-def solve_connections(model, work):
+def solve_connections(elimination, connections, solver):
     """Overwrite mu by the solution for the right side in mu."""
-    s, mu = work.solver.blocks, work.solver.mu
-    for step in range(model.elimination.order.shape[0]):
-        j = model.elimination.order[step]
-        n, o = model.connections.size[j], model.elimination.diagonal[j]
-        own = mu[model.connections.w0[j] : model.connections.w0[j + 1]]
+    s, mu = solver.blocks, solver.mu
+    for step in range(elimination.order.shape[0]):
+        j = elimination.order[step]
+        n, o = connections.size[j], elimination.diagonal[j]
+        own = mu[connections.w0[j] : connections.w0[j + 1]]
         lu_solve(
             s[o : o + n * n].reshape((n, n)),
-            work.solver.block_pivot[model.connections.w0[j] : model.connections.w0[j + 1]],
+            solver.block_pivot[connections.w0[j] : connections.w0[j + 1]],
             own,
         )
-        for e in range(model.elimination.after0[step], model.elimination.after0[step + 1]):
-            i = model.elimination.after[e]
-            o = model.elimination.after_lower[e]
-            for r in range(model.connections.size[i]):
+        for e in range(elimination.after0[step], elimination.after0[step + 1]):
+            i = elimination.after[e]
+            o = elimination.after_lower[e]
+            for r in range(connections.size[i]):
                 for k in range(n):
-                    mu[model.connections.w0[i] + r] -= s[o + r * n + k] * own[k]
-    for step in range(model.elimination.order.shape[0] - 1, -1, -1):
-        j = model.elimination.order[step]
-        for e in range(model.elimination.after0[step], model.elimination.after0[step + 1]):
-            i = model.elimination.after[e]
-            o, columns = model.elimination.after_upper[e], model.connections.size[i]
-            for r in range(model.connections.size[j]):
+                    mu[connections.w0[i] + r] -= s[o + r * n + k] * own[k]
+    for step in range(elimination.order.shape[0] - 1, -1, -1):
+        j = elimination.order[step]
+        for e in range(elimination.after0[step], elimination.after0[step + 1]):
+            i = elimination.after[e]
+            o, columns = elimination.after_upper[e], connections.size[i]
+            for r in range(connections.size[j]):
                 for k in range(columns):
-                    mu[model.connections.w0[j] + r] -= s[o + r * columns + k] * mu[model.connections.w0[i] + k]
+                    mu[connections.w0[j] + r] -= s[o + r * columns + k] * mu[connections.w0[i] + k]
 
 
 @inner
@@ -158,56 +156,57 @@ def correction(model, work, c_k, is_new):
 
     Return the connection with a singular block, or -1.
     """
-    y, mu = work.solver.y, work.solver.mu
-    for i in range(model.bodies.kind.shape[0]):
-        n, u0 = 6 + model.bodies.n_q[i], model.bodies.u0[i]
+    bodies, markers, connections, solver = model.bodies, model.markers, model.connections, work.solver
+    y, mu = solver.y, solver.mu
+    for i in range(bodies.kind.shape[0]):
+        n, u0 = 6 + bodies.n_q[i], bodies.u0[i]
         for k in range(u0, u0 + n):
             y[k] = -c_k * work.bodies.residual[k]
         lu_solve(
-            work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((n, n)),
-            work.solver.pivot[u0 : u0 + n],
+            solver.H[bodies.h0[i] : bodies.h0[i + 1]].reshape((n, n)),
+            solver.pivot[u0 : u0 + n],
             y[u0 : u0 + n],
         )
     if mu.shape[0] == 0:
         return -1
     if is_new:
         assemble(model, work, c_k)
-        singular = factorize_connections(model, work)
+        singular = factorize_connections(model.elimination, connections, solver)
         if singular >= 0:
             return singular
     for k in range(mu.shape[0]):
         mu[k] = -work.connections.g[k]
-    motion = work.solver.motion
-    for i in range(model.bodies.kind.shape[0]):
-        n, u0, R = 6 + model.bodies.n_q[i], model.bodies.u0[i], work.state.R[i]
-        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
-            m = model.bodies.ends[e]
-            c = model.markers.connection[m]
-            o, w0 = model.markers.x0[m], model.connections.w0[c]
-            n_motion = 12 if model.connections.has_rates[c] else 6
+    motion = solver.motion
+    for i in range(bodies.kind.shape[0]):
+        n, u0, R = 6 + bodies.n_q[i], bodies.u0[i], work.state.R[i]
+        for e in range(bodies.end0[i], bodies.end0[i + 1]):
+            m = bodies.ends[e]
+            c = markers.connection[m]
+            o, w0 = markers.x0[m], connections.w0[c]
+            n_motion = 12 if connections.has_rates[c] else 6
             for r in range(n_motion):
                 total = 0.0
                 for k in range(n):
-                    total += work.solver.J_row[12 * o + r * n + k] * y[u0 + k]
+                    total += solver.J_row[12 * o + r * n + k] * y[u0 + k]
                 motion[r] = total
             for part in range(0, n_motion, 3):
                 put(motion, part, turned(R, motion[part:]))
-            for r in range(model.connections.size[c]):
+            for r in range(connections.size[c]):
                 total = 0.0
                 for k in range(n_motion):
                     total += work.connections.P[m, r, k] * motion[k]
                 mu[w0 + r] -= total
-    solve_connections(model, work)
-    for i in range(model.bodies.kind.shape[0]):
-        n, u0, R = 6 + model.bodies.n_q[i], model.bodies.u0[i], work.state.R[i]
-        for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
-            m = model.bodies.ends[e]
-            c = model.markers.connection[m]
-            o, w0, sign = model.markers.x0[m], model.connections.w0[c], model.markers.sign[m]
-            size = 3 if model.markers.moment[m] < 0 else 6
-            wrench = work.solver.wrench  # of the correction on the marker, body axes
+    solve_connections(model.elimination, connections, solver)
+    for i in range(bodies.kind.shape[0]):
+        n, u0, R = 6 + bodies.n_q[i], bodies.u0[i], work.state.R[i]
+        for e in range(bodies.end0[i], bodies.end0[i + 1]):
+            m = bodies.ends[e]
+            c = markers.connection[m]
+            o, w0, sign = markers.x0[m], connections.w0[c], markers.sign[m]
+            size = 3 if markers.moment[m] < 0 else 6
+            wrench = solver.wrench  # of the correction on the marker, body axes
             for part in range(0, size, 3):
-                w_part = model.markers.force[m] if part == 0 else model.markers.moment[m]
+                w_part = markers.force[m] if part == 0 else markers.moment[m]
                 if w_part >= 0:
                     put(wrench, part, scaled(sign, turned_back(R, mu[w0 + w_part :])))
                 else:
@@ -215,6 +214,6 @@ def correction(model, work, c_k, is_new):
             for r in range(n):
                 total = 0.0
                 for k in range(size):
-                    total += work.solver.X[6 * o + r * 6 + k] * wrench[k]
+                    total += solver.X[6 * o + r * 6 + k] * wrench[k]
                 y[u0 + r] += total
     return -1

@@ -14,5 +14,5 @@ def begin_step(model, work, memory, h, alpha_f):
         work.state.w_start[k] = memory.w[k]
         work.state.w[k] = memory.w[k]
     for p in range(model.coordinates.a.shape[0]):
-        predict_coordinate(model, work, p, h)
-    begin_states(model, work, memory, h, alpha_f)
+        predict_coordinate(model.coordinates, work.state, p, h)
+    begin_states(model.states.row, work.states, memory, h, alpha_f)

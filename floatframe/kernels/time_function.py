@@ -8,16 +8,16 @@ __all__ = ["time_function"]
 
 
 @inner
-def time_function(model, f, t):
+def time_function(functions, f, t):
     """Return function f at t, its rate and its second rate: a polynomial of degree five and a sine on each piece."""
-    low, high = model.functions.piece0[f], model.functions.piece0[f + 1] - 1
+    low, high = functions.piece0[f], functions.piece0[f + 1] - 1
     while low < high:  # the last piece that begins at or before t
         middle = (low + high + 1) // 2
-        if model.functions.begin[middle] <= t:
+        if functions.begin[middle] <= t:
             low = middle
         else:
             high = middle - 1
-    x, c = t - model.functions.begin[low], model.functions.piece[low]
+    x, c = t - functions.begin[low], functions.piece[low]
     value, rate, second = 0.0, 0.0, 0.0
     for k in range(5, -1, -1):  # Horner's scheme, with derivatives
         second = second * x + 2 * rate

@@ -20,26 +20,26 @@ __all__ = ["count_turns"]
 
 
 @inner
-def in_ground(work, i, x):
+def in_ground(state, i, x):
     """Return a direction of body i, -1 for the ground, in ground axes."""
-    return vector(x) if i < 0 else turned(work.state.R[i], vector(x))
+    return vector(x) if i < 0 else turned(state.R[i], vector(x))
 
 
 @inner
-def spin(model, work, i):
+def spin(bodies, state, i):
     """Return the angular velocity of body i in ground axes."""
     if i < 0:
         return 0.0, 0.0, 0.0
-    return turned(work.state.R[i], vector(work.state.u[model.bodies.u0[i] + 3 :]))
+    return turned(state.R[i], vector(state.u[bodies.u0[i] + 3 :]))
 
 
 @inner
-def angle_and_rate(model, work, k):
+def angle_and_rate(angles, bodies, state, k):
     """Return angle k, between -pi and pi, and its rate."""
-    holder, other = model.angles.holder[k], model.angles.other[k]
-    E, Z = in_ground(work, holder, model.angles.x[k]), in_ground(work, holder, model.angles.z[k])
-    D = in_ground(work, other, model.angles.y[k])
-    D_dot = cross(sub(spin(model, work, other), spin(model, work, holder)), D)
+    holder, other = angles.holder[k], angles.other[k]
+    E, Z = in_ground(state, holder, angles.x[k]), in_ground(state, holder, angles.z[k])
+    D = in_ground(state, other, angles.y[k])
+    D_dot = cross(sub(spin(bodies, state, other), spin(bodies, state, holder)), D)
     S, C = -dot(E, D), dot(Z, D)
     S_dot, C_dot = -dot(E, D_dot), dot(Z, D_dot)
     square = S * S + C * C
@@ -51,7 +51,7 @@ def angle_and_rate(model, work, k):
 def count_turns(model, work, memory, h):
     """Take the angles of the iterate into the memory, a step of size h after those that are there."""
     for k in range(memory.angle.shape[0]):
-        angle, rate = angle_and_rate(model, work, k)
+        angle, rate = angle_and_rate(model.angles, model.bodies, work.state, k)
         sign = model.angles.sign[k]
         angle, rate = sign * angle, sign * rate
         expected = memory.angle[k] + 0.5 * h * (memory.angle_rate[k] + rate)

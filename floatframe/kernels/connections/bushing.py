@@ -134,7 +134,7 @@ def bushing_state(model, work, c):
         s.slope[r] = 0.0
         table = model.bushings.table[i, r]
         if table >= 0:
-            value, s.slope[r], _ = time_function(model, table, s.xi[r])
+            value, s.slope[r], _ = time_function(model.functions, table, s.xi[r])
             s.force[r] += value
     f, m = vector(s.force), vector(s.force[3:])
     p = cross(f, e)
@@ -207,6 +207,6 @@ def bushing_power(model, work, c):
     for r in range(6):
         taken += s.xi_dot[r] * law(model.bushings.damping[i, r], s.xi_dot)
         if model.bushings.table[i, r] >= 0:
-            value, _, _ = time_function(model, model.bushings.table[i, r], s.xi[r])
+            value, _, _ = time_function(model.functions, model.bushings.table[i, r], s.xi[r])
             given -= value * s.xi_dot[r]
     return given, taken

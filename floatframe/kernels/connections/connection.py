@@ -126,12 +126,13 @@ def row_rates(model, work, k, a, b):
 
     Of a velocity that is held: it, and its rate. `work.markers.bias` holds the accelerations of markers at zero u_dot.
     """
-    if model.rows.holds[k] == NOTHING:
+    rows = model.rows
+    if rows.holds[k] == NOTHING:
         return 0.0, 0.0
-    kind, markers = model.rows.kind[k], work.markers
+    kind, markers = rows.kind[k], work.markers
     _, n, m_a, m_b = held_value(kind, model, work, k, a, b)
     rate, second = held_rates(kind, model, work, k, a, b)
-    rate += dot(n, relative_velocity(work, a, b))
+    rate += dot(n, relative_velocity(markers, a, b))
     rate += dot(m_a, vector(markers.omega[a])) + dot(m_b, vector(markers.omega[b]))
     bias_a, bias_b = markers.bias[a], markers.bias[b]
     second += dot(n, sub(vector(bias_b), vector(bias_a)))

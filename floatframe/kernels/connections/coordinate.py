@@ -42,44 +42,46 @@ __all__ = [
 @inner
 def force_direction(model, work, p):
     """Return the direction in which the force of coordinate p acts, ground axes."""
+    rows, markers = model.rows, work.markers
     a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
-    if model.rows.kind[k] == SPAN:
-        d = distance(work, a, b)
+    if rows.kind[k] == SPAN:
+        d = distance(markers, a, b)
         return scaled(1 / norm(d), d)
-    return loaded_axis(model, work, k, a, b)
+    return loaded_axis(rows, markers, k, a, b)
 
 
 @inner
-def relative_rotation(work, a, b):
+def relative_rotation(markers, a, b):
     """Return omega_B - omega_A."""
-    return sub(work.markers.omega[b], work.markers.omega[a])
+    return sub(markers.omega[b], markers.omega[a])
 
 
 @inner
 def turning_gradient(model, work, k, a, b):
     """Return the derivative of an angle by the rotation of A; by that of B it is the opposite."""
-    _, t = turned_angle(model, work, k, a, b)
+    _, t = turned_angle(model.rows, work.markers, k, a, b)
     return t
 
 
 @inner
 def coordinate_motion(model, work, p):
     """Return value and rate of coordinate p; an angle is the one nearest to the unknown X."""
+    rows, markers = model.rows, work.markers
     a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
-    if model.rows.kind[k] == SPAN:
+    if rows.kind[k] == SPAN:
         e = force_direction(model, work, p)
-        return dot(e, distance(work, a, b)), dot(e, relative_velocity(work, a, b))
-    x, v = loaded_coordinate(model, work, k, a, b)
-    if model.rows.kind[k] != PUSH:
+        return dot(e, distance(markers, a, b)), dot(e, relative_velocity(markers, a, b))
+    x, v = loaded_coordinate(rows, markers, k, a, b)
+    if rows.kind[k] != PUSH:
         x += 2 * math.pi * math.floor((work.state.w[k] - x) / (2 * math.pi) + 0.5)
     return x, v
 
 
 @inner
-def predict_coordinate(model, work, p, h):
+def predict_coordinate(coordinates, state, p, h):
     """Move the unknown X of coordinate p by its rate, so that a fast angle is followed."""
-    k = model.coordinates.row[p]
-    work.state.w[k] += h * work.state.w[k + 1]
+    k = coordinates.row[p]
+    state.w[k] += h * state.w[k + 1]
 
 
 @inner
@@ -100,7 +102,7 @@ def coordinate_rows(model, work, p, Q, c_k):
     put_sum(wrench[b], first, scaled(-1.0, F))
     if m >= 0:
         M = vector(w[m:])
-        put(g, m, scaled(c_k, sub(M, cross(distance(work, a, b), F))))
+        put(g, m, scaled(c_k, sub(M, cross(distance(work.markers, a, b), F))))
         put_sum(wrench[a], 3, M)
 
 
@@ -114,17 +116,18 @@ def add_pair(P_a, P_b, r, column, x):
 @inner
 def coordinate_gradient(model, work, p, r, by_x, by_v):
     """Add by_x dx + by_v dv of coordinate p to row r of P at both markers; see kernels/joints/loaded_rows.py."""
+    markers = work.markers
     a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     P_a, P_b, kind = work.connections.P[a], work.connections.P[b], model.rows.kind[k]
-    e, d = force_direction(model, work, p), distance(work, a, b)
+    e, d = force_direction(model, work, p), distance(markers, a, b)
     if kind == SPAN:
-        v = relative_velocity(work, a, b)
+        v = relative_velocity(markers, a, b)
         across = sub(v, scaled(dot(e, v), e))
         add_pair(P_a, P_b, r, 0, sub(scaled(-by_x, e), scaled(by_v / dot(e, d), across)))
         add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
     elif kind == PUSH:
-        omega_a = vector(work.markers.omega[a])
-        arm, seen = cross(e, d), slip(work, a, b, d)
+        omega_a = vector(markers.omega[a])
+        arm, seen = cross(e, d), slip(markers, a, b, d)
         add_pair(P_a, P_b, r, 0, sub(scaled(by_v, cross(e, omega_a)), scaled(by_x, e)))
         add_pair(P_a, P_b, r, 6, scaled(-by_v, e))
         put_sum(P_a[r], 3, add(scaled(by_x, arm), scaled(by_v, cross(e, seen))))
@@ -133,7 +136,7 @@ def coordinate_gradient(model, work, p, r, by_x, by_v):
         add_pair(P_a, P_b, r, 3, scaled(by_x, turning_gradient(model, work, k, a, b)))
         add_pair(P_a, P_b, r, 9, scaled(-by_v, e))
         P = P_b if kind == TWIST_B else P_a  # of the marker that holds the axis
-        put_sum(P[r], 3, scaled(by_v, cross(e, relative_rotation(work, a, b))))
+        put_sum(P[r], 3, scaled(by_v, cross(e, relative_rotation(markers, a, b))))
 
 
 @inner
@@ -148,7 +151,7 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
     f, m = model.coordinates.force[p], model.coordinates.arm[p]
     if f < 0:
         return
-    e, d, kind = force_direction(model, work, p), distance(work, a, b), model.rows.kind[k]
+    e, d, kind = force_direction(model, work, p), distance(work.markers, a, b), model.rows.kind[k]
     P = P_b if kind == TWIST_B else P_a
     for i in range(3):  # row of F + Q e along an axis of the ground
         axis, r = unit(i), f - w0 + i
@@ -171,25 +174,27 @@ def coordinate_derivatives(model, work, c, p, Q, column, by_unknown, c_k):
 @inner
 def coordinate_tangent_rate(model, work, p):
     """Return the rate of coordinate p as its gradient gives it; of an angle between axes not parallel it is not v."""
+    rows = model.rows
     a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
-    if model.rows.kind[k] == SPAN or model.rows.kind[k] == PUSH:
+    if rows.kind[k] == SPAN or rows.kind[k] == PUSH:
         _, v = coordinate_motion(model, work, p)
         return v
-    return -dot(turning_gradient(model, work, k, a, b), relative_rotation(work, a, b))
+    return -dot(turning_gradient(model, work, k, a, b), relative_rotation(work.markers, a, b))
 
 
 @inner
 def coordinate_second_rate(model, work, p, bias_a, bias_b):
     """Return the second rate of coordinate p for given accelerations (6) of both markers; angles: of parallel axes."""
+    markers = work.markers
     a, b, k = model.coordinates.a[p], model.coordinates.b[p], model.coordinates.row[p]
     kind = model.rows.kind[k]
     if kind != SPAN and kind != PUSH:
         return -dot(turning_gradient(model, work, k, a, b), sub(bias_b[3:], bias_a[3:]))
-    e, d, v = force_direction(model, work, p), distance(work, a, b), relative_velocity(work, a, b)
+    e, d, v = force_direction(model, work, p), distance(markers, a, b), relative_velocity(markers, a, b)
     along = dot(e, sub(bias_b, bias_a))
     if kind == SPAN:
         return along + (dot(v, v) - dot(e, v) ** 2) / dot(e, d)
-    omega_a = vector(work.markers.omega[a])
+    omega_a = vector(markers.omega[a])
     e_dot = cross(omega_a, e)
     e_ddot = add(cross(omega_a, e_dot), cross(bias_a[3:], e))
     return along + dot(e_ddot, d) + 2 * dot(e_dot, v)

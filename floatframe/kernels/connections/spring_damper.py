@@ -18,17 +18,18 @@ def spring_tension(model, work, c):
 
     At length zero the tension has a direction only if the free length is zero: then k remains.
     """
+    markers = work.markers
     i, springs = model.connections.item[c], model.springs
     k, damping, free, preload = springs.stiffness[i], springs.damping[i], springs.free_length[i], springs.preload[i]
     a, b = model.connections.a[c], model.connections.b[c]
-    x = distance(work, a, b)
+    x = distance(markers, a, b)
     length = norm(x)
     if length == 0.0:
         return k, length, 0.0
-    rate = dot(x, relative_velocity(work, a, b)) / length
+    rate = dot(x, relative_velocity(markers, a, b)) / length
     tension = k * (length - free) + damping * rate + preload
     if springs.table[i] >= 0:
-        value, _, _ = time_function(model, springs.table[i], length - free)
+        value, _, _ = time_function(model.functions, springs.table[i], length - free)
         tension += value
     return tension / length, length, rate
 
@@ -38,21 +39,22 @@ def spring_rows(model, work, c, c_k):
     """Write the residual of spring c."""
     w0 = model.connections.w0[c]
     tension, _, _ = spring_tension(model, work, c)
-    x = distance(work, model.connections.a[c], model.connections.b[c])
+    x = distance(work.markers, model.connections.a[c], model.connections.b[c])
     put(work.connections.g, w0, scaled(c_k, sub(vector(work.state.w[w0:]), scaled(tension, x))))
 
 
 @inner
 def spring_derivatives(model, work, c, c_k):
     """Write P and V of spring c."""
+    markers = work.markers
     a, b = model.connections.a[c], model.connections.b[c]
     P_a, P_b, V = work.connections.P[a], work.connections.P[b], work.connections.V[c]
     i, springs = model.connections.item[c], model.springs
     k, damping, free = springs.stiffness[i], springs.damping[i], springs.free_length[i]
-    x, y = distance(work, a, b), relative_velocity(work, a, b)
+    x, y = distance(markers, a, b), relative_velocity(markers, a, b)
     tension, length, rate = spring_tension(model, work, c)
     if springs.table[i] >= 0:
-        _, slope, _ = time_function(model, springs.table[i], length - free)
+        _, slope, _ = time_function(model.functions, springs.table[i], length - free)
         k += slope
     for r in range(3):
         V[r, r] = 1.0

@@ -109,58 +109,59 @@ def binary(op, x, y):
 
 
 @inner
-def tape_value(model, work, f):
-    """Return the value of tape f at the inputs in `work`; results of all operations stay in work.tapes.results."""
-    first, last = model.tapes.operation0[f], model.tapes.operation0[f + 1]
+def tape_value(tapes, functions, f, inputs, registers):
+    """Return the value of tape f at the inputs; what its operations yield stays in the registers."""
+    results = registers.results
+    first, last = tapes.operation0[f], tapes.operation0[f + 1]
     for k in range(first, last):
-        op, a, b = model.tapes.op[k], model.tapes.a[k], model.tapes.b[k]
+        op, a, b = tapes.op[k], tapes.a[k], tapes.b[k]
         value = 0.0
         if op == CONSTANT:
-            value = model.tapes.c[k]
+            value = tapes.c[k]
         elif op == INPUT:
-            value = work.users.inputs[a]
+            value = inputs[a]
         elif op == CALL:
-            value, _, _ = time_function(model, b, work.tapes.results[a])
+            value, _, _ = time_function(functions, b, results[a])
         elif op == SELECT:  # the operation before holds the condition
-            value = work.tapes.results[a] if work.tapes.results[k - first - 1] != 0.0 else work.tapes.results[b]
+            value = results[a] if results[k - first - 1] != 0.0 else results[b]
         elif op < ADD:
-            value, _ = unary(op, work.tapes.results[a])
+            value, _ = unary(op, results[a])
         else:
-            value, _, _ = binary(op, work.tapes.results[a], work.tapes.results[b])
-        work.tapes.results[k - first] = value
-    return work.tapes.results[last - first - 1]
+            value, _, _ = binary(op, results[a], results[b])
+        results[k - first] = value
+    return results[last - first - 1]
 
 
 @inner
-def tape_gradient(model, work, f, gradient):
+def tape_gradient(tapes, functions, f, inputs, registers, gradient):
     """Write the derivatives of tape f by all inputs; return its value."""
-    value = tape_value(model, work, f)
-    first, n = model.tapes.operation0[f], model.tapes.operation0[f + 1] - model.tapes.operation0[f]
-    bar = work.tapes.bars
+    value = tape_value(tapes, functions, f, inputs, registers)
+    first, n = tapes.operation0[f], tapes.operation0[f + 1] - tapes.operation0[f]
+    results, bar = registers.results, registers.bars
     for k in range(gradient.shape[0]):
         gradient[k] = 0.0
     for k in range(n):
         bar[k] = 0.0
     bar[n - 1] = 1.0
     for k in range(n - 1, -1, -1):
-        op, a, b, s = model.tapes.op[first + k], model.tapes.a[first + k], model.tapes.b[first + k], bar[k]
+        op, a, b, s = tapes.op[first + k], tapes.a[first + k], tapes.b[first + k], bar[k]
         if s == 0.0 or op == CONSTANT:
             continue
         if op == INPUT:
             gradient[a] += s
         elif op == CALL:
-            _, slope, _ = time_function(model, b, work.tapes.results[a])
+            _, slope, _ = time_function(functions, b, results[a])
             bar[a] += s * slope
         elif op == SELECT:
-            if work.tapes.results[k - 1] != 0.0:
+            if results[k - 1] != 0.0:
                 bar[a] += s
             else:
                 bar[b] += s
         elif op < ADD:
-            _, slope = unary(op, work.tapes.results[a])
+            _, slope = unary(op, results[a])
             bar[a] += s * slope
         else:
-            _, by_a, by_b = binary(op, work.tapes.results[a], work.tapes.results[b])
+            _, by_a, by_b = binary(op, results[a], results[b])
             bar[a] += s * by_a
             bar[b] += s * by_b
     return value

@@ -56,7 +56,8 @@ def user_values(model, work, c):
         call_user_function(model.users.address[u], work.users.inputs, work.users.outputs)
     else:
         for j in range(n_out):
-            work.users.outputs[j] = tape_value(model, work, model.users.tape0[u] + j)
+            f = model.users.tape0[u] + j
+            work.users.outputs[j] = tape_value(model.tapes, model.functions, f, work.users.inputs, work.tapes)
     return n, n_in, n_out
 
 
@@ -67,7 +68,8 @@ def user_gradients(model, work, c):
     n, n_in, n_out = user_values(model, work, c)
     if model.users.address[u] == 0:
         for j in range(n_out):
-            tape_gradient(model, work, model.users.tape0[u] + j, work.users.gradients[j * n_in : (j + 1) * n_in])
+            f, gradient = model.users.tape0[u] + j, work.users.gradients[j * n_in : (j + 1) * n_in]
+            tape_gradient(model.tapes, model.functions, f, work.users.inputs, work.tapes, gradient)
         return n, n_in, n_out
     for k in range(n_in):
         here = work.users.inputs[k]
@@ -150,8 +152,10 @@ def user_force_power(model, work, c):
 
 
 @inner
-def begin_states(model, work, memory, h, alpha_f):
+def begin_states(rows, states, memory, h, alpha_f):
     """Write b, b', kappa and rho of a step of size h, with rho_inf = alpha_f/(1 - alpha_f).
+
+    The value of each state stands at its row of w, then its rate and algorithmic rate.
 
     z_new = z + h ((1 - th) a + th a_new),  (1 - d_m) a_new + d_m a = (1 - d_f) g_new + d_f g,  th = 1/2 + d_f - d_m,
     d_m = (3 rho_inf - 1)/(2 (rho_inf + 1)),  d_f = rho_inf/(rho_inf + 1):  second order, stable for all h.
@@ -159,19 +163,19 @@ def begin_states(model, work, memory, h, alpha_f):
     rho_inf = alpha_f / (1.0 - alpha_f)
     d_m, d_f = (3.0 * rho_inf - 1.0) / (2.0 * (rho_inf + 1.0)), alpha_f
     th = 0.5 + d_f - d_m
-    work.states.rho = (1.0 - d_f) / (1.0 - d_m)
-    work.states.kappa = h * th * work.states.rho
-    for s in range(model.states.row.shape[0]):
-        k = model.states.row[s]
+    states.rho = (1.0 - d_f) / (1.0 - d_m)
+    states.kappa = h * th * states.rho
+    for s in range(rows.shape[0]):
+        k = rows[s]
         z, g, a = memory.w[k], memory.w[k + 1], memory.w[k + 2]
         base = (d_f * g - d_m * a) / (1.0 - d_m)
-        work.states.base[s] = z + h * ((1.0 - th) * a + th * base)
-        work.states.rate_base[s] = base
+        states.base[s] = z + h * ((1.0 - th) * a + th * base)
+        states.rate_base[s] = base
 
 
 @inner
-def resize_states(model, memory, ratio):
+def resize_states(rows, memory, ratio):
     """Turn the algorithmic rates into those of steps that are longer by `ratio`."""
-    for s in range(model.states.row.shape[0]):
-        k = model.states.row[s]
+    for s in range(rows.shape[0]):
+        k = rows[s]
         memory.w[k + 2] = memory.w[k + 1] + ratio * (memory.w[k + 2] - memory.w[k + 1])

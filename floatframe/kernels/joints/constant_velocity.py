@@ -18,9 +18,9 @@ __all__ = ["bisector_derivatives", "bisector_value", "equal_turn_rates", "equal_
 @inner
 def equal_turn_value(model, work, k, a, b):
     """EQUAL_TURN: E · U - Z · D."""
-    rows = model.rows
-    g_1, zero, m_1, _ = product(direction(work, a, rows.x[k]), direction(work, b, rows.u[k]))
-    g_2, _, m_2, _ = product(direction(work, a, rows.z[k]), direction(work, b, rows.y[k]))
+    rows, markers = model.rows, work.markers
+    g_1, zero, m_1, _ = product(direction(markers, a, rows.x[k]), direction(markers, b, rows.u[k]))
+    g_2, _, m_2, _ = product(direction(markers, a, rows.z[k]), direction(markers, b, rows.y[k]))
     m = sub(m_1, m_2)
     return g_1 - g_2, zero, m, scaled(-1.0, m)
 
@@ -28,13 +28,13 @@ def equal_turn_value(model, work, k, a, b):
 @inner
 def equal_turn_rates(model, work, k, a, b):
     """EQUAL_TURN."""
-    rows, zero = model.rows, (0.0, 0.0, 0.0)
-    o, p = vector(work.markers.omega[a]), vector(work.markers.omega[b])
+    rows, markers, zero = model.rows, work.markers, (0.0, 0.0, 0.0)
+    o, p = vector(markers.omega[a]), vector(markers.omega[b])
     E, Z, D, U = (
-        direction(work, a, rows.x[k]),
-        direction(work, a, rows.z[k]),
-        direction(work, b, rows.y[k]),
-        direction(work, b, rows.u[k]),
+        direction(markers, a, rows.x[k]),
+        direction(markers, a, rows.z[k]),
+        direction(markers, b, rows.y[k]),
+        direction(markers, b, rows.u[k]),
     )
     _, beta_1 = product_rates(o, p, E, zero, zero, U)
     _, beta_2 = product_rates(o, p, Z, zero, zero, D)
@@ -42,24 +42,25 @@ def equal_turn_rates(model, work, k, a, b):
 
 
 @inner
-def shafts(model, work, k, a, b):
+def shafts(rows, markers, k, a, b):
     """Return E, the shaft of A and that of B."""
-    rows = model.rows
-    return direction(work, a, rows.x[k]), direction(work, a, rows.z[k]), direction(work, b, rows.y[k])
+    return direction(markers, a, rows.x[k]), direction(markers, a, rows.z[k]), direction(markers, b, rows.y[k])
 
 
 @inner
 def bisector_value(model, work, k, a, b, w):
     """BISECTOR: M · (E × (Z_A + Z_B))."""
-    E, Z_a, Z_b = shafts(model, work, k, a, b)
-    return dot(vector(w[model.rows.part[k] :]), cross(E, add(Z_a, Z_b)))
+    rows = model.rows
+    E, Z_a, Z_b = shafts(rows, work.markers, k, a, b)
+    return dot(vector(w[rows.part[k] :]), cross(E, add(Z_a, Z_b)))
 
 
 @inner
 def bisector_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """BISECTOR: M · (dphi × E) × S = dphi · (E × (S × M)), M · E × (dphi × Z) = dphi · (Z × (M × E))."""
-    part = model.rows.part[k]
-    E, Z_a, Z_b = shafts(model, work, k, a, b)
+    rows = model.rows
+    part = rows.part[k]
+    E, Z_a, Z_b = shafts(rows, work.markers, k, a, b)
     M, S = vector(w[part:]), add(Z_a, Z_b)
     put(V[r], part, cross(E, S))
     across = cross(M, E)

@@ -9,9 +9,9 @@ __all__ = ["coordinate_force", "coordinate_power", "coordinate_strain"]
 
 
 @inner
-def excess(model, i, is_angle, x):
+def excess(forces, i, is_angle, x):
     """Return a coordinate less its free value; of an angle the value between -pi and pi."""
-    x -= model.joint_forces.free[i]
+    x -= forces.free[i]
     return x - 2 * math.pi * math.floor(x / (2 * math.pi) + 0.5) if is_angle else x
 
 
@@ -22,17 +22,17 @@ def coordinate_force(model, work, k, is_angle, x, v, normal):
     -k x - c v + preload + motor(t) + characteristic(x) - (T + mu normal) tanh(v/v_0), summed over the forces there.
     """
     Q, Q_x, Q_v, Q_n = 0.0, 0.0, 0.0, 0.0
+    f, functions = model.joint_forces, model.functions
     for i in range(model.rows.force0[k], model.rows.force1[k]):
-        f = model.joint_forces
-        d = excess(model, i, is_angle, x)
+        d = excess(f, i, is_angle, x)
         Q += f.preload[i] - f.stiffness[i] * d - f.damping[i] * v
         Q_x -= f.stiffness[i]
         Q_v -= f.damping[i]
-        if model.joint_forces.motor[i] >= 0:
-            value, _, _ = time_function(model, model.joint_forces.motor[i], work.state.time)
+        if f.motor[i] >= 0:
+            value, _, _ = time_function(functions, f.motor[i], work.state.time)
             Q += value
-        if model.joint_forces.table[i] >= 0:
-            value, slope, _ = time_function(model, model.joint_forces.table[i], d)
+        if f.table[i] >= 0:
+            value, slope, _ = time_function(functions, f.table[i], d)
             Q += value
             Q_x += slope
         if f.friction[i] > 0.0 or f.coefficient[i] > 0.0:
@@ -48,8 +48,9 @@ def coordinate_force(model, work, k, is_angle, x, v, normal):
 def coordinate_strain(model, k, is_angle, x):
     """Return the energy in the linear springs of row k."""
     total = 0.0
+    f = model.joint_forces
     for i in range(model.rows.force0[k], model.rows.force1[k]):
-        total += 0.5 * model.joint_forces.stiffness[i] * excess(model, i, is_angle, x) ** 2
+        total += 0.5 * f.stiffness[i] * excess(f, i, is_angle, x) ** 2
     return total
 
 
@@ -57,14 +58,15 @@ def coordinate_strain(model, k, is_angle, x):
 def coordinate_power(model, work, k, is_angle, x, v, Q):
     """Return the power that enters by row k, and that taken by dampers and friction; Q: its whole force."""
     given, springs = 0.0, 0.0
+    f, functions = model.joint_forces, model.functions
     for i in range(model.rows.force0[k], model.rows.force1[k]):
-        d = excess(model, i, is_angle, x)
-        springs -= model.joint_forces.stiffness[i] * d
-        given += model.joint_forces.preload[i]
-        if model.joint_forces.motor[i] >= 0:
-            value, _, _ = time_function(model, model.joint_forces.motor[i], work.state.time)
+        d = excess(f, i, is_angle, x)
+        springs -= f.stiffness[i] * d
+        given += f.preload[i]
+        if f.motor[i] >= 0:
+            value, _, _ = time_function(functions, f.motor[i], work.state.time)
             given += value
-        if model.joint_forces.table[i] >= 0:
-            value, _, _ = time_function(model, model.joint_forces.table[i], d)
+        if f.table[i] >= 0:
+            value, _, _ = time_function(functions, f.table[i], d)
             given += value
     return given * v, (given + springs - Q) * v

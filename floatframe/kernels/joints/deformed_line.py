@@ -52,21 +52,21 @@ MOST, CLOSE = 30, 1e-14
 
 
 @inner
-def piece(model, k, s):
+def piece(lines, stations, k, s):
     """Return the first of the two stations about s and their distance; before or after the line: the nearest piece."""
-    j, last = model.lines.station0[k], model.lines.station0[k + 1] - 2
-    while j < last and s > model.stations.s[j + 1]:
+    j, last = lines.station0[k], lines.station0[k + 1] - 2
+    while j < last and s > stations.s[j + 1]:
         j += 1
-    return j, model.stations.s[j + 1] - model.stations.s[j]
+    return j, stations.s[j + 1] - stations.s[j]
 
 
 @inner
-def weights(model, j, h, s, order):
+def weights(stations, j, h, s, order):
     """Return a_1, a_2, b_1, b_2 or their derivatives by s."""
-    x = (s - model.stations.s[j]) / h
+    x = (s - stations.s[j]) / h
     if x < 0.0 or x > 1.0:
         end = 1.0 if x > 1.0 else 0.0
-        by_slope = s - model.stations.s[j] - end * h if order == 0 else (1.0 if order == 1 else 0.0)
+        by_slope = s - stations.s[j] - end * h if order == 0 else (1.0 if order == 1 else 0.0)
         own = 1.0 if order == 0 else 0.0
         return own * (1.0 - end), own * end, by_slope * (1.0 - end), by_slope * end
     if order == 0:
@@ -80,9 +80,9 @@ def weights(model, j, h, s, order):
 
 
 @inner
-def linear_weight(model, j, h, s):
+def linear_weight(stations, j, h, s):
     """Return l_2 and its derivative."""
-    x = (s - model.stations.s[j]) / h
+    x = (s - stations.s[j]) / h
     if x < 0.0:
         return 0.0, 0.0
     if x > 1.0:
@@ -114,10 +114,11 @@ def station_displacement(model, work, m):
 @inner
 def displacement(model, work, k, s, order):
     """Return D, D' or D'' at s, body axes."""
-    j, h = piece(model, k, s)
-    d_1, th_1 = station_displacement(model, work, model.stations.marker[j])
-    d_2, th_2 = station_displacement(model, work, model.stations.marker[j + 1])
-    return combined(vector(model.lines.axis[k]), weights(model, j, h, s, order), d_1, th_1, d_2, th_2)
+    stations = model.stations
+    j, h = piece(model.lines, stations, k, s)
+    d_1, th_1 = station_displacement(model, work, stations.marker[j])
+    d_2, th_2 = station_displacement(model, work, stations.marker[j + 1])
+    return combined(vector(model.lines.axis[k]), weights(stations, j, h, s, order), d_1, th_1, d_2, th_2)
 
 
 @inner
@@ -150,10 +151,11 @@ def slide_marker(model, work, k):
         s, rate, _ = prescribed(model, work, row)
     else:
         s, rate = place_of(model, work, k, b), 0.0
-    j, h = piece(model, k, s)
-    m_1, m_2 = model.stations.marker[j], model.stations.marker[j + 1]
+    stations = model.stations
+    j, h = piece(model.lines, stations, k, s)
+    m_1, m_2 = stations.marker[j], stations.marker[j + 1]
     th_1, th_2 = vector(markers.angle[m_1]), vector(markers.angle[m_2])
-    l_2, by_s = linear_weight(model, j, h, s)
+    l_2, by_s = linear_weight(stations, j, h, s)
     D, D_1, D_2 = (
         displacement(model, work, k, s, 0),
         displacement(model, work, k, s, 1),
@@ -162,7 +164,7 @@ def slide_marker(model, work, k):
     put(markers.rho[m], 0, add(add(vector(model.markers.position[m]), scaled(s, e)), D))
     angle = add(cross(e, D_1), scaled(dot(e, mean(l_2, th_1, th_2)), e))
     by_place = add(cross(e, D_2), scaled(by_s * dot(e, sub(th_2, th_1)), e))  # th'
-    value, slopes = weights(model, j, h, s, 0), weights(model, j, h, s, 1)
+    value, slopes = weights(stations, j, h, s, 0), weights(stations, j, h, s, 1)
     v_1, v_2 = vector(markers.rho_dot[m_1]), vector(markers.rho_dot[m_2])
     o_1, o_2 = vector(markers.angle_dot[m_1]), vector(markers.angle_dot[m_2])
     put(markers.rho_dot[m], 0, combined(e, value, v_1, o_1, v_2, o_2))
@@ -181,7 +183,7 @@ def slide_marker(model, work, k):
     slope = norm(tangent)
     n_0 = turned(R, scaled(1.0 / slope, tangent))
     if not is_driven:
-        rate = dot(n_0, relative_velocity(work, m, b)) / slope
+        rate = dot(n_0, relative_velocity(markers, m, b)) / slope
     line.s[k], line.s_dot[k], line.slope[k], line.by_place[k] = s, rate, slope, 0.0 if is_driven else 1.0 / slope
     put(line.n_0[k], 0, n_0)
     put(line.kappa[k], 0, turned(R, turned(T, by_place)))
@@ -228,7 +230,7 @@ def normal(model, work, row, a):
 def line_value(model, work, k, a, b):
     """LINE: n_i · d; A follows the point of B, so that its axes do not count."""
     n, zero = normal(model, work, k, a), (0.0, 0.0, 0.0)
-    return dot(n, distance(work, a, b)), n, zero, zero
+    return dot(n, distance(work.markers, a, b)), n, zero, zero
 
 
 @inner
@@ -260,8 +262,9 @@ def line_rates(model, work, k, a, b):
 @inner
 def line_turn_value(model, work, k, a, b):
     """LINE_TURN: E · D; A turns also with kappa s_dot, where s follows the points."""
+    rows = model.rows
     line, j = work.lines, model.markers.line[a]
-    E, D = direction(work, a, model.rows.x[k]), direction(work, b, model.rows.y[k])
+    E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
     m = cross(E, D)
     n = scaled(line.by_place[j] * dot(m, vector(line.kappa[j])), vector(line.n_0[j]))
     return dot(E, D), n, m, scaled(-1.0, m)
@@ -270,8 +273,9 @@ def line_turn_value(model, work, k, a, b):
 @inner
 def line_turn_rates(model, work, k, a, b):
     """LINE_TURN; the change of kappa with time and place is left out."""
+    rows = model.rows
     line, j = work.lines, model.markers.line[a]
-    E, D = direction(work, a, model.rows.x[k]), direction(work, b, model.rows.y[k])
+    E, D = direction(work.markers, a, rows.x[k]), direction(work.markers, b, rows.y[k])
     m, kappa, s_dot = cross(E, D), vector(line.kappa[j]), line.s_dot[j]
     rate, second, _ = place_rates(model, work, a)
     omega_a, p = vector(work.markers.omega[a]), vector(work.markers.omega[b])

@@ -56,10 +56,10 @@ def turned_twice(omega, x):
 
 
 @inner
-def along_rates(work, a, b, E):
+def along_rates(markers, a, b, E):
     """Return beta of E · d with E fixed in A."""
-    omega = vector(work.markers.omega[a])
-    d, v = distance(work, a, b), relative_velocity(work, a, b)
+    omega = vector(markers.omega[a])
+    d, v = distance(markers, a, b), relative_velocity(markers, a, b)
     return dot(turned_twice(omega, E), d) + 2 * dot(cross(omega, E), v)
 
 
@@ -83,7 +83,7 @@ def point_value(model, work, k, a, b):
     """POINT: -x · d, x in ground axes."""
     x = vector(model.rows.x[k])
     zero = (0.0, 0.0, 0.0)
-    return -dot(x, distance(work, a, b)), scaled(-1.0, x), zero, zero
+    return -dot(x, distance(work.markers, a, b)), scaled(-1.0, x), zero, zero
 
 
 @inner
@@ -95,15 +95,17 @@ def point_rates(model, work, k, a, b):
 @small
 def angle_value(model, work, k, a, b):
     """DOT: E · D - c."""
-    g, n, m_a, m_b = product(direction(work, a, model.rows.x[k]), direction(work, b, model.rows.y[k]))
-    return g - model.rows.c[k], n, m_a, m_b
+    rows, markers = model.rows, work.markers
+    g, n, m_a, m_b = product(direction(markers, a, rows.x[k]), direction(markers, b, rows.y[k]))
+    return g - rows.c[k], n, m_a, m_b
 
 
 @inner
 def angle_rates(model, work, k, a, b):
     """DOT."""
-    E, D, zero = direction(work, a, model.rows.x[k]), direction(work, b, model.rows.y[k]), (0.0, 0.0, 0.0)
-    return product_rates(vector(work.markers.omega[a]), vector(work.markers.omega[b]), E, zero, zero, D)
+    rows, markers = model.rows, work.markers
+    E, D, zero = direction(markers, a, rows.x[k]), direction(markers, b, rows.y[k]), (0.0, 0.0, 0.0)
+    return product_rates(vector(markers.omega[a]), vector(markers.omega[b]), E, zero, zero, D)
 
 
 @inner
@@ -120,61 +122,66 @@ def turning_direction(model, work, k, a, sense):
 def turn_value(model, work, k, a, b):
     """TURN: (E cos f + Z sin f) · D."""
     E, _, _ = turning_direction(model, work, k, a, 1.0)
-    return product(E, direction(work, b, model.rows.y[k]))
+    return product(E, direction(work.markers, b, model.rows.y[k]))
 
 
 @inner
 def turn_rates(model, work, k, a, b):
     """TURN."""
+    markers = work.markers
     E, E_1, E_2 = turning_direction(model, work, k, a, 1.0)
-    D = direction(work, b, model.rows.y[k])
-    return product_rates(vector(work.markers.omega[a]), vector(work.markers.omega[b]), E, E_1, E_2, D)
+    D = direction(markers, b, model.rows.y[k])
+    return product_rates(vector(markers.omega[a]), vector(markers.omega[b]), E, E_1, E_2, D)
 
 
 @inner
 def turn_b_value(model, work, k, a, b):
     """TURN_B: TURN with A and B exchanged; seen from B, A turns back."""
     E, _, _ = turning_direction(model, work, k, b, -1.0)
-    g, n, m_b, m_a = product(E, direction(work, a, model.rows.y[k]))
+    g, n, m_b, m_a = product(E, direction(work.markers, a, model.rows.y[k]))
     return g, n, m_a, m_b
 
 
 @inner
 def turn_b_rates(model, work, k, a, b):
     """TURN_B."""
+    markers = work.markers
     E, E_1, E_2 = turning_direction(model, work, k, b, -1.0)
-    D = direction(work, a, model.rows.y[k])
-    return product_rates(vector(work.markers.omega[b]), vector(work.markers.omega[a]), E, E_1, E_2, D)
+    D = direction(markers, a, model.rows.y[k])
+    return product_rates(vector(markers.omega[b]), vector(markers.omega[a]), E, E_1, E_2, D)
 
 
 @small
 def slide_value(model, work, k, a, b):
     """SLIDE: E · d - f."""
+    markers = work.markers
     f, _, _ = prescribed(model, work, k)
-    E, d = direction(work, a, model.rows.x[k]), distance(work, a, b)
+    E, d = direction(markers, a, model.rows.x[k]), distance(markers, a, b)
     return dot(E, d) - f, E, cross(E, d), (0.0, 0.0, 0.0)
 
 
 @inner
 def slide_rates(model, work, k, a, b):
     """SLIDE."""
+    markers = work.markers
     _, rate, second = prescribed(model, work, k)
-    return -rate, along_rates(work, a, b, direction(work, a, model.rows.x[k])) - second
+    return -rate, along_rates(markers, a, b, direction(markers, a, model.rows.x[k])) - second
 
 
 @inner
 def distance_value(model, work, k, a, b):
     """DISTANCE: (d · d/f - f)/2."""
     f, _, _ = prescribed(model, work, k)
-    d, zero = distance(work, a, b), (0.0, 0.0, 0.0)
+    d, zero = distance(work.markers, a, b), (0.0, 0.0, 0.0)
     return 0.5 * (dot(d, d) / f - f), scaled(1.0 / f, d), zero, zero
 
 
 @inner
 def distance_rates(model, work, k, a, b):
     """DISTANCE."""
+    markers = work.markers
     f, rate, second = prescribed(model, work, k)
-    d, v = distance(work, a, b), relative_velocity(work, a, b)
+    d, v = distance(markers, a, b), relative_velocity(markers, a, b)
     square = dot(d, d) / (f * f)
     own = (dot(v, v) - 2 * dot(d, v) * rate / f + square * rate * rate) / f
     return -0.5 * rate * (square + 1.0), own - 0.5 * second * (square + 1.0)
@@ -183,8 +190,9 @@ def distance_rates(model, work, k, a, b):
 @inner
 def screw_value(model, work, k, a, b):
     """SCREW: E · d - c th, E the axis and th the angle of D about it, of all turns the nearest."""
-    c, d, E = model.rows.c[k], distance(work, a, b), axis_between(model, work, k, a)
-    th, t = angle_between(model, work, k, a, b)
+    rows, markers = model.rows, work.markers
+    c, d, E = rows.c[k], distance(markers, a, b), axis_between(rows, markers, k, a)
+    th, t = angle_between(rows, markers, k, a, b)
     along = dot(E, d)
     turns = math.floor((along / c - th) / (2 * math.pi) + 0.5)
     return along - c * (th + 2 * math.pi * turns), E, sub(cross(E, d), scaled(c, t)), scaled(c, t)
@@ -193,4 +201,5 @@ def screw_value(model, work, k, a, b):
 @inner
 def screw_rates(model, work, k, a, b):
     """SCREW: the second rate of the angle is that of parallel axes."""
-    return 0.0, along_rates(work, a, b, axis_between(model, work, k, a))
+    markers = work.markers
+    return 0.0, along_rates(markers, a, b, axis_between(model.rows, markers, k, a))

@@ -37,20 +37,22 @@ def normal_force(w, e):
 @inner
 def loaded_value(model, work, k, a, b, w):
     """PUSH, TWIST, TWIST_B: e · part + Q."""
-    e = loaded_axis(model, work, k, a, b)
-    x, v = loaded_coordinate(model, work, k, a, b)
+    rows, markers = model.rows, work.markers
+    e = loaded_axis(rows, markers, k, a, b)
+    x, v = loaded_coordinate(rows, markers, k, a, b)
     normal, _ = normal_force(w, e)
-    Q, _, _, _ = coordinate_force(model, work, k, model.rows.kind[k] != PUSH, x, v, normal)
-    return dot(e, vector(w[model.rows.part[k] :])) + Q
+    Q, _, _, _ = coordinate_force(model, work, k, rows.kind[k] != PUSH, x, v, normal)
+    return dot(e, vector(w[rows.part[k] :])) + Q
 
 
 @inner
 def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """PUSH, TWIST, TWIST_B."""
-    part, is_angle = model.rows.part[k], model.rows.kind[k] != PUSH
-    omega_a, omega_b = vector(work.markers.omega[a]), vector(work.markers.omega[b])
-    e = loaded_axis(model, work, k, a, b)
-    x, v = loaded_coordinate(model, work, k, a, b)
+    rows, markers = model.rows, work.markers
+    part, is_angle = rows.part[k], rows.kind[k] != PUSH
+    omega_a, omega_b = vector(markers.omega[a]), vector(markers.omega[b])
+    e = loaded_axis(rows, markers, k, a, b)
+    x, v = loaded_coordinate(rows, markers, k, a, b)
     normal, along = normal_force(w, e)
     _, Q_x, Q_v, Q_n = coordinate_force(model, work, k, is_angle, x, v, normal)
     put(V[r], part, e)
@@ -60,18 +62,18 @@ def loaded_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
         put_sum(V[r], 0, scaled(f, sub(F, scaled(along, e))))
         turn = sub(turn, scaled(f * along, cross(e, F)))
     if is_angle:
-        _, t = turned_angle(model, work, k, a, b)
+        _, t = turned_angle(rows, markers, k, a, b)
         put_pair(P_a, P_b, r, 3, scaled(c_k * Q_x, t))
         put_pair(P_a, P_b, r, 9, scaled(-c_k * Q_v, e))
         turn = add(turn, scaled(Q_v, cross(e, sub(omega_b, omega_a))))
     else:
-        d = distance(work, a, b)
-        arm, s = cross(e, d), slip(work, a, b, d)
+        d = distance(markers, a, b)
+        arm, s = cross(e, d), slip(markers, a, b, d)
         put_pair(P_a, P_b, r, 0, scaled(c_k, sub(scaled(Q_v, cross(e, omega_a)), scaled(Q_x, e))))
         put_pair(P_a, P_b, r, 6, scaled(-c_k * Q_v, e))
         put(P_a[r], 9, scaled(c_k * Q_v, arm))
         turn = add(turn, add(scaled(Q_x, arm), scaled(Q_v, cross(e, s))))
-    if model.rows.kind[k] == TWIST_B:
+    if rows.kind[k] == TWIST_B:
         put_sum(P_b[r], 3, scaled(c_k, turn))
     else:
         put_sum(P_a[r], 3, scaled(c_k, turn))

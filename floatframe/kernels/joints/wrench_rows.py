@@ -27,13 +27,15 @@ __all__ = [
 @small
 def gauge_value(model, work, k, a, b, w):
     """GAUGE: E · part."""
-    return dot(direction(work, a, model.rows.x[k]), vector(w[model.rows.part[k] :]))
+    rows = model.rows
+    return dot(direction(work.markers, a, rows.x[k]), vector(w[rows.part[k] :]))
 
 
 @small
 def gauge_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """GAUGE."""
-    part, E = model.rows.part[k], direction(work, a, model.rows.x[k])
+    rows = model.rows
+    part, E = rows.part[k], direction(work.markers, a, rows.x[k])
     put(P_a[r], 3, scaled(c_k, cross(E, vector(w[part:]))))
     put(V[r], part, E)
 
@@ -41,13 +43,15 @@ def gauge_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 @inner
 def gauge_b_value(model, work, k, a, b, w):
     """GAUGE_B: D · part."""
-    return dot(direction(work, b, model.rows.y[k]), vector(w[model.rows.part[k] :]))
+    rows = model.rows
+    return dot(direction(work.markers, b, rows.y[k]), vector(w[rows.part[k] :]))
 
 
 @inner
 def gauge_b_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """GAUGE_B."""
-    part, D = model.rows.part[k], direction(work, b, model.rows.y[k])
+    rows = model.rows
+    part, D = rows.part[k], direction(work.markers, b, rows.y[k])
     put(P_b[r], 3, scaled(c_k, cross(D, vector(w[part:]))))
     put(V[r], part, D)
 
@@ -55,14 +59,16 @@ def gauge_b_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 @inner
 def thread_value(model, work, k, a, b, w):
     """THREAD: E · (N + c F)."""
-    W = add(vector(w[MOMENT_B:]), scaled(model.rows.c[k], vector(w)))
-    return dot(direction(work, a, model.rows.x[k]), W)
+    rows = model.rows
+    W = add(vector(w[MOMENT_B:]), scaled(rows.c[k], vector(w)))
+    return dot(direction(work.markers, a, rows.x[k]), W)
 
 
 @inner
 def thread_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """THREAD."""
-    c, E = model.rows.c[k], direction(work, a, model.rows.x[k])
+    rows = model.rows
+    c, E = rows.c[k], direction(work.markers, a, rows.x[k])
     W = add(vector(w[MOMENT_B:]), scaled(c, vector(w)))
     put(P_a[r], 3, scaled(c_k, cross(E, W)))
     put(V[r], MOMENT_B, E)
@@ -72,7 +78,7 @@ def thread_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 @small
 def arm_value(model, work, k, a, b, w):
     """ARM: x · (M - N - d × F), x in ground axes; N is missing where nothing acts on B but the force."""
-    M = sub(vector(w[MOMENT:]), cross(distance(work, a, b), vector(w)))
+    M = sub(vector(w[MOMENT:]), cross(distance(work.markers, a, b), vector(w)))
     if len(w) > MOMENT_B:
         M = sub(M, vector(w[MOMENT_B:]))
     return dot(vector(model.rows.x[k]), M)
@@ -81,7 +87,7 @@ def arm_value(model, work, k, a, b, w):
 @small
 def arm_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """ARM: (x × d) · F = d · (F × x)."""
-    x, d = vector(model.rows.x[k]), distance(work, a, b)
+    x, d = vector(model.rows.x[k]), distance(work.markers, a, b)
     put(V[r], FORCE, cross(d, x))
     put(V[r], MOMENT, x)
     if len(w) > MOMENT_B:
@@ -92,7 +98,7 @@ def arm_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
 @inner
 def rod_value(model, work, k, a, b, w):
     """ROD: x · (F - mu d), x in ground axes."""
-    return dot(vector(model.rows.x[k]), sub(vector(w), scaled(w[3], distance(work, a, b))))
+    return dot(vector(model.rows.x[k]), sub(vector(w), scaled(w[3], distance(work.markers, a, b))))
 
 
 @inner
@@ -100,5 +106,5 @@ def rod_derivatives(model, work, k, r, a, b, w, c_k, P_a, P_b, V):
     """ROD."""
     x = vector(model.rows.x[k])
     put(V[r], FORCE, x)
-    V[r, 3] = -dot(x, distance(work, a, b))
+    V[r, 3] = -dot(x, distance(work.markers, a, b))
     put_pair(P_a, P_b, r, 0, scaled(c_k * w[3], x))
