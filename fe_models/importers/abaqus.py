@@ -88,6 +88,8 @@ class _Sets:
                 parts.append(nodes_of(entry.elements))
             elif entry in self.entries:
                 parts.append(self._members(entry, nodes_of, (*seen, key)))
+            elif (short := entry.rpartition(".")[2]) in self.entries:  # instance.set
+                parts.append(self._members(short, nodes_of, (*seen, key)))
             else:
                 raise MeshError(f"{here} names an unknown set {quoted(entry)}{nearest(entry, self.entries)}")
         return np.unique(np.concatenate(parts))
@@ -334,8 +336,6 @@ def _set_entries(here: str, block: DeckBlock) -> Iterator[_Entry]:
         yield np.array(numeric, dtype=np.int64)
     for word in words:
         if not word.lstrip("+").isdigit():
-            if "." in word:
-                word = word.rpartition(".")[2]  # instance.set
             yield word.strip('"').upper()
 
 

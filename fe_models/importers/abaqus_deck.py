@@ -7,7 +7,7 @@ from pathlib import Path
 from fe_models.errors import MeshError
 from fe_models.foundation.paths import near_file
 
-__all__ = ["DeckBlock", "deck_blocks", "flat_blocks", "mesh_blocks"]
+__all__ = ["DeckBlock", "deck_blocks", "mesh_blocks", "refuse_unread"]
 
 DEEPEST = 10  #: levels of files that include files
 _REFUSED = {
@@ -67,18 +67,6 @@ def deck_blocks(where: str, text: str, folder: Path) -> list[DeckBlock]:
     return blocks
 
 
-def flat_blocks(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
-    """Return the blocks of a deck without parts, or of its only part and what belongs to the model, and what is left.
-
-    Raises
-    ------
-    MeshError
-        As `mesh_blocks`.
-    """
-    _refuse(where, blocks)
-    return _one_part(where, blocks)
-
-
 def mesh_blocks(where: str, text: str, folder: Path) -> tuple[list[DeckBlock], list[str]]:
     """Return the blocks of a deck that concern its mesh, and in words what was left out.
 
@@ -87,7 +75,9 @@ def mesh_blocks(where: str, text: str, folder: Path) -> tuple[list[DeckBlock], l
     MeshError
         If the text is no deck, has several parts, moves its instance, or makes nodes or elements by keywords.
     """
-    blocks, notes = flat_blocks(where, deck_blocks(where, text, folder))
+    blocks = deck_blocks(where, text, folder)
+    refuse_unread(where, blocks)
+    blocks, notes = _one_part(where, blocks)
     return blocks, notes + _left_out(blocks)
 
 
@@ -177,7 +167,8 @@ def _block(head: _Line, lines: list[str]) -> DeckBlock:
     return DeckBlock(*_head(head.text), lines, head.number, head.file)
 
 
-def _refuse(where: str, blocks: list[DeckBlock]) -> None:
+def refuse_unread(where: str, blocks: list[DeckBlock]) -> None:
+    """Raise `MeshError` if nodes or elements are made or moved by keywords that are not read."""
     for block in blocks:
         if block.keyword in _REFUSED:
             raise MeshError(f"{where}, {block.place}: *{block.keyword} is not read: {_REFUSED[block.keyword]}")

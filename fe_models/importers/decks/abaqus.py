@@ -7,7 +7,8 @@ import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.importers.abaqus import deck_mesh, raw_mesh_of
-from fe_models.importers.abaqus_deck import DeckBlock, deck_blocks, flat_blocks
+from fe_models.importers.abaqus_deck import DeckBlock, deck_blocks, refuse_unread
+from fe_models.importers.decks.abaqus_assembly import flat_assembly
 from fe_models.importers.decks.abaqus_couplings import read_coupling
 from fe_models.importers.decks.abaqus_elements import read_element
 from fe_models.importers.decks.abaqus_loads import read_boundary, read_load
@@ -77,7 +78,9 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
     where = f"deck {path}"
     if program not in PROGRAMS:
         raise MeshError(f"{where}: unknown program {program!r}; expected one of {', '.join(PROGRAMS)}")
-    blocks, notes = flat_blocks(where, deck_blocks(where, data.decode("utf-8", "replace"), path.parent))
+    blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent)
+    refuse_unread(where, blocks)
+    blocks, notes = flat_assembly(where, blocks)
     mesh = deck_mesh(where, blocks)
     draft = Draft(where, program, mesh, Ledger(where))
     for note in (*notes, *mesh.notes):

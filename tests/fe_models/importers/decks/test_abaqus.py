@@ -172,3 +172,59 @@ def test_suffixes_that_are_no_deck_and_missing_files_are_refused(tmp_path):
         read_deck(tmp_path / "a.xyz")
     with pytest.raises(MeshError, match="cannot be read: No such file"):
         read_deck(tmp_path / "a.inp")
+
+
+PART = """*PART, NAME=Bar
+*NODE
+1, 0, 0, 0
+2, 1, 0, 0
+3, 0, 1, 0
+4, 0, 0, 1
+*ELEMENT, TYPE=C3D4, ELSET=body
+1, 1, 2, 3, 4
+*NSET, NSET=tip
+4
+*NSET, NSET=both, GENERATE
+1, 2
+*SOLID SECTION, ELSET=body, MATERIAL=STEEL
+*END PART
+*ASSEMBLY, NAME=A
+*INSTANCE, NAME=Bar-1, PART=bar
+*END INSTANCE
+*INSTANCE, NAME=Bar-2, PART=BAR
+10., 0., 0.
+10., 0., 0., 10., 0., 1., 90.
+*END INSTANCE
+*NODE
+1, 5, 5, 5
+*NSET, NSET=point
+1
+*NSET, NSET=feet, INSTANCE=Bar-1
+1, 2
+*NSET, NSET=feet, INSTANCE=Bar-2
+tip
+*RIGID BODY, NSET=Bar-2.both, REF NODE=point
+*END ASSEMBLY
+*MATERIAL, NAME=STEEL
+*ELASTIC
+210., .3
+*BOUNDARY
+feet, 1, 3
+Bar-1.tip, 2
+Bar-2.3, 1
+"""
+
+
+def test_instances_of_an_assembly_are_placed_and_keep_their_names(tmp_path):
+    """Two instances of one part, the second moved by 10 along x, then turned by 90 degrees about z there."""
+    deck = deck_of(tmp_path, PART)
+    assert_allclose(deck.mesh.nodes[4:8], [[10, 0, 0], [10, 1, 0], [9, 0, 0], [10, 0, 1]], atol=1e-14)
+    assert [(s.group, s.material) for s in deck.solids] == [("Bar-1.body", "STEEL"), ("Bar-2.body", "STEEL")]
+    assert numbers(deck, "Bar-2.tip") == [14]
+    link = deck.rigid[0]
+    assert (numbers(deck, link.node), numbers(deck, link.followers)) == ([21], [11, 12])
+    held = {s.name: (numbers(deck, s.nodes), s.components) for s in deck.supports}
+    assert held == {"feet": ([1, 2, 14], (0, 1, 2)), "node_4": ([4], (1,)), "node_13": ([13], (0,))}
+    assert any("BAR-2: numbers of the deck + 10" in words for _, _, words in deck.ledger.rows())
+    with pytest.raises(MeshError, match=r"\*INSTANCE of an unknown part 'BAZ'; did you mean 'BAR'"):
+        deck_of(tmp_path, PART.replace("PART=BAR", "PART=BAZ"))

@@ -1,0 +1,169 @@
+"""Assemblies of Abaqus: instances of parts become one flat deck.
+
+Nodes and elements of the k-th instance (from 0) have k S added to their numbers, those of the assembly itself n S, with n
+instances and S a power of ten above all numbers. Sets of an instance are called `INSTANCE.set`, as Abaqus calls them;
+where a line names `INSTANCE.17`, the number of that node stands.
+"""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from fe_models.errors import MeshError
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from fe_models.importers.abaqus_deck import DeckBlock
+
+__all__ = ["flat_assembly"]
+
+SETS = {"NSET": "NSET", "ELSET": "ELSET", "NODE": "NSET", "ELEMENT": "ELSET"}  #: keyword -> parameter with its name
+NAMES = ("NSET", "ELSET", "NAME", "SURFACE", "REF NODE", "ROT NODE")  #: parameters that name something of a part
+
+
+def flat_assembly(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
+    """Return the blocks of a deck with its instances written out, and how their numbers follow from those of the deck.
+
+    Raises
+    ------
+    MeshError
+        If an instance names no part, or its place cannot be understood.
+    """
+    parts, instances, own, model = _sorted(where, blocks)
+    if not instances:
+        return (blocks if not parts else [*(b for part in parts.values() for b in part), *model]), []
+    inside = [b for part in parts.values() for b in part] + [b for _, extra in instances for b in extra] + own
+    step = 10 ** len(str(max([_largest(block) for block in inside] or [1])))
+    out: list[DeckBlock] = []
+    offsets: dict[str, int] = {}
+    for k, (head, extra) in enumerate(instances):
+        name, part = head.parameters.get("NAME", ""), head.parameters.get("PART", "").upper()
+        if part not in parts and not extra:
+            raise MeshError(f"{where}, {head.place}: *INSTANCE of an unknown part {quoted(part)}{nearest(part, parts)}")
+        offsets[name.upper()] = k * step
+        R, t = _motion(where, head)
+        out += [_placed(block, name, k * step, R, t) for block in [*parts.get(part, []), *extra]]
+    for block in own:
+        of = offsets.get(block.parameters.get("INSTANCE", "").upper())
+        prefix = block.parameters.get("INSTANCE", "") if of is not None else ""
+        offset = len(instances) * step if of is None else of
+        if block.keyword in SETS:
+            out.append(_numbered(block, offset, prefix))
+        else:
+            out.append(block)
+    out = [_resolved(block, offsets) for block in [*out, *model]]
+    words = [f"{name}: numbers of the deck + {offset}" for name, offset in offsets.items()]
+    words.append(f"nodes of the assembly: + {len(instances) * step}")
+    return out, [f"instances are written out; {'; '.join(words[:8])}"] if len(instances) > 1 or own else []
+
+
+def _sorted(
+    where: str, blocks: list[DeckBlock]
+) -> tuple[dict[str, list[DeckBlock]], list[tuple[DeckBlock, list[DeckBlock]]], list[DeckBlock], list[DeckBlock]]:
+    """Return the blocks of parts, of instances, of the assembly itself, and of the model."""
+    parts: dict[str, list[DeckBlock]] = {}
+    instances: list[tuple[DeckBlock, list[DeckBlock]]] = []
+    own: list[DeckBlock] = []
+    model: list[DeckBlock] = []
+    target, in_assembly = model, False
+    for block in blocks:
+        if block.keyword == "PART":
+            target = parts.setdefault(block.parameters.get("NAME", "").upper(), [])
+        elif block.keyword == "INSTANCE":
+            instances.append((block, []))
+            target = instances[-1][1]
+        elif block.keyword in ("ASSEMBLY", "END INSTANCE"):
+            target, in_assembly = own, True
+        elif block.keyword in ("END PART", "END ASSEMBLY"):
+            target, in_assembly = model, False
+        else:
+            target.append(block)
+    if in_assembly:
+        raise MeshError(f"{where}: expected *END ASSEMBLY, got none; the deck is incomplete")
+    return parts, instances, own, model
+
+
+def _largest(block: DeckBlock) -> int:
+    if block.keyword not in ("NODE", "ELEMENT"):
+        return 1
+    first = [line.split(",")[0].strip() for line in block.lines]
+    return max([int(word) for word in first if word.isdigit()] or [1])
+
+
+def _motion(where: str, head: DeckBlock) -> tuple[Array, Array]:
+    """Return R and t of x → R x + t: a translation, then a rotation about the line of two points by an angle."""
+    try:
+        rows = [[float(word or 0) for word in line.rstrip(", ").split(",")] for line in head.lines]
+        t = np.array([*rows[0], 0.0, 0.0, 0.0][:3]) if rows else np.zeros(3)
+        if len(rows) < 2:
+            return np.eye(3), t
+        a, b, angle = np.array(rows[1][:3]), np.array(rows[1][3:6]), np.radians(rows[1][6])
+    except (ValueError, IndexError) as error:
+        raise MeshError(
+            f"{where}, {head.place}: *INSTANCE: expected x, y, z and a, b, angle below ({error})"
+        ) from error
+    n = (b - a) / np.linalg.norm(b - a)
+    skew = np.array([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
+    R = np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+    return R, R @ (t - a) + a
+
+
+def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) -> DeckBlock:
+    """Return a block of a part as it is in an instance."""
+    block = _numbered(block, offset, instance)
+    parameters = {
+        key: f"{instance}.{value}" if key in NAMES and value and not value.isdigit() else value
+        for key, value in block.parameters.items()
+    }
+    if block.keyword == "NODE":
+        lines = []
+        for line in block.lines:
+            words = [word.strip() for word in line.rstrip(", ").split(",")]
+            x = R @ np.array([float(word or 0) for word in [*words[1:4], "0", "0", "0"][:3]]) + t
+            lines.append(", ".join([words[0], *(repr(float(value)) for value in x)]))
+        return replace(block, parameters=parameters, lines=lines)
+    if block.keyword not in SETS and block.keyword in ("SURFACE", "EQUATION", "BOUNDARY", "MPC"):
+        lines = [_prefixed(line, instance, offset) for line in block.lines]
+        return replace(block, parameters=parameters, lines=lines)
+    return replace(block, parameters=parameters)
+
+
+def _prefixed(line: str, instance: str, offset: int) -> str:
+    """Return a line whose first word is a set or a number of the part."""
+    first, comma, rest = line.partition(",")
+    word = first.strip()
+    return f"{int(word) + offset if word.isdigit() else f'{instance}.{word}'}{comma}{rest}"
+
+
+def _numbered(block: DeckBlock, offset: int, instance: str) -> DeckBlock:
+    """Return nodes, elements or sets with their numbers moved, and names of sets within sets those of the instance."""
+    if block.keyword not in SETS or (not offset and not instance):
+        return block
+    lines = []
+    for line in block.lines:
+        words = [word.strip() for word in line.rstrip(", ").split(",")]
+        if block.keyword == "NODE":
+            words[0] = str(int(words[0]) + offset)
+        elif "GENERATE" in block.parameters:
+            words[:2] = [str(int(word) + offset) for word in words[:2]]
+        else:
+            words = [
+                str(int(word) + offset) if word.isdigit() else f"{instance}.{word}" if instance and word else word
+                for word in words
+            ]
+        lines.append(", ".join(words) + ("," if line.endswith(",") and block.keyword == "ELEMENT" else ""))
+    return replace(block, lines=lines)
+
+
+def _resolved(block: DeckBlock, offsets: dict[str, int]) -> DeckBlock:
+    """Return a block in which INSTANCE.17 is the number of that node."""
+
+    def number(match: re.Match[str]) -> str:
+        of = offsets.get(match[1].strip().upper())
+        return match[0] if of is None else str(int(match[2]) + of)
+
+    pattern = re.compile(r"([^,.\s][^,.]*)\.(\d+)(?=\s*(?:,|$))")
+    if block.keyword in ("NODE", "ELEMENT", "STEP", "ELASTIC", "DENSITY"):
+        return block
+    parameters = {key: pattern.sub(number, value) for key, value in block.parameters.items()}
+    return replace(block, parameters=parameters, lines=[pattern.sub(number, line) for line in block.lines])
