@@ -1,7 +1,7 @@
 """Assemblies of Abaqus: instances of parts become one flat deck.
 
-Nodes and elements of the k-th instance (from 0) have k S added to their numbers, those of the assembly itself n S, with n
-instances and S a power of ten above all numbers. Sets of an instance are called `INSTANCE.set`, as Abaqus calls them;
+Nodes and elements of the k-th instance (from 0) have k S added to their numbers, those of the assembly itself n S, with
+n instances and S a power of ten above all numbers. Sets of an instance are called `INSTANCE.set`, as Abaqus calls them;
 where a line names `INSTANCE.17`, the number of that node stands.
 """
 

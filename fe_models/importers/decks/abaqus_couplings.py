@@ -5,6 +5,7 @@ import numpy as np
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus_elements import faces_of
+from fe_models.importers.decks.abaqus_ties import read_tie
 from fe_models.importers.decks.deck import Coupling, Equation, RigidGroup
 from fe_models.importers.decks.draft import Draft
 
@@ -27,6 +28,8 @@ def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
         draft.pending = {}
     elif keyword == "DISTRIBUTING COUPLING":
         _distributing_coupling(here, block, draft)
+    elif keyword == "TIE" and "CYCLIC SYMMETRY" not in given and "MULTISTAGE" not in given:
+        read_tie(here, block, draft, surface_nodes(here, draft, block.lines[0].split(",")[0].strip()))
     elif keyword == "MPC":
         _mpcs(here, block, draft)
     else:

@@ -7,6 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fe_models.errors import MeshError
 from fe_models.importers.decks.deck import DeckMaterial, LineSection, ShellSection, SolidSection
 from fe_models.importers.decks.read_deck import read_deck
+from tests.bodies import box_mesh
+from tests.decks import write_deck
 
 DECK = """*HEADING
 *NODE, NSET=NALL
@@ -130,7 +132,7 @@ def test_the_ledger_counts_what_is_not_taken_over_and_why(tmp_path):
         ("TYPE=C3D8I", "TYPE=C3D8X", "1 C3D8X .*: this element is not known here"),
         ("*ELASTIC\n", "*ELASTIC, TYPE=ORTHO\n", r"1 \*ELASTIC, TYPE=ORTHO"),
         ("SPRING, ELSET=coil", "SPRING, NONLINEAR, ELSET=coil", r"1 \*SPRING, NONLINEAR"),
-        ("*RIGID BODY, NSET=top, REF NODE=30", "*TIE, NAME=t\na, b", r"1 \*TIE"),
+        ("*RIGID BODY, NSET=top, REF NODE=30", "*TIE, NAME=t\nfoot, top", r"1 \*TIE .*not made of faces of solids"),
         ("SECTION=RECT", "SECTION=TRAPEZOID", "SECTION=TRAPEZOID: this shape is not known here"),
     ],
 )
@@ -228,3 +230,28 @@ def test_instances_of_an_assembly_are_placed_and_keep_their_names(tmp_path):
     assert any("BAR-2: numbers of the deck + 10" in words for _, _, words in deck.ledger.rows())
     with pytest.raises(MeshError, match=r"\*INSTANCE of an unknown part 'BAZ'; did you mean 'BAR'"):
         deck_of(tmp_path, PART.replace("PART=BAR", "PART=BAZ"))
+
+
+def test_tied_nodes_follow_the_face_they_stand_on(tmp_path):
+    """Rigid motions and a linear field of the master are met exactly at slaves anywhere on its faces."""
+    mesh = box_mesh(2, 2, 1, kind="hexahedron20")
+    path = write_deck(tmp_path / "tie.inp", mesh)
+    rng = np.random.default_rng(4)
+    spots = np.column_stack([rng.uniform(0, 1, (3, 2)), np.ones(3)])
+    extra = "*NODE\n" + "".join(f"{900 + k}, {x!r}, {y!r}, {z!r}\n" for k, (x, y, z) in enumerate(spots.tolist()))
+    extra += "903, .5, .5, 1.3\n904, .5, .9, 1.3\n905, .9, .9, 1.3\n906, .3, .3, 1.8\n"
+    extra += "*ELEMENT, TYPE=C3D4, ELSET=upper\n500, 900, 901, 902, 903\n*NSET, NSET=slaves\n900, 901, 902, 903\n"
+    extra += "*SURFACE, NAME=below, TYPE=NODE\nslaves\n*SURFACE, NAME=above\nall, S2\n*TIE, NAME=t\nbelow, above\n"
+    path.write_text(path.read_text() + extra)
+    deck = read_deck(path)
+    assert (
+        "*TIE",
+        "1",
+        "slave nodes farther from the master surface than the tolerance: not tied",
+    ) in deck.ledger.rows()
+    assert len(deck.equations) == 9
+    H, t = rng.normal(size=(3, 3)), rng.normal(size=3)
+    u = deck.mesh.nodes @ H.T + t
+    for equation in deck.equations:
+        total = sum(a * u[deck.mesh.node_sets[group][0], c] for group, c, a in equation.terms)
+        assert abs(total) < 1e-12
