@@ -136,6 +136,11 @@ def test_rows_that_the_other_program_took_out_hold_the_body(read, geometry):
     assert fe_models.body_from_foreign(cut, geometry, name="block", units=SI, held=True).is_held
     with pytest.raises(MatrixError, match="still not free"):
         fe_models.body_from_foreign(cut, geometry, name="block", units=SI, remove_supports=True)
+    rows = np.setdiff1d(np.arange(3 * n_nodes), kept)
+    said = fe_models.body_from_foreign(
+        replace(read, dofs=dofs, constrained=rows), geometry, name="block", units=SI, held=True
+    )
+    assert_array_equal(said.K.toarray(), read.K.toarray()[np.ix_(kept, kept)])
     zeroed = np.ones(3 * n_nodes)
     zeroed[np.isin(dofs[:, 0], [1, 2, 3, 4])] = 0.0
     Z = sp.diags_array(zeroed)
