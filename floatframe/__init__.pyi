@@ -37,7 +37,9 @@ from .bodies.ground import GROUND as GROUND
 from .bodies.ground import Ground as Ground
 from .bodies.markers import Marker as Marker
 from .bodies.rigid_body import RigidBody as RigidBody
+from .cosimulation.coupled_motion import co_simulate as co_simulate
 from .errors import ConvergenceError as ConvergenceError
+from .errors import CosimulationError as CosimulationError
 from .errors import FloatframeError as FloatframeError
 from .errors import ModelError as ModelError
 from .errors import ResultsError as ResultsError
@@ -79,6 +81,8 @@ from .joints import SphericalJoint as SphericalJoint
 from .joints import UniversalJoint as UniversalJoint
 from .joints.coordinate_coupler import CoordinateCoupler as CoordinateCoupler
 from .motion.events import Event as Event
+from .motion.foreign_units import Coupling as Coupling
+from .motion.foreign_units import ForeignUnit as ForeignUnit
 from .motion.integration import Progress as Progress
 from .motion.integration import integrate as integrate
 from .motion.integration import resume as resume

@@ -4,7 +4,7 @@ from typing import Any
 
 from fe_models.foundation.errors import ReportedError
 
-__all__ = ["ConvergenceError", "FloatframeError", "ModelError", "ResultsError", "SystemFileError"]
+__all__ = ["ConvergenceError", "CosimulationError", "FloatframeError", "ModelError", "ResultsError", "SystemFileError"]
 
 
 class FloatframeError(ReportedError):
@@ -41,4 +41,21 @@ class ConvergenceError(FloatframeError, RuntimeError):
         self.t = t
         self.h = h
         self.residual = residual
+        self.trajectory = trajectory
+
+
+class CosimulationError(FloatframeError, RuntimeError):
+    """A unit of another program failed, or the units did not agree; what was computed before is kept.
+
+    Attributes
+    ----------
+    t
+        Time at the beginning of the failed macro-step [s], None before the first.
+    trajectory
+        The motion up to there, or None if there was none.
+    """
+
+    def __init__(self, message: str, *, t: float | None = None, trajectory: Any = None) -> None:
+        super().__init__(message)
+        self.t = t
         self.trajectory = trajectory

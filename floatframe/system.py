@@ -53,10 +53,11 @@ class System:
     inputs: Sequence[Named] = field(default=(), kw_only=True)  #: forces that act on it when it is linearised
     outputs: Sequence[Named] = field(default=(), kw_only=True)  #: what is then observed
     events: Sequence[Named] = field(default=(), kw_only=True)  #: what a run does when a value passes a level
+    fmus: Sequence[Named] = field(default=(), kw_only=True)  #: units of other programs, see `co_simulate`
     source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
 
     def __post_init__(self) -> None:
-        for part in ("bodies", "joints", "forces", "couplers", "sensors", "inputs", "outputs", "events"):
+        for part in ("bodies", "joints", "forces", "couplers", "sensors", "inputs", "outputs", "events", "fmus"):
             object.__setattr__(self, part, tuple(getattr(self, part)))
         among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
         object.__setattr__(self, "couplers", (*self.couplers, *among))
@@ -69,7 +70,7 @@ class System:
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
         named = [force.name for force in self.forces if not isinstance(force, Gravity)]
         require_names(f"{where}: joints and forces", [joint.name for joint in (*self.joints, *self.couplers)] + named)
-        for kind in ("sensors", "inputs", "outputs", "events"):
+        for kind in ("sensors", "inputs", "outputs", "events", "fmus"):
             require_names(f"{where}: {kind}", [each.name for each in getattr(self, kind)])
         for body in self.bodies:
             if isinstance(body, FlexibleBody) and body.reduced.units != self.units:

@@ -37,6 +37,7 @@ def run_command(
 
     Example: floatframe run swing.toml -o swing.h5
     """
+    from floatframe.cosimulation.coupled_motion import co_simulate
     from floatframe.errors import ResultsError
     from floatframe.motion.integration import integrate
     from floatframe.system_file.read_system import read_system
@@ -49,9 +50,16 @@ def run_command(
     compute(
         model.name,
         path,
-        lambda on_progress: integrate(
-            model, options.integrator, options.t_end, options.h, output=path, output_every=options.output_every,
-            progress=on_progress,
+        lambda on_progress: (
+            co_simulate(
+                model, options.integrator, options.t_end, options.h, options.coupling, output=path,
+                output_every=options.output_every, progress=on_progress,
+            )
+            if model.fmus
+            else integrate(
+                model, options.integrator, options.t_end, options.h, output=path, output_every=options.output_every,
+                progress=on_progress,
+            )
         ),
     )  # fmt: skip
 

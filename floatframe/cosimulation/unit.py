@@ -117,8 +117,14 @@ class Unit:
     inputs: dict[str, float] = field(init=False)  #: values that were set
     notes: list[str] = field(init=False, default_factory=list)  #: words on bodies that left their linear range
     t: float = field(init=False, default=0.0)
+    steps: list[Rows] = field(init=False, default_factory=list)  #: results of the steps of the last communication step
 
     def __post_init__(self) -> None:
+        if self.system.fmus:
+            raise ModelError(
+                f"system {self.system.name!r}: units of other programs act beside it (fmus), which cannot be a part of "
+                "a unit; take them out and let the master connect them"
+            )
         if self.system.events:
             raise ModelError(
                 f"system {self.system.name!r}: its table [events] cannot be a part of a co-simulation; leave it out "
@@ -234,7 +240,7 @@ class Unit:
                 drives[each.name] = end
         self.work.solver.c_k[...] = 0.0  # factors are made anew: a step depends on the state alone
         jumps = jumps_of_steps(self.system, t, h, n)
-        k = 0
+        k, steps = 0, []
         while k < n:
             n_smooth = min((j - k for j in jumps if j >= k), default=n - k)
             if n_smooth:
@@ -254,8 +260,9 @@ class Unit:
                 )
                 raise ConvergenceError(words, t=t + k * h, h=h, residual=failure.residual)
             self.notes += [note.words for note in self.watch.observe(rows)]
-            self.row = Rows(*(array[-1:] for array in rows))
-        self.t, self.drives = t + size, drives
+            steps += [Rows(*(array[j : j + 1] for array in rows)) for j in range(len(rows.t))]
+            self.row = steps[-1]
+        self.t, self.drives, self.steps = t + size, drives, steps
 
     def measured(self) -> list[Measurement]:
         """Return what the sensors measure now, with the inputs that are set."""

@@ -123,6 +123,7 @@ def integrate(
         raise ModelError(
             f"integrate: expected output_every and batch_steps of at least 1, got {output_every} and {batch_steps}"
         )
+    require_no_units(system)
     n_total = number_of_steps(t_start, t_end, h)
     step = (t_end - t_start) / n_total
     if abs(step - h) > 1e-9 * h:
@@ -149,6 +150,16 @@ def integrate(
         if writer is not None:
             writer.close_segment(run.record(carry, 0))
         return run.advance(carry, 0, batch_steps, progress)
+
+
+def require_no_units(system: System) -> None:
+    """Raise `ModelError` if units of other programs act beside a system, which a run alone would leave out."""
+    if system.fmus:
+        names = ", ".join(unit.name for unit in system.fmus)
+        raise ModelError(
+            f"system {system.name!r}: units of other programs act beside it (fmus: {names}): use floatframe run, or "
+            "floatframe.co_simulate in place of integrate; such a run cannot be resumed"
+        )
 
 
 def number_of_steps(t_start: float, t_end: float, h: float) -> int:
@@ -193,6 +204,7 @@ def resume(
     ConvergenceError
         If a step fails.
     """
+    require_no_units(system)
     with ResultsPlace(output, inputs=system.files, is_begun=True) as place:
         head, record = last_restart(place.folder)
         run = dict(head.run)
@@ -263,6 +275,7 @@ class Run:
 
     def __post_init__(self) -> None:
         self.watch = ValidityWatch(self.system, self.notes)
+        self.closed = time.monotonic()  # when the last segment was
 
     def keep(self, rows: Rows) -> None:
         """Take rows of results; tell when a body leaves the range of its linear frame."""
@@ -345,6 +358,16 @@ class Run:
                 self.watch.notes,
                 carry.state,
             )
+        return self.finished(carry)
+
+    def close_segment_when_due(self) -> None:
+        """Close a segment of the results without a record to go on from, when the last one is old enough."""
+        if self.writer is not None and time.monotonic() - self.closed > SEGMENT_SECONDS:
+            self.writer.close_segment()
+            self.closed = time.monotonic()
+
+    def finished(self, carry: Carry) -> Trajectory:
+        """Return the motion, all of whose steps have been kept."""
         if self.writer is None:
             head = replace(self.head, summary=self.summary(carry))
             arrays = MemorySource(joint_rows(self.system, self.kept))
@@ -362,13 +385,18 @@ def stopped(system, head, kept, writer, failure, t: float, h: float, notes, stat
     words += "".join(f"; {note.words}" for note in notes)
     lost = indefinite_mass_words(indefinite_masses(system, state))
     words += f"; {lost}" if lost else ""
+    trajectory, where = motion_so_far(system, head, kept, writer, notes)
+    return ConvergenceError(words + where, t=t, h=h, residual=failure.residual, trajectory=trajectory)
+
+
+def motion_so_far(
+    system: System, head: Head, kept: list[Rows], writer: ResultsWriter | None, notes: tuple[ValidityNote, ...]
+) -> tuple[Trajectory, str]:
+    """Return the motion of a run that ends before its time, and where it is, in words; "" for one in memory."""
     if writer is None:
-        trajectory = Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False, validity=notes)
-    else:
-        writer.close_segment()
-        trajectory = read_results(writer.folder)
-        words += f"; the motion so far is in {str(writer.folder)!r}"
-    return ConvergenceError(words, t=t, h=h, residual=failure.residual, trajectory=trajectory)
+        return Trajectory(head, MemorySource(joint_rows(system, kept)), is_complete=False, validity=notes), ""
+    writer.close_segment()
+    return read_results(writer.folder), f"; the motion so far is in {str(writer.folder)!r}"
 
 
 def joint_rows(system: System, kept: list[Rows]) -> dict[str, np.ndarray]:

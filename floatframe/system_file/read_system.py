@@ -11,6 +11,7 @@ All of them raise `FloatframeError`, whose text is one message for the user.
 import logging
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ from floatframe.system import REDUNDANT, System
 from floatframe.system_file.bodies import BodySection, body_of
 from floatframe.system_file.changed_content import changed
 from floatframe.system_file.channel_section import InputSection, OutputSection
-from floatframe.system_file.cosimulation_section import FmuSection
+from floatframe.system_file.cosimulation_section import CosimulationSection, FmuSection, ForeignSection
 from floatframe.system_file.event_section import EventSection
 from floatframe.system_file.forces import ForceSection, force_of
 from floatframe.system_file.joints import CouplerSection, JointSection, coupler_of, joint_of
@@ -74,6 +75,8 @@ class SystemFile(Table):
     outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
     events: dict[str, EventSection] = Field({}, description="tables [events.NAME]")
     fmu: FmuSection | None = Field(None, description="a table [fmu] with inputs, outputs and parameters")
+    fmus: dict[str, ForeignSection] = Field({}, description="tables [fmus.NAME]")
+    cosimulation: CosimulationSection | None = Field(None, description="a table [cosimulation] with step and scheme")
     run: RunSection | None = Field(None, description="a table [run] with t_end and h")
 
     @model_validator(mode="after")
@@ -133,6 +136,7 @@ def read_system(
             inputs=[section.channel(key) for key, section in data.inputs.items()],
             outputs=[section.output(key) for key, section in data.outputs.items()],
             events=[section.event(key) for key, section in data.events.items()],
+            fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
             source=str(path.resolve()),
         )  # fmt: skip
         _ = compiled_system(system)  # markers and interfaces are looked up here
@@ -141,4 +145,7 @@ def read_system(
             log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:
         raise SystemFileError(f"{path}: {error}") from error
-    return system, None if data.run is None else data.run.options()
+    if data.run is None:
+        return system, None
+    coupling = None if data.cosimulation is None else data.cosimulation.coupling()
+    return system, replace(data.run.options(), coupling=coupling)

@@ -15,6 +15,7 @@ from floatframe.errors import SystemFileError
 from floatframe.integrators import INTEGRATORS
 from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.motion.foreign_units import Coupling
 
 __all__ = ["RunOptions", "RunSection", "required_run"]
 
@@ -92,6 +93,7 @@ class RunOptions:
     h: float
     output_every: int
     integrator: Integrator
+    coupling: Coupling | None = None  #: of units of other programs; None: explicit, in steps of h
 
     def output_times(self) -> Array:
         """Return the times of the results of a run, (n_t,) [s]; `SystemFileError` if no memory would hold them."""
