@@ -108,7 +108,11 @@ def test_directory_is_refused(tmp_path):
 
 
 def test_unknown_suffix_names_the_choices(tmp_path):
-    assert "unknown suffix '.stp'; choices: .bdf, .dat," in refusal(tmp_path, "rod.stp", "ISO-10303-21;")
+    assert "unknown suffix '.sldprt'; choices: .bdf," in refusal(tmp_path, "rod.sldprt", "anything")
+
+
+def test_cad_files_are_refused_with_the_way_to_mesh_them(tmp_path):
+    assert "this is a CAD geometry, which has to be meshed" in refusal(tmp_path, "rod.stp", "ISO-10303-21;")
 
 
 def test_unreadable_file_is_refused(tmp_path, monkeypatch):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.sparse.linalg as spl
 import skfem
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
@@ -156,3 +157,39 @@ def test_stiffness_of_a_material_is_that_of_its_tensor():
     assert_allclose(OBLIQUE.stiffness, voigt, rtol=0, atol=1e-12 * np.abs(voigt).max())
     isotropic = Material("any", E=2.0, nu=0.3, rho=1.0)
     assert_allclose(np.linalg.inv(isotropic.stiffness)[0, :4], [0.5, -0.15, -0.15, 0], rtol=0, atol=1e-15)
+
+
+def cross_ply(n_x=6, n_y=12, thickness=0.01):
+    """A square plate of side 1 with three layers of equal thickness, 0, 90, 0 degrees, one brick each."""
+    mesh = box_mesh(n_x, n_y, 3, 1.0, 1.0, thickness, "hexahedron20")
+    middle = np.abs(mesh.nodes[mesh.cells["hexahedron20"]].mean(axis=1)[:, 2] - thickness / 2) < thickness / 6
+    layers = {"outer": {"hexahedron20": np.flatnonzero(~middle)}, "middle": {"hexahedron20": np.flatnonzero(middle)}}
+    return replace(mesh, cell_sets=layers)
+
+
+def test_a_plate_of_three_layers_has_the_frequencies_of_laminate_theory():
+    """Simply supported cross-ply: omega² rho h = D_11 a⁴ + 2 (D_12 + 2 D_66) a² b² + D_22 b⁴, a = m pi, b = n pi.
+
+    D_ij = Σ Q_ij (z_k³ - z_(k-1)³)/3 of classical laminate theory; shear lowers the solid's frequencies by some
+    (pi h)² E_1 / G_13 / 12, which is 0.1 % for h = 0.01, and twelve bricks along the waves raise them a little.
+    """
+    h, rho = 0.01, 1500.0
+    E_1, E_2, G, nu = 140e9, 10e9, 5e9, 0.3
+    ply = OrthotropicMaterial("0", (E_1, E_2, E_2), (G, G, 3.5e9), (nu, nu, 0.4), rho)
+    across = replace(ply, name="90", axes=((0, 1, 0), (-1, 0, 0), (0, 0, 1)))
+    mesh = cross_ply(thickness=h)
+    body = body_of(mesh, {"outer": ply, "middle": across})
+    Q = np.array([[E_1, nu * E_2], [nu * E_2, E_2]]) / (1 - nu**2 * E_2 / E_1)
+    inner = (1 / 3) ** 3  # share of the middle third in ∫z² dz
+    D = h**3 / 12 * ((1 - inner) * Q + inner * Q[::-1, ::-1])
+    D_66 = G * h**3 / 12
+    m = np.pi * np.array([[i, j] for i in (1, 2, 3) for j in (1, 2, 3, 4)])
+    squares = D[0, 0] * m[:, 0] ** 4 + 2 * (D[0, 1] + 2 * D_66) * (m[:, 0] * m[:, 1]) ** 2 + D[1, 1] * m[:, 1] ** 4
+    x, y, _ = mesh.nodes.T
+    on_x, on_y = (x < 1e-9) | (x > 1 - 1e-9), (y < 1e-9) | (y > 1 - 1e-9)
+    held = np.stack([on_y, on_x, on_x | on_y], axis=1).ravel()  # along the edge and across the plate
+    free = np.flatnonzero(~held)
+    K, M = body.K[free][:, free], body.M[free][:, free]
+    start = np.random.default_rng(0).standard_normal(len(free))
+    found = np.sort(spl.eigsh(K, 2, M, sigma=0, v0=start, return_eigenvectors=False))
+    assert_allclose(np.sqrt(found), np.sort(np.sqrt(squares / (rho * h)))[:2], rtol=0.01, atol=0)
