@@ -34,15 +34,15 @@ FORMATS = (
     ),
     FileFormat(
         "modal joint, FEM data", "MBDyn", "reduced body", (".fem",), reads=True, key="mbdyn",
-        tried="files of our writer", lost="stress stiffening (record group 19)",
+        tried="files of our writer", lost="stress stiffening where an interface is no single node",
     ),
     FileFormat(
         "SID_FEM, m1(row, q, column)", "PY_SID, EMBSlib", "reduced body", (".SID_FEM",), reads=True, key="sid_fem",
-        tried="files of our writer", lost="geometric stiffness",
+        tried="files of our writer", lost="geometric stiffness without 5C (Gr of first order)",
     ),
     FileFormat(
         "SID_FEM, m1(row, column, q)", "FEMBeam, welib", "reduced body", (".SID_FEM",), reads=True,
-        key="sid_fem-fembeam", tried="files of our writer", lost="geometric stiffness",
+        key="sid_fem-fembeam", tried="files of our writer", lost="geometric stiffness without 5C (Gr of first order)",
     ),
     FileFormat(
         "ExtPtfm, FlexASCII", "OpenFAST", "reduced body", (".dat",), reads=True, key="ext_ptfm",

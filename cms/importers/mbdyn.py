@@ -10,6 +10,7 @@ from cms.errors import ForeignBodyError
 from cms.importers.inertia import moments_in_frame
 from cms.importers.integrals import moments_of_invariants
 from cms.importers.modal_body import ModalBody
+from cms.reduced_body.geometric_stiffness import GeometricStiffness
 from cms.reduced_body.invariants import Moments
 from cms.reduced_body.reduced_body import BodyFrame
 from fe_models.foundation.arrays import Array
@@ -95,8 +96,11 @@ def read_mbdyn(files: Sequence[Path], name: str, places: Mapping[int, Array]) ->
             f"{path}: neither record groups 12, 14 and 15 (invariants) nor 11 (lumped masses) are there: nothing "
             "says how the modes carry momentum; write one of them"
         )
+    geometric = None
     if 19 in groups:
-        notes += ("record group 19 (stress stiffening) is not taken over",)
+        geometric = stress_stiffening(path, groups[19], n_nodes, n)
+        if geometric is None:
+            notes += (f"record group 19 is not taken over: expected the {12 + 6 * n_nodes} matrices of all loads",)
     is_number = all(re.fullmatch(r"\d+", label) for label in labels)
     return ModalBody(
         name=name,
@@ -108,11 +112,37 @@ def read_mbdyn(files: Sequence[Path], name: str, places: Mapping[int, Array]) ->
         nodes=nodes,
         Phi=Phi,
         rotations=rotations,
+        geometric=geometric,
         program="MBDyn",
         provenance={
             "source": "MBDyn, FEM data of a modal joint",
             **{f"note {k + 1}": note for k, note in enumerate(notes)},
         },
+    )
+
+
+def stress_stiffening(path: Path, words: list[str], n_nodes: int, n: int) -> GeometricStiffness | None:
+    """Return the matrices of record group 19: a count, then a number and entries of each; None if some are missing.
+
+    1 to 6: omega_x², omega_y², omega_z², omega_x omega_y, omega_y omega_z, omega_z omega_x (products once: twice K_ab);
+    7 to 9: angular acceleration; 10 to 12: acceleration less gravity; then force and moment of each node.
+    """
+    where = f"{path}: record group 19"
+    count = whole(path, words[0], where) if words else 0
+    if count != 12 + 6 * n_nodes:
+        return None
+    if len(words) != 1 + count * (1 + n * n):
+        raise ForeignBodyError(f"{where}: expected {1 + count * (1 + n * n)} numbers, got {len(words)}")
+    try:
+        values = np.array([float(word.replace("D", "E")) for word in words[1:]]).reshape(count, 1 + n * n)
+    except ValueError as error:
+        raise ForeignBodyError(f"{where}: {error}") from error
+    if not np.array_equal(values[:, 0], np.arange(1, count + 1)):
+        raise ForeignBodyError(f"{where}: expected the matrices in the order of their numbers 1 to {count}")
+    K = values[:, 1:].reshape(count, n, n)
+    half = np.array([1.0, 1, 1, 0.5, 0.5, 0.5])[:, None, None]
+    return GeometricStiffness(
+        translation=K[9:12], rotation=K[6:9], spin=K[:6] * half, interfaces=K[12:].reshape(n_nodes, 6, n, n)
     )
 
 
@@ -132,12 +162,13 @@ def groups_of(path: Path) -> dict[int, list[str]]:
     return groups
 
 
-def whole(path: Path, word: str) -> int:
-    """Return a whole number of the header."""
+def whole(path: Path, word: str, where: str = "") -> int:
+    """Return a whole number."""
     try:
         return int(word)
     except ValueError:
-        raise ForeignBodyError(f"{path}: record group 1: expected a whole number, got {word!r}") from None
+        where = where or f"{path}: record group 1"
+        raise ForeignBodyError(f"{where}: expected a whole number, got {word!r}") from None
 
 
 def moments_of_lumps(lumps: Array, nodes: Array, Phi: Array, rotations: Array, M: Array) -> Moments:

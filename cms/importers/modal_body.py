@@ -54,7 +54,7 @@ class ModalBody:
     surface: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of rows of `nodes`
     interfaces: tuple[ForeignInterface, ...] = ()  #: those that the file names
     load_cases: tuple[ReducedLoadCase, ...] = ()
-    geometric: GeometricStiffness | None = None
+    geometric: GeometricStiffness | None = None  #: in mean axes; its interfaces are the nodes, in their order
     program: str = ""
     provenance: Mapping[str, str] = field(default_factory=dict)
 
@@ -85,6 +85,11 @@ class ModalBody:
             raise ForeignBodyError(f"{where}: node_numbers: a number is there twice")
         if self.moments.n_q != n:
             raise ForeignBodyError(f"{where}: {n} modes in the stiffness, {self.moments.n_q} in the mass integrals")
+        if self.geometric is not None and self.geometric.interfaces.shape != (n_nodes, 6, n, n):
+            raise ForeignBodyError(
+                f"{where}: geometric stiffness: expected 6 matrices ({n}, {n}) of each of {n_nodes} nodes, got "
+                f"{self.geometric.interfaces.shape}"
+            )
         for name in ("M", "K", "D"):
             matrix = getattr(self, name)
             if matrix is not None:

@@ -16,6 +16,7 @@ from cms.reduced_basis.damping import modal_damping
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_basis.frames import TisserandFrame
 from cms.reduced_basis.node_motion import are_spread, mean_translation
+from cms.reduced_body.geometric_stiffness import GeometricStiffness
 from cms.reduced_body.invariants import Moments, moments_from_gram
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.solvers.orientation import orientation
@@ -104,15 +105,31 @@ def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
         },
         load_cases=tuple(replace(case, h=Z.T @ case.h) for case in body.load_cases),
         stress=None if body.stress is None else np.asarray(body.stress) @ Z,
-        geometric=None if body.geometric is None else body.geometric.transformed(Z),
+        geometric=geometric_at(where, body, interfaces, Z) if in_mean_axes else None,
     )
     reduced = replace(reduced, free_frequencies=free_frequencies(where, reduced))
     if options.frame is None and in_mean_axes:  # (4)
         return reduced
-    if reduced.geometric is not None and not in_mean_axes:
+    if body.geometric is not None and not in_mean_axes:
         log.warning("%s: its geometric stiffness is that of a frame which the file does not name: left out", where)
-        reduced = replace(reduced, geometric=None)
     return convert_frame(reduced, options.frame or TisserandFrame())
+
+
+def geometric_at(
+    where: str, body: ModalBody, interfaces: tuple[ReducedInterface, ...], Z: Array
+) -> GeometricStiffness | None:
+    """Return the geometric stiffness over the new modes, of the nodes that are interfaces; None if one is none."""
+    if body.geometric is None:
+        return None
+    if any(len(interface.members) != 1 for interface in interfaces):
+        log.warning(
+            "%s: its geometric stiffness is known for loads on single nodes, and an interface is none: left out; name "
+            "interfaces of one node each",
+            where,
+        )
+        return None
+    rows = np.array([interface.members[0] for interface in interfaces], dtype=np.int64)
+    return replace(body.geometric, interfaces=body.geometric.interfaces[rows]).transformed(Z)
 
 
 def free_frequencies(where: str, reduced: ReducedBody) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from cms.errors import ForeignBodyError
 from cms.importers.integrals import moments_of_invariants
 from cms.importers.modal_body import ForeignInterface, ModalBody
+from cms.reduced_body.geometric_stiffness import GeometricStiffness
 from fe_models.foundation.arrays import Array
 
 __all__ = ["Taylor", "is_sid_fem", "read_sid_fem", "read_sid_fem_fembeam", "series_of"]
@@ -18,6 +19,7 @@ TERMS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
 NODE_TERMS = ("origin", "phi", "psi", "AP", "sigma")
 LARGEST = 50_000_000  #: numbers of a series that are taken
 SAME = 1e-6  #: difference of two statements of one thing, of its size, that is digits of a file
+SPIN_COLUMNS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))  #: omega_a omega_b of the columns of Oe
 DIAGONAL, SYMMETRIC, UNIT = 1, 2, 4  #: of `structure`
 
 
@@ -111,14 +113,22 @@ def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> Mo
     moments, found_notes = moments_of_invariants(
         str(path), mass, m0("mdCM", 3, 1)[:, 0], J0, C1, C2, M, C3=C3, C4=C4, C5=C5 if C4 is not None else None
     )
-    stiffening = [m1("Ct", n, 3), *([] if C5 is None else [m1("Oe", n, 6)])]
-    if any(term is not None and term.any() for term in stiffening):
-        notes.append("geometric stiffness in Ct, Cr, Oe and the nodes is not taken over")
     numbers = np.array(sorted(nodes), dtype=np.int64)
     sizes = {"origin": 1, "phi": n, "psi": n}
     node_values = [
         [values_of(path, key, nodes[int(k)], 0, (3, size), second) for key, size in sizes.items()] for k in numbers
     ]
+    geometric = None
+    if C5 is not None:
+        node_m1 = [
+            np.concatenate([
+                values_of(path, key, nodes[int(k)], 1, (3, n, n), second)
+                if nodes[int(k)][key].sizes.get("order", 0) > 0 else np.zeros((3, n, n))
+                for key in ("phi", "psi")
+            ])
+            for k in numbers
+        ]  # fmt: skip
+        geometric = stiffening_of(m1("Ct", n, 3), m1("Cr", n, 3), m1("Oe", n, 6), C5, node_m1)
     return ModalBody(
         name=name,
         M=M,
@@ -130,6 +140,7 @@ def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> Mo
         Phi=np.array([each[1] for each in node_values]).reshape(-1, 3, n),
         rotations=np.array([each[2] for each in node_values]).reshape(-1, 3, n),
         interfaces=tuple(ForeignInterface(f"node {k}", np.array([k])) for k in numbers) if len(numbers) <= 12 else (),
+        geometric=geometric,
         program="SID_FEM",
         provenance={
             "source": "standard input data (SID_FEM)",
@@ -137,6 +148,33 @@ def read_in_order(files: Sequence[Path], name: str, q_second: bool | None) -> Mo
             **{f"note {k + 1}": note for k, note in enumerate([*notes, *found_notes])},
         },
     )
+
+
+def stiffening_of(
+    Ct1: Array | None, Cr1: Array | None, Oe1: Array | None, C5: Array, nodes: list[Array]
+) -> GeometricStiffness | None:
+    """Return the geometric stiffness of the terms of first order; None where there is none.
+
+    Ct1_ka,l = K_t,a,kl; the part of Cr1_ka,l symmetric in k, l is K_r,a,kl;
+    Oe1_k,ab,l = -(5C_lk,ab + 5C_lk,ba) + 2 K_ab,kl, on the diagonal half of it; phi1, psi1 of a node: -K_i.
+    """
+    n = len(C5)
+    zero = np.zeros((n, 3, n))
+    K_t = (zero if Ct1 is None else Ct1).transpose(1, 0, 2)
+    Cr1 = zero if Cr1 is None else Cr1
+    K_r = ((Cr1 + Cr1.transpose(2, 1, 0)) / 2).transpose(1, 0, 2)
+    spin = np.zeros((6, n, n))
+    for column, (a, b) in enumerate(SPIN_COLUMNS):
+        pairs = [(a, b)] if a == b else [(a, b), (b, a)]
+        inertia = sum(C5[:, :, i, j].T for i, j in pairs)  # [k, l] = 5C_lk,ij
+        spin[column] = ((0 if Oe1 is None else Oe1[:, column]) + inertia) / len(pairs)
+    interfaces = -np.array(nodes).reshape(-1, 6, n, n)
+    parts = (K_t, K_r, interfaces)
+    size = np.abs(C5).max(initial=0.0)
+    if not any(part.any() for part in parts) and np.abs(spin).max(initial=0.0) <= SAME * size:
+        return None
+    even = [(part + part.swapaxes(-1, -2)) / 2 for part in (K_t, K_r, spin, interfaces)]
+    return GeometricStiffness(translation=even[0], rotation=even[1], spin=even[2], interfaces=even[3])
 
 
 def gyroscopic(path: Path, Ge: Array | None, Cr1: Array | None, notes: list[str]) -> Array | None:

@@ -122,8 +122,15 @@ def assemble(
     with ThreadPoolExecutor(n_threads()) as pool:
         graph = node_graph(list(lists.values()), len(mesh.nodes), pool)
         K_data, M_data = assembled_data(
-            mesh.nodes, lists, Elasticity.of(properties, tensors), of_cell, graph, pool, incompatible,
-            (integration, mass), progress,
+            mesh.nodes,
+            lists,
+            Elasticity.of(properties, tensors),
+            of_cell,
+            graph,
+            pool,
+            incompatible,
+            (integration, mass),
+            progress,
         )
         K = expanded_stiffness(graph, K_data, pool)
     M_s = sp.csr_array((M_data, graph.columns, index_like(graph.row_start, len(M_data))), shape=2 * (graph.n_nodes,))

@@ -239,9 +239,7 @@ def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[
     record |= {f"cells {kind}": str(len(cells)) for kind, cells in mesh.cells.items() if len(cells)}
     for number, material in enumerate(materials):
         count = sum(int((index == number).sum()) for index in of_cell.values())
-        record[f"material {material.name}"] = (
-            f"{_material_words(material)}, {count} cells"
-        )
+        record[f"material {material.name}"] = f"{_material_words(material)}, {count} cells"
     return {key: value for key, value in record.items() if value} | {"scikit-fem": version("scikit-fem")}
 
 

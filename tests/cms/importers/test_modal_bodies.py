@@ -244,3 +244,19 @@ def test_a_superelement_of_openfast_comes_back(tmp_path):
         path.write_text(changed)
         with pytest.raises(ForeignBodyError, match=words):
             cms.import_body(path, units="m-kg-s")
+
+
+@pytest.mark.parametrize("key", ["mbdyn", "sid_fem", "sid_fem-fembeam"])
+def test_geometric_stiffness_comes_back(key, tmp_path):
+    part = cms.couple(bar(nx=3, width=0.07, height=0.04))
+    own = cms.reduce(part, cms.craig_bampton(part, n_modes=1), stress=False)
+    path = written(own, key, tmp_path)
+    body = cms.import_body(path, units=own.units, interfaces=names_of(own, key))
+    flip = np.sign(np.einsum("ak,ak->k", body.interface("left").Psi[:3], own.interface("left").Psi[:3]) + 1e-300)
+    signs = flip[:, None] * flip
+    for name in ("spin", "rotation", "interfaces", "translation"):
+        expected = getattr(own.geometric, name)
+        size = max(np.abs(expected).max(), 1e-6 * np.abs(own.geometric.interfaces).max())
+        assert_allclose(getattr(body.geometric, name) * signs, expected, rtol=0, atol=1e-6 * size)
+    together = cms.import_body(path, units=own.units, interfaces={"both": [1, 2]})
+    assert together.geometric is None
