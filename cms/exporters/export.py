@@ -137,6 +137,9 @@ def export_body(
     require_content(converted, to, writer)
     request = Request(converted, with_suffix(Path(path), to), source, nodes, loads or {})
     made = writer.make(request)
+    if is_stream(request.path) and list(made.files) != [request.path]:
+        names = ", ".join(file.name for file in made.files)
+        raise ExportError(f"{path}: is a device or a pipe, and {to} is written in files that belong together: {names}")
     try:
         replace_files(made.files)
     except OSError as error:

@@ -46,11 +46,11 @@ FORMATS = (
     ),
     FileFormat(
         "OUTPUT4 with .asm, .pch", "Nastran", "reduced body", (".op4", ".asm", ".pch"), writes=True, key="nastran-op4",
-        tried="pyYeti 1.5", lost=BEYOND_MASS,
+        tried="pyYeti 1.4.7, pyNastran 1.4", lost=BEYOND_MASS,
     ),
     FileFormat(
-        "DMIG", "Nastran", "reduced body", (".pch",), writes=True, key="nastran-dmig", tried="pyYeti 1.5",
-        lost=f"{BEYOND_MASS}, digits beyond the tenth",
+        "DMIG", "Nastran", "reduced body", (".pch",), writes=True, key="nastran-dmig",
+        tried="pyYeti 1.4.7, pyNastran 1.4", lost=f"{BEYOND_MASS}, digits beyond the tenth",
     ),
     FileFormat(
         "ExtPtfm, FlexASCII", "OpenFAST", "reduced body", (".dat",), writes=True, key="ext_ptfm",

@@ -8,7 +8,7 @@ import numpy as np
 
 from cms.errors import ExportError
 from cms.exporters.interface_model import InterfaceModel, interface_model
-from cms.exporters.writer import Made, Request
+from cms.exporters.writer import Made, Request, in_ascii
 from fe_models.foundation.arrays import Array
 
 __all__ = ["make_mat5", "make_mat73", "make_simscape"]
@@ -88,7 +88,7 @@ def notes_of(model: InterfaceModel) -> tuple[str, ...]:
 
 def rows_of_text(lines: Any) -> np.ndarray:
     """Return strings as a column of one length, as MATLAB holds them."""
-    ascii_lines = [line.encode("ascii", "replace").decode("ascii") for line in lines]
+    ascii_lines = [in_ascii(line) for line in lines]
     width = max([len(line) for line in ascii_lines], default=1) or 1
     return np.array([line.ljust(width) for line in ascii_lines])
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
 
-__all__ = ["CONTENT", "Made", "Request", "Writer", "left_out"]
+__all__ = ["CONTENT", "Made", "Request", "Writer", "in_ascii", "left_out"]
 
 #: what a body may hold beside masses, stiffness and shapes: key -> in words, and whether a body has it
 CONTENT: dict[str, tuple[str, Callable[[ReducedBody], bool]]] = {
     "gyroscopic": (
         "inertia of the deformed body beyond its mass matrix (3C, 4C, 5C: Coriolis and centrifugal terms)",
-        lambda body: body.n_q > 0,
+        lambda body: body.n_q > 0 and not body.is_held,
     ),
     "geometric": ("geometric stiffness", lambda body: body.geometric is not None),
     "quadratic": ("displacements of second order", lambda body: body.quadratic is not None),

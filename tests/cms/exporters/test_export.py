@@ -176,6 +176,14 @@ def test_a_place_that_cannot_be_written(body, tmp_path):
         export_body(body, tmp_path / "shut" / "out.h5", to="mbsim", units="m-kg-s")
 
 
+def test_a_device_takes_a_single_file_only(body, tmp_path):
+    cms.export_body(body, "/dev/null", to="mbdyn", units="m-kg-s")
+    with pytest.raises(
+        ExportError, match=r"is a device or a pipe, and exudyn is written in files that belong together"
+    ):
+        cms.export_body(body, "/dev/null", to="exudyn", units="m-kg-s")
+
+
 def test_files_that_belong_together_appear_together_or_not_at_all(body, tmp_path, monkeypatch):
     """The second of two files fails while it is written: neither is there, and the old one is unchanged."""
     from fe_models.foundation import paths
