@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from cms.errors import CmsError, ExportError
+from cms.exporters.abaqus import make_abaqus
 from cms.exporters.ext_ptfm import make_ext_ptfm
 from cms.exporters.exudyn import make_exudyn
 from cms.exporters.formats import FORMATS
@@ -61,6 +62,7 @@ WRITERS: dict[str, Writer] = {
     ),
     "nastran-op4": Writer(make_op4, OVER_INTERFACES, takes_held=True, needs=("interfaces",)),
     "nastran-dmig": Writer(make_dmig, OVER_INTERFACES, takes_held=True, needs=("interfaces",)),
+    "abaqus": Writer(make_abaqus, OVER_INTERFACES - {"load cases"}, takes_held=True, needs=("interfaces",)),
     "ext_ptfm": Writer(
         make_ext_ptfm, OVER_INTERFACES, takes_held=True, takes_loads=True, units="m-kg-s", needs=("interfaces",)
     ),

@@ -53,6 +53,10 @@ FORMATS = (
         tried="pyYeti 1.4.7, pyNastran 1.4", lost=f"{BEYOND_MASS}, digits beyond the tenth",
     ),
     FileFormat(
+        "linear *USER ELEMENT", "Abaqus", "reduced body", (".inp",), writes=True, key="abaqus",
+        tried="our own reader", lost=f"{BEYOND_MASS}, load cases",
+    ),
+    FileFormat(
         "ExtPtfm, FlexASCII", "OpenFAST", "reduced body", (".dat",), writes=True, key="ext_ptfm",
         tried="its documentation", lost=f"{BEYOND_MASS}, all interfaces but one",
     ),

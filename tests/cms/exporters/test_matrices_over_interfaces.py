@@ -210,3 +210,23 @@ def test_superelements_come_back_with_their_frequencies(to, reduced, tmp_path):
     places = [back.frame.origin + back.frame.axes @ each.position for each in back.interfaces]
     expected = [reduced.frame.origin + reduced.frame.axes @ each.position for each in reduced.interfaces]
     assert_allclose(places, expected, rtol=0, atol=1e-9)
+
+
+def test_a_user_element_of_abaqus_holds_dofs_and_triangles(reduced, model, tmp_path):
+    """The reader of substructures of Abaqus and CalculiX: modes are dof 1 of nodes of their own."""
+    from fe_models.importers.matrices.read_matrices import read_matrices
+
+    export(reduced, tmp_path, "bar.inp", "abaqus")
+    (tmp_path / "bar.inp").rename(tmp_path / "bar.mtx")
+    found = read_matrices(tmp_path / "bar.mtx")
+    for name, matrix in {"K": model.K, "M": model.M, "D": model.D}.items():
+        assert_array_equal(getattr(found, name).toarray(), matrix)
+    expected = [(k + 1, c) for k in range(2) for c in range(6)] + [(1000001 + k, 0) for k in range(3)]
+    assert_array_equal(found.dofs, expected)
+    text = (tmp_path / "bar.mtx").read_text()
+    assert "*USER ELEMENT, TYPE=U1, NODES=5, LINEAR" in text
+    assert "1, 1, 2, 1000001, 1000002, 1000003" in text  # the element and its nodes
+    places = np.array(
+        [line.split(", ") for line in text.partition("*NODE\n")[2].split("*")[0].splitlines()], dtype=float
+    )
+    assert_array_equal(places[:2, 1:], [node.position for node in model.nodes])

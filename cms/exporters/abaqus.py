@@ -1,0 +1,60 @@
+"""Abaqus: a superelement as a linear user element, the text that substructures are written in."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cms.exporters.interface_model import InterfaceModel, interface_model
+from cms.exporters.writer import Made, Request
+from fe_models.foundation.arrays import Array
+
+__all__ = ["make_abaqus"]
+
+FIRST_MODE = 1000001  #: number of the node whose dof 1 is the first mode
+PER_LINE = 4  #: entries of a matrix
+
+
+def make_abaqus(request: Request) -> Made:
+    """Return a deck to include: nodes, `*USER ELEMENT, LINEAR` with its dofs and matrices, and the one element.
+
+    Modes are dof 1 of nodes of their own, at the origin. Matrices: column j from row 1 to the diagonal.
+    """
+    model = interface_model(request.body)
+    lines = [*(f"** {line}" for line in request.header()), *lines_of(model)]
+    notes = [f"interface {node.interface}: node {k + 1}" for k, node in enumerate(model.nodes)]
+    if model.n_modes:
+        notes.append(f"modes: dof 1 of nodes {FIRST_MODE} to {FIRST_MODE + model.n_modes - 1}")
+    return Made({request.path: ("\n".join(lines) + "\n").encode("ascii")}, tuple(notes))
+
+
+def lines_of(model: InterfaceModel) -> Iterator[str]:
+    """Yield the deck behind its comments."""
+    numbers = [k + 1 for k in range(len(model.nodes))] + [FIRST_MODE + k for k in range(model.n_modes)]
+    components = [[int(c) + 1 for c in node.components] for node in model.nodes] + [[1]] * model.n_modes
+    places = [node.position for node in model.nodes] + [np.zeros(3)] * model.n_modes
+    yield "*NODE"
+    for number, place in zip(numbers, places, strict=True):
+        yield f"{number}, " + ", ".join(f"{x:.16e}" for x in place)
+    yield f"*USER ELEMENT, TYPE=U1, NODES={len(numbers)}, LINEAR"
+    yield "** ELEMENT NODES"
+    for first in range(0, len(numbers), 10):
+        yield "** " + ", ".join(str(number) for number in numbers[first : first + 10])
+    for k, own in enumerate(components):
+        if k == 0 or own != components[k - 1]:  # a line holds for its node and those behind it
+            yield ", ".join(str(word) for word in (own if k == 0 else [k + 1, *own]))
+    for kind, matrix in {"STIFFNESS": model.K, "MASS": model.M, "VISCOUS DAMPING": model.D}.items():
+        if np.any(matrix):
+            yield f"*MATRIX, TYPE={kind}"
+            yield from triangle(matrix)
+    yield "*ELEMENT, TYPE=U1, ELSET=BODY"
+    words = [str(word) for word in (1, *numbers)]
+    for first in range(0, len(words), 16):
+        yield ", ".join(words[first : first + 16]) + ("," if first + 16 < len(words) else "")
+    yield "*UEL PROPERTY, ELSET=BODY"
+
+
+def triangle(matrix: Array) -> Iterator[str]:
+    """Yield the upper triangle by columns, each number to its last bit."""
+    entries = matrix.T[np.tril_indices(len(matrix))].tolist()
+    for first in range(0, len(entries), PER_LINE):
+        yield ", ".join(f"{value:.16e}" for value in entries[first : first + PER_LINE])
