@@ -16,9 +16,11 @@ pytestmark = [
 OTHERWISE = {
     "dloadlinI.inp": "C3D8I on distorted cells is corrected in another way",
     "dloadlinIf.inp": "C3D8I on distorted cells is corrected in another way",
+    "cube2.inp": "motions without stiffness, by reduced integration: numerical zeros",
+    "cubenewt.inp": "motions without stiffness, by reduced integration: numerical zeros",
     "segment1.inp": "supports along axes of their own (*TRANSFORM) are no interfaces",
 }
-READ_AT_LEAST = 0.82  #: share of the list
+READ_AT_LEAST = 0.83  #: share of the list
 
 
 def test_the_list_of_decks_follows_its_rule():

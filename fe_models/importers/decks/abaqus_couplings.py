@@ -58,7 +58,8 @@ def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _rigid_body(here: str, block: DeckBlock, draft: Draft) -> None:
-    given = block.parameters
+    spaced = {"REFNODE": "REF NODE", "ROTNODE": "ROT NODE"}  # blanks may be left out
+    given = {spaced.get(key, key): value for key, value in block.parameters.items()}
     if "NSET" in given:
         members = draft.nodes_of(here, given["NSET"])
     elif "ELSET" in given:
