@@ -232,7 +232,11 @@ def read(path: Path) -> "System":
     """Return the system of a file."""
     from floatframe.system_file.read_system import read_system
 
-    return read_system(path)[0]
+    system = read_system(path)[0]
+    if system.fmus:
+        names = ", ".join(unit.name for unit in system.fmus)
+        typer.echo(f"note: units of other programs (fmus: {names}) act in runs only; they are left out here", err=True)
+    return system
 
 
 def linearized(
