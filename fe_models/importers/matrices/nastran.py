@@ -27,6 +27,7 @@ USUAL = {
     "D": ("bxx1", *(f"b{end}" for end in SETS)),
 }
 LOADS = ("PX", "PX1", "PA", "PAX", "PG")  #: of which each column is a load
+STRUCTURAL_DAMPING = ("K4XX", "K4XX1", "K4AA", "K4GG", "K4AAX")
 SQUARE = 1  #: form of a matrix with both triangles
 
 
@@ -129,6 +130,9 @@ def _part(
         if raw.name in LOADS and not raw.is_complex and raw.matrix.shape[0] == n and raw.rows is None:
             columns = raw.matrix.toarray()
             loads |= {f"{raw.name} {k + 1}": columns[:, k] for k in range(columns.shape[1])}
+    structural = [raw.name for raw in there if raw.name in STRUCTURAL_DAMPING]
+    if structural:
+        notes = (*notes, f"{', '.join(structural)}: structural damping is left out; give a modal damping in its place")
     used = set(chosen.values()) | {name.partition(" ")[0] for name in loads}
     return ForeignMatrices(
         **full,

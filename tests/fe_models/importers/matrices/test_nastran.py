@@ -80,3 +80,10 @@ def test_complex_matrices_and_other_rows_are_refused(tmp_path):
     (tmp_path / "empty.pch").write_text("$ nothing\nPARAM,POST,-1\n")
     with pytest.raises(MatrixError, match=r"expected matrices \(DMIG\)"):
         read_matrices(tmp_path / "empty.pch")
+
+
+def test_structural_damping_is_said_to_be_left_out(tmp_path):
+    write_op4(tmp_path / "k.op4", {"KAA": np.eye(3), "MAA": np.eye(3), "K4AA": 0.02 * np.eye(3), "BAA": np.eye(3)})
+    read = read_matrices(tmp_path / "k.op4")
+    assert any("K4AA: structural damping is left out" in note for note in read.notes)
+    assert_array_equal(read.D.toarray(), np.eye(3))
