@@ -51,7 +51,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("", vector_words(tensor[1], largest)),
         ("", vector_words(tensor[2], largest)),
         ("principal moments", f"{vector_words(record['principal_moments'])} {inertia}"),
-        ("mass moments", "exact" if record["moments_are_exact"] else "approximate (from bare matrices)"),
+        ("mass moments", moments_words(record)),
         *(
             [("inertia missing", ", ".join(body.moments.missing)), ("to be trusted", body.moments.trust)]
             if body.moments.missing
@@ -104,6 +104,13 @@ def turned_axes(axes: Any) -> list[tuple[str, Any]]:
 def load_scale(case: Any, mass: float) -> float:
     """Return the size of the forces of a load case, also of one in balance: by its resultant and its modal forces."""
     return max(map(abs, [*case["force"], *(h * mass**0.5 for h in case["modal_forces"])]), default=0.0)
+
+
+def moments_words(record: Any) -> str:
+    """Return how well the mass moments are known."""
+    if not record["moments_are_exact"]:
+        return "approximate (from bare matrices)"
+    return "exact, as far as they are known" if record["missing_inertia_terms"] else "exact"
 
 
 def stress_words(stress: Any) -> str:

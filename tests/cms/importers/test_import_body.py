@@ -82,6 +82,7 @@ def test_the_command_writes_a_file_that_says_what_is_missing(outboard, tmp_path)
     result = CliRunner().invoke(app, [*words, str(path)])
     assert result.exit_code == 0, result.output
     assert "inertia missing" in result.output
+    assert "exact, as far as they are known" in result.output
     body = cms.read(path)
     assert [i.name for i in body.interfaces] == ["hub", "tips"]
     record = json.loads(CliRunner().invoke(app, ["check", str(path), "--json"]).output)
