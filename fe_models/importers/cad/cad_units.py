@@ -62,7 +62,8 @@ def _step_units(path: Path, content: bytes) -> set[float]:
             f"geometry {path}: expected a STEP file (ISO-10303-21 in its first line), got {content[:24]!r}; "
             "is the suffix right?"
         )
-    text = {int(number): body.decode("latin-1") for number, body in ENTITY.findall(content) if b"UNIT" in body.upper()}
+    entities = (found for found in ENTITY.finditer(content) if b"UNIT" in found[2].upper())  # one by one: files are large
+    text = {int(found[1]): found[2].decode("latin-1") for found in entities}
     assigned = {int(n) for group in CONTEXT.findall(content) for n in re.findall(rb"#(\d+)", group)}
     units = {number for number in assigned if "LENGTH_UNIT" in text.get(number, "")}
     return {_step_unit(path, text, number) for number in units}
