@@ -62,7 +62,7 @@ def _step_units(path: Path, content: bytes) -> set[float]:
             f"geometry {path}: expected a STEP file (ISO-10303-21 in its first line), got {content[:24]!r}; "
             "is the suffix right?"
         )
-    entities = (found for found in ENTITY.finditer(content) if b"UNIT" in found[2].upper())  # one by one: files are large
+    entities = (found for found in ENTITY.finditer(content) if b"UNIT" in found[2].upper())  # not all at once
     text = {int(found[1]): found[2].decode("latin-1") for found in entities}
     assigned = {int(n) for group in CONTEXT.findall(content) for n in re.findall(rb"#(\d+)", group)}
     units = {number for number in assigned if "LENGTH_UNIT" in text.get(number, "")}
