@@ -72,7 +72,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ],
     )
     free = ", ".join(hertz(f) for f in record["free_frequencies_hz"])
-    say(f"Free-free frequencies [Hz]: {free or 'none'}\n")
+    say(f"{'Frequencies as held' if body.is_held else 'Free-free frequencies'} [Hz]: {free or 'none'}\n")
     if selected := record["provenance"].get("mode set selected"):
         say(f"Selected: {selected}\n")
     print_table(

@@ -149,6 +149,9 @@ def test_a_job_says_that_its_matrices_are_held(tmp_path):
     run = CliRunner().invoke(app, ["reduce", str(tmp_path / "bar.toml")])
     assert run.exit_code == 0, run.stderr
     assert "no floating frame can take it" in run.stdout
+    told = CliRunner().invoke(app, ["info", str(tmp_path / "bar.h5")]).output
+    assert "Frequencies as held [Hz]" in told
+    assert "Free-free" not in told
     run = CliRunner().invoke(app, ["check", str(tmp_path / "bar.h5"), "--job", str(tmp_path / "bar.toml")])
     assert run.exit_code == 0, run.stdout
     assert [record.name for record in check_body(cms.read(tmp_path / "bar.h5")) if record.verdict == "fail"] == []
