@@ -102,8 +102,9 @@ def room_page(package: str, room: str, names: list[str]) -> str:
 
 
 def module_page(module: str) -> str:
-    """Return the page of a module with an `__all__` of its own."""
-    names = sorted(importlib.import_module(module).__all__, key=str.lower)
+    """Return the page of a module with an `__all__` of its own, without the public names of its package."""
+    package = module.split(".")[0]
+    names = sorted(set(importlib.import_module(module).__all__) - set(public_names(package)), key=str.lower)
     return "\n".join([*heading(module, "="), first_line(module), "", *entries(module, names)])
 
 

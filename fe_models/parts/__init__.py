@@ -1,8 +1,9 @@
 """Parametric parts, meshed with gmsh, and the meshes that are shipped."""
 
+from fe_models.errors import MeshingError
 from fe_models.parts.bracket import Bracket, mesh_bracket
 from fe_models.parts.connecting_rod import SLENDER_ROD, ConnectingRod, mesh_connecting_rod
-from fe_models.parts.errors import MeshingError, PartError
+from fe_models.parts.errors import PartError
 from fe_models.parts.gmsh_session import PartMesh
 from fe_models.parts.shipped import SHIPPED_MESHES, shipped_mesh
 

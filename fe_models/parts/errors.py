@@ -1,8 +1,8 @@
 """Errors of the parametric parts."""
 
-from fe_models.errors import FeModelsError, MeshError, MeshingError
+from fe_models.errors import FeModelsError
 
-__all__ = ["MeshError", "MeshingError", "PartError"]
+__all__ = ["PartError"]
 
 
 class PartError(FeModelsError, ValueError):
