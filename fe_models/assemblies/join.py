@@ -5,6 +5,9 @@
 (2) u_parts = S u, S a selection: K = Sᵀ diag(K_parts) S
 (3) constraints are eliminated, u = T u_rest (`fe_models.assemblies.constraints`)
 (4) rotations that nothing holds and that have no mass are no dofs of the whole
+
+The recovery has a row for each dof of the parts and, behind them, for each component that only a constraint gives a
+node (all six of a leader that is no node of a part): it moves in pictures and sensors as its interface says.
 """
 
 from collections.abc import Iterable, Sequence
@@ -14,8 +17,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.assemblies.constraints import Constraint, MeanMotion, RigidNodes, eliminated
+from fe_models.assemblies.massless_nodes import MasslessNodes
 from fe_models.body.elimination import eliminate_dofs
-from fe_models.body.fe_body import FEBody, Recovery
+from fe_models.body.fe_body import MULTIPLIER, FEBody, Recovery
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.weld import WeldedModel, WeldedPoints, mesh_rows
@@ -74,7 +78,7 @@ def join(name: str, parts: Sequence[Part], points: Array, constraints: Iterable[
     slaves, T_s = eliminated(constraints, points, dof_of, whole.n_dof)
     if len(slaves):
         whole = eliminate_dofs(whole, slaves, T_s)
-    return Joined(_without_idle_rotations(whole), place)
+    return Joined(_without_idle_rotations(whole, sum(len(recovered_dofs(body)) for body in bodies)), place)
 
 
 def _leaders(constraints: list[Constraint]) -> IntArray:
@@ -114,6 +118,8 @@ def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArr
         Recovery(sp.eye_array(body.n_dof, format="csr"), body.dofs) if body.recovery is None else body.recovery
         for body in bodies
     ]
+    loose = np.flatnonzero(np.diff(S.tocsc().indptr) == 0)  # dofs of leaders that no part has
+    own = sp.csr_array((np.ones(len(loose)), (np.arange(len(loose)), loose)), shape=(len(loose), len(dofs)))
     n_mesh_dof = tuple(int(recovery.matrix.shape[0]) for recovery in recoveries)
     models = [body.element_model for body in bodies]
     volumes = [np.zeros(len(b.nodes)) if b.node_volumes is None else b.node_volumes for b in bodies]
@@ -138,10 +144,16 @@ def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArr
         surface=np.concatenate([body.surface + begin for body, begin in zip(bodies, first, strict=False)]),
         element_model=None
         if any(model is None for model in models)
-        else WeldedModel(tuple(model for model in models if model is not None), n_mesh_dof, counts),
+        else WeldedModel(
+            (*(model for model in models if model is not None), MasslessNodes(len(loose), n_added)),
+            (*n_mesh_dof, len(loose)),
+            (*counts, n_added),
+        ),
         recovery=Recovery(
-            sp.csr_array(sp.block_diag([recovery.matrix for recovery in recoveries], format="csr") @ S),
-            np.concatenate([r.dofs + np.array([n, 0]) for r, n in zip(recoveries, first, strict=False)]),
+            sp.vstack([sp.block_diag([recovery.matrix for recovery in recoveries], format="csr") @ S, own], "csr"),
+            np.concatenate(
+                [*(r.dofs + np.array([n, 0]) for r, n in zip(recoveries, first, strict=False)), dofs[loose]]
+            ),
         ),
         stress_points=WeldedPoints(points) if points else None,
         node_volumes=np.concatenate([*volumes, np.zeros(n_added)]) if has_volumes else None,
@@ -153,10 +165,26 @@ def _side_by_side(name: str, bodies: list[FEBody], S: sp.csr_array, dofs: IntArr
     )
 
 
-def _without_idle_rotations(body: FEBody) -> FEBody:
-    """Step (4); a rotation with mass and no stiffness stays, and shows as a motion without frequency."""
+def recovered_dofs(body: FEBody) -> IntArray:
+    """Return (node, component) of the dofs of the mesh behind a body, (n_mesh_dof, 2)."""
+    return body.dofs if body.recovery is None else body.recovery.dofs
+
+
+def _without_idle_rotations(body: FEBody, n_of_parts: int) -> FEBody:
+    """Step (4); a rotation with mass and no stiffness stays, and shows as a motion without frequency.
+
+    Rows of the recovery beyond those of the parts that are rotations of this kind are no motion of their node: they
+    lose their component, as its rotation is not zero but unknown.
+    """
     is_idle = body.dofs[:, 1] >= 3
     for A in (body.K, body.M):
         is_idle &= np.asarray(abs(A).sum(axis=0)).ravel() == 0
     idle = np.flatnonzero(is_idle)
-    return eliminate_dofs(body, idle, sp.csr_array((len(idle), body.n_dof))) if len(idle) else replace(body)
+    if not len(idle):
+        return body
+    without = eliminate_dofs(body, idle, sp.csr_array((len(idle), body.n_dof)))
+    assert without.recovery is not None
+    T, dofs = without.recovery.matrix, without.recovery.dofs.copy()
+    is_lost = (np.arange(len(dofs)) >= n_of_parts) & ~abs(T).sum(axis=1).astype(bool)
+    dofs[is_lost, 1] = MULTIPLIER
+    return replace(without, recovery=Recovery(T, dofs))

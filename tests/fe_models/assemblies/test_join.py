@@ -15,6 +15,7 @@ from fe_models.body.fe_body import Interface
 from fe_models.body.weighted_motion import weighted_motion
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import unit_system
+from fe_models.loads import nodal_load
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.unused_nodes import drop_unused_nodes
@@ -159,3 +160,24 @@ def test_a_mean_motion_with_weights_per_component_holds_rotations_too():
     assert_allclose(joined.M.toarray(), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
     with pytest.raises(BodyError, match="c: weighted motion"):
         join("j", parts, points, [MeanMotion("c", 3, members[:3], np.ones(3))])
+
+
+@pytest.mark.parametrize("at", [[0.3, 0.5, 0.5], [1.3, 0.5, 0.5]])
+def test_a_leader_without_elements_is_seen_to_move_with_the_interface_on_it(at):
+    """Two roads: the same nodes as a rigid interface of its own; and the leader's node against its interface."""
+    mesh = box_mesh(3, 1, 1)
+    body = solid_body(mesh, STEEL, name="b", units=UNITS)
+    members, point, leader = mesh.node_sets["right"], np.array(at), len(mesh.nodes)
+    part = Part(body, np.arange(leader))
+    joined = join("j", [part], np.vstack([mesh.nodes, point]), [RigidNodes("right", leader, members)])
+    place = int(joined.place[leader])
+    ours = couple(joined.body.with_interfaces(Interface("tip", "rigid", np.array([place]), point)))
+    theirs = couple(body.with_interfaces(Interface("tip", "rigid", members, point)))
+    u = np.random.default_rng(4).normal(size=(ours.n_dof, 3))
+    assert_array_equal(ours.translations(u)[place], u[ours.interface("tip").dofs[:3]])
+    assert_allclose(ours.translations(u)[:leader], theirs.translations(u)[:leader], rtol=0, atol=1e-13)
+    force = np.random.default_rng(5).normal(size=6)
+    for held in (joined.body, ours):  # the work of a load on the leader is that on its own six components
+        at_node = np.flatnonzero(held.dofs[:, 0] == (place if held is joined.body else ours.dofs[-1, 0]))
+        load = nodal_load(held, "f", {place: force})
+        assert_allclose(load.f @ u, force @ u[at_node], rtol=1e-12, atol=0)
