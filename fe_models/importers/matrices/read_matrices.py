@@ -20,7 +20,11 @@ from fe_models.importers.matrices.request import MatrixFormat, Request
 from fe_models.importers.matrices.scipy_files import is_harwell_boeing, read_harwell_boeing, read_npz
 from fe_models.importers.matrices.text_files.abaqus_labels import is_labelled, read_labelled
 from fe_models.importers.matrices.text_files.abaqus_text import is_coordinates, read_coordinates
-from fe_models.importers.matrices.text_files.calculix import read_calculix_dofs, read_calculix_matrix
+from fe_models.importers.matrices.text_files.calculix import (
+    calculix_neighbours,
+    read_calculix_dofs,
+    read_calculix_matrix,
+)
 from fe_models.importers.matrices.text_files.matrix_market import is_matrix_market, read_matrix_market
 from fe_models.importers.matrices.text_files.user_element import is_user_element, read_user_element
 from fe_models.importers.nastran_matrices.op2 import is_op2
@@ -58,7 +62,8 @@ def read_matrices(files: MatrixFiles, *, names: Mapping[str, str] | None = None)
     ----------
     files
         One path; several, each with a part of the model (stiffness, mass, list of dofs); or role -> path, with roles
-        "K", "M", "D" where a file does not say which matrix it holds, and "dofs" for a list of rows.
+        "K", "M", "D" where a file does not say which matrix it holds, and "dofs" for a list of rows. Files of CalculiX
+        without roles bring those of the same name beside them along, which the notes say.
     names
         Role -> name of its matrix, for files that hold several by name and not under the usual ones.
 
@@ -85,9 +90,12 @@ def read_matrices(files: MatrixFiles, *, names: Mapping[str, str] | None = None)
         for role in asked:
             if role not in (*ROLES, "dofs"):
                 raise MatrixError(f"matrices: unknown role {quoted(role)}{nearest(role, (*ROLES, 'dofs'))}")
+    beside = [] if any(role for role, _ in listed) else calculix_neighbours([path for _, path in listed])
+    listed += [(None, path) for path in beside]
     parts = [read_part(path, Request(role, dict(names or {}))) for role, path in listed]
     where = f"matrices {', '.join(path.name for _, path in listed)}"
-    return in_basic_axes(joined(parts, where))
+    read = in_basic_axes(joined(parts, where))
+    return replace(read, notes=(*read.notes, *(f"{path.name} taken from beside the named files" for path in beside)))
 
 
 def read_part(path: Path, request: Request) -> ForeignMatrices:

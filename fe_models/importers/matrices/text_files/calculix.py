@@ -1,5 +1,6 @@
 """Matrices of CalculiX, `*FREQUENCY, SOLVER=MATRIXSTORAGE`: .sti, .mas, and the list of dofs .dof."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,26 @@ from fe_models.importers.matrices.request import Request
 from fe_models.importers.matrices.text_files.triplet_text import parsed_triplets
 from fe_models.importers.matrices.triangles import full_matrix, require_size
 
-__all__ = ["read_calculix_dofs", "read_calculix_matrix"]
+__all__ = ["calculix_neighbours", "read_calculix_dofs", "read_calculix_matrix"]
 
 ROLES_OF_SUFFIXES = {".sti": "K", ".mas": "M"}
+WRITTEN_TOGETHER = (".sti", ".mas", ".dof")  #: by one run, under one name
+
+
+def calculix_neighbours(paths: Sequence[Path]) -> list[Path]:
+    """Return the files that CalculiX wrote beside the given ones: all have one name, and these stand there unnamed.
+
+    Parameters
+    ----------
+    paths
+        Of one model. Files of several names, or of other kinds among them, were chosen one by one: nothing is added.
+    """
+    names = {path.with_suffix("") for path in paths}
+    given = {path.suffix.lower() for path in paths}
+    if len(names) != 1 or not given <= set(WRITTEN_TOGETHER) or given == {".dof"}:
+        return []
+    beside = [next(iter(names)).with_suffix(suffix) for suffix in WRITTEN_TOGETHER if suffix not in given]
+    return [path for path in beside if path.is_file()]
 
 
 def read_calculix_matrix(path: Path, request: Request) -> ForeignMatrices:

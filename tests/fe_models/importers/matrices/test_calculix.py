@@ -89,6 +89,22 @@ def test_a_list_of_dofs_that_does_not_fit_is_refused(tmp_path):
         fe_models.read_matrices([stiffness, mass, wrong])
 
 
+def test_the_stiffness_alone_brings_mass_and_dofs_from_beside_it_and_says_so(tmp_path):
+    stiffness, mass, dofs = unpack("bar", tmp_path)
+    shutil.copy(dofs, tmp_path)
+    alone, named = fe_models.read_matrices(stiffness), fe_models.read_matrices([stiffness, mass, dofs])
+    assert_array_equal(alone.M.toarray(), named.M.toarray())
+    assert_array_equal(alone.dofs, named.dofs)
+    assert "bar.mas taken from beside the named files" in alone.notes
+    assert "bar.dof taken from beside the named files" in alone.notes
+    assert sorted(Path(path).name for path in alone.files) == ["bar.dof", "bar.mas", "bar.sti"]
+    other = mass.rename(tmp_path / "other.mas")
+    chosen = fe_models.read_matrices([stiffness, other])
+    assert chosen.dofs is None
+    assert not chosen.notes
+    assert fe_models.read_matrices({"K": stiffness}).dofs is None
+
+
 def test_nodes_that_are_not_in_the_deck_are_named(tmp_path):
     paths = unpack("bar", tmp_path)
     deck = tmp_path / "other.inp"
