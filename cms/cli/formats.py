@@ -11,30 +11,48 @@ from cms.importers.formats import FORMATS as REDUCED
 from fe_models.foundation.formats import FileFormat
 from fe_models.importers.formats import FORMATS as MODELS
 
-__all__ = ["list_formats", "markdown_table"]
+__all__ = ["FORMATS", "list_formats", "markdown_tables"]
 
-FORMATS = (*MODELS, *REDUCED, *EXPORTED)
-HEAD = ("program", "format", "holds", "files", "in", "out", "name", "tried", "what is lost", "extra")
+HELD = ("mesh", "geometry", "deck", "matrices", "reduced body")  #: what files hold, from the part to the body
+FORMATS = tuple(sorted((*MODELS, *REDUCED, *EXPORTED), key=lambda known: HELD.index(known.holds)))
+IN = ("program", "format", "holds", "what is lost", "tried")
+OUT = ("program", "format", "--to", "what is lost", "tried")
 
 
 def list_formats(*, as_json: bool, as_markdown: bool) -> None:
-    """Print the table of formats, for readers, other programs or docs/formats.md."""
+    """Print the formats that come in and those that go out, for readers, other programs or docs/formats.md."""
     if as_json:
         typer.echo(json.dumps([asdict(known) for known in FORMATS], indent=2))
     elif as_markdown:
-        typer.echo(markdown_table())
+        typer.echo(markdown_tables())
     else:
-        print_table("formats of other programs", HEAD, [row(known) for known in FORMATS])
+        print_table("What comes in", IN, rows_in())
+        print_table("What goes out", OUT, rows_out())
 
 
-def markdown_table() -> str:
-    """Return the table as it stands in docs/formats.md."""
-    rows = [HEAD, ("---",) * len(HEAD), *(row(known) for known in FORMATS)]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
+def markdown_tables() -> str:
+    """Return both tables as they stand in docs/formats.md."""
+    parts = (("What comes in", IN, rows_in()), ("What goes out", OUT, rows_out()))
+    return "\n\n".join(f"**{title}**\n\n{markdown(head, rows)}" for title, head, rows in parts)
 
 
-def row(known: FileFormat) -> tuple[str, ...]:
-    """Return the cells of one format."""
-    reads, writes = ("yes" if done else "" for done in (known.reads, known.writes))
-    ways = " ".join(known.suffixes), reads, writes, known.key
-    return known.program, known.name, known.holds, *ways, known.tried, known.lost, known.extra
+def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """Return a table in Markdown; stars of keywords are letters."""
+    cells = [head, ("---",) * len(head), *(tuple(cell.replace("*", "\\*") for cell in row) for row in rows)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in cells)
+
+
+def rows_in() -> list[tuple[str, ...]]:
+    """Return the cells of the formats that are read."""
+    return [(f.program, format_words(f), f.holds, f.lost, f.tried) for f in FORMATS if f.reads]
+
+
+def rows_out() -> list[tuple[str, ...]]:
+    """Return the cells of the formats that are written."""
+    return [(f.program, format_words(f), f.key, f.lost, f.tried) for f in FORMATS if f.writes]
+
+
+def format_words(known: FileFormat) -> str:
+    """Return the name of a format with its files, and the extra that it needs."""
+    extra = f"; extra {known.extra}" if known.extra else ""
+    return f"{known.name} ({' '.join(known.suffixes)}{extra})"

@@ -1,6 +1,6 @@
 """The table of docs/formats.md is that of `cms formats`."""
 
-from cms.cli.formats import FORMATS, markdown_table
+from cms.cli.formats import FORMATS, markdown_tables
 from fe_models.importers.read_mesh import MESH_FORMATS
 from tests.root import ROOT
 
@@ -8,7 +8,7 @@ from tests.root import ROOT
 def test_the_page_has_the_table_of_the_command():
     page = (ROOT / "docs" / "formats.md").read_text()
     table = page.partition("<!-- formats -->\n")[2].partition("<!-- end of formats -->")[0]
-    assert table.strip() == markdown_table(), "write it again: cms formats --markdown"
+    assert table.strip() == markdown_tables(), "write it again: cms formats --markdown"
 
 
 def test_every_suffix_of_a_mesh_is_listed():
