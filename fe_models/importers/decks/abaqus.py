@@ -57,6 +57,7 @@ _NONLINEAR = {
     "NONSTRUCTURAL MASS": "mass that is not at nodes",
     "FLUID SECTION": "fluid elements",
 }  #: keyword -> why it cannot be taken over: these carry mass, stiffness or constraints
+_FIRST = ("ELEMENT", "TRANSFORM", "SURFACE")  #: read before the others, which may stand above them
 _SILENT = ("STEP", "END STEP", "ENDSTEP", "NO ANALYSIS")
 
 
@@ -89,7 +90,7 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
             f"*{word}" if word in ("NSET", "ELSET") else "*ELEMENT" if "elements" in note else "*PART", note
         )
     step, steps = 0, ""
-    for block in blocks:
+    for block in sorted(blocks, key=lambda block: block.keyword not in _FIRST):
         here = f"{where}, {block.place}: *{block.keyword}"
         try:
             if block.keyword == "STEP":

@@ -115,6 +115,14 @@ def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) ->
         key: f"{instance}.{value}" if key in NAMES and value and not value.isdigit() else value
         for key, value in block.parameters.items()
     }
+    for key in ("REF NODE", "ROT NODE"):
+        if parameters.get(key, "").isdigit():
+            parameters[key] = str(int(parameters[key]) + offset)
+    if block.keyword in ("BEAM SECTION", "BEAM GENERAL SECTION") and not np.array_equal(R, np.eye(3)):
+        n1 = block.lines[1] if len(block.lines) > 1 else "0, 0, -1"
+        turned = R @ np.array([float(word or 0) for word in n1.rstrip(", ").split(",")][:3])
+        line = ", ".join(repr(float(value)) for value in turned)
+        return replace(block, parameters=parameters, lines=[*block.lines[:1], line, *block.lines[2:]])
     if block.keyword == "NODE":
         lines = []
         for line in block.lines:

@@ -88,11 +88,16 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     leader = int(draft.nodes_of(here, given.get("REF NODE", ""))[0])
     members = surface_nodes(here, draft, given.get("SURFACE", ""))
     if block.keyword == "KINEMATIC":
-        held: set[int] = set()
-        for line in block.lines:
-            limits = [int(word) for word in line.rstrip(", ").split(",")]
-            held |= set(range(limits[0] - 1, limits[-1]))
-        _rigid_group(here, draft, leader, members, tuple(sorted(held)) or (0, 1, 2, 3, 4, 5))
+        components = tuple(sorted(_limits(block))) or (0, 1, 2, 3, 4, 5)
+        whole = all(set(part) <= set(components) or not set(part) & set(components) for part in ((0, 1, 2), (3, 4, 5)))
+        if not whole and ("ORIENTATION" in given or draft.transformed & {leader, *members.tolist()}):
+            why = "single components along axes of their own (ORIENTATION, *TRANSFORM)"
+            draft.ledger.refuse("*KINEMATIC", why, line=block.line_number)
+            return
+        _rigid_group(here, draft, leader, members, components)
+        return
+    if block.lines and _limits(block) != set(range(6)):
+        draft.ledger.refuse("*DISTRIBUTING", "of some components of the reference node", line=block.line_number)
         return
     name = given.get("CONSTRAINT NAME", f"coupling_{len(draft.couplings) + 1}")
     draft.ledger.note("*DISTRIBUTING", "every node of the surface has the same weight", line=block.line_number)
@@ -100,8 +105,17 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     draft.couplings.append(Coupling(name, draft.node_group(here, [leader]), ((group, 1.0),)))
 
 
+def _limits(block: DeckBlock) -> set[int]:
+    """Return the components, 0 to 5, of lines of a first and a last one."""
+    held: set[int] = set()
+    for line in block.lines:
+        limits = [int(word) for word in line.rstrip(", ").split(",")]
+        held |= set(range(limits[0] - 1, limits[-1]))
+    return held
+
+
 def _distributing_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
-    of_set = draft.points.pop(block.parameters.get("ELSET", "").upper(), None)
+    of_set = draft.points_of(block.parameters.get("ELSET", ""))
     if of_set is None or len(of_set.rows) != 1:
         draft.ledger.refuse("*DISTRIBUTING COUPLING", "expected one element DCOUP3D", line=block.line_number)
         return
@@ -110,7 +124,7 @@ def _distributing_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
         word, weight = [part.strip() for part in line.rstrip(", ").split(",")][:2]
         members.append((draft.node_group(here, draft.nodes_of(here, word), word), float(weight)))
     name = f"coupling_{len(draft.couplings) + 1}"
-    draft.couplings.append(Coupling(name, draft.node_group(here, of_set.rows[0]), tuple(members)))
+    draft.couplings.append(Coupling(name, draft.node_group(here, next(iter(of_set.rows.values()))), tuple(members)))
 
 
 def _mpcs(here: str, block: DeckBlock, draft: Draft) -> None:

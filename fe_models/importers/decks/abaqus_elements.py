@@ -62,9 +62,11 @@ def read_element(here: str, block: DeckBlock, draft: Draft) -> None:
         words = [int(word) for word in block.words]
         if len(words) % (n + 1):
             raise MeshError(f"{here}: {name} elements have {n} nodes: expected a multiple of {n + 1} numbers below")
-        rows = np.array(words, dtype=np.int64).reshape(-1, n + 1)[:, 1:]
-        of_set = draft.points.setdefault(block.parameters.get("ELSET", "").upper(), PointElements(name))
-        of_set.rows += [tuple(row) for row in rows.tolist()]
+        rows = np.array(words, dtype=np.int64).reshape(-1, n + 1).tolist()
+        key = block.parameters.get("ELSET", "").upper()
+        if draft.points.setdefault(key, PointElements(name)).kind != name:
+            key = f"{key} {name}"  # no name of a set: found by its numbers
+        draft.points.setdefault(key, PointElements(name)).rows.update({row[0]: tuple(row[1:]) for row in rows})
     elif name in draft.mesh.ignored:
         draft.ledger.refuse(name, "this element is not known here", count=len(block.lines), line=block.line_number)
 

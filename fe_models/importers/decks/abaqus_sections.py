@@ -66,7 +66,7 @@ def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
         draft.ledger.note("*NORMAL", "normals follow from the mesh", line=block.line_number)
     else:
         draft.ledger.refuse(f"*{block.keyword}", "not known here", line=block.line_number)
-        if "ELSET" in block.parameters:  # told once
+        if draft.points_of(block.parameters.get("ELSET", "")) is None and "ELSET" in block.parameters:  # told once
             draft.sectioned.append(draft.elements_of(here, block.parameters["ELSET"]))
 
 
@@ -144,7 +144,8 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
     n1 = numbers(block.lines[1])[:3] if len(block.lines) > 1 else [0.0, 0.0, -1.0]
     shape = shapes[kind]()
     scale = (shape["width"], shape["height"]) if "width" in shape else (2 * float(shape["radius"]),) * 2
-    offset = (offsets[0] * float(scale[0]), offsets[1] * float(scale[1]))
+    # as of shells, the nodes lie this far from the centroid
+    offset = (-offsets[0] * float(scale[0]) + 0.0, -offsets[1] * float(scale[1]) + 0.0)
     if kept.size:
         group = draft.cell_group(name, kept)
         draft.lines.append(LineSection(group, _material_of(block, draft), shape, (n1[0], n1[1], n1[2]), offset))
@@ -170,15 +171,17 @@ def _material_of(block: DeckBlock, draft: Draft) -> str:
 
 
 def _masses(here: str, block: DeckBlock, draft: Draft) -> None:
-    of_set = draft.points.pop(block.parameters.get("ELSET", "").upper(), None)
-    if of_set is not None:
+    of_set = draft.points_of(block.parameters.get("ELSET", ""))
+    if block.parameters.get("TYPE", "ISOTROPIC").upper() != "ISOTROPIC":
+        draft.ledger.refuse("*MASS", "a mass of its own in each direction", line=block.line_number)
+    elif of_set is not None:
         mass = numbers(block.lines[0])[0]
-        for row in of_set.rows:
+        for row in of_set.rows.values():
             draft.masses.append(DeckMass(draft.node_group(here, row), mass))
 
 
 def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
-    of_set = draft.points.pop(block.parameters.get("ELSET", "").upper(), None)
+    of_set = draft.points_of(block.parameters.get("ELSET", ""))
     if of_set is None:
         return
     n = len(of_set.rows)
@@ -187,7 +190,7 @@ def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
         return
     if of_set.kind == "SPRINGA":
         k = numbers(block.lines[-1])[0]
-        for row in of_set.rows:
+        for row in of_set.rows.values():
             draft.springs.append(_axial(here, draft, row, k))
     else:
         why = "a spring to the ground" if of_set.kind == "SPRING1" else "a spring between single components"
@@ -208,7 +211,7 @@ def _axial(here: str, draft: Draft, row: tuple[int, ...], k: float) -> DeckSprin
 
 
 def _dashpots(here: str, block: DeckBlock, draft: Draft) -> None:
-    of_set = draft.points.pop(block.parameters.get("ELSET", "").upper(), None)
+    of_set = draft.points_of(block.parameters.get("ELSET", ""))
     if of_set is not None:
         why = "dampers stand in the system file, or in [damping]"
         draft.ledger.note(of_set.kind, why, count=len(of_set.rows), line=block.line_number)

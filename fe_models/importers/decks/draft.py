@@ -36,7 +36,7 @@ class PointElements:
     """Elements of points: masses, springs, dashpots."""
 
     kind: str
-    rows: list[tuple[int, ...]] = field(default_factory=list)  #: numbers of their nodes
+    rows: dict[int, tuple[int, ...]] = field(default_factory=dict)  #: number -> numbers of its nodes
 
 
 @dataclass
@@ -90,6 +90,19 @@ class Draft:
         if key not in self.mesh.element_sets:
             raise MeshError(f"{here}: unknown element set {quoted(word)}{nearest(word, self.mesh.element_sets)}")
         return self.mesh.element_sets[key]
+
+    def points_of(self, word: str) -> PointElements | None:
+        """Return the elements of points of a set, and take them out of those that wait for a section; None: none."""
+        key = word.strip().strip('"').upper()
+        found = self.points.pop(key, None)
+        members = set(self.mesh.element_sets.get(key, np.zeros(0, np.int64)).tolist())
+        for other in list(self.points.values()):
+            mine = [number for number in other.rows if number in members]
+            if mine and found is None:
+                found = PointElements(other.kind)
+            if found is not None and found.kind == other.kind:
+                found.rows |= {number: other.rows.pop(number) for number in mine}
+        return found
 
     def node_group(self, here: str, numbers: Iterable[int], name: str = "") -> str:
         """Return the name of a group of these nodes: a set of the deck that is the same, or one made here."""
@@ -156,6 +169,10 @@ class Draft:
                 counts[name] = counts.get(name, 0) + n
         for name, n in counts.items():
             self.ledger.refuse(name, "elements without a section: neither material nor thickness is known", count=n)
+        for waiting in self.points.values():
+            if waiting.rows:
+                why = "elements without a section: neither mass nor stiffness is known"
+                self.ledger.refuse(waiting.kind, why, count=len(waiting.rows))
         if self.pending:
             self.ledger.refuse("*COUPLING", "neither *KINEMATIC nor *DISTRIBUTING stands below it")
 

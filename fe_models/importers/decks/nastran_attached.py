@@ -51,6 +51,9 @@ def _bush(model: NastranModel, card: Card) -> None:
     if known is None or not card.text(4) or card.text(4) == "0":
         model.ledger.refuse("CBUSH", "without PBUSH, or to the ground: put it into the system file")
         return
+    if card.text(10) or card.real(9, 0.5) != 0.5:
+        model.ledger.refuse("CBUSH", "acting elsewhere than midway between its grid points (S, OCID)")
+        return
     k, b = [0.0] * 6, [0.0] * 6
     keys = {"K": k, "B": b}
     words = list(known.fields)

@@ -106,6 +106,9 @@ def _bars(model: NastranModel, known: Card, cards: list[Card]) -> None:
         if card.text(9) not in ("", "0") or card.text(10) not in ("", "0"):
             model.ledger.refuse(card.name, "released ends (PA, PB)")
             continue
+        if set(card.text(8).upper()[1:]) - {"G"} and any(card.text(k) for k in range(11, 17)):
+            model.ledger.refuse(card.name, f"offsets along the axes of the element (OFFT {card.text(8)})")
+            continue
         ends = [model.point(card, card.integer(k)) for k in (3, 4)]
         v = _orientation(model, card, defaults, ends[0])
         key = _offset(model, card, ends, v)
@@ -188,8 +191,8 @@ def _pbeam(model: NastranModel, card: Card) -> tuple[dict[str, Any], float] | No
     stations = [k for k in range(17, len(card.fields)) if card.text(k).upper() in ("YES", "YESA", "NO")]
     last = 17
     for k in stations:
-        own = [card.text(k + j) for j in (2, 3, 4, 5, 6)]
-        base = [card.text(j) for j in (3, 4, 5, 6, 7)]
+        own = [card.text(k + j) for j in (2, 3, 4, 5, 6, 7)]
+        base = [card.text(j) for j in (3, 4, 5, 6, 7, 8)]
         if any(word and word != was for word, was in zip(own, base, strict=True)):
             return None
         last = k + 16 if card.text(k).upper() == "YES" else k + 8

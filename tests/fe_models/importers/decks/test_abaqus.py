@@ -255,3 +255,56 @@ def test_tied_nodes_follow_the_face_they_stand_on(tmp_path):
     for equation in deck.equations:
         total = sum(a * u[deck.mesh.node_sets[group][0], c] for group, c, a in equation.terms)
         assert abs(total) < 1e-12
+
+
+def test_parts_that_are_turned_turn_their_beams_and_keep_their_reference_nodes(tmp_path):
+    """The local 1-direction of a beam belongs to its part; so does a reference node that is named by its number."""
+    part = PART.replace("*END PART", "*NODE\n5, 2, 0, 0\n*ELEMENT, TYPE=B31, ELSET=arm\n2, 2, 5\n"
+        "*BEAM SECTION, ELSET=arm, MATERIAL=STEEL, SECTION=RECT\n0.1, 0.2\n0., 1., 0.\n"
+        "*RIGID BODY, NSET=both, REF NODE=3\n*END PART", 1)  # fmt: skip
+    deck = deck_of(tmp_path, part.replace("*RIGID BODY, NSET=Bar-2.both, REF NODE=point\n", ""))
+    first, second = deck.lines
+    assert_allclose(first.orientation, [0, 1, 0])
+    assert_allclose(second.orientation, [-1, 0, 0], atol=1e-15)
+    assert [numbers(deck, link.node) for link in deck.rigid] == [[3], [13]]
+
+
+def test_nodes_of_a_beam_with_an_offset_lie_off_its_centroid(tmp_path):
+    """OFFSET1 = 0.5: the nodes are on the surface towards 1. CalculiX 2.20 writes the section from -0.2 to 0 there."""
+    deck = deck_of(tmp_path, DECK.replace("SECTION=RECT", "SECTION=RECT, OFFSET1=0.5, OFFSET2=0.25"))
+    assert_allclose(deck.lines[0].offset, [-0.1, -0.075])
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("MASS, ELSET=lead\n4, 30", "MASS\n4, 30\n*ELSET, ELSET=lead\n4"),
+        ("*ELEMENT, TYPE=MASS, ELSET=lead\n4, 30", "*ELEMENT, TYPE=MASS, ELSET=x\n4, 30\n*ELSET, ELSET=lead\n4"),
+        ("*HEADING\n", "*HEADING\n*MASS, ELSET=lead\n2.5\n"),
+    ],
+)
+def test_a_mass_is_found_by_any_set_and_in_any_order(tmp_path, old, new):
+    text = DECK if "HEADING" not in old else DECK.replace("*MASS, ELSET=lead\n2.5\n", "")
+    deck = deck_of(tmp_path, text.replace(old, new))
+    assert [(numbers(deck, mass.nodes), mass.mass) for mass in deck.masses] == [([30], 2.5)]
+    deck.ledger.require_whole()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("*MASS, ELSET=lead\n2.5\n", "", "1 MASS: elements without a section"),
+        ("*SPRING, ELSET=coil\n\n1000.\n", "", "1 SPRINGA: elements without a section"),
+        ("*MASS, ELSET=lead\n", "*MASS, ELSET=lead, TYPE=ANISOTROPIC\n", r"1 \*MASS.*: a mass of its own"),
+        ("*RIGID BODY, NSET=top, REF NODE=30",
+         "*COUPLING, REF NODE=30, SURFACE=top, ORIENTATION=o, CONSTRAINT NAME=c\n*KINEMATIC\n1, 1",
+         r"1 \*KINEMATIC.*: single components along axes of their own"),
+        ("*RIGID BODY, NSET=top, REF NODE=30",
+         "*COUPLING, REF NODE=30, SURFACE=top, CONSTRAINT NAME=c\n*DISTRIBUTING\n1, 3",
+         r"1 \*DISTRIBUTING.*: of some components"),
+    ],
+)  # fmt: skip
+def test_what_was_left_out_in_silence_is_refused(tmp_path, old, new, words):
+    assert old in DECK
+    with pytest.raises(MeshError, match=words):
+        deck_of(tmp_path, DECK.replace(old, new)).ledger.require_whole()
