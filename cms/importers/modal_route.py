@@ -22,6 +22,7 @@ from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterfa
 from cms.solvers.orientation import orientation
 from fe_models.body.couplings import mean_motion
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.reports.unit_check import implausible_motion
 
 __all__ = ["body_of_modes"]
 
@@ -108,11 +109,25 @@ def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
         geometric=geometric_at(where, body, interfaces, Z) if in_mean_axes else None,
     )
     reduced = replace(reduced, free_frequencies=free_frequencies(where, reduced))
+    require_plausible(where, reduced, options.accept)
     if options.frame is None and in_mean_axes:  # (4)
         return reduced
     if body.geometric is not None and not in_mean_axes:
         log.warning("%s: its geometric stiffness is that of a frame which the file does not name: left out", where)
     return convert_frame(reduced, options.frame or TisserandFrame())
+
+
+def require_plausible(where: str, reduced: ReducedBody, accept: tuple[str, ...]) -> None:
+    """Raise `ForeignBodyError` if no body in these units has such a size, density or first frequency."""
+    frequencies = np.asarray(reduced.free_frequencies)
+    first = float(frequencies[0]) / reduced.units.time if len(frequencies) else None
+    for text in implausible_motion(reduced.units, reduced.nodes, reduced.moments.m, first):
+        if "units" not in accept:
+            raise ForeignBodyError(
+                f'{where}: units {reduced.units.name}: {text}; name the units of the file, or accept = ["units"] if it '
+                "is meant"
+            )
+        log.warning("%s: units %s: %s", where, reduced.units.name, text)
 
 
 def geometric_at(

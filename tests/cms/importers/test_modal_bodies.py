@@ -62,6 +62,15 @@ def test_a_body_in_mean_axes_comes_back_as_it_was(mean, key, tmp_path):
     assert verdicts["inertia-terms"] == "pass"
 
 
+def test_a_file_in_other_units_is_told(mean, tmp_path):
+    """A bar of 1 m and some 20 kg as one of 1 km and 20 g."""
+    for key in FORMATS:
+        path = written(mean, key, tmp_path)
+        with pytest.raises(ForeignBodyError, match="units m-kg-s: .*; name the units of the file"):
+            cms.import_body(path, units="m-kg-s", interfaces=names_of(mean, key))
+        assert cms.import_body(path, units="m-kg-s", interfaces=names_of(mean, key), accept=["units"]).n_q == mean.n_q
+
+
 @pytest.mark.parametrize("key", FORMATS)
 def test_a_body_in_another_frame_is_moved_to_mean_axes(key, tmp_path):
     soft = soft_bar(6)
