@@ -66,7 +66,7 @@ def test_a_file_in_other_units_is_told(mean, tmp_path):
     """A bar of 1 m and some 20 kg as one of 1 km and 20 g."""
     for key in FORMATS:
         path = written(mean, key, tmp_path)
-        with pytest.raises(ForeignBodyError, match="units m-kg-s: .*; name the units of the file"):
+        with pytest.raises(ForeignBodyError, match=r"units m-kg-s: .*; name the units of the file"):
             cms.import_body(path, units="m-kg-s", interfaces=names_of(mean, key))
         assert cms.import_body(path, units="m-kg-s", interfaces=names_of(mean, key), accept=["units"]).n_q == mean.n_q
 
