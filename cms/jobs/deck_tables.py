@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, StringConstraints
 
 from cms.jobs.beam_tables import component_numbers, names
 from fe_models.foundation.components import MOTION_COMPONENTS as COMPONENTS
-from fe_models.foundation.toml_file import Table, choice
+from fe_models.foundation.toml_file import Table, choice, is_no_number
 from fe_models.foundation.words import nearest, quoted
 from fe_models.solids.elements import INTEGRATIONS, MASSES
 
@@ -50,14 +50,23 @@ class SolidSection(Table):
     )
 
 
+def member_weight(value: Any) -> float | tuple[float, ...]:
+    """Return the weight of translations, or six, of ux uy uz rx ry rz."""
+    given = value if isinstance(value, list | tuple) else (value,) * 6
+    if len(given) != 6 or any(is_no_number(each) for each in given):
+        raise ValueError("expected a number, or a list of six")
+    return tuple(float(each) for each in given) if isinstance(value, list | tuple) else float(value)
+
+
 SixWeights = tuple[float, float, float, float, float, float]  #: of ux uy uz rx ry rz
+MemberWeight = Annotated[float | SixWeights, BeforeValidator(member_weight)]
 
 
 class CouplingSection(Table):
     """[couplings.NAME]: a node that follows the weighted mean motion of others (RBE3)."""
 
     node: Name = Field(description="the name of a group that holds one node, which follows")
-    members: dict[str, float | SixWeights] = Field(
+    members: dict[str, MemberWeight] = Field(
         description="a table {group = weight of each of its nodes}: one number, for translations, or a list of six"
     )
     components: Components = Field(ALL, description="components of the node that follow, ux to rz; default: all")

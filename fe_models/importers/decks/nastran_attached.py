@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array
-from fe_models.importers.bulk_data.cards import Card
+from fe_models.importers.bulk_data.cards import Card, real_of
 from fe_models.importers.decks.deck import Coupling, DeckMass, DeckSpring, Equation, Load, RigidGroup, Support
 from fe_models.importers.decks.nastran_model import NastranModel, components_of, numbers_of
 
@@ -164,28 +165,55 @@ def _written_out(words: list[str]) -> list[str]:
 
 
 def _mean(model: NastranModel, card: Card) -> None:
-    """RBE3: reference grid, its components, then sets of weight, components and grids."""
+    """RBE3: reference grid, its components, then sets of weight, components and grids; six weights for each grid.
+
+    The mean motion is that of `fe_models.body.weighted_motion`. A grid in several sets has the sum of their weights.
+    """
     node, components = card.integer(3), components_of(card, card.text(4))
     words = [word for word in card.fields[4:] if word]
-    members: list[tuple[float, str, list[int]]] = []
-    k = 0
-    while k < len(words) and words[k].upper() not in ("UM", "ALPHA"):
-        if "." in words[k]:
-            members.append((float(words[k]), words[k + 1], []))
-            k += 2
-        else:
-            members[-1][2].append(int(words[k]))
-            k += 1
-    has_um = any(word.upper() == "UM" for word in words)
-    if has_um or any(c != "123" for _, c, _ in members) or not _in_basic(model, [node], components):
-        why = "with UM, with components of the members other than 123, or axes of its own (CD)"
+    ends = [k for k, word in enumerate(words) if word.upper() in ("UM", "ALPHA")]
+    weights = _weights(card, words[: ends[0]] if ends else words)
+    turned = [
+        number
+        for number, six in weights.items()
+        if number in model.points.axes and not np.all(six == np.repeat(six[[0, 3]], 3))
+    ]
+    if any(words[k].upper() == "UM" for k in ends) or turned or not _in_basic(model, [node], components):
+        why = "with UM, or with weights of single components along axes of their own (CD)"
         model.ledger.refuse("RBE3", why)
         return
     name = f"rbe3_{card.text(1)}"
+    alike: dict[tuple[float, ...], list[int]] = {}
+    for number, six in weights.items():
+        alike.setdefault(tuple(six.tolist()), []).append(number)
     groups = tuple(
-        (model.group(card, nodes, f"{name}_nodes_{n}"), weight) for n, (weight, _, nodes) in enumerate(members, start=1)
+        (model.group(card, nodes, f"{name}_nodes_{n}"), six[0] if six == (six[0],) * 3 + (0.0,) * 3 else six)
+        for n, (six, nodes) in enumerate(alike.items(), start=1)
     )
     model.couplings.append(Coupling(name, model.group(card, [node]), groups, components))
+
+
+def _weights(card: Card, words: list[str]) -> dict[int, Array]:
+    """Return grid -> weight of each of its components, (6,), of the words `weight, components, grids` of an RBE3."""
+    weights: dict[int, Array] = {}
+    six = np.zeros(0)
+    k = 0
+    words = _written_out(words)
+    while k < len(words):
+        if words[k].isdigit() and len(six):
+            weights[int(words[k])] = weights.get(int(words[k]), np.zeros(6)) + six
+            k += 1
+            continue
+        try:
+            weight = real_of(words[k])
+        except ValueError:
+            weight = np.nan
+        if words[k].isdigit() or not weight >= 0 or k + 1 == len(words):
+            raise MeshError(f"{card.where} {card.text(1)}: expected a weight and components, got {words[k]!r}")
+        six = np.zeros(6)
+        six[list(components_of(card, words[k + 1]))] = weight
+        k += 2
+    return weights
 
 
 def _equation(model: NastranModel, card: Card) -> None:

@@ -123,13 +123,14 @@ def test_the_job_of_a_deck_of_nastran_has_its_mass_and_its_loads(tmp_path):
         ("RBE2,60,9,123456,5,6,7,8", "RBE1,60,9,123456", "1 RBE1: this card is not known here"),
         ("PSOLID,1,9", "PSOLID,2,9", "1 CHEXA: property 1 is not known here"),
         ("CONM2", "CONM1", "1 CONM1: this card is not known here"),
-        ("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456,1.,123456,5,6\n,7,8", "1 RBE3: .* components of the members"),
         ("CELAS2,70,5.+3,1,1,2,1", "CBUSH,70,71,1,2\n,.3\nPBUSH,71,K,1.,1.,1.", "1 CBUSH: acting elsewhere"),
         ("CELAS2,70,5.+3,1,1,2,1", "CBAR,70,71,1,2,0.,0.,1.,GOO\n,,,0.,0.,1.,0.,0.,1.\nPBARL,71,9,,ROD\n,.1",
          r"1 CBAR: offsets along the axes of the element \(OFFT GOO\)"),
         ("CELAS2,70,5.+3,1,1,2,1",
          "CBEAM,70,71,1,2,0.,0.,1.\nPBEAM,71,9,.1,.1,.1,,.1,2.\n,,,,,,,,\n,NO,1.,.1,.1,.1,,.1,3.",
          "1 PBEAM: property 71: this section is not known here"),
+        ("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456,1.,123,5,6\n,7,8,UM,9,123456", "1 RBE3: with UM"),
+        ("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456,1.,12,5,6\n,7,8", "1 RBE3: .* weights of single components"),
     ],
 )  # fmt: skip
 def test_cards_with_mass_or_stiffness_are_refused_by_name(tmp_path, old, new, words):
@@ -167,3 +168,62 @@ def test_rods_are_axial_springs_with_half_of_their_mass_at_each_end(tmp_path):
     assert_allclose(body.K[at][:, at].toarray(), K, rtol=0, atol=1e-12 * K.max())
     mass = sum(7800 * 1e-4 * np.linalg.norm(a) for a in arms) / 2
     assert_allclose(body.M[at][:, at].toarray(), mass * np.eye(3), rtol=0, atol=1e-12 * mass)
+
+
+def test_rbe3_with_weights_of_components_is_the_weighted_motion_of_its_grids(tmp_path):
+    """Grids of shells; one is in two sets, the reference grid follows in part; weights by an own least squares."""
+    cards = [
+        "BEGIN BULK", "MAT1,1,2.+11,,.3,7800.", "PSHELL,1,1,.01,1,,1", "CQUAD4,1,1,1,2,3,4", "GRID,9,,.4,.7,.5",
+        "CONM2,5,9,,11.", "RBE3,7,,9,12356,1.5,123,1,2", ",3,2.,126,2,4,.5,456,1", ",THRU,3",
+    ]  # fmt: skip
+    points = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.2, 0.0), (0.0, 1.2, 0.0)])
+    cards += [f"GRID,{k},,{x},{y},{z}" for k, (x, y, z) in enumerate(points, start=1)]
+    path = tmp_path / "plate.bdf"
+    path.write_text("\n".join(cards) + "\n")
+    deck = read_deck(path)
+    deck.ledger.require_whole()
+    coupling = deck.couplings[0]
+    assert coupling.components == (0, 1, 2, 4, 5)
+    weights = np.zeros((4, 6))
+    for group, given in coupling.members:
+        rows = deck.mesh.node_numbers[deck.mesh.node_sets[group]] - 1
+        weights[rows] = np.array([given] * 3 + [0.0] * 3) if isinstance(given, float) else given
+    expected = [1.5, 1.5, 1.5, 0.5, 0.5, 0.5] * np.ones((4, 1))
+    expected[1, [0, 1, 5]], expected[3] = [3.5, 3.5, 2.5], [2, 2, 0, 0, 0, 2]
+    assert_allclose(weights, expected, rtol=0, atol=0)
+    body = uncoupled_body(job_of(path), Stages())
+    reference = np.array([0.4, 0.7, 0.5])
+    arms = points - reference
+    length = np.linalg.norm(arms, axis=1).mean()
+    G = np.zeros((4, 6, 6))
+    for k, (x, y, z) in enumerate(arms):
+        G[k, :3] = np.hstack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
+        G[k, 3:, 3:] = np.eye(3)
+    root = np.sqrt(expected * [1, 1, 1, length**2, length**2, length**2])
+    solution = np.linalg.lstsq((root[:, :, None] * G).reshape(24, 6), np.diag(root.ravel()), rcond=None)[0]
+    node = int(np.flatnonzero((body.nodes == reference).all(axis=1))[0])
+    u = np.random.default_rng(2).normal(size=(body.n_dof, 2))
+    at_grids = np.zeros((4, 6, 2))
+    for (n, c), row in zip(body.recovery.dofs, body.mesh_displacement(u), strict=True):
+        found = np.flatnonzero((body.nodes[n] == points).all(axis=1))
+        if len(found) and c >= 0:
+            at_grids[found[0], c] = row
+    moved = body.translations(u)[node]
+    assert_allclose(moved, (solution @ at_grids.reshape(24, 2))[:3], rtol=0, atol=1e-12 * np.abs(u).max())
+
+
+@pytest.mark.parametrize("words", ["1,123,5", "1.,123,5,x", "1.", "-1.,123,5"])
+def test_an_rbe3_without_weight_and_components_is_refused(tmp_path, words):
+    deck = DECK.replace("RBE2,60,9,123456,5,6,7,8", f"RBE3,60,,9,123456,{words}")
+    with pytest.raises(ValueError, match="RBE3 60: expected a weight and components"):
+        read_deck(deck_of(tmp_path, deck))
+
+
+@pytest.mark.parametrize("weight", ["[1.0, 2.0]", "true", '"1"', "[1, 1, 1, 0, 0, nan]"])
+def test_a_weight_of_a_coupling_is_a_number_or_six(tmp_path, weight):
+    path = deck_of(tmp_path, DECK.replace("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456,1.,123,5,6\n,7,8"))
+    text = job_text(read_deck(path), JobRequest("m-kg-s", {}, ("CELAS2",)), path.name)
+    job = path.with_suffix(".toml")
+    job.write_text(text.replace("rbe3_60_nodes_1 = 1.0", f"rbe3_60_nodes_1 = {weight}"))
+    with pytest.raises(ValueError, match="expected a number, or a list of six"):
+        read_job(job)
