@@ -100,11 +100,13 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
             )
         density = material.density or request.densities.get(name, request.densities.get(""))
         if material.young is None or material.poisson is None:
-            raise JobError(f"deck {deck.path}: material {quoted(name)} has no elastic constants (isotropic, linear)")
+            raise JobError(f"deck {deck.path}: material {quoted(name)} has no elastic constants (linear)")
         if not density:
             without.append(name)
             continue
         made[name] = {"young": material.young, "poisson": material.poisson, "density": density}
+        made[name] |= {} if material.shear is None else {"shear": material.shear}
+        made[name] |= {} if material.axes is None else {"axes": material.axes}
     if without:
         raise JobError(
             f"deck {deck.path}: {len(without)} materials have no density: {', '.join(without)}; give it, as "

@@ -9,7 +9,7 @@ import numpy as np
 
 from cms.errors import JobError
 from cms.jobs.job import InterfaceSection, Job
-from cms.jobs.tables.material_table import isotropic_of
+from cms.jobs.tables.material_table import material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.stages import Stages
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fe_models.assemblies.constraints import Constraint
     from fe_models.assemblies.join import Joined, Part
     from fe_models.importers.raw_mesh import RawMesh
-    from fe_models.material import Material
+    from fe_models.material import AnyMaterial
     from fe_models.meshes.mesh import Mesh
 
 __all__ = ["body_of_deck"]
@@ -62,8 +62,8 @@ def _parts(
     return parts, meshes
 
 
-def _materials(job: Job) -> "dict[str, Material]":
-    return {name: isotropic_of(name, each, "decks") for name, each in job.materials.items()}
+def _materials(job: Job) -> "dict[str, AnyMaterial]":
+    return {name: material_of(name, each) for name, each in job.materials.items()}
 
 
 def _solids(
@@ -77,7 +77,7 @@ def _solids(
     from fe_models.solids.body import solid_body
 
     materials = _materials(job)
-    rules: dict[tuple[str, str], dict[str, Material]] = {}
+    rules: dict[tuple[str, str], dict[str, AnyMaterial]] = {}
     for name, table in job.solids.items():
         material = materials[table.material or next(iter(materials))]
         for group in table.cells:

@@ -12,7 +12,9 @@ from fe_models.importers.decks.abaqus_assembly import flat_assembly
 from fe_models.importers.decks.abaqus_couplings import read_coupling
 from fe_models.importers.decks.abaqus_elements import read_element
 from fe_models.importers.decks.abaqus_loads import read_boundary, read_load
-from fe_models.importers.decks.abaqus_sections import read_material, read_section
+from fe_models.importers.decks.abaqus_materials import materials_in_axes, read_material
+from fe_models.importers.decks.abaqus_sections import read_section
+from fe_models.importers.decks.abaqus_thickness import sections_by_thickness
 from fe_models.importers.decks.deck import Deck
 from fe_models.importers.decks.draft import Draft
 from fe_models.importers.decks.ledger import Ledger
@@ -135,6 +137,11 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 
 def _finished(path: Path, draft: Draft) -> Deck:
     """Return the deck of a draft whose blocks are all taken."""
+    sections_by_thickness(draft)
+    try:
+        materials_in_axes(draft)
+    except ValueError as error:
+        raise MeshError(f"{draft.where}: {error}") from error
     draft.close()
     supports = tuple(draft.supports_of_groups())
     mesh = raw_mesh_of(draft.mesh, [])

@@ -1,7 +1,6 @@
-"""Materials and sections of Abaqus and CalculiX, masses and springs."""
+"""Sections of Abaqus and CalculiX, masses and springs."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,40 +8,15 @@ import numpy as np
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus_elements import PLANE, SOLID_RULES
-from fe_models.importers.decks.deck import DeckMass, DeckMaterial, DeckSpring, LineSection, ShellSection, SolidSection
+from fe_models.importers.decks.abaqus_materials import numbers, read_orientation
+from fe_models.importers.decks.abaqus_thickness import read_nodal_thickness
+from fe_models.importers.decks.deck import DeckMass, DeckSpring, LineSection, ShellSection, SolidSection
 from fe_models.importers.decks.draft import Draft
 
-__all__ = ["read_material", "read_section"]
+__all__ = ["read_section"]
 
 _SHELLS = ("triangle", "triangle6", "quad", "quad8", "quad9")
 _LINES = ("line", "line3")
-
-
-def numbers(line: str) -> list[float]:
-    """Return the numbers of a data line; fields left empty are zero."""
-    return [float(word.strip().upper().replace("D", "E") or 0) for word in line.rstrip(", ").split(",")]
-
-
-def read_material(here: str, block: DeckBlock, draft: Draft) -> None:
-    """Take the elastic constants and the density; count the rest."""
-    name = draft.material
-    if block.keyword == "MATERIAL":
-        draft.materials[name] = DeckMaterial(name)
-    elif block.keyword == "ELASTIC" and name in draft.materials:
-        kind = block.parameters.get("TYPE", "ISO").upper()
-        if not kind.startswith("ISO"):
-            draft.ledger.refuse(f"*ELASTIC, TYPE={kind}", "only isotropic materials", line=block.line_number)
-            return
-        if len(block.lines) > 1:
-            draft.ledger.note("*ELASTIC", "of several temperatures the first line is taken", line=block.line_number)
-        young, poisson = numbers(block.lines[0])[:2]
-        draft.materials[name] = replace(draft.materials[name], young=young, poisson=poisson)
-    elif block.keyword == "DENSITY" and name in draft.materials:
-        draft.materials[name] = replace(draft.materials[name], density=numbers(block.lines[0])[0])
-    elif block.keyword == "DAMPING":
-        draft.ledger.note("*DAMPING", "say it in the table [damping] of the job", line=block.line_number)
-    else:
-        draft.ledger.note(f"*{block.keyword}", "heat is not part of the body", line=block.line_number)
 
 
 def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
@@ -61,7 +35,9 @@ def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
     elif block.keyword == "TRANSFORM":
         draft.transformed |= set(draft.nodes_of(here, block.parameters.get("NSET", "")).tolist())
     elif block.keyword == "ORIENTATION":
-        draft.ledger.note("*ORIENTATION", "axes of materials; isotropic ones need none", line=block.line_number)
+        read_orientation(here, block, draft)
+    elif block.keyword == "NODAL THICKNESS":
+        read_nodal_thickness(here, block, draft)
     elif block.keyword == "NORMAL":
         draft.ledger.note("*NORMAL", "normals follow from the mesh", line=block.line_number)
     else:
@@ -96,7 +72,9 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
         rules.setdefault(_common_rule(kind, rule), []).append(elements)
     for (integration, mass), parts in rules.items():
         own = name if len(rules) == 1 else f"{name}_{integration}_{mass}"
-        draft.solids.append(SolidSection(draft.cell_group(own, np.concatenate(parts)), material, integration, mass))
+        orientation = block.parameters.get("ORIENTATION", "").strip('"')
+        group = draft.cell_group(own, np.concatenate(parts))
+        draft.solids.append(SolidSection(group, material, integration, mass, orientation))
 
 
 def _common_rule(kind: str, rule: tuple[str, str, str]) -> tuple[str, str]:
@@ -106,20 +84,21 @@ def _common_rule(kind: str, rule: tuple[str, str, str]) -> tuple[str, str]:
 def _shell_section(here: str, block: DeckBlock, draft: Draft) -> None:
     name, types = _of_set(here, block, draft)
     n = sum(len(elements) for elements in types.values())
-    if "COMPOSITE" in block.parameters or "NODAL THICKNESS" in block.parameters:
-        what = "COMPOSITE" if "COMPOSITE" in block.parameters else "NODAL THICKNESS"
-        draft.ledger.refuse(f"*SHELL SECTION, {what}", "only shells of one thickness and material", count=n)
+    if "COMPOSITE" in block.parameters:
+        draft.ledger.refuse("*SHELL SECTION, COMPOSITE", "only shells of one material", count=n)
         return
     kept = _known(draft, types, _SHELLS, "S", block)
-    thickness = numbers(block.lines[0])[0]
+    is_nodal = "NODAL THICKNESS" in block.parameters
+    thickness = 1.0 if is_nodal else numbers(block.lines[0])[0]
     offset = block.parameters.get("OFFSET", "0").upper()
     share = {"SPOS": 0.5, "SNEG": -0.5}.get(offset)
     share = float(offset) if share is None else share
     if kept.size:
         # the reference surface lies share x thickness from the middle one, along the normal
-        draft.shells.append(
-            ShellSection(draft.cell_group(name, kept), _material_of(block, draft), thickness, -share * thickness + 0.0)
-        )
+        group = draft.cell_group(name, kept)
+        draft.shells.append(ShellSection(group, _material_of(block, draft), thickness, -share * thickness + 0.0))
+        if is_nodal:
+            draft.nodal_shells.add(group)
 
 
 def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:

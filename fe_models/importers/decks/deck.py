@@ -31,12 +31,14 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class DeckMaterial:
-    """An isotropic linear material; what the deck does not say is None."""
+    """A linear material, isotropic or orthotropic; what the deck does not say is None."""
 
     name: str
-    young: float | None = None
-    poisson: float | None = None
+    young: float | Vector | None = None  #: three: orthotropic, E_1, E_2, E_3
+    poisson: float | Vector | None = None  #: or nu_12, nu_13, nu_23
     density: float | None = None
+    shear: Vector | None = None  #: orthotropic: G_12, G_13, G_23
+    axes: tuple[Vector, Vector, Vector] | None = None  #: rows: axes 1, 2, 3 in basic axes; None: basic axes
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class SolidSection:
     material: str
     integration: str = "full"  #: one of `fe_models.solids.elements.INTEGRATIONS`, or "incompatible"
     mass: str = "consistent"
+    orientation: str = ""  #: name of the axes of its material
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fe_models.errors import MeshError
-from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus import DeckMesh
 from fe_models.importers.abaqus_deck import DeckBlock
@@ -49,6 +49,9 @@ class Draft:
     ledger: Ledger
     material: str = ""  #: whose properties are being read
     materials: dict[str, DeckMaterial] = field(default_factory=dict)
+    orientations: dict[str, Array | None] = field(default_factory=dict)  #: by name in upper case, (3, 3); None: unknown
+    nodal_thickness: dict[int, float] = field(default_factory=dict)  #: of shells, by node number
+    nodal_shells: set[str] = field(default_factory=set)  #: groups of shells that have their thickness from nodes alone
     solids: list[SolidSection] = field(default_factory=list)
     shells: list[ShellSection] = field(default_factory=list)
     lines: list[LineSection] = field(default_factory=list)
