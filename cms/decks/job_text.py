@@ -91,7 +91,8 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
     for name in request.densities:
         if name and name not in used:
             raise JobError(f"--density {quoted(name)}: the deck has no such material in use{nearest(name, used)}")
-    made, without = {}, []
+    made: dict[str, Any] = {}
+    without = []
     for name in used:
         material = deck.materials.get(name)
         if material is None:

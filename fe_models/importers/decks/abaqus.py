@@ -9,7 +9,7 @@ from fe_models.errors import MeshError
 from fe_models.importers.abaqus import deck_mesh, raw_mesh_of
 from fe_models.importers.abaqus_deck import DeckBlock, deck_blocks, refuse_unread
 from fe_models.importers.decks.abaqus_assembly import flat_assembly
-from fe_models.importers.decks.abaqus_couplings import read_coupling
+from fe_models.importers.decks.abaqus_couplings import equations_in_basic_axes, read_coupling
 from fe_models.importers.decks.abaqus_elements import read_element
 from fe_models.importers.decks.abaqus_loads import read_boundary, read_load
 from fe_models.importers.decks.abaqus_materials import materials_in_axes, read_material
@@ -137,6 +137,7 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 
 def _finished(path: Path, draft: Draft) -> Deck:
     """Return the deck of a draft whose blocks are all taken."""
+    equations_in_basic_axes(draft)
     sections_by_thickness(draft)
     try:
         materials_in_axes(draft)

@@ -18,7 +18,15 @@ from fe_models.importers.abaqus_deck import DeckBlock
 __all__ = ["flat_assembly"]
 
 SETS = {"NSET": "NSET", "ELSET": "ELSET", "NODE": "NSET", "ELEMENT": "ELSET"}  #: keyword -> parameter with its name
-NAMES = ("NSET", "ELSET", "NAME", "SURFACE", "REF NODE", "ROT NODE")  #: parameters that name something of a part
+NAMES = (
+    "NSET",
+    "ELSET",
+    "NAME",
+    "SURFACE",
+    "REF NODE",
+    "ROT NODE",
+    "ORIENTATION",
+)  #: parameters that name something of a part
 
 
 def flat_assembly(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
@@ -123,6 +131,9 @@ def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) ->
         turned = R @ np.array([float(word or 0) for word in n1.rstrip(", ").split(",")][:3])
         line = ", ".join(repr(float(value)) for value in turned)
         return replace(block, parameters=parameters, lines=[*block.lines[:1], line, *block.lines[2:]])
+    if block.keyword in ("ORIENTATION", "TRANSFORM") and block.lines:
+        line = _turned_points(block, R, t)
+        return replace(block, parameters=parameters, lines=[line, *block.lines[1:]])
     if block.keyword == "NODE":
         lines = []
         for line in block.lines:
@@ -130,10 +141,18 @@ def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) ->
             x = R @ np.array([float(word or 0) for word in [*words[1:4], "0", "0", "0"][:3]]) + t
             lines.append(", ".join([words[0], *(repr(float(value)) for value in x)]))
         return replace(block, parameters=parameters, lines=lines)
-    if block.keyword not in SETS and block.keyword in ("SURFACE", "EQUATION", "BOUNDARY", "MPC"):
+    if block.keyword not in SETS and block.keyword in ("SURFACE", "EQUATION", "BOUNDARY", "MPC", "NODAL THICKNESS"):
         lines = [_prefixed(line, instance, offset) for line in block.lines]
         return replace(block, parameters=parameters, lines=lines)
     return replace(block, parameters=parameters)
+
+
+def _turned_points(block: DeckBlock, R: Array, t: Array) -> str:
+    """Return the points of axes as they are in an instance: directions turn, the two points of an axis move too."""
+    words = [float(word or 0) for word in block.lines[0].rstrip(", ").split(",")]
+    points = np.array([*words, 0.0, 0.0, 0.0][: 9 if len(words) > 6 else 6]).reshape(-1, 3)
+    is_axis = block.keyword == "TRANSFORM" and block.parameters.get("TYPE", "R").upper() == "C"
+    return ", ".join(repr(float(value)) for value in (points @ R.T + (t if is_axis else 0.0)).ravel())
 
 
 def _prefixed(line: str, instance: str, offset: int) -> str:

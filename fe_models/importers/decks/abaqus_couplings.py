@@ -1,15 +1,18 @@
 """Couplings of Abaqus and CalculiX: equations, rigid bodies, kinematic and distributing couplings."""
 
 import numpy as np
+from scipy.linalg import qr
 
-from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus_elements import faces_of
 from fe_models.importers.decks.abaqus_ties import read_tie
 from fe_models.importers.decks.deck import Coupling, Equation, RigidGroup
 from fe_models.importers.decks.draft import Draft
 
-__all__ = ["read_coupling", "surface_nodes"]
+__all__ = ["equations_in_basic_axes", "read_coupling", "surface_nodes"]
+
+NEGLIGIBLE = 1e-14  #: part of the largest coefficient below which a term turned to basic axes is none
 
 
 def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
@@ -47,14 +50,62 @@ def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
         terms = []
         for node, component, coefficient in rows:
             nodes = draft.nodes_of(here, node)
-            is_one = len(nodes) == 1 and int(nodes[0]) not in {*draft.transformed, *draft.rotations}
+            is_one = len(nodes) == 1 and int(nodes[0]) not in draft.rotations
             if not is_one or not 1 <= int(component) <= 6:
-                why = "equations of sets, of nodes with axes of their own, or of other components than 1 to 6"
+                why = "equations of sets, of rotations at a ROT NODE, or of other components than 1 to 6"
                 draft.ledger.refuse("*EQUATION", why, line=block.line_number)
                 break
-            terms.append((draft.node_group(here, nodes), int(component) - 1, float(coefficient)))
+            terms.append((int(nodes[0]), int(component) - 1, float(coefficient)))
         else:
-            draft.equations.append(Equation(tuple(terms)))
+            draft.raw_equations.append(terms)
+
+
+def equations_in_basic_axes(draft: Draft) -> None:
+    """Make the equations of a deck those of its nodes in basic axes.
+
+    (1) a component of a node with axes R of its own is R[c] · u; terms of the same component are added
+    (2) equations of which the first terms are components of one such node are solved together for as many of its
+        components in basic axes, those that are determined best, so that these give way
+    """
+    together: dict[tuple[int, int], list[dict[tuple[int, int], float]]] = {}
+    for k, terms in enumerate(draft.raw_equations):
+        node, component, _ = terms[0]
+        row: dict[tuple[int, int], float] = {}
+        for other, c, a in terms:
+            first = c - c % 3
+            axes = draft.transformed.get(other)
+            parts = [(c, 1.0)] if axes is None else [(first + j, float(axes[c % 3, j])) for j in range(3)]
+            for j, r in parts:
+                row[other, j] = row.get((other, j), 0.0) + a * r  # (1)
+        key = (node, component // 3) if node in draft.transformed else (-1 - k, 0)
+        together.setdefault(key, []).append(row)
+    for (node, block), rows in together.items():
+        if node < 0:
+            _keep(draft, list(rows[0]), np.array(list(rows[0].values())))
+            continue
+        own = [(node, 3 * block + j) for j in range(3)]
+        names = own + [name for name in dict.fromkeys(name for row in rows for name in row) if name not in own]
+        A = np.array([[row.get(name, 0.0) for name in names] for row in rows])
+        order = qr(A[:, :3], pivoting=True, mode="r")[1][: len(rows)]
+        if len(rows) > 3 or np.linalg.matrix_rank(A[:, :3]) < len(rows):
+            why = f"equations that say more of a node (first: {node}) than its components, or the same twice"
+            draft.ledger.refuse("*EQUATION", why, count=len(rows))
+            continue
+        A = np.linalg.solve(A[:, order], A)  # (2)
+        A[np.abs(A) < NEGLIGIBLE * np.abs(A).max()] = 0.0
+        rest = [k for k in range(len(names)) if k not in order]
+        for k, slave in enumerate(order):
+            _keep(draft, [names[slave], *(names[j] for j in rest)], A[k, [slave, *rest]])
+
+
+def _keep(draft: Draft, names: list[tuple[int, int]], coefficients: Array) -> None:
+    """Add one equation; terms that vanish are left out, but for the first."""
+    terms = [
+        (draft.node_group(draft.where, [node]), c, float(a))
+        for k, ((node, c), a) in enumerate(zip(names, coefficients, strict=True))
+        if a != 0 or k == 0
+    ]
+    draft.equations.append(Equation(tuple(terms)))
 
 
 def _rigid_body(here: str, block: DeckBlock, draft: Draft) -> None:
@@ -90,7 +141,7 @@ def _coupling(here: str, block: DeckBlock, draft: Draft) -> None:
     if block.keyword == "KINEMATIC":
         components = tuple(sorted(_limits(block))) or (0, 1, 2, 3, 4, 5)
         whole = all(set(part) <= set(components) or not set(part) & set(components) for part in ((0, 1, 2), (3, 4, 5)))
-        if not whole and ("ORIENTATION" in given or draft.transformed & {leader, *members.tolist()}):
+        if not whole and ("ORIENTATION" in given or draft.transformed.keys() & {leader, *members.tolist()}):
             why = "single components along axes of their own (ORIENTATION, *TRANSFORM)"
             draft.ledger.refuse("*KINEMATIC", why, line=block.line_number)
             return

@@ -88,8 +88,16 @@ def _nodal(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
         component = int(words[1]) - 1
         if len(nodes) == 1 and int(nodes[0]) in draft.rotations:  # its components are rotations of the reference node
             nodes, component = np.array([draft.rotations[int(nodes[0])]]), component + 3
-        if any(node in draft.transformed for node in nodes.tolist()) or not 0 <= component < 6 or not nodes.size:
-            draft.ledger.note("*CLOAD", "along axes of their own (*TRANSFORM), or at no node", line=block.line_number)
+        if not 0 <= component < 6 or not nodes.size:
+            draft.ledger.note("*CLOAD", "at no node, or of no component 1 to 6", line=block.line_number)
+            continue
+        turned = [node for node in nodes.tolist() if node in draft.transformed]
+        for node in turned:
+            force = forces.setdefault(draft.node_group(here, [node]), np.zeros(6))
+            first = component - component % 3
+            force[first : first + 3] += float(words[2]) * draft.transformed[node][component % 3]
+        nodes = np.setdiff1d(nodes, turned)
+        if not nodes.size:
             continue
         group = draft.node_group(here, nodes, words[0] if len(nodes) > 1 else "")
         forces.setdefault(group, np.zeros(6))[component] += float(words[2])

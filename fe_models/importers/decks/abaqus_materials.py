@@ -1,4 +1,4 @@
-"""Materials of Abaqus and CalculiX, isotropic and orthotropic, and the axes that sections give them."""
+"""Materials of Abaqus and CalculiX, isotropic and orthotropic, and axes: of materials and of nodes."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.deck import DeckMaterial
 from fe_models.importers.decks.draft import Draft
 
-__all__ = ["materials_in_axes", "numbers", "read_material", "read_orientation"]
+__all__ = ["materials_in_axes", "numbers", "read_material", "read_orientation", "read_transform"]
 
 COLLINEAR = 1e-8
 
@@ -107,18 +107,44 @@ def read_orientation(here: str, block: DeckBlock, draft: Draft) -> None:
         return
     words = numbers(block.lines[0])
     origin = np.array(words[6:9]) if len(words) >= 9 else np.zeros(3)
-    x, y = np.array(words[:3]) - origin, np.array(words[3:6]) - origin
-    z = np.cross(x, y)
-    if np.linalg.norm(z) <= COLLINEAR * np.linalg.norm(x) * np.linalg.norm(y):
-        raise ValueError("points a and b lie on one line through the origin")
-    axes = np.stack([x, np.cross(z, x), z])
-    axes = axes / np.linalg.norm(axes, axis=1)[:, None]
+    axes = _plane_axes(np.array(words[:3]) - origin, np.array(words[3:6]) - origin)
     if len(block.lines) > 1:
         about, angle = (*numbers(block.lines[1]), 0.0)[:2]
         i, j = {1: (1, 2), 2: (2, 0), 3: (0, 1)}[int(about)]
         c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
         axes[i], axes[j] = c * axes[i] + s * axes[j], c * axes[j] - s * axes[i]
     draft.orientations[name] = axes
+
+
+def _plane_axes(x: Array, y: Array) -> Array:
+    """Return three axes as rows: along x, in the plane of x and y, across both."""
+    z = np.cross(x, y)
+    if np.linalg.norm(z) <= COLLINEAR * np.linalg.norm(x) * np.linalg.norm(y):
+        raise ValueError("points a and b lie on one line through the origin")
+    axes = np.stack([x, np.cross(z, x), z])
+    return np.asarray(axes / np.linalg.norm(axes, axis=1)[:, None])
+
+
+def read_transform(here: str, block: DeckBlock, draft: Draft) -> None:
+    """Keep the axes of nodes: of points a and b (R), or radial, tangential and along the line from a to b (C)."""
+    words = numbers(block.lines[0])
+    a, b = np.array(words[:3]), np.array(words[3:6])
+    kind = block.parameters.get("TYPE", "R").upper()
+    members = draft.nodes_of(here, block.parameters.get("NSET", ""))
+    members = members[draft.mesh.rows_of(members) >= 0]
+    if kind == "R":
+        draft.transformed |= dict.fromkeys(members.tolist(), _plane_axes(a, b))
+        return
+    if kind != "C" or not np.any(b - a):
+        raise ValueError(f"TYPE={kind}: expected R or C, and two different points")
+    axis = (b - a) / np.linalg.norm(b - a)
+    for node, point in zip(members.tolist(), draft.mesh.coordinates[draft.mesh.rows_of(members)], strict=True):
+        arm = point - a
+        radial = arm - axis * (axis @ arm)
+        if np.linalg.norm(radial) <= COLLINEAR * max(np.linalg.norm(arm), np.linalg.norm(b - a)):
+            raise ValueError(f"node {node} lies on the axis, where no direction is radial")
+        axes = np.stack([radial, np.cross(axis, radial), axis])
+        draft.transformed[node] = axes / np.linalg.norm(axes, axis=1)[:, None]
 
 
 def materials_in_axes(draft: Draft) -> None:
@@ -147,8 +173,8 @@ def materials_in_axes(draft: Draft) -> None:
     unused = len(set(draft.orientations) - used)
     if unused:
         draft.ledger.note("*ORIENTATION", "axes of materials; isotropic ones need none", count=unused)
-    for each in (*draft.shells, *draft.lines):
-        material = draft.materials.get(spelt.get(each.material.upper(), ""))
+    for name in [*(shell.material for shell in draft.shells), *(line.material for line in draft.lines)]:
+        material = draft.materials.get(spelt.get(name.upper(), ""))
         if material is not None and material.shear is not None:
             draft.ledger.refuse("*ELASTIC", "shells and beams of orthotropic materials")
 

@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus_elements import PLANE, SOLID_RULES
-from fe_models.importers.decks.abaqus_materials import numbers, read_orientation
+from fe_models.importers.decks.abaqus_materials import numbers, read_orientation, read_transform
 from fe_models.importers.decks.abaqus_thickness import read_nodal_thickness
 from fe_models.importers.decks.deck import DeckMass, DeckSpring, LineSection, ShellSection, SolidSection
 from fe_models.importers.decks.draft import Draft
@@ -33,7 +33,7 @@ def read_section(here: str, block: DeckBlock, draft: Draft) -> None:
     if block.keyword in makers:
         makers[block.keyword](here, block, draft)
     elif block.keyword == "TRANSFORM":
-        draft.transformed |= set(draft.nodes_of(here, block.parameters.get("NSET", "")).tolist())
+        read_transform(here, block, draft)
     elif block.keyword == "ORIENTATION":
         read_orientation(here, block, draft)
     elif block.keyword == "NODAL THICKNESS":

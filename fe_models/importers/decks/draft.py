@@ -59,13 +59,14 @@ class Draft:
     springs: list[DeckSpring] = field(default_factory=list)
     rigid: list[RigidGroup] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)
+    raw_equations: list[list[tuple[int, int, float]]] = field(default_factory=list)  #: in the axes of their nodes
     equations: list[Equation] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
     points: dict[str, PointElements] = field(default_factory=dict)  #: by set in upper case
     surfaces: dict[str, DeckBlock] = field(default_factory=dict)  #: by name in upper case
     rotations: dict[int, int] = field(default_factory=dict)  #: *RIGID BODY: number of ROT NODE -> of REF NODE
     pending: dict[str, str] = field(default_factory=dict)  #: parameters of a *COUPLING whose kind comes below
-    transformed: set[int] = field(default_factory=set)  #: numbers of nodes with axes of their own
+    transformed: dict[int, Array] = field(default_factory=dict)  #: node number -> its own axes as rows, (3, 3)
     node_groups: dict[str, IntArray] = field(default_factory=dict)  #: groups added here, rows
     cell_groups: dict[str, IntArray] = field(default_factory=dict)  #: groups added here, element numbers
     face_blocks: list[RawBlock] = field(default_factory=list)

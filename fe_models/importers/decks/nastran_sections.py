@@ -242,9 +242,12 @@ def _rod(model: NastranModel, card: Card, rods: dict[int, Card]) -> None:
     y = y / np.linalg.norm(y)
     rows = (x, y, np.cross(x, y))
     triad = tuple((float(a[0]), float(a[1]), float(a[2])) for a in rows)
-    G = material.young / (2 * (1 + material.poisson))
+    E, nu = material.young, material.poisson
+    assert isinstance(E, float)
+    assert isinstance(nu, float)
+    G = E / (2 * (1 + nu))
     names = [model.group(card, [number]) for number in numbers]
-    stiffness = (material.young * A / L, 0.0, 0.0, G * J / L, 0.0, 0.0)
+    stiffness = (E * A / L, 0.0, 0.0, G * J / L, 0.0, 0.0)
     model.springs.append(DeckSpring((names[0], names[1]), stiffness, triad=(triad[0], triad[1], triad[2])))
     mass = ((material.density or 0.0) * A + nsm * model.wtmass) * L
     if mass:

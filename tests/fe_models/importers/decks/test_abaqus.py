@@ -310,3 +310,54 @@ def test_what_was_left_out_in_silence_is_refused(tmp_path, old, new, words):
     assert old in DECK
     with pytest.raises(MeshError, match=words):
         deck_of(tmp_path, DECK.replace(old, new)).ledger.require_whole()
+
+
+def test_equations_and_forces_in_axes_of_their_nodes_are_turned_to_basic_axes(tmp_path):
+    """A hinge pin in cylindrical axes about z through (0.5, 0): components of nodes 3 and 6 there, formed by hand."""
+    extra = "*NSET, NSET=pin\n3, 6\n*TRANSFORM, NSET=pin, TYPE=C\n.5, 0., 0., .5, 0., 1.\n"
+    extra += "*EQUATION\n2\n3, 1, 1., 6, 1, -2.\n2\n3, 2, 1., 6, 2, -3.\n"
+    text = DECK.replace("20, 2, 1., 7, 2, -1.\n", "20, 2, 1., 7, 2, -1.\n" + extra)
+    text = text.replace("*CLOAD\n20, 3, -4.\n", "*CLOAD\n3, 2, -4.\n")
+    deck = deck_of(tmp_path, text)
+    at = {name: int(deck.mesh.node_numbers[rows[0]]) for name, rows in deck.mesh.node_sets.items() if len(rows) == 1}
+    u = {(6, c): value for c, value in enumerate((0.3, -0.7, 0.2))} | {(3, c): 0.0 for c in range(3)}
+    u[3, 2] = 0.9
+    turned = deck.equations[1:]
+    assert len(turned) == 2
+    for equation in turned:  # masters given, slaves follow
+        (slave, c, a), *others = [(at[name], c, a) for name, c, a in equation.terms]
+        assert slave == 3
+        u[slave, c] = -sum(b * u[node, k] for node, k, b in others) / a
+    radial = {3: np.array([0.5, 1.0]) / np.sqrt(1.25), 6: np.array([1.0, 0.0])}
+    local = {}
+    for node, e in radial.items():
+        v = np.array([u[node, 0], u[node, 1]])
+        local[node] = (e @ v, np.array([-e[1], e[0]]) @ v)
+    assert_allclose(local[3], [2 * local[6][0], 3 * local[6][1]], rtol=1e-13)
+    assert u[3, 2] == 0.9  # the axial motion stays free
+    forces = deck.loads[0].forces
+    assert_allclose(forces["node_3"][:3], -4 * np.array([-1.0, 0.5, 0.0]) / np.sqrt(1.25), rtol=1e-13)
+    assert forces["node_6"] == (1.0, 0, 0, 0, 0, 0)  # of the set top: radial there
+    with pytest.raises(MeshError, match="points a and b lie on one line"):
+        deck_of(tmp_path, text.replace("TYPE=C\n.5, 0., 0., .5, 0., 1.", "TYPE=R\n1., 0., 0., 2., 0., 0."))
+    deck = deck_of(tmp_path, text.replace("*EQUATION\n2\n3, 1, 1.", "*EQUATION\n2\n3, 2, 4., 6, 1, 1.\n2\n3, 1, 1."))
+    assert any(name == "*EQUATION" and "the same twice" in why for name, _, why in deck.ledger.rows())
+
+
+def test_axes_turn_with_their_instance(tmp_path):
+    """Bar-2 stands turned by 90 degrees about z at x = 10: axes of its material and of its nodes are those of Bar-1."""
+    axes = "*ORIENTATION, NAME=grain\n1., 1., 0., 0., 1., 0.\n*SOLID SECTION, ORIENTATION=grain, ELSET"
+    pin = "*TRANSFORM, NSET=tip, TYPE=C\n1., 0., 0., 1., 0., 1.\n*END PART"
+    text = PART.replace("*SOLID SECTION, ELSET", axes).replace("*END PART", pin)
+    text = text.replace("210., .3\n", "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n3., 2., 1., 0., 0., 0., 1., 1.\n1.\n")
+    text = (
+        text.replace("*ELASTIC\n*EL", "*EL") + "*STEP\n*STATIC\n*CLOAD\nBar-1.tip, 1, 2.\nBar-2.tip, 1, 2.\n*END STEP\n"
+    )
+    deck = deck_of(tmp_path, text)
+    first, second = (deck.materials[solid.material].axes for solid in deck.solids)
+    R = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    assert_allclose(first, np.array([[1, 1, 0], [-1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2), atol=1e-14)
+    assert_allclose(second, np.array(first) @ R.T, atol=1e-14)
+    forces = deck.loads[0].forces
+    assert_allclose(forces["node_4"][:3], [-2, 0, 0], atol=1e-14)
+    assert_allclose(forces["node_14"][:3], [0, -2, 0], atol=1e-14)
