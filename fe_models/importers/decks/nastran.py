@@ -147,5 +147,10 @@ def _mesh(model: NastranModel) -> RawMesh:
         table = table if order is None else table[:, order]
         groups = {group: np.arange(len(table))} if group else {}
         blocks.append(RawBlock(kind, table, groups, np.array(own_numbers, dtype=np.int64)))
+    for name, faces in model.faces.items():
+        for kind, n in (("triangle", 3), ("quad", 4)):
+            table = np.array([[place[node] for node in face] for face in faces if len(face) == n], dtype=np.int64)
+            if len(table):
+                blocks.append(RawBlock(kind, table, {name: np.arange(len(table))}))
     sets = {name: np.array([place[node] for node in nodes], dtype=np.int64) for name, nodes in model.groups.items()}
     return RawMesh(positions, tuple(blocks), sets, numbers)

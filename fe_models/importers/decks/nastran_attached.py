@@ -7,9 +7,11 @@ from fe_models.foundation.arrays import Array
 from fe_models.importers.bulk_data.cards import Card, real_of
 from fe_models.importers.decks.deck import Coupling, DeckMass, DeckSpring, Equation, Load, RigidGroup, Support
 from fe_models.importers.decks.nastran_model import NastranModel, components_of, numbers_of
+from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_attached"]
 
+_FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}  #: card -> kind, corner grids
 TRANSLATIONS, ALL = (0, 1, 2), (0, 1, 2, 3, 4, 5)
 
 
@@ -293,7 +295,7 @@ def _groups_of(model: NastranModel, card: Card, held: dict[int, set[int]], what:
 
 
 def _loads(model: NastranModel) -> None:
-    """Forces and moments by their set, gravity; other loads are counted."""
+    """Forces and moments by their set, gravity, pressure on solids; other loads are counted."""
     forces: dict[int, dict[str, Array]] = {}
     for card in model.of("FORCE", "MOMENT"):
         node = card.integer(2)
@@ -309,3 +311,47 @@ def _loads(model: NastranModel) -> None:
         g = card.real(3) * axes @ np.array([card.real(k, 0.0) for k in (4, 5, 6)])
         acceleration = (float(g[0]), float(g[1]), float(g[2]))
         model.loads.append(Load(f"gravity_{card.text(1)}", acceleration=acceleration))
+    solids = {card.integer(1): card for name in _FACED for card in model.cards.get(name, ())}
+    pressures: dict[tuple[int, float], list[tuple[int, ...]]] = {}
+    for card in model.of("PLOAD4"):
+        solid = solids.get(card.integer(2))
+        if (why := _untaken(card, solid)) or solid is None:
+            model.ledger.note("PLOAD4", f"{why}: left out of its load case")
+        else:
+            pressures.setdefault((card.integer(1), card.real(3)), []).append(_face(card, solid))
+    for card in model.of("PLOAD", "PLOAD2"):
+        model.ledger.note(card.name, "pressure on shells: no load case of a deck has it")
+    for k, ((sid, pressure), faces) in enumerate(pressures.items()):
+        again = sum(other == sid for other, _ in list(pressures)[:k])
+        name = f"pressure_{sid}" + (f"_{again + 1}" if again else "")
+        model.faces[f"{name}_faces"] = faces
+        model.loads.append(Load(name, faces=f"{name}_faces", pressure=pressure))
+
+
+def _untaken(card: Card, solid: Card | None) -> str:
+    """Return why a PLOAD4 is no uniform pressure along the normal of one face of a solid; empty where it is."""
+    if solid is None:
+        return "pressure on shells or on elements that are not there"
+    if any(card.text(k) and card.real(k) != card.real(3) for k in (4, 5, 6)):
+        return "a pressure that varies over the face"
+    if any(card.real(k, 0.0) for k in (10, 11, 12)) or card.text(13).upper() == "LINE":
+        return "along a direction, or on the edges"
+    return ""
+
+
+def _face(card: Card, solid: Card) -> tuple[int, ...]:
+    """Return the corner grids of a face, outward: G1 on it, and G3 opposite to G1 or, for CTETRA, G4 not on it."""
+    kind, n = _FACED[solid.name]
+    corners = [solid.integer(k) for k in range(3, 3 + n)]
+    first, other = card.integer(7), card.integer(8, 0)
+    for local in CELL_SHAPES[kind].facets:
+        face = tuple(corners[k] for k in local)
+        at = face.index(first) if first in face else -1
+        is_opposite = len(face) == 4 and face[at - 2] == other
+        is_it = other in corners and other not in face if n == 4 else is_opposite or (len(face) == 3 and not other)
+        if at >= 0 and is_it:
+            return face
+    raise MeshError(
+        f"{card.where} {card.text(1)}: element {card.text(2)} has no face of the grid points {card.text(7)} and "
+        f"{card.text(8) or 'none'}; expected G1 on it and G3 opposite to G1, or for CTETRA G4 not on it"
+    )

@@ -50,6 +50,7 @@ class NastranModel:
     supports: list[Support] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)  #: of nodes, by their numbers
+    faces: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)  #: group -> corner grids of faces
     elements: dict[int, tuple[str, str]] = field(default_factory=dict)  #: number -> card, group of cells
     done: set[str] = field(default_factory=set)  #: names of cards that are taken over or counted
 

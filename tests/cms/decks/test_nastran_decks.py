@@ -227,3 +227,54 @@ def test_a_weight_of_a_coupling_is_a_number_or_six(tmp_path, weight):
     job.write_text(text.replace("rbe3_60_nodes_1 = 1.0", f"rbe3_60_nodes_1 = {weight}"))
     with pytest.raises(ValueError, match="expected a number, or a list of six"):
         read_job(job)
+
+
+_SOLIDS = {
+    "CHEXA": "CHEXA,1,1,1,2,3,4,5,6\n,7,8",
+    "CPENTA": "CPENTA,1,1,1,2,4,5,6,8",
+    "CTETRA": "CTETRA,1,1,1,2,4,5",
+}
+
+
+@pytest.mark.parametrize(
+    ("card", "pair", "area"),
+    [
+        ("CHEXA", "5,7", (0, 0, 1)),
+        ("CHEXA", "8,1", (-1, 0, 0)),
+        ("CPENTA", "4,", (0, 0, -0.5)),
+        ("CPENTA", "6,", (0, 0, 0.5)),
+        ("CPENTA", "2,8", (1, 1, 0)),
+        ("CTETRA", "1,5", (0, 0, -0.5)),
+        ("CTETRA", "4,1", (0.5, 0.5, 0.5)),
+    ],
+)
+def test_pressure_on_a_face_of_a_solid_pushes_with_its_area(tmp_path, card, pair, area):
+    """Positive pressure acts against the outward area vector, which the unit cube gives by hand."""
+    deck = "BEGIN BULK\nINCLUDE 'nodes.bulk'\nPSOLID,1,9\nMAT1,9,2.+11,,.3,7850.\n"
+    deck += f"{_SOLIDS[card]}\nPLOAD4,5,1,10.,10.,,,{pair}\nPLOAD4,6,1,3.,,,,{pair}\nPLOAD2,7,4.,1\n"
+    path = deck_of(tmp_path, deck)
+    body = job_body(job_of(path))
+    assert [case.name for case in body.load_cases] == ["pressure_5", "pressure_6"]
+    for case, pressure in zip(body.load_cases, (10.0, 3.0), strict=True):
+        total = [case.f[body.dofs[:, 1] == c].sum() for c in range(3)]
+        assert_allclose(total, -pressure * np.array(area), rtol=0, atol=1e-13 * pressure)
+    assert "#   1 PLOAD2: pressure on shells" in path.with_suffix(".toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("load", "words"),
+    [
+        ("PLOAD4,5,1,10.,9.,,,5,7", "varies over the face"),
+        ("PLOAD4,5,1,10.,,,,5,7\n,,0.,0.,1.", "along a direction"),
+        ("PLOAD4,5,2,10.", "on shells or on elements that are not there"),
+    ],
+)
+def test_pressure_that_no_load_case_has_is_counted(tmp_path, load, words):
+    deck = read_deck(deck_of(tmp_path, DECK + load + "\n"))
+    assert [name for name in (load.name for load in deck.loads) if "pressure" in name] == []
+    assert any(name == "PLOAD4" and words in why for name, _, why in deck.ledger.rows())
+
+
+def test_a_face_that_the_element_has_not_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="element 1 has no face of the grid points 5 and 6"):
+        read_deck(deck_of(tmp_path, DECK + "PLOAD4,5,1,10.,,,,5,6\n"))
