@@ -12,7 +12,7 @@ import numpy as np
 from cms.errors import JobError
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.words import nearest, quoted
-from fe_models.importers.decks.deck import Deck, LineSection, ShellSection, SolidSection, Support
+from fe_models.importers.decks.deck import Deck, LineSection, RodSection, ShellSection, SolidSection, Support
 
 __all__ = ["JobRequest", "job_text"]
 
@@ -50,8 +50,8 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
         If a material lacks a constant, a support or a section names nothing.
     """
     deck.ledger.require_whole(request.leave_out)
-    if not (deck.solids or deck.shells or deck.lines or deck.springs):
-        raise JobError(f"deck {deck.path}: expected solids, shells, lines or springs, got none")
+    if not (deck.solids or deck.shells or deck.lines or deck.rods or deck.springs):
+        raise JobError(f"deck {deck.path}: expected solids, shells, lines, rods or springs, got none")
     tables: dict[str, Any] = {
         "body": {"name": deck.path.stem, "deck": deck_path, "units": request.units},
         "materials": _materials(deck, request),
@@ -80,9 +80,9 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
     return "\n".join(head) + "\n\n" + toml_text({key: value for key, value in tables.items() if value})
 
 
-def sections_of(deck: Deck) -> list[SolidSection | ShellSection | LineSection]:
+def sections_of(deck: Deck) -> list[SolidSection | ShellSection | LineSection | RodSection]:
     """Return all sections of a deck."""
-    return [*deck.solids, *deck.shells, *deck.lines]
+    return [*deck.solids, *deck.shells, *deck.lines, *deck.rods]
 
 
 def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
@@ -118,7 +118,7 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
 
 def _sections(deck: Deck) -> dict[str, Any]:
     """Return the tables of solids, shells and lines."""
-    tables: dict[str, dict[str, Any]] = {"solids": {}, "shells": {}, "sections": {}}
+    tables: dict[str, dict[str, Any]] = {"solids": {}, "shells": {}, "sections": {}, "rods": {}}
     for solid in deck.solids:
         table = {"cells": solid.group, "material": solid.material}
         if (solid.integration, solid.mass) != ("full", "consistent"):
@@ -137,6 +137,9 @@ def _sections(deck: Deck) -> dict[str, Any]:
         given |= {} if line.rotary_inertia else {"rotary_inertia": False}
         given |= {"added_mass": line.added_mass} if line.added_mass else {}
         tables["sections"][_free(tables["sections"], line.group)] = given
+    for rod in deck.rods:
+        row = {"lines": rod.group, "material": rod.material, "area": rod.area}
+        tables["rods"][_free(tables["rods"], rod.group)] = row
     return tables
 
 
@@ -186,7 +189,7 @@ def _interface(deck: Deck, support: Support) -> dict[str, Any]:
 
 def _nodes_with_rotations(deck: Deck) -> Any:
     """Return the rows of nodes of shells, lines and leaders of rigid groups."""
-    groups = {each.group for each in sections_of(deck) if not isinstance(each, SolidSection)}
+    groups = {each.group for each in sections_of(deck) if not isinstance(each, SolidSection | RodSection)}
     found = [
         block.nodes[block.groups[group]].ravel() for block in deck.mesh.blocks for group in groups & set(block.groups)
     ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from cms.errors import JobError
 from cms.jobs.job import InterfaceSection, Job
-from cms.jobs.tables.material_table import material_of
+from cms.jobs.tables.material_table import isotropic_of, material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.stages import Stages
@@ -56,7 +56,12 @@ def _parts(
     for body, mesh in _solids(job, path, raw, on_report):
         parts.append(Part(body, np.asarray(mesh.node_numbers)))
         meshes.append(mesh)
-    for made in (_shells(job, path, raw, on_report), _lines(job, path, raw, on_report), _attached(job, raw)):
+    for made in (
+        _shells(job, path, raw, on_report),
+        _lines(job, path, raw, on_report),
+        _rods(job, path, raw),
+        _attached(job, raw),
+    ):
         if made is not None:
             parts.append(made)
     return parts, meshes
@@ -85,7 +90,7 @@ def _solids(
                 _require_group(raw, f"solids.{name}.cells", group)
             rules.setdefault((table.integration, table.mass), {})[group] = material
     units = unit_system(job.body.units)
-    is_alone = len(rules) == 1 and not job.shells and not job.sections
+    is_alone = len(rules) == 1 and not job.shells and not job.sections and not job.rods
     for (integration, mass), of_group in rules.items():
         groups = None if "all" in of_group else tuple(of_group)
         piece = chosen_cells(raw, SOLID_TYPES, groups)
@@ -176,6 +181,26 @@ def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None
         name=f"{job.body.name} beams",
         units=unit_system(job.body.units),
     )
+    return Part(body, np.asarray(mesh.node_numbers))
+
+
+def _rods(job: Job, path: Path, raw: "RawMesh") -> "Part | None":
+    from fe_models.assemblies.join import Part
+    from fe_models.assemblies.rods import Rod, rod_body
+    from fe_models.importers.line_cells import line_mesh_from_raw
+    from fe_models.importers.raw_mesh import chosen_cells
+
+    if not job.rods:
+        return None
+    rods = {}
+    for table in job.rods.values():
+        name = table.material or next(iter(job.materials))
+        rod = Rod(isotropic_of(name, job.materials[name], "rods"), table.area)
+        for group in table.lines:
+            _require_group(raw, "rods.lines", group)
+            rods[group] = rod
+    mesh = line_mesh_from_raw(chosen_cells(raw, ("line",), tuple(rods)), path, "", tuple(rods))
+    body = rod_body(mesh, rods, name=f"{job.body.name} rods", units=unit_system(job.body.units))
     return Part(body, np.asarray(mesh.node_numbers))
 
 
@@ -336,7 +361,11 @@ def _require_group(raw: "RawMesh", where: str, group: str) -> None:
 def _require_used_groups(job: Job, raw: "RawMesh", joined: "Joined") -> None:
     """Refuse cells of the deck that are in no table: their mass would be lost in silence."""
     tables = [*(t.cells for t in job.solids.values()), *(t.cells for t in job.shells.values())]
-    groups = {group for names in (*tables, *(t.lines for t in job.sections.values())) for group in names}
+    groups = {
+        group
+        for names in (*tables, *(t.lines for t in job.sections.values()), *(t.lines for t in job.rods.values()))
+        for group in names
+    }
     if "all" in groups or "left-out" in job.body.accept:
         return
     faces = {group for table in job.load_cases.values() for group in table.faces or ()}

@@ -11,7 +11,7 @@ from fe_models.foundation.toml_file import Table, choice, is_no_number
 from fe_models.foundation.words import nearest, quoted
 from fe_models.solids.elements import INTEGRATIONS, MASSES
 
-__all__ = ["CouplingSection", "EquationSection", "SolidSection", "check_deck"]
+__all__ = ["CouplingSection", "EquationSection", "RodSection", "SolidSection", "check_deck"]
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 
@@ -58,6 +58,16 @@ def member_weight(value: Any) -> float | tuple[float, ...]:
     return tuple(float(each) for each in given) if isinstance(value, list | tuple) else float(value)
 
 
+class RodSection(Table):
+    """[rods.NAME]: lines that carry force along themselves only (trusses)."""
+
+    lines: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
+        description="the name of a group of lines, or a list of names"
+    )
+    material: Name | None = Field(None, description="the name of a material; default: the only one")
+    area: Annotated[float, Field(gt=0)] = Field(description="a number above 0 [length^2]")
+
+
 SixWeights = tuple[float, float, float, float, float, float]  #: of ux uy uz rx ry rz
 MemberWeight = Annotated[float | SixWeights, BeforeValidator(member_weight)]
 
@@ -88,7 +98,12 @@ def check_deck(job: Any) -> None:
     job
         The job, its tables read.
     """
-    tables: Mapping[str, Any] = {"solids": job.solids, "couplings": job.couplings, "equations": job.equations}
+    tables: Mapping[str, Any] = {
+        "solids": job.solids,
+        "rods": job.rods,
+        "couplings": job.couplings,
+        "equations": job.equations,
+    }
     if job.body.deck is None:
         for name, given in tables.items():
             if given:
@@ -96,9 +111,11 @@ def check_deck(job: Any) -> None:
         return
     if job.ties or job.body.part or job.body.plane or job.body.incompatible_modes:
         raise ValueError("body.deck: ties, part, plane and incompatible_modes belong to a mesh; remove them")
-    if not (job.solids or job.shells or job.sections or job.springs):
-        raise ValueError("body.deck: expected tables [solids.NAME], [shells.NAME], [sections.NAME] or [springs.NAME]")
-    for kind in ("solids", "shells", "sections"):
+    if not (job.solids or job.shells or job.sections or job.rods or job.springs):
+        raise ValueError(
+            "body.deck: expected tables [solids.NAME], [shells.NAME], [sections.NAME], [rods.NAME] or [springs.NAME]"
+        )
+    for kind in ("solids", "shells", "sections", "rods"):
         for name, table in getattr(job, kind).items():
             if table.material is None and len(job.materials) != 1:
                 raise ValueError(f"{kind}.{name}.material: missing; there are {len(job.materials)} materials, name one")

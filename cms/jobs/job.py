@@ -19,7 +19,7 @@ from cms.jobs.beam_tables import (
     numbers,
 )
 from cms.jobs.damping_table import DampingSection
-from cms.jobs.deck_tables import CouplingSection, EquationSection, SolidSection, check_deck
+from cms.jobs.deck_tables import CouplingSection, EquationSection, RodSection, SolidSection, check_deck
 from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_interfaces
 from cms.jobs.shell_tables import ShellSection, check_shells
 from cms.jobs.tables.material_table import MaterialSection
@@ -322,6 +322,7 @@ class Job(Table):
     links: dict[str, LinkSection] = Field({}, description="tables [links.NAME]")
     ties: dict[str, TieSection] = Field({}, description="tables [ties.NAME] of beams to a solid")
     solids: dict[str, SolidSection] = Field({}, description="tables [solids.NAME] of a deck")
+    rods: dict[str, RodSection] = Field({}, description="tables [rods.NAME] of a deck")
     couplings: dict[str, CouplingSection] = Field({}, description="tables [couplings.NAME] of a deck")
     equations: dict[str, EquationSection] = Field({}, description="tables [equations.NAME] of a deck")
     interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")

@@ -127,7 +127,9 @@ def frequencies(deck, body):
             values = eigh(M.toarray(), K.toarray(), eigvals_only=True)[::-1][:N_FREQUENCIES]
             return 1 / np.sqrt(values) / 2 / np.pi
         except np.linalg.LinAlgError:  # a free body
-            pass
+            if len(free) <= N_FREQUENCIES:
+                values = eigh(K.toarray(), M.toarray(), eigvals_only=True)
+                return np.sqrt(np.maximum(values, 0)) / 2 / np.pi
     shift = -1e-9 * K.diagonal().max() / M.diagonal().max()
     values = np.sort(eigsh(K, min(N_FREQUENCIES, len(free) - 2), M, sigma=shift, return_eigenvectors=False))
     return np.sqrt(np.maximum(values, 0)) / 2 / np.pi
@@ -152,7 +154,7 @@ def difference(name, folder):
     path.write_text(frequency_deck(text_of(name)))
     deck, body = body_of(path)
     theirs = frequencies_of_ccx(path)[:N_FREQUENCIES]
-    kinds = [kind for kind in ("solids", "shells", "lines") if getattr(deck, kind)]
+    kinds = [kind for kind in ("solids", "shells", "lines", "rods") if getattr(deck, kind)]
     if not len(theirs) or not theirs.any():
         return kinds, None
     ours = frequencies(deck, body)[: len(theirs)]

@@ -13,7 +13,7 @@ from fe_models.importers.decks.abaqus_couplings import equations_in_basic_axes, 
 from fe_models.importers.decks.abaqus_elements import read_element
 from fe_models.importers.decks.abaqus_loads import read_boundary, read_load
 from fe_models.importers.decks.abaqus_materials import materials_in_axes, read_material
-from fe_models.importers.decks.abaqus_sections import read_section
+from fe_models.importers.decks.abaqus_sections import ellipses_in_numbers, read_section
 from fe_models.importers.decks.abaqus_thickness import sections_by_thickness
 from fe_models.importers.decks.deck import Deck
 from fe_models.importers.decks.draft import Draft
@@ -138,6 +138,7 @@ def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
 def _finished(path: Path, draft: Draft) -> Deck:
     """Return the deck of a draft whose blocks are all taken."""
     equations_in_basic_axes(draft)
+    ellipses_in_numbers(draft)
     sections_by_thickness(draft)
     try:
         materials_in_axes(draft)
@@ -147,7 +148,7 @@ def _finished(path: Path, draft: Draft) -> Deck:
     supports = tuple(draft.supports_of_groups())
     mesh = raw_mesh_of(draft.mesh, [])
     spelt = {name.upper(): name for name in draft.materials}
-    for kind in (draft.solids, draft.shells, draft.lines):
+    for kind in (draft.solids, draft.shells, draft.lines, draft.rods):
         kind[:] = [replace(each, material=spelt.get(each.material.upper(), each.material)) for each in kind]  # type: ignore
     names = {**mesh.node_sets, **draft.node_groups}
     groups = draft.cell_groups
@@ -175,4 +176,5 @@ def _finished(path: Path, draft: Draft) -> Deck:
         tuple(draft.equations),
         supports,
         tuple(draft.loads),
+        tuple(draft.rods),
     )

@@ -173,10 +173,14 @@ def materials_in_axes(draft: Draft) -> None:
     unused = len(set(draft.orientations) - used)
     if unused:
         draft.ledger.note("*ORIENTATION", "axes of materials; isotropic ones need none", count=unused)
-    for name in [*(shell.material for shell in draft.shells), *(line.material for line in draft.lines)]:
+    for name in [
+        *(shell.material for shell in draft.shells),
+        *(line.material for line in draft.lines),
+        *(rod.material for rod in draft.rods),
+    ]:
         material = draft.materials.get(spelt.get(name.upper(), ""))
         if material is not None and material.shear is not None:
-            draft.ledger.refuse("*ELASTIC", "shells and beams of orthotropic materials")
+            draft.ledger.refuse("*ELASTIC", "shells, beams and trusses of orthotropic materials")
 
 
 def _three(values: Array | tuple[float, ...]) -> tuple[float, float, float]:

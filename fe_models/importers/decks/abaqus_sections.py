@@ -1,6 +1,7 @@
 """Sections of Abaqus and CalculiX, masses and springs."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,10 @@ from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus_elements import PLANE, SOLID_RULES
 from fe_models.importers.decks.abaqus_materials import numbers, read_orientation, read_transform
 from fe_models.importers.decks.abaqus_thickness import read_nodal_thickness
-from fe_models.importers.decks.deck import DeckMass, DeckSpring, LineSection, ShellSection, SolidSection
+from fe_models.importers.decks.deck import DeckMass, DeckSpring, LineSection, RodSection, ShellSection, SolidSection
 from fe_models.importers.decks.draft import Draft
 
-__all__ = ["read_section"]
+__all__ = ["ellipses_in_numbers", "read_section"]
 
 _SHELLS = ("triangle", "triangle6", "quad", "quad8", "quad9")
 _LINES = ("line", "line3")
@@ -60,6 +61,9 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
     material = _material_of(block, draft)
     rules: dict[tuple[str, str], list[IntArray]] = {}
     for (kind_name, kind), elements in types.items():
+        if kind_name == "T3D2":
+            _rods(name, block, draft, elements)
+            continue
         rule = SOLID_RULES[draft.program].get(kind_name)
         if rule is None:
             why = (
@@ -75,6 +79,14 @@ def _solid_section(here: str, block: DeckBlock, draft: Draft) -> None:
         orientation = block.parameters.get("ORIENTATION", "").strip('"')
         group = draft.cell_group(own, np.concatenate(parts))
         draft.solids.append(SolidSection(group, material, integration, mass, orientation))
+
+
+def _rods(name: str, block: DeckBlock, draft: Draft, elements: IntArray) -> None:
+    """Take the area of trusses; CalculiX and Abaqus both have 1 where none is given."""
+    area = numbers(block.lines[0])[0] if block.lines else 1.0
+    if draft.program == "abaqus":
+        draft.ledger.note("T3D2", "consistent mass, where Abaqus lumps it", count=len(elements))
+    draft.rods.append(RodSection(draft.cell_group(name, elements), _material_of(block, draft), area))
 
 
 def _common_rule(kind: str, rule: tuple[str, str, str]) -> tuple[str, str]:
@@ -115,9 +127,11 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
         "BOX": lambda: {"shape": "box", "width": size[0], "height": size[1], "web": size[2], "flange": size[3]},
     }
     is_even = kind != "BOX" or (size[2] == size[4] and size[3] == size[5])
-    is_round = kind != "CIRC" or draft.program == "abaqus" or len(size) < 2 or size[1] in (0.0, size[0])
+    is_ellipse = kind == "CIRC" and draft.program == "calculix" and len(size) > 1 and size[1] not in (0.0, size[0])
+    if is_ellipse:
+        shapes["CIRC"] = lambda: {"shape": "ellipse", "width": size[0], "height": size[1]}
     offsets = [float(block.parameters.get(key, 0)) for key in ("OFFSET1", "OFFSET2")]
-    if kind not in shapes or not is_even or not is_round:
+    if kind not in shapes or not is_even:
         draft.ledger.refuse(f"*{block.keyword}, SECTION={kind}", "this shape is not known here", count=len(kept))
         return
     n1 = numbers(block.lines[1])[:3] if len(block.lines) > 1 else [0.0, 0.0, -1.0]
@@ -128,6 +142,39 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
     if kept.size:
         group = draft.cell_group(name, kept)
         draft.lines.append(LineSection(group, _material_of(block, draft), shape, (n1[0], n1[1], n1[2]), offset))
+
+
+def ellipses_in_numbers(draft: Draft) -> None:
+    """Give ellipses their area, moments, torsion constant and Cowper's (1966) shear areas.
+
+    With half axes a, along the force, and b: kappa = 12 (1 + nu) a² (3 a² + b²) / ((40 + 37 nu) a⁴ +
+    (16 + 10 nu) a² b² + nu b⁴), that of the circle for a = b, and 9/10 for b -> 0 as by the energy of the shear flow.
+    """
+    for k, line in enumerate(draft.lines):
+        if line.shape["shape"] != "ellipse":
+            continue
+        nu = next((m.poisson for name, m in draft.materials.items() if name.upper() == line.material.upper()), None)
+        if not isinstance(nu, float):
+            draft.ledger.refuse("*BEAM SECTION, SECTION=CIRC", "an ellipse without Poisson's ratio")
+            continue
+        a, b = float(str(line.shape["width"])) / 2, float(str(line.shape["height"])) / 2
+        area, angle = np.pi * a * b, np.linspace(0, 2 * np.pi, 16, endpoint=False)
+        shape = {
+            "shape": "general",
+            "area": area,
+            "iy": area * b**2 / 4,
+            "iz": area * a**2 / 4,
+            "torsion": area * a**2 * b**2 / (a**2 + b**2),
+            "shear_area_y": _cowper(a, b, nu) * area,
+            "shear_area_z": _cowper(b, a, nu) * area,
+            "outline": [[a * float(np.cos(t)), b * float(np.sin(t))] for t in angle],
+        }
+        draft.lines[k] = replace(line, shape=shape)
+
+
+def _cowper(a: float, b: float, nu: float) -> float:
+    below = (40 + 37 * nu) * a**4 + (16 + 10 * nu) * a**2 * b**2 + nu * b**4
+    return 12 * (1 + nu) * a**2 * (3 * a**2 + b**2) / below
 
 
 def _known(

@@ -21,6 +21,7 @@ __all__ = [
     "LineSection",
     "Load",
     "RigidGroup",
+    "RodSection",
     "ShellSection",
     "SolidSection",
     "Support",
@@ -75,6 +76,15 @@ class LineSection:
     shear: bool = True
     rotary_inertia: bool = True
     added_mass: float = 0.0  #: per length
+
+
+@dataclass(frozen=True)
+class RodSection:
+    """Lines that carry force along themselves only (trusses)."""
+
+    group: str
+    material: str
+    area: float
 
 
 @dataclass(frozen=True)
@@ -165,3 +175,4 @@ class Deck:
     equations: tuple[Equation, ...] = ()
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()
+    rods: tuple[RodSection, ...] = ()

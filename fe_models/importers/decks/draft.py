@@ -19,6 +19,7 @@ from fe_models.importers.decks.deck import (
     LineSection,
     Load,
     RigidGroup,
+    RodSection,
     ShellSection,
     SolidSection,
     Support,
@@ -55,6 +56,7 @@ class Draft:
     solids: list[SolidSection] = field(default_factory=list)
     shells: list[ShellSection] = field(default_factory=list)
     lines: list[LineSection] = field(default_factory=list)
+    rods: list[RodSection] = field(default_factory=list)
     masses: list[DeckMass] = field(default_factory=list)
     springs: list[DeckSpring] = field(default_factory=list)
     rigid: list[RigidGroup] = field(default_factory=list)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fe_models.beams.sections import Circle
 from fe_models.errors import MeshError
 from fe_models.importers.decks.deck import DeckMaterial, LineSection, ShellSection, SolidSection
 from fe_models.importers.decks.read_deck import read_deck
@@ -131,7 +132,7 @@ def test_the_ledger_counts_what_is_not_taken_over_and_why(tmp_path):
         ("TYPE=S4R", "TYPE=CPS4R", "1 CPS4R: not an element of"),
         ("TYPE=C3D8I", "TYPE=C3D8X", "1 C3D8X .*: this element is not known here"),
         ("*ELASTIC\n", "*ELASTIC, TYPE=COUPLED\n", r"1 \*ELASTIC, TYPE=COUPLED"),
-        ("*ELASTIC\n210., .25", f"*ELASTIC, TYPE=ENG\n{'1., ' * 3}{'0., ' * 3}1., 1.\n1.", "shells and beams"),
+        ("*ELASTIC\n210., .25", f"*ELASTIC, TYPE=ENG\n{'1., ' * 3}{'0., ' * 3}1., 1.\n1.", "shells, beams"),
         ("*ELASTIC\n210., .25", f"*ELASTIC, TYPE=ORTHO\n{'0., ' * 6}1., 1.\n1.", "not positive definite"),
         ("SPRING, ELSET=coil", "SPRING, NONLINEAR, ELSET=coil", r"1 \*SPRING, NONLINEAR"),
         ("*RIGID BODY, NSET=top, REF NODE=30", "*TIE, NAME=t\nfoot, top", r"1 \*TIE .*not made of faces of solids"),
@@ -361,3 +362,18 @@ def test_axes_turn_with_their_instance(tmp_path):
     forces = deck.loads[0].forces
     assert_allclose(forces["node_4"][:3], [-2, 0, 0], atol=1e-14)
     assert_allclose(forces["node_14"][:3], [0, -2, 0], atol=1e-14)
+
+
+def test_an_ellipse_is_between_the_circle_and_the_thin_strip(tmp_path):
+    """Nearly a circle it has the numbers of our circle; a thin one along y has 9/10 of its area in shear, J = 4 Iy."""
+    section = "SECTION=RECT\n0.2, 0.3\n"
+    nearly = deck_of(tmp_path, DECK.replace(section, "SECTION=CIRC\n0.2, 0.2000001\n")).lines[0].shape
+    circle = Circle(0.1).properties(0.25)
+    numbers_ = [nearly[key] for key in ("area", "iy", "iz", "torsion", "shear_area_y", "shear_area_z")]
+    expected = [circle.A, circle.Iy, circle.Iz, circle.J, circle.A_sy, circle.A_sz]
+    assert_allclose(numbers_, expected, rtol=3e-6)
+    thin = deck_of(tmp_path, DECK.replace(section, "SECTION=CIRC\n0.2, 0.0002\n").replace("210., .25", "210., 0."))
+    shape = thin.lines[0].shape
+    assert_allclose(shape["shear_area_y"], 0.9 * shape["area"], rtol=1e-4)
+    assert_allclose([shape["iz"], shape["torsion"]], [shape["area"] * 0.01 / 4, 4 * shape["iy"]], rtol=1e-5)
+    assert len(shape["outline"]) == 16
