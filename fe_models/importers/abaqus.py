@@ -88,8 +88,6 @@ class _Sets:
                 parts.append(nodes_of(entry.elements))
             elif entry in self.entries:
                 parts.append(self._members(entry, nodes_of, (*seen, key)))
-            elif (short := entry.rpartition(".")[2]) in self.entries:  # instance.set
-                parts.append(self._members(short, nodes_of, (*seen, key)))
             else:
                 raise MeshError(f"{here} names an unknown set {quoted(entry)}{nearest(entry, self.entries)}")
         return np.unique(np.concatenate(parts))

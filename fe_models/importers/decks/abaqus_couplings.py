@@ -181,12 +181,30 @@ def _distributing_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
 def _mpcs(here: str, block: DeckBlock, draft: Draft) -> None:
     for line in block.lines:
         kind, *words = [word.strip() for word in line.rstrip(", ").split(",")]
-        if kind.upper() in ("BEAM", "TIE", "PIN") and len(words) >= 2:
-            leader = int(draft.nodes_of(here, words[1])[0])
-            components = (0, 1, 2) if kind.upper() == "PIN" else (0, 1, 2, 3, 4, 5)
-            _rigid_group(here, draft, leader, draft.nodes_of(here, words[0]), components)
+        name = f"*MPC, {kind.upper()}"
+        if kind.upper() not in ("BEAM", "TIE", "PIN") or len(words) != 2:
+            draft.ledger.refuse(name, "this constraint is not known here", line=block.line_number)
+            continue
+        members, leaders = (draft.nodes_of(here, word) for word in words)
+        if len(leaders) != 1:
+            draft.ledger.refuse(name, "of nodes in pairs; write a line for each pair", line=block.line_number)
+        elif kind.upper() != "BEAM":
+            _equal(here, draft, int(leaders[0]), members, is_tied=kind.upper() == "TIE")
+        elif draft.program == "abaqus":
+            _rigid_group(here, draft, int(leaders[0]), members)
         else:
-            draft.ledger.refuse(f"*MPC, {kind.upper()}", "this constraint is not known here", line=block.line_number)
+            why = "CalculiX keeps the distance of the nodes alone, Abaqus all of their motion: read it as abaqus, or"
+            draft.ledger.refuse(name, f"{why} write *RIGID BODY", line=block.line_number)
+
+
+def _equal(here: str, draft: Draft, leader: int, members: IntArray, *, is_tied: bool) -> None:
+    """Take PIN, equal displacements, and TIE, equal rotations too: without a lever, however far apart the nodes are."""
+    first = draft.node_group(here, [leader])
+    for member in np.setdiff1d(members, [leader]).tolist():
+        other = draft.node_group(here, [member])
+        draft.equations += [Equation(((other, c, 1.0), (first, c, -1.0))) for c in range(3)]
+    if is_tied:
+        _rigid_group(here, draft, leader, members, (3, 4, 5))
 
 
 def surface_nodes(here: str, draft: Draft, name: str) -> IntArray:

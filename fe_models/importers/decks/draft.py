@@ -82,7 +82,7 @@ class Draft:
         word = word.strip().strip('"')
         if word.lstrip("+").isdigit():
             return np.array([int(word)], dtype=np.int64)
-        key = word.rpartition(".")[2].upper() if word.upper() not in self.mesh.node_sets else word.upper()
+        key = word.upper()
         if key not in self.mesh.node_sets:
             raise MeshError(f"{here}: unknown node set {quoted(word)}{nearest(word, self.mesh.node_sets)}")
         return self.mesh.node_sets[key]
@@ -92,7 +92,7 @@ class Draft:
         word = word.strip().strip('"')
         if word.lstrip("+").isdigit():
             return np.array([int(word)], dtype=np.int64)
-        key = word.rpartition(".")[2].upper() if word.upper() not in self.mesh.element_sets else word.upper()
+        key = word.upper()
         if key not in self.mesh.element_sets:
             raise MeshError(f"{here}: unknown element set {quoted(word)}{nearest(word, self.mesh.element_sets)}")
         return self.mesh.element_sets[key]

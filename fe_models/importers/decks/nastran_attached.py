@@ -67,6 +67,15 @@ def _bush(model: NastranModel, card: Card) -> None:
         elif key:
             model.ledger.note(f"PBUSH, {key}", "not taken over")
     ends = [model.point(card, card.integer(n)) for n in (3, 4)]
+    has_length = bool(np.linalg.norm(ends[1] - ends[0]))
+    is_round = all(row[1] == row[2] and row[4] == row[5] for row in (k, b))
+    if has_length and not is_round and not card.text(8) and not card.text(5):
+        why = "with length, other values along y than along z, and neither orientation nor CID: which is y is not said"
+        model.ledger.refuse("CBUSH", why)
+        return
+    if not has_length and not card.text(8):
+        why = "of no length and without CID: its axes are those of the displacements of GA (CD)"
+        model.ledger.note("CBUSH", why)
     triad = _bush_axes(model, card, ends)
     names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
     damping = tuple(b) if any(b) else None

@@ -124,6 +124,7 @@ def test_the_job_of_a_deck_of_nastran_has_its_mass_and_its_loads(tmp_path):
         ("PSOLID,1,9", "PSOLID,2,9", "1 CHEXA: property 1 is not known here"),
         ("CONM2", "CONM1", "1 CONM1: this card is not known here"),
         ("CELAS2,70,5.+3,1,1,2,1", "CBUSH,70,71,1,2\n,.3\nPBUSH,71,K,1.,1.,1.", "1 CBUSH: acting elsewhere"),
+        ("CELAS2,70,5.+3,1,1,2,1", "CBUSH,70,71,1,2\nPBUSH,71,K,1.,1.,2.", "1 CBUSH: with length, other values"),
         ("CELAS2,70,5.+3,1,1,2,1", "CBAR,70,71,1,2,0.,0.,1.,GOO\n,,,0.,0.,1.,0.,0.,1.\nPBARL,71,9,,ROD\n,.1",
          r"1 CBAR: offsets along the axes of the element \(OFFT GOO\)"),
         ("CELAS2,70,5.+3,1,1,2,1",
@@ -138,6 +139,25 @@ def test_cards_with_mass_or_stiffness_are_refused_by_name(tmp_path, old, new, wo
     deck = read_deck(deck_of(tmp_path, DECK.replace(old, new)))
     with pytest.raises(ValueError, match=words):
         deck.ledger.require_whole()
+
+
+@pytest.mark.parametrize(
+    ("bush", "axes"),
+    [
+        ("CBUSH,70,71,5,10", "its axes are those of the displacements of GA"),
+        ("CBUSH,70,71,5,10,,,,0", ""),
+        ("CBUSH,70,71,1,2,0.,0.,1.", ""),
+        ("CBUSH,70,71,1,2,,,,0", ""),
+    ],
+)
+def test_a_bush_says_whose_axes_it_takes_unasked(tmp_path, bush, axes):
+    lines = f"GRID,10,,0.,0.,1.\n{bush}\nPBUSH,71,K,1.,2.,3."
+    deck = read_deck(deck_of(tmp_path, DECK.replace("CELAS2,70,5.+3,1,1,2,1", lines)))
+    deck.ledger.require_whole()
+    assert len(deck.springs) == 1
+    told = [why for name, _, why in deck.ledger.rows() if name == "CBUSH"]
+    assert len(told) == bool(axes)
+    assert all(axes in why for why in told)
 
 
 def test_a_missing_include_and_a_ring_of_them_are_refused(tmp_path):

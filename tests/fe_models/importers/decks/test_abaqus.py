@@ -377,3 +377,37 @@ def test_an_ellipse_is_between_the_circle_and_the_thin_strip(tmp_path):
     assert_allclose(shape["shear_area_y"], 0.9 * shape["area"], rtol=1e-4)
     assert_allclose([shape["iz"], shape["torsion"]], [shape["area"] * 0.01 / 4, 4 * shape["iy"]], rtol=1e-5)
     assert len(shape["outline"]) == 16
+RIGID = "*RIGID BODY, NSET=top, REF NODE=30\n"
+
+
+@pytest.mark.parametrize("program", ["calculix", "abaqus"])
+def test_pinned_and_tied_nodes_apart_have_equal_displacements_without_a_lever(tmp_path, program):
+    """Abaqus: PIN makes global displacements equal, TIE all six; a rotation of one moves the other not at all."""
+    deck = deck_of(tmp_path, DECK.replace(RIGID, "*MPC\nPIN, 5, 30\nTIE, 6, 30\n"), program=program)
+    terms = {tuple((*numbers(deck, group), c, a) for group, c, a in each.terms) for each in deck.equations[:-1]}
+    assert terms == {((node, c, 1.0), (30, c, -1.0)) for node in (5, 6) for c in range(3)}
+    assert [(numbers(deck, x.node), numbers(deck, x.followers), x.components) for x in deck.rigid] == [
+        ([30], [6], (3, 4, 5))
+    ]
+    deck.ledger.require_whole()
+
+
+def test_a_beam_between_nodes_is_rigid_in_abaqus_and_keeps_a_distance_in_calculix(tmp_path):
+    text = DECK.replace(RIGID, "*MPC\nBEAM, top, 30\n")
+    deck = deck_of(tmp_path, text, program="abaqus")
+    assert [(numbers(deck, x.followers), x.components) for x in deck.rigid] == [([5, 6, 7, 8], (0, 1, 2, 3, 4, 5))]
+    with pytest.raises(MeshError, match=r"1 \*MPC, BEAM .*CalculiX keeps the distance of the nodes alone"):
+        deck_of(tmp_path, text).ledger.require_whole()
+    with pytest.raises(MeshError, match=r"1 \*MPC, PIN .*: of nodes in pairs"):
+        deck_of(tmp_path, DECK.replace(RIGID, "*MPC\nPIN, foot, top\n")).ledger.require_whole()
+
+
+def test_a_set_of_an_instance_is_not_one_of_the_same_name_elsewhere(tmp_path):
+    """Bar-1.feet is not the set `feet` of the assembly, of nodes or of elements."""
+    for old, new in (("Bar-1.tip, 2", "Bar-1.feet, 2"), ("\ntip\n", "\npoint\n")):
+        with pytest.raises(MeshError, match=r"unknown (node )?set 'B[Aa][Rr]-[12]\.(feet|POINT)'"):
+            deck_of(tmp_path, PART.replace(old, new))
+    surface = "*ELSET, ELSET=skin, INSTANCE=Bar-1\n1\n*SURFACE, NAME=s\nBar-2.skin, S1\n*END ASSEMBLY"
+    tie = "*COUPLING, REF NODE=point, SURFACE=s, CONSTRAINT NAME=c\n*KINEMATIC\n1, 6\n*END ASSEMBLY"
+    with pytest.raises(MeshError, match=r"unknown element set 'Bar-2\.skin'"):
+        deck_of(tmp_path, PART.replace("*END ASSEMBLY", surface).replace("*END ASSEMBLY", tie))
