@@ -46,7 +46,10 @@ FORMATS = (
         tried="decks of ccx 2.20",
         lost="contact, nonlinear and anisotropic materials, layers, steps: each listed with its count",
     ),
-    FileFormat("bulk data", "Nastran", "mesh", (".bdf", ".nas", ".dat", ".fem"), reads=True, lost="all but the mesh"),
+    FileFormat(
+        "bulk data", "Nastran", "mesh", (".bdf", ".nas", ".dat", ".fem", ".blk", ".bulk"), reads=True,
+        lost="all but the mesh",
+    ),
     FileFormat("MED", "Salome, code_aster", "mesh", (".med",), reads=True),
     FileFormat(
         "OUTPUT4", "Nastran", "matrices", (".op4",), reads=True,
@@ -97,5 +100,5 @@ FORMATS = (
         "BREP", "OpenCASCADE, FreeCAD", "geometry", (".brep",), reads=True, tried="Gmsh 4.15, OpenCASCADE 7.8",
         lost="it has no unit, names, colours", extra="mesh",
     ),
-)  # fmt: skip
+)
 #: one line a format; `cms formats` and docs/formats.md list them

@@ -1,17 +1,20 @@
 """The mesh of a Nastran bulk data deck: grid points, elements, and property numbers as groups.
 
 Read here and not by meshio, which ignores coordinate systems (CP) and INCLUDE, skips elements in large field format
-and cards in lower case, and assigns property numbers to the wrong elements where some have none. Cards that would
-change where the nodes are, and are not understood here, are refused.
+and cards in lower case, and assigns property numbers to the wrong elements where some have none. The cards are those
+of whole decks, `fe_models.importers.bulk_data`.
 """
 
-from collections.abc import Iterator
+import re
 from pathlib import Path
 
 import numpy as np
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import IntArray
+from fe_models.importers.bulk_data.cards import Card, read_cards
+from fe_models.importers.bulk_data.coordinate_systems import SYSTEM_CARDS, read_grid_points
+from fe_models.importers.bulk_data.includes import bulk_text
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["ELEMENT_TYPES", "nodes_of", "read_nastran"]
@@ -38,81 +41,62 @@ _SOLID_CARDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRA", "CPYRAM")
 _SOLID_PREFIXES = ("CTET", "CHEX", "CPEN", "CPYR")
 _NOTED = ("RBE", "RBAR", "RROD", "MPC", "CON", "CEL", "CBU", "CGA", "CMA", "CDA", "CTR", "CQU", "CSH", "CWE", "CTU")
 
+PLACING = ("GRID", "GRDSET", *SYSTEM_CARDS)
+BEGIN, END = re.compile(r"(?im)^[ \t]*BEGIN"), re.compile(r"(?im)^[ \t]*ENDDATA")
+
 
 def read_nastran(path: Path, data: bytes) -> RawMesh:
     """Return grid points and elements; the elements of property n are group `pid_n`, those without one in none.
 
-    A deck may start with its bulk data. Displacement coordinate systems (CD) do not move nodes and are not read.
+    Cards, includes and coordinate systems are those of whole decks (`fe_models.importers.bulk_data`). A deck may start
+    with its bulk data. Displacement coordinate systems (CD) do not move nodes and are not read.
 
     Parameters
     ----------
     path
-        File name, for messages.
+        File name, for messages and for files that are included.
     data
         Content of the file.
 
     Raises
     ------
     MeshError
-        If grid points are given in another coordinate system, cards are included from elsewhere, replicated, or not
-        in sequence, or the deck is damaged.
+        If a coordinate system or an included file is missing, cards are replicated or not in sequence, or the deck is
+        damaged.
     """
     where = f"mesh {path}"
-    text = data.decode("utf-8", "replace")
-    grid_numbers: list[int] = []
-    coordinates: list[tuple[float, float, float]] = []
+    text = bulk_text(where, path, data.decode("utf-8", "replace"))
+    placing: list[Card] = []  # what says where grid points are
     cells: dict[tuple[str, int, str], tuple[list[int], list[list[str]]]] = {}  # card, nodes, property -> elements
     noted: dict[str, int] = {}
-    default_cp = ""
-    without_cp: list[int] = []
-    for line, card, fields in _cards(where, text):
-        here = f"{where}, line {line}: {card}"
-        if card == "GRID":
-            number = _integer(here, fields, 1)
-            cp = fields[2] if len(fields) > 2 else ""
-            if cp not in ("", "0"):
-                raise MeshError(
-                    f"{here} {number}: position in coordinate system {cp} (CP), which is not read; "
-                    f"expected basic coordinates. Export the deck with all grid points in the basic system"
-                )
-            if not cp:
-                without_cp.append(number)
-            grid_numbers.append(number)
-            coordinates.append((_real(here, fields, 3), _real(here, fields, 4), _real(here, fields, 5)))
-        elif card in ELEMENT_TYPES:
-            n_fields = 2 + max(ELEMENT_TYPES[card])
-            given = [*fields[3 : n_fields + 1], *[""] * (n_fields + 1 - len(fields))]
-            count, nodes = nodes_of(here, card, given)
-            number = _integer(here, fields, 1)
-            numbers, rows = cells.setdefault((card, count, fields[2]), ([], []))
-            numbers.append(number)
+    for card in read_cards(where, text):
+        if card.name in PLACING:
+            placing.append(card)
+        elif card.name in ELEMENT_TYPES:
+            widest = max(ELEMENT_TYPES[card.name])
+            given = [*card.fields[2 : 2 + widest], *[""] * (2 + widest - len(card.fields))]
+            count, nodes = nodes_of(card.where, card.name, given)
+            numbers, rows = cells.setdefault((card.name, count, card.text(2)), ([], []))
+            numbers.append(card.integer(1))
             rows.append(nodes)
-        elif card == "GRDSET":
-            default_cp = fields[2] if len(fields) > 2 else ""
-        elif card.startswith(_SOLID_PREFIXES):
-            raise MeshError(f"{here}: unknown solid element; expected {', '.join(_SOLID_CARDS)}")
-        elif card.startswith(_NOTED):
-            noted[card] = noted.get(card, 0) + 1
-    if default_cp not in ("", "0") and without_cp:
-        raise MeshError(
-            f"{where}: GRDSET puts {len(without_cp)} grid points into coordinate system {default_cp}, "
-            f"which is not read; expected basic coordinates"
-        )
-    if not grid_numbers:
+        elif card.name.startswith(_SOLID_PREFIXES):
+            raise MeshError(f"{card.where}: unknown solid element; expected {', '.join(_SOLID_CARDS)}")
+        elif card.name.startswith(_NOTED):
+            noted[card.name] = noted.get(card.name, 0) + 1
+    points = read_grid_points(placing, only_positions=True).positions
+    if not points:
         raise MeshError(f"{where}: expected grid points (GRID), got none; is this a Nastran bulk data file?")
-    numbers_of_nodes = np.array(grid_numbers, dtype=np.int64)
+    listed = dict.fromkeys(card.integer(1) for card in placing if card.name == "GRID")
+    numbers_of_nodes = np.array(list(listed), dtype=np.int64)
     order = np.argsort(numbers_of_nodes, kind="stable")
     ordered = numbers_of_nodes[order]
-    if (np.diff(ordered) == 0).any():
-        twice = ordered[:-1][np.diff(ordered) == 0]
-        raise MeshError(f"{where}: {twice.size} grid points are defined twice, first {twice[0]}; keep one of each")
     blocks = []
-    for (card, count, pid), (element_numbers, rows) in cells.items():
-        kind, local = ELEMENT_TYPES[card][count]
+    for (card_name, count, pid), (element_numbers, rows) in cells.items():
+        kind, local = ELEMENT_TYPES[card_name][count]
         try:
             wanted = np.array(rows, dtype=np.int64)
         except ValueError as error:
-            raise MeshError(f"{where}: {card}: expected grid numbers; {error}") from error
+            raise MeshError(f"{where}: {card_name}: expected grid numbers; {error}") from error
         at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
         nodes_of_cells: IntArray = np.where(ordered[at] == wanted, order[at], -1)
         if local is not None:
@@ -120,68 +104,11 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
         group = {f"pid_{pid}": np.arange(len(rows))} if pid else {}
         blocks.append(RawBlock(kind, nodes_of_cells, group, np.array(element_numbers, dtype=np.int64)))
     _require_unique(where, blocks)
-    notes = tuple(f"{times} {card} cards were left out" for card, times in noted.items())
-    return RawMesh(np.array(coordinates), tuple(blocks), node_numbers=numbers_of_nodes, notes=notes)
-
-
-def _cards(where: str, text: str) -> Iterator[tuple[int, str, list[str]]]:
-    """Yield line number, name without '*', and the fields of each bulk data card, continuations joined."""
-    lines = text.splitlines()
-    begins = [k for k, line in enumerate(lines) if line.lstrip().upper().startswith("BEGIN")]
-    for k, line in enumerate(lines):
-        if line.lstrip().upper().startswith("INCLUDE"):
-            raise MeshError(f"{where}, line {k + 1}: INCLUDE is not read; put the included text into this file")
-    if len(begins) > 1:
-        raise MeshError(f"{where}, line {begins[1] + 1}: a second BEGIN (superelement) is not read; expected one body")
-    start = begins[0] + 1 if begins else 0
-    number, mark, has_end = 0, "", False
-    fields: list[str] = []
-    for k, raw in enumerate(lines[start:], start=start + 1):
-        line = raw.partition("$")[0].rstrip()
-        if not line:
-            continue
-        if line[:7].upper() == "ENDDATA":
-            has_end = True
-            break
-        new, own_mark, next_mark = _fields(line)
-        if line[0] in "=":
-            raise MeshError(f"{where}, line {k}: replicated cards (=) are not read; write them out")
-        if line[0] in "+*, " and not new[0].strip("+*"):
-            new[0] = ""
-        if line[0] in "+*" or not new[0]:
-            if not fields:
-                raise MeshError(f"{where}, line {k}: a continuation without a card before it: {line[:40]!r}")
-            if own_mark.strip("+*") and mark.strip("+*") and own_mark.strip("+*") != mark.strip("+*"):
-                raise MeshError(
-                    f"{where}, line {k}: continuation {own_mark!r} does not follow its card, which asks "
-                    f"for {mark!r}; write the continuations in sequence"
-                )
-            fields += new[1:]
-        else:
-            if fields:
-                yield number, fields[0].upper().rstrip("*"), fields
-            number, fields = k, new
-        mark = next_mark
-    if fields:
-        yield number, fields[0].upper().rstrip("*"), fields
-    if begins and not has_end:
-        raise MeshError(f"{where}: expected ENDDATA at the end, got none; the file is truncated")
-
-
-def _fields(line: str) -> tuple[list[str], str, str]:
-    """Return name and data fields of a line (9 small or 5 large ones), its own and the next continuation mark."""
-    if "," in line:
-        parts = [part.strip() for part in line.split(",")]
-        is_large = parts[0].endswith("*") or parts[0].startswith("*")
-        width = 5 if is_large else 9
-        data = [*parts[:width], *[""] * (width - len(parts))]
-        return data, parts[0], parts[width] if len(parts) > width else ""
-    line = line.expandtabs(8)
-    first = line[:8].strip()
-    is_large = "*" in first
-    width, count = (16, 4) if is_large else (8, 8)
-    data = [line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)]
-    return [first, *data], first, line[72:80].strip()
+    notes = [f"{times} {name} cards were left out" for name, times in noted.items()]
+    if BEGIN.search(text) and not END.search(text):
+        notes.append("BEGIN BULK without ENDDATA at the end: is the file complete?")
+    positions = np.array([points[number] for number in listed])
+    return RawMesh(positions, tuple(blocks), node_numbers=numbers_of_nodes, notes=tuple(notes))
 
 
 def nodes_of(here: str, card: str, given: list[str]) -> tuple[int, list[str]]:
@@ -195,30 +122,6 @@ def nodes_of(here: str, card: str, given: list[str]) -> tuple[int, list[str]]:
         f"{here}: expected {' or '.join(str(c) for c in counts)} nodes, got {sum(filled)}; elements with "
         f"some middle nodes left out are not supported"
     )
-
-
-def _integer(here: str, fields: list[str], place: int) -> int:
-    try:
-        return int(fields[place])
-    except (ValueError, IndexError) as error:
-        got = fields[place] if place < len(fields) else ""
-        raise MeshError(f"{here}: field {place + 1}: expected a number, got {got!r}") from error
-
-
-def _real(here: str, fields: list[str], place: int) -> float:
-    """Return a real; Nastran may leave out the E of the exponent (1.5-3) and a zero (blank)."""
-    word = fields[place] if place < len(fields) else ""
-    if not word:
-        return 0.0
-    try:
-        return float(word)
-    except ValueError:
-        try:
-            return float(
-                word[0] + word[1:].upper().replace("D", "").replace("E", "").replace("+", "E+").replace("-", "E-")
-            )
-        except ValueError as error:
-            raise MeshError(f"{here}: field {place + 1}: expected a coordinate, got {word!r}") from error
 
 
 def _require_unique(where: str, blocks: list[RawBlock]) -> None:

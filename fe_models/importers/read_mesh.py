@@ -36,6 +36,8 @@ MESH_FORMATS: dict[str, tuple[str, Callable[[Path, bytes], RawMesh]]] = {
     ".nas": ("Nastran", read_nastran),
     ".dat": ("Nastran", read_nastran),
     ".fem": ("Nastran", read_nastran),
+    ".blk": ("Nastran", read_nastran),
+    ".bulk": ("Nastran", read_nastran),
     ".med": ("MED", read_med),
 }  #: suffix -> format and its reader (path, content)
 
@@ -44,8 +46,8 @@ def read_mesh(path: str | Path) -> Mesh:
     """Read the mesh of one body from a file.
 
     The suffix names the format: Gmsh 2.2 and 4.1 (.msh), VTK (.vtk, .vtu), Abaqus and CalculiX (.inp), Nastran
-    (.bdf, .nas, .dat, .fem), MED (.med). Cells of two dimensions become faces, those of one or none become node
-    sets; they select interfaces and are no part of the body. `Mesh.notes` says what was left out.
+    (.bdf, .nas, .dat, .fem, .blk, .bulk), MED (.med). Cells of two dimensions become faces, those of one or none become
+    node sets; they select interfaces and are no part of the body. `Mesh.notes` says what was left out.
 
     Parameters
     ----------

@@ -59,8 +59,11 @@ class Card:
 
 def real_of(word: str) -> float:
     """Return the number of a field; ValueError if there is none."""
-    word = word.upper().replace("D", "E")
-    return float(word if "E" in word else EXPONENT.sub(r"E\1", word))
+    try:
+        return float(word)
+    except ValueError:  # D, or no letter of the exponent
+        word = word.upper().replace("D", "E")
+        return float(word if "E" in word else EXPONENT.sub(r"E\1", word))
 
 
 def read_cards(where: str, text: str) -> Iterator[Card]:
@@ -69,8 +72,8 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
     Raises
     ------
     MeshError
-        If a continuation has no card before it, or does not carry the mark that its card asks for, or a line has too
-        many fields.
+        If a continuation has no card before it, or does not carry the mark that its card asks for, a line has too many
+        fields, or cards are replicated.
     """
     lines = text.splitlines()
     begin = next((k for k, line in enumerate(lines) if line.lstrip()[:5].upper() == "BEGIN"), -1)
@@ -82,6 +85,8 @@ def read_cards(where: str, text: str) -> Iterator[Card]:
             continue
         if line.lstrip()[:7].upper() == "ENDDATA":
             break
+        if line[0] == "=":
+            raise MeshError(f"{where}, line {number}: replicated cards (=) are not read; write them out")
         first, data, following, beyond = _fields(line)
         if beyond:
             raise MeshError(

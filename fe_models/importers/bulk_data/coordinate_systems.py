@@ -67,10 +67,11 @@ class GridPoints:
     systems: dict[int, CoordinateSystem] = field(default_factory=dict)  #: by id, 0 is the basic one
 
 
-def read_grid_points(cards: Iterable[Card]) -> GridPoints:
+def read_grid_points(cards: Iterable[Card], *, only_positions: bool = False) -> GridPoints:
     """Return the grid points of the GRID cards, with GRDSET, in the systems of the CORD cards.
 
-    A card that is there twice with the same fields counts once.
+    A card that is there twice with the same fields counts once. With `only_positions` displacement axes (CD) and
+    systems that place no grid point are not looked at.
 
     Raises
     ------
@@ -78,7 +79,10 @@ def read_grid_points(cards: Iterable[Card]) -> GridPoints:
         If two cards of one number differ, a system or a grid point is missing or defined by itself, or the points of
         a system lie on one line.
     """
-    return _Resolver(tuple(cards)).all()
+    resolver = _Resolver(tuple(cards))
+    if not only_positions:
+        return resolver.all()
+    return GridPoints({number: resolver.place(number, card.where) for number, card in resolver.grids.items()})
 
 
 class _Resolver:
@@ -127,7 +131,8 @@ class _Resolver:
             card = self.grids[number]
             self._enter(f"GRID {number}", card)
             given = np.array([card.real(k, 0.0) for k in (3, 4, 5)])
-            self.places[number] = self.system(card.integer(2, self.default_cp), card.where).place(given)
+            system = self.system(card.integer(2, self.default_cp), card.where)
+            self.places[number] = given if system is BASIC else system.place(given)
             self.open.pop()
         return self.places[number]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from fe_models.errors import MeshError
-from fe_models.foundation.paths import near_file
 from fe_models.importers.bulk_data.cards import Card, read_cards
 from fe_models.importers.bulk_data.coordinate_systems import SYSTEM_CARDS, read_grid_points
+from fe_models.importers.bulk_data.includes import bulk_text
 from fe_models.importers.decks.deck import Deck
 from fe_models.importers.decks.ledger import Ledger
 from fe_models.importers.decks.nastran_attached import read_attached
@@ -17,59 +17,12 @@ from fe_models.importers.decks.nastran_sections import BARS, SHELLS, SOLIDS, rea
 from fe_models.importers.nastran import ELEMENT_TYPES, nodes_of
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
-__all__ = ["bulk_text", "read_nastran_deck"]
+__all__ = ["read_nastran_deck"]
 
-DEEPEST = 10  #: levels of files that include files
 _BODY = re.compile(
     r"(C(?!ORD)[A-Z]|RBE|RBAR|RROD|RTRPLT|RJOINT|RSPLINE|MPC|DMIG|GENEL|PLOTEL|NSM|SLOAD|MAT[2-9]|P(?!ARAM|LOAD))"
 )
 _HARMLESS = ("CORD", "CSET", "CREEP", "CHACAB", "PLOTEL", "CAMPBLL", "CYJOIN")
-
-
-def bulk_text(where: str, path: Path, text: str, files: tuple[Path, ...] = ()) -> str:
-    """Return a deck with its includes put in, and without the BEGIN BULK and ENDDATA of these.
-
-    Raises
-    ------
-    MeshError
-        If a file is missing or includes itself.
-    """
-    out, is_first = [], not files
-    lines = text.splitlines()
-    k = 0
-    while k < len(lines):
-        line = lines[k]
-        head = line.lstrip().upper()
-        if head.startswith("INCLUDE"):
-            statement = line.partition("$")[0].strip()
-            while statement.count("'") % 2 and k + 1 < len(lines):  # names may go on over lines
-                k += 1
-                statement += lines[k].partition("$")[0].strip()
-            name = statement[7:].strip().strip("'\" =")
-            other = path.parent / name
-            if other in files or other == path or len(files) >= DEEPEST:
-                raise MeshError(f"{where}: INCLUDE {name}: includes itself, or files nest too deeply")
-            try:
-                inner = other.read_bytes().decode("utf-8", "replace")
-            except OSError as error:
-                raise MeshError(
-                    f"{where}: INCLUDE {name}: {other} cannot be read: {error.strerror or error}{near_file(other)}"
-                ) from error
-            out.append(bulk_text(where, other, inner, (*files, path)))
-        elif head.startswith("ENDDATA") and not is_first:
-            break
-        elif head.startswith("BEGIN") and "SUPER" in head:
-            raise MeshError(f"{where}: {line.strip()}: a deck of several superelements; expected one body")
-        elif head.startswith("BEGIN") and (not is_first or any(_is_begin(each) for each in out)):
-            pass  # a second BEGIN BULK says nothing
-        else:
-            out.append(line)
-        k += 1
-    return "\n".join(out)
-
-
-def _is_begin(line: str) -> bool:
-    return any(each.lstrip().upper().startswith("BEGIN") for each in line.splitlines())
 
 
 def read_nastran_deck(path: Path, data: bytes) -> Deck:

@@ -8,10 +8,11 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from fe_models.errors import MeshError
 from fe_models.importers import MESH_FORMATS, read_mesh
+from fe_models.importers.decks.read_deck import read_deck
 from fe_models.importers.read_mesh import read_line_mesh
 from tests.fe_models.small_meshes import faced_box, nastran_deck
 
@@ -288,7 +289,7 @@ def test_numbers_defined_twice_are_refused(tmp_path):
         tmp_path, "rod.inp", TETRA.replace("*ELEMENT", "4, 0, 0, 2\n*ELEMENT")
     )
     assert "1 element numbers are defined twice, first 1" in refusal(tmp_path, "rod.inp", TETRA + "1, 2, 3, 4, 1\n")
-    assert "grid points are defined twice, first 1" in refusal(
+    assert "GRID 1: is defined otherwise at" in refusal(
         tmp_path, "rod.bdf", BULK.replace("CTETRA", "GRID,1,,5.,0.,0.\nCTETRA")
     )
     assert "a node number is listed twice" in refusal(tmp_path, "rod.msh", MSH22.replace("4 0 0 1", "3 0 0 1"))
@@ -518,19 +519,18 @@ CONM2,77,4,,3.5
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("GRID,2,,", "GRID,2,5,", "GRID 2: position in coordinate system 5 (CP)"),
-        ("GRID,1", "GRDSET,,5\nGRID,1", "GRDSET puts 4 grid points into coordinate system 5"),
-        ("GRID,1,", "INCLUDE 'more.bdf'\nGRID,1,", "INCLUDE is not read"),
-        ("ENDDATA\n", "", "expected ENDDATA at the end"),
+        ("GRID,2,,", "GRID,2,5,", "GRID: needs coordinate system 5, which is not defined"),
+        ("GRID,1", "GRDSET,,5\nGRID,1", "GRID: needs coordinate system 5, which is not defined"),
+        ("GRID,1,", "INCLUDE 'more.bdf'\nGRID,1,", "more.bdf cannot be read: No such file"),
         ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3,4,5", "expected 4 or 10 nodes, got 5"),
         ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3", "expected 4 or 10 nodes, got 3"),
         ("CTETRA,1", "CTETRX,1", "unknown solid element"),
-        ("GRID,2,,1.,0.,0.", "GRID,2,,1.,x,0.", "field 5: expected a coordinate, got 'x'"),
-        ("GRID,2", "GRID,two", "field 2: expected a number, got 'two'"),
+        ("GRID,2,,1.,0.,0.", "GRID,2,,1.,x,0.", "field 5: expected a real number, got 'x'"),
+        ("GRID,2", "GRID,two", "field 2: expected an integer, got 'two'"),
         ("GRID,1", "=,*1\nGRID,1", "replicated cards"),
         ("BEGIN BULK\n", "BEGIN BULK\n+,1,2\n", "continuation without a card"),
-        ("ENDDATA", "BEGIN SUPER=2\nENDDATA", "a second BEGIN (superelement)"),
-        ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3,4,,,+A\n+B,", "continuation '+B' does not follow its card"),
+        ("ENDDATA", "BEGIN SUPER=2\nENDDATA", "a deck of several superelements"),
+        ("CTETRA,1,1,1,2,3,4", "CTETRA,1,1,1,2,3,4,,,+A\n+B,", "asks for the continuation 'A', but line 7 has 'B'"),
         ("GRID", "XRID", "expected grid points (GRID), got none"),
     ],
 )
@@ -538,6 +538,26 @@ def test_nastran_decks_that_cannot_be_read_truthfully(old, new, words, tmp_path,
     assert old in BULK
     text = BULK.replace(old, new) if old == "GRID" else BULK.replace(old, new, 1)
     assert words in refusal(tmp_path, "rod.bdf", text, capsys)
+
+
+def test_a_mesh_of_nastran_is_that_of_the_whole_deck_with_includes_and_coordinate_systems(tmp_path):
+    """Positions by hand in a turned cylindrical system, and cells as the reader of whole decks has them."""
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "grids.blk").write_text(
+        "BEGIN BULK\nGRID,4,,0.,0.,1.,77\nGRID,1,5,2.,90.,3.\nGRID,2,,1.\nGRID,3,,0.,1.\nENDDATA\n"
+    )
+    text = "BEGIN BULK\nCORD2C,5,,10.,0.,0.,10.,0.,1.\n,11.,0.,0.\nINCLUDE 'parts/grids.blk'\nCTETRA,8,6,1,2,3,4\n"
+    path = tmp_path / "rod.bulk"
+    path.write_text(text)
+    mesh = read_mesh(path)
+    assert list(mesh.node_numbers) == [4, 1, 2, 3]
+    assert_allclose(mesh.nodes, [[0, 0, 1], [10, 2, 3], [1, 0, 0], [0, 1, 0]], rtol=0, atol=1e-15 * 10)
+    assert mesh.notes == ("BEGIN BULK without ENDDATA at the end: is the file complete?",)
+    path.write_text((text + "CORD2R,77\n,1.\nENDDATA\n").replace("CORD2R,77\n,1.", "CORD2R,77,,,,,,,1.\n,1.,,"))
+    deck = read_deck(path).mesh
+    assert_array_equal(deck.nodes, read_mesh(path).nodes)
+    assert_array_equal(deck.blocks[0].nodes, mesh.cells["tetra"])
+    assert list(mesh.cell_sets["pid_6"]["tetra"]) == [0]
 
 
 # --- VTK and MED ---------------------------------------------------------------------------------------------------
