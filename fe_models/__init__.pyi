@@ -89,8 +89,12 @@ from .reports.shell_report import report_shell as report_shell
 from .shells.body import shell_body as shell_body
 from .shells.interfaces import shell_interface as shell_interface
 from .shells.normals import orient_normals as orient_normals
+from .shells.shell_points import layer_stress as layer_stress
 from .shells.shell_points import shell_points as shell_points
+from .shells.shell_property import LaminateProperty as LaminateProperty
+from .shells.shell_property import Layer as Layer
 from .shells.shell_property import ShellProperty as ShellProperty
+from .shells.shell_property import symmetric as symmetric
 from .skfem_body import body_from_skfem as body_from_skfem
 from .solids.body import solid_body as solid_body
 from .solids.interfaces import check_overlap as check_overlap

@@ -17,6 +17,7 @@ __all__ = [
     "OrthotropicMaterial",
     "assign_materials",
     "isotropic_tensor",
+    "material_words",
     "require_isotropic",
 ]
 
@@ -151,6 +152,16 @@ def isotropic_tensor(lam: float, mu: float) -> Array:
     C = np.diag([2 * mu, 2 * mu, 2 * mu, mu, mu, mu])
     C[:3, :3] += lam
     return np.asarray(C)
+
+
+def material_words(material: AnyMaterial) -> str:
+    """Return the numbers of a material as a line of a provenance."""
+    if isinstance(material, Material):
+        return f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}"
+    return (
+        f"orthotropic, E = {list(material.young)}, G_12, G_13, G_23 = {list(material.shear)}, nu_12, nu_13, nu_23 = "
+        f"{list(material.poisson)}, rho = {material.rho!r}, axes {[list(row) for row in material.axes]}"
+    )
 
 
 def require_isotropic(where: str, material: object) -> None:

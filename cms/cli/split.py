@@ -191,7 +191,8 @@ def edit_job(
     keep_groups(document, "sections", "lines", getattr(part, "line_sets", {}))
     keep_groups(document, "shells", "cells", getattr(part, "cell_sets", {}))
     used = {section.material for name, section in job.sections.items() if name in document.get("sections", {})}
-    used |= {shell.material for name, shell in job.shells.items() if name in document.get("shells", {})}
+    shells = [shell for name, shell in job.shells.items() if name in document.get("shells", {})]
+    used |= {item.material for shell in shells for item in shell.layers or (shell,)}
     if (job.sections or job.shells) and None not in used:
         keep(document, "materials", [name for name in job.materials if name in used])
     keep(document, "interfaces", inside)

@@ -137,7 +137,7 @@ def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], Non
             _require_group(raw, "shells.cells", group)
     groups = None if "all" in properties else tuple(properties)
     mesh = shell_mesh_from_raw(chosen_cells(raw, SHELL_TYPES, groups), path, "", groups, ())
-    materials = {item.material: None for item in properties.values()}
+    materials = {made: None for item in properties.values() for made in item.materials}
     report = report_shell(mesh, materials, units=unit_system(job.body.units))
     if on_report is not None:
         on_report(report)

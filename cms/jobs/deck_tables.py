@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, StringConstraints
 
 from cms.jobs.beam_tables import component_numbers, names
+from cms.jobs.shell_tables import check_layups
 from fe_models.foundation.components import MOTION_COMPONENTS as COMPONENTS
 from fe_models.foundation.toml_file import Table, choice, is_no_number
 from fe_models.foundation.words import nearest, quoted
@@ -115,7 +116,8 @@ def check_deck(job: Any) -> None:
         raise ValueError(
             "body.deck: expected tables [solids.NAME], [shells.NAME], [sections.NAME], [rods.NAME] or [springs.NAME]"
         )
-    for kind in ("solids", "shells", "sections", "rods"):
+    check_layups(job.shells, job.materials)
+    for kind in ("solids", "sections", "rods"):
         for name, table in getattr(job, kind).items():
             if table.material is None and len(job.materials) != 1:
                 raise ValueError(f"{kind}.{name}.material: missing; there are {len(job.materials)} materials, name one")

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cms.jobs.job import InterfaceSection, Job
-from cms.jobs.tables.material_table import isotropic_of
+from cms.jobs.shell_tables import ShellSection
+from cms.jobs.tables.material_table import isotropic_of, material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 
 if TYPE_CHECKING:
     from fe_models.meshes.shell_mesh import ShellMesh
-    from fe_models.shells.shell_property import ShellProperty
+    from fe_models.shells.shell_property import AnyShellProperty
 
 __all__ = ["body_of_shell", "shell_interface_of", "shell_mesh"]
 
@@ -33,7 +34,7 @@ def body_of_shell(job: Job, stages: Stages, on_report: Callable[[Any], None] | N
     stiffeners = properties_of(job) if job.sections else None
     masses, springs, links = attachments_of(job, mesh)
     with stages("check mesh"):
-        materials = {item.material: None for item in properties.values()}
+        materials = {made: None for item in properties.values() for made in item.materials}
         materials |= {item.material: None for item in (stiffeners or {}).values()}
         report = report_shell(mesh, materials, units=units, springs=springs, links=links)
         if on_report is not None:
@@ -69,18 +70,34 @@ def shell_mesh(job: Job) -> "ShellMesh":
     return read_shell_mesh(str(job.body.mesh), groups=groups if is_part else None, stiffeners=lines)
 
 
-def shell_properties_of(job: Job) -> "dict[str, ShellProperty]":
-    """Return group of cells -> its thickness and material."""
+def shell_properties_of(job: Job) -> "dict[str, AnyShellProperty]":
+    """Return group of cells -> its thickness and material, or its layers."""
     from fe_models.shells.shell_property import ShellProperty
 
-    made: dict[str, ShellProperty] = {}
+    made: dict[str, AnyShellProperty] = {}
     for shell in job.shells.values():
+        if shell.layers:
+            made |= dict.fromkeys(shell.cells, _laminate_of(job, shell))
+            continue
+        assert shell.thickness is not None  # the job has checked it
         name = shell.material or next(iter(job.materials))
         table = job.materials[name]
-        material = isotropic_of(name, table, "shells")
+        material = isotropic_of(name, table, "shells without layers (give layers, docs/shells.md)")
         item = ShellProperty(shell.thickness, material, offset=shell.offset, added_mass=shell.added_mass)
         made |= dict.fromkeys(shell.cells, item)
     return made
+
+
+def _laminate_of(job: Job, shell: ShellSection) -> "AnyShellProperty":
+    from fe_models.shells.shell_property import LaminateProperty, Layer, symmetric
+
+    layers = []
+    for layer in shell.layers:
+        name = layer.material or next(iter(job.materials))
+        layers.append(Layer(material_of(name, job.materials[name]), layer.thickness, layer.angle))
+    assert shell.direction is not None  # the job has checked it
+    stack = symmetric(layers) if shell.symmetric else tuple(layers)
+    return LaminateProperty(stack, shell.direction, offset=shell.offset, added_mass=shell.added_mass)
 
 
 def shell_interface_of(name: str, section: InterfaceSection, mesh: "ShellMesh") -> Interface:

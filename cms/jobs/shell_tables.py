@@ -6,18 +6,33 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, StringConstraints
 
 from cms.jobs.beam_tables import BeamSection, names
-from fe_models.foundation.toml_file import Table
+from fe_models.foundation.toml_file import Table, Vector3
 from fe_models.foundation.words import nearest
 
-__all__ = ["ShellSection", "check_shells"]
+__all__ = ["LayerTable", "ShellSection", "check_layups", "check_shells"]
 
 Name = Annotated[str, StringConstraints(min_length=1)]
 
 
-class ShellSection(Table):
-    """[shells.NAME]: thickness and material of a group of triangles and quads."""
+class LayerTable(Table):
+    """One entry of `layers`."""
 
     thickness: Annotated[float, Field(gt=0)] = Field(description="a number above 0")
+    angle: float = Field(0.0, description="a number [degree], of the material's axis 1 from the direction of the layup")
+    material: Name | None = Field(None, description="the name of a material; default: the only one")
+
+
+class ShellSection(Table):
+    """[shells.NAME]: thickness and material, or layers, of a group of triangles and quads."""
+
+    thickness: Annotated[float, Field(gt=0)] | None = Field(None, description="a number above 0")
+    layers: list[LayerTable] = Field(
+        [], description="a list of layers, bottom to top: {thickness = , angle = , material = }"
+    )
+    direction: Vector3 | None = Field(
+        None, description="[x, y, z] in mesh axes; projected on the shell it is the direction of angle 0 of layers"
+    )
+    symmetric: bool = Field(False, description="true: the layers listed are the lower half, their mirror image follows")
     cells: Annotated[tuple[str, ...], BeforeValidator(names)] = Field(
         ("all",), description='"all", the name of a group of cells, or a list of names'
     )
@@ -29,7 +44,7 @@ class ShellSection(Table):
 def check_shells(
     shells: Mapping[str, ShellSection], sections: Mapping[str, BeamSection], body: Any, materials: Mapping[str, Any]
 ) -> None:
-    """Raise `ValueError` unless every shell has a mesh, a material and its cells, and every stiffener its lines.
+    """Raise `ValueError` unless every shell has a mesh, its layers and its cells, and every stiffener its lines.
 
     Parameters
     ----------
@@ -44,14 +59,8 @@ def check_shells(
         raise ValueError("shells: belong to a mesh; give [body] mesh, or remove the tables")
     if body.plane is not None:
         raise ValueError("body.plane: belongs to beams alone; remove it")
+    check_layups(shells, materials)
     for name, shell in shells.items():
-        if shell.material is None and len(materials) != 1:
-            raise ValueError(f"shells.{name}.material: missing; there are {len(materials)} materials, name one")
-        if shell.material is not None and shell.material not in materials:
-            raise ValueError(
-                f'shells.{name}.material = "{shell.material}": there is no such material'
-                f"{nearest(shell.material, materials)}"
-            )
         if shell.cells == ("all",) and len(shells) > 1:
             raise ValueError(
                 f'shells.{name}: cells = "all", but there are {len(shells)} tables; name the cells of each'
@@ -59,3 +68,31 @@ def check_shells(
     for name, section in sections.items():
         if section.lines == ("all",):
             raise ValueError(f"sections.{name}.lines: missing; which group of lines is the stiffener?")
+
+
+def check_layups(shells: Mapping[str, ShellSection], materials: Mapping[str, Any]) -> None:
+    """Raise `ValueError` unless every shell has a thickness or layers, and a material for each."""
+    for name, shell in shells.items():
+        where = f"shells.{name}"
+        if not shell.layers:
+            for key, given in (("direction", shell.direction is not None), ("symmetric", shell.symmetric)):
+                if given:
+                    raise ValueError(f"{where}.{key}: belongs to layers; remove it, or give layers")
+            if shell.thickness is None:
+                raise ValueError(f"{where}.thickness: missing; expected a number above 0, or layers")
+            _check_material(where, shell.material, materials)
+            continue
+        for key in ("thickness", "material"):
+            if getattr(shell, key) is not None:
+                raise ValueError(f"{where}.{key}: each of the layers has its own; remove it")
+        if shell.direction is None:
+            raise ValueError(f"{where}.direction: missing; expected [x, y, z], where angle 0 of the layers points")
+        for number, layer in enumerate(shell.layers):
+            _check_material(f"{where}.layers.{number}", layer.material, materials)
+
+
+def _check_material(where: str, material: str | None, materials: Mapping[str, Any]) -> None:
+    if material is None and len(materials) != 1:
+        raise ValueError(f"{where}.material: missing; there are {len(materials)} materials, name one")
+    if material is not None and material not in materials:
+        raise ValueError(f'{where}.material = "{material}": there is no such material{nearest(material, materials)}')

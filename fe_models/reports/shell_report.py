@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from fe_models.beams.attachments import RigidLink, Spring
 from fe_models.foundation.units import Units
 from fe_models.importers.objects.as_mesh import as_shell_mesh
-from fe_models.material import Material
+from fe_models.material import AnyMaterial
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.reports.report import Finding, Report
 from fe_models.reports.unit_check import implausible_units
@@ -57,7 +57,7 @@ class ShellReport(Report):
 
 def report_shell(
     mesh: Any,
-    materials: Iterable[Material],
+    materials: Iterable[AnyMaterial],
     *,
     units: Units,
     springs: Iterable[Spring] = (),

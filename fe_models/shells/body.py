@@ -17,13 +17,14 @@ from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Units
 from fe_models.importers.objects.as_mesh import as_shell_mesh
+from fe_models.material import material_words
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.elements import ShellCells, shell_cells
 from fe_models.shells.model import ShellModel
 from fe_models.shells.quality import WARP_LIMIT, cell_quality
 from fe_models.shells.section_rotations import rotations_of_sections
-from fe_models.shells.shell_property import ShellProperty, assign_shell_properties
+from fe_models.shells.shell_property import AnyShellProperty, LaminateProperty, assign_shell_properties
 from fe_models.shells.skin import ShellSkin, make_shell_skin
 from fe_models.shells.stiffeners import element_model_of, with_frame
 
@@ -32,7 +33,7 @@ __all__ = ["shell_body"]
 
 def shell_body(
     mesh: Any,
-    properties: ShellProperty | Mapping[str, ShellProperty],
+    properties: AnyShellProperty | Mapping[str, AnyShellProperty],
     *,
     name: str,
     units: Units,
@@ -74,7 +75,7 @@ def shell_body(
     ------
     ShellError
         If a group is unknown, cells have no thickness or two, no area, or are folded or warped, or a node belongs to
-        nothing.
+        nothing, or cells stand across the direction of their layup.
     SectionError, BeamError
         As `beam_body` for the stiffeners and what is attached.
     """
@@ -213,14 +214,17 @@ def _number(mesh: ShellMesh, node: int) -> int:
     return int(mesh.node_numbers[node] if mesh.node_numbers.size else node)
 
 
-def _provenance(mesh: ShellMesh, used: tuple[ShellProperty, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
+def _provenance(mesh: ShellMesh, used: tuple[AnyShellProperty, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
     record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
     record |= {f"cells {kind}": str(len(cells)) for kind, cells in mesh.cells.items() if len(cells)}
     for number, item in enumerate(used):
         count = sum(int((index == number).sum()) for index in of_cell.values())
-        m = item.material
+        words = "; ".join(f"{m.name}: {material_words(m)}" for m in item.materials)
         record[f"shell {number + 1}"] = (
-            f"thickness {item.thickness!r}, offset {item.offset!r}, added mass {item.added_mass!r}; {m.name}: "
-            f"E = {m.E!r}, nu = {m.nu!r}, rho = {m.rho!r}; {count} cells"
+            f"thickness {item.thickness!r}, offset {item.offset!r}, added mass {item.added_mass!r}; {words}; "
+            f"{count} cells"
         )
+        if isinstance(item, LaminateProperty):
+            layers = ", ".join(f"{x.material.name} {x.thickness!r} at {x.angle!r}" for x in item.layers)
+            record[f"layers {number + 1}"] = f"bottom to top, from direction {list(item.direction)}: {layers}"
     return {key: value for key, value in record.items() if value}

@@ -1,24 +1,27 @@
 """The shell elements of one cell type: stiffness, mass, stress resultants, stress."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fe_models.beams.axes import skew
 from fe_models.beams.slices import Slices
+from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.shells.geometry import CellPlanes, cell_planes
+from fe_models.shells.laminate import ShellLaw, shell_law
 from fe_models.shells.quad import quad_strains
 from fe_models.shells.shapes import FlatShape, flat_quadrature, flat_shape
-from fe_models.shells.shell_property import ShellProperty
-from fe_models.shells.strains import N_STRAINS, FlatStrains, jacobians, plane_elasticity
+from fe_models.shells.shell_property import AnyShellProperty, LaminateProperty
+from fe_models.shells.strains import N_STRAINS, FlatLaw, FlatStrains, jacobians
 from fe_models.shells.triangle import triangle_strains
 
 __all__ = ["ShellCells", "shell_cells"]
 
 CHUNK = 500  #: cells whose operators are held at once
-SHEAR_FACTOR = 5 / 6  #: of the transverse shear stiffness of a homogeneous plate
+LEAST_ANGLE = 5.0  #: between the direction of a layup and the normal of a cell [degree]
 DRILLING = 0.1  #: gamma of quads, over the shear modulus; see docs/shells.md for what larger and smaller ones cost
 DRILLING_SHARE = {"triangle": 1.0, "quad": 0.3}  #: of the drilling rotations in the displacement of the sides
 STRAIN_DEGREE = {"triangle": 2, "quad": 3}
@@ -32,10 +35,17 @@ class ShellCells:
     kind: str
     cells: IntArray  #: nodes, (n, c)
     planes: CellPlanes
-    t: Array  #: thickness, (n,) [m]
-    E: Array  #: (n,) [Pa]
-    nu: Array  #: (n,)
-    mass: Array  #: per area, added mass included, (n,) [kg/m²]
+    laws: tuple[ShellLaw, ...]
+    law: IntArray  #: number of that of each cell, (n,)
+
+    @property
+    def t(self) -> Array:
+        """Thickness, (n,) [m]."""
+        return self.by_law(lambda law: law.thickness, slice(None))
+
+    def by_law(self, value: Callable[[ShellLaw], Any], rows: slice) -> Array:
+        """Return a value of the laws for each of some cells, (n, ...)."""
+        return np.array([value(law) for law in self.laws], dtype=float)[self.law[rows]]
 
     @property
     def dofs(self) -> IntArray:
@@ -50,23 +60,23 @@ class ShellCells:
     def strains(self, rows: slice) -> FlatStrains:
         """Return strain operators in local axes over the dofs of the nodes, points of `STRAIN_DEGREE`."""
         planes = self.planes[rows]
-        G = self.E[rows] / (2 * (1 + self.nu[rows]))
-        ratio = self.t[rows] ** 2 / (6 * SHEAR_FACTOR * (1 - self.nu[rows]))  # D / (kappa G t)
-        if self.kind == "quad":
-            local = quad_strains(planes.xy, plane_elasticity(self.E[rows], self.nu[rows]), DRILLING * G, ratio)
-        else:
-            local = triangle_strains(planes.xy, self.nu[rows], ratio)
+        law = FlatLaw(
+            A=self.by_law(lambda law: law.A, rows),
+            B=self.by_law(lambda law: law.B, rows),
+            bending=self.by_law(lambda law: law.bending, rows),
+            shear_flexibility=self.by_law(lambda law: np.linalg.inv(law.H), rows),
+            drilling=DRILLING * self.by_law(lambda law: law.shear_modulus, rows),
+            nu=self.by_law(lambda law: law.nu, rows),
+        )
+        local = quad_strains(planes.xy, law) if self.kind == "quad" else triangle_strains(planes.xy, law)
         return FlatStrains(_times_blocks(local.B, planes), local.weights)
 
     def elasticity(self, rows: slice) -> Array:
         """Return resultants per strain: N, M, Q and drilling, (n, 9, 9) [N/m, N m]."""
-        t, E, nu = self.t[rows], self.E[rows], self.nu[rows]
-        C, G = plane_elasticity(E, nu), E / (2 * (1 + nu))
-        D = np.zeros((len(t), N_STRAINS, N_STRAINS))
-        D[:, :3, :3] = t[:, None, None] * C
-        D[:, 3:6, 3:6] = (t**3 / 12)[:, None, None] * C
-        D[:, 6, 6] = D[:, 7, 7] = SHEAR_FACTOR * G * t
-        D[:, 8, 8] = DRILLING * G * t
+        stiffness = self.by_law(lambda law: law.stiffness, rows)
+        D = np.zeros((len(stiffness), N_STRAINS, N_STRAINS))
+        D[:, :8, :8] = stiffness
+        D[:, 8, 8] = DRILLING * self.by_law(lambda law: law.shear_modulus, rows)
         return D
 
     def stiffness(self) -> Array:
@@ -81,30 +91,37 @@ class ShellCells:
         return (K + K.transpose(0, 2, 1)) / 2
 
     def slices(self, rows: slice) -> Slices:
-        """Return pieces of the normal as rigid slices: mass per area, and its second moment t²/12 along the normal.
+        """Return pieces of the normal as rigid slices: mass per area, and its second moment along the normal.
 
-        A slice at the middle surface moves by u + theta × z n, z in -t/2..t/2: the drilling rotation does not move it.
+        A point of it moves by u + theta × z n, z in -t/2..t/2: the drilling rotation does not move it. The second
+        moment is t²/12 for one material; layers may have their centre of mass aside the middle surface.
         """
         planes = self.planes[rows]
         points, w = flat_quadrature(self.kind, MASS_DEGREE[self.kind])
         shape = flat_shape(self.kind, points)
         n, p, c = len(planes.R), len(points), self.cells.shape[1]
         _, det = jacobians(shape.gradients, planes.xy)
-        mass = self.mass[rows, None] * w * det
+        mass = self.by_law(lambda law: law.mass, rows)[:, None] * w * det
+        arm = self.mass_arms(rows)
         motion = np.zeros((n, p, 6, c, 6))
         motion[:, :, :3] = translations(planes, shape.values, shape.side_values, shape, DRILLING_SHARE[self.kind])
         for a in range(3, 6):
             motion[:, :, a, :, a] = shape.values
+        motion[:, :, :3] -= np.einsum("nab,npbcd->npacd", skew(arm), motion[:, :, 3:])
         moments = np.zeros((n, p, 3))
-        moments[:, :, 2] = mass * self.t[rows, None] ** 2 / 12
+        moments[:, :, 2] = mass * self.by_law(lambda law: law.spread, rows)[:, None]
         return Slices(
-            position=shape.values @ planes.corners,
+            position=shape.values @ planes.corners + arm[:, None],
             mass=mass,
             axes=np.broadcast_to(planes.R[:, None], (n, p, 3, 3)),
             moments=moments,
             motion=motion.reshape(n, p, 6, 6 * c),
             dofs=self.dofs[rows],
         )
+
+    def mass_arms(self, rows: slice) -> Array:
+        """Return the way from the middle surface to the centre of mass, mesh axes, (n, 3) [m]."""
+        return self.by_law(lambda law: law.centre, rows)[:, None] * self.planes.R[rows][:, :, 2]
 
     def areas(self) -> Array:
         """Return the area of each cell, (n,) [m²]."""
@@ -146,7 +163,8 @@ class ShellCells:
     def stress(self, resultants: Array, rows: slice, height: float) -> Array:
         """Return the stress at a height of the thickness, (n, ..., 6, k) [Pa], xx yy zz yz xz xy in mesh axes.
 
-        sigma = N/t + 12 z M/t³; transverse shear 3 Q/(2 t) (1 - 4 z²/t²).
+        sigma = Q (eps + z kappa) of the layer there, below where two meet; transverse shear from equilibrium
+        (`fe_models.shells.laminate`). One material: N/t + 12 z M/t³ and 3 Q/(2 t) (1 - 4 z²/t²).
 
         Parameters
         ----------
@@ -157,16 +175,17 @@ class ShellCells:
         height
             z/t, -1/2 bottom, 0 middle, 1/2 top.
         """
-        t = self.t[rows][:, None, None, None]
-        plane = resultants[:, :, :3] / t + 12 * height / t**2 * resultants[:, :, 3:6]
-        across = 1.5 * (1 - 4 * height**2) / t * resultants[:, :, 6:8]
-        return np.einsum(
-            "nas,npsk->npak", stress_directions(self.planes.R[rows]), np.concatenate([plane, across], axis=2)
-        )
+
+        def at_height(law: ShellLaw) -> Array:
+            z = height * law.thickness
+            return law.stress(z, law.layer_at(z))
+
+        local = self.by_law(at_height, rows)[:, None] @ resultants
+        return np.einsum("nas,npsk->npak", stress_directions(self.planes.R[rows]), local)
 
 
 def shell_cells(
-    nodes: Array, kind: str, cells: IntArray, used: tuple[ShellProperty, ...], of_cell: IntArray
+    nodes: Array, kind: str, cells: IntArray, used: tuple[AnyShellProperty, ...], of_cell: IntArray
 ) -> ShellCells:
     """Return the elements of one cell type.
 
@@ -179,19 +198,21 @@ def shell_cells(
     used, of_cell
         Properties and the number of that of each cell, (n,).
     """
-
-    def per_cell(values: list[float]) -> Array:
-        return np.array(values, dtype=float)[of_cell]
-
-    return ShellCells(
-        kind,
-        cells,
-        cell_planes(nodes, cells, per_cell([item.offset for item in used])),
-        t=per_cell([item.thickness for item in used]),
-        E=per_cell([item.material.E for item in used]),
-        nu=per_cell([item.material.nu for item in used]),
-        mass=per_cell([item.material.rho * item.thickness + item.added_mass for item in used]),
-    )
+    none = (0.0, 0.0, 0.0)
+    directions = np.array([item.direction if isinstance(item, LaminateProperty) else none for item in used])
+    offsets = np.array([item.offset for item in used], dtype=float)
+    planes = cell_planes(nodes, cells, offsets[of_cell], directions[of_cell])
+    along = directions[of_cell]
+    lengths = np.linalg.norm(along, axis=1)
+    across = np.linalg.norm(np.cross(along, planes.R[:, :, 2]), axis=1)
+    lost = np.flatnonzero((lengths > 0) & (across < np.sin(np.deg2rad(LEAST_ANGLE)) * lengths))
+    if lost.size:
+        raise ShellError(
+            f"laminate: {lost.size} {kind} cells stand across direction {used[of_cell[lost[0]]].direction}, first cell "  # type: ignore[union-attr]
+            f"{lost[0]}: within {LEAST_ANGLE:g} degrees of their normal it gives no axis on them; give these cells a "
+            "laminate with another direction"
+        )
+    return ShellCells(kind, cells, planes, tuple(shell_law(item) for item in used), of_cell)
 
 
 def translations(planes: CellPlanes, N: Array, E: Array, shape: FlatShape, share: float) -> Array:

@@ -2,9 +2,9 @@
 
 A point at the distance z from the middle surface moves by u + z psi + ½ z theta × (theta × n), psi = theta × n, theta a
 rotation vector. The second order of its Green strain is worked on by the stress, whose resultants are N = ∫ sigma,
-M = ∫ z sigma, Q; ∫ z² sigma = N t²/12. Over the middle surface, a and b along its axes e_a:
+M = ∫ z sigma, Q; P = ∫ z² sigma, N t²/12 for one material. Over the middle surface, a and b along its axes e_a:
 
-    N_ab [½ u,a·u,b + t²/24 psi,a·psi,b]  +  M_ab [u,a·psi,b + ½ e_b·(theta × (theta × n)),a]
+    ½ N_ab u,a·u,b + ½ P_ab psi,a·psi,b  +  M_ab [u,a·psi,b + ½ e_b·(theta × (theta × n)),a]
     +  Q_a [u,a·psi + ½ e_a·(theta × (theta × n))]
 
 and the loads work on the second order of the rotation, on the normal and on the levers between nodes and middle surface
@@ -48,18 +48,20 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
     strains, elasticity = cells.strains(rows), cells.elasticity(rows)
     values = strains.B @ u[dofs][:, None]
     resultants = (elasticity[:, None] @ values) * strains.weights[..., None, None]
+    second = (_second_moments(cells, rows)[:, None] @ values[:, :, :6]) * strains.weights[..., None, None]
     m, p, s, d = strains.B.shape
     forces = strains.B.reshape(m, p * s, d).transpose(0, 2, 1) @ resultants.reshape(m, p * s, -1)
     resultants[:, :, 6:8] += _missing_shear(cells, rows, forces, resultants[:, :, 6:8], strains.weights)
     slices = cells.slices(rows)
     forces -= slice_forces(slices, loads)
-    couples = slice_couples(slices, loads)[1]
+    force, couples = slice_couples(slices, loads)
+    couples = couples + force[..., :, None] * cells.mass_arms(rows)[:, None, None]
     fields = _fields(cells, rows) @ columns[:, None]  # (m, p, 15, n)
     theta = slices.motion[:, :, 3:] @ columns[:, None]
     turns = columns.reshape(len(dofs), -1, 6, Phi.shape[1])[:, :, 3:]
     K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
     for j in range(loads.k):
-        W = _work(resultants[..., :8, j], cells.t[rows])
+        W = _work(resultants[..., :8, j], second[..., j])
         K[j] += _contracted(fields, W)
         K[j] += _contracted(theta, -rotation_work(couples[j]))
         at_corners = forces[:, :, j].reshape(len(dofs), -1, 6)[:, :, :3, None]
@@ -112,16 +114,20 @@ def _fields(cells: ShellCells, rows: slice) -> Array:
     return np.asarray(local.reshape(n, p, N_FIELDS, 6 * c))
 
 
-def _work(resultants: Array, t: Array) -> Array:
-    """Second derivative of the work by the fields, (m, p, 15, 15), of weighted N M Q, (m, p, 8)."""
-    of_fibres = (t**2 / 12)[:, None, None] * resultants[..., :3]
-    W = np.concatenate([resultants, of_fibres], axis=-1) @ _unit_work().reshape(-1, N_FIELDS**2)
+def _second_moments(cells: ShellCells, rows: slice) -> Array:
+    """P = ∫ z² sigma dz by eps and kappa, (m, 3, 6)."""
+    return cells.by_law(lambda law: np.hstack([law.D, law.third]), rows)
+
+
+def _work(resultants: Array, second: Array) -> Array:
+    """Second derivative of the work by the fields, (m, p, 15, 15), of weighted N M Q, (m, p, 8), and P, (m, p, 3)."""
+    W = np.concatenate([resultants, second], axis=-1) @ _unit_work().reshape(-1, N_FIELDS**2)
     return np.asarray(W.reshape(*resultants.shape[:2], N_FIELDS, N_FIELDS))
 
 
 @cache
 def _unit_work() -> Array:
-    """Second derivatives of the work of unit N_x N_y N_xy, M_x M_y M_xy, Q_x Q_y, N t²/12 (three), (11, 15, 15)."""
+    """Second derivatives of the work of unit N_x N_y N_xy, M_x M_y M_xy, Q_x Q_y, P (three), (11, 15, 15)."""
     W = np.zeros((11, 5, 3, 5, 3))
     across = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # psi = across @ theta = theta × e_z
     for number, pairs in enumerate((((0, 0),), ((1, 1),), ((0, 1), (1, 0)))):

@@ -40,11 +40,12 @@ class CellPlanes:
         return CellPlanes(self.R[rows], self.corners[rows], self.levers[rows], self.xy[rows], self.warp[rows])
 
 
-def cell_planes(nodes: Array, cells: IntArray, offset: Array) -> CellPlanes:
+def cell_planes(nodes: Array, cells: IntArray, offset: Array, direction: Array) -> CellPlanes:
     """Return the planes of cells of three or four nodes.
 
     (1) z: normal to both diagonals of a quad, to the sides of a triangle, by the right hand along the order of nodes
-    (2) x: along the first side of a triangle; between the diagonals of a quad, along d_13 - d_24
+    (2) x: the direction projected on the plane; where there is none, along the first side of a triangle, between the
+        diagonals of a quad, along d_13 - d_24
     (3) the plane goes through the mean of the nodes, moved by the offset along z
 
     Parameters
@@ -55,6 +56,8 @@ def cell_planes(nodes: Array, cells: IntArray, offset: Array) -> CellPlanes:
         (n, 3) or (n, 4).
     offset
         Of the middle surface from the nodes along z, (n,) [m].
+    direction
+        In mesh axes, (n, 3); zero: none.
     """
     X = nodes[cells]
     if cells.shape[1] == 3:
@@ -65,7 +68,8 @@ def cell_planes(nodes: Array, cells: IntArray, offset: Array) -> CellPlanes:
         normal = np.cross(d_13, d_24)  # (1)
         x = _unit(d_13) - _unit(d_24)  # (2)
     z = _unit(normal)
-    x = _unit(x)
+    along = direction - z * np.einsum("na,na->n", direction, z)[:, None]
+    x = _unit(np.where((direction != 0).any(axis=1)[:, None], along, x))
     R = np.stack([x, np.cross(z, x), z], axis=2)
     middle = X.mean(axis=1, keepdims=True)
     local = (X - middle) @ R

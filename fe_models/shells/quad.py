@@ -22,24 +22,20 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.shells.shapes import flat_quadrature, flat_shape
-from fe_models.shells.strains import N_STRAINS, FlatStrains, PlateSides, inverse_2x2, jacobians, plate_sides
+from fe_models.shells.strains import N_STRAINS, FlatLaw, FlatStrains, PlateSides, inverse_2x2, jacobians, plate_sides
 
 __all__ = ["quad_strains"]
 
 
-def quad_strains(xy: Array, C: Array, drilling: Array, shear_ratio: Array) -> FlatStrains:
+def quad_strains(xy: Array, law: FlatLaw) -> FlatStrains:
     """Return the strain operators at 2 × 2 Gauss points.
 
     Parameters
     ----------
     xy
         Corners in the plane, (n, 4, 2) [m].
-    C
-        Plane stress elasticity, (n, 3, 3) [Pa].
-    drilling
-        Stiffness gamma G of the drilling rotation, (n,) [Pa].
-    shear_ratio
-        Bending over shear stiffness, D/(kappa G t), (n,) [m²].
+    law
+        Of the elements.
     """
     n = len(xy)
     points, w = flat_quadrature("quad", 3)
@@ -55,12 +51,12 @@ def quad_strains(xy: Array, C: Array, drilling: Array, shear_ratio: Array) -> Fl
     B[:, :, 8, :, 5] = -shape.values
     B[:, :, 3, :, 4], B[:, :, 4, :, 3] = dN[..., 0], -dN[..., 1]
     B[:, :, 5, :, 4], B[:, :, 5, :, 3] = dN[..., 1], -dN[..., 0]
-    sides = plate_sides(xy, shape.sides, shear_ratio)
+    sides = plate_sides(xy, shape.sides, law)
     B[:, :, 3:6][..., 2:5] += sides.curvature(np.einsum("npak,pck->npca", inverse, shape.side_gradients))
     B[:, :, 6:8][..., 2:5] = _shear(xy, points, inverse, sides)
     operators: Array = B.reshape(n, len(points), N_STRAINS, 24)
     rows = [0, 1, 2, 8]
-    operators[:, :, rows] += _condensed_modes(xy, points, det, weights, C, drilling, operators[:, :, rows])
+    operators[:, :, rows] += _condensed_modes(xy, points, det, weights, law, operators)
     return FlatStrains(operators, weights)
 
 
@@ -80,12 +76,11 @@ def _between(low: Array, high: Array, x: Array) -> Array:
     return np.asarray((1 - x[:, None, None]) / 2 * low[:, None] + (1 + x[:, None, None]) / 2 * high[:, None])
 
 
-def _condensed_modes(
-    xy: Array, points: Array, det: Array, weights: Array, C: Array, drilling: Array, B: Array
-) -> Array:
+def _condensed_modes(xy: Array, points: Array, det: Array, weights: Array, law: FlatLaw, operators: Array) -> Array:
     """What the internal modes add to eps_x eps_y gamma_xy and the drilling strain, (n, p, 4, 24).
 
-    The internal vectors a make the energy least: a = -(∫ Gᵀ C G)⁻¹ ∫ Gᵀ C B u.
+    The internal vectors a make the energy least: a = -(∫ Gᵀ C G)⁻¹ ∫ Gᵀ (C B u + N_kappa), C of A and the
+    drilling, N_kappa = B kappa the membrane force of the curvatures of layups that are not symmetric.
     """
     n, p = weights.shape
     centre = flat_shape("quad", np.zeros((1, 2)))
@@ -100,7 +95,11 @@ def _condensed_modes(
     modes[:, :, 3, :, 0], modes[:, :, 3, :, 1] = -dM[..., 1] / 2, dM[..., 0] / 2
     G: Array = modes.reshape(n, p, 4, 4)
     stiffness = np.zeros((n, 4, 4))
-    stiffness[:, :3, :3], stiffness[:, 3, 3] = C, drilling
+    stiffness[:, :3, :3], stiffness[:, 3, 3] = law.A, law.drilling
     weighted = np.einsum("npis,nij,np->npjs", G, stiffness, weights).reshape(n, 4 * p, 4).transpose(0, 2, 1)
-    a = -np.linalg.solve(weighted @ G.reshape(n, 4 * p, 4), weighted @ B.reshape(n, 4 * p, 24))
+    forces = weighted @ operators[:, :, [0, 1, 2, 8]].reshape(n, 4 * p, 24)
+    if law.B.any():
+        bent = np.einsum("npis,nij,np->npjs", G[:, :, :3], law.B, weights).reshape(n, 3 * p, 4).transpose(0, 2, 1)
+        forces += bent @ operators[:, :, 3:6].reshape(n, 3 * p, 24)
+    a = -np.linalg.solve(weighted @ G.reshape(n, 4 * p, 4), forces)
     return np.asarray(G @ a[:, None])

@@ -1,4 +1,4 @@
-"""Named stress points at top, middle and bottom of the centres of chosen cells (`fe_body.StressPointModel`)."""
+"""Stress at the centres of chosen cells: named points (`fe_body.StressPointModel`) and layers."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -9,10 +9,11 @@ from fe_models.body.fe_body import FEBody
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.shells.elements import ShellCells
+from fe_models.shells.laminate import layer_axes_stress
 from fe_models.shells.model import BOTTOM, MIDDLE, TOP, ShellModel
 from fe_models.shells.stiffeners import StiffenedModel
 
-__all__ = ["ShellPoints", "shell_points"]
+__all__ = ["ShellPoints", "layer_stress", "shell_points"]
 
 HEIGHTS = {"top": TOP, "middle": MIDDLE, "bottom": BOTTOM}
 
@@ -64,10 +65,57 @@ def shell_points(body: FEBody, cells: Mapping[str, Iterable[int]]) -> FEBody:
     ShellError
         If the body is no shell, or a cell does not exist.
     """
+    return replace(body, stress_points=ShellPoints(_chosen("shell_points", body, cells)))
+
+
+def layer_stress(body: FEBody, u: Array, cells: Mapping[str, Iterable[int]], layer: int) -> Array:
+    """Return the stress of one layer at the centres of some cells, in the axes of the layer.
+
+    Parameters
+    ----------
+    body
+        Made by `shell_body`, coupled or not.
+    u
+        Columns over its dofs, (n_dof, k).
+    cells
+        Cell type -> rows of `ShellMesh.cells`.
+    layer
+        Number of the layer, 0 at the bottom.
+
+    Returns
+    -------
+    Array
+        (n_cells, 2, 5, k) [Pa]: at the bottom and at the top of the layer sigma_1 sigma_2 tau_12 tau_13 tau_23, axis 1
+        at the angle of the layer, axis 3 the normal; cells in the order given.
+
+    Raises
+    ------
+    ShellError
+        If the body is no shell, a cell does not exist or has no such layer.
+    """
+    u = np.asarray(u)
+    if u.ndim != 2 or len(u) != body.n_dof:
+        raise ShellError(f"layer_stress: u: expected columns over {body.n_dof} dofs, got {u.shape}")
+    of_mesh, values = body.mesh_displacement(u), []
+    for group, rows in _chosen("layer_stress", body, cells):
+        for row in rows.tolist():
+            law = group.laws[group.law[row]]
+            if not 0 <= layer < len(law.layers):
+                raise ShellError(
+                    f"layer_stress: {group.kind} {row} has {len(law.layers)} layers; expected 0..{len(law.layers) - 1}"
+                    f", got {layer}"
+                )
+            resultants = group.resultants(of_mesh, slice(row, row + 1)).mean(axis=1)[0]
+            T = layer_axes_stress(law.layers[layer].angle)
+            values.append([T @ law.stress(z, layer) @ resultants for z in law.z[layer : layer + 2]])
+    return np.array(values)
+
+
+def _chosen(what: str, body: FEBody, cells: Mapping[str, Iterable[int]]) -> tuple[tuple[ShellCells, IntArray], ...]:
     model = body.element_model
     if isinstance(model, StiffenedModel):
         model = model.shell
-    where = f"shell_points: body {body.name!r}"
+    where = f"{what}: body {body.name!r}"
     if not isinstance(model, ShellModel):
         raise ShellError(f"{where} is no shell; choose points before welding")
     parts = []
@@ -80,4 +128,4 @@ def shell_points(body: FEBody, cells: Mapping[str, Iterable[int]]) -> FEBody:
         parts.append((group, rows))
     if not parts:
         raise ShellError(f"{where}: expected cells, got none")
-    return replace(body, stress_points=ShellPoints(tuple(parts)))
+    return tuple(parts)

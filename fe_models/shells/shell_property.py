@@ -1,6 +1,6 @@
-"""Thickness, material and offset of groups of cells."""
+"""Thickness and material, or layers, and offset of groups of cells."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +8,10 @@ import numpy as np
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.words import nearest, quoted
-from fe_models.material import Material, require_isotropic
+from fe_models.material import AnyMaterial, Material, OrthotropicMaterial, require_isotropic
 from fe_models.meshes.shell_mesh import ShellMesh
 
-__all__ = ["ShellProperty", "assign_shell_properties"]
+__all__ = ["AnyShellProperty", "LaminateProperty", "Layer", "ShellProperty", "assign_shell_properties", "symmetric"]
 
 
 @dataclass(frozen=True)
@@ -31,19 +31,104 @@ class ShellProperty:
 
     def __post_init__(self) -> None:
         require_isotropic("shell property", self.material)
-        for name in ("thickness", "offset", "added_mass"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-                raise ShellError(f"shell property: {name}: expected a finite number, got {value!r}")
+        _require_numbers("shell property", self, ("thickness", "offset", "added_mass"))
         if not self.thickness > 0:
             raise ShellError(f"shell property: thickness: expected a length above zero, got {self.thickness}")
         if self.added_mass < 0:
             raise ShellError(f"shell property: added_mass: expected zero or more, got {self.added_mass}")
 
+    @property
+    def materials(self) -> tuple[AnyMaterial, ...]:
+        """The material, as that of layers."""
+        return (self.material,)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One layer of a laminate.
+
+    Raises
+    ------
+    ShellError
+        Unless the thickness is above zero and the angle finite, and where the material has axes of its own.
+    """
+
+    material: AnyMaterial
+    thickness: float  #: [m]
+    angle: float = (
+        0.0  #: of the material's axis 1 from the direction of the layup, right hand about the normal [degree]
+    )
+
+    def __post_init__(self) -> None:
+        _require_numbers("layer", self, ("thickness", "angle"))
+        if not self.thickness > 0:
+            raise ShellError(f"layer: thickness: expected a length above zero, got {self.thickness}")
+        material = self.material
+        if isinstance(material, OrthotropicMaterial) and not np.array_equal(material.axes, np.eye(3)):
+            raise ShellError(
+                f"layer: material {material.name!r} has axes of its own; a layer is laid by its angle from the "
+                "direction of the layup: take a material without axes"
+            )
+
+
+@dataclass(frozen=True)
+class LaminateProperty:
+    """Layers and offset of a group of cells.
+
+    Raises
+    ------
+    ShellError
+        Unless there are layers, the direction is none of zero length, and all numbers are finite.
+    """
+
+    layers: tuple[Layer, ...]  #: from the bottom to the top, along the normal of the cell
+    direction: tuple[float, float, float]  #: mesh axes; projected on a cell it is the first axis of the layup
+    offset: float = 0.0  #: of the middle surface from the nodes, along the normal of the cell [m]
+    added_mass: float = 0.0  #: per area, without stiffness, spread through the thickness [kg/m²]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "layers", tuple(self.layers))
+        if not self.layers or not all(isinstance(layer, Layer) for layer in self.layers):
+            raise ShellError(f"laminate: layers: expected one Layer or more, got {self.layers!r}")
+        direction = np.asarray(self.direction)
+        if direction.shape != (3,) or direction.dtype.kind not in "iuf" or not np.isfinite(direction).all():
+            raise ShellError(f"laminate: direction: expected three finite numbers, got {self.direction!r}")
+        if not np.linalg.norm(direction) > 0:
+            raise ShellError("laminate: direction: expected a vector that is not zero, such as (1, 0, 0)")
+        object.__setattr__(self, "direction", tuple(float(x) for x in direction))
+        _require_numbers("laminate", self, ("offset", "added_mass"))
+        if self.added_mass < 0:
+            raise ShellError(f"laminate: added_mass: expected zero or more, got {self.added_mass}")
+
+    @property
+    def thickness(self) -> float:
+        """Of all layers [m]."""
+        return sum(layer.thickness for layer in self.layers)
+
+    @property
+    def materials(self) -> tuple[AnyMaterial, ...]:
+        """Of the layers, each once."""
+        return tuple(dict.fromkeys(layer.material for layer in self.layers))
+
+
+AnyShellProperty = ShellProperty | LaminateProperty
+
+
+def symmetric(layers: Sequence[Layer]) -> tuple[Layer, ...]:
+    """Return the layers, bottom to middle, and their mirror image above: [0, 90] gives [0, 90, 90, 0]."""
+    return (*layers, *reversed(layers))
+
+
+def _require_numbers(where: str, item: object, names: tuple[str, ...]) -> None:
+    for name in names:
+        value = getattr(item, name)
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+            raise ShellError(f"{where}: {name}: expected a finite number, got {value!r}")
+
 
 def assign_shell_properties(
-    mesh: ShellMesh, properties: ShellProperty | Mapping[str, ShellProperty]
-) -> tuple[tuple[ShellProperty, ...], dict[str, IntArray]]:
+    mesh: ShellMesh, properties: AnyShellProperty | Mapping[str, AnyShellProperty]
+) -> tuple[tuple[AnyShellProperty, ...], dict[str, IntArray]]:
     """Return the properties in use and, by cell type, the number of the property of every cell.
 
     Parameters
@@ -58,7 +143,7 @@ def assign_shell_properties(
     ShellError
         If a group is unknown, or cells have no property or two.
     """
-    if isinstance(properties, ShellProperty):
+    if isinstance(properties, AnyShellProperty):
         return (properties,), {kind: np.zeros(len(cells), np.int64) for kind, cells in mesh.cells.items()}
     used = tuple(dict.fromkeys(properties.values()))
     number = {kind: np.full(len(cells), -1, np.int64) for kind, cells in mesh.cells.items()}

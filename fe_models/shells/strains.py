@@ -6,7 +6,16 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["N_STRAINS", "FlatStrains", "PlateSides", "inverse_2x2", "jacobians", "plane_elasticity", "plate_sides"]
+__all__ = [
+    "N_STRAINS",
+    "FlatLaw",
+    "FlatStrains",
+    "PlateSides",
+    "inverse_2x2",
+    "jacobians",
+    "plane_elasticity",
+    "plate_sides",
+]
 
 N_STRAINS = 9  #: eps_x eps_y gamma_xy, kappa_x kappa_y kappa_xy, gamma_xz gamma_yz, drilling
 
@@ -17,6 +26,18 @@ class FlatStrains:
 
     B: Array  #: (n, p, 9, 6 c)
     weights: Array  #: area elements, (n, p) [m²]
+
+
+@dataclass(frozen=True, eq=False)
+class FlatLaw:
+    """What the strain operators of n elements depend on, per area, in local axes (`fe_models.shells.laminate`)."""
+
+    A: Array  #: membrane forces by membrane strains, (n, 3, 3) [N/m]
+    B: Array  #: by curvatures, (n, 3, 3) [N]
+    bending: Array  #: D* = D - B A⁻¹ B, (n, 3, 3) [N m]
+    shear_flexibility: Array  #: H⁻¹, (n, 2, 2) [m/N]
+    drilling: Array  #: gamma G t, (n,) [N/m]
+    nu: Array  #: (n,)
 
 
 def plane_elasticity(E: Array, nu: Array) -> Array:
@@ -65,12 +86,13 @@ class PlateSides:
         return np.einsum("npas,nscd->npacd", factors, self.bulge)
 
 
-def plate_sides(xy: Array, sides: IntArray, shear_ratio: Array) -> PlateSides:
+def plate_sides(xy: Array, sides: IntArray, law: FlatLaw) -> PlateSides:
     """Return rotation and shear along the sides of plate elements (DKMT, DKMQ).
 
     (1) the rotation is quadratic, beta_s = linear + 4 s/L (1 - s/L) Delta
     (2) equilibrium of the side, Q = M,s, gives its constant shear strain gamma = -(2/3) phi Delta with
-        phi = 12 D/(kappa G t L²)
+        phi = 12 D_s/L² (H⁻¹)_s, D_s the bending stiffness along the side and (H⁻¹)_s the shear flexibility; of one
+        isotropic material 12 D/(kappa G t L²)
     (3) ∫ (w,s + beta_s - gamma) ds = 0 gives Delta = -3/2/(1 + phi) [(w_j - w_i)/L + (beta_si + beta_sj)/2]
 
     Parameters
@@ -79,14 +101,17 @@ def plate_sides(xy: Array, sides: IntArray, shear_ratio: Array) -> PlateSides:
         Corners in the plane, (n, c, 2) [m].
     sides
         First and second corner of each, (n_sides, 2).
-    shear_ratio
-        Bending over shear stiffness, D/(kappa G t), (n,) [m²].
+    law
+        Of the elements.
     """
     n, c = xy.shape[:2]
     d = xy[:, sides[:, 1]] - xy[:, sides[:, 0]]
     L = np.linalg.norm(d, axis=2)
     along = d / L[..., None]
-    phi = 12 * shear_ratio[:, None] / L**2
+    cos, sin = np.moveaxis(along, -1, 0)
+    curvature = np.stack([cos**2, sin**2, 2 * cos * sin], axis=-1)  # of a unit one along the side
+    D_s = np.einsum("nsi,nij,nsj->ns", curvature, law.bending, curvature)
+    phi = 12 * D_s * np.einsum("nsi,nij,nsj->ns", along, law.shear_flexibility, along) / L**2
     bulge = np.zeros((n, len(sides), c, 3))
     for k, (i, j) in enumerate(sides):
         for corner, sign in ((i, -1.0), (j, 1.0)):

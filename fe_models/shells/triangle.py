@@ -18,7 +18,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.shells.shapes import flat_quadrature, flat_shape
-from fe_models.shells.strains import N_STRAINS, FlatStrains, plate_sides
+from fe_models.shells.strains import N_STRAINS, FlatLaw, FlatStrains, plate_sides
 
 __all__ = ["triangle_strains"]
 
@@ -35,24 +35,22 @@ CORNER_STRAINS = np.array(
 LEAST_BETA_0 = 0.01  #: where nu is near 1/2
 
 
-def triangle_strains(xy: Array, nu: Array, shear_ratio: Array) -> FlatStrains:
+def triangle_strains(xy: Array, law: FlatLaw) -> FlatStrains:
     """Return the strain operators in the middles of the sides.
 
     Parameters
     ----------
     xy
         Corners in the plane, anticlockwise, (n, 3, 2) [m].
-    nu
-        Poisson's ratio, (n,).
-    shear_ratio
-        Bending over shear stiffness, D/(kappa G t), (n,) [m²].
+    law
+        Of the elements.
     """
     n = len(xy)
     points, w = flat_quadrature("triangle", 2)
     area = _area(xy)
     B = np.zeros((n, len(points), N_STRAINS, 3, 6))
-    B[:, :, :3][..., [0, 1, 5]] = _membrane(xy, area, nu)
-    B[:, :, 3:8][..., [2, 3, 4]] = _plate(xy, area, shear_ratio, points)
+    B[:, :, :3][..., [0, 1, 5]] = _membrane(xy, area, law.nu)
+    B[:, :, 3:8][..., [2, 3, 4]] = _plate(xy, area, law, points)
     return FlatStrains(B.reshape(n, len(points), N_STRAINS, 18), 2 * area[:, None] * w)
 
 
@@ -88,7 +86,7 @@ def _membrane(xy: Array, area: Array, nu: Array) -> Array:
     )
 
 
-def _plate(xy: Array, area: Array, shear_ratio: Array, points: Array) -> Array:
+def _plate(xy: Array, area: Array, law: FlatLaw, points: Array) -> Array:
     """Curvature and shear operators over w, theta_x, theta_y, (n, p, 5, 3 corners, 3)."""
     n = len(xy)
     shape = flat_shape("triangle", points)
@@ -101,7 +99,7 @@ def _plate(xy: Array, area: Array, shear_ratio: Array, points: Array) -> Array:
     B[:, :, 2, :, 2] = slope[:, None, :, 1]
     B[:, :, 1, :, 1] = -slope[:, None, :, 1]
     B[:, :, 2, :, 1] = -slope[:, None, :, 0]
-    sides = plate_sides(xy, shape.sides, shear_ratio)
+    sides = plate_sides(xy, shape.sides, law)
     by_xy = slope[:, 1:]  # the reference coordinates are the functions of the second and third corner
     B[:, :, :3] += sides.curvature(np.einsum("pks,nsa->npka", shape.side_gradients, by_xy))
     along, shear = sides.along, sides.shear

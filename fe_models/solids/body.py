@@ -18,7 +18,7 @@ from fe_models.foundation.threads import n_threads
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.objects.as_mesh import as_mesh
-from fe_models.material import AnyMaterial, Material, assign_materials
+from fe_models.material import AnyMaterial, assign_materials, material_words
 from fe_models.meshes.boundary import boundary_triangles
 from fe_models.meshes.cell_shapes import cell_jacobians
 from fe_models.meshes.mesh import Mesh
@@ -239,17 +239,8 @@ def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[
     record |= {f"cells {kind}": str(len(cells)) for kind, cells in mesh.cells.items() if len(cells)}
     for number, material in enumerate(materials):
         count = sum(int((index == number).sum()) for index in of_cell.values())
-        record[f"material {material.name}"] = f"{_material_words(material)}, {count} cells"
+        record[f"material {material.name}"] = f"{material_words(material)}, {count} cells"
     return {key: value for key, value in record.items() if value} | {"scikit-fem": version("scikit-fem")}
-
-
-def _material_words(material: AnyMaterial) -> str:
-    if isinstance(material, Material):
-        return f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}"
-    return (
-        f"orthotropic, E = {list(material.young)}, G_12, G_13, G_23 = {list(material.shear)}, nu_12, nu_13, nu_23 = "
-        f"{list(material.poisson)}, rho = {material.rho!r}, axes {[list(row) for row in material.axes]}"
-    )
 
 
 def _brick_words(mesh: Mesh, incompatible_modes: bool) -> dict[str, str]:

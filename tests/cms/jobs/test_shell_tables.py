@@ -8,9 +8,11 @@ from cms.errors import JobError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
-from cms.jobs.shell_body import shell_mesh
+from cms.jobs.shell_body import shell_mesh, shell_properties_of
 from cms.jobs.shell_tables import ShellSection
+from cms.jobs.tables.material_table import material_of
 from fe_models.errors import FeModelsError
+from fe_models.shells.shell_property import LaminateProperty, Layer
 from tests.root import ROOT
 
 DOCUMENT = ROOT / "docs" / "job_file.md"
@@ -191,6 +193,65 @@ def test_quads_warped_beyond_the_limit_are_refused_unless_they_are_accepted(job_
     with pytest.raises(FeModelsError, match=r"1 quad cells are warped beyond 20 degrees.*split them into triangles"):
         job_body(read_job(path))
     job_body(read_job(job_file(TRAY.replace("[materials.steel]", 'accept = "warped"\n\n[materials.steel]', 1))))
+
+
+LAYUP = (
+    TRAY.replace(
+        'thickness = 0.01\ncells = "floor"\nmaterial = "steel"\n',
+        """layers = [{thickness = 0.002, angle = 45, material = "ply"}, {thickness = 0.003, material = "steel"}]
+symmetric = true
+direction = [1, 1, 0]
+cells = "floor"
+""",
+    )
+    + """
+[materials.ply]
+young = [140e9, 10e9, 10e9]
+shear = [5e9, 5e9, 3.5e9]
+poisson = [0.3, 0.3, 0.4]
+density = 1500
+"""
+)
+
+
+def test_a_job_of_layers_makes_the_laminate(job_file):
+    job = read_job(job_file(LAYUP))
+    body = job_body(job)
+    ply, steel = (material_of(name, job.materials[name]) for name in ("ply", "steel"))
+    lower = (Layer(ply, 0.002, 45.0), Layer(steel, 0.003))
+    made = shell_properties_of(job)["floor"]
+    assert made == LaminateProperty((*lower, *lower[::-1]), (1, 1, 0), offset=0.005)
+    assert body.provenance["layers 1"].endswith(
+        "ply 0.002 at 45.0, steel 0.003 at 0.0, steel 0.003 at 0.0, ply 0.002 at 45.0"
+    )
+    rib, floor = 8000 * 0.01 * 0.04, 1500 * 0.004 + 8000 * 0.006
+    assert_allclose(reduce_job(job).moments.m, floor + 2700 * 0.02 + 10 + rib + 2.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("direction = [1, 1, 0]\n", "", "shells.floor.direction: missing; expected [x, y, z], where angle 0"),
+        ("symmetric = true", "thickness = 0.01", "shells.floor.thickness: each of the layers has its own"),
+        ("symmetric = true", 'material = "ply"', "shells.floor.material: each of the layers has its own"),
+        (', material = "ply"}', "}", "shells.floor.layers.0.material: missing; there are 3 materials"),
+        ('material = "steel"}', 'material = "steal"}', 'shells.floor.layers.1.material = "steal": there is no such'),
+        ("thickness = 0.02", "thickness = 0.02\nsymmetric = true", "shells.wall.symmetric: belongs to layers"),
+        ("thickness = 0.02", "thickness = 0.02\ndirection = [1, 0, 0]", "shells.wall.direction: belongs to layers"),
+        ("angle = 45", "angel = 45", "shells.floor.layers.0.angel: unknown key; did you mean"),
+    ],
+)
+def test_a_bad_job_of_layers_is_refused(job_file, old, new, words):
+    assert old in LAYUP
+    with pytest.raises(JobError) as caught:
+        read_job(job_file(LAYUP.replace(old, new, 1)))
+    assert words in str(caught.value)
+
+
+def test_an_orthotropic_material_belongs_to_layers(job_file):
+    text = LAYUP.replace('material = "tin"', 'material = "ply"')
+    with pytest.raises(JobError, match=r"materials.ply: it is orthotropic; shells without layers \(give layers"):
+        job_body(read_job(job_file(text)))
 
 
 def test_a_surface_mesh_without_thickness_is_refused(job_file):
