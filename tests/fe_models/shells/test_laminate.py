@@ -298,7 +298,7 @@ def test_cross_plies_have_the_frequencies_and_the_deflection_of_naviers_series(k
 def test_thick_plates_vibrate_as_their_layers_of_bricks(angles):
     """Simply supported square, ten times as wide as thick: Navier's series with the shear stiffness H is 0.4 % lower.
 
-    With 5/6 of ∫ G dz instead of H the three layers would be 1 % higher, beyond the bricks, which are too stiff themselves.
+    With 5/6 of ∫ G dz instead of H the three layers would be 1 % higher, beyond the bricks.
     """
     h, t = 0.1, 0.1 / len(angles)
     mesh = box_mesh(6, 6, {2: 4, 3: 3}[len(angles)], 1.0, 1.0, h, "hexahedron20")
