@@ -82,7 +82,7 @@ def shell_properties_of(job: Job) -> "dict[str, AnyShellProperty]":
         assert shell.thickness is not None  # the job has checked it
         name = shell.material or next(iter(job.materials))
         table = job.materials[name]
-        material = isotropic_of(name, table, "shells without layers (give layers, docs/shells.md)")
+        material = isotropic_of(name, table, "shells of one thickness (not of layers)")
         item = ShellProperty(shell.thickness, material, offset=shell.offset, added_mass=shell.added_mass)
         made |= dict.fromkeys(shell.cells, item)
     return made

@@ -48,7 +48,7 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
     strains, elasticity = cells.strains(rows), cells.elasticity(rows)
     values = strains.B @ u[dofs][:, None]
     resultants = (elasticity[:, None] @ values) * strains.weights[..., None, None]
-    second = (_second_moments(cells, rows)[:, None] @ values[:, :, :6]) * strains.weights[..., None, None]
+    second = (stress_second_moments(cells, rows)[:, None] @ values[:, :, :6]) * strains.weights[..., None, None]
     m, p, s, d = strains.B.shape
     forces = strains.B.reshape(m, p * s, d).transpose(0, 2, 1) @ resultants.reshape(m, p * s, -1)
     resultants[:, :, 6:8] += _missing_shear(cells, rows, forces, resultants[:, :, 6:8], strains.weights)
@@ -114,7 +114,7 @@ def _fields(cells: ShellCells, rows: slice) -> Array:
     return np.asarray(local.reshape(n, p, N_FIELDS, 6 * c))
 
 
-def _second_moments(cells: ShellCells, rows: slice) -> Array:
+def stress_second_moments(cells: ShellCells, rows: slice) -> Array:
     """P = ∫ z² sigma dz by eps and kappa, (m, 3, 6)."""
     return cells.by_law(lambda law: np.hstack([law.D, law.third]), rows)
 

@@ -11,6 +11,7 @@ import fe_models as fm
 from cms.families.rigid_modes import geometric_rigid_modes
 from fe_models.body.mass_loads import MassLoads
 from fe_models.errors import ShellError
+from fe_models.shells.geometric import stress_second_moments
 from fe_models.shells.laminate import shell_law
 from tests.bodies import box_mesh
 from tests.fe_models.shells.test_geometric import balanced_state, turned_loads
@@ -411,3 +412,26 @@ def test_cells_across_the_direction_and_layers_that_do_not_exist_are_refused():
         fm.layer_stress(body, np.zeros((body.n_dof, 1)), {"quad": [1]}, 4)
     with pytest.raises(ShellError, match="expected columns over 54 dofs"):
         fm.layer_stress(body, np.zeros(body.n_dof), {"quad": [1]}, 0)
+
+
+def test_transverse_shear_carries_its_force_vanishes_at_the_faces_and_does_not_jump():
+    law = shell_law(laminate(*ODD))
+    points, weights = np.polynomial.legendre.leggauss(3)
+    force = np.zeros((2, 2))
+    for k, (low, high) in enumerate(zip(law.z[:-1], law.z[1:], strict=True)):
+        for x, w in zip(points, weights, strict=True):
+            force += w * (high - low) / 2 * law.stress((low + high) / 2 + x * (high - low) / 2, k)[3:, 6:]
+    assert_allclose(force, np.eye(2), rtol=0, atol=1e-11)
+    tau = np.array([[law.stress(z, k)[3:, 6:] for z in law.z[k : k + 2]] for k in range(len(ODD))]) * law.thickness
+    assert_allclose(tau[0, 0], 0, rtol=0, atol=1e-11)
+    assert_allclose(tau[-1, 1], 0, rtol=0, atol=1e-11)
+    assert_allclose(tau[:-1, 1], tau[1:, 0], rtol=0, atol=1e-11)
+    assert np.abs(tau[1:, 0]).min(axis=0).max() > 0.1
+
+
+def test_geometric_stiffness_takes_the_second_moment_of_the_stress_of_layers():
+    body = shell(fm.flat_plate(1.0, 1.0, 1, 1), laminate(fm.Layer(PLY, 0.01, 30.0), fm.Layer(PLY, 0.01, 80.0)))
+    _, _, D, third, _ = by_quadrature((30, 80), 0.01)
+    P = stress_second_moments(body.element_model.groups[0], slice(0, 1))[0]
+    assert_allclose(P, np.hstack([D, third]), rtol=0, atol=1e-11 * E_1 * 0.02**3)
+    assert_allclose(P[:, 3:], third, rtol=0, atol=1e-11 * E_1 * 0.02**4)
