@@ -81,5 +81,8 @@ def test_impossible_numbers_are_refused_in_words(job_file):
 
 def test_shells_refuse_an_orthotropic_material(job_file):
     path = job_file(("[reduction]", "[shells.skin]\nthickness = 0.01\n\n[reduction]"))
-    with pytest.raises(JobError, match=r"materials\.spruce: it is orthotropic; shells of one thickness \(not of layers\) take isotropic"):
+    with pytest.raises(
+        JobError,
+        match=r"materials\.spruce: it is orthotropic; shells of one thickness \(not of layers\) take isotropic",
+    ):
         shell_properties_of(read_job(path))
