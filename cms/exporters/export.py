@@ -29,25 +29,27 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["WRITERS", "Exported", "export_body"]
 
-OVER_INTERFACES = frozenset({"damping", "rotation", "load cases"})  #: held by all matrices over the interfaces
+OVER_INTERFACES = frozenset({"damping", "rotation", "load cases", "axes in B"})  #: held by all matrices over the interfaces
 WRITERS: dict[str, Writer] = {
     "mbsim": Writer(
         make_mbsim,
-        frozenset({"gyroscopic", "damping", "rotation", "stress", "surface"}),
+        frozenset({"gyroscopic", "damping", "rotation", "stress", "surface", "axes in the mesh"}),
         needs=("modes",),
     ),
     "exudyn": Writer(
         make_exudyn,
-        frozenset({"gyroscopic", "damping", "interfaces", "stress", "surface"}),
+        frozenset({"gyroscopic", "damping", "interfaces", "stress", "surface", "axes in B", "axes in the mesh"}),
         needs=("modes", "nodes"),
     ),
     "mbdyn": Writer(
-        make_mbdyn, frozenset({"gyroscopic", "geometric", "damping", "rotation"}), needs=("modes", "interfaces")
+        make_mbdyn,
+        frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"}),
+        needs=("modes", "interfaces"),
     ),
     **{
         dialect: Writer(
             partial(make_sid_fem, dialect=dialect),
-            frozenset({"gyroscopic", "geometric", "damping", "rotation"}),
+            frozenset({"gyroscopic", "geometric", "damping", "rotation", "axes in the mesh"}),
             needs=("modes", "interfaces"),
         )
         for dialect in DIALECTS
@@ -66,7 +68,7 @@ WRITERS: dict[str, Writer] = {
     "ext_ptfm": Writer(
         make_ext_ptfm, OVER_INTERFACES, takes_held=True, takes_loads=True, units="m-kg-s", needs=("interfaces",)
     ),
-    "vtk": Writer(make_vtk, frozenset({"surface", "stress"}), takes_held=True, needs=("modes", "nodes")),
+    "vtk": Writer(make_vtk, frozenset({"surface", "stress", "axes in the mesh"}), takes_held=True, needs=("modes", "nodes")),
 }  #: by key of `cms.exporters.formats.FORMATS`
 
 NEEDS = {

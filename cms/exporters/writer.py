@@ -9,8 +9,18 @@ from unicodedata import combining, normalize
 import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
 
 __all__ = ["CONTENT", "Made", "Request", "Writer", "in_ascii", "left_out"]
+
+OWN_AXES = "axes of the interfaces that are turned against those of the file"
+TURNED = 1e-12  #: part of a direction cosine that is more than rounding
+
+
+def is_turned(axes: Array) -> bool:
+    """Return whether axes are others than those they are written in."""
+    return bool(np.abs(axes - np.eye(3)).max() > TURNED)
+
 
 #: what a body may hold beside masses, stiffness and shapes: key -> in words, and whether a body has it
 CONTENT: dict[str, tuple[str, Callable[[ReducedBody], bool]]] = {
@@ -22,6 +32,8 @@ CONTENT: dict[str, tuple[str, Callable[[ReducedBody], bool]]] = {
     "quadratic": ("displacements of second order", lambda body: body.quadratic is not None),
     "damping": ("modal damping", lambda body: bool(np.any(body.D))),
     "interfaces": ("names of the interfaces", lambda body: bool(body.interfaces)),
+    "axes in B": (OWN_AXES, lambda body: any(is_turned(each.triad) for each in body.interfaces)),
+    "axes in the mesh": (OWN_AXES, lambda body: any(is_turned(body.frame.axes @ x.triad) for x in body.interfaces)),
     "rotation": ("rotations of the interfaces", lambda body: any(each.has_rotation for each in body.interfaces)),
     "load cases": ("load cases", lambda body: bool(body.load_cases)),
     "stress": ("stress of the modes", lambda body: body.stress is not None),

@@ -125,6 +125,7 @@ def import_body(
     )  # fmt: skip
     places = places_of(nodes)
     if isinstance(files, ForeignMatrices):
+        options = with_names(options, files)
         return body_of_superelement(of_matrices(files, name or "superelement", places, boundary), options)
     paths = paths_of(files)
     name = name or paths[0].stem
@@ -134,6 +135,7 @@ def import_body(
     try:
         if key == "matrices":
             read = read_matrices(files if isinstance(files, Mapping) else paths)
+            options = with_names(options, read)
             body: Superelement | ModalBody = of_matrices(read, name, places, boundary)
         else:
             if boundary is not None:
@@ -200,6 +202,22 @@ def of_matrices(foreign: ForeignMatrices, name: str, places: Places, boundary: S
         note = f"the first {len(own)} rows are six dofs of each of nodes {list(map(int, boundary))}, as it was said"
         foreign = replace(foreign, dofs=np.concatenate([own, modal]), notes=(*foreign.notes, note))
     return superelement_of_matrices(foreign, name, places)
+
+
+def with_names(options: ImportOptions, foreign: ForeignMatrices) -> ImportOptions:
+    """Return the options with the interfaces that the files name, where the user names none."""
+    return options if options.interfaces is not None else replace(options, interfaces=named_interfaces(foreign))
+
+
+def named_interfaces(foreign: ForeignMatrices) -> dict[str, list[int]] | None:
+    """Return the interfaces whose names stand beside the places of the nodes, as our own .mat files have them."""
+    names = np.asarray(foreign.others.get("interfaces", ()))
+    if foreign.node_numbers is None or names.dtype.kind != "U" or names.shape != (len(foreign.node_numbers),):
+        return None
+    found: dict[str, list[int]] = {}
+    for text, number in zip(names.tolist(), foreign.node_numbers.tolist(), strict=True):
+        found.setdefault(text.strip(), []).append(number)
+    return None if "" in found else found
 
 
 def places_of(nodes: str | Path | Places | None) -> Places:

@@ -64,6 +64,8 @@ def read_matlab_7(path: Path, request: Request) -> ForeignMatrices:
             if isinstance(entry, h5py.Dataset):
                 if entry.dtype.kind in "fiucV" and entry.ndim == 2:
                     content[name] = array_of(where, name, entry).T
+                    if entry.attrs.get("MATLAB_class") == b"char":
+                        content[name] = np.array(["".join(map(chr, row)) for row in content[name].tolist()])
             elif "MATLAB_sparse" in entry.attrs:
                 n_rows = int(entry.attrs["MATLAB_sparse"])
                 parts = {

@@ -201,3 +201,22 @@ def test_files_that_belong_together_appear_together_or_not_at_all(body, tmp_path
     with pytest.raises(ExportError, match=r"No space left on device; nothing was written"):
         export_body(body, tmp_path / "b.npz", to="exudyn", units="m-kg-s")
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("b.npz", b"old")]
+
+
+@pytest.mark.parametrize("to", ["mbsim", "mbdyn", "sid_fem", "exudyn", "nastran-op4", "nastran-dmig", "mat"])
+def test_turned_axes_of_interfaces_are_said_to_be_lost(to, tmp_path):
+    """Files over B lose what is turned against B, files over the mesh what is turned against the mesh."""
+    from tests.cms.exporters.test_matrices_over_interfaces import reduced_bar
+
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    body = reduced_bar("left", "right")
+    over_mesh = to in ("nastran-op4", "nastran-dmig", "mat")
+    straight = body.frame.axes.T if over_mesh else np.eye(3)
+
+    def lost(triad):
+        each = replace(body, interfaces=[replace(x, triad=triad) for x in body.interfaces])
+        told = cms.export_body(each, tmp_path / "b", to=to, units="m-kg-s").left_out
+        return [words for words in told if words.startswith("axes of the interfaces")]
+
+    assert lost(straight) == []
+    assert len(lost(straight @ turn)) == (to != "exudyn")

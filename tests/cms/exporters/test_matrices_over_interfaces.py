@@ -207,6 +207,8 @@ def test_superelements_come_back_with_their_frequencies(to, reduced, tmp_path):
     assert_allclose(back.free_frequencies, reduced.free_frequencies, rtol=1e-6 if to == "nastran-dmig" else 1e-8)
     assert_allclose(back.moments.m, reduced.moments.m, rtol=1e-8)
     assert back.moments.missing == ("3C", "4C", "5C")
+    own = ["left", "right"] if to in ("mat", "mat73") else ["node 1", "node 2"]  # where the file holds them
+    assert [each.name for each in back.interfaces] == own
     places = [back.frame.origin + back.frame.axes @ each.position for each in back.interfaces]
     expected = [reduced.frame.origin + reduced.frame.axes @ each.position for each in reduced.interfaces]
     assert_allclose(places, expected, rtol=0, atol=1e-9)
