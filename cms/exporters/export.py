@@ -29,7 +29,9 @@ from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["WRITERS", "Exported", "export_body"]
 
-OVER_INTERFACES = frozenset({"damping", "rotation", "load cases", "axes in B"})  #: held by all matrices over the interfaces
+OVER_INTERFACES = frozenset(
+    {"damping", "rotation", "load cases", "axes in B"}
+)  #: held by all matrices over the interfaces
 WRITERS: dict[str, Writer] = {
     "mbsim": Writer(
         make_mbsim,
@@ -68,7 +70,9 @@ WRITERS: dict[str, Writer] = {
     "ext_ptfm": Writer(
         make_ext_ptfm, OVER_INTERFACES, takes_held=True, takes_loads=True, units="m-kg-s", needs=("interfaces",)
     ),
-    "vtk": Writer(make_vtk, frozenset({"surface", "stress", "axes in the mesh"}), takes_held=True, needs=("modes", "nodes")),
+    "vtk": Writer(
+        make_vtk, frozenset({"surface", "stress", "axes in the mesh"}), takes_held=True, needs=("modes", "nodes")
+    ),
 }  #: by key of `cms.exporters.formats.FORMATS`
 
 NEEDS = {
