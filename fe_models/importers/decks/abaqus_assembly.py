@@ -141,7 +141,12 @@ def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) ->
             x = R @ np.array([float(word or 0) for word in [*words[1:4], "0", "0", "0"][:3]]) + t
             lines.append(", ".join([words[0], *(repr(float(value)) for value in x)]))
         return replace(block, parameters=parameters, lines=lines)
-    if block.keyword not in SETS and block.keyword in ("SURFACE", "EQUATION", "BOUNDARY", "MPC", "NODAL THICKNESS"):
+    if block.keyword in ("EQUATION", "MPC") and (offset or not np.array_equal(R, np.eye(3))):
+        raise MeshError(
+            f"{block.place}: *{block.keyword} inside a part of which instance {quoted(instance)} is turned or not the "
+            "first: its numbers and directions are not taken to instances; write it into *ASSEMBLY"
+        )
+    if block.keyword not in SETS and block.keyword in ("SURFACE", "BOUNDARY", "NODAL THICKNESS"):
         lines = [_prefixed(line, instance, offset) for line in block.lines]
         return replace(block, parameters=parameters, lines=lines)
     return replace(block, parameters=parameters)

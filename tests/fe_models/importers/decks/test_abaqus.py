@@ -411,3 +411,9 @@ def test_a_set_of_an_instance_is_not_one_of_the_same_name_elsewhere(tmp_path):
     tie = "*COUPLING, REF NODE=point, SURFACE=s, CONSTRAINT NAME=c\n*KINEMATIC\n1, 6\n*END ASSEMBLY"
     with pytest.raises(MeshError, match=r"unknown element set 'Bar-2\.skin'"):
         deck_of(tmp_path, PART.replace("*END ASSEMBLY", surface).replace("*END ASSEMBLY", tie))
+
+
+@pytest.mark.parametrize("lines", ["*EQUATION\n2\n1, 1, 1., 2, 1, -1.\n", "*MPC\nTIE, 1, 2\n"])
+def test_equations_of_a_part_are_refused_where_its_instances_would_misread_them(tmp_path, lines):
+    with pytest.raises(MeshError, match=r"inside a part of which instance 'Bar-2' is turned or not the first"):
+        deck_of(tmp_path, PART.replace("*END PART", f"{lines}*END PART"))
