@@ -16,7 +16,6 @@ from fe_models.importers.decks.deck import Deck, LineSection, RodSection, ShellS
 
 __all__ = ["JobRequest", "job_text"]
 
-FEW_NODES = 50  #: of a support held in part, above which the job says what they cost
 N_MODES = 10
 COLLINEAR = 1e-6
 

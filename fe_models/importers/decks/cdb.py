@@ -16,7 +16,6 @@ from fe_models.importers.raw_mesh import RawBlock, RawMesh
 __all__ = ["read_cdb_deck"]
 
 COLUMNS = 11  #: of an element before its nodes
-FIRST_NODES = 8  #: on the first line of an element
 #: element -> integration, mass, what is different
 SOLIDS = {
     185: (

@@ -12,7 +12,8 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES
 __all__ = ["read_attached"]
 
 _FACED = {"CTETRA": ("tetra", 4), "CPENTA": ("wedge", 6), "CHEXA": ("hexahedron", 8)}  #: card -> kind, corner grids
-TRANSLATIONS, ALL = (0, 1, 2), (0, 1, 2, 3, 4, 5)
+ALL = (0, 1, 2, 3, 4, 5)
+ALONG = 1e-9  #: part of a vector across a line, below which it is along it
 
 
 def read_attached(model: NastranModel) -> None:
@@ -77,14 +78,20 @@ def _bush(model: NastranModel, card: Card) -> None:
         why = "of no length and without CID: its axes are those of the displacements of GA (CD)"
         model.ledger.note("CBUSH", why)
     triad = _bush_axes(model, card, ends)
+    if triad is None:
+        model.ledger.refuse("CBUSH", "whose orientation is along the element itself, which says no direction of y")
+        return
     names = [model.group(card, [card.integer(n)]) for n in (3, 4)]
     damping = tuple(b) if any(b) else None
     rows = tuple((float(a[0]), float(a[1]), float(a[2])) for a in triad.T)
     model.springs.append(DeckSpring((names[0], names[1]), tuple(k), damping, (rows[0], rows[1], rows[2])))
 
 
-def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array:
-    """Return the axes of a bush, (3, 3), columns: of CID, else x along the element and y towards the vector."""
+def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array | None:
+    """Return the axes of a bush, (3, 3), columns: of CID, else x along the element and y towards the vector.
+
+    None if the vector is along the element.
+    """
     if card.text(8):
         return model.system(card, card.integer(8), ends[0])
     x = ends[1] - ends[0]
@@ -96,6 +103,8 @@ def _bush_axes(model: NastranModel, card: Card, ends: list[Array]) -> Array:
     v = v if is_grid else model.axes(card.integer(3)) @ v
     x = x / np.linalg.norm(x)
     z = np.cross(x, v)
+    if np.linalg.norm(z) <= ALONG * np.linalg.norm(v):
+        return None
     z = z / np.linalg.norm(z)
     return np.stack([x, np.cross(z, x), z], axis=1)
 

@@ -14,7 +14,6 @@ from fe_models.foundation.copies import FrozenMapping, frozen_copies
 __all__ = ["SCALAR", "ForeignMatrices", "pair_keys"]
 
 SCALAR = -1  #: component of a dof without place: a scalar point, a modal coordinate
-TRIANGLES = ("both", "lower", "upper", "diagonal")
 ROLES = ("K", "M", "D")
 
 

@@ -18,7 +18,6 @@ from fe_models.importers.matrices.triangles import mirrored
 __all__ = ["is_harwell_boeing", "read_harwell_boeing", "read_npz"]
 
 SPARSE = {"format", "shape", "data"}  #: keys that `save_npz` always writes
-HEADER = 160  #: bytes of the title and the counts of a Harwell-Boeing file
 
 
 def read_npz(path: Path, request: Request) -> ForeignMatrices:

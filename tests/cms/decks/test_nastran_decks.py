@@ -125,6 +125,7 @@ def test_the_job_of_a_deck_of_nastran_has_its_mass_and_its_loads(tmp_path):
         ("CONM2", "CONM1", "1 CONM1: this card is not known here"),
         ("CELAS2,70,5.+3,1,1,2,1", "CBUSH,70,71,1,2\n,.3\nPBUSH,71,K,1.,1.,1.", "1 CBUSH: acting elsewhere"),
         ("CELAS2,70,5.+3,1,1,2,1", "CBUSH,70,71,1,2\nPBUSH,71,K,1.,1.,2.", "1 CBUSH: with length, other values"),
+        ("CELAS2,70,5.+3,1,1,2,1", "CBUSH,70,71,1,2,1.,0.,0.\nPBUSH,71,K,1.,1.,2.", "1 CBUSH: whose orientation"),
         ("CELAS2,70,5.+3,1,1,2,1", "CBAR,70,71,1,2,0.,0.,1.,GOO\n,,,0.,0.,1.,0.,0.,1.\nPBARL,71,9,,ROD\n,.1",
          r"1 CBAR: offsets along the axes of the element \(OFFT GOO\)"),
         ("CELAS2,70,5.+3,1,1,2,1",
