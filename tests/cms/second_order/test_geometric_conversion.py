@@ -154,7 +154,7 @@ def test_a_reaction_that_is_not_on_record_is_refused(made):
     assert cms.convert_frame(as_before_version_4(made["tisserand"]), NodalFrame("left")).geometric.spread is None
 
 
-def test_a_file_of_an_older_version_goes_where_it_went(made):
+def test_a_file_of_an_older_version_goes_where_it_went(made, caplog):
     """Without a record of how its loads turn a rotation is taken to turn them, which in solids and beams it does."""
     beams = reductions(frame_of_beams(), ("nodal left", "tisserand"))
     for bodies, source, target in ((made, "nodal right", "tisserand"), (made, "buckens", "nodal left"),
@@ -164,12 +164,16 @@ def test_a_file_of_an_older_version_goes_where_it_went(made):
         for name in UNIT_LOADS:
             K, K_expected = getattr(found.geometric, name), getattr(expected.geometric, name) * np.outer(sign, sign)
             assert_allclose(K, K_expected, rtol=0, atol=10 * SLACK * np.abs(K_expected).max(), err_msg=name)
+    assert not caplog.text
 
 
-def test_coarse_shells_need_the_record():
+def test_coarse_shells_need_the_record(caplog):
     """Turned loads stand for it only as their cells get small: the fourth part of the largest entry is missed here."""
     made = reductions(warped_shell(), ("nodal left", "tisserand"))
+    cms.convert_frame(made["nodal left"], TisserandFrame())
+    assert not caplog.text
     found = cms.convert_frame(as_before_version_4(made["nodal left"]), TisserandFrame()).geometric.spin
+    assert "from before version 4 and it has shells" in caplog.text
     expected = cms.convert_frame(made["nodal left"], TisserandFrame()).geometric.spin
     assert np.abs(found - expected).max() > 0.25 * np.abs(expected).max()
 
