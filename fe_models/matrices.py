@@ -1,6 +1,5 @@
 """Bodies from the matrices of another program: plain arrays, or an .npz file."""
 
-import hashlib
 import logging
 import zipfile
 import zlib
@@ -20,6 +19,7 @@ from fe_models.body.mass_loads import MassLoads
 from fe_models.body.positive_mass import DENSE, negative_mass, positive_mass
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.digest import file_digest
 from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import Units, unit_system
 from fe_models.foundation.words import nearest, quoted
@@ -350,7 +350,7 @@ def body_from_npz(
         interfaces=interfaces_of(path, arrays),
         D=sparse_of(path, arrays, "D", n_dof) if has_damping else None,
         surface=arrays.get("surface"),
-        provenance={"mesh": str(path), "mesh sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
+        provenance={"mesh": str(path), "mesh sha256": file_digest(path)},
         held=held or is_held(path, arrays),
         mend_mass=mend_mass,
         accept=accept,

@@ -1,6 +1,5 @@
 """One door for bodies that another program has reduced: formats by suffix and content, one judgement, one error."""
 
-import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,9 +23,10 @@ from cms.reduced_basis.frames import Frame
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.errors import FeModelsError
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.digest import file_digest
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.units import Units, unit_system
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import damage, nearest, quoted
 from fe_models.importers.matrices.body import numbers_of
 from fe_models.importers.matrices.foreign_matrices import SCALAR, ForeignMatrices
 from fe_models.importers.matrices.read_matrices import read_matrices
@@ -146,14 +146,10 @@ def import_body(
     except MemoryError as error:
         raise ForeignBodyError(f"{paths[0]}: not enough memory to read it") from error
     except Exception as error:  # whatever a damaged file does to a parser, the user gets one message
-        text = str(error).strip().splitlines()
-        raise ForeignBodyError(
-            f"{paths[0]}: could not be read as {key}: it is damaged or of another kind "
-            f"({type(error).__name__}{': ' + text[0][:200] if text else ''})"
-        ) from error
+        raise ForeignBodyError(f"{paths[0]}: could not be read as {key}: {damage(error)}") from error
     if isinstance(body, Superelement):
         return body_of_superelement(body, options)
-    record = {f"file {path}": hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
+    record = {f"file {path}": file_digest(path) for path in paths}
     return body_of_modes(replace(body, provenance={**record, **body.provenance}), options)
 
 

@@ -12,6 +12,7 @@ from cms.jobs.job import InterfaceSection, Job
 from cms.jobs.tables.material_table import isotropic_of, material_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.digest import file_digest
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 from fe_models.foundation.words import nearest
@@ -39,7 +40,8 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
     with stages("assemble"):
         parts, meshes = _parts(job, path, raw, on_report)
         joined = join(str(job.body.name), parts, raw.nodes, _constraints(job, raw))
-        body = joined.body
+        record = {**joined.body.provenance, "deck": str(path), "deck sha256": file_digest(path)}
+        body = replace(joined.body, provenance=record)
         _require_used_groups(job, raw, joined)
         body = body.with_load_cases(*_load_cases(job, raw, joined, meshes))
         return body.with_interfaces(*[_interface(name, each, raw, joined) for name, each in job.interfaces.items()])

@@ -6,7 +6,9 @@ from pathlib import Path
 __all__ = ["file_digest"]
 
 
-def file_digest(path: str) -> str:
-    """Return the sha256 of a file, "" if it is not there."""
-    file = Path(path)
-    return hashlib.sha256(file.read_bytes()).hexdigest() if path and file.is_file() else ""
+def file_digest(path: str | Path) -> str:
+    """Return the sha256 of a file, read in pieces; "" if it is not there."""
+    if not path or not Path(path).is_file():
+        return ""
+    with Path(path).open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

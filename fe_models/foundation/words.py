@@ -6,7 +6,7 @@ from difflib import get_close_matches
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["nearest", "node_list", "quoted", "shortened"]
+__all__ = ["damage", "nearest", "node_list", "quoted", "shortened"]
 
 LONGEST = 80  #: characters of a name or value in a message
 MOST_CHOICES = 40  #: names in a message
@@ -42,3 +42,10 @@ def quoted(value: object) -> str:
     except (RecursionError, ValueError):  # nested too deeply, or a whole number of thousands of digits
         return f"<{type(value).__name__}>"
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...{text[-1]}"
+
+
+def damage(error: BaseException) -> str:
+    """Return the tail of a message about a file on which its reader failed: what it may be, what the reader said."""
+    lines = str(error).strip().splitlines()
+    said = f": {lines[0][:200]}" if lines else ""
+    return f"it is damaged or of another kind ({type(error).__name__}{said})"

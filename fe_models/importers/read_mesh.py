@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.foundation.digest import file_digest
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import damage, nearest, quoted
 from fe_models.importers.abaqus import read_abaqus
 from fe_models.importers.cad.cad_units import CAD_SUFFIXES
 from fe_models.importers.geometry import geometry_from_raw
@@ -169,11 +169,7 @@ def _read(path: str | Path, convert: Callable[[RawMesh, Path, str], M]) -> M:
     except FeModelsError:
         raise
     except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
-        text = str(error).strip().splitlines()
-        raise MeshError(
-            f"{where}: could not be read as a {name} file: it is damaged or of another kind "
-            f"({type(error).__name__}{': ' + text[0][:200] if text else ''})"
-        ) from error
+        raise MeshError(f"{where}: could not be read as a {name} file: {damage(error)}") from error
 
 
 def _neighbours(path: Path) -> str:

@@ -65,6 +65,9 @@ def test_a_curved_mesh_with_elements_as_curved_is_a_free_body():
     volume = gram[0, 0] / STEEL.rho
     assert 0.9 * 4 / 3 * np.pi < volume < 4 / 3 * np.pi
     assert_allclose(gram[1, 1] + gram[2, 2] + gram[3, 3], 0.6 * gram[0, 0], rtol=0.05, atol=0)
+    curved = skfem.Basis(mesh, skfem.ElementTetP2(), intorder=6)
+    square = skfem.Functional(lambda w: STEEL.rho * (w.x**2).sum(axis=0)).assemble(curved)
+    assert_allclose(gram[1, 1] + gram[2, 2] + gram[3, 3], square, rtol=1e-10, atol=0)
     assert_allclose(body.M.sum(), 3 * gram[0, 0], rtol=1e-12, atol=0)
 
 

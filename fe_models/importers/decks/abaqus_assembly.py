@@ -9,6 +9,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array
@@ -110,9 +111,7 @@ def _motion(where: str, head: DeckBlock) -> tuple[Array, Array]:
         raise MeshError(
             f"{where}, {head.place}: *INSTANCE: expected x, y, z and a, b, angle below ({error})"
         ) from error
-    n = (b - a) / np.linalg.norm(b - a)
-    skew = np.array([[0, -n[2], n[1]], [n[2], 0, -n[0]], [-n[1], n[0], 0]])
-    R = np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+    R = Rotation.from_rotvec(angle * (b - a) / np.linalg.norm(b - a)).as_matrix()
     return R, R @ (t - a) + a
 
 

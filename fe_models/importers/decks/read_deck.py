@@ -1,12 +1,11 @@
 """One door for whole decks: the program by the suffix, one error for everything that can be wrong with a file."""
 
 from collections.abc import Callable
-from hashlib import sha256
 from pathlib import Path
 
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import damage, nearest, quoted
 from fe_models.importers.decks.abaqus import read_abaqus_deck
 from fe_models.importers.decks.cdb import read_cdb_deck
 from fe_models.importers.decks.deck import Deck
@@ -60,13 +59,4 @@ def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
     except FeModelsError:
         raise
     except Exception as error:  # whatever a damaged file does to a reader, the user gets one message
-        text = str(error).strip().splitlines()
-        raise MeshError(
-            f"{where}: could not be read: it is damaged or of another kind "
-            f"({type(error).__name__}{': ' + text[0][:200] if text else ''})"
-        ) from error
-
-
-def digest_of(path: Path) -> str:
-    """Return the sha256 of a file."""
-    return sha256(path.read_bytes()).hexdigest()
+        raise MeshError(f"{where}: could not be read: {damage(error)}") from error

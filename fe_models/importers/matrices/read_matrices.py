@@ -1,6 +1,5 @@
 """One door for matrix files: formats by suffix and content, several files that make one model, one error."""
 
-import hashlib
 import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -8,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fe_models.errors import FeModelsError, MatrixError
+from fe_models.foundation.digest import file_digest
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.words import nearest, quoted
+from fe_models.foundation.words import damage, nearest, quoted
 from fe_models.importers.ansys_matrices.records import is_ansys_binary
 from fe_models.importers.matrices.ansys import read_full_part, read_sub_part
 from fe_models.importers.matrices.foreign_matrices import ROLES, ForeignMatrices, joined
@@ -115,7 +115,7 @@ def read_part(path: Path, request: Request) -> ForeignMatrices:
     form = format_of(where, path, head)
     try:
         with ThreadPoolExecutor(1) as beside:  # the digest takes a core of its own
-            digest = beside.submit(digest_of, path)
+            digest = beside.submit(file_digest, path)
             part = form.read(path, request)
     except FeModelsError:
         raise
@@ -123,11 +123,7 @@ def read_part(path: Path, request: Request) -> ForeignMatrices:
         size = os.path.getsize(path)
         raise MatrixError(f"{where}: not enough memory to read {size / 1e6:.0f} MB as {form.name}") from error
     except (Exception, SystemExit) as error:  # whatever a damaged file does to a parser, the user gets one message
-        text = str(error).strip().splitlines()
-        raise MatrixError(
-            f"{where}: could not be read as {form.name}: it is damaged or of another kind "
-            f"({type(error).__name__}{': ' + text[0][:200] if text else ''})"
-        ) from error
+        raise MatrixError(f"{where}: could not be read as {form.name}: {damage(error)}") from error
     return replace(part, files={**part.files, str(path): digest.result()})
 
 
@@ -144,9 +140,3 @@ def format_of(where: str, path: Path, head: bytes) -> MatrixFormat:
     raise MatrixError(
         f"{where}: expected {' or '.join(form.name for form in mine)}, got a file that begins with {quoted(head[:30])}"
     )
-
-
-def digest_of(path: Path) -> str:
-    """Return the sha256 of a file, read in pieces."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,5 +1,6 @@
 """Decks of Nastran become bodies: a frame of bars beside the superelement that Nastran made of it."""
 
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,7 @@ def test_the_job_of_a_deck_of_nastran_has_its_mass_and_its_loads(tmp_path):
     up = np.where(body.dofs[:, 1] == 2, 1.0, 0.0)
     assert_allclose(up @ body.M @ up, 2 * 7850.0 + 6.0, rtol=1e-12)
     assert_allclose(body.load_cases[0].f @ up, 2.0, rtol=1e-12)
+    assert body.provenance["deck sha256"] == sha256(path.read_bytes()).hexdigest()
     text = path.with_suffix(".toml").read_text()
     assert "#   1 CELAS2: LEFT OUT ON REQUEST: between grid points at different places" in text
 

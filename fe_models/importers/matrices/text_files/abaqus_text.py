@@ -3,13 +3,10 @@
 import re
 from pathlib import Path
 
-import numpy as np
-
 from fe_models.errors import MatrixError
 from fe_models.importers.matrices.foreign_matrices import ForeignMatrices
 from fe_models.importers.matrices.request import Request
-from fe_models.importers.matrices.text_files.triplet_text import parsed_triplets
-from fe_models.importers.matrices.triangles import full_matrix, require_size
+from fe_models.importers.matrices.text_files.triplet_text import triplet_matrix
 
 __all__ = ["is_coordinates", "read_coordinates", "role_by_name"]
 
@@ -40,12 +37,7 @@ def read_coordinates(path: Path, request: Request) -> ForeignMatrices:
     """
     where = f"matrices {path}"
     role = request.role_of(where, role_by_name(path), ", and it is not named as Abaqus does it (job_STIF1, job_MASS1)")
-    data = path.read_bytes()
-    rows, columns, values = parsed_triplets(where, data)
-    n = max(int(rows.max(initial=-1)), int(columns.max(initial=-1))) + 1
-    require_size(where, n, len(data))
-    del data
-    matrix, triangle = full_matrix(f"{where}: {role}", rows, columns, values, n)
-    if not len(values) or not np.any(values):
+    matrix, triangle, says_something = triplet_matrix(where, role, path.read_bytes())
+    if not says_something:
         raise MatrixError(f"{where}: {role}: expected entries, got none but zeros")
     return ForeignMatrices(**{role: matrix}, triangle={role: triangle}, program="Abaqus")

@@ -8,8 +8,7 @@ import numpy as np
 from fe_models.errors import MatrixError
 from fe_models.importers.matrices.foreign_matrices import ForeignMatrices
 from fe_models.importers.matrices.request import Request
-from fe_models.importers.matrices.text_files.triplet_text import parsed_triplets
-from fe_models.importers.matrices.triangles import full_matrix, require_size
+from fe_models.importers.matrices.text_files.triplet_text import triplet_matrix
 
 __all__ = ["calculix_neighbours", "read_calculix_dofs", "read_calculix_matrix"]
 
@@ -43,12 +42,7 @@ def read_calculix_matrix(path: Path, request: Request) -> ForeignMatrices:
     """
     where = f"matrices {path}"
     role = request.role_of(where, ROLES_OF_SUFFIXES.get(path.suffix.lower()))
-    data = path.read_bytes()
-    rows, columns, values = parsed_triplets(where, data)
-    n = max(int(rows.max(initial=-1)), int(columns.max(initial=-1))) + 1
-    require_size(where, n, len(data))
-    del data
-    matrix, triangle = full_matrix(f"{where}: {role}", rows, columns, values, n)
+    matrix, triangle, _ = triplet_matrix(where, role, path.read_bytes())
     return ForeignMatrices(**{role: matrix}, triangle={role: triangle}, program="CalculiX")
 
 

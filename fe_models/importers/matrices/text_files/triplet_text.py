@@ -9,11 +9,13 @@ import io
 
 import numpy as np
 import scipy.io
+import scipy.sparse as sp
 
 from fe_models.errors import MatrixError
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.importers.matrices.triangles import full_matrix, require_size
 
-__all__ = ["HeadAndData", "judged", "parsed_triplets"]
+__all__ = ["HeadAndData", "judged", "parsed_triplets", "triplet_matrix"]
 
 UNBOUNDED = 2**40  #: rows told to the parser, which only compares
 
@@ -55,6 +57,24 @@ def parsed_triplets(where: str, data: bytes, *, first_line: int = 1) -> tuple[In
         k = int(np.argmin(np.isfinite(entries.data)))
         raise MatrixError(f"{where}: entry {k + 1}: expected a finite number, got one beyond the range of doubles")
     return np.asarray(entries.row, np.int64), np.asarray(entries.col, np.int64), entries.data
+
+
+def triplet_matrix(where: str, role: str, data: bytes) -> tuple[sp.csc_array, str, bool]:
+    """Return the matrix of a text of entries alone, what was stored of it, and whether any entry is not zero.
+
+    It has as many rows as the largest number says.
+
+    Raises
+    ------
+    MatrixError
+        If a line is something else, an entry is listed twice, or the matrix is too large for its file.
+    """
+    rows, columns, values = parsed_triplets(where, data)
+    n = max(int(rows.max(initial=-1)), int(columns.max(initial=-1))) + 1
+    require_size(where, n, len(data))
+    del data  # the text is larger than the matrix
+    matrix, triangle = full_matrix(f"{where}: {role}", rows, columns, values, n)
+    return matrix, triangle, bool(np.any(values))
 
 
 def judged(where: str, data: bytes, first_line: int) -> tuple[int, int]:
