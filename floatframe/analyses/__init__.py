@@ -1,17 +1,17 @@
 """Analyses of a system besides its motion: equilibrium, driven motion, linearisation, system modes, responses."""
 
-from floatframe.analyses.channels import Channel, CoordinateChannel, StressChannel
-from floatframe.analyses.driven_motion import frozen_bodies, quasi_static_bodies
+from floatframe.analyses.driven.driven_motion import frozen_bodies, quasi_static_bodies
+from floatframe.analyses.driven.inverse_dynamics import InverseDynamics, drive_forces, inverse_dynamics, with_motors
+from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium, steady_rotation
-from floatframe.analyses.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies
-from floatframe.analyses.inverse_dynamics import InverseDynamics, drive_forces, inverse_dynamics, with_motors
-from floatframe.analyses.kinematics import kinematics
-from floatframe.analyses.linearization import LinearSystem, linearize
-from floatframe.analyses.parameter_study import Locus, campbell, root_locus
+from floatframe.analyses.linear.channels import Channel, CoordinateChannel, StressChannel
+from floatframe.analyses.linear.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies
+from floatframe.analyses.linear.linearization import LinearSystem, linearize
+from floatframe.analyses.linear.parameter_study import Locus, campbell, root_locus
+from floatframe.analyses.linear.state_space import NamedStateSpace, named_state_space, write_state_space
+from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.analyses.snapshot import snapshot
-from floatframe.analyses.state_space import NamedStateSpace, named_state_space, write_state_space
 from floatframe.analyses.sweep import sweep
-from floatframe.analyses.system_modes import SystemModes, system_modes
 
 __all__ = [
     "Channel",

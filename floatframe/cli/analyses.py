@@ -10,7 +10,7 @@ from cms.cli.console import guarded, output_path, print_table, say, stages, vect
 
 if TYPE_CHECKING:
     from floatframe.analyses import Equilibrium, LinearSystem, SystemModes
-    from floatframe.analyses.channels import AnyChannel
+    from floatframe.analyses.linear.channels import AnyChannel
     from floatframe.pictures.body_colors import BodyColor
     from floatframe.system import System
 
@@ -185,7 +185,7 @@ def campbell_command(
 
     from fe_models.foundation.paths import replace_file
     from floatframe.analyses import campbell
-    from floatframe.analyses.plots import plot_campbell
+    from floatframe.analyses.linear.plots import plot_campbell
     from floatframe.errors import ModelError
 
     model = read(system)

@@ -109,8 +109,8 @@ def inverse_command(
 def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) -> "tuple[System, Trajectory, Path]":
     """Compute the motion that the drives of a system file decide; return system, motion and where it was written."""
     from fe_models.foundation.words import nearest
-    from floatframe.analyses.driven_motion import ELASTICITY
-    from floatframe.analyses.kinematics import kinematics
+    from floatframe.analyses.driven.driven_motion import ELASTICITY
+    from floatframe.analyses.driven.kinematics import kinematics
     from floatframe.errors import ModelError, ResultsError
     from floatframe.motion.integration import integrate
     from floatframe.system_file.read_system import read_system

@@ -11,8 +11,8 @@ from floatframe.cli.analyses import Axis, Center, Speed, SystemArgument, lineari
 
 if TYPE_CHECKING:
     from floatframe.analyses import LinearSystem
-    from floatframe.analyses.channels import AnyChannel
-    from floatframe.analyses.frequency_response import FrequencyResponse
+    from floatframe.analyses.linear.channels import AnyChannel
+    from floatframe.analyses.linear.frequency_response import FrequencyResponse
     from floatframe.system import System
 
 __all__ = ["register"]
@@ -54,7 +54,7 @@ def linearize_command(
 
     Example: floatframe linearize crane.toml --input jib/tip:z --out jib/tip:z
     """
-    from floatframe.analyses.state_space import WRITERS, write_state_space
+    from floatframe.analyses.linear.state_space import WRITERS, write_state_space
     from floatframe.errors import ModelError
 
     model = read(system)
@@ -101,8 +101,8 @@ def response_command(
     import io
 
     from fe_models.foundation.paths import replace_file
-    from floatframe.analyses.frequency_response import frequency_response, resolved_frequencies
-    from floatframe.analyses.plots import plot_frequency_response
+    from floatframe.analyses.linear.frequency_response import frequency_response, resolved_frequencies
+    from floatframe.analyses.linear.plots import plot_frequency_response
     from floatframe.errors import ModelError
 
     model = read(system)
@@ -141,7 +141,7 @@ def channel_of(system: "System", text: str) -> "AnyChannel":
     import numpy as np
 
     from fe_models.foundation.words import nearest
-    from floatframe.analyses.channels import Channel, CoordinateChannel, channels_of
+    from floatframe.analyses.linear.channels import Channel, CoordinateChannel, channels_of
     from floatframe.bodies.markers import Marker
     from floatframe.errors import ModelError
 

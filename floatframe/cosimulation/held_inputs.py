@@ -12,7 +12,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.analyses.channels import Channel, channel_units, channels_of
+from floatframe.analyses.linear.channels import Channel, channel_units, channels_of
 from floatframe.compiling.system import CompiledSystem
 from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad, JointForce, PointForce

@@ -9,7 +9,7 @@ from cms.rendering import Drawing, Lines, Scene, Surface, Triad, render_animatio
 from cms.rendering.drawing import OnFrame
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.analyses.equilibrium import Equilibrium
-from floatframe.analyses.system_modes import SystemModes
+from floatframe.analyses.linear.system_modes import SystemModes
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError

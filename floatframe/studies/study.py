@@ -13,13 +13,13 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.words import nearest, quoted
+from floatframe.analyses.driven.inverse_dynamics import inverse_dynamics
+from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.analyses.equilibrium import static_equilibrium
-from floatframe.analyses.inverse_dynamics import inverse_dynamics
-from floatframe.analyses.kinematics import kinematics
-from floatframe.analyses.linearization import linearize
+from floatframe.analyses.linear.linearization import linearize
+from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.sweep import sweep
-from floatframe.analyses.system_modes import SystemModes, system_modes
 from floatframe.compiling.file_frames import state_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError

@@ -5,7 +5,7 @@ from pydantic import Field, model_validator
 
 from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.toml_file import Table, Vector3, choice
-from floatframe.analyses.channels import (
+from floatframe.analyses.linear.channels import (
     QUANTITIES,
     RATES,
     AnyChannel,

@@ -30,7 +30,7 @@ from floatframe import (
     resolved_frequencies,
     static_equilibrium,
 )
-from floatframe.analyses.plots import plot_frequency_response
+from floatframe.analyses.linear.plots import plot_frequency_response
 from floatframe.analyses.snapshot import snapshot
 from floatframe.cli.app import app
 from floatframe.results.sensors import StressSensor

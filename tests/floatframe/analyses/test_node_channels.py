@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 
 import cms
 from floatframe import GROUND, FixedJoint, FlexibleBody, Gravity, Marker, ModelError, System
-from floatframe.analyses.channels import Channel
 from floatframe.analyses.equilibrium import static_equilibrium
-from floatframe.analyses.linearization import linearize
+from floatframe.analyses.linear.channels import Channel
+from floatframe.analyses.linear.linearization import linearize
 from tests.cms.second_order.test_geometric_reduction import bar_of_beams
 
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 from floatframe import GROUND, GeneralizedAlpha, Marker, RevoluteJoint, integrate
-from floatframe.analyses.channels import Channel, channel_rows
+from floatframe.analyses.linear.channels import Channel, channel_rows
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError, SystemFileError

@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 
 import floatframe.motion.integration as integration
 from floatframe import GeneralizedAlpha, ResultsError, integrate, read_results, resume
-from floatframe.analyses.kinematics import kinematics
+from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.functions.time_functions import cycloidal_spin_up
 from floatframe.mechanisms import slider_crank
 from tests.floatframe.results.test_results_file import SYSTEM

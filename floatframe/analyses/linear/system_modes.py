@@ -6,7 +6,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.linearization import LinearSystem
+from floatframe.analyses.linear.linearization import LinearSystem
 
 __all__ = ["SystemModes", "system_modes"]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.linearization import LinearSystem
-from floatframe.analyses.system_modes import system_modes
+from floatframe.analyses.linear.linearization import LinearSystem
+from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.errors import ModelError
 
 __all__ = ["FrequencyResponse", "frequency_response", "resolved_frequencies"]

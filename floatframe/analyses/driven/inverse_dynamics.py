@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.driven_motion import Elasticity, quasi_static_bodies
+from floatframe.analyses.driven.driven_motion import Elasticity, quasi_static_bodies
+from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.analyses.joint_rates import driven_coordinates
-from floatframe.analyses.kinematics import kinematics
 from floatframe.errors import ModelError
 from floatframe.forces import JointForce
 from floatframe.functions.time_functions import table

@@ -16,9 +16,9 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array, frozen
-from floatframe.analyses.channels import AnyChannel, StressChannel, channel_rows, channel_units, channels_of
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
 from floatframe.analyses.joint_rates import coordinate_rows
+from floatframe.analyses.linear.channels import AnyChannel, StressChannel, channel_rows, channel_units, channels_of
 from floatframe.analyses.system_matrices import tangents, turning_matrices
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file

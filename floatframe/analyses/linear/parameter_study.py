@@ -8,8 +8,8 @@ from scipy.optimize import linear_sum_assignment
 
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
-from floatframe.analyses.linearization import LinearSystem, linearize
-from floatframe.analyses.system_modes import system_modes
+from floatframe.analyses.linear.linearization import LinearSystem, linearize
+from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.checked_values import array_of_shape, unit_vector
 from floatframe.errors import ModelError
 from floatframe.system import System

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.driven_motion import Instant, rigid_columns, rigid_equations
+from floatframe.analyses.driven.driven_motion import Instant, rigid_columns, rigid_equations
 from floatframe.analyses.joint_rates import coordinate_rows, driven_coordinates
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError

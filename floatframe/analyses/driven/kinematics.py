@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.driven_freedoms import SingularityGuard, free_coordinates
-from floatframe.analyses.driven_motion import ELASTICITY, Elasticity, Instant, frozen_bodies
+from floatframe.analyses.driven.driven_freedoms import SingularityGuard, free_coordinates
+from floatframe.analyses.driven.driven_motion import ELASTICITY, Elasticity, Instant, frozen_bodies
 from floatframe.analyses.joint_rates import driven_coordinates
 from floatframe.analyses.observed_state import observed_state
 from floatframe.compiling.file_frames import rows_of_file

@@ -18,7 +18,7 @@ import scipy.linalg as la
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.extras import extra_module
 from fe_models.foundation.paths import replace_file
-from floatframe.analyses.linearization import LinearSystem, NamedMotions
+from floatframe.analyses.linear.linearization import LinearSystem, NamedMotions
 from floatframe.errors import ModelError
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from floatframe.analyses.frequency_response import FrequencyResponse
-from floatframe.analyses.parameter_study import Locus
+from floatframe.analyses.linear.frequency_response import FrequencyResponse
+from floatframe.analyses.linear.parameter_study import Locus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

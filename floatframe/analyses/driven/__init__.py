@@ -1,0 +1,1 @@
+"""Fully driven systems: motion from joints and drives alone, and the forces that make it."""
