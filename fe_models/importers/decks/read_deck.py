@@ -6,10 +6,10 @@ from pathlib import Path
 from fe_models.errors import FeModelsError, MeshError
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.words import damage, nearest, quoted
-from fe_models.importers.decks.abaqus import read_abaqus_deck
-from fe_models.importers.decks.cdb import read_cdb_deck
+from fe_models.importers.decks.abaqus.whole_deck import read_abaqus_deck
+from fe_models.importers.decks.ansys.cdb import read_cdb_deck
 from fe_models.importers.decks.deck import Deck
-from fe_models.importers.decks.nastran import read_nastran_deck
+from fe_models.importers.decks.nastran.whole_deck import read_nastran_deck
 
 __all__ = ["DECK_FORMATS", "read_deck"]
 

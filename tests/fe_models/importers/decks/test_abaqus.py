@@ -377,6 +377,8 @@ def test_an_ellipse_is_between_the_circle_and_the_thin_strip(tmp_path):
     assert_allclose(shape["shear_area_y"], 0.9 * shape["area"], rtol=1e-4)
     assert_allclose([shape["iz"], shape["torsion"]], [shape["area"] * 0.01 / 4, 4 * shape["iy"]], rtol=1e-5)
     assert len(shape["outline"]) == 16
+
+
 RIGID = "*RIGID BODY, NSET=top, REF NODE=30\n"
 
 

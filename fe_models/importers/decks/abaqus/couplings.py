@@ -5,10 +5,10 @@ from scipy.linalg import qr
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
-from fe_models.importers.decks.abaqus_elements import faces_of
-from fe_models.importers.decks.abaqus_ties import read_tie
+from fe_models.importers.decks.abaqus.draft import Draft
+from fe_models.importers.decks.abaqus.elements import faces_of
+from fe_models.importers.decks.abaqus.ties import read_tie
 from fe_models.importers.decks.deck import Coupling, Equation, RigidGroup
-from fe_models.importers.decks.draft import Draft
 
 __all__ = ["equations_in_basic_axes", "read_coupling", "surface_nodes"]
 

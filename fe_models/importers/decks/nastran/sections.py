@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.importers.bulk_data.cards import Card
 from fe_models.importers.decks.deck import DeckMass, DeckMaterial, DeckSpring, LineSection, ShellSection, SolidSection
-from fe_models.importers.decks.nastran_model import NastranModel
+from fe_models.importers.decks.nastran.model import NastranModel
 
 __all__ = ["BARS", "SHELLS", "SOLIDS", "read_sections"]
 

@@ -11,9 +11,9 @@ from fe_models.importers.bulk_data.coordinate_systems import SYSTEM_CARDS, read_
 from fe_models.importers.bulk_data.includes import bulk_text
 from fe_models.importers.decks.deck import Deck
 from fe_models.importers.decks.ledger import Ledger
-from fe_models.importers.decks.nastran_attached import read_attached
-from fe_models.importers.decks.nastran_model import NastranModel
-from fe_models.importers.decks.nastran_sections import BARS, SHELLS, SOLIDS, read_sections
+from fe_models.importers.decks.nastran.attached import read_attached
+from fe_models.importers.decks.nastran.model import NastranModel
+from fe_models.importers.decks.nastran.sections import BARS, SHELLS, SOLIDS, read_sections
 from fe_models.importers.nastran import ELEMENT_TYPES, nodes_of
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 

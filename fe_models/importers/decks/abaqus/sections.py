@@ -8,11 +8,11 @@ import numpy as np
 
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
-from fe_models.importers.decks.abaqus_elements import PLANE, SOLID_RULES
-from fe_models.importers.decks.abaqus_materials import numbers, read_orientation, read_transform
-from fe_models.importers.decks.abaqus_thickness import read_nodal_thickness
+from fe_models.importers.decks.abaqus.draft import Draft
+from fe_models.importers.decks.abaqus.elements import PLANE, SOLID_RULES
+from fe_models.importers.decks.abaqus.materials import numbers, read_orientation, read_transform
+from fe_models.importers.decks.abaqus.thickness import read_nodal_thickness
 from fe_models.importers.decks.deck import DeckMass, DeckSpring, LineSection, RodSection, ShellSection, SolidSection
-from fe_models.importers.decks.draft import Draft
 
 __all__ = ["ellipses_in_numbers", "read_section"]
 

@@ -4,9 +4,9 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
-from fe_models.importers.decks.abaqus_elements import faces_of
+from fe_models.importers.decks.abaqus.draft import Draft
+from fe_models.importers.decks.abaqus.elements import faces_of
 from fe_models.importers.decks.deck import Equation
-from fe_models.importers.decks.draft import Draft
 from fe_models.meshes.cell_shapes import CELL_SHAPES, facet_tables, shape_values
 
 __all__ = ["read_tie"]

@@ -5,7 +5,7 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
-from fe_models.importers.decks.draft import Draft, PointElements
+from fe_models.importers.decks.abaqus.draft import Draft, PointElements
 
 __all__ = ["PLANE", "SOLID_RULES", "faces_of", "read_element"]
 

@@ -4,10 +4,10 @@ import numpy as np
 
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
-from fe_models.importers.decks.abaqus_elements import faces_of
-from fe_models.importers.decks.abaqus_materials import numbers
+from fe_models.importers.decks.abaqus.draft import Draft
+from fe_models.importers.decks.abaqus.elements import faces_of
+from fe_models.importers.decks.abaqus.materials import numbers
 from fe_models.importers.decks.deck import Load
-from fe_models.importers.decks.draft import Draft
 from fe_models.importers.raw_mesh import RawBlock
 
 __all__ = ["read_boundary", "read_load"]

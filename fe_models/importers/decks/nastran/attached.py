@@ -6,7 +6,7 @@ from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array
 from fe_models.importers.bulk_data.cards import Card, real_of
 from fe_models.importers.decks.deck import Coupling, DeckMass, DeckSpring, Equation, Load, RigidGroup, Support
-from fe_models.importers.decks.nastran_model import NastranModel, components_of, numbers_of
+from fe_models.importers.decks.nastran.model import NastranModel, components_of, numbers_of
 from fe_models.meshes.cell_shapes import CELL_SHAPES
 
 __all__ = ["read_attached"]

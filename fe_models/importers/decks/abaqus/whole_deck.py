@@ -8,15 +8,15 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.importers.abaqus import deck_mesh, raw_mesh_of
 from fe_models.importers.abaqus_deck import DeckBlock, deck_blocks, refuse_unread
-from fe_models.importers.decks.abaqus_assembly import flat_assembly
-from fe_models.importers.decks.abaqus_couplings import equations_in_basic_axes, read_coupling
-from fe_models.importers.decks.abaqus_elements import read_element
-from fe_models.importers.decks.abaqus_loads import read_boundary, read_load
-from fe_models.importers.decks.abaqus_materials import materials_in_axes, read_material
-from fe_models.importers.decks.abaqus_sections import ellipses_in_numbers, read_section
-from fe_models.importers.decks.abaqus_thickness import sections_by_thickness
+from fe_models.importers.decks.abaqus.assembly import flat_assembly
+from fe_models.importers.decks.abaqus.couplings import equations_in_basic_axes, read_coupling
+from fe_models.importers.decks.abaqus.draft import Draft
+from fe_models.importers.decks.abaqus.elements import read_element
+from fe_models.importers.decks.abaqus.loads import read_boundary, read_load
+from fe_models.importers.decks.abaqus.materials import materials_in_axes, read_material
+from fe_models.importers.decks.abaqus.sections import ellipses_in_numbers, read_section
+from fe_models.importers.decks.abaqus.thickness import sections_by_thickness
 from fe_models.importers.decks.deck import Deck
-from fe_models.importers.decks.draft import Draft
 from fe_models.importers.decks.ledger import Ledger
 
 __all__ = ["PROGRAMS", "read_abaqus_deck"]

@@ -7,8 +7,8 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus_deck import DeckBlock
+from fe_models.importers.decks.abaqus.draft import Draft
 from fe_models.importers.decks.deck import DeckMaterial
-from fe_models.importers.decks.draft import Draft
 
 __all__ = ["materials_in_axes", "numbers", "read_material", "read_orientation", "read_transform"]
 

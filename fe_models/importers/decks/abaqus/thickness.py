@@ -6,8 +6,8 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.importers.abaqus_deck import DeckBlock
-from fe_models.importers.decks.abaqus_materials import numbers
-from fe_models.importers.decks.draft import Draft
+from fe_models.importers.decks.abaqus.draft import Draft
+from fe_models.importers.decks.abaqus.materials import numbers
 
 __all__ = ["read_nodal_thickness", "sections_by_thickness"]
 

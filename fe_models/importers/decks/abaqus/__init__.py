@@ -1,0 +1,1 @@
+"""Whole decks of Abaqus and CalculiX: one module for each kind of block, all writing one draft."""
