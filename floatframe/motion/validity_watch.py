@@ -17,6 +17,7 @@ import numpy as np
 import scipy.linalg as la
 
 from cms.reduced_body.geometric_stiffness import SPIN_PAIRS
+from cms.reduced_body.linear_range import LEFT_OUT, LINEAR, STIFFENED, Limits
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.bodies.flexible_body import FlexibleBody
@@ -27,7 +28,7 @@ from floatframe.joints.rows import is_held
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.model import JOINT, STIFFNESS
 from floatframe.kernels.work import new_work
-from floatframe.results.validity import LEFT_OUT, LINEAR, STIFFENED, Limits, ValidityNote
+from floatframe.results.validity import ValidityNote
 from floatframe.start.newton_equations import linearized, modal_matrix, set_iterate
 from floatframe.system import System
 

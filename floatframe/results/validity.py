@@ -1,31 +1,12 @@
-"""The range of a linear body frame: what is compared with which limit, and what to do beyond it."""
+"""Notes that a body has left the range of its linear frame: what is too large, and what to do."""
 
 import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
-from math import inf
 from typing import Any
 
-__all__ = ["LEFT_OUT", "LINEAR", "STIFFENED", "Limits", "ValidityNote", "notes_from_json", "notes_to_json"]
+__all__ = ["ValidityNote", "notes_from_json", "notes_to_json"]
 
-
-@dataclass(frozen=True)
-class Limits:
-    """Largest values for which the motion of a body can be trusted within about one per cent of its deformation."""
-
-    rotation: float  #: elastic rotation of an interface in the body frame [rad]
-    load: float  #: relative change of the stiffness by the loads; of a stiffened body: loads by the first buckling load
-    speed: float  #: angular speed by the lowest angular frequency of the body, held by one of its joints
-    inertia: float = inf  #: the same speed, of a body whose unknown inertia terms are left out
-
-
-#: a linear frame: its strain is wrong by the square of the rotation, its stiffness by what the loads change of it
-LINEAR = Limits(rotation=0.1, load=0.1, speed=0.2)
-#: with the terms of second order what is left goes with the third power of the rotation; near buckling a body bends far
-STIFFENED = Limits(rotation=0.3, load=0.7, speed=3.5)
-
-#: the square of it is the deformation by centrifugal loads, in sizes of the body, that a body without 3C does not have
-LEFT_OUT = 0.1
 KINDS = ("rotation", "load", "speed", "inertia")
 
 
@@ -34,7 +15,7 @@ class ValidityNote:
     """A body has left the range of its linear frame; one per body and kind."""
 
     body: str
-    kind: str  #: "rotation", "load", "speed" or "inertia", the field of `Limits`
+    kind: str  #: "rotation", "load", "speed" or "inertia", the field of `cms.reduced_body.linear_range.Limits`
     limit: float
     largest: float  #: so far; rotation in rad, else a ratio
     t_first: float  #: when the limit was passed [s]

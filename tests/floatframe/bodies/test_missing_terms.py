@@ -8,10 +8,11 @@ from numpy.testing import assert_allclose
 
 import cms
 from cms.reduced_body.invariants import INERTIA_TERMS
+from cms.reduced_body.linear_range import LEFT_OUT
 from floatframe import GeneralizedAlpha, integrate
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.errors import ModelError, SystemFileError
-from floatframe.results.validity import LEFT_OUT, notes_from_json, notes_to_json
+from floatframe.results.validity import notes_from_json, notes_to_json
 from floatframe.system import System
 from floatframe.system_file.read_system import read_system
 from tests.floatframe.orders import slope

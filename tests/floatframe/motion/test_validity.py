@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import cms
 import fe_models as fm
+from cms.reduced_body.linear_range import LINEAR, STIFFENED
 from floatframe import (
     GROUND,
     FixedJoint,
@@ -33,7 +34,7 @@ from floatframe.kernels.memory import memory_at
 from floatframe.kernels.work import new_work
 from floatframe.mechanisms import slider_crank, spin_up_beam, spinning_shaft
 from floatframe.motion.validity_watch import ValidityWatch, estimated_interface_loads
-from floatframe.results.validity import LINEAR, STIFFENED, ValidityNote, notes_from_json, notes_to_json
+from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.state import State
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness
