@@ -41,7 +41,7 @@ def refined_mesh(mesh: Mesh) -> Mesh:
         values = shape_values(kind, points)[0]
         places.append(np.einsum("pn,cnx->cpx", values, mesh.nodes[rows]).reshape(-1, 3))  # (2)
         sizes[kind] = (len(rows), len(points), parts)
-    found, first, number = np.unique(np.concatenate(keys), axis=0, return_index=True, return_inverse=True)
+    _, first, number = np.unique(np.concatenate(keys), axis=0, return_index=True, return_inverse=True)
     number = number.ravel()
     cells, start = {}, 0
     for kind, (n_cells, n_points, parts) in sizes.items():
