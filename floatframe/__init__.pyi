@@ -38,6 +38,10 @@ from .bodies.ground import Ground as Ground
 from .bodies.markers import Marker as Marker
 from .bodies.rigid_body import RigidBody as RigidBody
 from .cosimulation.coupled_motion import co_simulate as co_simulate
+from .equations import BodyEquations as BodyEquations
+from .equations import Equations as Equations
+from .equations import body_equations as body_equations
+from .equations import open_equations as open_equations
 from .errors import ConvergenceError as ConvergenceError
 from .errors import CosimulationError as CosimulationError
 from .errors import FloatframeError as FloatframeError

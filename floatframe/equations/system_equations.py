@@ -1,0 +1,458 @@
+"""The equations of motion of a system, for integrators and controllers of one's own.
+
+    M(x) a = f(t, x, v) + G(t, x)ᵀ lam,     g(t, x) = 0,     x_dot = v (see `Configurations`)
+
+with rates of the constraint G v = g_1(t, x) and G a = g_2(t, x, v). Every number comes from the kernels that
+`integrate` uses (docs/theory.md §6, §10). These know the whole wrench w of each connection as an unknown, with as many
+rows: those that hold something, and those that say what the wrench is, C w = b. Here the latter are solved,
+
+    w = w_0(t, x, v) + W(t, x) lam,   C w_0 = b (least norm),   C W = 0,   Jᵀ W = Gᵀ,
+
+so that what is left are the forces f = f_bodies + Jᵀ w_0 and a multiplier for each row that holds something.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, overload
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.callbacks import raise_errors_of
+from floatframe.compiling.file_frames import state_of_engine, state_of_file
+from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.equations.configuration import Configurations
+from floatframe.equations.layout import Layout, layout_of
+from floatframe.equations.rows import RowParts, Structure, row_parts, structure_of
+from floatframe.errors import ModelError
+from floatframe.joints.rows import is_held_velocity
+from floatframe.kernels.model import Model
+from floatframe.kernels.work import Work, new_work
+from floatframe.rotations import rotation_matrix, tilde
+from floatframe.start.initial import (
+    assembled,
+    consistent_motion,
+    has_normal_friction,
+    start_unknowns,
+    with_compatible_velocities,
+)
+from floatframe.start.newton_equations import linearized, set_iterate
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["Equations", "Tangents", "open_equations"]
+
+AGREES = 1e-9  #: relative defect of rows and forces that are affine, or the transposed of each other
+STEP = 2e-3  #: of the differences by which a wrench with fixed multipliers changes with x
+
+
+@dataclass(frozen=True, eq=False)
+class Tangents:
+    """Derivatives of the residual M a - f - Gᵀ lam, each (n_v, n_v)."""
+
+    by_x: Array  #: along the displacement dx of x (+) dx; rotations in rad, translations in m
+    by_v: Array
+    by_a: Array  #: the mass matrix
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Equations:
+    """Open equations of a system; positions, velocities and multipliers as in `layout`, in the units of the system.
+
+    A stiffened flexible body moves in mean axes (docs/equations.md): `state` and `vectors` turn
+    vectors into the states that results and sensors speak of, and back.
+    """
+
+    system: System
+    compiled: CompiledSystem
+    model: Model  #: without the compliance of redundant rows
+    work: Work
+    structure: Structure  #: of its rows
+    configurations: Configurations  #: the maps x (+) dx, log, T, velocities and rates
+    layout: Layout  #: names and units of x, v, lam
+    #: unknowns of connections from which angles of couplers and user forces are counted, (n_w,), see `followed`
+    near: Array
+
+    @property
+    def n_x(self) -> int:
+        """Numbers of x."""
+        return self.configurations.n_x
+
+    @property
+    def n_v(self) -> int:
+        """Numbers of v, of a and of the residual."""
+        return self.configurations.n_v
+
+    @property
+    def n_lam(self) -> int:
+        """Constraints and multipliers."""
+        return len(self.structure.held)
+
+    @cached_property
+    def is_holonomic(self) -> NDArray[np.bool_]:
+        """Which constraints hold a position, (n_lam,) bool; the others hold a velocity (rolling) alone."""
+        return ~is_held_velocity(self.model.rows.kind[self.structure.held])
+
+    # states
+
+    def vectors(self, state: State) -> tuple[Array, Array]:
+        """Return x, (n_x,), and v, (n_v,), of a state in the frames of the files, such as one of a trajectory."""
+        return self.vectors_of_engine(state_of_engine(self.compiled, state))
+
+    def state(self, x: Array, v: Array) -> State:
+        """Return the state of x and v, in the frames of the files: for `integrate`, `snapshot` and comparisons."""
+        return state_of_file(self.compiled, self.engine_state(x, v))
+
+    def vectors_of_engine(self, state: State) -> tuple[Array, Array]:
+        """Return x and v of a state in the frames of the engine."""
+        x, q0 = np.zeros(self.n_x), self.model.bodies.q0
+        for i, (j, _, n) in enumerate(self.configurations.parts()):
+            x[j : j + 7 + n] = np.concatenate([state.r[i], state.p[i], state.q[q0[i] : q0[i + 1]]])
+        return x, np.array(state.u)
+
+    def engine_state(self, x: Array, v: Array | None = None) -> State:
+        """Return the state of x and v in the frames of the engine; v zero if not given."""
+        x = vector("x", x, self.n_x)
+        r, p, q = [], [], [np.zeros(0)]
+        for j, _, n in self.configurations.parts():
+            r.append(x[j : j + 3])
+            p.append(x[j + 3 : j + 7])
+            q.append(x[j + 7 : j + 7 + n])
+        u = np.zeros(self.n_v) if v is None else vector("v", v, self.n_v)
+        return State(np.array(r), np.array(p), np.concatenate(q), u)
+
+    def start(self, state: State | None = None, *, t: float = 0.0) -> tuple[Array, Array, Array, Array]:
+        """Return consistent x, v, a, lam at time t near a state (default: the bodies as placed).
+
+        Raises
+        ------
+        ModelError
+            If the joints cannot be closed, or some constraints repeat others.
+        """
+        x, v = self.vectors_of_engine(consistent_motion(self.system, state, t=t).state)
+        return x, v, *self.accelerations(t, x, v)
+
+    def project(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
+        """Return x and v put back on g = 0 and G v = g_1 with the least motion, as the start of `integrate` does."""
+        self.work.state.time[...] = t
+        state = assembled(self.compiled, self.work, self.engine_state(self.configurations.normalized(x), v))
+        return self.vectors_of_engine(with_compatible_velocities(self.compiled, self.work, state))
+
+    def followed(self, t: float, x: Array) -> "Equations":
+        """Return equations whose angles of couplers and user forces are counted on from those at x.
+
+        Angles are the ones within half a turn of the last that were followed, at first of zero. Where a gear turns
+        further, call this between steps: `eq = eq.followed(t, x)`.
+        """
+        rows = self.model.coordinates.row
+        g = self.rows_at(t, x).g
+        near = self.near.copy()
+        near[rows] -= g[rows]
+        return replace(self, near=near, work=new_work(self.model))
+
+    # the equations
+
+    def residual(self, t: float, x: Array, v: Array, a: Array, lam: Array) -> Array:
+        """Return M a - f - Gᵀ lam, (n_v,) [N, N m, N]: zero along a motion."""
+        parts, own = self.at(t, x, v, vector("a", a, self.n_v))
+        return np.asarray(own - parts.held_force(vector("lam", lam, self.n_lam)))
+
+    def force(self, t: float, x: Array, v: Array) -> Array:
+        """Return f, (n_v,) [N, N m, N]: loads, weight, elastic, damping and inertia forces without accelerations."""
+        return -self.at(t, x, v)[1]
+
+    @overload
+    def mass(self, x: Array) -> Array: ...
+    @overload
+    def mass(self, x: Array, *, sparse: Literal[False]) -> Array: ...
+    @overload
+    def mass(self, x: Array, *, sparse: Literal[True]) -> sp.csr_array: ...
+
+    def mass(self, x: Array, *, sparse: bool = False) -> Array | sp.csr_array:
+        """Return M(x), (n_v, n_v) [kg, kg m, kg m²], symmetric; `sparse`: its blocks as a csr_array."""
+        set_iterate(self.work, self.engine_state(x))
+        blocks = linearized(self.model, self.work, 1.0, 0.0, 0.0).H
+        for R, block in zip(self.work.state.R, blocks, strict=True):
+            block[:3] = R @ block[:3]
+            block[:, :3] = block[:, :3] @ R.T
+        return sp.csr_array(sp.block_diag(blocks)) if sparse else np.asarray(la.block_diag(*blocks))
+
+    def constraint(self, t: float, x: Array) -> Array:
+        """Return g, (n_lam,) [m, rad]; zero for rows that hold a velocity alone (`is_holonomic`)."""
+        return np.where(self.is_holonomic, self.rows_at(t, x).g[self.structure.held], 0.0)
+
+    @overload
+    def jacobian(self, t: float, x: Array) -> Array: ...
+    @overload
+    def jacobian(self, t: float, x: Array, *, sparse: Literal[False]) -> Array: ...
+    @overload
+    def jacobian(self, t: float, x: Array, *, sparse: Literal[True]) -> sp.csr_array: ...
+
+    def jacobian(self, t: float, x: Array, *, sparse: bool = False) -> Array | sp.csr_array:
+        """Return G, (n_lam, n_v): dg = G dx, rate of g = G v - g_1."""
+        G = self.rows_at(t, x).held_jacobian()
+        return G if sparse else G.toarray()
+
+    def velocity_right(self, t: float, x: Array) -> Array:
+        """Return g_1 with G v = g_1, (n_lam,) [m/s, rad/s]: zero but for prescribed motions."""
+        return -self.rates(t, x, np.zeros(self.n_v))[0]
+
+    def velocity_defect(self, t: float, x: Array, v: Array) -> Array:
+        """Return G v - g_1, (n_lam,) [m/s, rad/s], the rate of g."""
+        return self.rates(t, x, v)[0]
+
+    def acceleration_right(self, t: float, x: Array, v: Array) -> Array:
+        """Return g_2 with G a = g_2, (n_lam,) [m/s², rad/s²]."""
+        return -self.rates(t, x, v)[1]
+
+    def accelerations(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
+        """Return a, (n_v,), and lam, (n_lam,), of M a - Gᵀ lam = f, G a = g_2; of redundant rows the least lam.
+
+        Raises
+        ------
+        ModelError
+            If the matrix is singular: a mode without mass, or a singular position.
+        """
+        M, f = self.mass(x), self.force(t, x, v)
+        G, right = self.jacobian(t, x), self.acceleration_right(t, x, v)
+        top, n = np.hstack([M, -G.T]), self.n_v
+        matrix = np.vstack([top, np.hstack([G, np.zeros((self.n_lam, self.n_lam))])])
+        rows = np.concatenate([f, right])
+        try:
+            if self.system.redundant == "minimum-norm":
+                solution = la.lstsq(matrix, rows)[0]
+            else:
+                solution = np.linalg.solve(matrix, rows)
+        except np.linalg.LinAlgError as error:
+            raise ModelError(
+                f"system {self.system.name!r}: accelerations do not follow from the state: a mode has no mass, or the "
+                "constraints depend on each other here"
+            ) from error
+        return solution[:n], solution[n:]
+
+    def ordinary(self, t: float, y: Array) -> Array:
+        """Return y_dot of y = (x, v), (n_x + n_v,): the underlying ordinary differential equation, index one.
+
+        For `scipy.integrate.solve_ivp`; constraints drift off as its tolerances allow (`project` closes them).
+        """
+        x, v = y[: self.n_x], y[self.n_x :]
+        a, _ = self.accelerations(t, self.configurations.normalized(x), v)
+        return np.concatenate([self.configurations.rate(x, v), a])
+
+    def null_space(self, t: float, x: Array) -> Array:
+        """Return an M-orthonormal basis N of the motions that the constraints allow, (n_v, n_free).
+
+        G N = 0, Nᵀ M N = 1: v = N z + (a velocity that fulfils G v = g_1), and z_dot = Nᵀ (f - M N_dot z - ...).
+        """
+        L = np.linalg.cholesky(self.mass(x))
+        scaled = la.solve_triangular(L, self.jacobian(t, x).T, lower=True).T
+        size = np.linalg.norm(scaled, axis=1)
+        free = la.null_space(scaled[size > 0] / size[size > 0, None]) if self.n_lam else np.eye(self.n_v)
+        return np.asarray(la.solve_triangular(L.T, free))
+
+    def energy(self, x: Array, v: Array) -> float:
+        """Return the kinetic energy vᵀ M v / 2 [J]."""
+        return float(0.5 * v @ self.mass(x) @ v)
+
+    def wrenches(self, t: float, x: Array, v: Array, lam: Array) -> Array:
+        """Return w = w_0 + W lam, (n_w,): wrenches of all connections on their markers A, as in results, ground axes.
+
+        Raises
+        ------
+        ModelError
+            If a joint carries what is not the transposed of what it holds: some do where they are open.
+        """
+        parts, lam = self.rows_at(t, x, v), vector("lam", lam, self.n_lam)
+        w, at = self.law(parts), self.structure
+        for c in range(len(self.model.connections.size)):
+            own, first, last = self.own_rows(c), int(at.lam0[c]), int(at.lam0[c + 1])
+            if first == last:
+                continue
+            rows = at.holds[own]
+            G, J = parts.of_connection(c)
+            C = parts.V[c][~rows]
+            left = np.vstack([J.T, C])
+            right = np.concatenate([G[rows].T @ lam[first:last], np.zeros(len(C))])
+            part = la.lstsq(left, right)[0]
+            if np.abs(left @ part - right).max() > AGREES * np.abs(right).max():
+                raise ModelError(
+                    f"open_equations: {self.compiled.connection_names[c]!r}: its wrench does not follow from "
+                    "multipliers at this x; wrenches are defined where the constraints are closed (see `project`)"
+                )
+            w[own] += part
+        return w
+
+    def tangents(self, t: float, x: Array, v: Array, a: Array, lam: Array) -> Tangents:
+        """Return the derivatives of the residual by x, v and a at fixed multipliers.
+
+        Those by v and a, and that by x at fixed wrenches, are those of Newton's method in the kernels. How the wrenches
+        w_0 and the forces Gᵀ lam change with x is found by central differences of fourth order (relative error about
+        1e-10 of these forces).
+        """
+        v, a = vector("v", v, self.n_v), vector("a", a, self.n_v)
+        _, own = self.at(t, x, v, a)  # leaves w_0 in the working arrays
+        by_x = linearized(self.model, self.work, 0.0, 0.0, 1.0)
+        by_both = linearized(self.model, self.work, 0.0, 1.0, 1.0)
+        turn, holds = self.turning(x), self.structure.holds
+        K, C = la.block_diag(*by_x.H), la.block_diag(*by_both.H) - la.block_diag(*by_x.H)
+        J = by_x.J.toarray()
+        if (~holds).any():  # dw_0 = -C⁺ G_v dv
+            G_v = (by_both.G - by_x.G).toarray()[~holds]
+            C = C + J.T @ np.linalg.pinv(by_x.V.toarray()[~holds]) @ G_v
+        K = turn @ K @ turn.T + self.turned_forces(own)
+        if len(self.work.state.w):
+            by_w, by_lam = self.change_of_wrenches(t, x, v, vector("lam", lam, self.n_lam))
+            K = K - turn @ (J.T @ by_w) - by_lam
+        return Tangents(K, turn @ C @ turn.T, self.mass(x))
+
+    # parts
+
+    def change_of_wrenches(self, t: float, x: Array, v: Array, lam: Array) -> tuple[Array, Array]:
+        """Return the derivatives of w_0, (n_w, n_v), and of Gᵀ lam, (n_v, n_v), by x: differences of fourth order."""
+        scale = np.ones(self.n_v)
+        for _, j, n in self.configurations.parts():
+            scale[j : j + 3] = self.compiled.length
+            scale[j + 6 : j + 6 + n] = self.modal_scale
+
+        def forces(dx: Array) -> Array:
+            parts = self.rows_at(t, self.configurations.retract(x, dx), v)
+            return np.concatenate([self.law(parts), parts.held_force(lam)])
+
+        columns = []
+        for k in range(self.n_v):
+            dx = np.zeros(self.n_v)
+            dx[k] = STEP * scale[k]
+            near, far = forces(dx) - forces(-dx), forces(2 * dx) - forces(-2 * dx)
+            columns.append((8 * near - far) / (12 * dx[k]))
+        both = np.array(columns).T
+        n_w = len(self.work.state.w)
+        return both[:n_w], both[n_w:]
+
+    @cached_property
+    def modal_scale(self) -> float:
+        """A modal coordinate that moves markers by about a thousandth of the size of the system."""
+        largest = float(np.abs(self.model.markers.psi).max(initial=0.0))
+        return 1e-2 * self.compiled.length / largest if largest > 0 else 1.0
+
+    def turned_forces(self, own: Array) -> Array:
+        """Return how a residual in ground axes changes since the axes of the bodies turn, (n_v, n_v)."""
+        result = np.zeros((self.n_v, self.n_v))
+        for i, (_, j, _) in enumerate(self.configurations.parts()):
+            R = self.work.state.R[i]
+            result[j : j + 3, j + 3 : j + 6] = -R @ tilde(R.T @ own[j : j + 3])
+        return result
+
+    def turning(self, x: Array) -> Array:
+        """Return the matrix that turns translations from body to ground axes, (n_v, n_v)."""
+        result = np.eye(self.n_v)
+        for j, k, _ in self.configurations.parts():
+            result[k : k + 3, k : k + 3] = rotation_matrix(x[j + 3 : j + 7])
+        return result
+
+    def own_rows(self, c: int) -> slice:
+        """Return the rows of connection c."""
+        return slice(int(self.model.connections.w0[c]), int(self.model.connections.w0[c + 1]))
+
+    def rows_at(self, t: float, x: Array, v: Array | None = None, a: Array | None = None) -> RowParts:
+        """Evaluate at a state and wrenches of zero; the residual of the bodies is in the working arrays."""
+        from floatframe.kernels.entry import evaluate_and_linearize
+
+        set_iterate(self.work, self.engine_state(x, v), a, self.near.copy())
+        self.work.state.time[...] = t
+        evaluate_and_linearize(self.model, self.work, 1.0, 0.0, 0.0)
+        raise_errors_of(self.compiled.callbacks)
+        return row_parts(self.structure, self.model, self.work)
+
+    def at(self, t: float, x: Array, v: Array, a: Array | None = None) -> tuple[RowParts, Array]:
+        """Return the rows at a state, and M a - f in ground axes, (n_v,).
+
+        Raises
+        ------
+        ModelError
+            If a force is not affine in the wrench of its connection.
+        """
+        from floatframe.kernels.entry import rates_of_constraints
+
+        parts = self.rows_at(t, x, v, a)
+        w = self.law(parts)
+        if (w != self.work.state.w).any():
+            self.work.state.w[:] = w
+            rates_of_constraints(self.model, self.work)  # evaluates
+            left = np.where(self.structure.holds, 0.0, self.work.connections.g)
+            allowed = AGREES * max(np.abs(w).max(initial=0.0), np.abs(parts.g).max(initial=0.0))
+            if np.abs(left).max(initial=0.0) > allowed:
+                c = int(np.searchsorted(self.model.connections.w0, int(np.abs(left).argmax()), side="right")) - 1
+                raise ModelError(
+                    f"open_equations: {self.compiled.connection_names[c]!r}: its force depends on itself, not on the "
+                    "motion alone; take it out"
+                )
+        result = self.work.bodies.residual.copy()
+        for i, (_, j, _) in enumerate(self.configurations.parts()):
+            result[j : j + 3] = self.work.state.R[i] @ result[j : j + 3]
+        return parts, result
+
+    def law(self, parts: RowParts) -> Array:
+        """Return w_0: the least wrenches that fulfil the rows that say what they are, (n_w,)."""
+        w = self.near.copy()
+        for c, V in enumerate(parts.V):
+            own = self.own_rows(c)
+            rows = ~self.structure.holds[own]
+            if rows.any() and parts.g[own][rows].any():
+                w[own] -= la.lstsq(V[rows], parts.g[own][rows])[0]
+        return w
+
+    def rates(self, t: float, x: Array, v: Array) -> tuple[Array, Array]:
+        """Return rate and second rate at zero a of what the held rows hold, each (n_lam,)."""
+        from floatframe.kernels.entry import rates_of_constraints
+
+        set_iterate(self.work, self.engine_state(x, v), w=self.near.copy())
+        self.work.state.time[...] = t
+        rate, bias = rates_of_constraints(self.model, self.work)
+        return rate[self.structure.held], bias[self.structure.held]
+
+
+def open_equations(system: System) -> Equations:
+    """Return the open equations of a system: M a = f + Gᵀ lam with its constraints, as functions of Python.
+
+    Parameters
+    ----------
+    system
+        The system. Each call makes working arrays of its own, so that two threads need two `Equations`.
+
+    Raises
+    ------
+    ModelError
+        If a force has states of its own, or friction follows the force in its joint: neither is a function of
+        t, x and v.
+    """
+    compiled = compiled_system(system)
+    model = compiled.model
+    if len(model.states.row):
+        users = np.searchsorted(model.connections.w0, model.states.row, side="right") - 1
+        raise ModelError(
+            f"open_equations: {compiled.connection_names[int(users[0])]!r} has states of its own, which are no part of "
+            "x and v; give its forces without states, and integrate the states beside"
+        )
+    if has_normal_friction(model):
+        raise ModelError(
+            "open_equations: friction by the force in its joint (JointForce: coefficient) makes f depend on the "
+            "multipliers; take it out, or give friction by itself"
+        )
+    model = model._replace(rows=model.rows._replace(soft=np.zeros_like(model.rows.soft)))
+    structure = structure_of(model)
+    return Equations(
+        system, compiled, model, new_work(model), structure, Configurations(np.array(model.bodies.n_q)),
+        layout_of(compiled, [int(row) for row in structure.held], system.units), start_unknowns(model),
+    )  # fmt: skip
+
+
+def vector(name: str, value: Array, n: int) -> Array:
+    """Return a vector of n finite numbers; `ModelError` if it is not one."""
+    result = np.asarray(value, dtype=float)
+    if result.shape != (n,) or not np.isfinite(result).all():
+        told = f"shape {result.shape}" if result.shape != (n,) else "numbers that are not finite"
+        raise ModelError(f"open_equations: {name}: expected {n} finite numbers, got {told}")
+    return result
