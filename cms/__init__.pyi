@@ -58,10 +58,13 @@ from .reduced_basis.damping import RayleighDamping as RayleighDamping
 from .reduced_basis.frames import BuckensFrame as BuckensFrame
 from .reduced_basis.frames import NodalFrame as NodalFrame
 from .reduced_basis.frames import TisserandFrame as TisserandFrame
+from .reduced_body.address import Address as Address
+from .reduced_body.address import FoundNodes as FoundNodes
 from .reduced_body.geometric_stiffness import GeometricStiffness as GeometricStiffness
 from .reduced_body.geometric_stiffness import SpreadLoads as SpreadLoads
 from .reduced_body.geometric_stiffness import TurnedLoads as TurnedLoads
 from .reduced_body.invariants import Moments as Moments
+from .reduced_body.kept_points import KeptPoints as KeptPoints
 from .reduced_body.reduced_body import BodyFrame as BodyFrame
 from .reduced_body.reduced_body import ReducedBody as ReducedBody
 from .reduced_body.reduced_body import ReducedInterface as ReducedInterface

@@ -281,6 +281,7 @@ def changed_body(
         provenance=dict(reduced.provenance) | record,
         columns=None if reduced.columns is None else reduced.columns.of_modes(Z),
         nodal_sums=None if reduced.nodal_sums is None else changed_sums(reduced.nodal_sums, change),
+        kept=None if reduced.kept is None else reduced.kept.moved(change.C[3:], change.R, Z),
         load_cases=tuple(changed_load_case(case, change) for case in reduced.load_cases),
         stress=None if reduced.stress is None else turned_stress(np.asarray(reduced.stress) @ Z, change.R),
         geometric=None

@@ -1,9 +1,10 @@
 """Reduce: a coupled FEBody and a mode set become a ReducedBody in a body frame."""
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import metadata
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from cms.mode_set import ModeSet
 from cms.reduced_basis.damping import Damping, modal_damping
 from cms.reduced_basis.finishing import FinishedBasis, finish
 from cms.reduced_basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
+from cms.reduced_basis.kept_rotations import kept_points
 from cms.reduced_basis.matrix_moments import gram_from_matrices
 from cms.reduced_basis.node_motion import reference_motion
 from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
@@ -26,6 +28,7 @@ from cms.second_order.geometric_reduction import stiffness_of_states
 from cms.second_order.quadratic_modes import quadratic_modes
 from cms.second_order.unit_states import UnitStates, has_geometric_stiffness, require_geometric_stiffness, states_of
 from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.kept_nodes import keep_nodes
 from fe_models.body.load_cases import LoadCase, ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray
 
@@ -41,6 +44,7 @@ def reduce(
     stress: bool = True,
     geometric: bool | UnitStates | None = None,
     quadratic: bool = False,
+    keep: Sequence[Any] = (),
 ) -> ReducedBody:
     """Reduce a body to the span of a mode set.
 
@@ -65,6 +69,10 @@ def reduce(
     quadratic
         Whether to add quadratic modes, the displacement of second order of every kept node (`quadratic_modes`),
         with the geometric stiffness that is their inertia. For slender bodies: three static solutions a kept node.
+    keep
+        Nodes that are kept with translations and rotations beside surface and interfaces: numbers of the user's mesh,
+        names of sets, or positions [x, y, z] in mesh axes (`fe_models.keep_nodes`); nodes of lines and point masses
+        are kept anyway.
 
     Raises
     ------
@@ -92,11 +100,11 @@ def reduce(
     elif geometric or quadratic:
         states = states_of(source, condition)
     finished = finish(body, modes, condition)
-    kept = kept_nodes(body)
+    kept = kept_nodes(keeping := keep_nodes(body, keep))
     axes, origin = condition.frame.axes, condition.frame.origin
     moments = reduced_moments(body, finished.Phi, condition.frame)
     return replace(
-        assembled(body, modes, finished, condition, kept=kept, moments=moments, damping=damping),
+        assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping),
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
         geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),
@@ -144,6 +152,8 @@ def assembled(
         node_ids=kept,
         Phi=Phi_kept,
         surface=index_of[body.surface],
+        numbering=body.numbering.of_rows(kept, len(body.nodes)).without_indices(kept),
+        kept=kept_points(body, finished.Phi, axes, index_of),
         interfaces=tuple(
             reduced_interface(body, interface, finished.Phi, condition.frame, index_of) for interface in body.interfaces
         ),
@@ -167,8 +177,8 @@ def require_states_of(body: FEBody, frame: BodyFrame, states: UnitStates) -> Non
 
 
 def kept_nodes(body: FEBody) -> IntArray:
-    """Return the nodes a reduced body keeps: surface, interface members and reference nodes, ascending."""
-    parts = [body.surface.ravel()] + [interface.nodes for interface in body.interfaces]
+    """Return the nodes a reduced body keeps: surface, interfaces with reference nodes, those asked for; ascending."""
+    parts = [body.surface.ravel(), body.kept] + [interface.nodes for interface in body.interfaces]
     parts += [body.dofs[interface.dofs, 0] for interface in body.interfaces if interface.dofs is not None]
     return np.unique(np.concatenate(parts))
 

@@ -18,7 +18,10 @@ from .body.beam_line import BeamLine as BeamLine
 from .body.couplings import couple as couple
 from .body.fe_body import FEBody as FEBody
 from .body.fe_body import Interface as Interface
+from .body.kept_nodes import keep_nodes as keep_nodes
 from .body.load_cases import LoadCase as LoadCase
+from .body.numbering import NamedSet as NamedSet
+from .body.numbering import Numbering as Numbering
 from .errors import BeamError as BeamError
 from .errors import BodyError as BodyError
 from .errors import FeModelsError as FeModelsError

@@ -16,6 +16,7 @@ from fe_models.body.fe_body import FEBody, Interface, put_translations
 from fe_models.body.freedom import rigid_forces
 from fe_models.body.held_causes import mistake_of, support_words
 from fe_models.body.mass_loads import MassLoads
+from fe_models.body.numbering import Numbering
 from fe_models.body.positive_mass import DENSE, negative_mass, positive_mass
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray
@@ -61,6 +62,10 @@ class ScalarMassModel:
             f"(fe_models.solids.body.solid_body) for stresses"
         )
 
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return NaN, (n, 3, k): matrices do not know the elements."""
+        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
+
     @property
     def has_geometric_stiffness(self) -> bool:
         """False: matrices do not know the elements."""
@@ -100,6 +105,7 @@ def body_from_matrices(
     held: bool = False,
     mend_mass: bool = False,
     accept: Iterable[str] = (),
+    numbering: Numbering | None = None,
 ) -> FEBody:
     """Make a body of mass and stiffness from any program.
 
@@ -156,6 +162,7 @@ def body_from_matrices(
         interfaces=tuple(interfaces),
         units=units,
         surface=np.zeros((0, 3), np.int64) if surface is None else surface,
+        numbering=numbering or Numbering(),
     )
     unique, count = np.unique(body.dofs, axis=0, return_counts=True)
     if len(unique) < len(body.dofs):

@@ -12,6 +12,7 @@ from fe_models.body.elimination import eliminate_dofs
 from fe_models.body.fe_body import ElementModel, FEBody, Interface, Recovery, StressPointModel
 from fe_models.body.load_cases import LoadCase
 from fe_models.body.mass_loads import MassLoads
+from fe_models.body.numbering import numbering_side_by_side
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
@@ -54,6 +55,16 @@ class WeldedModel:
                 stress[: len(own)] = own
             stresses.append(stress)
         return np.concatenate(stresses)
+
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return the rotations that the parts know at nodes of all, (n, 3, k); NaN at others."""
+        rotation = np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
+        first = np.cumsum([0, *self.n_nodes])
+        for part, rows, begin, n_nodes in zip(self.parts, self._rows(), first[:-1], self.n_nodes, strict=True):
+            is_own = (nodes >= begin) & (nodes < begin + n_nodes)
+            if is_own.any():
+                rotation[is_own] = part.nodal_rotation(u[rows], nodes[is_own] - begin)
+        return rotation
 
     @property
     def has_geometric_stiffness(self) -> bool:
@@ -251,6 +262,8 @@ def _side_by_side(
         ),
         load_cases=tuple(load_cases),
         stress_points=WeldedPoints(points) if points else None,
+        numbering=numbering_side_by_side([body.numbered for body in bodies]),
+        kept=np.concatenate([body.kept + n for body, n in zip(bodies, first_node, strict=False)]),
         node_volumes=None if any(v is None for v in volumes) else np.concatenate([v for v in volumes if v is not None]),
         provenance={f"{body.name}: {key}": value for body in bodies for key, value in body.provenance.items()},
     )

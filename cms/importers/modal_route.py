@@ -21,6 +21,7 @@ from cms.reduced_body.invariants import Moments, moments_from_gram
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.solvers.orientation import orientation
 from fe_models.body.couplings import mean_motion
+from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.reports.unit_check import implausible_motion
 
@@ -95,6 +96,7 @@ def body_of_modes(body: ModalBody, options: ImportOptions) -> ReducedBody:
         free_frequencies=np.zeros(0),
         nodes=body.nodes,
         node_ids=body.node_numbers,
+        numbering=Numbering(nodes=body.node_numbers),
         Phi=np.asarray(body.Phi) @ Z,
         surface=body.surface,
         interfaces=interfaces,

@@ -20,6 +20,7 @@ from cms.reduced_body.reduced_body import BodyFrame, ReducedBody
 from cms.reduction import assembled
 from fe_models.body.fe_body import FEBody, Interface, Recovery
 from fe_models.body.load_cases import LoadCase
+from fe_models.body.numbering import Numbering
 from fe_models.body.positive_mass import positive_mass
 from fe_models.body.rigid_motion import rigid_motion_of_dofs
 from fe_models.foundation.arrays import Array, IntArray
@@ -131,6 +132,8 @@ def fe_body_of_superelement(element: Superelement, options: ImportOptions) -> FE
         units=options.units,
         recovery=Recovery(sp.csr_array(np.concatenate(matrix)), np.concatenate(rows)),
         load_cases=tuple(LoadCase(name, "force", T.T @ load) for name, load in element.loads.items()),
+        numbering=Numbering(nodes=element.node_numbers),
+        kept=np.unique(np.concatenate([table[table[:, 1] >= 3, 0] for table in rows])),
         provenance=element.provenance,
     )
     return replace(body, interfaces=interfaces_of(body, element, options.interfaces))

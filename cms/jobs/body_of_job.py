@@ -42,7 +42,14 @@ def coupled_body(job: Job, body: FEBody) -> FEBody:
 
 
 def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
-    """Run a job up to the body whose interfaces are still to be coupled."""
+    """Run a job up to the body whose interfaces are still to be coupled, with the nodes that it asks to be kept."""
+    from fe_models.body.kept_nodes import keep_nodes
+
+    return keep_nodes(made_body(job, stages, on_report), job.body.keep)
+
+
+def made_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
+    """Make the body of a job from what it names: a deck, a mesh, tables or matrices."""
     if job.body.deck is not None:
         from cms.jobs.deck_body import body_of_deck
 

@@ -36,10 +36,13 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
     with stages("read deck"):
         raw = read_deck(path).mesh
         raw = with_centres(raw)
+        numbers = raw.node_numbers
         raw = replace(raw, node_numbers=np.arange(len(raw.nodes)))  # rows of the deck are the numbers of the parts
     with stages("assemble"):
         parts, meshes = _parts(job, path, raw, on_report)
-        joined = join(str(job.body.name), parts, raw.nodes, _constraints(job, raw))
+        joined = join(
+            str(job.body.name), parts, raw.nodes, _constraints(job, raw), numbers=numbers, node_sets=raw.node_sets
+        )
         record = {**joined.body.provenance, "deck": str(path), "deck sha256": file_digest(path)}
         body = replace(joined.body, provenance=record)
         _require_used_groups(job, raw, joined)

@@ -83,6 +83,24 @@ def accepted(value: Any) -> tuple[str, ...]:
     return words
 
 
+def kept(value: Any) -> tuple[Any, ...]:
+    """Return numbers of nodes, names of sets and positions that name what is kept."""
+    if not isinstance(value, list):
+        raise ValueError("expected a list of node numbers, names of sets, and positions [x, y, z]")
+    entries: list[Any] = []
+    for each in value:
+        if isinstance(each, list):
+            if len(each) != 3 or any(is_no_number(x) for x in each):
+                raise ValueError(f"{quoted(each)}: expected a position [x, y, z]")
+            entries.append(tuple(float(x) for x in each))
+        elif isinstance(each, bool) or not isinstance(each, int | str) or each == "":
+            raise ValueError(f"{quoted(each)}: expected a node number, the name of a set, or a position [x, y, z]")
+        else:
+            entries.append(each)
+    return tuple(entries)
+
+
+Keep = Annotated[tuple[Any, ...], BeforeValidator(kept)]
 Names = Annotated[tuple[str, ...], BeforeValidator(names)]
 Nodes = Annotated[Name | tuple[int, ...], BeforeValidator(node_names)]
 FACES = "the name of a group of faces, of a CAD file also what they are (cylinder r=12), or a list of these"
@@ -150,6 +168,7 @@ class BodySection(Table):
         None, description="true or false, for matrices: whether slightly negative masses are set to zero"
     )
     incompatible_modes: bool = Field(False, description="true or false: bricks of eight nodes bend by internal modes")
+    keep: Keep = Field((), description="a list of nodes that are kept: numbers, names of sets, positions [x, y, z]")
     accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
 
     @field_validator("mesh", "deck", "geometry", "nodes", "lines", mode="before")

@@ -10,11 +10,13 @@ from cms.errors import ModalFileError
 from cms.modal_file.entries import ENTRIES, entry_of, unit_of
 from cms.reduced_body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, SpreadLoads, TurnedLoads
 from cms.reduced_body.invariants import Moments
+from cms.reduced_body.kept_points import KeptPoints
 from cms.reduced_body.nodal_sums import NodalSums
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.reduced_body.source_columns import SourceColumns
 from cms.reduced_body.stress import PointStress
 from fe_models.body.load_cases import ReducedLoadCase
+from fe_models.body.numbering import NamedSet, Numbering, no_numbers
 from fe_models.foundation.arrays import require_shape
 from fe_models.foundation.sealed_hdf5 import Attribute, Content, Dataset
 from fe_models.foundation.units import UNIT_SYSTEMS, Units
@@ -28,6 +30,14 @@ INVARIANT_DEFECT = 1e-12  #: largest difference of a stored 1C-5C from that of t
 OF_FRAME = UNIT_LOADS[:3]  #: unit loads of the geometric stiffness beside those of the interfaces, which stand there
 TURNED, SPREAD = "/geometric/turned", "/geometric/spread"  #: groups
 EPSILON = np.cross(np.eye(3)[:, None], np.eye(3)[None])  #: (a × b)_c = EPSILON_abc a_a b_b, (3, 3, 3)
+NUMBERS = {
+    "/nodes/label": "nodes",
+    "/nodes/on_skin": "on_skin",
+    "/nodes/instance": "node_instance",
+    "/surface/element": "elements",
+    "/surface/instance": "element_instance",
+}  #: dataset -> field of `Numbering`
+SET_KEYS = {"name": str, "kind": str, "size": int}  #: attributes of a set
 INVARIANTS = ("J0", "C1", "C2", "C3", "C4", "C5")
 
 
@@ -71,6 +81,14 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
         }
     for k, case in enumerate(body.load_cases):
         attributes[f"/load_cases/{k}"] = {"name": case.name, "kind": case.kind}
+    if body.numbering.instances:
+        attributes["/instances"] = {}
+    if body.numbering.sets:
+        attributes["/sets"] = {"count": len(body.numbering.sets)}
+    for k, each in enumerate(body.numbering.sets):
+        attributes[f"/sets/{k}"] = {"name": each.name, "kind": each.kind, "size": each.size}
+    if body.kept is not None:
+        attributes["/kept"] = {}
     if body.columns is not None:
         attributes["/columns"] = {}
     if body.geometric is not None:
@@ -105,6 +123,9 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
         "/nodes/Phi": body.Phi,
         "/surface/triangles": body.surface,
     }
+    values |= numbering_values(body.numbering)
+    if body.kept is not None:
+        values |= {f"/kept/{name}": getattr(body.kept, name) for name in ("nodes", "rotation", "source")}
     values |= {f"/moments/{name}": getattr(moments, name) for name in ("S", "R", "C1")}
     values |= {f"/moments/{name}": getattr(moments, name) for name in known_products(moments.missing)}
     values |= {f"/invariants/{name}": getattr(moments, name) for name in known_invariants(moments.missing)}
@@ -128,6 +149,15 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
         values["/stress/points/names"], values["/stress/points/position"] = points.names, points.positions
         values["/stress/points/modes"] = points.modes
     return values
+
+
+def numbering_values(numbering: Numbering) -> dict[str, Any]:
+    """Return the values of the user's numbers and sets by path, of those that are known."""
+    arrays = {path: getattr(numbering, name) for path, name in NUMBERS.items()}
+    values: dict[str, Any] = {path: numbers for path, numbers in arrays.items() if numbers.size}
+    if numbering.instances:
+        values["/instances/names"] = numbering.instances
+    return values | {f"/sets/{k}/members": each.members for k, each in enumerate(numbering.sets)}
 
 
 def geometric_values(geometric: GeometricStiffness) -> dict[str, Any]:
@@ -260,7 +290,26 @@ def body_of(content: Content) -> ReducedBody:
         else None,
         geometric=geometric_of(contents) if contents.has("/geometric") else None,
         quadratic=array("/quadratic/g") if contents.has("/quadratic") else None,
+        numbering=numbering_of(contents),
+        kept=kept_of(contents) if contents.has("/kept") else None,
     )  # fmt: skip
+
+
+def numbering_of(contents: Contents) -> Numbering:
+    """Return the user's numbers and sets; empty where the file has none, as all before version 5."""
+    known = contents.content.datasets
+    arrays = {name: contents.array(path) if path in known else no_numbers() for path, name in NUMBERS.items()}
+    sets = []
+    for group in contents.numbered("/sets"):
+        name, kind, size = (contents.attribute(group, key, what) for key, what in SET_KEYS.items())
+        sets.append(NamedSet(name, kind, contents.array(f"{group}/members"), size))
+    instances = contents.words("/instances/names") if contents.has("/instances") else ()
+    return Numbering(**arrays, instances=instances, sets=tuple(sets))
+
+
+def kept_of(contents: Contents) -> KeptPoints:
+    """Return the points with rotations."""
+    return KeptPoints(contents.array("/kept/nodes"), contents.array("/kept/rotation"), contents.words("/kept/source"))
 
 
 def moments_of(contents: Contents) -> Moments:

@@ -8,10 +8,12 @@ import numpy as np
 from cms.errors import BodyError
 from cms.reduced_body.geometric_stiffness import GeometricStiffness
 from cms.reduced_body.invariants import Moments
+from cms.reduced_body.kept_points import KeptPoints
 from cms.reduced_body.nodal_sums import NodalSums
 from cms.reduced_body.source_columns import SourceColumns
 from cms.reduced_body.stress import PointStress
 from fe_models.body.load_cases import ReducedLoadCase
+from fe_models.body.numbering import NONE, Numbering
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.foundation.units import Units
@@ -104,7 +106,7 @@ class ReducedBody:
     moments: Moments
     free_frequencies: Array  #: of the reduced body without joints, elastic only, ascending [Hz]; a held body as held
     nodes: Array  #: kept nodes (surface, interfaces) in B, (n_kept, 3) [m]
-    node_ids: IntArray  #: their indices in the mesh the body came from, (n_kept,)
+    node_ids: IntArray  #: their indices in the model the body came from, (n_kept,); `numbering` has the user's numbers
     Phi: Array  #: translations of the kept nodes in B, (n_kept, 3, n_q)
     surface: IntArray  #: triangles of kept nodes, (n_tri, 3)
     interfaces: tuple[ReducedInterface, ...]
@@ -119,6 +121,8 @@ class ReducedBody:
     geometric: GeometricStiffness | None = None  #: for geometric stiffening; None: left out, or not known
     #: g_kl of the kept nodes in B, displacement ½ Σ q_k q_l g_kl, (n_kept, 3, n_q, n_q) [1/(kg m)]; None: left out
     quadratic: Array | None = None
+    numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of kept nodes and elements, and sets
+    kept: KeptPoints | None = None  #: kept nodes that have rotations too; None: there are none
 
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"
@@ -159,6 +163,8 @@ class ReducedBody:
         widths = {f"load case {case.name!r}: h": case.h.shape for case in self.load_cases}
         if self.columns is not None:
             widths["columns"] = (np.asarray(self.columns.A).shape[1],)
+        if self.kept is not None:
+            widths["kept points"] = (np.asarray(self.kept.rotation).shape[2],)
         if self.nodal_sums is not None:
             widths["nodal sums"] = (np.asarray(self.nodal_sums.U1).shape[1],)
         if self.point_stress is not None:
@@ -179,6 +185,9 @@ class ReducedBody:
                 raise BodyError(f"{where}: {n} modes, but {name} of {width[0]}")
         if self.surface.size and (self.surface.min() < 0 or self.surface.max() >= n_kept):
             raise BodyError(f"{where}: surface: nodes outside 0..{n_kept - 1}")
+        self.numbering.require_fit(where, n_kept, len(self.surface))
+        if self.kept is not None and (self.kept.nodes.min(initial=0) < 0 or self.kept.nodes.max(initial=0) >= n_kept):
+            raise BodyError(f"{where}: kept points: nodes outside 0..{n_kept - 1}")
         for interface in self.interfaces:
             require_shape(f"{where}: interface {interface.name!r}: Psi", interface.Psi, (6, n))
             if interface.members.size and (interface.members.min() < 0 or interface.members.max() >= n_kept):
@@ -200,6 +209,12 @@ class ReducedBody:
         mass = np.diag(self.M)
         omega2 = np.divide(np.diag(self.K), mass, out=np.full(self.n_q, np.inf), where=mass > 0)
         return np.sqrt(np.maximum(omega2, 0.0)) / (2 * np.pi)
+
+    def node_name(self, row: int) -> str:
+        """Return what the user calls a kept node, by its row: "12", "PART-1-1.12"; without a number "index 7"."""
+        if self.numbering.nodes.size and self.numbering.nodes[row] != NONE:
+            return self.numbering.node_name(row)
+        return f"index {self.node_ids[row]}"
 
     def interface(self, name: str) -> ReducedInterface:
         """Return the interface of that name; `BodyError` with the choices if there is none."""

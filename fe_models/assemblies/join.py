@@ -10,7 +10,7 @@ The recovery has a row for each dof of the parts and, behind them, for each comp
 node (all six of a leader that is no node of a part): it moves in pictures and sensors as its interface says.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from fe_models.assemblies.constraints import Constraint, MeanMotion, RigidNodes,
 from fe_models.assemblies.massless_nodes import MasslessNodes
 from fe_models.body.elimination import eliminate_dofs
 from fe_models.body.fe_body import MULTIPLIER, FEBody, Recovery
+from fe_models.body.numbering import NONE, NamedSet, Numbering, no_numbers, numbering_side_by_side
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.weld import WeldedModel, WeldedPoints, mesh_rows
@@ -43,7 +44,15 @@ class Joined:
     place: IntArray  #: node of the body for each node of the whole, -1 where it has none, (n_nodes,)
 
 
-def join(name: str, parts: Sequence[Part], points: Array, constraints: Iterable[Constraint] = ()) -> Joined:
+def join(
+    name: str,
+    parts: Sequence[Part],
+    points: Array,
+    constraints: Iterable[Constraint] = (),
+    *,
+    numbers: IntArray | None = None,
+    node_sets: Mapping[str, IntArray] | None = None,
+) -> Joined:
     """Make one body of parts that share nodes.
 
     Parameters
@@ -56,6 +65,10 @@ def join(name: str, parts: Sequence[Part], points: Array, constraints: Iterable[
         Of all nodes of the whole, used or not, (n_nodes, 3) [m].
     constraints
         Between nodes of the whole.
+    numbers
+        The user's numbers of the nodes of the whole, (n_nodes,); None: they have none.
+    node_sets
+        Sets of nodes of the whole.
 
     Raises
     ------
@@ -75,10 +88,47 @@ def join(name: str, parts: Sequence[Part], points: Array, constraints: Iterable[
     dofs, S, dof_of = _shared_dofs(parts, first_node, place, leaders)
     bodies = [part.body for part in parts]
     whole = _side_by_side(name, bodies, S, dofs, np.concatenate([b.nodes for b in bodies] + [points[added]]))
+    kept = np.concatenate([_kept(part, begin, place) for part, begin in zip(parts, first_node, strict=False)])
+    whole = replace(whole, numbering=_numbering(parts, added, numbers, node_sets or {}), kept=kept)
     slaves, T_s = eliminated(constraints, points, dof_of, whole.n_dof)
     if len(slaves):
         whole = eliminate_dofs(whole, slaves, T_s)
     return Joined(_without_idle_rotations(whole, sum(len(recovered_dofs(body)) for body in bodies)), place)
+
+
+def _kept(part: Part, begin: int, place: IntArray) -> IntArray:
+    """Return the nodes that a part keeps, where they are shared the one copy that stands for all."""
+    kept = part.body.kept
+    is_shared = kept < len(part.nodes)
+    return np.concatenate([place[part.nodes[kept[is_shared]]], begin + kept[~is_shared]])
+
+
+def _numbering(
+    parts: Sequence[Part], added: IntArray, numbers: IntArray | None, node_sets: Mapping[str, IntArray]
+) -> Numbering:
+    """Return the numbering of the whole: every part has its own copy of a node that it shares, of the same number.
+
+    Points of a skin have the node that moves them: their parts number nodes by those of the whole.
+    """
+    side = []
+    for part in parts:
+        own = part.body.numbering.nodes  # rows of the whole: what its mesh was numbered by
+        at = np.full(len(part.body.nodes), NONE) if not own.size else np.array(own)
+        at[: len(part.nodes)] = part.nodes
+        on_skin = (np.arange(len(at)) >= len(part.nodes)).astype(np.int64)
+        elements = tuple(each for each in part.body.numbering.sets if each.kind == "elements")
+        numbering = replace(part.body.numbering, nodes=at, on_skin=on_skin, sets=elements)
+        side.append((part.body.name, numbering, len(at), len(part.body.surface)))
+    side.append(("", Numbering(nodes=added) if len(added) else Numbering(), len(added), 0))
+    whole = numbering_side_by_side(side, share_numbers=True)
+    sets = []
+    for name, members in node_sets.items():
+        rows = np.flatnonzero(np.isin(whole.nodes, members))
+        sets.append(NamedSet(name, "nodes", rows, len(np.unique(members))))
+    has = whole.nodes != NONE
+    if numbers is None:
+        return replace(whole, nodes=no_numbers(), on_skin=no_numbers(), sets=(*sets, *whole.sets))
+    return replace(whole, nodes=np.where(has, numbers[whole.nodes], NONE), sets=(*sets, *whole.sets))
 
 
 def _leaders(constraints: list[Constraint]) -> IntArray:

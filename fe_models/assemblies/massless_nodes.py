@@ -22,6 +22,10 @@ class MasslessNodes:
         """No: there is no material at these nodes."""
         return False
 
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return NaN, (n, 3, k): there is no element at these nodes."""
+        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
+
     @property
     def has_geometric_stiffness(self) -> bool:
         """Yes: it is zero."""

@@ -16,6 +16,7 @@ from fe_models.foundation.errors import BodyError
 from fe_models.foundation.units import Units
 from fe_models.material import Material
 from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh_numbering import line_numbering
 
 __all__ = ["Rod", "rod_body"]
 
@@ -78,6 +79,8 @@ def rod_body(mesh: LineMesh, rods: Mapping[str, Rod], *, name: str, units: Units
         dofs=np.stack([np.repeat(np.arange(n_nodes), 3), np.tile(np.arange(3), n_nodes)], axis=1),
         units=units,
         node_volumes=volumes,
+        numbering=line_numbering(mesh, np.zeros(0, np.int64), np.zeros(0, np.int64)),
+        kept=np.arange(n_nodes),
     )
 
 

@@ -19,6 +19,7 @@ from fe_models.errors import BeamError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Units
 from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh_numbering import line_numbering
 
 __all__ = ["beam_body"]
 
@@ -109,6 +110,8 @@ def beam_body(
             np.concatenate([node_dofs, skin_dofs]),
         ),
         node_volumes=_node_volumes(n_nodes, geometry.length, of_line, sections, skin),
+        numbering=line_numbering(mesh, skin.mover, skin.line_of),
+        kept=np.arange(n_nodes),
         provenance=_provenance(mesh, used, of_line, point_masses, springs, links),
     )
     return link_rigidly(body, links)

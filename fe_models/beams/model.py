@@ -118,6 +118,10 @@ class BeamModel:
         n, n_points = table.shape[:2]
         return np.asarray((table.reshape(n, 6 * n_points, 6) @ about).reshape(n, n_points, 6, -1))
 
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return NaN, (n, 3, k): rotations of beams are dofs."""
+        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
+
     @property
     def has_geometric_stiffness(self) -> bool:
         """True: from section forces, masses and springs."""

@@ -20,6 +20,7 @@ class Skin:
     points: Array  #: (n_skin, 3) [m]
     mover: IntArray  #: node of the mesh that moves each point rigidly, (n_skin,)
     triangles: IntArray  #: of points, outward, (n_tri, 3)
+    line_of: IntArray  #: the line behind each triangle, (n_tri,)
     ring_start: IntArray  #: first point of the ring at both ends of each line, (n_lines, 2)
 
 
@@ -44,6 +45,7 @@ def make_skin(
         tuple[int, int], list[tuple[Array, Array, int, int]]
     ] = {}  # (node, section) -> ends nothing continues yet
     points, mover, triangles = [], [], []
+    line_of: list[IntArray] = []
     start = np.zeros((len(lines), 2), np.int64)
     uses: dict[int, list[tuple[int, int]]] = {}
     n_points = 0
@@ -74,15 +76,18 @@ def make_skin(
             uses.setdefault(first, []).append((line, end))
         for loop, turn in zip(sections[section].loops, (1, *[-1] * len(sections[section].loops)), strict=False):
             triangles.append(_side(start[line], loop, turn))
+            line_of.append(np.full(len(triangles[-1]), line))
     for first, ends in uses.items():
         if len(ends) == 1:  # nothing continues here: close it
             line, end = ends[0]
             cap = sections[of_line[line]].cap + first
             triangles.append(cap if end == 1 else cap[:, ::-1])
+            line_of.append(np.full(len(cap), line))
     return Skin(
         frozen(np.concatenate(points) if points else np.zeros((0, 3))),
         frozen_int(np.concatenate(mover) if mover else np.zeros(0)),
         frozen_int(np.concatenate(triangles) if triangles else np.zeros((0, 3))),
+        frozen_int(np.concatenate(line_of) if line_of else np.zeros(0)),
         frozen_int(start),
     )
 

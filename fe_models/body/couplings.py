@@ -101,6 +101,7 @@ def couple(body: FEBody) -> FEBody:
         node_volumes=None
         if body.node_volumes is None
         else np.concatenate([body.node_volumes, np.zeros(len(references))]),
+        numbering=body.numbering.with_nodes_added(len(references)),
         recovery=Recovery(recovery, body.dofs)
         if body.recovery is None
         else Recovery(sp.csr_array(body.recovery.matrix @ recovery), body.recovery.dofs),

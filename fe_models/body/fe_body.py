@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from fe_models.body.load_cases import LoadCase, check_load_cases
 from fe_models.body.mass_loads import MassLoads
+from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import (
     Array,
     IntArray,
@@ -65,6 +66,22 @@ class ElementModel(Protocol):
         -------
         Array
             (n_mesh_nodes, 6, k) [Pa], components xx, yy, zz, yz, xz, xy; zero at nodes without solid elements.
+        """
+
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Rotation vectors at nodes that have no rotations among their dofs, from the elements there.
+
+        Parameters
+        ----------
+        u
+            Displacement columns over the dofs of the uncoupled body, (n_mesh_dof, k).
+        nodes
+            Indices of nodes, some perhaps beyond the mesh, (n,).
+
+        Returns
+        -------
+        Array
+            (n, 3, k); NaN where the elements do not know it.
         """
 
     @property
@@ -219,6 +236,9 @@ class FEBody:
     node_volumes: Array | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)  #: where it came from: file, digest, options
     is_held: bool = False  #: whether it is held to the ground, as it is meant to be; no floating frame takes it
+    numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of nodes and elements, and sets
+    #: nodes that the reduced body keeps with translations and rotations, beside surface and interfaces, (n,)
+    kept: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __post_init__(self) -> None:
         where = f"body {self.name!r}"
@@ -264,6 +284,15 @@ class FEBody:
                 raise BodyError(f"{where}: interface {interface.name!r}: nodes outside 0..{len(self.nodes) - 1}")
         if self.surface.size and (self.surface.min() < 0 or self.surface.max() >= len(self.nodes)):
             raise BodyError(f"{where}: surface: nodes outside 0..{len(self.nodes) - 1}")
+        self.numbering.require_fit(where, len(self.nodes), len(self.surface))
+        put(self, "kept", frozen_int(np.unique(self.kept)))
+        if self.kept.size and (self.kept.min() < 0 or self.kept.max() >= len(self.nodes)):
+            raise BodyError(f"{where}: kept: nodes outside 0..{len(self.nodes) - 1}")
+
+    @property
+    def numbered(self) -> tuple[str, Numbering, int, int]:
+        """Name, numbering, number of nodes and of triangles: what joins the numbering of several bodies."""
+        return self.name, self.numbering, len(self.nodes), len(self.surface)
 
     @property
     def n_dof(self) -> int:

@@ -33,7 +33,7 @@ def line_mesh_from_raw(raw: RawMesh, path: Path, digest: str, groups: tuple[str,
     where = f"mesh {path}"
     nodes, blocks = require_nodes(where, raw)
     notes = list(raw.notes)
-    lines, line_sets = collect_lines(where, blocks, raw, notes)
+    lines, line_sets, line_numbers = collect_lines(where, blocks, raw, notes)
     if groups is not None:
         unknown = [group for group in groups if group not in line_sets]
         if unknown:
@@ -42,6 +42,7 @@ def line_mesh_from_raw(raw: RawMesh, path: Path, digest: str, groups: tuple[str,
         place = np.full(len(lines), -1)
         place[kept] = np.arange(len(kept))
         lines = lines[kept]
+        line_numbers = line_numbers[kept] if line_numbers.size else line_numbers
         line_sets = {group: place[rows][place[rows] >= 0] for group, rows in line_sets.items()}
         line_sets = {group: rows for group, rows in line_sets.items() if rows.size}
     if not len(lines):
@@ -72,17 +73,19 @@ def line_mesh_from_raw(raw: RawMesh, path: Path, digest: str, groups: tuple[str,
         source=str(path),
         digest=digest,
         node_numbers=np.zeros(0, np.int64) if raw.node_numbers is None else raw.node_numbers[used],
+        line_numbers=line_numbers,
         notes=tuple(notes),
     )
 
 
 def collect_lines(
     where: str, blocks: list[RawBlock], raw: RawMesh, notes: list[str]
-) -> tuple[IntArray, dict[str, IntArray]]:
-    """Return the lines of two nodes, (n_lines, 2), those of three as two each, and group -> rows of them."""
+) -> tuple[IntArray, dict[str, IntArray], IntArray]:
+    """Return the lines of two nodes, (n_lines, 2), those of three as two each, group -> rows of them, and numbers."""
     halves = [_two_nodes(block) for block in blocks if block.kind in ("line", "line3")]
-    cells, sets, _ = collect_cells(where, halves, ("line",), raw.repeats_are_memberships, notes)
-    return cells.get("line", np.zeros((0, 2), np.int64)), {group: by_type["line"] for group, by_type in sets.items()}
+    cells, sets, numbers = collect_cells(where, halves, ("line",), raw.repeats_are_memberships, notes)
+    line_sets = {group: by_type["line"] for group, by_type in sets.items()}
+    return cells.get("line", np.zeros((0, 2), np.int64)), line_sets, numbers.get("line", np.zeros(0, np.int64))
 
 
 def _two_nodes(block: RawBlock) -> RawBlock:

@@ -64,7 +64,7 @@ def shell_mesh_from_raw(
     others = sum(len(block.nodes) for block in blocks if block.kind not in (*_PARTS, *_LOWER))
     if others:
         notes.append(f"{others} cells that are neither flat nor lines were left out")
-    lines, line_sets = collect_lines(where, blocks, raw, notes)
+    lines, line_sets, line_numbers = collect_lines(where, blocks, raw, notes)
     unknown = [group for group in stiffeners if group not in line_sets]
     if unknown:
         raise MeshError(f"{where}: no group of lines {unknown[0]!r}{nearest(unknown[0], line_sets)}")
@@ -98,6 +98,7 @@ def shell_mesh_from_raw(
         digest=digest,
         node_numbers=np.zeros(0, np.int64) if raw.node_numbers is None else raw.node_numbers[used],
         cell_numbers=numbers,
+        line_numbers=line_numbers[kept] if line_numbers.size else line_numbers,
         notes=tuple(notes),
     )
 
@@ -105,20 +106,19 @@ def shell_mesh_from_raw(
 def with_centres(raw: RawMesh) -> RawMesh:
     """Return a mesh whose quads of eight nodes have a ninth, where the quadratic field has its middle.
 
-    The new nodes come last; their numbers follow the largest of the file.
+    The new nodes come last, with the number -1: the file does not number them.
     """
     nodes, numbers = [raw.nodes], [raw.node_numbers]
     blocks, n = [], len(raw.nodes)
-    next_number = 0 if raw.node_numbers is None or not len(raw.node_numbers) else int(raw.node_numbers.max()) + 1
     for block in raw.blocks:
         if block.kind != "quad8" or not len(block.nodes):
             blocks.append(block)
             continue
         X = raw.nodes[block.nodes]
         nodes.append(X[:, 4:].sum(axis=1) / 2 - X[:, :4].sum(axis=1) / 4)
-        numbers.append(next_number + np.arange(len(X)))
+        numbers.append(np.full(len(X), -1))
         centres = n + np.arange(len(X))
-        n, next_number = n + len(X), next_number + len(X)
+        n += len(X)
         blocks.append(RawBlock("quad9", np.column_stack([block.nodes, centres]), block.groups, block.numbers))
     given = None if raw.node_numbers is None else np.concatenate([each for each in numbers if each is not None])
     return replace(raw, nodes=np.concatenate(nodes), blocks=tuple(blocks), node_numbers=given)

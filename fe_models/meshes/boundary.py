@@ -15,6 +15,7 @@ __all__ = [
     "area_centroid",
     "boundary_facets",
     "boundary_nodes",
+    "boundary_owners",
     "boundary_triangles",
     "face_triangles",
     "facet_weights",
@@ -31,7 +32,8 @@ _TRIANGLES = {
 
 CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}  #: corner nodes of a face
 
-_known: WeakKeyDictionary[Mesh, Mapping[str, IntArray]] = WeakKeyDictionary()  # boundaries of meshes still in use
+Facets = Mapping[str, IntArray]
+_known: WeakKeyDictionary[Mesh, tuple[Facets, Facets]] = WeakKeyDictionary()  # boundaries of meshes still in use
 
 
 def all_facets(mesh: Mesh) -> dict[str, IntArray]:
@@ -52,14 +54,31 @@ def boundary_facets(mesh: Mesh) -> Mapping[str, IntArray]:
     Facets are compared by their corner nodes. Rows are complete faces in meshio order (corners, middles, centre).
     The result is kept as long as the mesh is.
     """
+    return _boundary(mesh)[0]
+
+
+def boundary_owners(mesh: Mesh) -> IntArray:
+    """Return the cell behind each of the `boundary_triangles`, (n_tri,); cells are numbered through, type by type."""
+    owners = _boundary(mesh)[1]
+    parts = [np.repeat(cells, len(_TRIANGLES[kind])) for kind, cells in owners.items()]
+    return np.concatenate(parts) if parts else np.zeros(0, np.int64)
+
+
+def _boundary(mesh: Mesh) -> tuple[Facets, Facets]:
+    """Return face type -> facets, and face type -> the cell of each."""
     if mesh not in _known:
-        _known[mesh] = MappingProxyType({kind: frozen_int(f) for kind, f in _single_facets(mesh).items()})
+        facets, owners = _single_facets(mesh)
+        _known[mesh] = (
+            MappingProxyType({kind: frozen_int(f) for kind, f in facets.items()}),
+            MappingProxyType({kind: frozen_int(cells) for kind, cells in owners.items()}),
+        )
     return _known[mesh]
 
 
-def _single_facets(mesh: Mesh) -> dict[str, IntArray]:
-    facets = all_facets(mesh)
-    boundary = {}
+def _single_facets(mesh: Mesh) -> tuple[dict[str, IntArray], dict[str, IntArray]]:
+    facets, cells = all_facets(mesh), _cells_of_facets(mesh)
+    boundary: dict[str, IntArray] = {}
+    owners: dict[str, IntArray] = {}
     for n_corners in (3, 4):
         kinds = [kind for kind in facets if CORNERS[kind] == n_corners]
         if not kinds:
@@ -70,8 +89,19 @@ def _single_facets(mesh: Mesh) -> dict[str, IntArray]:
         ends = np.cumsum([len(facets[kind]) for kind in kinds])
         for kind, mask in zip(kinds, np.split(single, ends[:-1]), strict=True):
             if mask.any():
-                boundary[kind] = facets[kind][mask]
-    return boundary
+                boundary[kind], owners[kind] = facets[kind][mask], cells[kind][mask]
+    return boundary, owners
+
+
+def _cells_of_facets(mesh: Mesh) -> dict[str, IntArray]:
+    """Return face type -> the cell of each of `all_facets`, numbered through, type by type."""
+    parts: dict[str, list[IntArray]] = {}
+    first = 0
+    for kind, cells in mesh.cells.items():
+        for face_kind, local in facet_tables(kind).items():
+            parts.setdefault(face_kind, []).append(np.repeat(first + np.arange(len(cells)), len(local)))
+        first += len(cells)
+    return {face_kind: np.concatenate(blocks) for face_kind, blocks in parts.items()}
 
 
 def first_of_equal_rows(rows: IntArray) -> tuple[IntArray, IntArray]:

@@ -53,7 +53,7 @@ def divide_lines(mesh: LineMesh, n: ArrayLike) -> LineMesh:
         offsets = np.stack([(1 - s)[:, None] * ends[:, 0] + s[:, None] * ends[:, 1] for s in (start, end)], axis=1)
     numbers = mesh.node_numbers
     if numbers.size:
-        numbers = np.concatenate([numbers, numbers.max() + 1 + np.arange(int(is_inner.sum()))])
+        numbers = np.concatenate([numbers, np.full(int(is_inner.sum()), -1)])  # the file does not number them
     line_sets = {group: np.flatnonzero(np.isin(of_line, rows)) for group, rows in mesh.line_sets.items()}
     node_sets: dict[str, IntArray] = dict(mesh.node_sets)
     for group, rows in mesh.line_sets.items():
@@ -69,4 +69,5 @@ def divide_lines(mesh: LineMesh, n: ArrayLike) -> LineMesh:
         orientations=None if mesh.orientations is None else mesh.orientations[of_line],
         offsets=offsets,
         node_numbers=numbers,
+        line_numbers=mesh.line_numbers[of_line] if mesh.line_numbers.size else mesh.line_numbers,
     )

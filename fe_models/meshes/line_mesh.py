@@ -32,6 +32,7 @@ class LineMesh:
     source: str = ""  #: file it was read from, or how it was made
     digest: str = ""  #: sha256 of that file
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
+    line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_lines,); or none
     notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
 
     def __post_init__(self) -> None:
@@ -39,6 +40,7 @@ class LineMesh:
         put(self, "nodes", frozen(self.nodes))
         put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
         put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "line_numbers", frozen_int(self.line_numbers))
         for name in ("line_sets", "node_sets"):
             put(self, name, FrozenMapping({group: frozen_int(m) for group, m in getattr(self, name).items()}))
         n = len(self.lines)

@@ -35,6 +35,7 @@ class ShellMesh:
     digest: str = ""  #: sha256 of that file
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
     cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
+    line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_lines,); or none
     notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
 
     def __post_init__(self) -> None:
@@ -42,6 +43,7 @@ class ShellMesh:
         put(self, "nodes", frozen(self.nodes))
         put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
         put(self, "node_numbers", frozen_int(self.node_numbers))
+        put(self, "line_numbers", frozen_int(self.line_numbers))
         put(self, "notes", tuple(self.notes))
         for name in ("cells", "line_sets", "node_sets", "cell_numbers"):
             put(self, name, FrozenMapping({key: frozen_int(rows) for key, rows in getattr(self, name).items()}))

@@ -203,6 +203,7 @@ def lines_kept(mesh: LineMesh, kept: Mapping[str, Array], source: str) -> LineMe
         node_sets=without_empty({group: moved(place, m) for group, m in mesh.node_sets.items()}),
         orientations=None if mesh.orientations is None else mesh.orientations[rows],
         offsets=None if mesh.offsets is None else mesh.offsets[rows],
+        line_numbers=mesh.line_numbers[rows] if mesh.line_numbers.size else mesh.line_numbers,
         node_numbers=mesh.node_numbers[nodes] if mesh.node_numbers.size else mesh.node_numbers,
         source=source,
     )
@@ -227,6 +228,7 @@ def shell_kept(mesh: ShellMesh, kept: Mapping[str, Array], behind: IntArray, sou
         cell_sets=cell_sets_kept(mesh, kept),
         cell_numbers={kind: numbers[kept[kind]] for kind, numbers in mesh.cell_numbers.items() if kind in cells},
         lines=place[mesh.lines[rows]],
+        line_numbers=mesh.line_numbers[rows] if mesh.line_numbers.size else mesh.line_numbers,
         line_sets=without_empty({group: moved(line_place, m) for group, m in mesh.line_sets.items()}),
         node_sets=without_empty({group: moved(place, m) for group, m in mesh.node_sets.items()}),
         node_numbers=mesh.node_numbers[nodes] if mesh.node_numbers.size else mesh.node_numbers,

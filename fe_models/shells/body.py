@@ -19,6 +19,7 @@ from fe_models.foundation.units import Units
 from fe_models.importers.objects.as_mesh import as_shell_mesh
 from fe_models.material import material_words
 from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh_numbering import shell_numbering
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.elements import ShellCells, shell_cells
 from fe_models.shells.model import ShellModel
@@ -105,6 +106,7 @@ def shell_body(
             np.concatenate([node_dofs, skin_dofs]),
         ),
         node_volumes=_node_volumes(n_nodes, groups, skin),
+        numbering=shell_numbering(mesh, skin.mover, skin.cell_of),
         provenance=_provenance(mesh, used, of_cell),
     )
     interfaces, masses, springs, links = tuple(interfaces), tuple(point_masses), tuple(springs), tuple(links)
@@ -149,6 +151,7 @@ def _frame(
         mesh.nodes[nodes],
         place[lines],
         line_sets=mesh.line_sets if stiffeners is not None else {},
+        line_numbers=mesh.line_numbers if stiffeners is not None else np.zeros(0, np.int64),
         node_numbers=mesh.node_numbers[nodes] if mesh.node_numbers.size else mesh.node_numbers,
     )
     frame = beam_body(

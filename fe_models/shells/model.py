@@ -77,6 +77,10 @@ class ShellModel:
                     stress += mean[:, of_chunk] @ corners
         return stress.reshape(-1, 6, k)
 
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return NaN, (n, 3, k): rotations of shells are dofs."""
+        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
+
     @property
     def has_geometric_stiffness(self) -> bool:
         """True: from stress resultants and masses."""

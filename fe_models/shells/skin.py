@@ -20,6 +20,7 @@ class ShellSkin:
     points: Array  #: those of the tops, then of the bottoms, (2 n, 3) [m]
     mover: IntArray  #: node of the mesh that moves each point, (2 n,)
     triangles: IntArray  #: of points, outward, (n_tri, 3)
+    cell_of: IntArray  #: the cell behind each triangle, numbered through, (n_tri,)
     patch: tuple[IntArray, ...]  #: of every corner, for each cell type, (n_cells, c)
 
     @property
@@ -121,13 +122,18 @@ def make_shell_skin(nodes: Array, groups: tuple[ShellCells, ...]) -> ShellSkin:
         np.stack([low[:, 0], low[:, 1], rim[:, 1]], axis=1),
         np.stack([low[:, 0], rim[:, 1], rim[:, 0]], axis=1),
     ]
-    for rows in by_type:
+    rim_cells = edges.cell[is_end]
+    behind: list[IntArray] = [rim_cells, rim_cells]
+    for rows, first_cell in zip(by_type, starts, strict=False):
+        own = first_cell + np.arange(len(rows))
         faces = [rows] if rows.shape[1] == 3 else [rows[:, [0, 1, 2]], rows[:, [0, 2, 3]]]
         for face in faces:
             triangles += [face, face[:, ::-1] + n_patches]
+            behind += [own, own]
     return ShellSkin(
         frozen(np.concatenate([center + half, center - half])),
         frozen_int(np.concatenate([mover, mover])),
         frozen_int(np.concatenate(triangles)),
+        frozen_int(np.concatenate(behind)),
         tuple(frozen_int(rows) for rows in by_type),
     )

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from fe_models.beams.model import BeamModel
 from fe_models.body.fe_body import ElementModel, FEBody, Recovery
 from fe_models.body.mass_loads import MassLoads
+from fe_models.body.numbering import numbering_side_by_side
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
 from fe_models.shells.model import ShellModel
@@ -49,6 +50,10 @@ class StiffenedModel:
         """Return the stress of the shell at its nodes and skin, then that of the frame at its own."""
         of_shell, of_frame = self._parts("nodal_stress", u)
         return np.concatenate([self.shell.nodal_stress(of_shell, nodes=nodes), self.frame.nodal_stress(of_frame)])
+
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return NaN, (n, 3, k): rotations of shells and beams are dofs."""
+        return np.full((len(nodes), 3, np.shape(u)[1]), np.nan)
 
     @property
     def has_geometric_stiffness(self) -> bool:
@@ -144,6 +149,8 @@ def with_frame(shell: FEBody, model: ShellModel, frame: FEBody, nodes: IntArray,
             np.concatenate([shell.recovery.dofs, frame.recovery.dofs + shift]),
         ),
         node_volumes=np.concatenate([np.asarray(shell.node_volumes), volumes]),
+        numbering=numbering_side_by_side([shell.numbered, frame.numbered], share_numbers=True),
+        kept=np.concatenate([shell.kept, n_shell + frame.kept]),
         provenance={**shell.provenance, **{f"stiffeners: {key}": value for key, value in frame.provenance.items()}},
     )
 

@@ -22,10 +22,12 @@ from fe_models.material import AnyMaterial, assign_materials, material_words
 from fe_models.meshes.boundary import boundary_triangles
 from fe_models.meshes.cell_shapes import cell_jacobians
 from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh_numbering import solid_numbering
 from fe_models.solids.assembly import Progress, assemble, elastic_properties, expand_scalar_mass
 from fe_models.solids.elements import INTEGRATIONS, MASSES, reference_element
 from fe_models.solids.geometric import internal_forces, projected_geometric_stiffness
 from fe_models.solids.incompatible import KIND
+from fe_models.solids.rotation import nodal_rotation
 from fe_models.solids.stress import nodal_stress, stiffest_at_nodes
 
 __all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
@@ -68,6 +70,14 @@ class SolidModel:
         return nodal_stress(
             self.mesh, self.materials, self.of_cell, self.of_node, u, nodes=nodes, incompatible=self.incompatible
         )
+
+    def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
+        """Return half the curl of u at nodes of the mesh, (n, 3, k); NaN at others."""
+        require_rows("nodal_rotation", u, 3 * len(self.mesh.nodes))
+        rotation = np.full((len(nodes), 3, u.shape[1]), np.nan)
+        is_own = nodes < len(self.mesh.nodes)
+        rotation[is_own] = nodal_rotation(self.mesh, u, nodes[is_own])
+        return rotation
 
     @property
     def has_geometric_stiffness(self) -> bool:
@@ -185,6 +195,7 @@ def solid_body(
         surface=boundary_triangles(mesh),
         node_volumes=node_volumes(mesh),
         element_model=SolidModel(mesh, used, of_cell, M_s, incompatible_modes, integration),
+        numbering=solid_numbering(mesh),
         provenance=provenance(mesh, used, of_cell) | _brick_words(mesh, incompatible_modes) | rule_words,
     )
 

@@ -52,6 +52,7 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
         interfaces=tuple(replace(i, Psi=i.Psi[:, k]) for i in body.interfaces),
         columns=None,
         nodal_sums=None,
+        kept=None if body.kept is None else body.kept.of_modes(np.eye(body.n_q)[:, k]),
         load_cases=tuple(replace(case, h=case.h[k]) for case in body.load_cases),
         stress=None if body.stress is None else body.stress[:, :, k],
         point_stress=None,

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.load_cases import LoadCase
+from fe_models.body.numbering import Numbering
 from fe_models.errors import MatrixError
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.units import Units
@@ -16,6 +17,7 @@ from fe_models.importers.matrices.supports import without_supports
 from fe_models.matrices import body_from_matrices
 from fe_models.meshes.boundary import boundary_triangles
 from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.mesh_numbering import node_sets, solid_numbering
 from fe_models.meshes.node_cloud import NodeCloud
 
 __all__ = ["body_from_foreign", "nodes_of", "with_geometry"]
@@ -145,9 +147,19 @@ def body_from_foreign(
         matrices["M"], matrices["K"], nodes, dofs, name=name, units=units, interfaces=interfaces, D=matrices.get("D"),
         surface=boundary_triangles(geometry) if isinstance(geometry, Mesh) else None,
         provenance=record, held=held, mend_mass=mend_mass, accept=accept,
+        numbering=foreign_numbering(read, geometry),
     )  # fmt: skip
     loads = {load: force[is_kept] for load, force in read.loads.items()}
     return body.with_load_cases(*(LoadCase(load, "force", force) for load, force in loads.items()))
+
+
+def foreign_numbering(read: ForeignMatrices, geometry: Mesh | NodeCloud | None) -> Numbering:
+    """Return what the other program calls nodes, and elements and sets where a mesh says it."""
+    numbers = np.zeros(0, np.int64) if read.node_numbers is None else read.node_numbers
+    if isinstance(geometry, Mesh):
+        return replace(solid_numbering(geometry), nodes=numbers)
+    sets = node_sets(geometry.node_sets) if geometry is not None else []
+    return Numbering(nodes=numbers, sets=tuple(sets))
 
 
 def rows_of_nodes(where: str, read: ForeignMatrices) -> IntArray:

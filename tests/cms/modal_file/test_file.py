@@ -112,7 +112,7 @@ def test_a_body_in_other_units_is_that_of_the_model_in_those_units(system):
     converted = convert_units(made[0], system)
     assert converted.units == made[1].units
     sign = np.sign(np.einsum("nck,nck->k", converted.Phi, made[1].Phi))
-    assert len(compare(converted, made[1], sign)) == 51
+    assert len(compare(converted, made[1], sign)) == 63
 
 
 def compare(a, b, sign, where="body"):
@@ -299,11 +299,11 @@ def test_other_files_are_refused_with_words(tmp_path, path):
 
 
 def test_a_newer_version_is_refused_by_its_number(body, tmp_path, monkeypatch):
-    monkeypatch.setattr(modal_file, "version_of", lambda reduced: 5)
+    monkeypatch.setattr(modal_file, "version_of", lambda reduced: 6)
     write(body, tmp_path / "new.h5")
     monkeypatch.undo()
     for file in (tmp_path / "new.h5", repacked(tmp_path / "new.h5")):
-        with pytest.raises(ModalFileError, match="format version 5, this program reads versions up to 4"):
+        with pytest.raises(ModalFileError, match="format version 6, this program reads versions up to 5"):
             read(file)
     (tmp_path / "new.h5").write_bytes(b"floatframe modal-file 12\nbytes 9\nof a kind that does not exist yet")
     with pytest.raises(ModalFileError, match="format version 12"):

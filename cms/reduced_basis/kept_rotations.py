@@ -1,0 +1,62 @@
+"""Rotations of the nodes that a body is asked to keep, over the shapes."""
+
+import numpy as np
+
+from cms.reduced_body.kept_points import KeptPoints
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["kept_points"]
+
+
+def kept_points(body: FEBody, Phi: Array, axes: Array, row_of: IntArray) -> KeptPoints | None:
+    """Return the points that a body keeps with rotations; None if there are none.
+
+    (1) where all three rotations of the node are dofs of the model (beams, shells, leaders of rigid groups): these
+    (2) else where elements know it: half the curl of the displacement (`fe_models.solids.rotation`)
+    (3) else the rotations that are dofs, the others zero: a model in a plane; a node without any has an unknown one
+
+    Parameters
+    ----------
+    body
+        Coupled.
+    Phi
+        Columns over its dofs, (n_dof, n_q).
+    axes
+        Columns: axes of B in mesh axes, (3, 3).
+    row_of
+        Row among the kept nodes of every node, (n_nodes,).
+    """
+    nodes = body.kept
+    if not len(nodes):
+        return None
+    u = body.mesh_displacement(Phi)
+    rotation, has = rotations_of_dofs(body, Phi, u, nodes)
+    source = np.where(has.any(axis=1), "dofs", "unknown").astype(object)
+    ask = np.flatnonzero(~has.all(axis=1))
+    if len(ask) and body.element_model is not None:
+        own = body.element_model.nodal_rotation(u, nodes[ask])
+        known = np.isfinite(own).all(axis=(1, 2))
+        rotation[ask[known]], source[ask[known]] = own[known], "elements"
+    order = np.argsort(row_of[nodes])
+    in_body = np.einsum("ba,nbk->nak", axes, rotation)
+    return KeptPoints(row_of[nodes][order], in_body[order], tuple(str(word) for word in source[order]))
+
+
+def rotations_of_dofs(body: FEBody, Phi: Array, u: Array, nodes: IntArray) -> tuple[Array, np.ndarray]:
+    """Return rotations that are dofs, (n, 3, n_q), zero where they are none, and which are, (n, 3) bool.
+
+    A row of the recovery without entries is no motion: a rotation that nothing holds was taken out of the model.
+    """
+    place = np.full(len(body.nodes), -1)
+    place[nodes] = np.arange(len(nodes))
+    rotation, has = np.zeros((len(nodes), 3, Phi.shape[1])), np.zeros((len(nodes), 3), dtype=bool)
+    tables = [(body.dofs, Phi, np.ones(len(body.dofs), dtype=bool))]
+    if body.recovery is not None:
+        is_motion = np.diff(body.recovery.matrix.tocsr().indptr) > 0
+        tables.insert(0, (body.recovery.dofs, u, is_motion))
+    for dofs, values, is_motion in tables:
+        rows = np.flatnonzero((dofs[:, 1] >= 3) & (place[dofs[:, 0]] >= 0) & is_motion)
+        at, component = place[dofs[rows, 0]], dofs[rows, 1] - 3
+        rotation[at, component], has[at, component] = values[rows], True
+    return rotation, has

@@ -1,0 +1,74 @@
+"""Points that a reduced body keeps with all six motions: nodes of lines, point masses, and those the user names."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cms.errors import BodyError
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, require_finite, require_shape
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["SOURCES", "KeptPoints"]
+
+SOURCES = {
+    "dofs": "rotations that are dofs of the model, as of beams and shells",
+    "elements": "half the curl of the displacement, by the elements at the node, as of solids",
+    "unknown": "not known: bare matrices and rods without rotations",
+}  #: where the rotations of a point come from
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class KeptPoints:
+    """Rotations of kept nodes over the modes; their translations are those of all kept nodes.
+
+    Raises
+    ------
+    BodyError
+        If shapes do not fit, or a source is unknown.
+    """
+
+    nodes: IntArray  #: rows of `ReducedBody.nodes`, ascending, (n,)
+    rotation: Array  #: rotation vectors in B, zero where they are unknown, (n, 3, n_q) [1/m]
+    source: tuple[str, ...]  #: one of `SOURCES` each, (n,)
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "nodes", frozen_int(self.nodes))
+        put(self, "rotation", frozen(self.rotation))
+        put(self, "source", tuple(self.source))
+        n = self.nodes.size
+        if self.nodes.ndim != 1 or np.unique(self.nodes).size != n:
+            raise BodyError("kept points: nodes: a node is there twice")
+        require_shape("kept points: rotation", self.rotation, (n, 3, self.rotation.shape[-1]))
+        require_finite("kept points: rotation", self.rotation)
+        if len(self.source) != n:
+            raise BodyError(f"kept points: expected {n} sources, got {len(self.source)}")
+        for word in set(self.source) - set(SOURCES):
+            raise BodyError(f"kept points: unknown source {quoted(word)}{nearest(word, SOURCES)}")
+
+    def of_node(self, row: int) -> Array | None:
+        """Return the rotation of a kept node by its row, (3, n_q); None if it has none or it is unknown."""
+        at = np.flatnonzero(self.nodes == row)
+        return None if not len(at) or self.source[at[0]] == "unknown" else np.asarray(self.rotation[at[0]])
+
+    def of_modes(self, Z: Array) -> "KeptPoints":
+        """Return the points over new modes, whose coordinates in the old ones are the columns of Z, (n_q, n)."""
+        return replace(self, rotation=self.rotation @ Z)
+
+    def moved(self, rotation: Array, R: Array, Z: Array) -> "KeptPoints":
+        """Return the points in another frame.
+
+        Parameters
+        ----------
+        rotation
+            Of the new frame over the old modes, which leaves the shapes, (3, n_q).
+        R
+            Columns: axes of the new frame in the old one, (3, 3).
+        Z
+            As in `of_modes`.
+        """
+        is_known = np.array([word != "unknown" for word in self.source], dtype=float)
+        own = self.rotation - is_known[:, None, None] * rotation
+        return replace(self, rotation=np.einsum("ba,nbk->nak", R, own) @ Z)

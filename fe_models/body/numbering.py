@@ -1,0 +1,328 @@
+"""Numbers and names of the user: of nodes, elements and sets, as the deck or mesh has them that a body came from.
+
+Inside, a node is its row in an array of nodes, and an element is known by the triangles of the surface that it made.
+This record says what the user calls them. It goes with the body through coupling, joining and reduction into the modal
+file; messages, sensors, tables and files of other programs take names from here alone.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray, frozen_int
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["NONE", "NamedSet", "Numbering", "no_numbers", "node_place", "numbering_side_by_side"]
+
+NONE = -1  #: a node or element that the user did not number: reference nodes of interfaces made here
+SHOWN = 3  #: nearest numbers that a message names
+KINDS = ("nodes", "elements")
+
+
+def no_numbers() -> IntArray:
+    """Return an empty array: there are no numbers."""
+    return frozen_int(np.zeros(0))
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class NamedSet:
+    """A set of the user, as far as the body has it."""
+
+    name: str
+    kind: str  #: "nodes" or "elements"
+    members: IntArray  #: rows of the nodes, or of the triangles of the surface that its elements made, (n,)
+    size: int  #: nodes or elements that it has in the deck or mesh
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "members", frozen_int(self.members))
+        if self.kind not in KINDS:
+            raise BodyError(f"set {self.name!r}: kind: expected one of {', '.join(KINDS)}, got {quoted(self.kind)}")
+        if self.members.ndim != 1:
+            raise BodyError(f"set {self.name!r}: members: expected (n,), got {self.members.shape}")
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Numbering:
+    """The user's numbers of the nodes of a body and of the elements behind its surface, and the sets of both.
+
+    Arrays that are empty are not known: nodes are then told by their index, and said to be.
+    """
+
+    nodes: IntArray = field(default_factory=no_numbers)  #: number of each node, `NONE` where it has none, (n_nodes,)
+    #: 1: the row is a point of a skin that moves with the node of that number, as those of beams and shells;
+    #: 0: the node itself, (n_nodes,); empty: all are nodes themselves
+    on_skin: IntArray = field(default_factory=no_numbers)
+    elements: IntArray = field(default_factory=no_numbers)  #: number of the element behind each triangle, (n_tri,)
+    instances: tuple[str, ...] = ()  #: names of what repeats numbers: instances of parts, bodies that were joined
+    node_instance: IntArray = field(default_factory=no_numbers)  #: of each node, `NONE` for none, (n_nodes,)
+    element_instance: IntArray = field(default_factory=no_numbers)  #: of each triangle, `NONE` for none, (n_tri,)
+    sets: tuple[NamedSet, ...] = ()
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        for name in ("nodes", "on_skin", "elements", "node_instance", "element_instance"):
+            put(self, name, frozen_int(getattr(self, name)))
+            if getattr(self, name).ndim != 1:
+                raise BodyError(f"numbering: {name}: expected (n,), got {getattr(self, name).shape}")
+        put(self, "instances", tuple(self.instances))
+        put(self, "sets", tuple(self.sets))
+        if self.nodes.min(initial=0) < NONE or self.elements.min(initial=0) < NONE:
+            raise BodyError("numbering: expected numbers from 0, and -1 where there is none")
+        for name, of in (("on_skin", "nodes"), ("node_instance", "nodes"), ("element_instance", "elements")):
+            if getattr(self, name).size not in (0, getattr(self, of).size):
+                raise BodyError(f"numbering: {name}: expected one for each of the {getattr(self, of).size} {of}")
+        for name in ("node_instance", "element_instance"):
+            own = getattr(self, name)
+            if own.size and (own.min() < NONE or own.max() >= len(self.instances)):
+                raise BodyError(f"numbering: {name}: expected -1 to {len(self.instances) - 1}")
+        named = [(each.kind, each.name) for each in self.sets]
+        if len(set(named)) != len(named):
+            twice = next(name for kind, name in named if named.count((kind, name)) > 1)
+            raise BodyError(f"numbering: two sets have the name {twice!r}")
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is known."""
+        return not (self.nodes.size or self.elements.size or self.sets)
+
+    def require_fit(self, where: str, n_nodes: int, n_triangles: int) -> None:
+        """Raise `BodyError` unless it is one for so many nodes and triangles."""
+        for name, n in (("nodes", n_nodes), ("elements", n_triangles)):
+            if getattr(self, name).size not in (0, n):
+                raise BodyError(f"{where}: numbering: {name}: expected ({n},) or none, got {getattr(self, name).shape}")
+        for each in self.sets:
+            n = n_nodes if each.kind == "nodes" else n_triangles
+            if each.members.size and (each.members.min() < 0 or each.members.max() >= n):
+                raise BodyError(f"{where}: numbering: set {each.name!r}: members outside 0..{n - 1}")
+
+    # Names ------------------------------------------------------------------------------------------------------------
+
+    def node_name(self, row: int) -> str:
+        """Return what the user calls a node: "12", or "PART-1-1.12"; of one without number "index 7", its row."""
+        if not self.nodes.size or self.nodes[row] == NONE:
+            return f"index {row}"
+        return self._name(int(self.nodes[row]), self.node_instance, row)
+
+    def element_name(self, triangle: int) -> str:
+        """Return what the user calls the element behind a triangle; of one without number "of triangle 7"."""
+        if not self.elements.size or self.elements[triangle] == NONE:
+            return f"of triangle {triangle}"
+        return self._name(int(self.elements[triangle]), self.element_instance, triangle)
+
+    def _name(self, number: int, instance: IntArray, row: int) -> str:
+        at = int(instance[row]) if instance.size else NONE
+        return str(number) if at == NONE else f"{self.instances[at]}.{number}"
+
+    @property
+    def set_names(self) -> tuple[str, ...]:
+        """Names of the sets, of nodes first, each once."""
+        of_nodes = [each.name for each in self.sets if each.kind == "nodes"]
+        return tuple(dict.fromkeys([*of_nodes, *(each.name for each in self.sets)]))
+
+    # What a name means ------------------------------------------------------------------------------------------------
+
+    def rows_of_node(self, where: str, node: int | str) -> IntArray:
+        """Return the rows of a node, itself first, then the points of a skin that move with it, (n,) with n >= 1.
+
+        Parameters
+        ----------
+        where
+            Who asks, for messages.
+        node
+            Its number, or "INSTANCE.number" where instances have the same numbers.
+
+        Raises
+        ------
+        BodyError
+            If nodes have no numbers, there is no such node, or several instances have one.
+        """
+        rows = self._found(where, "node", node, self.nodes, self.node_instance)
+        if self.on_skin.size:
+            rows = rows[np.argsort(self.on_skin[rows], kind="stable")]
+        return rows
+
+    def triangles_of_element(self, where: str, element: int | str) -> IntArray:
+        """Return the triangles of an element, (n,) with n >= 1; `BodyError` if it is not behind the surface."""
+        return self._found(where, "element", element, self.elements, self.element_instance)
+
+    def named_set(self, where: str, name: str) -> NamedSet:
+        """Return the set of that name, of nodes before one of elements; `BodyError` if there is none or it is empty."""
+        for kind in KINDS:
+            for each in self.sets:
+                if (each.kind, each.name) == (kind, name):
+                    if not each.size:
+                        raise BodyError(f"{where}: set {name!r} is empty in the mesh or deck; name another")
+                    if not each.members.size:
+                        raise BodyError(
+                            f"{where}: set {name!r}: none of its {each.size} {kind} is kept in the body; keep them: "
+                            f'keep = ["{name}"] in the [body] of the job, keep= in Python'
+                        )
+                    return each
+        known = f"{nearest(name, self.set_names)}" if self.sets else "; the body knows no sets"
+        raise BodyError(f"{where}: no set {quoted(name)}{known}")
+
+    def _found(self, where: str, what: str, asked: int | str, numbers: IntArray, instance: IntArray) -> IntArray:
+        if not numbers.size:
+            raise BodyError(
+                f"{where}: {what} {asked}: the body knows no numbers of {what}s (its file is older, or it was made "
+                "without a mesh); give a position, or reduce it again from its mesh"
+            )
+        prefix, number = split_name(where, what, asked)
+        found = np.flatnonzero(numbers == number)
+        if prefix is not None:
+            if prefix not in self.instances:
+                near = nearest(prefix, self.instances)
+                raise BodyError(f"{where}: {what} {asked!r}: no instance {quoted(prefix)}{near}")
+            found = found[instance[found] == self.instances.index(prefix)] if instance.size else found
+        if not found.size:
+            raise BodyError(f"{where}: no {what} {asked}{self._near(what, number, numbers, instance)}")
+        if instance.size and len(np.unique(instance[found])) > 1:
+            names = dict.fromkeys(self._name(number, instance, int(row)) for row in found)
+            raise BodyError(
+                f"{where}: {what} {asked} is there {len(names)} times; name the instance: "
+                f"{what} = {' or '.join(quoted(name) for name in list(names)[:6])}"
+            )
+        return np.asarray(found)
+
+    def _near(self, what: str, number: int, numbers: IntArray, instance: IntArray) -> str:
+        """Say which numbers are there, the nearest ones by name."""
+        rows = np.flatnonzero(numbers != NONE)
+        if not rows.size:
+            return f": no {what} that is kept has a number"
+        order = rows[np.argsort(np.abs(numbers[rows] - number), kind="stable")]
+        names = list(dict.fromkeys(self._name(int(numbers[row]), instance, int(row)) for row in order[:64]))[:SHOWN]
+        n = len(np.unique(numbers[rows]))
+        return (
+            f" among the {n} that are kept, from {numbers[rows].min()} to {numbers[rows].max()}; nearest: "
+            f"{', '.join(names)}. Others are kept where they are named: keep = [{number}] in the [body] of the job, "
+            "keep= in Python"
+            if what == "node"
+            else f" behind the surface, whose {n} go from {numbers[rows].min()} to {numbers[rows].max()}; nearest: "
+            f"{', '.join(names)}"
+        )
+
+    # Carried along ----------------------------------------------------------------------------------------------------
+
+    def with_nodes_added(self, n: int) -> "Numbering":
+        """Return the numbering of a body with n nodes more at the end, which the user did not number."""
+        return replace(
+            self,
+            nodes=longer(self.nodes, n, NONE),
+            on_skin=longer(self.on_skin, n, 0),
+            node_instance=longer(self.node_instance, n, NONE),
+        )
+
+    def of_rows(self, rows: IntArray, n_nodes: int) -> "Numbering":
+        """Return the numbering of some nodes, (n,) rows of n_nodes, in that order; triangles are those of before."""
+        place = np.full(n_nodes, NONE)
+        place[rows] = np.arange(len(rows))
+        sets = []
+        for each in self.sets:
+            if each.kind == "nodes":
+                members = place[each.members]
+                each = replace(each, members=members[members >= 0])
+            sets.append(each)
+        taken = {name: getattr(self, name) for name in ("nodes", "on_skin", "node_instance")}
+        return replace(self, **{name: a[rows] if a.size else a for name, a in taken.items()}, sets=tuple(sets))
+
+    def without_indices(self, indices: IntArray) -> "Numbering":
+        """Return the numbering without numbers of nodes that say no more than these indices, (n_nodes,)."""
+        if np.array_equal(self.nodes, indices) and not self.instances and not self.on_skin.any():
+            return replace(self, nodes=no_numbers(), on_skin=no_numbers())
+        return self
+
+
+def split_name(where: str, what: str, asked: int | str) -> tuple[str | None, int]:
+    """Return instance, None for none, and number of 12, "12" or "PART-1-1.12"."""
+    if isinstance(asked, bool) or not isinstance(asked, int | np.integer | str):
+        raise BodyError(f'{where}: {what}: expected a whole number, or text "INSTANCE.number", got {asked!r}')
+    prefix, dot, number = str(asked).rpartition(".")
+    if not number.strip().lstrip("-").isdigit():
+        raise BodyError(f'{where}: {what}: expected a whole number, or text "INSTANCE.number", got {asked!r}')
+    return (prefix if dot else None), int(number)
+
+
+def longer(values: IntArray, n: int, filling: int) -> IntArray:
+    """Return an array with n equal values added at its end; an empty one as it is."""
+    return np.concatenate([values, np.full(n, filling)]) if values.size else values
+
+
+def numbering_side_by_side(
+    parts: Sequence[tuple[str, Numbering, int, int]], *, share_numbers: bool = False
+) -> Numbering:
+    """Return the numbering of bodies side by side.
+
+    Parameters
+    ----------
+    parts
+        Name, numbering, number of nodes and of triangles of each.
+    share_numbers
+        Whether they share the nodes of one deck, so that a number that is there twice means one node, and a set of
+        the same name one set; else the names of the bodies tell them apart.
+    """
+    n_nodes, n_triangles = np.cumsum([0, *(n for _, _, n, _ in parts)]), np.cumsum([0, *(n for *_, n in parts)])
+    joined: dict[str, IntArray] = {}
+    for name, filling in (("nodes", NONE), ("on_skin", 0), ("elements", NONE)):
+        counts = [n if name == "elements" else m for _, _, m, n in parts]
+        arrays = [getattr(numbering, name) for _, numbering, *_ in parts]
+        if any(a.size for a in arrays):
+            filled = [a if a.size else np.full(n, filling) for a, n in zip(arrays, counts, strict=True)]
+            joined[name] = np.concatenate(filled)
+    if "on_skin" in joined and "nodes" not in joined:
+        del joined["on_skin"]
+    prefixed = {} if share_numbers else told_apart(parts, joined)
+    sets: dict[tuple[str, str], NamedSet] = {}
+    names = [(each.kind, each.name) for part in parts for each in part[1].sets]
+    for (body, numbering, *_), node, triangle in zip(parts, n_nodes, n_triangles, strict=False):
+        for each in numbering.sets:
+            moved = each.members + (node if each.kind == "nodes" else triangle)
+            is_twice = names.count((each.kind, each.name)) > 1 and not share_numbers
+            name = f"{body}.{each.name}" if is_twice else each.name
+            key = each.kind, name
+            before = sets.get(key)
+            members = moved if before is None else np.concatenate([before.members, moved])
+            sets[key] = NamedSet(name, each.kind, members, each.size + (0 if before is None else before.size))
+    return Numbering(**joined, **prefixed, sets=tuple(sets.values()))  # type: ignore[arg-type]
+
+
+def told_apart(parts: Sequence[tuple[str, Numbering, int, int]], joined: Mapping[str, IntArray]) -> dict[str, object]:
+    """Return instances of nodes and triangles where numbers of several bodies are the same; else nothing."""
+    had = any(part[1].instances for part in parts)
+    if not had and not any(overlap([part[1] for part in parts], name) for name in ("nodes", "elements")):
+        return {}
+    instances: list[str] = []
+    found: dict[str, list[IntArray]] = {"node_instance": [], "element_instance": []}
+    for body, numbering, n_nodes, n_triangles in parts:
+        own = [f"{body}.{name}" for name in numbering.instances] or [body]
+        for name, numbers, n in (
+            ("node_instance", numbering.nodes, n_nodes),
+            ("element_instance", numbering.elements, n_triangles),
+        ):
+            at = getattr(numbering, name) if numbering.instances else np.zeros(n, np.int64)
+            at = at if at.size else np.full(n, NONE)
+            has = (at >= 0) & (numbers != NONE if numbers.size else False)
+            found[name].append(np.where(has, at + len(instances), NONE))
+        instances += own
+    arrays = {
+        name: np.concatenate(found[name])
+        for name, of in (("node_instance", "nodes"), ("element_instance", "elements"))
+        if of in joined
+    }
+    return {"instances": tuple(instances), **arrays}
+
+
+def overlap(numberings: Iterable[Numbering], name: str) -> bool:
+    """Whether two of them have the same number."""
+    own = [np.unique(a[a != NONE]) for a in (getattr(each, name) for each in numberings)]
+    together = np.concatenate([*own, np.zeros(0, np.int64)])
+    return len(np.unique(together)) < len(together)
+
+
+def node_place(numbering: Numbering, nodes: Array, row: int) -> str:
+    """Say name and place of a node in words, for messages."""
+    return f"node {numbering.node_name(row)} at [{', '.join(f'{x:.6g}' for x in nodes[row])}]"

@@ -1,0 +1,120 @@
+"""What the user's mesh calls its nodes, elements and sets, as the numbering of the body that is made of it."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fe_models.body.numbering import NONE, NamedSet, Numbering, no_numbers
+from fe_models.foundation.arrays import IntArray
+from fe_models.meshes.boundary import boundary_owners
+from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh import Mesh
+from fe_models.meshes.shell_mesh import ShellMesh
+
+__all__ = ["line_numbering", "node_sets", "shell_numbering", "solid_numbering"]
+
+NO_NUMBERS = no_numbers()
+CellSets = Mapping[str, Mapping[str, IntArray]]
+
+
+def solid_numbering(mesh: Mesh) -> Numbering:
+    """Return the numbering of the body of a mesh of solids: its nodes, the cells behind the boundary triangles, sets.
+
+    Groups of faces are sets of their nodes.
+    """
+    cell_of = boundary_owners(mesh)
+    of_faces = {
+        group: np.unique(np.concatenate([mesh.faces[kind][rows].ravel() for kind, rows in by_type.items()]))
+        for group, by_type in mesh.face_sets.items()
+        if any(rows.size for rows in by_type.values())
+    }
+    return Numbering(
+        nodes=mesh.node_numbers,
+        elements=cell_numbers(mesh)[cell_of] if mesh.cell_numbers else NO_NUMBERS,
+        sets=(
+            *node_sets({**of_faces, **mesh.node_sets}),
+            *cell_sets(mesh.cell_sets, {kind: len(cells) for kind, cells in mesh.cells.items()}, cell_of),
+        ),
+    )
+
+
+def shell_numbering(mesh: ShellMesh, mover: IntArray, cell_of: IntArray) -> Numbering:
+    """Return the numbering of the body of a shell.
+
+    Parameters
+    ----------
+    mesh
+        The shell, without its stiffeners.
+    mover
+        Node that moves each point of the skin, (n_skin,).
+    cell_of
+        Cell behind each triangle of the skin, numbered through, (n_tri,).
+    """
+    return Numbering(
+        nodes=np.concatenate([mesh.node_numbers, mesh.node_numbers[mover]]) if mesh.node_numbers.size else NO_NUMBERS,
+        on_skin=skin_flags(len(mesh.nodes), len(mover)) if mesh.node_numbers.size else NO_NUMBERS,
+        elements=cell_numbers(mesh)[cell_of] if mesh.cell_numbers else NO_NUMBERS,
+        sets=(
+            *node_sets(mesh.node_sets, mover, len(mesh.nodes)),
+            *cell_sets(mesh.cell_sets, {kind: len(cells) for kind, cells in mesh.cells.items()}, cell_of),
+        ),
+    )
+
+
+def line_numbering(mesh: LineMesh, mover: IntArray, line_of: IntArray) -> Numbering:
+    """Return the numbering of the body of a frame.
+
+    Parameters
+    ----------
+    mesh
+        The lines.
+    mover
+        Node that moves each point of the skin, (n_skin,).
+    line_of
+        Line behind each triangle of the skin, (n_tri,).
+    """
+    sets = {group: {"line": rows} for group, rows in mesh.line_sets.items()}
+    return Numbering(
+        nodes=np.concatenate([mesh.node_numbers, mesh.node_numbers[mover]]) if mesh.node_numbers.size else NO_NUMBERS,
+        on_skin=skin_flags(len(mesh.nodes), len(mover)) if mesh.node_numbers.size else NO_NUMBERS,
+        elements=mesh.line_numbers[line_of] if mesh.line_numbers.size else NO_NUMBERS,
+        sets=(
+            *node_sets(mesh.node_sets, mover, len(mesh.nodes)),
+            *cell_sets(sets, {"line": len(mesh.lines)}, line_of),
+        ),
+    )
+
+
+def skin_flags(n_nodes: int, n_skin: int) -> IntArray:
+    """Return 0 for nodes and 1 for the points of a skin behind them, (n_nodes + n_skin,)."""
+    return np.repeat(np.arange(2), [n_nodes, n_skin])
+
+
+def node_sets(sets: Mapping[str, IntArray], mover: IntArray | None = None, n_nodes: int = 0) -> list[NamedSet]:
+    """Return sets of nodes, with the points of a skin that their nodes move."""
+    made = []
+    for name, nodes in sets.items():
+        members = np.unique(nodes)
+        if mover is not None:
+            members = np.concatenate([members, n_nodes + np.flatnonzero(np.isin(mover, nodes))])
+        made.append(NamedSet(name, "nodes", members, len(np.unique(nodes))))
+    return made
+
+
+def cell_sets(sets: CellSets, counts: Mapping[str, int], cell_of: IntArray) -> list[NamedSet]:
+    """Return sets of cells by the triangles that they made; cells are numbered through, type by type."""
+    first = dict(zip(counts, np.cumsum([0, *counts.values()]), strict=False))
+    made = []
+    for name, by_type in sets.items():
+        inside = np.zeros(sum(counts.values()), dtype=bool)
+        for kind, rows in by_type.items():
+            inside[first[kind] + rows] = True
+        made.append(NamedSet(name, "elements", np.flatnonzero(inside[cell_of]), int(inside.sum())))
+    return made
+
+
+def cell_numbers(mesh: Mesh | ShellMesh) -> IntArray:
+    """Return the numbers of all cells, type by type, (n_cells,); `NONE` where a type has none."""
+    return np.concatenate(
+        [mesh.cell_numbers.get(kind, np.full(len(cells), NONE)) for kind, cells in mesh.cells.items()]
+    )
