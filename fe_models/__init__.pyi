@@ -58,6 +58,7 @@ from .loads import interface_load as interface_load
 from .loads import nodal_load as nodal_load
 from .loads import pressure_load as pressure_load
 from .loads import selection_load as selection_load
+from .material import AnisotropicMaterial as AnisotropicMaterial
 from .material import Material as Material
 from .material import OrthotropicMaterial as OrthotropicMaterial
 from .matrices import body_from_matrices as body_from_matrices

@@ -1,4 +1,4 @@
-"""Linear elastic materials, isotropic and orthotropic, and which cell has which."""
+"""Linear elastic materials, isotropic, orthotropic and anisotropic, and which cell has which."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,6 +12,7 @@ from fe_models.foundation.words import nearest, quoted
 from fe_models.meshes.mesh import Mesh
 
 __all__ = [
+    "AnisotropicMaterial",
     "AnyMaterial",
     "Material",
     "OrthotropicMaterial",
@@ -20,6 +21,8 @@ __all__ = [
     "material_words",
     "require_isotropic",
 ]
+
+SYMMETRY = 1e-9  #: of an elasticity, of its largest entry: what digits of a file leave
 
 
 @dataclass(frozen=True)
@@ -97,20 +100,10 @@ class OrthotropicMaterial:
         where = f"material {self.name!r}"
         for key in ("young", "shear", "poisson"):
             object.__setattr__(self, key, _three(f"{where}: {key}", getattr(self, key)))
-        object.__setattr__(self, "axes", tuple(_three(f"{where}: axes", row) for row in self.axes))
-        if isinstance(self.rho, bool) or not isinstance(self.rho, int | float | np.number) or not self.rho > 0:
-            raise MaterialError(f"{where}: rho: expected a density above zero, got {self.rho!r}")
-        object.__setattr__(self, "rho", float(self.rho))
+        _set_axes_and_density(where, self)
         for key in ("young", "shear"):
             if min(getattr(self, key)) <= 0:
                 raise MaterialError(f"{where}: {key}: expected moduli above zero, got {_listed(getattr(self, key))}")
-        axes = np.array(self.axes)
-        is_triad = axes.shape == (3, 3) and np.abs(axes @ axes.T - np.eye(3)).max() < 1e-6 and np.linalg.det(axes) > 0
-        if not is_triad:
-            raise MaterialError(
-                f"{where}: axes: expected three rows, orthonormal and right-handed, got "
-                f"{np.array2string(axes, precision=4)}"
-            )
         least = np.linalg.eigvalsh(_normalised(self.compliance[:3, :3])).min()
         if not least > 0:
             nu_12, nu_13, nu_23 = self.poisson
@@ -144,7 +137,71 @@ class OrthotropicMaterial:
         return np.asarray((C + C.T) / 2)
 
 
-AnyMaterial = Material | OrthotropicMaterial
+@dataclass(frozen=True)
+class AnisotropicMaterial:
+    """Linear elastic without any symmetry: 21 constants.
+
+    Raises
+    ------
+    MaterialError
+        Unless all numbers are finite, the density above zero, the axes orthonormal and right-handed, and the elasticity
+        symmetric and positive definite.
+    """
+
+    name: str
+    elasticity: tuple[
+        tuple[float, ...], ...
+    ]  #: stress by strain in its axes, rows 11 22 33 23 13 12, shear doubled [Pa]
+    rho: float  #: density [kg/m³]
+    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  #: rows 1, 2, 3
+
+    def __post_init__(self) -> None:
+        where = f"material {self.name!r}"
+        C = np.asarray(self.elasticity)
+        if C.shape != (6, 6) or C.dtype.kind not in "iuf" or not np.isfinite(C).all():
+            raise MaterialError(f"{where}: elasticity: expected six rows of six finite numbers, got {C.shape}")
+        object.__setattr__(self, "elasticity", tuple(tuple(float(x) for x in row) for row in C))
+        _set_axes_and_density(where, self)
+        if np.abs(C - C.T).max() > SYMMETRY * np.abs(C).max():
+            i, j = np.unravel_index(int(np.abs(C - C.T).argmax()), C.shape)
+            raise MaterialError(
+                f"{where}: elasticity: expected a symmetric matrix, got {C[i, j]:g} in row {i + 1}, column {j + 1} and "
+                f"{C[j, i]:g} across"
+            )
+        if np.diag(C).min() <= 0 or not np.linalg.eigvalsh(_normalised(C)).min() > 0:
+            raise MaterialError(
+                f"{where}: elasticity: some strains would have no energy or a negative one (it is not positive "
+                "definite). Is the order of rows and columns 11 22 33 23 13 12?"
+            )
+
+    @property
+    def E(self) -> float:
+        """The largest Young's modulus along its axes [Pa]."""
+        return float(1 / np.diag(np.linalg.inv(np.array(self.elasticity)))[:3].min())
+
+    @property
+    def stiffness(self) -> Array:
+        """Stress by strain in mesh axes, (6, 6) [Pa], rows xx yy zz yz xz xy, shear strains doubled."""
+        T = _stress_turn(np.array(self.axes).T)
+        C = T @ np.array(self.elasticity) @ T.T
+        return np.asarray((C + C.T) / 2)
+
+
+def _set_axes_and_density(where: str, material: "OrthotropicMaterial | AnisotropicMaterial") -> None:
+    """Take axes and density as numbers, or refuse them."""
+    object.__setattr__(material, "axes", tuple(_three(f"{where}: axes", row) for row in material.axes))
+    rho = material.rho
+    if isinstance(rho, bool) or not isinstance(rho, int | float | np.number) or not rho > 0:
+        raise MaterialError(f"{where}: rho: expected a density above zero, got {rho!r}")
+    object.__setattr__(material, "rho", float(rho))
+    axes = np.array(material.axes)
+    is_triad = axes.shape == (3, 3) and np.abs(axes @ axes.T - np.eye(3)).max() < 1e-6 and np.linalg.det(axes) > 0
+    if not is_triad:
+        given = np.array2string(axes, precision=4)
+        raise MaterialError(f"{where}: axes: expected three rows, orthonormal and right-handed, got {given}")
+
+
+AnyMaterial = Material | OrthotropicMaterial | AnisotropicMaterial
 
 
 def isotropic_tensor(lam: float, mu: float) -> Array:
@@ -158,16 +215,21 @@ def material_words(material: AnyMaterial) -> str:
     """Return the numbers of a material as a line of a provenance."""
     if isinstance(material, Material):
         return f"E = {material.E!r}, nu = {material.nu!r}, rho = {material.rho!r}"
+    axes = f"axes {[list(row) for row in material.axes]}"
+    if isinstance(material, AnisotropicMaterial):
+        C = [list(row) for row in material.elasticity]
+        return f"anisotropic, stress by strain 11 22 33 23 13 12 = {C}, rho = {material.rho!r}, {axes}"
     return (
         f"orthotropic, E = {list(material.young)}, G_12, G_13, G_23 = {list(material.shear)}, nu_12, nu_13, nu_23 = "
-        f"{list(material.poisson)}, rho = {material.rho!r}, axes {[list(row) for row in material.axes]}"
+        f"{list(material.poisson)}, rho = {material.rho!r}, {axes}"
     )
 
 
 def require_isotropic(where: str, material: object) -> None:
-    """Raise `MaterialError` for an orthotropic material: what is here has no stiffness for it."""
-    if isinstance(material, OrthotropicMaterial):
-        raise MaterialError(f"{where}: material {material.name!r} is orthotropic; expected an isotropic one (Material)")
+    """Raise `MaterialError` for a material with directions: what is here has no stiffness for it."""
+    if isinstance(material, OrthotropicMaterial | AnisotropicMaterial):
+        kind = "orthotropic" if isinstance(material, OrthotropicMaterial) else "anisotropic"
+        raise MaterialError(f"{where}: material {material.name!r} is {kind}; expected an isotropic one (Material)")
 
 
 def _three(where: str, values: Sequence[float]) -> tuple[float, float, float]:

@@ -75,7 +75,8 @@ def job_text(deck: Deck, request: JobRequest, deck_path: str) -> str:
         if support.is_boundary:
             head.append(f"# The deck keeps {held} of {support.name} as the boundary of a superelement.")
             continue
-        head.append(f"# The deck holds {held} at the interface {support.name}; here the body is free.")
+        along = "" if support.axes is None else " along its own axes"
+        head.append(f"# The deck holds {held}{along} at the interface {support.name}; here the body is free.")
     return "\n".join(head) + "\n\n" + toml_text({key: value for key, value in tables.items() if value})
 
 
@@ -84,9 +85,14 @@ def sections_of(deck: Deck) -> list[SolidSection | ShellSection | LineSection | 
     return [*deck.solids, *deck.shells, *deck.lines, *deck.rods]
 
 
+def materials_in(section: SolidSection | ShellSection | LineSection | RodSection) -> tuple[str, ...]:
+    """Return the names of the materials of a section."""
+    return section.materials if isinstance(section, ShellSection) else (section.material,)
+
+
 def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
     """Return the materials in use; a density that the deck lacks comes from the request."""
-    used = dict.fromkeys(each.material for each in sections_of(deck))
+    used = dict.fromkeys(name for each in sections_of(deck) for name in materials_in(each))
     for name in request.densities:
         if name and name not in used:
             raise JobError(f"--density {quoted(name)}: the deck has no such material in use{nearest(name, used)}")
@@ -99,13 +105,16 @@ def _materials(deck: Deck, request: JobRequest) -> dict[str, Any]:
                 f"deck {deck.path}: a section names the material {quoted(name)}{nearest(name, deck.materials)}"
             )
         density = material.density or request.densities.get(name, request.densities.get(""))
-        if material.young is None or material.poisson is None:
+        if material.elasticity is None and (material.young is None or material.poisson is None):
             raise JobError(f"deck {deck.path}: material {quoted(name)} has no elastic constants (linear)")
         if not density:
             without.append(name)
             continue
-        made[name] = {"young": material.young, "poisson": material.poisson, "density": density}
-        made[name] |= {} if material.shear is None else {"shear": material.shear}
+        if material.elasticity is not None:
+            made[name] = {"elasticity": material.elasticity, "density": density}
+        else:
+            made[name] = {"young": material.young, "poisson": material.poisson, "density": density}
+            made[name] |= {} if material.shear is None else {"shear": material.shear}
         made[name] |= {} if material.axes is None else {"axes": material.axes}
     if without:
         raise JobError(
@@ -124,7 +133,13 @@ def _sections(deck: Deck) -> dict[str, Any]:
             table |= {"integration": solid.integration, "mass": solid.mass}
         tables["solids"][_free(tables["solids"], solid.group)] = table
     for shell in deck.shells:
-        row = {"cells": shell.group, "material": shell.material, "thickness": shell.thickness}
+        row: dict[str, Any] = {"cells": shell.group}
+        if shell.layers:
+            keys = ("thickness", "angle", "material")
+            row["layers"] = [{key: getattr(layer, key) for key in keys} for layer in shell.layers]
+            row["direction"] = shell.direction
+        else:
+            row |= {"material": shell.material, "thickness": shell.thickness}
         row |= {"offset": shell.offset} if shell.offset else {}
         row |= {"added_mass": shell.added_mass} if shell.added_mass else {}
         tables["shells"][_free(tables["shells"], shell.group)] = row
@@ -183,7 +198,8 @@ def _interface(deck: Deck, support: Support) -> dict[str, Any]:
     turns = np.isin(nodes, _nodes_with_rotations(deck))
     all_held = set(support.components) >= set(range(6)) if turns.any() else set(support.components) >= {0, 1, 2}
     is_rigid = all_held and (turns.any() or is_spread) and not support.is_boundary
-    return {"kind": "rigid" if is_rigid else "nodes", "nodes": support.nodes}
+    made: dict[str, Any] = {"kind": "rigid" if is_rigid else "nodes", "nodes": support.nodes}
+    return made | ({} if support.axes is None else {"triad": support.axes})
 
 
 def _nodes_with_rotations(deck: Deck) -> Any:

@@ -1,6 +1,6 @@
 """The body of a whole deck: solids, shells and lines on shared nodes, with what is attached to them and their links."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,15 +61,9 @@ def _parts(
     for body, mesh in _solids(job, path, raw, on_report):
         parts.append(Part(body, np.asarray(mesh.node_numbers)))
         meshes.append(mesh)
-    for made in (
-        _shells(job, path, raw, on_report),
-        _lines(job, path, raw, on_report),
-        _rods(job, path, raw),
-        _attached(job, raw),
-    ):
-        if made is not None:
-            parts.append(made)
-    return parts, meshes
+    parts += [*_shells(job, path, raw, on_report), *_lines(job, path, raw, on_report), *_rods(job, path, raw)]
+    attached = _attached(job, raw)
+    return [*parts, *([] if attached is None else [attached])], meshes
 
 
 def _materials(job: Job) -> "dict[str, AnyMaterial]":
@@ -125,7 +119,8 @@ def _is_linked(job: Job) -> bool:
     return bool(job.links or job.couplings or job.equations or job.springs)
 
 
-def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Part | None":
+def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Iterable[Part]":
+    """Yield a body of the shells; more than one where shells lie on the same nodes."""
     from cms.jobs.shell_body import shell_properties_of
     from fe_models.assemblies.join import Part
     from fe_models.importers.raw_mesh import chosen_cells
@@ -134,31 +129,47 @@ def _shells(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], Non
     from fe_models.shells.body import shell_body
     from fe_models.shells.quality import WARP_LIMIT
 
-    if not job.shells:
-        return None
-    properties = shell_properties_of(job)
+    properties = shell_properties_of(job) if job.shells else {}
+    layers = _layers(raw, "shells.cells", SHELL_TYPES, properties)
+    is_alone = not job.solids and not job.sections and not _is_linked(job) and len(layers) == 1
+    for name, groups in zip(_names(f"{job.body.name} shells", layers), layers, strict=True):
+        mesh = shell_mesh_from_raw(chosen_cells(raw, SHELL_TYPES, groups), path, "", groups, ())
+        mine = properties if groups is None else {group: properties[group] for group in groups}
+        materials = {made: None for item in mine.values() for made in item.materials}
+        report = report_shell(mesh, materials, units=unit_system(job.body.units))
+        if on_report is not None:
+            on_report(report)
+        report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts", "transition"))
+        body = shell_body(
+            mesh,
+            mine["all"] if groups is None else mine,
+            name=name,
+            units=unit_system(job.body.units),
+            warp_limit=180.0 if "warped" in job.body.accept else WARP_LIMIT,
+        )
+        yield Part(body, np.asarray(mesh.node_numbers))
+
+
+def _layers(
+    raw: "RawMesh", where: str, kinds: tuple[str, ...], properties: Mapping[str, Any]
+) -> list[tuple[str, ...] | None]:
+    """Return the groups in parts of which none has cells on the same nodes as another; None: all cells."""
+    from fe_models.importers.cells_apart import groups_apart
+
+    if "all" in properties:
+        return [None]
     for group in properties:
-        if group != "all":
-            _require_group(raw, "shells.cells", group)
-    groups = None if "all" in properties else tuple(properties)
-    mesh = shell_mesh_from_raw(chosen_cells(raw, SHELL_TYPES, groups), path, "", groups, ())
-    materials = {made: None for item in properties.values() for made in item.materials}
-    report = report_shell(mesh, materials, units=unit_system(job.body.units))
-    if on_report is not None:
-        on_report(report)
-    is_alone = not job.solids and not job.sections and not _is_linked(job)
-    report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts", "transition"))
-    body = shell_body(
-        mesh,
-        properties["all"] if groups is None else properties,
-        name=f"{job.body.name} shells",
-        units=unit_system(job.body.units),
-        warp_limit=180.0 if "warped" in job.body.accept else WARP_LIMIT,
-    )
-    return Part(body, np.asarray(mesh.node_numbers))
+        _require_group(raw, where, group)
+    return [*groups_apart(raw, kinds, properties)]
 
 
-def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Part | None":
+def _names(name: str, layers: list[Any]) -> list[str]:
+    """Return a name for each part."""
+    return [name] if len(layers) == 1 else [f"{name} {k}" for k in range(1, len(layers) + 1)]
+
+
+def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None] | None) -> "Iterable[Part]":
+    """Yield a body of the beams; more than one where beams lie on the same nodes."""
     from cms.jobs.attachments_of_job import properties_of
     from fe_models.assemblies.join import Part
     from fe_models.beams.body import beam_body
@@ -166,47 +177,40 @@ def _lines(job: Job, path: Path, raw: "RawMesh", on_report: Callable[[Any], None
     from fe_models.importers.raw_mesh import chosen_cells
     from fe_models.reports.frame_report import report_frame
 
-    if not job.sections:
-        return None
-    properties = properties_of(job)
-    for group in properties:
-        if group != "all":
-            _require_group(raw, "sections.lines", group)
-    groups = None if "all" in properties else tuple(properties)
-    mesh = line_mesh_from_raw(chosen_cells(raw, ("line", "line3"), groups), path, "", groups)
-    materials = {item.material: None for item in properties.values()}
-    report = report_frame(mesh, materials, units=unit_system(job.body.units))
-    if on_report is not None:
-        on_report(report)
-    is_alone = not job.solids and not job.shells and not _is_linked(job)
-    report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts"))
-    body = beam_body(
-        mesh,
-        properties["all"] if groups is None else properties,
-        name=f"{job.body.name} beams",
-        units=unit_system(job.body.units),
-    )
-    return Part(body, np.asarray(mesh.node_numbers))
+    properties = properties_of(job) if job.sections else {}
+    layers = _layers(raw, "sections.lines", ("line", "line3"), properties)
+    is_alone = not job.solids and not job.shells and not _is_linked(job) and len(layers) == 1
+    for name, groups in zip(_names(f"{job.body.name} beams", layers), layers, strict=True):
+        mesh = line_mesh_from_raw(chosen_cells(raw, ("line", "line3"), groups), path, "", groups)
+        mine = properties if groups is None else {group: properties[group] for group in groups}
+        materials = {item.material: None for item in mine.values()}
+        report = report_frame(mesh, materials, units=unit_system(job.body.units))
+        if on_report is not None:
+            on_report(report)
+        report.raise_for_errors(accept=job.body.accept if is_alone else (*job.body.accept, "parts"))
+        body = beam_body(mesh, mine["all"] if groups is None else mine, name=name, units=unit_system(job.body.units))
+        yield Part(body, np.asarray(mesh.node_numbers))
 
 
-def _rods(job: Job, path: Path, raw: "RawMesh") -> "Part | None":
+def _rods(job: Job, path: Path, raw: "RawMesh") -> "Iterable[Part]":
+    """Yield a body of the rods; more than one where rods lie on the same nodes."""
     from fe_models.assemblies.join import Part
     from fe_models.assemblies.rods import Rod, rod_body
     from fe_models.importers.line_cells import line_mesh_from_raw
     from fe_models.importers.raw_mesh import chosen_cells
 
-    if not job.rods:
-        return None
-    rods = {}
+    rods: dict[str, Rod] = {}
     for table in job.rods.values():
         name = table.material or next(iter(job.materials))
         rod = Rod(isotropic_of(name, job.materials[name], "rods"), table.area)
-        for group in table.lines:
-            _require_group(raw, "rods.lines", group)
-            rods[group] = rod
-    mesh = line_mesh_from_raw(chosen_cells(raw, ("line",), tuple(rods)), path, "", tuple(rods))
-    body = rod_body(mesh, rods, name=f"{job.body.name} rods", units=unit_system(job.body.units))
-    return Part(body, np.asarray(mesh.node_numbers))
+        rods |= dict.fromkeys(table.lines, rod)
+    layers = _layers(raw, "rods.lines", ("line",), rods)
+    for name, groups in zip(_names(f"{job.body.name} rods", layers), layers, strict=True):
+        assert groups is not None  # rods name their lines
+        mesh = line_mesh_from_raw(chosen_cells(raw, ("line",), groups), path, "", groups)
+        mine = {group: rods[group] for group in groups}
+        body = rod_body(mesh, mine, name=name, units=unit_system(job.body.units))
+        yield Part(body, np.asarray(mesh.node_numbers))
 
 
 def _attached(job: Job, raw: "RawMesh") -> "Part | None":

@@ -146,10 +146,17 @@ def _blocks(where: str, lines: Iterator[_Line]) -> Iterator[DeckBlock]:
             head, data = line, []
         elif head is not None:
             data.append(line.text)
+        elif _is_remark(line.text):
+            continue
         else:
             raise MeshError(f"{where}, line {line.number}: expected a keyword line (*...), got {line.text[:40]!r}")
     if head is not None:
         yield _block(head, data)
+
+
+def _is_remark(text: str) -> bool:
+    """Whether a line above the first keyword is one of stars behind a sign that slipped in, such as >**."""
+    return text[1:].strip("* ") == "" and "**" in text
 
 
 def _head(text: str) -> tuple[str, dict[str, str]]:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
-from fe_models.material import AnyMaterial, OrthotropicMaterial
+from fe_models.material import AnyMaterial, Material, OrthotropicMaterial
 from fe_models.shells.shell_property import AnyShellProperty, LaminateProperty, Layer
 from fe_models.shells.strains import plane_elasticity
 
@@ -171,8 +171,9 @@ def turned_elasticity(material: AnyMaterial, angle: float) -> Array:
     angle
         From the first layup axis, right hand about the normal [degree].
     """
-    if not isinstance(material, OrthotropicMaterial):
+    if isinstance(material, Material):
         return np.asarray(plane_elasticity(np.array([material.E]), np.array([material.nu]))[0])
+    assert isinstance(material, OrthotropicMaterial)  # layers take no others
     (E_1, E_2, _), nu_12 = material.young, material.poisson[0]
     share = 1 - nu_12**2 * E_2 / E_1
     Q = np.array([[E_1, nu_12 * E_2, 0.0], [nu_12 * E_2, E_2, 0.0], [0.0, 0.0, material.shear[0] * share]]) / share
@@ -182,8 +183,9 @@ def turned_elasticity(material: AnyMaterial, angle: float) -> Array:
 
 def turned_shear(material: AnyMaterial, angle: float) -> Array:
     """Return the transverse shear moduli in layup axes, (2, 2) [Pa], rows xz yz."""
-    if not isinstance(material, OrthotropicMaterial):
+    if isinstance(material, Material):
         return material.mu * np.eye(2)
+    assert isinstance(material, OrthotropicMaterial)  # layers take no others
     _, G_13, G_23 = material.shear
     c, s = cosine_sine(angle)
     R = np.array([[c, s], [-s, c]])

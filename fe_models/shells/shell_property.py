@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.errors import ShellError
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.words import nearest, quoted
-from fe_models.material import AnyMaterial, Material, OrthotropicMaterial, require_isotropic
+from fe_models.material import AnisotropicMaterial, AnyMaterial, Material, OrthotropicMaterial, require_isotropic
 from fe_models.meshes.shell_mesh import ShellMesh
 
 __all__ = ["AnyShellProperty", "LaminateProperty", "Layer", "ShellProperty", "assign_shell_properties", "symmetric"]
@@ -64,6 +64,11 @@ class Layer:
         if not self.thickness > 0:
             raise ShellError(f"layer: thickness: expected a length above zero, got {self.thickness}")
         material = self.material
+        if isinstance(material, AnisotropicMaterial):
+            raise ShellError(
+                f"layer: material {material.name!r} is anisotropic; layers are isotropic (Material) or orthotropic "
+                "(OrthotropicMaterial)"
+            )
         if isinstance(material, OrthotropicMaterial) and not np.array_equal(material.axes, np.eye(3)):
             raise ShellError(
                 f"layer: material {material.name!r} has axes of its own; a layer is laid by its angle from the "

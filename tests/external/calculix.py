@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import eigh
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import eigsh, spsolve
 
 from cms.decks.job_text import JobRequest, job_text
 from cms.jobs.body_of_job import uncoupled_body
@@ -117,11 +117,18 @@ def body_of(path):
 def frequencies(deck, body):
     """The lowest frequencies of the body with the supports of its deck [Hz]."""
     is_held = np.zeros(body.n_dof, dtype=bool)
+    R = sp.lil_array(sp.eye_array(body.n_dof))  # rows of nodes that are held along axes of their own: these
     for support in deck.supports:
         at = np.isin(body.dofs[:, 0], body.interface(support.name).nodes)
         is_held |= at & np.isin(body.dofs[:, 1], support.components)
+        if support.axes is not None:
+            for node in body.interface(support.name).nodes:
+                rows = np.flatnonzero((body.dofs[:, 0] == node) & (body.dofs[:, 1] < 3))
+                assert len(rows) == 3
+                R[np.ix_(rows, rows)] = np.array(support.axes)
     free = np.flatnonzero(~is_held)
-    K, M = sp.csc_array(body.K[free][:, free]), sp.csc_array(body.M[free][:, free])
+    turned = sp.csr_array(R)[free]
+    K, M = sp.csc_array(turned @ body.K @ turned.T), sp.csc_array(turned @ body.M @ turned.T)
     if len(free) < 400:
         try:
             values = eigh(M.toarray(), K.toarray(), eigvals_only=True)[::-1][:N_FREQUENCIES]
@@ -161,6 +168,33 @@ def difference(name, folder):
     theirs = theirs[: len(ours)]
     elastic = theirs > 1e-3 * theirs.max()
     return kinds, float(np.abs(ours[elastic] / theirs[elastic] - 1).max())
+
+
+def static_difference(name, folder):
+    """The largest difference of displacements under three small forces, relative to the largest displacement."""
+    step = "*STATIC\n*CLOAD\n22,2,1e-4\n22,1,2e-4\n5,3,3e-4\n*NODE PRINT,NSET=EVERY\nU\n"
+    text = frequency_deck(text_of(name)).replace("*FREQUENCY\n8\n", step)
+    numbers = re.findall(r"^ *(\d+),", text.split("*ELEMENT")[0], re.MULTILINE)
+    path = Path(folder) / name
+    path.write_text(text.replace("*STEP", "*NSET,NSET=EVERY\n" + ",\n".join(numbers) + "\n*STEP", 1))
+    subprocess.run(["ccx", "-i", path.stem], cwd=path.parent, capture_output=True, timeout=300, check=False)
+    rows = [line.split() for line in path.with_suffix(".dat").read_text().splitlines()]
+    theirs = {int(row[0]): np.array(row[1:], dtype=float) for row in rows if len(row) == 4}
+    deck, body = body_of(path)
+    is_held = np.zeros(body.n_dof, dtype=bool)
+    for support in deck.supports:
+        at = np.isin(body.dofs[:, 0], body.interface(support.name).nodes)
+        is_held |= at & np.isin(body.dofs[:, 1], support.components)
+    free = np.flatnonzero(~is_held)
+    u = np.zeros(body.n_dof)
+    u[free] = spsolve(sp.csc_array(body.K[free][:, free]), sum(case.f for case in body.load_cases)[free])
+    ours = np.zeros((len(body.nodes), 6))
+    ours[tuple(body.recovery.dofs.T)] = body.recovery.matrix @ u
+    place = {tuple(np.round(x, 9)): k for k, x in enumerate(body.nodes)}
+    pairs = zip(deck.mesh.node_numbers.tolist(), deck.mesh.nodes, strict=True)
+    errors = [theirs[n] - ours[place[tuple(np.round(x, 9))], :3] for n, x in pairs if n in theirs]
+    assert len(errors) > 200
+    return float(np.abs(errors).max() / np.abs(ours).max())
 
 
 def main(folder):

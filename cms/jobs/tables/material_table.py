@@ -14,9 +14,11 @@ if TYPE_CHECKING:
 __all__ = ["MaterialSection", "isotropic_of", "material_of"]
 
 Three = tuple[float, float, float]
+Tensor = tuple[tuple[float, ...], ...]
 
 YOUNG = "a number above 0, Young's modulus [stress unit], or three along the axes 1, 2, 3 of the material"
 POISSON = "a number between -1 and 0.5, Poisson's ratio, or three: nu_12, nu_13, nu_23"
+ELASTICITY = "six rows of six numbers, stress by strain in the order 11 22 33 23 13 12, shear strains doubled"
 SHEAR = "three numbers above 0, the shear moduli G_12, G_13, G_23, where young has three"
 
 
@@ -37,6 +39,16 @@ def shear_moduli(value: Any) -> Three:
     return found
 
 
+def tensor(value: Any) -> Tensor:
+    """Return six rows of six numbers; whether they are symmetric and positive definite the material finds out."""
+    is_list = isinstance(value, list | tuple) and len(value) == 6
+    if not is_list or any(
+        not isinstance(row, list | tuple) or len(row) != 6 or any(is_no_number(x) for x in row) for row in value
+    ):
+        raise ValueError(f"expected {ELASTICITY}")
+    return tuple(tuple(float(x) for x in row) for row in value)
+
+
 def _one_or_three(value: Any, expected: str, one: Any, each: Any) -> Any:
     if isinstance(value, list | tuple) and len(value) == 3 and not any(is_no_number(x) or not each(x) for x in value):
         return tuple(float(x) for x in value)
@@ -48,9 +60,10 @@ def _one_or_three(value: Any, expected: str, one: Any, each: Any) -> Any:
 class MaterialSection(Table):
     """[materials.NAME]: a material and the cells that have it."""
 
-    young: Annotated[float | Three, BeforeValidator(moduli)] = Field(description=YOUNG)
-    poisson: Annotated[float | Three, BeforeValidator(ratios)] = Field(description=POISSON)
+    young: Annotated[float | Three, BeforeValidator(moduli)] | None = Field(None, description=YOUNG)
+    poisson: Annotated[float | Three, BeforeValidator(ratios)] | None = Field(None, description=POISSON)
     shear: Annotated[Three, BeforeValidator(shear_moduli)] | None = Field(None, description=SHEAR)
+    elasticity: Annotated[Tensor, BeforeValidator(tensor)] | None = Field(None, description=ELASTICITY)
     axes: Matrix3 | None = Field(
         None, description="the axes 1, 2, 3 of the material in mesh axes, three rows; default: the mesh axes"
     )
@@ -66,6 +79,14 @@ class MaterialSection(Table):
 
     @model_validator(mode="after")
     def _one_kind(self) -> "MaterialSection":
+        if self.elasticity is not None:
+            for key in ("young", "poisson", "shear"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"{key}: elasticity says it already; remove it")
+            return self
+        for key, expected in (("young", YOUNG), ("poisson", POISSON)):
+            if getattr(self, key) is None:
+                raise ValueError(f"{key}: missing; expected {expected}")
         if self.is_orthotropic != isinstance(self.poisson, tuple):
             three, one = ("young", "poisson") if self.is_orthotropic else ("poisson", "young")
             raise ValueError(f"{one}: {three} has three numbers; an orthotropic material needs three here too")
@@ -85,8 +106,11 @@ def material_of(name: str, table: MaterialSection) -> "AnyMaterial":
     MaterialError
         If some strain would have negative energy, or the axes are none.
     """
-    from fe_models.material import Material, OrthotropicMaterial
+    from fe_models.material import AnisotropicMaterial, Material, OrthotropicMaterial
 
+    if table.elasticity is not None:
+        axes = {} if table.axes is None else {"axes": table.axes}
+        return AnisotropicMaterial(name, table.elasticity, table.density, **axes)
     if isinstance(table.young, tuple) and isinstance(table.poisson, tuple) and table.shear is not None:
         axes = {} if table.axes is None else {"axes": table.axes}
         return OrthotropicMaterial(name, table.young, table.shear, table.poisson, table.density, **axes)
@@ -107,5 +131,7 @@ def isotropic_of(name: str, table: MaterialSection, what: str) -> "Material":
 
     made = material_of(name, table)
     if not isinstance(made, Material):
-        raise JobError(f"materials.{name}: it is orthotropic; {what} take isotropic materials only: young = one number")
+        raise JobError(
+            f"materials.{name}: it is not isotropic; {what} take isotropic materials only: young = one number"
+        )
     return made

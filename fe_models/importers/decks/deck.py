@@ -14,6 +14,7 @@ from fe_models.importers.raw_mesh import RawMesh
 __all__ = [
     "Coupling",
     "Deck",
+    "DeckLayer",
     "DeckMass",
     "DeckMaterial",
     "DeckSpring",
@@ -40,6 +41,8 @@ class DeckMaterial:
     density: float | None = None
     shear: Vector | None = None  #: orthotropic: G_12, G_13, G_23
     axes: tuple[Vector, Vector, Vector] | None = None  #: rows: axes 1, 2, 3 in basic axes; None: basic axes
+    #: anisotropic: stress by strain in its axes, six rows 11 22 33 23 13 12, shear strains doubled; no other constants
+    elasticity: tuple[tuple[float, ...], ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -54,14 +57,32 @@ class SolidSection:
 
 
 @dataclass(frozen=True)
-class ShellSection:
-    """Shell cells of one thickness."""
+class DeckLayer:
+    """One layer of a shell."""
 
-    group: str
     material: str
     thickness: float
+    angle: float = 0.0  #: of axis 1 of its material from the direction of the layup, about the normal [degree]
+    orientation: str = ""  #: name of axes, or an angle as the deck writes it; while a deck is read
+
+
+@dataclass(frozen=True)
+class ShellSection:
+    """Shell cells of one thickness, or of the same layers."""
+
+    group: str
+    material: str  #: empty: each of the layers has its own
+    thickness: float  #: of all layers
     offset: float = 0.0  #: of the middle surface from the nodes, along the normal
     added_mass: float = 0.0  #: mass per area without stiffness
+    layers: tuple[DeckLayer, ...] = ()  #: bottom to top
+    direction: Vector = (1.0, 0.0, 0.0)  #: projected on the shell, angle 0 of layers
+    orientation: str = ""  #: name of the axes of its material; while a deck is read
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Of the layers, or the one."""
+        return tuple(layer.material for layer in self.layers) or (self.material,)
 
 
 @dataclass(frozen=True)
@@ -143,6 +164,7 @@ class Support:
     nodes: str
     components: tuple[int, ...]
     is_boundary: bool = False
+    axes: tuple[Vector, Vector, Vector] | None = None  #: rows: along which they are held; None: basic axes
 
 
 @dataclass(frozen=True)

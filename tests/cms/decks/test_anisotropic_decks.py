@@ -11,7 +11,7 @@ from cms.jobs.job import read_job
 from fe_models.errors import MeshError
 from fe_models.foundation.stages import Stages
 from fe_models.importers.decks.read_deck import read_deck
-from fe_models.material import OrthotropicMaterial
+from fe_models.material import AnisotropicMaterial, OrthotropicMaterial
 from fe_models.solids.body import solid_body
 from tests.bodies import box_mesh
 from tests.decks import write_deck
@@ -80,14 +80,40 @@ def test_axes_that_are_not_known_are_refused(tmp_path):
         read_deck(deck(tmp_path, "ORTHOTROPIC", line))
 
 
-def test_constants_that_couple_shear_and_stretch_are_refused(tmp_path):
-    path = deck(tmp_path, "ANISOTROPIC", "*ORIENTATION, NAME=GRAIN\n1., 0., 0., 0., 1., 0.\n")
+def coupled(folder, value):
+    """The anisotropic deck with D_1112 = value, rows 11 and 12 coupled."""
+    path = deck(folder, "ANISOTROPIC", "*ORIENTATION, NAME=GRAIN\n1., 1., 0., -1., 1., 0.\n")
     lines = path.read_text().splitlines()
     at = lines.index("*ELASTIC, TYPE=ANISOTROPIC")
     words = lines[at + 1].split(", ")
-    lines[at + 1] = ", ".join([*words[:6], "1e9", *words[7:]])  # D_1112
+    lines[at + 1] = ", ".join([*words[:6], value, *words[7:]])
     path.write_text("\n".join(lines) + "\n")
-    with pytest.raises(MeshError, match="shear and stretch are coupled"):
+    return path
+
+
+def test_constants_that_couple_shear_and_stretch_make_an_anisotropic_material(tmp_path):
+    """The 21 constants, 11 22 33 12 13 23, in the order of our rows 11 22 33 23 13 12."""
+    body = body_of(coupled(tmp_path, "1e9"))
+    C = tensor()
+    C[0, 3] = C[3, 0] = 1e9
+    C = C[np.ix_([0, 1, 2, 5, 4, 3], [0, 1, 2, 5, 4, 3])]
+    s = np.sqrt(0.5)
+    material = AnisotropicMaterial("PLY", C, 600.0, ((s, s, 0), (-s, s, 0), (0, 0, 1)))
+    plain = solid_body(box_mesh(2, 1, 1, 1.0, 0.1, 0.08, "hexahedron20"), material, name="b", units=body.units)
+    assert_allclose(body.K.toarray(), plain.K.toarray(), rtol=0, atol=1e-11 * abs(plain.K).max())
+
+
+def test_constants_without_energy_are_refused(tmp_path):
+    with pytest.raises(MeshError, match="the stiffness is not positive definite"):
+        body_of(coupled(tmp_path, "1e12"))
+
+
+@pytest.mark.parametrize("section", ["*SHELL SECTION, MATERIAL=PLY, ORIENTATION=GRAIN, ELSET=plate\n.01\n"])
+def test_shells_of_anisotropic_materials_are_refused(tmp_path, section):
+    path = coupled(tmp_path, "1e9")
+    text = path.read_text().partition("*SOLID SECTION")[0].partition("*MATERIAL")[2]
+    path.write_text(PLATE.partition("*MATERIAL")[0] + "*MATERIAL" + text + section)
+    with pytest.raises(MeshError, match="shells of anisotropic materials"):
         body_of(path)
 
 

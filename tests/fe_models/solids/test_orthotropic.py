@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from skfem.helpers import ddot, sym_grad
 
-from fe_models import Material, OrthotropicMaterial, as_mesh, solid_body, unit_system
+from fe_models import AnisotropicMaterial, Material, OrthotropicMaterial, as_mesh, solid_body, unit_system
 from fe_models.body.mass_loads import MassLoads
 from fe_models.errors import MaterialError
 from fe_models.meshes.boundary import boundary_nodes
@@ -118,6 +118,40 @@ def test_geometric_stiffness_turns_the_internal_forces(kind, incompatible):
     assert_allclose(body.element_model.internal_forces(u), f, rtol=0, atol=1e-11 * np.abs(f).max())
     expected = np.cross(theta, f.reshape(-1, 3, 2), axisb=1, axisc=1).reshape(body.n_dof, 2)
     assert_allclose(K[:, 1:, 0].T, expected[:9], rtol=0, atol=1e-11 * np.abs(expected).max())
+
+
+def anisotropic(C, **more):
+    return AnisotropicMaterial("a", tuple(tuple(row) for row in np.asarray(C).tolist()), 450.0, **more)
+
+
+def test_an_anisotropic_material_of_an_orthotropic_tensor_is_the_orthotropic_one():
+    """Rows xx yy zz yz xz xy of its own axes are 11 22 33 23 13 12."""
+    mesh = distorted(box_mesh(2, 1, 1, 1.0, 0.7, 0.6, "hexahedron20"), 0.1)
+    same = anisotropic(WOOD.stiffness, axes=OBLIQUE.axes)
+    ours, general = body_of(mesh, OBLIQUE), body_of(mesh, same)
+    assert_allclose(general.K.toarray(), ours.K.toarray(), rtol=0, atol=1e-11 * np.abs(ours.K.data).max())
+    assert_allclose(same.E, max(WOOD.young), rtol=1e-12)
+    turned = anisotropic(OBLIQUE.stiffness)  # the couplings of shear and stretch written out
+    assert np.abs(OBLIQUE.stiffness[:3, 3:]).max() > 1e8
+    K = body_of(mesh, turned).K.toarray()
+    assert_allclose(K, ours.K.toarray(), rtol=0, atol=1e-11 * np.abs(ours.K.data).max())
+    assert "anisotropic, stress by strain" in body_of(mesh, turned).provenance["material a"]
+
+
+def test_anisotropic_materials_that_are_none_are_refused():
+    C = WOOD.stiffness
+    with pytest.raises(MaterialError, match="expected six rows of six finite numbers"):
+        anisotropic(C[:5])
+    lopsided = C.copy()
+    lopsided[0, 4] = 1e8
+    with pytest.raises(MaterialError, match=r"symmetric matrix, got 1e\+08 in row 1, column 5 and 0 across"):
+        anisotropic(lopsided)
+    soft = C.copy()
+    soft[0, 3] = soft[3, 0] = 2e10
+    with pytest.raises(MaterialError, match="some strains would have no energy"):
+        anisotropic(soft)
+    with pytest.raises(MaterialError, match="axes: expected three rows, orthonormal"):
+        anisotropic(C, axes=((1, 0, 0), (0, 1, 0), (0, 0, -1)))
 
 
 def test_isotropic_and_orthotropic_cells_stand_side_by_side():

@@ -7,6 +7,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus.draft import Draft
 from fe_models.importers.decks.abaqus.elements import faces_of
+from fe_models.importers.decks.abaqus.multipoint import LINEARISED, read_linearised
 from fe_models.importers.decks.abaqus.ties import read_tie
 from fe_models.importers.decks.deck import Coupling, Equation, RigidGroup
 
@@ -179,9 +180,24 @@ def _distributing_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
 
 
 def _mpcs(here: str, block: DeckBlock, draft: Draft) -> None:
+    listed: list[list[str]] = []
     for line in block.lines:
-        kind, *words = [word.strip() for word in line.rstrip(", ").split(",")]
+        words = [word.strip() for word in line.rstrip(", ").split(",")]
+        if listed and words[0].isdigit():  # the line above goes on
+            listed[-1] += words[1:] if words[0] == "0" else words
+        else:
+            listed.append(words)
+    for kind, *words in listed:
         name = f"*MPC, {kind.upper()}"
+        if kind.upper() in LINEARISED:
+            why = read_linearised(here, draft, kind.upper(), words)
+            if why:
+                draft.ledger.refuse(name, why, line=block.line_number)
+            continue
+        if kind.upper() == "DIST":
+            why = "a limit of a distance, closed or open like a gap, is not linear"
+            draft.ledger.refuse(name, why, line=block.line_number)
+            continue
         if kind.upper() not in ("BEAM", "TIE", "PIN") or len(words) != 2:
             draft.ledger.refuse(name, "this constraint is not known here", line=block.line_number)
             continue

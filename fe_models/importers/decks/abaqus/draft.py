@@ -30,6 +30,8 @@ from fe_models.importers.raw_mesh import RawBlock
 __all__ = ["Draft", "PointElements"]
 
 COMPONENTS = "123456"
+AXES_DIGITS = 7  #: to which the axes of nodes that are held together are the same
+MOST_AXES = 50  #: different axes of supports, each an interface of the job
 
 
 @dataclass
@@ -51,6 +53,7 @@ class Draft:
     material: str = ""  #: whose properties are being read
     materials: dict[str, DeckMaterial] = field(default_factory=dict)
     orientations: dict[str, Array | None] = field(default_factory=dict)  #: by name in upper case, (3, 3); None: unknown
+    used_orientations: set[str] = field(default_factory=set)  #: names in upper case
     nodal_thickness: dict[int, float] = field(default_factory=dict)  #: of shells, by node number
     nodal_shells: set[str] = field(default_factory=set)  #: groups of shells that have their thickness from nodes alone
     solids: list[SolidSection] = field(default_factory=list)
@@ -67,6 +70,8 @@ class Draft:
     points: dict[str, PointElements] = field(default_factory=dict)  #: by set in upper case
     surfaces: dict[str, DeckBlock] = field(default_factory=dict)  #: by name in upper case
     rotations: dict[int, int] = field(default_factory=dict)  #: *RIGID BODY: number of ROT NODE -> of REF NODE
+    moved: dict[int, Array] = field(default_factory=dict)  #: nodes put elsewhere than the deck has them
+    pilots: dict[int, Array] = field(default_factory=dict)  #: nodes whose component 1 is a rotation -> about which axis
     pending: dict[str, str] = field(default_factory=dict)  #: parameters of a *COUPLING whose kind comes below
     transformed: dict[int, Array] = field(default_factory=dict)  #: node number -> its own axes as rows, (3, 3)
     node_groups: dict[str, IntArray] = field(default_factory=dict)  #: groups added here, rows
@@ -184,11 +189,15 @@ class Draft:
 
     def supports_of_groups(self) -> list[Support]:
         """Return the supports: nodes held in the same components under the same names together."""
-        found: dict[tuple[tuple[str, ...], tuple[int, ...]], list[int]] = {}
+        found: dict[tuple[tuple[str, ...], tuple[int, ...], bytes], list[int]] = {}
         for turned, leader in self.rotations.items():
             for name, about in self.held.pop(turned, {}).items():
                 turns = {c + 3 for c in about if c < 3}
                 self.held.setdefault(leader, {}).setdefault(name, set()).update(turns)
+        for pilot, axis in self.pilots.items():
+            turns = {3 + int(np.argmax(np.abs(axis)))}
+            by_name = self.held.pop(pilot, {})
+            self.held |= {pilot: {name: turns for name, about in by_name.items() if 0 in about}} if by_name else {}
         used = set(self.used_nodes().tolist())
         loose = [node for node in self.held if node not in used]
         if loose:
@@ -198,12 +207,33 @@ class Draft:
             if node not in used:
                 continue
             components = tuple(sorted(set().union(*by_name.values())))
-            found.setdefault((tuple(sorted(by_name)), components), []).append(node)
+            axes = b"" if self._are_whole(components) else self._axes_of(node)
+            found.setdefault((tuple(sorted(by_name)), components, axes), []).append(node)
+        oblique = {axes for *_, axes in found if axes}
+        if len(oblique) > MOST_AXES:
+            count = sum(len(nodes) for (*_, axes), nodes in found.items() if axes)
+            why = f"supports along more than {MOST_AXES} different axes (*TRANSFORM): left out of the interfaces"
+            self.ledger.note("*BOUNDARY", why, count=count)
+            found = {key: nodes for key, nodes in found.items() if not key[2]}
         supports: list[Support] = []
-        for (names, components), nodes in found.items():
+        for (names, components, axes), nodes in found.items():
             letters = "".join(COMPONENTS[c] for c in components)
             name = names[0] if names != ("",) and names[0] else f"support_{letters}"
             group = self.node_group(self.where, nodes, name)
             label = group if group not in {s.name for s in supports} else f"{group}_{letters}"
-            supports.append(Support(label, group, components))
+            rows = [(x, y, z) for x, y, z in self.transformed[nodes[0]].tolist()] if axes else []
+            triad = (rows[0], rows[1], rows[2]) if rows else None
+            supports.append(Support(label, group, components, axes=triad))
         return supports
+
+    @staticmethod
+    def _are_whole(components: tuple[int, ...]) -> bool:
+        """Whether these are all translations or none, and all rotations or none: the same along any axes."""
+        return all(
+            not set(part) - set(components) or not set(part) & set(components) for part in ((0, 1, 2), (3, 4, 5))
+        )
+
+    def _axes_of(self, node: int) -> bytes:
+        """Return the axes of a node, equal for nodes whose axes are but for roundoff; empty: basic axes."""
+        axes = self.transformed.get(node)
+        return b"" if axes is None else (np.round(axes, AXES_DIGITS) + 0.0).tobytes()

@@ -43,12 +43,8 @@ def read_boundary(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
         known = draft.mesh.rows_of(nodes) >= 0
         if not known.all():
             draft.ledger.note("*BOUNDARY", "nodes that are not in the deck", count=int((~known).sum()))
-        turned = [node for node in nodes[known].tolist() if node in draft.transformed]
-        if turned and not components >= {0, 1, 2}:
-            why = "supports along axes of their own (*TRANSFORM): left out of the interfaces"
-            draft.ledger.note("*BOUNDARY", why, count=len(turned), line=block.line_number)
         for node in nodes[known].tolist():
-            if components and (components >= {0, 1, 2} or node not in draft.transformed):
+            if components:
                 draft.held.setdefault(node, {}).setdefault(name, set()).update(components)
 
 
@@ -91,6 +87,13 @@ def _nodal(here: str, block: DeckBlock, draft: Draft, step: str) -> None:
         if not 0 <= component < 6 or not nodes.size:
             draft.ledger.note("*CLOAD", "at no node, or of no component 1 to 6", line=block.line_number)
             continue
+        for pilot in [node for node in nodes.tolist() if node in draft.pilots]:
+            if component == 0:
+                moment = forces.setdefault(draft.node_group(here, [pilot]), np.zeros(6))
+                moment[3:] += float(words[2]) * draft.pilots[pilot]
+            else:
+                draft.ledger.note("*CLOAD", "at no node, or of no component 1 to 6", line=block.line_number)
+        nodes = np.setdiff1d(nodes, list(draft.pilots))
         turned = [node for node in nodes.tolist() if node in draft.transformed]
         for node in turned:
             force = forces.setdefault(draft.node_group(here, [node]), np.zeros(6))

@@ -51,16 +51,17 @@ def _elastic(block: DeckBlock, draft: Draft) -> None:
         draft.ledger.note("*ELASTIC", "of several temperatures the first line is taken", line=block.line_number)
     material = draft.materials[draft.material]
     if n == 2:
-        draft.materials[draft.material] = replace(material, young=values[0], poisson=values[1], shear=None)
+        draft.materials[draft.material] = replace(
+            material, young=values[0], poisson=values[1], shear=None, elasticity=None
+        )
         return
     if kind[:3] == "ENG":
         young, poisson, shear = np.split(np.array(values[:9]), 3)
         normal = np.linalg.inv(_compliance(young, poisson)) if young.all() else np.zeros((3, 3))
     else:
         C = _tensor(values[:n])
-        if (n == 21 and np.any(C[:3, 3:])) or np.any(C[3:, 3:] - np.diag(np.diag(C)[3:])):
-            why = "shear and stretch are coupled: only isotropic and orthotropic materials"
-            draft.ledger.refuse(what, why, line=block.line_number)
+        if np.any(C[:3, 3:]) or np.any(C[3:, 3:] - np.diag(np.diag(C)[3:])):
+            _anisotropic(what, block, draft, C)
             return
         normal, shear = C[:3, :3], np.diag(C)[3:]
     if np.linalg.eigvalsh(normal).min() <= 0 or shear.min() <= 0:
@@ -70,8 +71,20 @@ def _elastic(block: DeckBlock, draft: Draft) -> None:
     S = np.linalg.inv(normal)
     young = 1 / np.diag(S)
     nu = (-S[0, 1] * young[0], -S[0, 2] * young[0], -S[1, 2] * young[1])
-    changed = replace(material, young=_three(young), poisson=_three(nu), shear=_three(shear))
+    changed = replace(material, young=_three(young), poisson=_three(nu), shear=_three(shear), elasticity=None)
     draft.materials[draft.material] = changed
+
+
+def _anisotropic(what: str, block: DeckBlock, draft: Draft, C: Array) -> None:
+    """Take stress by strain, (6, 6), rows 11 22 33 12 13 23, where shear and stretch are coupled."""
+    if np.linalg.eigvalsh(C).min() <= 0:
+        why = "the stiffness is not positive definite: some strain would cost no energy"
+        draft.ledger.refuse(what, why, line=block.line_number)
+        return
+    order = [0, 1, 2, 5, 4, 3]  # 12 13 23 -> 23 13 12
+    rows = tuple(tuple(float(x) for x in row) for row in C[np.ix_(order, order)])
+    material = draft.materials[draft.material]
+    draft.materials[draft.material] = replace(material, young=None, poisson=None, shear=None, elasticity=rows)
 
 
 def _tensor(values: list[float]) -> Array:
@@ -149,11 +162,11 @@ def read_transform(here: str, block: DeckBlock, draft: Draft) -> None:
 
 def materials_in_axes(draft: Draft) -> None:
     """Give each solid section whose material is orthotropic this material in its own axes."""
-    used = set()
+    used = set(draft.used_orientations)
     spelt = {name.upper(): name for name in draft.materials}
     for k, solid in enumerate(draft.solids):
         material = draft.materials.get(spelt.get(solid.material.upper(), ""))
-        if material is None or material.shear is None or not solid.orientation:
+        if material is None or (material.shear is None and material.elasticity is None) or not solid.orientation:
             continue
         key = solid.orientation.upper()
         if key not in draft.orientations:
@@ -173,14 +186,14 @@ def materials_in_axes(draft: Draft) -> None:
     unused = len(set(draft.orientations) - used)
     if unused:
         draft.ledger.note("*ORIENTATION", "axes of materials; isotropic ones need none", count=unused)
-    for name in [
-        *(shell.material for shell in draft.shells),
-        *(line.material for line in draft.lines),
-        *(rod.material for rod in draft.rods),
-    ]:
+    for name in [*(line.material for line in draft.lines), *(rod.material for rod in draft.rods)]:
         material = draft.materials.get(spelt.get(name.upper(), ""))
-        if material is not None and material.shear is not None:
-            draft.ledger.refuse("*ELASTIC", "shells, beams and trusses of orthotropic materials")
+        if material is not None and (material.shear is not None or material.elasticity is not None):
+            draft.ledger.refuse("*ELASTIC", "beams and trusses of materials that are not isotropic")
+    for name in [name for shell in draft.shells for name in shell.materials]:
+        material = draft.materials.get(spelt.get(name.upper(), ""))
+        if material is not None and material.elasticity is not None:
+            draft.ledger.refuse("*ELASTIC", "shells of anisotropic materials")
 
 
 def _three(values: Array | tuple[float, ...]) -> tuple[float, float, float]:

@@ -10,8 +10,10 @@ from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
 from fe_models.importers.decks.abaqus.draft import Draft
 from fe_models.importers.decks.abaqus.elements import PLANE, SOLID_RULES
+from fe_models.importers.decks.abaqus.layups import layers_of_block
 from fe_models.importers.decks.abaqus.materials import numbers, read_orientation, read_transform
 from fe_models.importers.decks.abaqus.thickness import read_nodal_thickness
+from fe_models.importers.decks.abaqus.uneven_box import uneven_box
 from fe_models.importers.decks.deck import DeckMass, DeckSpring, LineSection, RodSection, ShellSection, SolidSection
 
 __all__ = ["ellipses_in_numbers", "read_section"]
@@ -95,20 +97,25 @@ def _common_rule(kind: str, rule: tuple[str, str, str]) -> tuple[str, str]:
 
 def _shell_section(here: str, block: DeckBlock, draft: Draft) -> None:
     name, types = _of_set(here, block, draft)
-    n = sum(len(elements) for elements in types.values())
-    if "COMPOSITE" in block.parameters:
-        draft.ledger.refuse("*SHELL SECTION, COMPOSITE", "only shells of one material", count=n)
-        return
     kept = _known(draft, types, _SHELLS, "S", block)
     is_nodal = "NODAL THICKNESS" in block.parameters
-    thickness = 1.0 if is_nodal else numbers(block.lines[0])[0]
+    layers = layers_of_block(here, block) if "COMPOSITE" in block.parameters else ()
+    thickness = 1.0 if is_nodal else sum(layer.thickness for layer in layers) or numbers(block.lines[0])[0]
     offset = block.parameters.get("OFFSET", "0").upper()
     share = {"SPOS": 0.5, "SNEG": -0.5}.get(offset)
     share = float(offset) if share is None else share
     if kept.size:
         # the reference surface lies share x thickness from the middle one, along the normal
         group = draft.cell_group(name, kept)
-        draft.shells.append(ShellSection(group, _material_of(block, draft), thickness, -share * thickness + 0.0))
+        made = ShellSection(
+            group,
+            "" if layers else _material_of(block, draft),
+            thickness,
+            -share * thickness + 0.0,
+            layers=layers,
+            orientation=block.parameters.get("ORIENTATION", "").strip('"'),
+        )
+        draft.shells.append(made)
         if is_nodal:
             draft.nodal_shells.add(group)
 
@@ -126,22 +133,31 @@ def _beam_section(here: str, block: DeckBlock, draft: Draft) -> None:
         "PIPE": lambda: {"shape": "tube", "radius": size[0], "thickness": size[1]},
         "BOX": lambda: {"shape": "box", "width": size[0], "height": size[1], "web": size[2], "flange": size[3]},
     }
-    is_even = kind != "BOX" or (size[2] == size[4] and size[3] == size[5])
+    walls = tuple(size[2:6])
+    uneven = uneven_box(size[0], size[1], walls) if _is_uneven(kind, walls) else None
     is_ellipse = kind == "CIRC" and draft.program == "calculix" and len(size) > 1 and size[1] not in (0.0, size[0])
     if is_ellipse:
         shapes["CIRC"] = lambda: {"shape": "ellipse", "width": size[0], "height": size[1]}
     offsets = [float(block.parameters.get(key, 0)) for key in ("OFFSET1", "OFFSET2")]
-    if kind not in shapes or not is_even:
-        draft.ledger.refuse(f"*{block.keyword}, SECTION={kind}", "this shape is not known here", count=len(kept))
+    if kind not in shapes or (_is_uneven(kind, walls) and uneven is None):
+        why = "walls that differ both ways" if kind in shapes else "this shape is not known here"
+        draft.ledger.refuse(f"*{block.keyword}, SECTION={kind}", why, count=len(kept))
         return
     n1 = numbers(block.lines[1])[:3] if len(block.lines) > 1 else [0.0, 0.0, -1.0]
     shape = shapes[kind]()
     scale = (shape["width"], shape["height"]) if "width" in shape else (2 * float(shape["radius"]),) * 2
     # as of shells, the nodes lie this far from the centroid
     offset = (-offsets[0] * float(scale[0]) + 0.0, -offsets[1] * float(scale[1]) + 0.0)
+    if uneven is not None:
+        shape, offset = uneven.shape, (offset[0] + uneven.centroid[0], offset[1] + uneven.centroid[1])
     if kept.size:
         group = draft.cell_group(name, kept)
         draft.lines.append(LineSection(group, _material_of(block, draft), shape, (n1[0], n1[1], n1[2]), offset))
+
+
+def _is_uneven(kind: str, walls: tuple[float, ...]) -> bool:
+    """Whether a box has four walls and those that face each other differ."""
+    return kind == "BOX" and len(walls) == 4 and (walls[0] != walls[2] or walls[1] != walls[3])
 
 
 def ellipses_in_numbers(draft: Draft) -> None:

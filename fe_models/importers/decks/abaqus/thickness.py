@@ -46,6 +46,10 @@ def sections_by_thickness(draft: Draft) -> None:
     at_node[rows[rows >= 0]] = np.array(list(draft.nodal_thickness.values()))[rows >= 0]
     shells, draft.shells[:] = list(draft.shells), []
     for shell in shells:
+        if shell.layers:
+            why = "shells of layers, whose thickness varies"
+            draft.ledger.refuse("*NODAL THICKNESS", why, count=len(_mean_thickness(draft, shell.group, at_node)[0]))
+            continue
         base = np.nan if shell.group in draft.nodal_shells else shell.thickness
         elements, means, is_varied = _mean_thickness(draft, shell.group, np.where(np.isnan(at_node), base, at_node))
         is_known = bool(np.isfinite(means).all() and means.min() > 0)

@@ -12,6 +12,7 @@ from fe_models.importers.decks.abaqus.assembly import flat_assembly
 from fe_models.importers.decks.abaqus.couplings import equations_in_basic_axes, read_coupling
 from fe_models.importers.decks.abaqus.draft import Draft
 from fe_models.importers.decks.abaqus.elements import read_element
+from fe_models.importers.decks.abaqus.layups import layups_in_axes
 from fe_models.importers.decks.abaqus.loads import read_boundary, read_load
 from fe_models.importers.decks.abaqus.materials import materials_in_axes, read_material
 from fe_models.importers.decks.abaqus.sections import ellipses_in_numbers, read_section
@@ -141,21 +142,28 @@ def _finished(path: Path, draft: Draft) -> Deck:
     ellipses_in_numbers(draft)
     sections_by_thickness(draft)
     try:
+        layups_in_axes(draft)
         materials_in_axes(draft)
     except ValueError as error:
         raise MeshError(f"{draft.where}: {error}") from error
     draft.close()
     supports = tuple(draft.supports_of_groups())
     mesh = raw_mesh_of(draft.mesh, [])
+    if draft.moved:
+        points = mesh.nodes.copy()
+        points[draft.mesh.rows_of(np.array(list(draft.moved)))] = list(draft.moved.values())
+        mesh = replace(mesh, nodes=points)
     spelt = {name.upper(): name for name in draft.materials}
     for kind in (draft.solids, draft.shells, draft.lines, draft.rods):
         kind[:] = [replace(each, material=spelt.get(each.material.upper(), each.material)) for each in kind]  # type: ignore
+    for k, shell in enumerate(draft.shells):
+        layers = tuple(replace(each, material=spelt.get(each.material.upper(), each.material)) for each in shell.layers)
+        draft.shells[k] = replace(shell, layers=layers, material="" if layers else shell.material)
     names = {**mesh.node_sets, **draft.node_groups}
-    groups = draft.cell_groups
     blocks = []
     for block in mesh.blocks:
         assert block.numbers is not None
-        own = {name: np.flatnonzero(np.isin(block.numbers, members)) for name, members in groups.items()}
+        own = {name: np.flatnonzero(np.isin(block.numbers, members)) for name, members in draft.cell_groups.items()}
         blocks.append(
             replace(block, groups={**block.groups, **{name: rows for name, rows in own.items() if rows.size}})
         )

@@ -83,6 +83,6 @@ def test_shells_refuse_an_orthotropic_material(job_file):
     path = job_file(("[reduction]", "[shells.skin]\nthickness = 0.01\n\n[reduction]"))
     with pytest.raises(
         JobError,
-        match=r"materials\.spruce: it is orthotropic; shells of one thickness \(not of layers\) take isotropic",
+        match=r"materials\.spruce: it is not isotropic; shells of one thickness \(not of layers\) take isotropic",
     ):
         shell_properties_of(read_job(path))
