@@ -267,9 +267,54 @@ def check_command(
 
     Example: cms check rod.h5 --job rod.toml --json
     """
-    from cms.cli.check import check_file
+    from cms.cli.verdicts.check import check_file
 
     raise typer.Exit(check_file(file, job, band=band, as_json=json))
+
+
+@app.command("accept")
+@guarded
+def accept_command(
+    file: ModalFile,
+    full: Annotated[Path | None, typer.Option("--full", help="Job file of the full model to compare with.")] = None,
+    deck: Annotated[
+        Path | None, typer.Option(help="Or its deck: Abaqus, CalculiX (.inp), Nastran (.bdf), ANSYS (.cdb).")
+    ] = None,
+    program: Annotated[
+        str | None, typer.Option(help="Whose elements a deck (.inp) has: calculix (default) or abaqus.")
+    ] = None,
+    density: Annotated[
+        list[str] | None, typer.Option(help="Density of materials of the deck without one: NAME=NUMBER; repeatable.")
+    ] = None,
+    band: Annotated[
+        float | None, typer.Option(help="Highest frequency of interest [Hz]; default: highest kept mode over 1.5.")
+    ] = None,
+    most_dofs: Annotated[
+        int, typer.Option(min=0, help="Largest refined model for the estimate of the mesh error; 0: no estimate.")
+    ] = 600_000,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 for reservations too.")] = False,
+    output: Annotated[
+        list[Path] | None, typer.Option("--output", "-o", help="Document: .pdf, .html or .json; repeatable.")
+    ] = None,
+) -> None:
+    """Make the document a body is accepted with: origin, every check, effective masses, what it is good for.
+
+    For own and received bodies; with a full model also what that says, and the cards of its deck that were left out.
+    Exit code 0: accepted, 1: not. Without -o: rod.h5 gives rod_acceptance.pdf; a PDF needs the extra pdf.
+
+    Example: cms accept rod.h5 --full rod.toml -o acceptance.pdf -o acceptance.json
+
+    Example: cms accept received.h5 --deck model.bdf --density steel=7.85e-9 -o acceptance.html
+    """
+    from cms.cli.verdicts.accept import AcceptRequest, run_accept
+
+    raise typer.Exit(
+        run_accept(
+            AcceptRequest(
+                file, full, deck, program, tuple(density or ()), band, most_dofs, strict, tuple(output or ())
+            )
+        )
+    )
 
 
 @app.command("frf")
@@ -338,7 +383,7 @@ def compare_command(
 
     Example: cms compare rod.toml --sets rubin,benfield-hruda --load small_end:mass=1e-3 --band 5000
     """
-    from cms.cli.compare import CompareRequest, run_compare
+    from cms.cli.verdicts.compare import CompareRequest, run_compare
 
     run_compare(
         CompareRequest(job, sets, modes, output, band, reference_modes, tuple(load or ()), pulse_at, motion, stills)

@@ -18,8 +18,8 @@ def info_record(file: Path, units: str | None = None, mass_at: str | None = None
     """Return what is in a modal file as JSON text, with the effective masses at an interface if one is named."""
     import json
 
-    from cms.cli.record import body_record, effective_mass_record
     from cms.modal_file.file import digest, read
+    from cms.quality.body_record import body_record, effective_mass_record
 
     body = read(file, units=units)
     more = {} if mass_at is None else {"effective_mass": effective_mass_record(body, mass_at)}
@@ -28,7 +28,7 @@ def info_record(file: Path, units: str | None = None, mass_at: str | None = None
 
 def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     """Print mass properties, modes and interfaces of a body; provenance too if everything is wanted."""
-    from cms.cli.record import body_record, body_size
+    from cms.quality.body_record import body_record, body_size
 
     record = body_record(body)
     length, mass, inertia = (

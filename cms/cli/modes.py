@@ -8,8 +8,8 @@ import numpy as np
 import typer
 
 from cms.cli.console import print_table, say, stages
-from cms.cli.record import body_record
 from cms.mode_set import ModeSet
+from cms.quality.body_record import body_record
 from cms.reduced_body.reduced_body import ReducedBody
 
 __all__ = ["list_modes", "mode_record"]

@@ -147,6 +147,19 @@ LIMITS: dict[str, Limit] = {
         "change of frequencies between rigid and distributing interfaces", 0.05, None,
         "the truth lies between RBE2 and RBE3: choose by the stiffness of the real joint, or spread the interface",
     ),
+    # A received body against a full model of the same part --------------------------------------------------------
+    "model-mass": Limit(
+        "mass, centre and inertia: full model against the body", 1e-3, 1e-2,
+        "look for masses that one of both has and the other not: what the deck lists as left out, units, densities",
+    ),
+    "mesh-error": Limit(
+        "lowest frequencies too high by the mesh, estimated", 0.02, None,
+        "mesh finer, or with cells of second order",
+    ),
+    "left-out": Limit(
+        "kinds of cards of the deck that carry mass or stiffness and are left out", 0.0, None,
+        "decide for each whether the answer may do without it",
+    ),
     "deformation-error": Limit(
         "deformation of the reference motion outside the mode set", 0.05, None,
         "add modes that carry the load: inertia relief, attachment or load-case residual vectors",

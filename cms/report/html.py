@@ -71,8 +71,6 @@ def page(title: str, brand: str, header: str, sections: Sequence[Section], scrip
     scripts
         id -> JSON that the page's programs read.
     """
-    from plotly.offline import get_plotlyjs
-
     charts = {key: chart for section in sections for key, chart in section.charts.items()}
     contents = "".join(f'<a href="#{s.key}">{text(s.short)}</a>' for s in sections)
     body = "".join(
@@ -81,6 +79,11 @@ def page(title: str, brand: str, header: str, sections: Sequence[Section], scrip
         + f"{s.body}</section>"
         for s in sections
     )
+    plotly = ""
+    if charts:
+        from plotly.offline import get_plotlyjs
+
+        plotly = f"<script>{get_plotlyjs()}</script>\n"
     data = "".join(_json_script(key, words) for key, words in {"charts": json.dumps(charts), **scripts}.items())
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -88,7 +91,7 @@ def page(title: str, brand: str, header: str, sections: Sequence[Section], scrip
         f'<title>{text(title)}</title><link rel="icon" href="data:,"><style>{asset("page.css")}</style></head>\n<body>'
         f'<div class="frame"><nav aria-label="Contents"><div class="brand">{brand}</div>{contents}</nav>'
         f"<main>{header}{body}<footer>{footer}</footer></main></div>\n"
-        f"{data}<script>{get_plotlyjs()}</script>\n<script>{asset('page.js')}</script>\n"
+        f"{data}{plotly}<script>{asset('page.js')}</script>\n"
         f"<script>{asset('viewer.js')}</script></body></html>\n"
     )
 

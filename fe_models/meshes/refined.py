@@ -11,7 +11,8 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["DIVIDED", "refined_mesh"]
 
-DIVIDED = ("tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27")  #: cells that can be divided
+#: cells that can be divided: tetrahedra and bricks of any order
+DIVIDED = tuple(name for name, shape in CELL_SHAPES.items() if shape.dim == 3 and len(shape.corners) in (4, 8))
 PARTS = 64  #: weights of corners are whole numbers of this, at a quarter of each direction
 
 

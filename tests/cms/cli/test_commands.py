@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 
 import cms
 from cms.cli.app import app
-from cms.cli.record import body_record, central_inertia
 from cms.frame_conversion import convert_frame
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
 from cms.modal_file.file import VERSION, read, write
+from cms.quality.body_record import body_record, central_inertia
 from cms.reduced_basis.frames import TisserandFrame
 from fe_models.foundation.sealed_hdf5 import Content, write_sealed
 from tests.bodies import box_mesh

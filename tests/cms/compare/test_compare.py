@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import cms
 from cms.cli.app import app
-from cms.cli.compare import parse_load
+from cms.cli.verdicts.compare import parse_load
 from cms.compare.compare import compare
 from cms.compare.comparison import Point, SetResult
 from cms.compare.drawing import draw_modes, thinned_surface

@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
-from cms.cli.record import body_record
 from cms.errors import BodyError, ModalFileError
+from cms.quality.body_record import body_record
 from cms.reduced_body.invariants import INERTIA_TERMS, moments_from_gram
 from cms.reduction import reduce
 from tests.bodies import bar

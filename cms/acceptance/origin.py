@@ -1,0 +1,51 @@
+"""Where a body came from: what its provenance says, in groups, and whether its files still are the same."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from fe_models.foundation.digest import file_digest
+
+__all__ = ["GROUPS", "SourceFile", "origin_groups", "source_files"]
+
+#: title -> beginnings of the keys of a provenance; a key goes to the first that takes it
+GROUPS: Mapping[str, tuple[str, ...]] = {
+    "versions": ("version ",),
+    "reduction": ("mode set", "full dofs", "damping", "frame", "job"),
+    "model": ("",),
+}
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A file that the body was made from, and what it is today."""
+
+    path: str
+    digest: str  #: on record, sha256
+    state: str  #: "unchanged", "CHANGED since", "not found"
+
+
+def origin_groups(provenance: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """Return title -> key -> words; digests of files stand with the files instead."""
+    groups: dict[str, dict[str, str]] = {title: {} for title in GROUPS}
+    for key, words in provenance.items():
+        title = next(title for title, starts in GROUPS.items() if key.startswith(starts))
+        groups[title][key] = words
+    return {title: rows for title, rows in reversed(groups.items()) if rows}
+
+
+def source_files(provenance: Mapping[str, str], folder: Path) -> tuple[SourceFile, ...]:
+    """Return the files with a digest on record, looked up where the record says, or in a folder.
+
+    A file is on record as "NAME" with "NAME sha256", or as "file PATH" with its digest.
+    """
+    pairs = [(provenance[key.removesuffix(" sha256")], value) for key, value in provenance.items()
+             if key.endswith(" sha256") and key.removesuffix(" sha256") in provenance]  # fmt: skip
+    pairs += [(key.removeprefix("file "), value) for key, value in provenance.items() if key.startswith("file ")]
+    found = []
+    for path, digest in dict(pairs).items():
+        places = [place for place in (Path(path), folder / Path(path).name) if place.is_file()]
+        same = any(file_digest(place) == digest for place in places)
+        state = "not found" if not places else "unchanged" if same else "CHANGED since"
+        found.append(SourceFile(path, digest, state))
+    return tuple(found)
