@@ -51,6 +51,11 @@ from .quality.body_check import check_body as check_body
 from .quality.of_body.buckling import critical_loads as critical_loads
 from .quality.record import QualityRecord as QualityRecord
 from .quality.reduction_check import check_reduction as check_reduction
+from .recovery.craig_bampton import CraigBampton as CraigBampton
+from .recovery.craig_bampton import craig_bampton_matrices as craig_bampton_matrices
+from .recovery.matrices import recovery_matrices as recovery_matrices
+from .recovery.request import RecoveryRequest as RecoveryRequest
+from .recovery.request import Rows as Rows
 from .reduced_basis.damping import ModalDamping as ModalDamping
 from .reduced_basis.damping import PerModeDamping as PerModeDamping
 from .reduced_basis.damping import RampDamping as RampDamping
@@ -65,6 +70,8 @@ from .reduced_body.geometric_stiffness import SpreadLoads as SpreadLoads
 from .reduced_body.geometric_stiffness import TurnedLoads as TurnedLoads
 from .reduced_body.invariants import Moments as Moments
 from .reduced_body.kept_points import KeptPoints as KeptPoints
+from .reduced_body.recovery_table import RecoveryTable as RecoveryTable
+from .reduced_body.recovery_table import spin_products as spin_products
 from .reduced_body.reduced_body import BodyFrame as BodyFrame
 from .reduced_body.reduced_body import ReducedBody as ReducedBody
 from .reduced_body.reduced_body import ReducedInterface as ReducedInterface

@@ -13,6 +13,7 @@ __all__ = [
     "JobError",
     "ModalFileError",
     "ModeSetError",
+    "RecoveryError",
     "UnitsError",
 ]
 
@@ -43,3 +44,7 @@ class JobError(CmsError, ValueError):
 
 class ExportError(CmsError, ValueError):
     """A reduced body cannot be written in the format of another program."""
+
+
+class RecoveryError(CmsError, ValueError):
+    """Recovery rows cannot be made as they were asked for, or written."""

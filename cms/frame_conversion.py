@@ -31,6 +31,7 @@ from cms.reduced_basis.frames import (
 from cms.reduced_basis.stress_modes import turned_stress
 from cms.reduced_body.invariants import INERTIA_TERMS, Moments, moments_from_gram
 from cms.reduced_body.nodal_sums import NodalSums
+from cms.reduced_body.recovery_table import RecoveryTable
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.reduced_body.source_columns import SourceColumns, share_words
 from cms.reduced_body.stress import PointStress
@@ -289,6 +290,7 @@ def changed_body(
         else converted_geometric_stiffness(reduced, frame, C=change.C, Z=Z, p=change.p, R=change.R),
         quadratic=None,  # its reaction is that of the old frame
         point_stress=None if reduced.point_stress is None else changed_point_stress(reduced.point_stress, change),
+        recovery={name: changed_table(table, change) for name, table in reduced.recovery.items()},
     )
 
 
@@ -349,6 +351,15 @@ def changed_load_case(case: ReducedLoadCase, change: Change) -> ReducedLoadCase:
         torque=change.R.T @ (case.torque - np.cross(change.p, case.force)),
         h=change.Z.T @ (case.h - change.C.T @ wrench),
     )
+
+
+def changed_table(table: RecoveryTable, change: Change) -> RecoveryTable:
+    """Return recovery rows in the new frame: z = X z'' (docs/theory.md §11)."""
+    X = np.zeros((6 + table.n_q, 6 + table.n_q))
+    X[:6, :6] = six_motions(-change.p) @ np.kron(np.eye(2), change.R)  # d - theta × p, theta
+    X[:6, 6:] = -change.C @ change.Z
+    X[6:, 6:] = change.Z
+    return table.changed(X, change.R, change.p)
 
 
 def changed_point_stress(points: PointStress, change: Change) -> PointStress:

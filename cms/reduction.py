@@ -1,7 +1,7 @@
 """Reduce: a coupled FEBody and a mode set become a ReducedBody in a body frame."""
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import metadata
 from typing import Any
@@ -13,6 +13,8 @@ from cms.families.families import Families
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.families.sharing import body_of
 from cms.mode_set import ModeSet
+from cms.recovery.matrices import recovery_of_model
+from cms.recovery.request import RecoveryRequest
 from cms.reduced_basis.damping import Damping, modal_damping
 from cms.reduced_basis.finishing import FinishedBasis, finish
 from cms.reduced_basis.frames import Frame, FrameCondition, HeldFrame, TisserandFrame, frame_condition
@@ -45,6 +47,7 @@ def reduce(
     geometric: bool | UnitStates | None = None,
     quadratic: bool = False,
     keep: Sequence[Any] = (),
+    recovery: RecoveryRequest | Iterable[RecoveryRequest] = (),
 ) -> ReducedBody:
     """Reduce a body to the span of a mode set.
 
@@ -73,6 +76,9 @@ def reduce(
         Nodes that are kept with translations and rotations beside surface and interfaces: numbers of the user's mesh,
         names of sets, or positions [x, y, z] in mesh axes (`fe_models.keep_nodes`); nodes of lines and point masses
         are kept anyway.
+    recovery
+        Tables of recovery rows to add (`ReducedBody.recovery`): motions, stress, forces in elements and at interfaces,
+        with their static part, which needs the factorisation.
 
     Raises
     ------
@@ -81,6 +87,8 @@ def reduce(
     BodyError
         If the body is a mechanism, the frame cannot be attached, or geometric stiffness is asked of a body without an
         element model.
+    RecoveryError
+        If a recovery row is asked for that the body does not know.
     """
     body = body_of(source)
     states = geometric if isinstance(geometric, UnitStates) else None
@@ -103,8 +111,10 @@ def reduce(
     kept = kept_nodes(keeping := keep_nodes(body, keep))
     axes, origin = condition.frame.axes, condition.frame.origin
     moments = reduced_moments(body, finished.Phi, condition.frame)
+    reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)
     return replace(
-        assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping),
+        reduced,
+        recovery=recovery_of_model(source, finished.Phi, condition, reduced, recovery),
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,
         geometric=None if states is None else stiffness_of_states(body, finished.Phi, states),

@@ -175,9 +175,9 @@ def require_rank(body: ReducedBody, nodes: tuple[BoundaryNode, ...], scaled: Arr
     shown = ", ".join(names[k] for k in missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
     raise ExportError(
         f"body {body.name!r}: its {body.n_q} modes{'' if body.is_held else ' and 6 rigid motions'} move only {rank} of "
-        f"the {n_b} dofs of its interfaces independently, and the format is made of all of them; missing constraint "
-        f"modes: {shown}. Reduce the body with a set that holds a static mode for each (craig-bampton, guyan, rubin), "
-        "or with fewer interfaces"
+        f"the {n_b} dofs of its interfaces independently, and matrices over the interfaces need all of them; "
+        f"missing constraint modes: {shown}. Reduce the body with a set that holds a static mode for each "
+        "(craig-bampton, guyan, rubin), or with fewer interfaces"
     )
 
 

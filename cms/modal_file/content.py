@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from cms.errors import ModalFileError
+from cms.modal_file.contents import Contents
 from cms.modal_file.entries import ENTRIES, entry_of, unit_of
+from cms.modal_file.recovery import recovery_attributes, recovery_of, recovery_values
 from cms.reduced_body.geometric_stiffness import UNIT_LOADS, GeometricStiffness, SpreadLoads, TurnedLoads
 from cms.reduced_body.invariants import Moments
 from cms.reduced_body.kept_points import KeptPoints
@@ -97,6 +99,7 @@ def attributes_of(body: ReducedBody) -> dict[str, Mapping[str, Attribute]]:
         attributes |= {SPREAD: {}} if body.geometric.spread is not None else {}
     if body.quadratic is not None:
         attributes["/quadratic"] = {}
+    attributes |= recovery_attributes(body.recovery)
     if body.nodal_sums is not None:
         attributes["/nodal_sums"] = {"is_volume": int(body.nodal_sums.is_volume)}
     return attributes
@@ -148,7 +151,7 @@ def values_of(body: ReducedBody) -> dict[str, Any]:
     if points is not None:
         values["/stress/points/names"], values["/stress/points/position"] = points.names, points.positions
         values["/stress/points/modes"] = points.modes
-    return values
+    return values | recovery_values(body.recovery)
 
 
 def numbering_values(numbering: Numbering) -> dict[str, Any]:
@@ -188,74 +191,15 @@ def known_invariants(missing: tuple[str, ...]) -> tuple[str, ...]:
 # Content to body -----------------------------------------------------------------------------------------------------
 
 
-class Contents:
-    """Datasets and attributes of a file by path, with words for what is missing or of another kind."""
-
-    def __init__(self, content: Content) -> None:
-        self.content = content
-
-    def array(self, path: str) -> np.ndarray:
-        """Return the numbers of a dataset."""
-        values = self._values(path)
-        if isinstance(values, tuple):
-            raise ModalFileError(f"dataset {path}: expected numbers, got text")
-        return values
-
-    def number(self, path: str) -> float:
-        """Return the one number of a dataset."""
-        values = self.array(path)
-        require_shape(f"dataset {path}", values, ())
-        return float(values)
-
-    def arrays(self, group: str, *names: str) -> dict[str, Any]:
-        """Return the numbers of datasets of a group by name."""
-        return {name: self.array(f"{group}/{name}") for name in names}
-
-    def words(self, path: str) -> tuple[str, ...]:
-        """Return the strings of a dataset."""
-        values = self._values(path)
-        if not isinstance(values, tuple):
-            raise ModalFileError(f"dataset {path}: expected text, got numbers")
-        return values
-
-    def attribute(self, path: str, name: str, kind: type) -> Any:
-        """Return an attribute of that kind."""
-        value = self.content.attributes.get(path, {}).get(name)
-        if not isinstance(value, kind):
-            got = "nothing" if value is None else repr(value)
-            raise ModalFileError(f"attribute {name!r} of {path}: expected {kind.__name__}, got {got}")
-        return value
-
-    def numbered(self, group: str) -> tuple[str, ...]:
-        """Return the paths of the groups that a group counts; none if it is not there."""
-        if group not in self.content.attributes:
-            return ()
-        count = self.attribute(group, "count", int)
-        held = sum(path.startswith(f"{group}/") for path in self.content.attributes)
-        if count != held:  # before as many paths are made
-            raise ModalFileError(f"attribute 'count' of {group}: expected {held}, as many as it holds, got {count:g}")
-        return tuple(f"{group}/{k}" for k in range(count))
-
-    def has(self, group: str, name: str | None = None) -> bool:
-        """Whether an optional group is there, and says so by its attribute where it has one."""
-        there = group in self.content.attributes
-        return there and (name is None or bool(self.attribute(group, name, int)))
-
-    def _values(self, path: str) -> Any:
-        if path not in self.content.datasets:
-            raise ModalFileError(f"dataset {path} is missing; the file was not written by a complete writer")
-        return self.content.datasets[path].values
-
-
 def body_of(content: Content) -> ReducedBody:
     """Return the body that a file describes; what a file of an older version lacks is None or empty."""
     contents = Contents(content)
     array, words, attribute = contents.array, contents.words, contents.attribute
     is_1 = content.version < 2  # the version before held dofs, and rotations told apart
-    moments = moments_of(contents)
+    moments, units = moments_of(contents), units_of(contents)
     return ReducedBody(
         name=attribute("/", "name", str),
-        units=units_of(contents),
+        units=units,
         frame=BodyFrame(
             kind=attribute("/frame", "kind", str),
             origin=array("/frame/origin"),
@@ -292,6 +236,7 @@ def body_of(content: Content) -> ReducedBody:
         quadratic=array("/quadratic/g") if contents.has("/quadratic") else None,
         numbering=numbering_of(contents),
         kept=kept_of(contents) if contents.has("/kept") else None,
+        recovery=recovery_of(contents, units),
     )  # fmt: skip
 
 

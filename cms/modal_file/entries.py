@@ -10,24 +10,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from cms.errors import ModalFileError
+from cms.modal_file.contents import Contents
+from cms.modal_file.recovery import GROUP as RECOVERY
+from cms.modal_file.recovery import recovery_of, recovery_values
 from fe_models.foundation.sealed_hdf5 import Content, Dataset
-from fe_models.foundation.units import Units
+from fe_models.foundation.units import Dimensions, Units, unit_text
 
 __all__ = ["ENTRIES", "Dimensions", "Entry", "entry_of", "in_units", "unit_text"]
-
-
-@dataclass(frozen=True)
-class Dimensions:
-    """Exponents of mass, length and time."""
-
-    mass: float = 0.0
-    length: float = 0.0
-    time: float = 0.0
-
-    def factor(self, old: Units, new: Units) -> float:
-        """Return what numbers in old units are multiplied by to be in new ones."""
-        ratio = (old.mass / new.mass) ** self.mass * (old.length / new.length) ** self.length
-        return float(ratio * (old.time / new.time) ** self.time)
 
 
 NONE, MASS, LENGTH, RATE = Dimensions(), Dimensions(1), Dimensions(0, 1), Dimensions(0, 0, -1)
@@ -42,6 +31,7 @@ class Entry:
     dimensions: Dimensions
     description: str
     last_rows: Dimensions | None = None  #: of rows 3-5, where they are rotations and rows 0-2 translations
+    unit: str = ""  #: in words, where each row or column has its own
 
 
 def entry(description: str, dimensions: Dimensions = NONE, last_rows: Dimensions | None = None) -> Entry:
@@ -135,6 +125,20 @@ ENTRIES = {
     "/stress/points/position": entry("undeformed position of the stress points in B", LENGTH),
     "/stress/points/modes": entry("stress of each mode at the stress points; index order as /stress/nodal",
                                   Dimensions(0.5, -2, -2)),
+    "/recovery/<i>/labels": entry("one per row, each once"),
+    "/recovery/<i>/quantities": entry("what each row is"),
+    "/recovery/<i>/entities": entry("what each row belongs to: node, element, interface, point or body"),
+    "/recovery/<i>/components": entry("component of each row, mesh axes or those of the element"),
+    "/recovery/<i>/loads": entry("one per column of static"),
+    "/recovery/<i>/numbers": entry("number of the node or element of each row; -1 where it has a name only"),
+    "/recovery/<i>/dimensions": entry("exponents of mass, length and time of each row"),
+    "/recovery/<i>/load_dimensions": entry("exponents of mass, length and time of the amplitude of each load"),
+    "/recovery/<i>/units": entry("unit of each row"),
+    "/recovery/<i>/load_units": entry("unit of the amplitude of each load"),
+    "/recovery/<i>/dynamic": Entry(NONE, "factors of z = (d, theta, q), of its rate and of its acceleration; index "
+                                   "order derivative, row, component of z", unit="of the row per that of z"),
+    "/recovery/<i>/static": Entry(NONE, "residual static response to each load; index order row, load",
+                                  unit="of the row per that of the load"),
 }  #: by path; `<i>` stands for the number of a group
 # fmt: on
 
@@ -147,19 +151,10 @@ def entry_of(path: str) -> Entry | None:
 def unit_of(path: str, units: Units) -> str:
     """Return the unit of a dataset in ASCII; both where the rows differ."""
     found = ENTRIES[re.sub(r"/\d+/", "/<i>/", path)]
+    if found.unit:
+        return found.unit
     first = unit_text(units, found.dimensions)
     return first if found.last_rows is None else f"{first} (rows 0-2), {unit_text(units, found.last_rows)} (rows 3-5)"
-
-
-def unit_text(units: Units, dimensions: Dimensions) -> str:
-    """Return a unit in ASCII, such as 't^(1/2) mm' or 's^-2'; '1' if there is none."""
-    parts = []
-    for field in fields(dimensions):
-        power, symbol = getattr(dimensions, field.name), getattr(units, f"{field.name}_symbol")
-        if power:
-            exponent = f"{power:g}" if power == int(power) else f"({2 * power:g}/2)"
-            parts.append(symbol if power == 1 else f"{symbol}^{exponent}")
-    return " ".join(parts) or "1"
 
 
 def in_units(content: Content, old: Units, new: Units) -> Content:
@@ -172,7 +167,7 @@ def in_units(content: Content, old: Units, new: Units) -> Content:
     datasets = {}
     for path, dataset in content.datasets.items():
         found = entry_of(path)
-        if found is None:
+        if found is None or path.startswith(f"{RECOVERY}/"):
             continue
         values = dataset.values
         if isinstance(values, np.ndarray) and values.dtype.kind == "f":
@@ -185,4 +180,7 @@ def in_units(content: Content, old: Units, new: Units) -> Content:
                     raise ModalFileError(f"dataset {path}: expected six rows, got {len(values)}")
                 values[3:] = dataset.values[3:] * found.last_rows.factor(old, new)
         datasets[path] = Dataset(values, unit_of(path, new), found.description)
+    tables = {name: table.in_units(new) for name, table in recovery_of(Contents(content), old).items()}
+    for path, values in recovery_values(tables).items():
+        datasets[path] = Dataset(values, unit_of(path, new), ENTRIES[re.sub(r"/\d+/", "/<i>/", path)].description)
     return Content(content.format, content.version, datasets, attributes)

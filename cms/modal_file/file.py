@@ -31,10 +31,10 @@ def write(reduced: ReducedBody, path: str | os.PathLike[str]) -> None:
 def version_of(reduced: ReducedBody) -> int:
     """Return the least version that says what the body is, so that older readers take all bodies they can.
 
-    5: nodes or elements have numbers of the user, there are sets, or points with rotations; 4: how loads turn with the
-    body is known, or inertia terms are missing; 3: the body is held; 2: others.
+    5: nodes or elements have numbers of the user, there are sets, points with rotations, or recovery matrices; 4: how
+    loads turn with the body is known, or inertia terms are missing; 3: the body is held; 2: others.
     """
-    if not reduced.numbering.is_empty or reduced.kept is not None:
+    if not reduced.numbering.is_empty or reduced.kept is not None or reduced.recovery:
         return 5
     if reduced.moments.missing or (reduced.geometric is not None and reduced.geometric.turned is not None):
         return 4

@@ -10,6 +10,7 @@ from cms.reduced_body.geometric_stiffness import GeometricStiffness
 from cms.reduced_body.invariants import Moments
 from cms.reduced_body.kept_points import KeptPoints
 from cms.reduced_body.nodal_sums import NodalSums
+from cms.reduced_body.recovery_table import RecoveryTable
 from cms.reduced_body.source_columns import SourceColumns
 from cms.reduced_body.stress import PointStress
 from fe_models.body.load_cases import ReducedLoadCase
@@ -123,6 +124,7 @@ class ReducedBody:
     quadratic: Array | None = None
     numbering: Numbering = field(default_factory=Numbering)  #: the user's numbers of kept nodes and elements, and sets
     kept: KeptPoints | None = None  #: kept nodes that have rotations too; None: there are none
+    recovery: Mapping[str, RecoveryTable] = field(default_factory=dict)  #: recovery matrices by name
 
     def __post_init__(self) -> None:
         where = f"reduced body {self.name!r}"
@@ -145,6 +147,7 @@ class ReducedBody:
         for name in ("labels", "sources", "interfaces", "load_cases"):
             put(self, name, tuple(getattr(self, name)))
         put(self, "provenance", FrozenMapping(dict(self.provenance)))
+        put(self, "recovery", FrozenMapping(dict(self.recovery)))
         n, n_kept = self.n_q, len(self.nodes)
         for name, shape in {
             "M": (n, n),
@@ -179,6 +182,13 @@ class ReducedBody:
             if self.geometric.spread is not None and self.nodal_sums is None:
                 raise BodyError(
                     f"{where}: loads spread over the nodes without the nodal sums that are their resultants"
+                )
+        for name, table in self.recovery.items():
+            widths[f"recovery {name!r}"] = (table.n_q,)
+            if table.system != self.units or table.name != name:
+                raise BodyError(
+                    f"{where}: recovery {name!r}: expected a table of this name in {self.units.name}, got "
+                    f"{table.name!r} in {table.system.name}"
                 )
         for name, width in widths.items():
             if width != (n,):

@@ -126,6 +126,12 @@ def point_slices(nodes: Array, masses: tuple[PointMass, ...]) -> Slices:
 
 def spring_matrix(nodes: Array, spring: Spring, matrix: Array) -> tuple[Array, IntArray]:
     """Return Bᵀ matrix B with d = B u over the twelve dofs of both nodes, (12, 12), and these dofs."""
+    B, dofs = spring_motion(nodes, spring)
+    return B.T @ matrix @ B, dofs
+
+
+def spring_motion(nodes: Array, spring: Spring) -> tuple[Array, IntArray]:
+    """Return B of d = B u, the motion of the second side against the first at the point, (6, 12), and the dofs u."""
     first, second = (nodes[node] for node in spring.nodes)
     point = (first + second) / 2 if spring.point is None else np.asarray(spring.point)
     B = np.zeros((6, 12))
@@ -135,8 +141,7 @@ def spring_matrix(nodes: Array, spring: Spring, matrix: Array) -> tuple[Array, I
         B[:3, at : at + 3] = sign * axes
         B[:3, at + 3 : at + 6] = sign * axes @ np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])  # theta × lever
         B[3:, at + 3 : at + 6] = sign * axes
-    dofs = np.concatenate([6 * node + np.arange(6) for node in spring.nodes])
-    return B.T @ matrix @ B, dofs
+    return B, np.concatenate([6 * node + np.arange(6) for node in spring.nodes])
 
 
 def _semidefinite(where: str, values: Any) -> Array:

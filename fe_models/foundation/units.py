@@ -1,11 +1,11 @@
 """Coherent unit systems: numbers are stored as the model has them, the system is named beside them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from fe_models.foundation.errors import UnitsError
 from fe_models.foundation.words import nearest, quoted
 
-__all__ = ["UNIT_SYSTEMS", "Units", "unit_system"]
+__all__ = ["UNIT_SYSTEMS", "Dimensions", "Units", "unit_system", "unit_text", "unit_words"]
 
 
 @dataclass(frozen=True)
@@ -53,3 +53,38 @@ def unit_system(name: str) -> Units:
     if name not in UNIT_SYSTEMS:
         raise UnitsError(f"units: unknown unit system {quoted(name)}{nearest(name, UNIT_SYSTEMS)}")
     return UNIT_SYSTEMS[name]
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """Exponents of mass, length and time."""
+
+    mass: float = 0.0
+    length: float = 0.0
+    time: float = 0.0
+
+    def factor(self, old: Units, new: Units) -> float:
+        """Return what numbers in old units are multiplied by to be in new ones."""
+        ratio = (old.mass / new.mass) ** self.mass * (old.length / new.length) ** self.length
+        return float(ratio * (old.time / new.time) ** self.time)
+
+
+def unit_text(units: Units, dimensions: Dimensions) -> str:
+    """Return a unit in ASCII, such as 't^(1/2) mm' or 's^-2'; '1' if there is none."""
+    parts = []
+    for field in fields(dimensions):
+        power, symbol = getattr(dimensions, field.name), getattr(units, f"{field.name}_symbol")
+        if power:
+            exponent = f"{power:g}" if power == int(power) else f"({2 * power:g}/2)"
+            parts.append(symbol if power == 1 else f"{symbol}^{exponent}")
+    return " ".join(parts) or "1"
+
+
+def unit_words(units: Units, dimensions: Dimensions) -> str:
+    """Return a unit by the names of force and stress where it is one, such as 'N mm' or 'MPa', else as `unit_text`."""
+    if (dimensions.mass, dimensions.time) != (1.0, -2.0):
+        return unit_text(units, dimensions)
+    if dimensions.length == -1:
+        return units.stress_symbol
+    rest = unit_text(units, Dimensions(0.0, dimensions.length - 1, 0.0))
+    return units.force_symbol if rest == "1" else f"{units.force_symbol} {rest}"

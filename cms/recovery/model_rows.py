@@ -1,0 +1,241 @@
+"""Recovery rows of a finite element body: motions, stress and strain at nodes, forces in elements."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import RecoveryError
+from cms.recovery.blocks import Block, RowName
+from cms.recovery.places import Places
+from cms.recovery.request import OF_ELEMENTS, OF_MOTION, Rows, motion_dimensions
+from cms.reduced_basis.node_motion import reference_motion
+from fe_models.body.fe_body import FEBody
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.components import MOTION_COMPONENTS, STRESS_COMPONENTS
+from fe_models.foundation.units import Dimensions
+from fe_models.foundation.words import nearest, quoted
+from fe_models.recovery.element_forces import ElementGroup, element_groups
+from fe_models.recovery.strain import node_compliances
+
+__all__ = ["chosen_components", "model_block", "node_rows"]
+
+STRESS, STRAIN = Dimensions(1, -1, -2), Dimensions()
+COLUMNS_AT_ONCE = 16  #: stress is known at all nodes before it is cut to those asked for
+
+
+def model_block(body: FEBody, rows: Rows) -> Block:
+    """Return the rows of one quantity at nodes or elements of a coupled body.
+
+    Raises
+    ------
+    RecoveryError
+        If a place, a component or the quantity itself is not known of the body.
+    """
+    if rows.quantity in OF_MOTION:
+        block = motion_block(body, rows)
+    elif rows.quantity in OF_ELEMENTS:
+        block = element_block(body, rows)
+    else:
+        block = stress_block(body, rows)
+    return chosen_components(block, rows, f"body {body.name!r}")
+
+
+def chosen_components(block: Block, rows: Rows, where: str) -> Block:
+    """Return the rows whose components were asked for; all if none were."""
+    if not rows.components:
+        return block
+    known = tuple(dict.fromkeys(name.component for name in block.names))
+    for component in rows.components:
+        if component not in known:
+            raise RecoveryError(
+                f"{where}: recovery of {rows.quantity}: no component {quoted(component)}{nearest(component, known)}"
+            )
+    return block.of_rows([k for k, name in enumerate(block.names) if name.component in rows.components])
+
+
+# Motions --------------------------------------------------------------------------------------------------------------
+
+
+def motion_block(body: FEBody, rows: Rows) -> Block:
+    """Return displacements, velocities or accelerations of nodes and of reference points of interfaces."""
+    order = OF_MOTION.index(rows.quantity)
+    names: list[RowName] = []
+    matrices: list[sp.csr_array] = []
+    points: list[Array] = []
+    directions: list[Array] = []
+
+    def add(entity: str, number: int, place: str, matrix: sp.csr_array, components: Iterable[int], at: Array) -> None:
+        matrices.append(matrix)
+        for component in components:
+            word = MOTION_COMPONENTS[component]
+            names.append(RowName(rows.quantity, entity, number, place, word, motion_dimensions(order, word)))
+            points.append(at)
+            directions.append(np.eye(3)[component] if component < 3 else np.zeros(3))
+
+    places = Places(body)
+    for at in rows.at:
+        interface = places.interface(at)
+        if interface is not None:
+            matrix, point, has_rotation = reference_motion(body, interface)
+            n = 6 if has_rotation else 3
+            add("interface", -1, interface.name, sp.csr_array(matrix[:n]), range(n), point)
+            continue
+        for node in places.nodes(at).tolist():
+            matrix, components = node_rows(body, node)
+            if not len(components):
+                raise RecoveryError(f"body {body.name!r}: node {places.word(node)} does not move: it has no dofs")
+            add("node", places.number(node), places.word(node), matrix, components.tolist(), body.nodes[node])
+    stacked = sp.csr_array(sp.vstack(matrices))
+    return Block(tuple(names), order, lambda u: np.asarray(stacked @ u), (np.array(points), np.array(directions)))
+
+
+def node_rows(body: FEBody, node: int) -> tuple[sp.csr_array, IntArray]:
+    """Return the motion of a node over the dofs of the body, and which components it has, (n, n_dof) and (n,).
+
+    Of the mesh behind the body where that has the node, else its own dofs; rotations that nothing moves are none.
+    """
+    if body.recovery is not None:
+        dofs = body.recovery.dofs
+        own = np.flatnonzero((dofs[:, 0] == node) & (dofs[:, 1] >= 0))
+        own = own[np.argsort(dofs[own, 1], kind="stable")]
+        if len(own):
+            matrix = sp.csr_array(body.recovery.matrix[own])
+            moves = (dofs[own, 1] < 3) | (np.diff(matrix.indptr) > 0)
+            return sp.csr_array(matrix[np.flatnonzero(moves)]), dofs[own, 1][moves]
+    own = np.flatnonzero((body.dofs[:, 0] == node) & (body.dofs[:, 1] >= 0))
+    own = own[np.argsort(body.dofs[own, 1], kind="stable")]
+    matrix = sp.csr_array((np.ones(len(own)), (np.arange(len(own)), own)), shape=(len(own), body.n_dof))
+    return matrix, body.dofs[own, 1]
+
+
+# Stress and strain ----------------------------------------------------------------------------------------------------
+
+
+def stress_block(body: FEBody, rows: Rows) -> Block:
+    """Return stress or strain at nodes, stress at named points too, in mesh axes."""
+    model = body.element_model
+    places = Places(body)
+    is_strain = rows.quantity == "strain"
+    dimensions = STRAIN if is_strain else STRESS
+    names: list[RowName] = []
+    nodes: list[int] = []
+    points: list[int] = []
+    for at in rows.at:
+        if not is_strain and (found := places.points(at)):
+            points += found
+            continue
+        if model is None or not model.has_nodal_stress:
+            raise RecoveryError(
+                f"body {body.name!r}: recovery of {rows.quantity}: the model knows no stress at nodes (bare matrices, "
+                "or beams without a skin); ask for forces in its elements"
+            )
+        nodes += places.nodes(at).tolist()
+    for node in nodes:
+        number, word = places.number(node), places.word(node)
+        names += [RowName(rows.quantity, "node", number, word, c, dimensions) for c in STRESS_COMPONENTS]
+    for point in points:
+        word = places.point_names[point]
+        names += [RowName(rows.quantity, "point", -1, word, c, dimensions) for c in STRESS_COMPONENTS]
+    rows_of_nodes = np.array(nodes, dtype=np.int64)
+    if len(rows_of_nodes):
+        require_stress(body, places, rows_of_nodes)
+    compliance = node_compliances(body, rows_of_nodes) if is_strain else None
+    return Block(tuple(names), 0, stress_values(body, rows_of_nodes, points, compliance))
+
+
+def stress_values(
+    body: FEBody, nodes: IntArray, points: list[int], compliance: Array | None
+) -> Callable[[Array], Array]:
+    """Return the function of displacement columns, (6 (n_nodes + n_points), k)."""
+    wanted = np.unique(nodes)
+
+    def values(u: Array) -> Array:
+        parts = []
+        for begin in range(0, u.shape[1], COLUMNS_AT_ONCE):
+            mesh = body.mesh_displacement(u[:, begin : begin + COLUMNS_AT_ONCE])
+            stress = np.zeros((0, 6, mesh.shape[1]))
+            if len(nodes):
+                assert body.element_model is not None
+                stress = body.element_model.nodal_stress(mesh, nodes=wanted)[nodes]
+            if compliance is not None:
+                stress = compliance @ stress
+            if points:
+                assert body.stress_points is not None
+                stress = np.concatenate([stress, body.stress_points.stress(mesh)[points]])
+            parts.append(stress.reshape(-1, mesh.shape[1]))
+        return np.concatenate(parts, axis=1)
+
+    return values
+
+
+def require_stress(body: FEBody, places: "Places", nodes: IntArray) -> None:
+    """Raise `RecoveryError` if a node shows no stress whatever the body does: reference nodes, axes of beams."""
+    u = np.random.default_rng(0).standard_normal((body.n_dof, 1))
+    assert body.element_model is not None
+    on_mesh = np.zeros((len(body.nodes), 6, 1))
+    shown = body.element_model.nodal_stress(body.mesh_displacement(u), nodes=np.unique(nodes))
+    on_mesh[: len(shown)] = shown
+    silent = nodes[~on_mesh[nodes].any(axis=(1, 2))]
+    if len(silent):
+        raise RecoveryError(
+            f"body {body.name!r}: node {places.word(int(silent[0]))} shows no stress: it is a reference node or on the "
+            "axis of a beam; take a node of the solid or shell, a stress point, or the forces in the beams"
+        )
+
+
+# Elements -------------------------------------------------------------------------------------------------------------
+
+
+def element_block(body: FEBody, rows: Rows) -> Block:
+    """Return the forces in beams, shells or springs; a name among the places is that of a part or a kind of cells."""
+    groups = [group for group in element_groups(body) if group.quantity == rows.quantity]
+    if not groups:
+        known = tuple(dict.fromkeys(group.quantity for group in element_groups(body)))
+        raise RecoveryError(
+            f"body {body.name!r}: recovery of {rows.quantity}: it has no such elements"
+            + (f"; it has {', '.join(known)}" if known else ": solids and bare matrices have stress or nothing")
+        )
+    chosen = [(group, elements_of(body, rows, group, groups)) for group in groups]
+    chosen = [(group, elements) for group, elements in chosen if len(elements)]
+    names = [
+        RowName(rows.quantity, "element", k, f"{group.part} {k}".strip(), component, dimensions)
+        for group, elements in chosen
+        for k in elements.tolist()
+        for component, dimensions in zip(group.components, group.dimensions, strict=True)
+    ]
+
+    def values(u: Array) -> Array:
+        mesh = body.mesh_displacement(u)
+        return np.concatenate([group.forces(mesh, rows).reshape(-1, u.shape[1]) for group, rows in chosen])
+
+    return Block(tuple(names), 0, values)
+
+
+def elements_of(body: FEBody, rows: Rows, group: ElementGroup, groups: list[ElementGroup]) -> IntArray:
+    """Return the elements of a group that were asked for: all, by number, by the name of the group."""
+    if not rows.at:
+        return np.arange(group.count)
+    found: list[int] = []
+    for at in rows.at:
+        if isinstance(at, str):
+            parts = [each.part for each in groups]
+            if at not in parts:
+                raise RecoveryError(
+                    f"body {body.name!r}: recovery of {rows.quantity}: no elements {quoted(at)}{nearest(at, parts)}"
+                )
+            if at == group.part:
+                found += range(group.count)
+            continue
+        if len(groups) > 1:
+            raise RecoveryError(
+                f"body {body.name!r}: recovery of {rows.quantity}: element {at} may be of "
+                f"{', '.join(each.part for each in groups)}; name one of these, or leave at out for all"
+            )
+        if not 0 <= at < group.count:
+            raise RecoveryError(
+                f"body {body.name!r}: recovery of {rows.quantity}: no element {at}; they are numbered 0 to "
+                f"{group.count - 1}"
+            )
+        found.append(at)
+    return np.array(list(dict.fromkeys(found)), dtype=np.int64)

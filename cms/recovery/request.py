@@ -1,0 +1,77 @@
+"""What recovery rows are asked for."""
+
+from dataclasses import dataclass, field
+
+from cms.errors import RecoveryError
+from fe_models.foundation.units import Dimensions
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["OF_ELEMENTS", "OF_NODES", "QUANTITIES", "RecoveryRequest", "Rows", "motion_dimensions"]
+
+OF_MOTION = ("displacement", "velocity", "acceleration")  #: in the order of the derivatives of z
+OF_NODES = (*OF_MOTION, "stress", "strain")
+OF_ELEMENTS = ("beam force", "shell resultant", "spring force")
+OF_INTERFACES = ("interface force", "net force")
+QUANTITIES = (*OF_NODES, *OF_ELEMENTS, *OF_INTERFACES)
+
+Place = str | int
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of one quantity at some places.
+
+    Raises
+    ------
+    RecoveryError
+        If the quantity is unknown, or does not go with what is given.
+    """
+
+    quantity: str  #: one of `QUANTITIES`
+    #: nodes or elements by number, node sets or groups, interfaces, stress points by name; empty: all there are, which
+    #: rows of nodes refuse
+    at: tuple[Place, ...] = ()
+    components: tuple[str, ...] = ()  #: such as "uz" or "xx"; empty: all that are there
+    about: tuple[float, float, float] | None = None  #: of net forces: the point, mesh coordinates [m]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", (self.at,) if isinstance(self.at, str | int) else tuple(self.at))
+        object.__setattr__(self, "components", tuple(self.components))
+        if self.quantity not in QUANTITIES:
+            raise RecoveryError(
+                f"recovery rows: unknown quantity {quoted(self.quantity)}{nearest(self.quantity, QUANTITIES)}"
+            )
+        if self.quantity in OF_NODES and not self.at:
+            raise RecoveryError(
+                f"recovery rows: {self.quantity}: at is missing; expected nodes, node sets or interfaces, as "
+                'at = ["tip", 17]'
+            )
+        if (self.about is not None) != (self.quantity == "net force"):
+            has = "is missing; expected a point [x, y, z]" if self.about is None else "belongs to net force; remove it"
+            raise RecoveryError(f"recovery rows: {self.quantity}: about {has}")
+
+
+@dataclass(frozen=True)
+class RecoveryRequest:
+    """Rows that make one table, in their order, and what their static part answers beside the interfaces.
+
+    Raises
+    ------
+    RecoveryError
+        If there is no row.
+    """
+
+    name: str
+    rows: tuple[Rows, ...]
+    loads_at: tuple[Place, ...] = field(default=())  #: nodes or node sets at which forces act too
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rows", tuple(self.rows))
+        object.__setattr__(self, "loads_at", tuple(self.loads_at))
+        if not self.rows:
+            raise RecoveryError(f"recovery {self.name!r}: expected rows, got none")
+
+
+def motion_dimensions(order: int, component: str) -> Dimensions:
+    """Return the dimensions of a displacement, velocity or acceleration; of rotations for "rx" to "rz"."""
+    return Dimensions(0.0, 0.0 if component.startswith("r") else 1.0, -float(order))
