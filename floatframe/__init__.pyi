@@ -47,6 +47,7 @@ from .errors import CosimulationError as CosimulationError
 from .errors import FloatframeError as FloatframeError
 from .errors import ModelError as ModelError
 from .errors import ResultsError as ResultsError
+from .errors import SignalError as SignalError
 from .errors import SystemFileError as SystemFileError
 from .flexible_parts import FlexiblePart as FlexiblePart
 from .flexible_parts import corotational as corotational

@@ -4,7 +4,15 @@ from typing import Any
 
 from fe_models.foundation.errors import ReportedError
 
-__all__ = ["ConvergenceError", "CosimulationError", "FloatframeError", "ModelError", "ResultsError", "SystemFileError"]
+__all__ = [
+    "ConvergenceError",
+    "CosimulationError",
+    "FloatframeError",
+    "ModelError",
+    "ResultsError",
+    "SignalError",
+    "SystemFileError",
+]
 
 
 class FloatframeError(ReportedError):
@@ -21,6 +29,10 @@ class SystemFileError(FloatframeError, ValueError):
 
 class ResultsError(FloatframeError, ValueError):
     """A file is not a readable results file, or cannot be written."""
+
+
+class SignalError(FloatframeError, ValueError):
+    """A file of signals, or what was asked of a signal, is not valid; the text names file, line and channel."""
 
 
 class ConvergenceError(FloatframeError, RuntimeError):

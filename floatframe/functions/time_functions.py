@@ -5,10 +5,9 @@ The kernels know this one form; whatever the user gives (a table, a formula, a c
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import factorial
+from math import factorial, perm
 
 import numpy as np
-from numpy.polynomial import polynomial
 
 from fe_models.foundation.arrays import Array, frozen
 from fe_models.foundation.copies import frozen_copies
@@ -57,30 +56,38 @@ class TimeFunction:
         A jump is above 1e-9 of the sizes of the numbers it lies between.
         """
         length = np.diff(self.begins)
-        before = np.array([at_piece(c, x, order) for c, x in zip(self.pieces[:-1], length, strict=True)])
-        after = np.array([at_piece(c, 0.0, order) for c in self.pieces[1:]])
-        sizes = [piece_size(c, x, order) for c, x in zip(self.pieces[:-1], length, strict=True)]
-        scale = np.maximum(sizes, [piece_size(c, 0.0, order) for c in self.pieces[1:]])
+        before, after = at_pieces(self.pieces[:-1], length, order), at_pieces(self.pieces[1:], 0.0, order)
+        scale = np.maximum(piece_sizes(self.pieces[:-1], length, order), piece_sizes(self.pieces[1:], 0.0, order))
         is_jump = np.abs(after - before) > 1e-9 * scale
         return self.begins[1:][is_jump], (after - before)[is_jump]
 
     def __call__(self, t: float, order: int = 0) -> float:
         """Return the value at t, or its first or second derivative."""
-        k = max(int(np.searchsorted(self.begins, t, side="right")) - 1, 0)
-        return at_piece(self.pieces[k], t - self.begins[k], order)
+        return float(self.at(np.array([t]), order)[0])
+
+    def at(self, t: Array, order: int = 0) -> Array:
+        """Return the values at times t, (n_t,), or their derivatives of an order."""
+        t = np.asarray(t, dtype=float)
+        k = np.maximum(np.searchsorted(self.begins, t, side="right") - 1, 0)
+        return at_pieces(self.pieces[k], t - self.begins[k], order)
 
 
-def at_piece(c: Array, x: float, order: int = 0) -> float:
-    """Return the value of a piece, or its derivative, at a time x from its beginning."""
-    amplitude, omega, phase = c[6:]
-    smooth = polynomial.polyval(x, polynomial.polyder(c[:6], order) if order else c[:6])
-    return float(smooth + amplitude * omega**order * np.sin(omega * x + phase + order * np.pi / 2))
+def at_pieces(c: Array, x: Array | float, order: int = 0) -> Array:
+    """Return the values of pieces c, (n, 9), or their derivatives, at times x, (n,), from their beginnings."""
+    smooth = np.zeros(len(c))
+    for k in range(5, order - 1, -1):  # Horner's scheme
+        smooth = smooth * x + perm(k, order) * c[:, k]
+    amplitude, omega, phase = c[:, 6], c[:, 7], c[:, 8]
+    return smooth + amplitude * omega**order * np.sin(omega * x + phase + order * np.pi / 2)
 
 
-def piece_size(c: Array, x: float, order: int) -> float:
-    """Return the sum of the sizes of the terms of `at_piece`, the scale of its rounding errors."""
-    terms = np.abs(polynomial.polyder(c[:6], order) if order else c[:6])
-    return float(polynomial.polyval(abs(x), terms) + abs(c[6]) * abs(c[7]) ** order * (1 + abs(c[7] * x)))
+def piece_sizes(c: Array, x: Array | float, order: int) -> Array:
+    """Return the sums of the sizes of the terms of `at_pieces`, (n,), the scale of their rounding errors."""
+    c, x = np.abs(c), np.abs(x)
+    terms = np.zeros(len(c))
+    for k in range(5, order - 1, -1):
+        terms = terms * x + perm(k, order) * c[:, k]
+    return terms + c[:, 6] * c[:, 7] ** order * (1 + c[:, 7] * x)
 
 
 def one_piece(coefficients: list[float], sine: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> TimeFunction:
@@ -175,7 +182,8 @@ def piecewise(t: Sequence[float], pieces: Sequence[TimeFunction]) -> TimeFunctio
 def moved_piece(c: Array, x: float) -> Array:
     """Return the coefficients of a piece about a time x after its beginning."""
     row = np.array(c)
-    row[:6] = [at_piece(np.concatenate([c[:6], np.zeros(3)]), x, k) / factorial(k) for k in range(6)]
+    smooth = np.concatenate([c[:6], np.zeros(3)])[None, :]
+    row[:6] = [at_pieces(smooth, x, k)[0] / factorial(k) for k in range(6)]
     row[8] = c[8] + c[7] * x
     return row
 
