@@ -80,7 +80,7 @@ class Address:
         value = getattr(self, self.kind)
         return f"{self.kind} {quoted(value) if self.kind == 'set' else value}"
 
-    def find(self, reduced: ReducedBody, where: str) -> FoundNodes:
+    def find(self, reduced: ReducedBody, where: str, *, of_stress: bool = False, body: str = "") -> FoundNodes:
         """Return the kept nodes that are meant.
 
         Parameters
@@ -89,6 +89,11 @@ class Address:
             The body.
         where
             Who asks, for messages: "sensor 'tip'".
+        of_stress
+            Whether only points with stress count. Nodes of beams and shells have none, but the points of the skin that
+            they move: all of these are meant then.
+        body
+            What the body is called in messages; "": its own name.
 
         Raises
         ------
@@ -96,11 +101,12 @@ class Address:
             If there is no such node, element or set in the body, or no kept node stands at the position: with the
             nearest ones, and how to keep what is missing.
         """
-        where = f"{where}: body {reduced.name!r}"
+        where = f"{where}: body {body or reduced.name!r}"
         distance = 0.0
         if self.kind == "node":
             assert self.node is not None
-            rows = own_rows(reduced, reduced.numbering.rows_of_node(where, self.node))
+            rows = reduced.numbering.rows_of_node(where, self.node)
+            rows = rows if of_stress else own_rows(reduced, rows)
         elif self.kind == "element":
             assert self.element is not None
             triangles = reduced.numbering.triangles_of_element(where, self.element)
@@ -110,16 +116,26 @@ class Address:
             named = reduced.numbering.named_set(where, self.set)
             rows = named.members if named.kind == "nodes" else np.unique(reduced.surface[named.members])
         else:
-            rows, distance = self.nearest_row(reduced, where)
+            rows, distance = self.nearest_row(reduced, where, has_stress(reduced) if of_stress else None)
+        if of_stress and self.kind != "position":
+            asked, rows = rows, rows[has_stress(reduced)[rows]]
+            if not len(rows):
+                names = ", ".join(reduced.node_name(int(row)) for row in asked[:NEAREST])
+                raise BodyError(
+                    f"{where}: {self} has no stress in its file (node {names}): no solid or skin is there, or the file "
+                    "holds no stress modes; name a stress point, or a node on the surface"
+                )
         place = reduced.frame.origin + reduced.frame.axes @ reduced.nodes[rows].mean(axis=0)
         return FoundNodes(str(self), rows, distance, tuple(reduced.node_name(int(row)) for row in rows), place)
 
-    def nearest_row(self, reduced: ReducedBody, where: str) -> tuple[IntArray, float]:
-        """Return the kept node nearest to the position, (1,), and its distance."""
+    def nearest_row(self, reduced: ReducedBody, where: str, among: np.ndarray | None) -> tuple[IntArray, float]:
+        """Return the kept node nearest to the position, (1,), among those that count, and its distance."""
         frame, nodes = reduced.frame, reduced.nodes
         if not len(nodes):
             raise BodyError(f"{where}: it has no nodes; its place at {self} is not known")
         away = np.linalg.norm(nodes - (self.position - frame.origin) @ frame.axes, axis=1)
+        if among is not None and among.any():
+            away = np.where(among, away, np.inf)
         order = np.argsort(away, kind="stable")
         size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
         nearest = float(away[order[0]])
@@ -147,6 +163,13 @@ def own_rows(reduced: ReducedBody, rows: IntArray) -> IntArray:
         return rows
     with_rotation = own if reduced.kept is None else np.intersect1d(own, reduced.kept.nodes)
     return (with_rotation if len(with_rotation) else own)[:1]
+
+
+def has_stress(reduced: ReducedBody) -> np.ndarray:
+    """Return which kept nodes have stress of any mode, (n_kept,) bool; all where there is no mode at all."""
+    if reduced.stress is None or not reduced.n_q:
+        return np.full(len(reduced.nodes), reduced.stress is not None)
+    return np.asarray(np.abs(reduced.stress).max(axis=(1, 2)) > 0)
 
 
 def has_number(reduced: ReducedBody, row: int) -> bool:

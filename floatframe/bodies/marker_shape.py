@@ -23,8 +23,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cms.reduced_basis.node_motion import are_spread
 from cms.reduced_body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array
+from fe_models.body.couplings import mean_motion
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.copies import frozen_copies
 from floatframe.rotations import cross, left_jacobian, rotation_exp, spin_rate, tilde, turned
 
@@ -35,6 +37,7 @@ __all__ = [
     "MotionInBody",
     "bending_of",
     "interface_shape",
+    "is_turning",
     "marker_motion",
     "motion_in_body",
     "node_shape",
@@ -112,16 +115,39 @@ def interface_shape(reduced: ReducedBody, name: str, *, is_stiffened: bool) -> M
     return MarkerShape(interface.position, interface.triad, np.asarray(interface.Psi), bend)
 
 
-def node_shape(reduced: ReducedBody, node: int, *, is_stiffened: bool) -> MarkerShape:
-    """Return the marker at a kept node, with the axes of the body frame: nodes keep no rotations.
+def node_shape(reduced: ReducedBody, nodes: int | IntArray, *, is_stiffened: bool) -> MarkerShape:
+    """Return the marker at a kept node, or of the mean motion of several, with the axes of the body frame.
 
-    Of a stiffened body with quadratic modes its displacement is of second order, Phi q + ½ Σ q_k q_l g_kl.
+    One node turns as its rotation is kept (`ReducedBody.kept`), and not at all where it is not (`is_turning`); several
+    turn by the mean rotation of their translations (an RBE3 of equal weights), and not at all where they lie on one
+    line. Of a stiffened body with quadratic modes the displacement is of second order, Phi q + ½ Σ q_k q_l g_kl.
     """
-    psi = np.concatenate([reduced.Phi[node], np.zeros((3, reduced.n_q))])
+    rows = np.atleast_1d(np.asarray(nodes, dtype=np.int64))
+    psi = np.concatenate([reduced.Phi[rows].mean(axis=0), rotation_of_nodes(reduced, rows)])
     bend = None
     if is_stiffened and reduced.quadratic is not None:
-        bend = np.concatenate([-reduced.quadratic[node], np.zeros((3, reduced.n_q, reduced.n_q))])
-    return MarkerShape(reduced.nodes[node], np.eye(3), psi, bend)
+        second = -reduced.quadratic[rows].mean(axis=0)
+        bend = np.concatenate([second, np.zeros((3, reduced.n_q, reduced.n_q))])
+    return MarkerShape(reduced.nodes[rows].mean(axis=0), np.eye(3), psi, bend)
+
+
+def rotation_of_nodes(reduced: ReducedBody, rows: IntArray) -> Array:
+    """Return the rotation of a node, or the mean one of several, over the modes, (3, n_q); zero where it is unknown."""
+    if not is_turning(reduced, rows):
+        return np.zeros((3, reduced.n_q))
+    if len(rows) == 1:
+        assert reduced.kept is not None
+        return np.asarray(reduced.kept.of_node(int(rows[0])))
+    points = np.asarray(reduced.nodes[rows])
+    A = mean_motion(points, np.full(len(rows), 1.0 / len(rows)), points.mean(axis=0))
+    return np.asarray(A[3:] @ np.asarray(reduced.Phi)[rows].reshape(-1, reduced.n_q))
+
+
+def is_turning(reduced: ReducedBody, rows: IntArray) -> bool:
+    """Whether the rotation of a node is kept, or several nodes have a mean one."""
+    if len(rows) == 1:
+        return reduced.kept is not None and reduced.kept.of_node(int(rows[0])) is not None
+    return are_spread(np.asarray(reduced.nodes[rows]))
 
 
 class MotionInBody(NamedTuple):

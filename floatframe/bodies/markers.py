@@ -3,9 +3,13 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from cms.errors import BodyError
+from cms.reduced_body.address import Address
+from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import array_of_shape, rotation_of
+from floatframe.errors import ModelError
 
 __all__ = ["Marker", "Named", "Place", "body_name"]
 
@@ -24,20 +28,39 @@ class Marker:
     """A place with axes on a body.
 
     On a flexible body: an interface by name, with its own triad. On a rigid body or the ground: a position and a
-    triad in the body frame, the frame itself by default.
+    triad in the body frame, the frame itself by default. Sensors and channels also take a place on a flexible body that
+    is no interface: a kept node by its number in the user's mesh or by its position there, or the mean motion of the
+    nodes of an element or a set.
     """
 
     body: str | Named  #: the body or its name
     interface: str | None = None  #: interface of a flexible body
     position: Array | None = None  #: in the body frame of a rigid body or the ground, (3,) [m]; None: the origin
     triad: Array | None = None  #: columns: axes of the marker in those of the body or interface, (3, 3); None: the same
+    node: int | str | None = None  #: number of a kept node; "INSTANCE.number" where instances have the same numbers
+    element: int | str | None = None  #: number of an element on the surface
+    set: str | None = None  #: name of a set of nodes or elements
+    tolerance: float = TOLERANCE  #: how far a node may be from a position, of the size of the body
 
     def __post_init__(self) -> None:
         where = f"marker on {body_name(self.body)!r}"
+        given = [k for k in ("interface", "position", "node", "element", "set") if getattr(self, k) is not None]
+        if len(given) > 1:
+            raise ModelError(f"{where}: expected one place, got {' and '.join(given)}")
         if self.position is not None:
             object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
         if self.triad is not None:
             object.__setattr__(self, "triad", rotation_of(f"{where}: triad", self.triad))
+
+    @property
+    def address(self) -> Address | None:
+        """The place on a flexible body where it is no interface; None: it is one, or the body itself."""
+        if self.position is None and self.node is None and self.element is None and self.set is None:
+            return None
+        try:
+            return Address(self.node, self.element, self.set, self.position, self.tolerance)
+        except BodyError as error:
+            raise ModelError(f"marker on {body_name(self.body)!r}: {error}") from error
 
 
 Place = Marker | Named | str  #: a marker, or a body (or its name): then where the other marker of the joint is placed

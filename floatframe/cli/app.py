@@ -191,6 +191,9 @@ def print_run(trajectory: "Trajectory") -> None:
                 for name, column in record["sensors"].items()
             ],
         )
+    if record["places"]:
+        places = [(name, each) for name, words in record["places"].items() for each in words]
+        print_table("Places of sensors on flexible bodies", ("", "place"), places)
 
 
 def known_system(trajectory: "Trajectory") -> "System | None":

@@ -68,6 +68,7 @@ def run_record(trajectory: Trajectory, system: System | None = None) -> dict[str
             for name, drift in drifts.items()
         },
         "sensors": {} if system is None or not n_t else sensors_record(system, trajectory),
+        "places": {name: list(words) for name, words in trajectory.head.places.items()},
     }
 
 

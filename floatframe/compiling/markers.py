@@ -69,13 +69,19 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
                 f"{where}: body {body_name(marker.body)!r} is not flexible and has no interface "
                 f"{marker.interface!r}; give a position"
             )
+        if marker.address is not None and marker.position is None:
+            raise ModelError(
+                f"{where}: body {body_name(marker.body)!r} is not flexible: it knows no {marker.address.kind} "
+                f"{getattr(marker, marker.address.kind)!r}; give a position"
+            )
         position = np.zeros(3) if marker.position is None else marker.position
         return MarkerData(index, MarkerShape(position, triad))
     choices = [interface.name for interface in body.reduced.interfaces]
-    if marker.interface is None or marker.position is not None:
+    if marker.interface is None:
+        place = "position" if marker.address is None else marker.address.kind
         raise ModelError(
-            f"{where}: a marker on the flexible body {body.name!r} needs an interface and no position; choices: "
-            f"{', '.join(choices)}"
+            f"{where}: a marker on the flexible body {body.name!r} needs an interface and no {place} (sensors and "
+            f"channels alone take kept nodes); choices: {', '.join(choices)}"
         )
     if marker.interface not in choices:
         raise ModelError(

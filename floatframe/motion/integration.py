@@ -32,6 +32,7 @@ from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import MemorySource, validity_text
 from floatframe.results.sensors import measured
+from floatframe.results.sensors.taken_places import taken_places
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.validity import ValidityNote, notes_from_json, notes_to_json
 from floatframe.results.writer import ResultsPlace, ResultsWriter, arrays_of, last_restart
@@ -448,6 +449,7 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
         compiled.spring_names,
         tuple(int(k) for k in compiled.model.connections.w0),
         run,
+        places=taken_places(system),
     )
 
 

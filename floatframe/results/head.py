@@ -12,6 +12,7 @@ from floatframe.compiling.counted_angles import CountedAngle, direction
 
 __all__ = ["BodyEntry", "Head", "head_of_text", "text_of_head"]
 
+OPTIONAL = {"summary", "angles", "places"}
 NUMBERS_OF_RUN = ("t_start", "t_end", "h")
 
 
@@ -42,6 +43,8 @@ class Head:
     #: of a run that has ended: n_steps, n_rejected, n_iterations (of Newton's method), wall_time [s]
     summary: Mapping[str, Any] = field(default_factory=dict)
     angles: tuple[CountedAngle, ...] | None = None  #: of the columns of `angle`; None: not counted
+    #: sensor -> in words, the places on flexible bodies that it takes and how far they are from those asked for
+    places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def text_of_head(head: Head) -> str:
@@ -62,7 +65,7 @@ def head_of_text(text: Any) -> Head:
     except (TypeError, ValueError, RecursionError):
         raise ValueError("head: expected JSON text") from None
     known = [part.name for part in fields(Head)]
-    require(isinstance(data, dict) and set(data) <= set(known) and set(known) - set(data) <= {"summary", "angles"},
+    require(isinstance(data, dict) and set(data) <= set(known) and set(known) - set(data) <= OPTIONAL,
             "head", f"an object with {', '.join(known)}", data)  # fmt: skip
     for name in ("system", "units"):
         require(isinstance(data[name], str), name, "text", data[name])
@@ -80,8 +83,11 @@ def head_of_text(text: Any) -> Head:
     check_run(data["run"])
     check_summary(summary)
     angles = None if data.get("angles") is None else angles_of(data["angles"], len(bodies))
+    places = data.get("places", {})
+    is_words = isinstance(places, dict) and all(is_list(words, str) for words in places.values())
+    require(is_words, "places", "an object of lists of words", places)
     return Head(data["system"], data["units"], bodies, tuple(data["joints"]), tuple(data["springs"]), tuple(w0),
-                data["run"], summary, angles)  # fmt: skip
+                data["run"], summary, angles, {name: tuple(words) for name, words in places.items()})  # fmt: skip
 
 
 def angles_of(tables: Any, n_bodies: int) -> tuple[CountedAngle, ...]:

@@ -7,8 +7,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from cms.errors import BodyError
+from cms.reduced_body.address import Address
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.reduced_body.stress import stress_of, von_mises_of
+from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.marker_shape import (
     BodyFrameMotion,
@@ -97,11 +100,12 @@ def as_moved(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[B
     return BodyMotion(motion.t, *(getattr(moved, each.name) for each in fields(moved))), axes.reduced
 
 
-def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: int) -> PlaceMotion:
-    """Return the motion of a kept node (its index in `ReducedBody.nodes`), with the axes of the body frame.
+def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: int | IntArray) -> PlaceMotion:
+    """Return the motion of a kept node (its row in `ReducedBody.nodes`), or the mean motion of several.
 
     In the body it moves as `nodal_displacements` says: by Phi q, and of a stiffened body with quadratic modes by
-    ½ Σ q_k q_l g_kl besides.
+    ½ Σ q_k q_l g_kl besides. Its axes are those of the body frame, turned as the node turns where its rotation is kept
+    (`floatframe.bodies.marker_shape.node_shape`).
 
     Raises
     ------
@@ -109,16 +113,23 @@ def node_motion(trajectory: Trajectory, body: str, reduced: ReducedBody, node: i
         If there is no such body or node, or the reduced body is another one.
     """
     require_same_modes(trajectory, body, reduced)
-    if not 0 <= node < len(reduced.nodes):
-        raise ResultsError(f"body {body!r}: node: expected 0 to {len(reduced.nodes) - 1}, got {node}")
+    rows = np.atleast_1d(node)
+    if not len(rows) or rows.min() < 0 or rows.max() >= len(reduced.nodes):
+        raise ResultsError(f"body {body!r}: node: expected rows 0 to {len(reduced.nodes) - 1}, got {node}")
     is_stiffened = trajectory.entry(body)[1].is_stiffened
     return shape_motion(trajectory.body(body), node_shape(reduced, node, is_stiffened=is_stiffened))
 
 
 def point_motion(
-    trajectory: Trajectory, body: str, point: Array | tuple[float, float, float], *, undeformed: bool = False
+    trajectory: Trajectory,
+    body: str,
+    point: Array | tuple[float, float, float],
+    *,
+    reduced: ReducedBody | None = None,
+    tolerance: float = TOLERANCE,
+    undeformed: bool = False,
 ) -> PlaceMotion:
-    """Return the motion of a point that is fixed in the frame of a body, with the axes of the frame.
+    """Return the motion of a point of a body, with the axes of its frame; on a flexible body it deforms with the body.
 
     Parameters
     ----------
@@ -126,18 +137,32 @@ def point_motion(
         The motion, and a body of it.
     point
         Position in the frame of the body, (3,) [m].
+    reduced
+        Of a flexible body: what it was run with. A kept node must stand at the point, which moves and turns as it does
+        (`node_motion`), as `interface_motion` does at interfaces.
+    tolerance
+        How far that node may be away, of the size of the body.
     undeformed
         Whether the point of a flexible body is meant to move with its frame alone.
 
     Raises
     ------
     ResultsError
-        If there is no such body, or it is flexible: its points deform, as interfaces and nodes do.
+        If there is no such body; or it is flexible, and no reduced body is given, or none of its kept nodes is there.
     """
+    if reduced is not None and undeformed:
+        raise ResultsError(f"body {body!r}: expected either its reduced body or undeformed=True, got both")
+    if reduced is not None:
+        place = reduced.frame.origin + reduced.frame.axes @ np.asarray(point, dtype=float)
+        try:
+            found = Address(position=place, tolerance=tolerance).find(reduced, "point_motion", body=body)
+        except BodyError as error:
+            raise ResultsError(str(error)) from error
+        return node_motion(trajectory, body, reduced, found.rows)
     if trajectory.entry(body)[1].n_q and not undeformed:
         raise ResultsError(
-            f"body {body!r} is flexible: a point fixed in its frame does not deform with it; take interface_motion or "
-            "node_motion with its modal file, or, where the frame alone is meant, undeformed=True"
+            f"body {body!r} is flexible: a point fixed in its frame does not deform with it; give its modal file, "
+            "reduced=, so that the kept node there is taken, or, where the frame alone is meant, undeformed=True"
         )
     motion = trajectory.body(body)
     shape = MarkerShape(np.asarray(point, dtype=float), np.eye(3))
@@ -202,12 +227,22 @@ def nodal_stress(trajectory: Trajectory, body: str, reduced: ReducedBody, i_time
     return np.asarray(stress_of(stress_modes(body, reduced), trajectory.body(body).q[i_time]))
 
 
-def largest_von_mises(trajectory: Trajectory, body: str, reduced: ReducedBody) -> tuple[Array, IntArray]:
-    """Return the largest von Mises stress of the kept nodes over time, (n_t,) [Pa], and where it is, (n_t,) index."""
+def largest_von_mises(
+    trajectory: Trajectory, body: str, reduced: ReducedBody, *, rows: IntArray | None = None
+) -> tuple[Array, IntArray]:
+    """Return the largest von Mises stress of kept nodes over time, (n_t,) [Pa], and the row of its node, (n_t,).
+
+    Parameters
+    ----------
+    rows
+        Of the nodes among which it is sought, (n,); None: all.
+    """
     require_same_modes(trajectory, body, reduced)
+    modes = stress_modes(body, reduced)
+    rows = np.arange(len(modes)) if rows is None else np.asarray(rows)
     largest, where = [np.zeros(0)], [np.zeros(0, np.int64)]
-    for stress in von_mises_of(stress_modes(body, reduced), trajectory.body(body).q):
-        where.append(stress.argmax(axis=1))
+    for stress in von_mises_of(modes[rows], trajectory.body(body).q):
+        where.append(rows[stress.argmax(axis=1)])
         largest.append(stress.max(axis=1))
     return np.concatenate(largest), np.concatenate(where)
 

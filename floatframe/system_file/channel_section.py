@@ -13,8 +13,7 @@ from floatframe.analyses.linear.channels import (
     CoordinateChannel,
     StressChannel,
 )
-from floatframe.system_file.place_key import PlaceOnBody
-from floatframe.system_file.sensor_section import marker_at
+from floatframe.system_file.place_key import MeasuredPlace, marker_at
 
 __all__ = ["InputSection", "OutputSection"]
 
@@ -29,13 +28,13 @@ class InputSection(Table):
     """[inputs.NAME]: a force or torque at a place, or along a joint coordinate."""
 
     body: str | None = Field(None, description='the name of a body, or "ground"')
-    marker: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in the body")
+    marker: MeasuredPlace | None = Field(None, description="an interface, or a position [x, y, z] in the body")
     direction: Vector3 | None = Field(None, description="the direction in ground axes, [x, y, z]; default: x")
     quantity: choice("quantity", lambda: QUANTITIES) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(QUANTITIES)}"
     )
     relative_to: str | None = Field(None, description="the name of the body against which it is taken")
-    relative_marker: PlaceOnBody | None = Field(None, description="an interface of, or a position in that body")
+    relative_marker: MeasuredPlace | None = Field(None, description="an interface of, or a position in that body")
     joint: str | None = Field(None, description="the name of a joint")
     coordinate: str | None = Field(None, description="a coordinate of the joint")
 
@@ -62,7 +61,7 @@ class InputSection(Table):
         seen_from = None if self.relative_to is None else marker_at(self.relative_to, self.relative_marker)
         direction = np.array(self.direction or (1.0, 0.0, 0.0))
         return Channel(
-            name, marker_at(self.body, self.marker), direction, self.quantity or QUANTITIES[0], seen_from, rate
+            name, marker_at(str(self.body), self.marker), direction, self.quantity or QUANTITIES[0], seen_from, rate
         )
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, model_validator
 
+from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.toml_file import Table, Vector3, choice
 from fe_models.foundation.words import nearest
 from floatframe.bodies.markers import Marker
@@ -27,25 +28,35 @@ from floatframe.results.sensors import (
 )
 from floatframe.results.sensors.loads import AXES
 from floatframe.results.sensors.places import PLACE_QUANTITIES
-from floatframe.system_file.place_key import PlaceOnBody
+from floatframe.system_file.place_key import (
+    TOLERANCE_WORDS,
+    MeasuredPlace,
+    MeshNumber,
+    NodeOrPosition,
+    address_at,
+    marker_at,
+)
 
 __all__ = ["SENSOR_TYPES", "SensorSection"]
 
+MESH = ("node", "element", "set")  #: keys that name a place by the user's mesh
+AT = ("marker", *MESH, "tolerance")  #: keys of a place
+
 SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up to "|" are needed
-    **dict.fromkeys(PLACE_QUANTITIES, ("body", "|", "marker", "relative_to", "relative_marker")),
+    **dict.fromkeys(PLACE_QUANTITIES, ("body", "|", *AT, "relative_to", "relative_marker")),
     "angle": ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
     "control": ("of", "|"),
     "coordinate": ("joint", "coordinate", "|"),
     "coupler": ("of", "|"),
-    "displacement": ("body", "marker", "|"),
-    "elongation": ("body", "position_a", "position_b", "|"),
+    "displacement": ("body", "|", *AT),
+    "elongation": ("body", "position_a", "position_b", "|", "tolerance"),
     "energy": ("|",),
     "mode": ("body", "mode", "|"),
     "momentum": ("|",),
     "reaction": ("of", "|", "axes"),
-    "strain": ("body", "direction", "young", "poisson", "|", "position", "point"),
-    "stress": ("body", "|", "position", "point"),
-    "von-mises": ("body", "|"),
+    "strain": ("body", "direction", "young", "poisson", "|", "position", "point", "node", "tolerance"),
+    "stress": ("body", "|", "position", "point", *MESH, "tolerance"),
+    "von-mises": ("body", "|", *MESH),
 }
 
 
@@ -56,13 +67,17 @@ class SensorSection(Table):
         description=f"one of {', '.join(SENSOR_TYPES)}"
     )
     body: str | None = Field(None, description='the name of a body, or "ground"')
-    marker: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in the body")
+    marker: MeasuredPlace | None = Field(None, description="an interface, or a position [x, y, z] in the body")
+    node: MeshNumber | None = Field(None, description="the number of a kept node in the mesh of the body")
+    element: MeshNumber | None = Field(None, description="the number of an element on the surface of its mesh")
+    set: str | None = Field(None, description="the name of a set of its mesh")
+    tolerance: float | None = Field(None, ge=0, description=TOLERANCE_WORDS)
     relative_to: str | None = Field(None, description="the name of the body that sees it")
-    relative_marker: PlaceOnBody | None = Field(None, description="an interface of, or a position in that body")
+    relative_marker: MeasuredPlace | None = Field(None, description="an interface of, or a position in that body")
     body_a: str | None = Field(None, description='the name of a body, or "ground"')
     body_b: str | None = Field(None, description='the name of a body, or "ground"')
-    marker_a: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_a")
-    marker_b: PlaceOnBody | None = Field(None, description="an interface, or a position [x, y, z] in body_b")
+    marker_a: MeasuredPlace | None = Field(None, description="an interface, or a position [x, y, z] in body_a")
+    marker_b: MeasuredPlace | None = Field(None, description="an interface, or a position [x, y, z] in body_b")
     axis: Vector3 | None = Field(None, description="an axis in the axes of marker_a, [x, y, z]; default: z")
     joint: str | None = Field(None, description="the name of a joint")
     coordinate: str | None = Field(None, description="a coordinate of the joint")
@@ -71,10 +86,10 @@ class SensorSection(Table):
         None, description=f"one of {', '.join(AXES)}"
     )
     mode: int | None = Field(None, description="a whole number, the mode, from 1")
-    position: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the nearest node is taken")
+    position: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the node there")
     point: str | None = Field(None, description="the name of a stress point of the modal file")
-    position_a: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the nearest node is taken")
-    position_b: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the nearest node is taken")
+    position_a: NodeOrPosition | None = Field(None, description="a position in the body, [x, y, z], or {node = 12}")
+    position_b: NodeOrPosition | None = Field(None, description="a position in the body, [x, y, z], or {node = 12}")
     direction: Vector3 | None = Field(None, description="the direction of the gauge in the body, [x, y, z]")
     young: float | None = Field(None, description="a number above 0, Young's modulus")
     poisson: float | None = Field(None, description="a number, Poisson's ratio")
@@ -89,32 +104,50 @@ class SensorSection(Table):
         for key in needed:
             if getattr(self, key) is None:
                 raise ValueError(f"{key}: missing; expected {type(self).model_fields[key].description}")
-        if self.type in ("stress", "strain") and (self.position is None) == (self.point is None):
-            raise ValueError("expected either position or point: where it is measured")
+        given = [key for key in ("marker", "position", "point", *MESH) if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise ValueError(f"expected one place, got {' and '.join(given)}")
+        if self.type in ("stress", "strain") and not given:
+            raise ValueError("expected either position or point, or node, element or set: where it is measured")
+        if self.type == "displacement" and not given:
+            raise ValueError("marker: missing; expected an interface, a position, or node, element or set")
         return self
 
     def sensor(self, name: str) -> Sensor:
         """Return the sensor of the table."""
         if self.type in PLACE_QUANTITIES:
             seen_from = None if self.relative_to is None else marker_at(self.relative_to, self.relative_marker)
-            return PlaceSensor(name, marker_at(self.body, self.marker), self.type, seen_from)
+            return PlaceSensor(name, self.place(), self.type, seen_from)
         if self.type == "angle":
-            ends = marker_at(self.body_a, self.marker_a), marker_at(self.body_b, self.marker_b)
+            ends = marker_at(str(self.body_a), self.marker_a), marker_at(str(self.body_b), self.marker_b)
             return AngleSensor(name, *ends, axis=np.array(self.axis or (0.0, 0.0, 1.0)))
         if self.type == "displacement":
-            return DisplacementSensor(name, marker_at(self.body, self.marker))
+            return DisplacementSensor(name, self.place())
+        if self.type == "elongation":
+            a, b = address_at(self.position_a, self.limit), address_at(self.position_b, self.limit)
+            return ElongationSensor(name, str(self.body), a, b)
         given: dict[str, Any] = {
             key: getattr(self, key) for key in SENSOR_TYPES[self.type] if key != "|" and getattr(self, key) is not None
         }
         given = {key: np.array(value) if isinstance(value, tuple) else value for key, value in given.items()}
         return BY_KEYS[self.type](name, **given)
 
+    @property
+    def limit(self) -> float:
+        """How far a node may be from a position."""
+        return TOLERANCE if self.tolerance is None else self.tolerance
+
+    def place(self) -> Marker:
+        """Return the marker of the table: an interface, a position, or a node, element or set."""
+        if any(getattr(self, key) is not None for key in MESH):
+            return Marker(str(self.body), node=self.node, element=self.element, set=self.set)
+        return marker_at(str(self.body), self.marker, self.limit)
+
 
 BY_KEYS: dict[str, Any] = {  # sensors whose fields are the keys of their table
     "control": ControlSensor,
     "coordinate": CoordinateSensor,
     "coupler": CouplerSensor,
-    "elongation": ElongationSensor,
     "energy": EnergySensor,
     "mode": ModeSensor,
     "momentum": MomentumSensor,
@@ -123,11 +156,3 @@ BY_KEYS: dict[str, Any] = {  # sensors whose fields are the keys of their table
     "stress": StressSensor,
     "von-mises": VonMisesSensor,
 }
-
-
-def marker_at(body: str | None, place: str | tuple[float, float, float] | None) -> Marker:
-    """Return a marker by interface or position."""
-    assert body is not None  # checked by the table
-    if isinstance(place, str):
-        return Marker(body, place)
-    return Marker(body, position=None if place is None else np.array(place))

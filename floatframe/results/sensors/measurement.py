@@ -21,6 +21,7 @@ class Measurement:
     t: Array  #: (n_t,) [s]
     columns: Mapping[str, Array]  #: each (n_t,)
     units: Mapping[str, str]  #: of each column, in the symbols of the system
+    places: tuple[str, ...] = ()  #: where on the motion it measured, in words, as far as the motion decides it
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", FrozenMapping(dict(self.columns)))

@@ -1,18 +1,21 @@
 """Sensors of places: position, velocity, acceleration and rotation of markers, angles, elastic displacement.
 
-A place on a flexible body is an interface, or the kept node nearest to a position (in mesh axes of the body frame B).
+A place on a flexible body is an interface, a kept node by its number or position (as the mesh was drawn), or the mean
+of the nodes of an element or set.
 """
 
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from cms.errors import BodyError
+from cms.reduced_body.address import Address, FoundNodes
+from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.bodies.marker_shape import MarkerShape
+from floatframe.bodies.marker_shape import MarkerShape, is_turning, node_shape
 from floatframe.bodies.markers import Marker, body_name
 from floatframe.checked_values import unit_vector
 from floatframe.compiling.counted_angles import CountedAngle, angle_of
@@ -31,13 +34,15 @@ __all__ = [
     "AngleSensor",
     "DisplacementSensor",
     "PlaceSensor",
+    "found_at",
+    "found_nodes",
     "is_at_node",
     "nearest_node",
+    "node_marker",
     "place_motion",
 ]
 
-FAR = 0.1  #: of the size of a body: from a node that is meant to stand for a position
-
+TURNING = ("rotation-vector", "angular-velocity")  #: quantities of the axes of a place
 PLACE_QUANTITIES = {
     "position": "length",
     "velocity": "speed",
@@ -48,7 +53,7 @@ PLACE_QUANTITIES = {
 
 
 def place_motion(system: System, trajectory: Trajectory, where: str, marker: Marker) -> PlaceMotion:
-    """Return the motion of a marker; on a flexible body a position stands for the kept node nearest to it.
+    """Return the motion of a marker; on a flexible body a position or number stands for a kept node.
 
     Raises
     ------
@@ -56,18 +61,52 @@ def place_motion(system: System, trajectory: Trajectory, where: str, marker: Mar
         If the marker names what does not exist.
     """
     if is_at_node(system, marker):
-        assert marker.position is not None  # so it is
-        body = system.body(body_name(marker.body))
-        assert isinstance(body, FlexibleBody)
-        return node_motion(trajectory, body.name, body.reduced, nearest_node(body, marker.position))
+        body, found = found_nodes(system, where, marker)
+        return node_motion(trajectory, body.name, body.reduced, found.rows)
     return end_motion(system, trajectory, find_marker(system, where, marker))
 
 
 def is_at_node(system: System, marker: Marker) -> bool:
-    """Whether a marker stands for a kept node of a flexible body, with the axes of its frame."""
+    """Whether a marker stands for kept nodes of a flexible body, with the axes of its frame."""
     name = body_name(marker.body)
     body = next((each for each in system.bodies if each.name == name), None)
-    return isinstance(body, FlexibleBody) and marker.position is not None
+    return isinstance(body, FlexibleBody) and marker.address is not None
+
+
+def found_nodes(system: System, where: str, marker: Marker) -> tuple[FlexibleBody, FoundNodes]:
+    """Return the flexible body of a marker and its kept nodes that are meant; `ModelError` if there are none."""
+    body = system.body(body_name(marker.body))
+    assert isinstance(body, FlexibleBody)  # `is_at_node`
+    assert marker.address is not None
+    return body, found_at(body, where, marker.address)
+
+
+def found_at(body: FlexibleBody, where: str, address: Address, *, of_stress: bool = False) -> FoundNodes:
+    """Return the kept nodes that an address means; `ModelError` with the nearest ones if there are none."""
+    try:
+        return address.find(body.reduced, where, of_stress=of_stress, body=body.name)
+    except BodyError as error:
+        raise ModelError(str(error)) from error
+
+
+def node_marker(system: System, where: str, marker: Marker) -> MarkerData:
+    """Return the marker at kept nodes of a flexible body, as the engine has the body: with its mean axes."""
+    body, found = found_nodes(system, where, marker)
+    shape = node_shape(body.moved, found.rows, is_stiffened=body.is_stiffened)
+    return MarkerData(find_body(system, where, body.name), shape)
+
+
+def require_turning(system: System, where: str, marker: Marker) -> None:
+    """Raise `ModelError` if a marker is at a node whose rotation is not kept: it would show that of the frame."""
+    if not is_at_node(system, marker):
+        return
+    body, found = found_nodes(system, where, marker)
+    if not is_turning(body.reduced, found.rows):
+        raise ModelError(
+            f"{where}: {found.asked} of flexible body {body.name!r} keeps no rotation; keep it "
+            f"(keep = [...] in the [body] of its job, keep= in Python), or take an interface: "
+            f"{', '.join(interface.name for interface in body.reduced.interfaces) or 'it has none'}"
+        )
 
 
 def frame_marker(system: System, where: str, marker: Marker) -> MarkerData:
@@ -79,29 +118,15 @@ def frame_marker(system: System, where: str, marker: Marker) -> MarkerData:
     return MarkerData(find_body(system, where, name), MarkerShape(np.zeros(3), axes))
 
 
-def nearest_node(body: FlexibleBody, position: Array) -> int:
-    """Return the index of the kept node nearest to a position in mesh axes, as the mesh was drawn.
+def nearest_node(body: FlexibleBody, position: Array, *, where: str = "place", tolerance: float = TOLERANCE) -> int:
+    """Return the row of the kept node at a position in mesh axes, as the mesh was drawn.
 
     Raises
     ------
     ModelError
-        If the position is farther from it than a tenth of the body, and than nodes are from each other.
+        If it is farther away than the tolerance, of the size of the body.
     """
-    frame, nodes = body.reduced.frame, body.reduced.nodes
-    local = (np.asarray(position, dtype=float) - frame.origin) @ frame.axes
-    away = np.linalg.norm(nodes - local, axis=1)
-    nearest = int(np.argmin(away))
-    size = float(np.linalg.norm(np.ptp(nodes, axis=0)))
-    if away[nearest] > FAR * size and len(nodes) > 1:
-        spacing = float(cKDTree(nodes).query(nodes, k=2)[0][:, 1].max())
-        if away[nearest] > spacing:
-            x, y, z = frame.origin + frame.axes @ nodes[nearest]
-            raise ModelError(
-                f"flexible body {body.name!r}: position {np.asarray(position).tolist()} is {away[nearest]:.3g} away "
-                f"from its nearest kept node, [{x:.4g}, {y:.4g}, {z:.4g}]; the body has a size of {size:.3g}: give a "
-                "position in the axes and units of its mesh, at a node that the file keeps"
-            )
-    return nearest
+    return int(found_at(body, where, Address(position=position, tolerance=tolerance)).rows[0])
 
 
 @frozen_copies
@@ -126,6 +151,10 @@ class PlaceSensor:
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return x, y, z and size over time."""
         where = f"sensor {self.name!r}: marker"
+        if self.quantity in TURNING:
+            for key, marker in (("marker", self.marker), ("relative_to", self.relative_to)):
+                if marker is not None:
+                    require_turning(system, f"sensor {self.name!r}: {key}", marker)
         place = place_motion(system, trajectory, where, self.marker)
         if self.relative_to is None:
             values = absolute(place, self.quantity)
@@ -221,7 +250,7 @@ class DisplacementSensor:
     """Elastic displacement of an interface or node of a flexible body, in axes of its frame B, all modes included."""
 
     name: str
-    marker: Marker  #: an interface, or a position that stands for the nearest kept node
+    marker: Marker  #: an interface, or a kept node by number or position
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return x, y, z and size over time."""
@@ -230,8 +259,9 @@ class DisplacementSensor:
         if not isinstance(body, FlexibleBody):
             find_marker(system, f"sensor {self.name!r}: marker", self.marker)  # names an unknown body
             raise ModelError(f"sensor {self.name!r}: body {name!r} is not flexible; it has no elastic displacement")
-        if self.marker.position is not None:
-            moved = trajectory.body(name).q @ body.reduced.Phi[nearest_node(body, self.marker.position)].T
+        if is_at_node(system, self.marker):
+            _, found = found_nodes(system, f"sensor {self.name!r}: marker", self.marker)
+            moved = trajectory.body(name).q @ body.reduced.Phi[found.rows].mean(axis=0).T
         else:
             end = find_marker(system, f"sensor {self.name!r}: marker", self.marker)
             moved = end.shape.deformation(trajectory.body(name).q)[:, :3]

@@ -4,8 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cms.errors import BodyError
+from cms.reduced_body.address import KINDS_OF_ADDRESS, Address, FoundNodes
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.reduced_body.stress import stress_of, von_mises
+from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.copies import frozen_copies
@@ -16,11 +19,11 @@ from floatframe.errors import ModelError
 from floatframe.results.place_motion import largest_von_mises, stress_modes
 from floatframe.results.recovery import require_same_modes
 from floatframe.results.sensors.measurement import Measurement
-from floatframe.results.sensors.places import nearest_node
+from floatframe.results.sensors.places import found_at
 from floatframe.results.trajectory import Trajectory
 from floatframe.system import System
 
-__all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor"]
+__all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor", "address_of"]
 
 
 def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
@@ -32,12 +35,21 @@ def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
     raise ModelError(f"sensor {sensor!r}: no flexible body {quoted(name)}{nearest(name, choices)}")
 
 
-def modes_at(body: FlexibleBody, sensor: str, position: Array | None, point: str | None) -> Array:
-    """Return the stress modes at the kept node nearest to a position, or at a named stress point, (6, n_q)."""
+def modes_at(
+    body: FlexibleBody, sensor: str, position: Array | None, point: str | None, *, address: Address | None = None
+) -> Array:
+    """Return the stress modes at one kept node, by position or address, or at a named stress point, (6, n_q)."""
     reduced = body.reduced
     if point is None:
-        assert position is not None  # checked by the sensors
-        return np.asarray(stress_modes(body.name, reduced)[nearest_node(body, position)])
+        given = Address(position=position) if address is None else address
+        modes = stress_modes(body.name, reduced)
+        found = found_at(body, f"sensor {sensor!r}", given, of_stress=True)
+        if len(found.rows) > 1:
+            raise ModelError(
+                f"sensor {sensor!r}: {found.asked} has stress at {len(found.rows)} points of the surface; name one by "
+                "its position, or a stress point"
+            )
+        return np.asarray(modes[found.rows[0]])
     names = () if reduced.point_stress is None else reduced.point_stress.names
     if reduced.point_stress is None or point not in names:
         raise ModelError(
@@ -46,50 +58,129 @@ def modes_at(body: FlexibleBody, sensor: str, position: Array | None, point: str
     return np.asarray(reduced.point_stress.modes[list(names).index(point)])
 
 
+def address_of(sensor: "StressSensor | StrainGauge | VonMisesSensor") -> Address | None:
+    """Return where a sensor measures on the surface; None: at a stress point, or all over.
+
+    Raises
+    ------
+    ModelError
+        If several places are given.
+    """
+    given = {kind: value for kind in KINDS_OF_ADDRESS if (value := getattr(sensor, kind, None)) is not None}
+    if not given:
+        return None
+    try:
+        return Address(**given, tolerance=sensor.tolerance)
+    except BodyError as error:
+        raise ModelError(f"sensor {sensor.name!r}: {error}") from error
+
+
+def require_one_place(sensor: "StressSensor | StrainGauge") -> None:
+    """Raise `ModelError` unless a sensor has either a stress point, or one place on the surface."""
+    if (address_of(sensor) is None) == (sensor.point is None):
+        raise ModelError(
+            f"sensor {sensor.name!r}: expected either a position or a stress point, or a node, element or set"
+        )
+
+
+def with_position(sensor: "StressSensor | StrainGauge") -> None:
+    """Check and freeze the position of a sensor, where it has one."""
+    if sensor.position is not None:
+        position = array_of_shape(f"sensor {sensor.name!r}: position", sensor.position, (3,))
+        object.__setattr__(sensor, "position", position)
+
+
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class StressSensor:
-    """Stress at a node or stress point: six components in axes of the body frame, and von Mises'."""
+    """Stress at a node or stress point: six components in axes of the body frame, and von Mises'.
+
+    Where several points are meant (an element, a set, the skin round a node of a beam or shell), it is the one of them
+    that has the largest von Mises stress of the motion.
+    """
 
     name: str
     body: str
-    position: Array | None = None  #: mesh axes; the kept node nearest to it is taken, (3,) [m]
+    position: Array | None = None  #: mesh axes; the kept node there, (3,) [m]
     point: str | None = None  #: or a stress point of the file by its name
+    node: int | str | None = None  #: or a node by the user's number
+    element: int | str | None = None  #: or an element on the surface by its number
+    set: str | None = None  #: or a set by its name
+    tolerance: float = TOLERANCE  #: how far the node may be from the position, of the size of the body
 
     def __post_init__(self) -> None:
-        if (self.position is None) == (self.point is None):
-            raise ModelError(f"sensor {self.name!r}: expected either a position or a stress point")
-        if self.position is not None:
-            position = array_of_shape(f"sensor {self.name!r}: position", self.position, (3,))
-            object.__setattr__(self, "position", position)
+        with_position(self)
+        require_one_place(self)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the components and von Mises' stress over time."""
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
-        modes = modes_at(body, self.name, self.position, self.point)[None]
-        stress = stress_of(modes, trajectory.body(self.body).q)[0].T
+        address = address_of(self)
+        places: tuple[str, ...] = ()
+        if address is None:
+            modes = modes_at(body, self.name, None, self.point)
+        else:
+            stress_modes(body.name, body.reduced)
+            found = found_at(body, f"sensor {self.name!r}", address, of_stress=True)
+            row = int(found.rows[0])
+            if len(found.rows) > 1:
+                largest, where = largest_von_mises(trajectory, self.body, body.reduced, rows=found.rows)
+                row = int(where[int(largest.argmax())])
+            modes = np.asarray(stress_modes(body.name, body.reduced)[row])
+            places = (f"{found.words()}; measured at node {body.reduced.node_name(row)}",)
+        stress = stress_of(modes[None], trajectory.body(self.body).q)[0].T
         columns = {component: stress[:, k] for k, component in enumerate(STRESS_COMPONENTS)}
         columns["von Mises"] = von_mises(stress)
-        return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, system.units.stress_symbol))
+        units = dict.fromkeys(columns, system.units.stress_symbol)
+        return Measurement(self.name, trajectory.t, columns, units, places)
 
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class VonMisesSensor:
-    """The largest von Mises stress of a body over its kept nodes, and at which node it is."""
+    """The largest von Mises stress of a body, or of one place on it, over its kept nodes, and at which node it is."""
 
     name: str
     body: str
+    node: int | str | None = None  #: only at this node, by the user's number
+    element: int | str | None = None  #: only at this element on the surface
+    set: str | None = None  #: only at the nodes of this set
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        address_of(self)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
-        """Return the largest stress over time, and the number of its node in the mesh."""
+        """Return the largest stress over time, and the number of its node in the user's mesh.
+
+        Without numbers (an older file) the column says that it holds the index in the model; where instances have the
+        same numbers, a further column counts the instance.
+        """
         body = flexible_body(system, self.name, self.body)
-        largest, where = largest_von_mises(trajectory, self.body, body.reduced)
-        columns = {"largest": largest, "node": body.reduced.node_ids[where].astype(float)}
-        return Measurement(
-            self.name, trajectory.t, columns, {"largest": system.units.stress_symbol, "node": "number in the mesh"}
-        )
+        reduced, address = body.reduced, address_of(self)
+        stress_modes(body.name, reduced)
+        found = None if address is None else found_at(body, f"sensor {self.name!r}", address, of_stress=True)
+        rows = None if found is None else found.rows
+        largest, where = largest_von_mises(trajectory, self.body, reduced, rows=rows)
+        numbering, units = reduced.numbering, {"largest": system.units.stress_symbol}
+        columns = {"largest": largest}
+        if numbering.nodes.size:
+            columns["node"], units["node"] = numbering.nodes[where].astype(float), "number in the mesh"
+        else:
+            columns["node"], units["node"] = reduced.node_ids[where].astype(float), "index in the model, from 0"
+        if numbering.node_instance.size:
+            names = ", ".join(f"{k}: {name}" for k, name in enumerate(numbering.instances))
+            columns["instance"], units["instance"] = numbering.node_instance[where].astype(float), names
+        hot = int(where[int(largest.argmax())]) if len(where) else None
+        words = () if hot is None else (f"largest at {node_words(reduced, hot)}",)
+        return Measurement(self.name, trajectory.t, columns, units, (*((found.words(),) if found else ()), *words))
+
+
+def node_words(reduced: ReducedBody, row: int) -> str:
+    """Say name and place of a kept node, in mesh axes."""
+    x = reduced.frame.origin + reduced.frame.axes @ reduced.nodes[row]
+    return f"node {reduced.node_name(row)} at [{', '.join(f'{value:.6g}' for value in x)}]"
 
 
 @frozen_copies
@@ -105,24 +196,24 @@ class StrainGauge:
     direction: Array  #: mesh axes, (3,)
     young: float  #: [Pa]
     poisson: float
-    position: Array | None = None  #: mesh axes; the kept node nearest to it is taken, (3,) [m]
+    position: Array | None = None  #: mesh axes; the kept node there, (3,) [m]
     point: str | None = None  #: or a stress point of the file by its name
+    node: int | str | None = None  #: or a node by the user's number
+    tolerance: float = TOLERANCE  #: how far the node may be from the position, of the size of the body
 
     def __post_init__(self) -> None:
         where = f"sensor {self.name!r}"
         object.__setattr__(self, "direction", unit_vector(f"{where}: direction", self.direction))
         object.__setattr__(self, "young", number(f"{where}: young", self.young, above=0.0))
         object.__setattr__(self, "poisson", number(f"{where}: poisson", self.poisson, at_least=-1.0))
-        if (self.position is None) == (self.point is None):
-            raise ModelError(f"{where}: expected either a position or a stress point")
-        if self.position is not None:
-            object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
+        with_position(self)
+        require_one_place(self)
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the strain over time."""
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
-        modes = modes_at(body, self.name, self.position, self.point)
+        modes = modes_at(body, self.name, None, self.point, address=address_of(self))
         x, y, z = self.direction @ body.reduced.frame.axes
         along = np.array([x * x, y * y, z * z, 2 * y * z, 2 * x * z, 2 * x * y]) @ modes
         strain = ((1 + self.poisson) * along - self.poisson * modes[:3].sum(axis=0)) / self.young
@@ -137,24 +228,38 @@ class ElongationSensor:
 
     name: str
     body: str
-    position_a: Array  #: mesh axes; the kept node nearest to it is taken, (3,) [m]
-    position_b: Array
+    position_a: Array | Address  #: mesh axes, (3,) [m]: the kept node there; or its address, such as a number
+    position_b: Array | Address
+    tolerance: float = TOLERANCE  #: how far nodes may be from positions, of the size of the body
 
     def __post_init__(self) -> None:
         for key in ("position_a", "position_b"):
-            where = f"sensor {self.name!r}: {key}"
-            object.__setattr__(self, key, array_of_shape(where, getattr(self, key), (3,)))
+            given = getattr(self, key)
+            if not isinstance(given, Address):
+                object.__setattr__(self, key, array_of_shape(f"sensor {self.name!r}: {key}", given, (3,)))
+
+    def ends(self, body: FlexibleBody) -> tuple[FoundNodes, FoundNodes]:
+        """Return the kept nodes at both ends; of an element or set the mean of its nodes."""
+        a, b = (
+            found_at(
+                body,
+                f"sensor {self.name!r}: {key}",
+                given if isinstance(given, Address) else Address(position=given, tolerance=self.tolerance),
+            )
+            for key, given in (("position_a", self.position_a), ("position_b", self.position_b))
+        )
+        return a, b
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the mean strain between the nodes over time."""
         body = flexible_body(system, self.name, self.body)
         reduced: ReducedBody = body.reduced
         require_same_modes(trajectory, self.body, reduced)
-        a, b = nearest_node(body, self.position_a), nearest_node(body, self.position_b)
-        if a == b:
+        a, b = (each.rows for each in self.ends(body))
+        if np.array_equal(a, b):
             raise ModelError(f"sensor {self.name!r}: both positions are nearest to one node; take them further apart")
-        d = reduced.nodes[b] - reduced.nodes[a]
-        change = trajectory.body(self.body).q @ (reduced.Phi[b] - reduced.Phi[a]).T
+        d = reduced.nodes[b].mean(axis=0) - reduced.nodes[a].mean(axis=0)
+        change = trajectory.body(self.body).q @ (reduced.Phi[b].mean(axis=0) - reduced.Phi[a].mean(axis=0)).T
         length = np.linalg.norm(d)
         # |d + c| - |d| without the loss of digits of the difference
         grown = (2 * change @ d + (change**2).sum(axis=1)) / (np.linalg.norm(d + change, axis=1) + length)

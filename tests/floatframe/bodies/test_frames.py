@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import cms
+from fe_models.body.numbering import Numbering
 from floatframe import GROUND, FixedJoint, FlexibleBody, GeneralizedAlpha, Marker, PointForce, System, integrate
 from floatframe.results.recovery import interface_positions, nodal_positions
 from tests.bodies import bar
@@ -65,7 +66,7 @@ def test_drawn_nodes_are_those_of_the_mesh_at_the_start(parts):
 def test_a_body_keeps_its_motion_when_its_kept_nodes_are_dropped(parts):
     """The mesh plays no part in the motion: interfaces are 6 × n maps."""
     bare = replace(parts[0], nodes=parts[0].nodes[:0], node_ids=parts[0].node_ids[:0], Phi=parts[0].Phi[:0],
-                   surface=parts[0].surface[:0], stress=parts[0].stress[:0],
+                   surface=parts[0].surface[:0], stress=parts[0].stress[:0], numbering=Numbering(),
                    interfaces=[replace(i, members=[]) for i in parts[0].interfaces])  # fmt: skip
     np.testing.assert_array_equal(tip_path(bare, 40.0)[0], tip_path(parts[0], 40.0)[0])
 

@@ -26,6 +26,7 @@ from floatframe.results.place_motion import (
     interface_motion,
     largest_von_mises,
     nodal_stress,
+    node_motion,
     point_motion,
     rotation_angle,
 )
@@ -54,8 +55,21 @@ def differences(values):
 
 
 def test_a_point_of_a_flexible_body_does_not_leave_its_deformation_out_in_silence(swing):
-    with pytest.raises(ResultsError, match=r"'rod' is flexible: .* take interface_motion or node_motion"):
+    with pytest.raises(ResultsError, match=r"'rod' is flexible: .* give its modal file, reduced="):
         point_motion(swing, "rod", (0.3, -0.4, 0.5))
+    with pytest.raises(ResultsError, match=r"point_motion: body 'rod': no node that its file keeps is at .* nearest:"):
+        point_motion(swing, "rod", REDUCED.nodes[5] + 0.2, reduced=REDUCED)
+    with pytest.raises(ResultsError, match="either its reduced body or undeformed=True, got both"):
+        point_motion(swing, "rod", REDUCED.nodes[5], reduced=REDUCED, undeformed=True)
+
+
+def test_a_point_at_a_kept_node_deforms_as_the_node(swing):
+    at_node = node_motion(swing, "rod", REDUCED, 5)
+    at_point = point_motion(swing, "rod", REDUCED.nodes[5], reduced=REDUCED)
+    for name in ("position", "velocity", "acceleration", "axes", "omega"):
+        assert_allclose(getattr(at_point, name), getattr(at_node, name), rtol=0, atol=0)
+    rigid = point_motion(swing, "rod", REDUCED.nodes[5], undeformed=True)
+    assert np.abs(at_point.position - rigid.position).max() > 1e-3
 
 
 @pytest.mark.parametrize("place", ["end_a", "end_b", "point"])

@@ -67,14 +67,17 @@ def test_a_drive_may_turn_a_body_far_at_its_start(caplog):
     assert "was placed 0.479 from" in caplog.text  # the chord of one radian at 0.5 m
 
 
-@pytest.mark.parametrize(("offset", "is_refused"), [(0.0, False), (0.05, False), (5.0, True)])
-def test_a_sensor_far_from_the_body_is_refused(offset, is_refused):
+@pytest.mark.parametrize(
+    ("offset", "tolerance", "is_refused"),
+    [(0.0, 0.0, False), (0.05, 1e-3, True), (0.05, 0.03, False), (5.0, 0.1, True)],
+)
+def test_a_sensor_beside_the_kept_nodes_is_refused(offset, tolerance, is_refused):
     reduced = reduced_body(random_point_masses(3, 2), stiffness(3))
     system = System([FlexibleBody("arm", reduced)])
     motion = integrate(system, GeneralizedAlpha(), 1e-3, 1e-3)
-    sensor = PlaceSensor("place", Marker("arm", position=reduced.nodes[4] + [0.0, offset, 0.0]))
+    sensor = PlaceSensor("place", Marker("arm", position=reduced.nodes[4] + [0.0, offset, 0.0], tolerance=tolerance))
     if is_refused:
-        with pytest.raises(ModelError, match=r"'arm': position .* away from its nearest kept node"):
+        with pytest.raises(ModelError, match=r"body 'arm': no node that its file keeps is at .* nearest: node index"):
             measured(system, motion, [sensor])
     else:
         assert np.isfinite(measured(system, motion, [sensor])["place"].columns["x"]).all()

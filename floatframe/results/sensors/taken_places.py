@@ -1,0 +1,52 @@
+"""Which places the sensors of a system take, in words: what was asked for, the node that stands for it, how far off."""
+
+from floatframe.bodies.markers import Marker
+from floatframe.results.sensors import (
+    AngleSensor,
+    DisplacementSensor,
+    ElongationSensor,
+    PlaceSensor,
+    Sensor,
+    StrainGauge,
+    StressSensor,
+    VonMisesSensor,
+    sensors_of,
+)
+from floatframe.results.sensors.places import found_at, found_nodes, is_at_node
+from floatframe.results.sensors.stresses import address_of, flexible_body
+from floatframe.system import System
+
+__all__ = ["taken_places"]
+
+
+def taken_places(system: System) -> dict[str, tuple[str, ...]]:
+    """Return the places on flexible bodies that sensors take which name no interface, by sensor; none of the others.
+
+    Raises
+    ------
+    ModelError
+        If a sensor names a node, element or set that is not kept, or no kept node is at its position.
+    """
+    found = {sensor.name: places_of(system, sensor) for sensor in sensors_of(system)}
+    return {name: words for name, words in found.items() if words}
+
+
+def places_of(system: System, sensor: Sensor) -> tuple[str, ...]:
+    """Return the places of one sensor in words."""
+    where = f"sensor {sensor.name!r}"
+    if isinstance(sensor, StressSensor | StrainGauge | VonMisesSensor):
+        body, address = flexible_body(system, sensor.name, sensor.body), address_of(sensor)
+        return () if address is None else (found_at(body, where, address, of_stress=True).words(),)
+    if isinstance(sensor, ElongationSensor):
+        return tuple(each.words() for each in sensor.ends(flexible_body(system, sensor.name, sensor.body)))
+    at_nodes = [marker for marker in markers_of(sensor) if is_at_node(system, marker)]
+    return tuple(found_nodes(system, where, marker)[1].words() for marker in at_nodes)
+
+
+def markers_of(sensor: Sensor) -> tuple[Marker, ...]:
+    """Return the markers of a sensor."""
+    if isinstance(sensor, PlaceSensor):
+        return (sensor.marker,) if sensor.relative_to is None else (sensor.marker, sensor.relative_to)
+    if isinstance(sensor, AngleSensor):
+        return sensor.marker_a, sensor.marker_b
+    return (sensor.marker,) if isinstance(sensor, DisplacementSensor) else ()
