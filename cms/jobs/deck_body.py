@@ -11,6 +11,7 @@ from cms.errors import JobError
 from cms.jobs.job import InterfaceSection, Job
 from cms.jobs.tables.material_table import isotropic_of, material_of
 from fe_models.body.fe_body import FEBody, Interface
+from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.stages import Stages
@@ -312,7 +313,7 @@ def _pressure(body: FEBody, joined: "Joined", mesh: "Mesh", name: str, table: An
     alone = replace(
         body, M=_empty(len(dofs)), K=_empty(len(dofs)), D=None, nodes=mesh.nodes, dofs=dofs,
         surface=np.zeros((0, 3), np.int64), element_model=None, recovery=None, load_cases=(), stress_points=None,
-        node_volumes=None, interfaces=(),
+        node_volumes=None, interfaces=(), numbering=Numbering(),
     )  # fmt: skip
     f = pressure_load(alone, mesh, name, FaceGroup(table.faces[0], tuple(table.faces[1:])), table.pressure).f.reshape(
         -1, 3
