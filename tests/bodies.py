@@ -16,7 +16,7 @@ ALUMINIUM = Material("aluminium", E=7.0e10, nu=0.33, rho=2700.0)
 
 
 def box_mesh(nx=2, ny=2, nz=2, lx=1.0, ly=1.0, lz=1.0, kind="hexahedron") -> Mesh:
-    """A box 0..lx, 0..ly, 0..lz of nx * ny * nz bricks, each one hexahedron, two wedges or six tetrahedra.
+    """A box 0..lx, 0..ly, 0..lz of nx * ny * nz bricks, each one hexahedron, two wedges, six tetrahedra or pyramids.
 
     Node sets: "left" (x = 0), "right" (x = lx), "bottom" (z = 0), "top" (z = lz); cell sets: "all", and "left half",
     "right half" by the bricks' position along x (the middle brick is in the right half).
@@ -26,6 +26,9 @@ def box_mesh(nx=2, ny=2, nz=2, lx=1.0, ly=1.0, lz=1.0, kind="hexahedron") -> Mes
         parts = [corners]
     elif kind.startswith("wedge"):
         parts = [corners[[0, 1, 3, 4, 5, 7]], corners[[1, 2, 3, 5, 6, 7]]]
+    elif kind.startswith("pyramid"):  # with their tips in the middle
+        facets = CELL_SHAPES["hexahedron"].facets
+        parts = [np.vstack([corners[list(facet[::-1])], [0.5, 0.5, 0.5]]) for facet in facets]
     else:
         parts = []
         for order in itertools.permutations(range(3)):  # six tetrahedra along the paths from corner 0 to corner 6
@@ -34,20 +37,21 @@ def box_mesh(nx=2, ny=2, nz=2, lx=1.0, ly=1.0, lz=1.0, kind="hexahedron") -> Mes
             parts.append(tet if np.linalg.det(tet[1:]) > 0 else tet[[0, 2, 1, 3]])
     reference = CELL_SHAPES[kind].nodes
     low_order = {
-        "tetra10": "tetra", "hexahedron20": "hexahedron", "hexahedron27": "hexahedron", "wedge15": "wedge"
+        "tetra10": "tetra", "hexahedron20": "hexahedron", "hexahedron27": "hexahedron", "wedge15": "wedge",
+        "pyramid13": "pyramid",
     }.get(kind, kind)  # fmt: skip
     to_nodes = shape_values(low_order, reference)[0]
-    inside = np.rint(2 * np.array([to_nodes @ part for part in parts])).astype(int)  # on the half-step lattice
+    inside = np.rint(4 * np.array([to_nodes @ part for part in parts])).astype(int)  # on the quarter-step lattice
     bricks = np.array(list(itertools.product(range(nx), range(ny), range(nz))))
-    lattice = (2 * bricks[:, None, None] + inside[None]).reshape(-1, 3)
-    sizes = (2 * nx + 1, 2 * ny + 1, 2 * nz + 1)
+    lattice = (4 * bricks[:, None, None] + inside[None]).reshape(-1, 3)
+    sizes = (4 * nx + 1, 4 * ny + 1, 4 * nz + 1)
     keys, cells = np.unique(np.ravel_multi_index(lattice.T, sizes), return_inverse=True)
     points, cells = np.stack(np.unravel_index(keys, sizes), axis=1), cells.reshape(-1, len(reference))
-    nodes = points * np.array([lx / nx, ly / ny, lz / nz]) / 2
+    nodes = points * np.array([lx / nx, ly / ny, lz / nz]) / 4
     is_left = np.repeat(2 * bricks[:, 0] + 1 < nx, len(parts))
     halves = {"left half": is_left, "right half": ~is_left, "all": np.ones(len(cells), bool)}
     x, z = points[:, 0], points[:, 2]
-    sides = {"left": x == 0, "right": x == 2 * nx, "bottom": z == 0, "top": z == 2 * nz}
+    sides = {"left": x == 0, "right": x == 4 * nx, "bottom": z == 0, "top": z == 4 * nz}
     return Mesh(
         nodes,
         {kind: cells},

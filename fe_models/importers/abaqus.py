@@ -21,7 +21,7 @@ from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["DeckMesh", "deck_mesh", "raw_mesh_of", "read_abaqus"]
 
-_SOLIDS = {4: "tetra", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
+_SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
 _SOLID = re.compile(r"C3D(\d+)[A-Z]*$")
 _FACES = {
     "3": ("triangle", 3),

@@ -52,6 +52,7 @@ _TYPES = {
 _ORDER = {
     "tetra10": [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
     "wedge15": [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11],
+    "pyramid13": [0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12],
     "hexahedron20": [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15],
     "hexahedron27": [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26],
 }  # meshio (VTK) place -> Gmsh place, for types that differ: the edges are numbered in another sequence

@@ -33,9 +33,9 @@ _TYPES = {
     "HE8": "hexahedron",
     "H20": "hexahedron20",
     "PY5": "pyramid",
-    "P13": "pyramid13",
+    "P13": "P13",  # no file has shown the order of its middle nodes
     "PE6": "wedge",
-    "P15": "P15",  # no file has shown the order of its middle nodes
+    "P15": "P15",  # nor of these
 }
 
 

@@ -16,6 +16,8 @@ _REFLECTED_CORNERS = {
     "hexahedron27": (0, 3, 2, 1, 4, 7, 6, 5),
     "wedge": (0, 2, 1, 3, 5, 4),
     "wedge15": (0, 2, 1, 3, 5, 4),
+    "pyramid": (0, 3, 2, 1, 4),
+    "pyramid13": (0, 3, 2, 1, 4),
 }
 _CHUNK = 20_000  #: cells judged at a time, so that a million dofs need 100 MB
 

@@ -7,7 +7,10 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray, frozen
 
-__all__ = ["CELL_SHAPES", "CellShape", "cell_jacobians", "facet_tables", "quadrature", "shape_values"]
+__all__ = ["CELL_SHAPES", "CellShape", "cell_jacobians", "collapsed_cube", "facet_tables", "quadrature", "shape_values"]
+
+
+TIP = 1e-14  #: height below the tip of a pyramid that counts as the tip
 
 
 @dataclass(frozen=True)
@@ -19,12 +22,17 @@ class CellShape:
     corners: tuple[tuple[float, ...], ...]  #: reference coordinates of the corner nodes
     middles: tuple[tuple[int, ...], ...]  #: for every further node the corners it is the middle of
     facets: tuple[tuple[int, ...], ...]  #: corner nodes of each facet, anticlockwise seen from outside
-    exponents: tuple[tuple[int, ...], ...]  #: monomials of the shape functions
+    exponents: tuple[tuple[int, ...], ...]  #: monomials of the shape functions; of pyramids in x, y, 1 - z
 
     @property
     def n_nodes(self) -> int:
         """Number of nodes of one cell."""
         return len(self.corners) + len(self.middles)
+
+    @property
+    def is_pyramid(self) -> bool:
+        """Whether its functions are rational: polynomials in x/(1 - z), y/(1 - z) and 1 - z."""
+        return len(self.corners) == 5
 
     @property
     def nodes(self) -> Array:
@@ -55,6 +63,8 @@ _TET = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 _HEX = tuple((x, y, 0) for x, y in _QUAD) + tuple((x, y, 1) for x, y in _QUAD)
 _WEDGE = tuple((x, y, 0) for x, y in _TRI) + tuple((x, y, 1) for x, y in _TRI)
 
+_PYRAMID = (*((x, y, 0) for x, y in _QUAD), (0, 0, 1))
+
 _TRI_EDGES = ((0, 1), (1, 2), (2, 0))
 _QUAD_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0))
 _TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
@@ -63,9 +73,15 @@ _HEX_EDGES = (*_QUAD_EDGES, (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 
 _WEDGE_EDGES = (*_TRI_EDGES, (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
 _WEDGE15 = (*((*e, k) for e in _total(2, 2) for k in (0, 1)), *((*e, 2) for e in _total(2, 1)))
 
+_PYRAMID_EDGES = (*_QUAD_EDGES, (0, 4), (1, 4), (2, 4), (3, 4))
+
 _TET_FACETS = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 _HEX_FACETS = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))  # -x +x -y +y -z +z
 _WEDGE_FACETS = ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5))
+_PYRAMID_FACETS = ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+# with w = 1 - z: on the base w = 1 and the space is that of the quad, on each side it is that of the triangle
+_PYRAMID5 = (*_total(3, 1), (1, 1, -1))
+_PYRAMID13 = (*_total(3, 2), (1, 1, -1), (2, 1, -1), (1, 2, -1))
 _HEX_CENTRES = (*_HEX_FACETS, tuple(range(8)))
 
 CELL_SHAPES = {
@@ -83,8 +99,10 @@ CELL_SHAPES = {
         CellShape("hexahedron27", 3, _HEX, (*_HEX_EDGES, *_HEX_CENTRES), _HEX_FACETS, _grid(3, 2)),
         CellShape("wedge", 3, _WEDGE, (), _WEDGE_FACETS, tuple((*e, k) for e in _total(2, 1) for k in (0, 1))),
         CellShape("wedge15", 3, _WEDGE, _WEDGE_EDGES, _WEDGE_FACETS, _WEDGE15),
+        CellShape("pyramid", 3, _PYRAMID, (), _PYRAMID_FACETS, _PYRAMID5),
+        CellShape("pyramid13", 3, _PYRAMID, _PYRAMID_EDGES, _PYRAMID_FACETS, _PYRAMID13),
     )
-}  #: reference cells are the unit simplex, the unit square and cube, and triangle x interval
+}  #: reference cells are the unit simplex, the unit square and cube, triangle x interval, square with tip
 
 
 @cache
@@ -124,18 +142,29 @@ def shape_values(kind: str, points: Array) -> tuple[Array, Array]:
     """
     shape = CELL_SHAPES[kind]
     exponents = np.array(shape.exponents)
-    vandermonde = _monomials(shape.nodes, exponents)
-    columns = [_monomials(points, exponents)]
+    monomials = _collapsed_monomials if shape.is_pyramid else _monomials
+    vandermonde = monomials(shape.nodes, exponents)
+    columns = [monomials(points, exponents)]
     for axis in range(shape.dim):
         lowered = exponents.copy()
-        lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
-        columns.append(exponents[:, axis] * _monomials(points, lowered))
+        lowered[:, axis] -= exponents[:, axis] != 0
+        sign = -1 if shape.is_pyramid and axis == 2 else 1  # w = 1 - z
+        columns.append(sign * exponents[:, axis] * monomials(points, lowered))
     values = [np.linalg.solve(vandermonde.T, column.T).T for column in columns]
     return frozen(values[0]), frozen(np.stack(values[1:], axis=2))
 
 
 def _monomials(points: Array, exponents: IntArray) -> Array:
     return np.prod(points[:, None, :] ** exponents[None, :, :], axis=2)
+
+
+def _collapsed_monomials(points: Array, exponents: IntArray) -> Array:
+    """Return x^i y^j w^k = (x/w)^i (y/w)^j w^(i+j+k), w = 1 - z; at the tip, where x/w has no value, it is 1/2."""
+    w = 1 - points[:, 2:]
+    is_tip = w < TIP
+    across = np.where(is_tip, 0.5, points[:, :2] / np.where(is_tip, 1.0, w))
+    collapsed = np.concatenate([across, np.where(is_tip, 0.0, w)], axis=1)
+    return _monomials(collapsed, np.column_stack([exponents[:, :2], exponents.sum(axis=1)]))
 
 
 @cache
@@ -156,6 +185,8 @@ def quadrature(kind: str) -> tuple[Array, Array]:
         points = np.stack(np.meshgrid(*[x] * shape.dim, indexing="ij"), -1).reshape(-1, shape.dim)
         weights = np.stack(np.meshgrid(*[w] * shape.dim, indexing="ij"), -1).reshape(-1, shape.dim).prod(axis=1)
         return frozen(points), frozen(weights)
+    if shape.is_pyramid:
+        return collapsed_cube(4, 4)
     s, t = (a.ravel() for a in np.meshgrid(x, x, indexing="ij"))
     triangle, weight = np.column_stack([1 - s, s * t]), np.outer(w, w).ravel() * s
     if shape.dim == 2:
@@ -165,6 +196,18 @@ def quadrature(kind: str) -> tuple[Array, Array]:
         return frozen(points), frozen(np.outer(weight, w).ravel())
     points = np.column_stack([np.repeat(1 - x, len(triangle)), np.kron(x[:, None], triangle)])
     return frozen(points), frozen(np.kron(w * x**2, weight))
+
+
+def collapsed_cube(n_across: int, n_up: int) -> tuple[Array, Array]:
+    """Return Gauss points of a pyramid, (n, 3), and weights, (n,): x = w s, y = w t, z = 1 - w, weight w² ds dt dw.
+
+    Exact for polynomials in s, t of degree 2 n_across - 1 each times those in w of degree 2 n_up - 3.
+    """
+    x, a = ((v + i) / 2 for v, i in zip(np.polynomial.legendre.leggauss(n_across), (1, 0), strict=True))
+    w, b = ((v + i) / 2 for v, i in zip(np.polynomial.legendre.leggauss(n_up), (1, 0), strict=True))
+    s, t, up = (v.ravel() for v in np.meshgrid(x, x, w, indexing="ij"))
+    weights = (a[:, None, None] * a[:, None] * (b * w**2)).ravel()
+    return frozen(np.column_stack([up * s, up * t, 1 - up])), frozen(weights)
 
 
 def cell_jacobians(kind: str, coordinates: Array, points: Array) -> Array:

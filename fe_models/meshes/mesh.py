@@ -11,7 +11,17 @@ from fe_models.foundation.copies import FrozenMapping, frozen_copies
 __all__ = ["FACE_TYPES", "SOLID_TYPES", "Mesh"]
 
 #: meshio names, node order
-SOLID_TYPES = ("tetra", "tetra10", "hexahedron", "hexahedron20", "hexahedron27", "wedge", "wedge15")
+SOLID_TYPES = (
+    "tetra",
+    "tetra10",
+    "hexahedron",
+    "hexahedron20",
+    "hexahedron27",
+    "wedge",
+    "wedge15",
+    "pyramid",
+    "pyramid13",
+)
 FACE_TYPES = ("triangle", "triangle6", "quad", "quad8", "quad9")
 
 

@@ -9,7 +9,7 @@ from fe_models.meshes.mesh import Mesh
 
 __all__ = ["FIRST_ORDER", "raised_mesh", "tetrahedra_of"]
 
-FIRST_ORDER = ("tetra", "hexahedron", "wedge")  #: solid cells with corner nodes only
+FIRST_ORDER = ("tetra", "hexahedron", "wedge", "pyramid")  #: solid cells with corner nodes only
 RAISED = {"tetra": "tetra10", "hexahedron": "hexahedron27"}  #: whose field holds that of the first order
 
 
@@ -46,7 +46,7 @@ def raised_mesh(mesh: Mesh) -> tuple[Mesh, sp.csr_array]:
 
 
 def tetrahedra_of(mesh: Mesh) -> tuple[Mesh, sp.csr_array, IntArray]:
-    """Return the mesh with every brick and wedge cut into tetrahedra that meet in its centre.
+    """Return the mesh with every brick, wedge and pyramid cut into tetrahedra that meet in its centre.
 
     Faces of four nodes are cut from their node of the lowest number, so that neighbours agree.
 

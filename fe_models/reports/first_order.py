@@ -66,6 +66,7 @@ class FirstOrderError:
             "tetra": "mesh with ten-node tetrahedra (tetra10)",
             "hexahedron": "give bricks incompatible modes, or mesh with 20 or 27 nodes",
             "wedge": "mesh with tetra10 instead of wedges",
+            "pyramid": "mesh with pyramid13 beside tetra10 and hexahedron20",
         }
         what = "; ".join(cures[kind] for kind in self.kinds)
         return (
@@ -196,7 +197,7 @@ def piece_of(mesh: Mesh) -> tuple[Mesh, IntArray]:
     is_new = np.zeros(len(in_order), bool)
     is_new[np.unique(in_order, return_index=True)[1]] = True
     n_nodes = np.cumsum(is_new)[np.cumsum(size[nearest]) - 1]
-    most = LARGEST_PIECE if len(mesh.cells) == 1 and "wedge" not in mesh.cells else LARGEST_CUT
+    most = LARGEST_PIECE if set(mesh.cells) in ({"tetra"}, {"hexahedron"}) else LARGEST_CUT
     chosen = np.sort(nearest[: max(1, int((n_nodes <= most).sum()))])
     is_chosen, first = np.zeros(n, bool), 0
     is_chosen[chosen] = True

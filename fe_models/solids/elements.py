@@ -15,13 +15,13 @@ import numpy as np
 from fe_models.errors import MeshError
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.words import nearest, quoted
-from fe_models.meshes.cell_shapes import CELL_SHAPES, shape_values
+from fe_models.meshes.cell_shapes import CELL_SHAPES, collapsed_cube, shape_values
 from fe_models.meshes.mesh import SOLID_TYPES
 from fe_models.meshes.skfem_cells import SKFEM_ELEMENTS, skfem_node_order
 
 __all__ = ["INTEGRATIONS", "MASSES", "ReferenceElement", "ShapeTable", "reference_element", "shape_table"]
 
-Degree = int | tuple[int, int]
+Degree = int | tuple[int, int]  #: wedges: of triangle and line; pyramids: numbers of points across and up
 
 # scikit-fem 12 labels its tetrahedron tables 5 to 8 one degree too high (measured; a test holds them to what is used
 # here), so label 8 gives degree 7. Degrees: stiffness, mass; per direction for hexahedra, (triangle, line) for wedges.
@@ -34,6 +34,10 @@ RULES: dict[str, tuple[str, Degree, Degree]] = {
     "wedge": ("wedge", (2, 3), (3, 5)),  # mass: triangle 1 + 1 + 1 = 3, line 1 + 1 + 2 = 4
     # stiffness: triangle 2 (1 + 1), or 3 (0 + 2, along the line) within 4, line 2 + 2; mass: triangle 2 + 2 + 3, line 9
     "wedge15": ("wedge", (4, 5), (8, 9)),
+    # of x/w, y/w and w = 1 - z, points across and up: the gradients of the functions have degree 1 and 0, 2 and 1, the
+    # Jacobian three of them, and the weight has w²
+    "pyramid": ("pyramid", (2, 2), (3, 3)),  # stiffness: 3 across, 0 + 2 up; mass: 2 + 3 across, 2 + 0 + 2 up
+    "pyramid13": ("pyramid", (4, 3), (6, 5)),  # stiffness: 6 across, 3 + 2 up; mass: 4 + 6 across, 4 + 3 + 2 up
 }
 REDUCED: dict[str, tuple[str, Degree]] = {
     "tetra": ("tet", 1),  # 1 point
@@ -43,6 +47,8 @@ REDUCED: dict[str, tuple[str, Degree]] = {
     "hexahedron27": ("hex", 3),
     "wedge": ("wedge", (1, 3)),  # 1 x 2
     "wedge15": ("wedge", (2, 5)),  # 3 x 3
+    "pyramid": ("pyramid", (2, 2)),  # 8
+    "pyramid13": ("pyramid", (2, 2)),  # 8
 }  #: fewest points that programs use; cells with straight edges keep their full stiffness but for the wedges and bricks
 INTEGRATIONS = ("full", "reduced")  #: of the stiffness
 #: consistent; by the points of the reduced stiffness; bricks of 20 nodes by 14 points (others consistent); diagonal
@@ -57,6 +63,8 @@ STRESS_RULES: dict[str, tuple[tuple[str, Degree], str | None]] = {
     "hexahedron27": (("hex", 3), "hexahedron"),
     "wedge": (("wedge", (2, 3)), "wedge"),
     "wedge15": (("wedge", (2, 3)), "wedge"),
+    "pyramid": (("pyramid", (2, 2)), "pyramid"),  # 8 points for 5 functions: the nearest in the sense of least squares
+    "pyramid13": (("pyramid", (2, 2)), "pyramid"),
 }
 
 
@@ -110,14 +118,18 @@ class ReferenceElement:
 
 
 def quadrature(cell: str, degree: Degree) -> tuple[Array, Array]:
-    """Return points (n_points, 3) and weights (n_points,) of a rule of scikit-fem on "tet", "hex" or "wedge".
+    """Return points (n_points, 3) and weights (n_points,) of a rule on "tet", "hex", "wedge" or "pyramid".
 
     The wedge is the product of the triangle and the line made here: scikit-fem 12 repeats the triangle's points with
-    products of its weights and so gives half of the volume.
+    products of its weights and so gives half of the volume. It has no pyramid: Gauss points across and up.
     """
     from skfem.quadrature import get_quadrature
     from skfem.refdom import RefHex, RefLine, RefTet, RefTri
 
+    if cell == "pyramid":
+        across, up = degree  # type: ignore[misc]
+        points, weights = collapsed_cube(across, up)
+        return points.copy(), weights.copy()
     if cell == "wedge":
         degree_triangle, degree_line = degree  # type: ignore[misc]
         triangle, w_triangle = get_quadrature(RefTri, degree_triangle)
@@ -189,7 +201,7 @@ def reference_element(kind: str, integration: str = "full", mass: str = "consist
     else:
         nodes = CELL_SHAPES[kind].nodes
         at_nodes = shape_table(low_order, nodes, np.ones(len(nodes))).values
-        extrapolation = at_nodes @ np.linalg.inv(shape_table(low_order, stress_points, stress_weights).values)
+        extrapolation = at_nodes @ np.linalg.pinv(shape_table(low_order, stress_points, stress_weights).values)
     return ReferenceElement(
         kind=kind,
         stiffness=shape_table(kind, *quadrature(cell, degree_stiffness)),

@@ -46,7 +46,7 @@ def nastran_deck(mesh, style="small"):
     penta15 = [*range(9), *range(12, 15), *range(9, 12)]
     hexa20 = [*range(12), *range(16, 20), *range(12, 16)]  # Nastran numbers upright edges before those of the top
     for kind, cells in mesh.cells.items():
-        name = {"tet": "CTETRA", "hex": "CHEXA", "wed": "CPENTA"}[kind[:3]]
+        name = {"tet": "CTETRA", "hex": "CHEXA", "wed": "CPENTA", "pyr": "CPYRAM"}[kind[:3]]
         for k, cell in enumerate(cells[:, {"hexahedron20": hexa20, "wedge15": penta15}.get(kind, slice(None))]):
             cards.append((name, [k + 1, 7, *(cell + 1)]))
     per_line, width = (4, 16) if style == "large" else (8, 8)

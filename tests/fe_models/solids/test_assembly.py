@@ -96,6 +96,8 @@ def gauss_points(kind):
         return np.stack([r, s, t], 1), weight
     if kind.startswith("wedge"):
         return np.stack([r, s * (1 - r), t], 1), weight * (1 - r)
+    if kind.startswith("pyramid"):
+        return np.stack([r * (1 - t), s * (1 - t), t], 1), weight * (1 - t) ** 2
     return np.stack([r, s * (1 - r), t * (1 - r) * (1 - s)], 1), weight * (1 - r) ** 2 * (1 - s)
 
 
@@ -288,7 +290,7 @@ def test_mesh_without_solid_cells_is_refused():
         (np.eye(4, 3), {"tetra": [[0, 1, 2, 4]]}, r"tetra: expected nodes 0\.\.3, got 0\.\.4"),
         (np.eye(4, 3), {"tetra": [[0, 1, 2]]}, r"tetra: expected \(n_cells, 4\) nodes, got \(1, 3\)"),
         (np.eye(4, 3) * np.nan, {"tetra": [[0, 1, 2, 3]]}, "4 nodes have coordinates that are not finite"),
-        (np.eye(4, 3), {"pyramid": [[0, 1, 2, 3, 3]]}, "unknown cell type 'pyramid'"),
+        (np.eye(4, 3), {"pyramid14": [[0, 1, 2, 3, 3]]}, "unknown cell type 'pyramid14'"),
     ],
 )
 def test_garbage_is_refused(nodes, cells, message):

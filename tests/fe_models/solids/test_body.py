@@ -105,6 +105,8 @@ def test_gram_is_the_integral_of_the_interpolated_fields(kind):
         points, weight = np.stack([r, s * (1 - r), t * (1 - r) * (1 - s)], 1), weight * (1 - r) ** 2 * (1 - s)
     elif kind.startswith("wedge"):
         points, weight = np.stack([r, s * (1 - r), t], 1), weight * (1 - r)
+    elif kind.startswith("pyramid"):
+        points, weight = np.stack([r * (1 - t), s * (1 - t), t], 1), weight * (1 - t) ** 2
     else:
         points = np.stack([r, s, t], 1)
     N, dN = shape_values(kind, points)

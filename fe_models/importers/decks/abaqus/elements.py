@@ -24,6 +24,7 @@ SOLID_RULES: dict[str, dict[str, tuple[str, str, str]]] = {
     },
     "abaqus": {
         "C3D4": ("full", "lumped", ""),
+        "C3D5": ("full", "lumped", ""),
         "C3D6": ("full", "lumped", ""),
         "C3D8": ("incompatible", "lumped", "stiffness by incompatible modes instead of selective integration"),
         "C3D8I": ("incompatible", "lumped", ""),
@@ -47,10 +48,12 @@ _QUADS: dict[int, tuple[int, ...]] = {
 }
 _TETS: dict[int, tuple[int, ...]] = {1: (0, 1, 2), 2: (0, 3, 1), 3: (1, 3, 2), 4: (2, 3, 0)}
 _WEDGES: dict[int, tuple[int, ...]] = {1: (0, 1, 2), 2: (3, 5, 4), 3: (0, 3, 4, 1), 4: (1, 4, 5, 2), 5: (2, 5, 3, 0)}
+_PYRAMIDS: dict[int, tuple[int, ...]] = {1: (0, 1, 2, 3), 2: (0, 4, 1), 3: (1, 4, 2), 4: (2, 4, 3), 5: (3, 4, 0)}
 _FACES: dict[str, dict[int, tuple[int, ...]]] = {
     "hexa": _QUADS,
     "tetr": _TETS,
     "wedg": _WEDGES,
+    "pyra": _PYRAMIDS,
 }  #: first letters of the kind -> face -> local corner nodes
 
 

@@ -170,9 +170,6 @@ def _deck(path: Path, draft: _Draft) -> Deck:
             draft.ledger.refuse(f"element {kind or 'of type ' + str(row[1])}", "this element is not known here")
             continue
         shape, nodes = _shape(draft.where, kind, row)
-        if not shape:
-            draft.ledger.refuse(f"pyramids of element {kind}", "pyramids are not known here")
-            continue
         group = f"mat_{row[0]}_solid{kind}"
         integration, mass, different = SOLIDS[kind]
         if different:
@@ -228,7 +225,7 @@ def _material(draft: _Draft, number: int, labels: dict[str, float]) -> DeckMater
 
 
 def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
-    """Return the cell of an element and its nodes; equal nodes of a brick make it a wedge or a tetrahedron."""
+    """Return the cell of an element and its nodes; equal nodes of a brick make it another one."""
     n = row[COLUMNS:]
     if kind == 187 and len(n) >= 10:
         return "tetra10", n[:10]
@@ -237,7 +234,7 @@ def _shape(where: str, kind: int, row: list[int]) -> tuple[str, list[int]]:
     is_quadratic = len(n) == 20 and kind == 186
     if len(set(n[4:8])) == 1:
         if n[2] != n[3]:
-            return "", []
+            return ("pyramid13", [*n[:5], *n[8:12], *n[16:20]]) if is_quadratic else ("pyramid", n[:5])
         return ("tetra10", [*n[:3], n[4], n[8], n[9], n[11], *n[16:19]]) if is_quadratic else ("tetra", [*n[:3], n[4]])
     if n[2] == n[3] and n[6] == n[7]:
         corners = [*n[:3], *n[4:7]]

@@ -12,7 +12,7 @@ from fe_models.importers.decks.nastran.model import NastranModel
 
 __all__ = ["BARS", "SHELLS", "SOLIDS", "read_sections"]
 
-SOLIDS = ("CTETRA", "CHEXA", "CPENTA")
+SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM", "CPYRA")
 SHELLS = ("CTRIA3", "CTRIAR", "CTRIA6", "CQUAD4", "CQUADR", "CQUAD8")
 BARS = ("CBAR", "CBEAM")
 _OFFSET_FIELD = {"CTRIA3": 7, "CTRIAR": 7, "CTRIA6": 10, "CQUAD4": 8, "CQUADR": 8, "CQUAD8": 16}
@@ -65,7 +65,7 @@ def _solids(model: NastranModel, known: Card, cards: list[Card]) -> None:
     _cells(model, cards, group)
     model.solids.append(SolidSection(group, known.text(2), "full", "lumped" if model.is_lumped else "consistent"))
     why = "elements of full integration here; Nastran's own differ in shear and bubble functions"
-    model.ledger.note("CHEXA, CPENTA, CTETRA", why, count=len(cards))
+    model.ledger.note("CHEXA, CPENTA, CPYRAM, CTETRA", why, count=len(cards))
 
 
 def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
