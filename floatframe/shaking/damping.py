@@ -1,0 +1,94 @@
+"""Damping of the modes with the bases held: one ratio, a table over frequency, bands, single modes, or that of the body."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.errors import ModelError
+
+__all__ = ["Damping"]
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Ratios zeta of critical damping, Q = 1/(2 zeta); later ones win: `ratio`, `table`, `bands`, `modes`.
+
+    Raises
+    ------
+    ModelError
+        If nothing or a contradiction is given, or a ratio is not between 0 and 1.
+    """
+
+    ratio: float | None = None  #: of all modes
+    Q: float | None = None  #: the same as an amplification
+    table: Sequence[Sequence[float]] = ()  #: rows (frequency [Hz], ratio): linear in log f, held at the ends
+    bands: Sequence[Sequence[float]] = ()  #: rows (from [Hz], to [Hz], ratio), from <= f < to
+    modes: Mapping[int, float] = field(default_factory=dict)  #: ratio of single modes, from 1
+    own: bool = False  #: the damping that the body or the dampers of the system have
+
+    def __post_init__(self) -> None:
+        if self.ratio is not None and self.Q is not None:
+            raise ModelError("damping: expected either ratio or Q, got both")
+        if self.Q is not None:
+            if not (math.isfinite(self.Q) and self.Q > 0.5):
+                raise ModelError(f"damping: Q: expected a number above 0.5, got {self.Q!r}")
+            object.__setattr__(self, "ratio", 1 / (2 * self.Q))
+        given = self.ratio is not None or len(self.table) or len(self.bands) or len(self.modes)
+        if self.own and given:
+            raise ModelError("damping: expected either own = true or ratios, got both")
+        if not self.own and not given:
+            raise ModelError("damping: expected ratio, Q, table, bands, modes or own = true, got nothing")
+        for row in self.table:
+            if len(row) != 2:
+                raise ModelError(f"damping: table: expected rows (Hz, ratio), got {list(row)!r}")
+        f = [float(row[0]) for row in self.table]
+        for k, (low, high) in enumerate(zip(f, f[1:], strict=False)):
+            if not 0 < low < high:
+                raise ModelError(f"damping: table: frequencies must rise above 0: row {k + 2} has {high:g} after {low:g}")
+        for row in self.bands:
+            if len(row) != 3 or not 0 <= row[0] < row[1]:
+                raise ModelError(f"damping: bands: expected rows (from Hz, to Hz, ratio) with from < to, got {list(row)!r}")
+        ratios = [self.ratio or 0.0, *(row[-1] for row in self.table), *(row[-1] for row in self.bands)]
+        for value in [*ratios, *self.modes.values()]:
+            if not (math.isfinite(value) and 0 <= value < 1):
+                raise ModelError(f"damping: expected ratios of critical damping from 0 to below 1, got {value!r}")
+
+    def ratios(self, frequencies: Array) -> Array:
+        """Return the ratio of every mode, (n_m,), by its frequency [Hz] and number.
+
+        Raises
+        ------
+        ModelError
+            If a mode gets no ratio, or there is no mode of a number in `modes`.
+        """
+        zeta = np.full(len(frequencies), np.nan if self.ratio is None else self.ratio)
+        if len(self.table):
+            f, z = np.array(self.table, dtype=float).T
+            zeta = np.interp(np.log(frequencies), np.log(f), z)
+        for low, high, value in self.bands:
+            zeta[(frequencies >= low) & (frequencies < high)] = value
+        for number, value in self.modes.items():
+            if not 1 <= int(number) <= len(frequencies):
+                raise ModelError(f"damping: modes: no mode {number}; there are {len(frequencies)} with the bases held")
+            zeta[int(number) - 1] = value
+        if np.isnan(zeta).any():
+            k = int(np.flatnonzero(np.isnan(zeta))[0])
+            raise ModelError(
+                f"damping: mode {k + 1} at {frequencies[k]:.4g} Hz is in none of the bands and no ratio is given for all; "
+                "give a ratio besides, or a band that holds it"
+            )
+        return zeta
+
+    @property
+    def words(self) -> str:
+        """Say what it is."""
+        if self.own:
+            return "damping of the model itself"
+        parts = [] if self.ratio is None else [f"{100 * self.ratio:g} % of critical (Q = {1 / (2 * self.ratio):.4g})" if self.ratio else "none"]
+        parts += [f"table of {len(self.table)} frequencies"] * bool(len(self.table))
+        parts += [f"{len(self.bands)} bands"] * bool(len(self.bands))
+        parts += [f"{len(self.modes)} modes by number"] * bool(self.modes)
+        return ", ".join(parts)

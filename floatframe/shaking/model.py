@@ -1,0 +1,187 @@
+"""A structure on moved bases in the modes it has while the bases are held.
+
+    eta_ddot + C eta_dot + diag(omega²) eta = B_0 s + B_1 s_dot + B_2 s_ddot
+    y = Σ_r E_r d^r eta/dt^r + D_r d^r s/dt^r,  r = 0, 1, 2
+
+An input is the r-th rate of its s: r = 2 for the acceleration of a base, whose displacement is s, r = 0 for a force. No
+base is held by a huge mass: s is prescribed, and what it takes to move it so is an output (docs/shake.md).
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.units import Units
+from floatframe.errors import ModelError
+
+__all__ = [
+    "DIRECTIONS",
+    "Base",
+    "Output",
+    "ShakenModel",
+    "gravity_in",
+    "modal_response",
+    "response",
+    "rigid_rows",
+]
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  #: of a base, in its own axes
+STANDARD_GRAVITY = 9.80665  #: [m/s²], exact by definition (ISO 80000-3)
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """A rigid base: what it holds, and the point about which it turns and its forces are given."""
+
+    name: str
+    holds: tuple[str, ...]  #: interfaces of a body, or joints and springs of a system
+    point: Array  #: reference point in coordinates of the mesh, or of the ground, (3,) [m]
+    axes: Array = field(default_factory=lambda: np.eye(3))  #: columns: axes of its directions, (3, 3)
+
+    def __post_init__(self) -> None:
+        for name in ("point", "axes"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a row of the outputs is."""
+
+    name: str  #: of the place and the component: "mirror x", "base force z"
+    kind: str  #: "acceleration", "angular acceleration", "displacement", "rotation", "force", "moment", "stress", ...
+    unit: str  #: in units of the model
+    group: str  #: the place: all rows of one place share it
+    place: str = ""  #: where that is, in words, with ids
+
+
+@dataclass(frozen=True, eq=False)
+class ShakenModel:
+    """Modes with the bases held, how inputs drive them, and what is observed."""
+
+    name: str
+    units: Units
+    bases: tuple[Base, ...]
+    inputs: tuple[str, ...]  #: "base:x" of a base, otherwise the name of a force
+    rates: IntArray  #: r of each input, (n_s,)
+    omega: Array  #: angular frequencies, ascending, (n_m,) [rad per unit of time]
+    C: Array  #: modal damping, (n_m, n_m) [1/unit of time]
+    B: Array  #: (3, n_m, n_s)
+    E: Array  #: (3, n_out, n_m)
+    D: Array  #: (3, n_out, n_s)
+    outputs: tuple[Output, ...]
+    mass: Array  #: rigid mass matrix about the points of the bases, (6 n_bases, 6 n_bases)
+    #: stress of the modes and of s at the kept nodes, xx yy zz yz xz xy, (n_nodes, 6, n_m) and (n_nodes, 6, n_s); None: no
+    #: stress modes
+    field: tuple[Array, Array] | None = None
+    field_labels: tuple[str, ...] = ()  #: of those nodes, as the user numbers them
+    n_residual: int = 0  #: modes from there on answer statically
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("omega", "C", "B", "E", "D", "mass"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "rates", frozen_int(self.rates))
+        n_m, n_s, n_out = len(self.omega), len(self.inputs), len(self.outputs)
+        for name, shape in {"C": (n_m, n_m), "B": (3, n_m, n_s), "E": (3, n_out, n_m), "D": (3, n_out, n_s)}.items():
+            if getattr(self, name).shape != shape:
+                raise ModelError(f"shake: {name}: expected {shape}, got {getattr(self, name).shape}")
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies with the bases held, (n_m,) [Hz]."""
+        return np.asarray(self.omega / (2 * np.pi) / self.units.time)
+
+    @property
+    def damping_ratios(self) -> Array:
+        """Diagonal of C over 2 omega, (n_m,)."""
+        return np.asarray(np.diag(self.C) / (2 * self.omega))
+
+    @property
+    def is_modal(self) -> bool:
+        """Whether the damping couples no modes."""
+        return not (self.C - np.diag(np.diag(self.C))).any()
+
+    @property
+    def gravity(self) -> float:
+        """One g in units of the model [length/time²]."""
+        return gravity_in(self.units)
+
+    def output_index(self, name: str) -> int:
+        """Return the row of an output; `ModelError` with the nearest name if there is none."""
+        from fe_models.foundation.words import nearest, quoted
+
+        names = [output.name for output in self.outputs]
+        if name not in names:
+            raise ModelError(f"shake: no output {quoted(name)}{nearest(name, names)}")
+        return names.index(name)
+
+    def with_frequencies(self, factor: float) -> "ShakenModel":
+        """Return the model with all frequencies times a factor and the same damping ratios."""
+        return replace(self, omega=self.omega * factor, C=self.C * factor)
+
+
+def gravity_in(units: Units) -> float:
+    """Return one g in a unit system, 9.80665 m/s² exactly [length/time²]."""
+    return STANDARD_GRAVITY / units.to_si(length=1, time=-2)
+
+
+def rigid_rows(point: Array, base: Base) -> Array:
+    """Return the motion of a point (translation, rotation; common axes) with a base, (6, 6).
+
+    u = d + theta × (p - p_0), d and theta in the axes of the base.
+    """
+    x, y, z = np.asarray(point) - base.point
+    arm = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+    rows = np.block([[np.eye(3), arm], [np.zeros((3, 3)), np.eye(3)]])
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = base.axes
+    return np.asarray(rows @ turn)
+
+
+def response(model: ShakenModel, frequencies: Array) -> Array:
+    """Return the outputs for inputs exp(i omega t), (n_f, n_out, n_s) complex; frequencies in Hz, above 0."""
+    eta, omega = modal_response(model, frequencies)
+    ones = np.ones_like(omega)
+    H = sum(
+        np.einsum("f,ok,fks->fos", factor, E, eta, optimize=True)
+        for factor, E in zip((ones, 1j * omega, -(omega**2)), moving(model), strict=True)
+        if E.any()
+    )
+    return np.asarray(H + driven(model.D, model.rates, omega))
+
+
+def moving(model: ShakenModel) -> Array:
+    """Return E without the rates of modes that answer statically, (3, n_out, n_m)."""
+    if not model.n_residual:
+        return model.E
+    E = np.array(model.E)
+    E[1:, :, len(model.omega) - model.n_residual :] = 0.0
+    return E
+
+
+def modal_response(model: ShakenModel, frequencies: Array) -> tuple[Array, Array]:
+    """Return eta for inputs exp(i omega t), (n_f, n_m, n_s), and omega, (n_f,) [rad per unit of time]."""
+    omega = 2 * np.pi * np.asarray(frequencies, dtype=float) * model.units.time
+    load = driven(model.B, model.rates, omega)
+    n_d = len(model.omega) - model.n_residual
+    eta = np.empty_like(load)
+    eta[:, n_d:] = load[:, n_d:] / model.omega[n_d:, None] ** 2
+    own, C = model.omega[:n_d], model.C[:n_d, :n_d]
+    if model.is_modal:
+        impedance = own**2 - omega[:, None] ** 2 + 1j * omega[:, None] * np.diag(C)
+        eta[:, :n_d] = load[:, :n_d] / impedance[:, :, None]
+    else:
+        for k, w in enumerate(omega):
+            eta[k, :n_d] = np.linalg.solve(np.diag(own**2 - w**2) + 1j * w * C, load[k, :n_d])
+    return eta, omega
+
+
+def driven(by_rate: Array, rates: IntArray, omega: Array) -> Array:
+    """Return Σ_r A_r (i omega)^(r - r_input), (n_f, rows, n_s), of matrices A (3, rows, n_s)."""
+    total = np.zeros((len(omega), *by_rate.shape[1:]), complex)
+    for r in range(3):
+        for k, rate in enumerate(rates):
+            if by_rate[r, :, k].any():
+                total[:, :, k] += (1j * omega[:, None]) ** (r - int(rate)) * by_rate[r, :, k]
+    return total

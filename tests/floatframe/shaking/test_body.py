@@ -1,0 +1,229 @@
+"""A body on bases against its own finite element matrices with the driven dofs put on the right side, and pyYeti."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+from cms.errors import BodyError
+from floatframe.errors import ModelError
+from floatframe.shaking.body import bases_of_body, shaken_body
+from floatframe.shaking.damping import Damping
+from floatframe.shaking.model import response
+from floatframe.shaking.places import Observed
+from fe_models.body.fe_body import Interface
+from tests.bodies import bar, beam, with_interfaces
+
+FREQUENCIES = np.array([1.0, 30.0, 77.0, 140.0, 400.0])
+ZETA = 0.03
+
+
+@pytest.fixture(scope="module")
+def part():
+    ends = [Interface(name, "nodes", np.array([k]), np.array([k / 3, 0, 0])) for k, name in enumerate("left first second right".split())]
+    return cms.couple(with_interfaces(beam(n=3), *ends))
+
+
+@pytest.fixture(scope="module", params=[None, cms.NodalFrame("left")], ids=["mean axes", "nodal frame"])
+def reduced(part, request):
+    modes = cms.guyan(part)  # all there are: the span is that of the matrices
+    return cms.reduce(part, modes, frame=request.param)
+
+
+def driven_response(part, held, T, wanted, zeta):
+    """Acceleration of dofs and forces on held dofs, from the finite element matrices, for s_ddot = exp(i omega t)."""
+    M, K = part.M.toarray(), part.K.toarray()
+    inner = np.setdiff1d(np.arange(len(M)), held)
+    import scipy.linalg as la
+
+    omega2, Phi = la.eigh(K[np.ix_(inner, inner)], M[np.ix_(inner, inner)])
+    omega = np.sqrt(omega2)
+    full = np.zeros((len(M), T.shape[1]))
+    full[held] = T
+    full[inner] = -np.linalg.solve(K[np.ix_(inner, inner)], K[np.ix_(inner, held)] @ T)
+    load = -Phi.T @ (M @ full)[inner]
+    acceleration, forces = [], []
+    for w in 2 * np.pi * FREQUENCIES:
+        eta = load / (omega2 - w**2 + 2j * zeta * omega * w)[:, None]
+        x_ddot = full.astype(complex)
+        x_ddot[inner] += -(w**2) * Phi @ eta
+        acceleration.append(x_ddot[wanted])
+        forces.append(full.T @ (M @ x_ddot + K @ full / -(w**2)))
+    return np.array(acceleration), np.array(forces)
+
+
+def dofs_of(part, node):
+    return np.flatnonzero(part.dofs[:, 0] == node)
+
+
+def test_one_driven_interface_gives_the_response_of_the_full_matrices(part, reduced):
+    bases = bases_of_body(reduced, "left")
+    model = shaken_body(reduced, bases, Damping(ratio=ZETA), [Observed("tip", interface="right")])
+    H = response(model, FREQUENCIES)
+    names = [output.name for output in model.outputs]
+    expected, forces = driven_response(part, dofs_of(part, 0), np.eye(6), dofs_of(part, 3), ZETA)
+    scale = np.abs(expected).max()
+    assert_allclose(H[:, names.index("tip acceleration x") :][:, :6], expected, rtol=0, atol=1e-9 * scale)
+    assert_allclose(H[:, :6], forces, rtol=0, atol=1e-9 * np.abs(forces).max())
+
+
+def test_two_bases_moved_against_each_other_give_the_response_of_the_full_matrices(part, reduced):
+    bases = bases_of_body(reduced, {"a": ("left",), "b": ("right",)})
+    model = shaken_body(reduced, bases, Damping(ratio=ZETA), [Observed("middle", interface="first")])
+    H = response(model, FREQUENCIES)
+    names = [output.name for output in model.outputs]
+    held = np.concatenate([dofs_of(part, 0), dofs_of(part, 3)])
+    expected, forces = driven_response(part, held, np.eye(12), dofs_of(part, 1), ZETA)
+    first = names.index("middle acceleration x")
+    assert_allclose(H[:, first : first + 6], expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert_allclose(H[:, :12], forces, rtol=0, atol=1e-9 * np.abs(forces[0]).max())
+    net = names.index("net force x")
+    assert_allclose(H[:, net : net + 3], forces[:, :3] + forces[:, 6:9], rtol=0, atol=1e-9 * np.abs(forces[0]).max())
+    moments = forces[:, 3:6] + forces[:, 9:12] + np.cross([1.0, 0, 0], forces[:, 6:9], axisb=1, axisc=1)
+    assert_allclose(H[:, net + 3 : net + 6], moments, rtol=0, atol=1e-9 * np.abs(forces[0]).max())
+
+
+def test_one_base_may_hold_two_interfaces(part, reduced):
+    base = bases_of_body(reduced, {"table": ("left", "right")})
+    model = shaken_body(reduced, base, Damping(ratio=ZETA), [Observed("middle", interface="second")])
+    held = np.concatenate([dofs_of(part, 0), dofs_of(part, 3)])
+    arm = np.array([[0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
+    T = np.vstack([np.eye(6), np.block([[np.eye(3), arm], [np.zeros((3, 3)), np.eye(3)]])])
+    expected, forces = driven_response(part, held, T, dofs_of(part, 2), ZETA)
+    H = response(model, FREQUENCIES)
+    assert_allclose(H[:, -6:], expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert_allclose(H[:, :6], forces, rtol=0, atol=1e-9 * np.abs(forces).max())
+
+
+def test_effective_masses_and_the_mass_on_the_base_sum_to_the_mass(part, reduced):
+    model = shaken_body(reduced, bases_of_body(reduced, "left"), Damping(ratio=ZETA))
+    participation = -model.B[2]
+    held = dofs_of(part, 0)
+    on_base = part.M.toarray()[np.ix_(held, held)]
+    inner = np.setdiff1d(np.arange(24), held)
+    M = part.M.toarray()
+    coupled = M[np.ix_(held, inner)] @ np.linalg.solve(M[np.ix_(inner, inner)], M[np.ix_(inner, held)])
+    assert_allclose(participation.T @ participation, model.mass - on_base + coupled, atol=1e-9 * model.mass.max())
+    assert_allclose(model.mass[0, 0], 7850.0 * 1e-4, rtol=1e-9)
+
+
+def test_the_lowest_relative_displacement_is_the_static_one_under_the_base_acceleration(reduced):
+    outputs = [Observed("tip", interface="right", quantities=("displacement",))]
+    model = shaken_body(reduced, bases_of_body(reduced, "left"), Damping(ratio=ZETA), outputs)
+    H = response(model, np.array([1e-3]))[0]
+    k = model.output_index("tip displacement z")
+    rho_A, E_I, L = 7850.0 * 1e-4, 2.1e11 * 1e-9, 1.0
+    # a uniform load -rho A a over a cantilever; consistent nodal loads give its tip exactly
+    assert_allclose(H[k, 2].real, -rho_A * L**4 / (8 * E_I), rtol=1e-6)
+
+
+def test_random_loads_of_pyyeti_on_the_same_matrices(reduced):
+    from pyyeti.ode import SolveUnc
+
+    model = shaken_body(reduced, bases_of_body(reduced, "left"), Damping(ratio=ZETA), [Observed("tip", interface="right")])
+    solver = SolveUnc(np.ones(len(model.omega)), 2 * ZETA * model.omega, model.omega**2)
+    load = np.tile(model.B[2][:, [1]], (1, len(FREQUENCIES)))
+    eta = solver.fsolve(load.astype(complex), FREQUENCIES, rf_disp_only=False).a
+    expected = model.E[2] @ eta + model.D[2][:, [1]]
+    assert_allclose(response(model, FREQUENCIES)[:, :, 1].T, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_own_damping_of_the_body_couples_its_modes_and_changes_the_response():
+    part = cms.couple(beam(n=3))
+    body = cms.reduce(part, cms.craig_bampton(part, n_modes=12), damping=cms.ModalDamping(0.02))
+    model = shaken_body(body, bases_of_body(body, "left"), Damping(own=True), [Observed("tip", interface="right")])
+    assert not model.is_modal
+    M, C, K = np.eye(len(model.omega)), model.C, np.diag(model.omega**2)
+    w = 2 * np.pi * 77.0
+    eta = np.linalg.solve(K - w**2 * M + 1j * w * C, model.B[2].astype(complex))
+    assert_allclose(response(model, np.array([77.0]))[0], -(w**2) * model.E[2] @ eta + model.D[2], rtol=1e-9, atol=1e-9)
+    # the same from the whole pencil of the free body with its base held by rows of its own, no elimination
+    from cms.quality.reference.free_pencil import whole_pencil, whole_port_rows
+
+    pencil, G = whole_pencil(body), whole_port_rows(body, "left")
+    n = len(pencil.M)
+    S = np.block([[pencil.K - w**2 * pencil.M + 1j * w * pencil.D, -G.T], [G, np.zeros((6, 6))]])
+    x = np.linalg.solve(S, np.vstack([np.zeros((n, 6)), np.eye(6) / -(w**2)]))
+    tip = -(w**2) * whole_port_rows(body, "right") @ x[:n]
+    assert_allclose(response(model, np.array([77.0]))[0, -6:], tip, rtol=0, atol=1e-8 * np.abs(tip).max())
+
+
+@pytest.fixture(scope="module")
+def solid():
+    part = cms.couple(bar(nx=3))
+    return cms.reduce(part, cms.craig_bampton(part, n_modes=3))
+
+
+def test_stress_and_places_of_a_solid(solid):
+    number = int(solid.node_ids[5])
+    place = solid.frame.origin + solid.frame.axes @ solid.nodes[5]
+    wanted = [Observed("a", node=number, quantities=("stress",)), Observed("b", position=place, quantities=("stress",))]
+    model = shaken_body(solid, bases_of_body(solid, "left"), Damping(Q=10), wanted)
+    H = response(model, FREQUENCIES)
+    a, b = model.output_index("a stress xx"), model.output_index("b stress xx")
+    assert_allclose(H[:, a : a + 6], H[:, b : b + 6], rtol=0, atol=0)
+    assert np.abs(H[:, a]).max() > 0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ({"node": 10**6}, "keeps no node 1000000"),
+        ({"position": (0.5, 0.5, 0.5)}, "away from the nearest kept node"),
+        ({"interface": "rigth"}, "right"),
+        ({"point": "p"}, "no stress point"),
+        ({}, "expected one of interface, node, position, point"),
+        ({"interface": "right", "quantities": ("stress",)}, "not at interface"),
+        ({"node": 0, "quantities": ("strain",)}, "unknown quantity"),
+    ],
+)
+def test_places_that_do_not_exist_are_refused(solid, wanted, words):
+    with pytest.raises((ModelError, BodyError), match=words):
+        shaken_body(solid, bases_of_body(solid, "left"), Damping(ratio=0.01), [Observed("o", **wanted)])
+
+
+@pytest.mark.parametrize(
+    ("bases", "words"),
+    [
+        (None, "name the one that is the base"),
+        ("lft", "left"),
+        ({"a": ("left",), "b": ("left",)}, "held by two bases"),
+        ({"a": ()}, "expected one interface at least"),
+    ],
+)
+def test_bases_that_do_not_exist_are_refused(solid, bases, words):
+    with pytest.raises((ModelError, BodyError), match=words):
+        bases_of_body(solid, bases)
+
+
+def test_a_body_whose_modes_cannot_follow_two_bases_is_refused():
+    part = cms.couple(bar(nx=3))
+    body = cms.reduce(part, cms.normal_modes(part, n_modes=4))
+    with pytest.raises(ModelError, match="cannot follow motions of the bases against each other"):
+        shaken_body(body, bases_of_body(body, {"a": ("left",), "b": ("right",)}), Damping(ratio=0.01))
+
+
+def test_damping_by_table_band_and_mode():
+    damping = Damping(ratio=0.01, table=[(10, 0.01), (1000, 0.03)], bands=[(50, 150, 0.05)], modes={3: 0.2})
+    assert_allclose(damping.ratios(np.array([5.0, 100.0, 100.0, 316.22776601683796, 5000.0])), [0.01, 0.05, 0.2, 0.025, 0.03])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({}, "got nothing"),
+        ({"ratio": 0.1, "Q": 5}, "either ratio or Q"),
+        ({"ratio": -0.1}, "from 0 to below 1"),
+        ({"table": [(10, 0.1), (5, 0.1)]}, "row 2"),
+        ({"bands": [(10, 5, 0.1)]}, "from < to"),
+        ({"own": True, "ratio": 0.1}, "either own"),
+    ],
+)
+def test_damping_that_makes_no_sense_is_refused(given, words):
+    with pytest.raises(ModelError, match=words):
+        Damping(**given)
+
+
+def test_a_mode_in_no_band_is_refused():
+    with pytest.raises(ModelError, match="mode 2 at 200 Hz is in none of the bands"):
+        Damping(bands=[(0, 100, 0.01)]).ratios(np.array([50.0, 200.0]))
