@@ -1,0 +1,77 @@
+"""What a model is not trusted for: factors on its responses, and frequencies that may lie elsewhere.
+
+With a share delta of the frequencies, the response at f is the largest of the transfer functions between f/(1 + delta) and
+f/(1 - delta), under the level at f: as if the model had been stretched along the axis by up to delta.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.errors import ModelError
+
+__all__ = ["Uncertainty"]
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Factor on responses and share of frequencies, for all or by band."""
+
+    factor: float = 1.0  #: dynamic or model uncertainty factor, 1 or more
+    frequency: float = 0.0  #: share of a frequency by which it may be off, 0.05 for 5 %
+    bands: Sequence[Sequence[float]] = ()  #: rows (from [Hz], to [Hz], factor, share), before the values above
+
+    def __post_init__(self) -> None:
+        rows = [(0.0, math.inf, self.factor, self.frequency), *self.bands]
+        for row in rows:
+            if len(row) != 4 or not row[0] < row[1]:
+                raise ModelError(f"uncertainty: bands: expected rows (from Hz, to Hz, factor, share), got {list(row)!r}")
+            if not (math.isfinite(row[2]) and row[2] >= 1):
+                raise ModelError(f"uncertainty: factor: expected a number of 1 or more, got {row[2]!r}")
+            if not 0 <= row[3] < 0.5:
+                raise ModelError(f"uncertainty: frequency: expected a share between 0 and 0.5 (0.05 for 5 %), got {row[3]!r}")
+
+    @property
+    def is_none(self) -> bool:
+        """Whether nothing is uncertain."""
+        return not len(self.bands) and self.factor == 1.0 and self.frequency == 0.0
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """Largest factor and share of all bands: what responses in time are given."""
+        return (
+            max([self.factor, *(row[2] for row in self.bands)]),
+            max([self.frequency, *(row[3] for row in self.bands)]),
+        )
+
+    def of(self, frequencies: Array) -> tuple[Array, Array]:
+        """Return factor and share at frequencies [Hz], (n_f,) each."""
+        f = np.asarray(frequencies)
+        factor, share = np.full(len(f), self.factor), np.full(len(f), self.frequency)
+        for low, high, own, off in self.bands:
+            inside = (f >= low) & (f < high)
+            factor[inside], share[inside] = own, off
+        return factor, share
+
+    def widened(self, frequencies: Array, sizes: Array) -> Array:
+        """Return sizes (n_f, ...) of transfer functions with their factor, the largest within the share about each."""
+        f = np.asarray(frequencies)
+        factor, share = self.of(f)
+        low = np.searchsorted(f, f / (1 + share), side="left")
+        high = np.searchsorted(f, f / (1 - share), side="right")
+        widest = np.stack([sizes[a : max(b, a + 1)].max(axis=0) for a, b in zip(low, high, strict=True)])
+        return np.asarray(widest * factor.reshape(-1, *([1] * (sizes.ndim - 1))))
+
+    @property
+    def words(self) -> str:
+        """Say what it is."""
+        if self.is_none:
+            return "none"
+        rows = [(0.0, math.inf, self.factor, self.frequency), *self.bands]
+        return "; ".join(
+            f"{'' if high == math.inf else f'{low:g} to {high:g} Hz: '}factor {factor:g}, frequencies ±{100 * share:g} %"
+            for low, high, factor, share in rows
+        )
