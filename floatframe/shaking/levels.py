@@ -6,16 +6,18 @@ Between two rows a level is straight in log-log axes, as test specifications dra
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.paths import near_file
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.shaking.model import STANDARD_GRAVITY, gravity_in
 
-__all__ = ["ACCELERATIONS", "DENSITIES", "STROKES", "Level", "in_model", "level_rms"]
+__all__ = ["ACCELERATIONS", "DENSITIES", "STROKES", "Level", "in_model", "level_rms", "read_level"]
 
 ACCELERATIONS = {  # unit -> m/s² or rad/s²
     "g": STANDARD_GRAVITY,
@@ -28,6 +30,7 @@ ACCELERATIONS = {  # unit -> m/s² or rad/s²
 }
 STROKES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "rad": 1.0}  # amplitude of a displacement or rotation
 DENSITIES = {"g2/Hz": "g", "(m/s2)2/Hz": "m/s2", "(mm/s2)2/Hz": "mm/s2", "(rad/s2)2/Hz": "rad/s2"}
+OF_OUTPUT = "output"  #: the unit of whatever output a table belongs to
 FEWEST = 2  #: rows
 
 
@@ -116,11 +119,51 @@ class Level:
         return "rad" in self.unit
 
 
+def read_level(path: Path, unit: str, where: str) -> Level:
+    """Return a level from a text file of two columns, Hz and value; empty lines and lines from # on are skipped.
+
+    Raises
+    ------
+    ModelError
+        With the line, if it is not two numbers or what `Level` refuses.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise ModelError(f"{where}: {path}: cannot be read: {error.strerror}{near_file(path)}") from error
+    except UnicodeDecodeError:
+        raise ModelError(f"{where}: {path}: expected a text file of two columns, Hz and {unit}") from None
+    rows, places = [], []
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
+        if not words:
+            continue
+        try:
+            f, value = (float(word) for word in words)
+        except ValueError:
+            if not rows and len(words) >= 2 and not is_number(words[0]):
+                continue  # a heading
+            raise ModelError(f"{where}: {path}: line {number}: expected two numbers, Hz and {unit}, got {line[:60]!r}") from None
+        rows.append((f, value))
+        places.append(f"{path.name}, line {number}")
+    table = np.array(rows).reshape(-1, 2)
+    return Level(table[:, 0], table[:, 1], unit, where, places)
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
 def known_unit(unit: str, where: str) -> str:
     """Return the unit as the tables write it; `ModelError` with the nearest one if it is not known."""
     plain = unit.strip().replace("²", "2").replace("^2", "2").replace("s**2", "s2").replace(" ", "")
     plain = re.sub(r"^g2/hz$|^G2/Hz$", "g2/Hz", plain)
-    known = [*ACCELERATIONS, *STROKES, *DENSITIES]
+    known = [*ACCELERATIONS, *STROKES, *DENSITIES, OF_OUTPUT]
     if plain not in known:
         raise ModelError(
             f"{where}: unit: unknown unit {quoted(unit)}{nearest(plain, known)}; one g is {STANDARD_GRAVITY} m/s2"

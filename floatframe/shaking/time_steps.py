@@ -1,0 +1,149 @@
+"""Linear oscillators under loads that are straight between samples: exact from sample to sample.
+
+    eta_ddot + 2 zeta omega eta_dot + omega² eta = a(t),  a straight between t_n and t_n+1
+
+(1) x = (eta, eta_dot): x_n+1 = A x_n + B_0 a_n + B_1 a_n+1, from the exponential of the state matrix with a and its slope
+(2) without x: eta_n + c_1 eta_n-1 + c_2 eta_n-2 = Σ b_k a_n-k, c from the trace and determinant of A: a digital filter, whose
+    initial values put x_0 and a_0 right
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+from scipy.signal import lfilter
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.shaking.model import ShakenModel
+
+__all__ = ["Motion", "base_motions", "histories", "oscillator"]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Displacement, velocity and acceleration of an oscillator, (n_t,) each."""
+
+    value: Array
+    rate: Array
+    second: Array
+
+
+def oscillator(omega: float, zeta: float, load: Array, h: float) -> Motion:
+    """Return the motion from rest under a load that is straight between its samples.
+
+    Parameters
+    ----------
+    omega, zeta
+        Angular frequency [rad/s] and damping ratio of any size.
+    load
+        a(t), (n_t,).
+    h
+        Time between its samples [s].
+    """
+    a = np.asarray(load, dtype=float)
+    if not len(a):
+        return Motion(a, a, a)
+    states = np.zeros((4, 4))  # x, a, h a_dot
+    states[:2, :2] = [[0.0, h], [-(omega**2) * h, -2 * zeta * omega * h]]
+    states[1, 2], states[2, 3] = h, 1.0
+    step = la.expm(states)
+    A, B_1 = step[:2, :2], step[:2, 3]
+    B_0 = step[:2, 2] - B_1
+    c = np.array([1.0, -np.trace(A), la.det(A)])
+    # z² - tr z + det over adj(z - A) (B_0 + B_1 z): rows of the numerator by falling powers of z
+    adjugate = np.array([[-A[1, 1], A[0, 1]], [A[1, 0], -A[0, 0]]])
+    outputs = []
+    for k in range(2):
+        b = np.array([B_1[k], B_0[k] + adjugate[k] @ B_1, adjugate[k] @ B_0])
+        x_1 = B_0[k] * a[0] + (B_1[k] * a[1] if len(a) > 1 else 0.0)
+        start = [-b[0] * a[0], x_1 - b[1] * a[0] - (b[0] * a[1] if len(a) > 1 else 0.0)]
+        outputs.append(lfilter(b, c, a, zi=np.array(start))[0])
+    value, rate = outputs
+    return Motion(value, rate, a - 2 * zeta * omega * rate - omega**2 * value)
+
+
+def base_motions(acceleration: Array, h: float) -> Motion:
+    """Return displacement and velocity from rest of accelerations that are straight between samples, (n_t,) each."""
+    a = np.asarray(acceleration, dtype=float)
+    v = np.concatenate([[0.0], np.cumsum((a[1:] + a[:-1]) * h / 2)])
+    steps = v[:-1] * h + (2 * a[:-1] + a[1:]) * h**2 / 6
+    return Motion(np.concatenate([[0.0], np.cumsum(steps)]), v, a)
+
+
+def histories(model: ShakenModel, inputs: Array, h: float, columns: IntArray) -> Array:
+    """Return the outputs over time for inputs that are straight between samples, (n_out, n_t).
+
+    Parameters
+    ----------
+    inputs
+        Of the inputs named by `columns`, (n_act, n_t) [units of the model].
+    h
+        Time between samples [units of time of the model].
+    """
+    n_t = inputs.shape[1]
+    s = [motion_of_input(inputs[j], int(model.rates[k]), h) for j, k in enumerate(columns)]
+    load = np.zeros((len(model.omega), n_t))
+    out = np.zeros((len(model.outputs), n_t))
+    for j, k in enumerate(columns):
+        for rate, values in enumerate((s[j].value, s[j].rate, s[j].second)):
+            if model.B[rate, :, k].any():
+                load += np.outer(model.B[rate, :, k], values)
+            if model.D[rate, :, k].any():
+                out += np.outer(model.D[rate, :, k], values)
+    n_d = len(model.omega) - model.n_residual
+    for m in range(n_d, len(model.omega)):
+        out += np.outer(model.E[0, :, m], load[m] / model.omega[m] ** 2)
+    if model.is_modal:
+        zeta = model.damping_ratios
+        for m in range(n_d):
+            add_mode(out, model.E[:, :, m], oscillator(float(model.omega[m]), float(zeta[m]), load[m], h))
+        return out
+    eta, eta_dot = coupled(model, load[:n_d], h)
+    eta_ddot = load[:n_d] - model.C[:n_d, :n_d] @ eta_dot - model.omega[:n_d, None] ** 2 * eta
+    for rate, values in enumerate((eta, eta_dot, eta_ddot)):
+        out += model.E[rate, :, :n_d] @ values
+    return out
+
+
+def add_mode(out: Array, E: Array, motion: Motion) -> None:
+    """Add the part of a mode to the outputs."""
+    for rate, values in enumerate((motion.value, motion.rate, motion.second)):
+        rows = np.flatnonzero(E[rate])
+        if len(rows):
+            out[rows] += np.outer(E[rate, rows], values)
+
+
+def motion_of_input(values: Array, rate: int, h: float) -> Motion:
+    """Return s with its rates from its r-th rate, r = 0 or 2; those of a force are not needed and zero."""
+    if rate == 2:
+        return base_motions(values, h)
+    zero = np.zeros_like(values)
+    return Motion(np.asarray(values, dtype=float), zero, zero)
+
+
+def coupled(model: ShakenModel, load: Array, h: float) -> tuple[Array, Array]:
+    """Return eta and eta_dot of modes that damping couples, (n_d, n_t) each: filters in eigenvectors of the states."""
+    n_d, n_t = load.shape
+    A = np.zeros((2 * n_d, 2 * n_d))
+    A[:n_d, n_d:] = np.eye(n_d)
+    A[n_d:, :n_d], A[n_d:, n_d:] = -np.diag(model.omega[:n_d] ** 2), -model.C[:n_d, :n_d]
+    mu, X = np.linalg.eig(A)
+    left = np.linalg.solve(X, np.vstack([np.zeros((n_d, n_d)), np.eye(n_d)]))
+    eta, eta_dot = np.zeros((n_d, n_t)), np.zeros((n_d, n_t))
+    for k in range(2 * n_d):
+        if mu[k].imag < 0:
+            continue
+        twice = 2.0 if mu[k].imag > 0 else 1.0  # with its conjugate
+        e, phi_1, phi_2 = exponentials(mu[k] * h)
+        f = left[k] @ load
+        b = h * np.array([phi_2, phi_1 - phi_2])  # of a_n+1, a_n
+        p = lfilter(b, [1.0, -e], f, zi=np.array([-b[0] * f[0]]))[0]
+        eta += twice * np.outer(X[:n_d, k], p).real
+        eta_dot += twice * np.outer(X[n_d:, k], p).real
+    return eta, eta_dot
+
+
+def exponentials(z: complex) -> tuple[complex, complex, complex]:
+    """Return exp(z), (exp(z) - 1)/z and (exp(z) - 1 - z)/z²."""
+    step = la.expm(np.array([[z, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]))
+    return step[0, 0], step[0, 1], step[0, 2]
