@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli import analyses, cosimulation, driven, linear, sweep
+from floatframe.cli import analyses, cosimulation, driven, linear, shake, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -451,4 +451,5 @@ analyses.register(app)
 linear.register(app)
 driven.register(app)
 sweep.register(app)
+shake.register(app)
 cosimulation.register(app)

@@ -8,16 +8,16 @@ import numpy as np
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
-from floatframe.shaking.body import bases_of_body, shaken_body
-from floatframe.shaking.damping import Damping
-from floatframe.shaking.inputs import band_notes
-from floatframe.shaking.model import DIRECTIONS, ShakenModel
-from floatframe.shaking.notching import DEEPEST, Limit, NotchedRun, ResponseLimit, notched_random, notched_sine
-from floatframe.shaking.places import Observed
-from floatframe.shaking.random_test import RandomRun, RandomTest, random_runs
-from floatframe.shaking.shock import TimeRun, TimeTest, time_runs
-from floatframe.shaking.sine import SineRun, SineTest, sine_run
-from floatframe.shaking.uncertainty import Uncertainty
+from floatframe.shaking.loads.inputs import band_notes
+from floatframe.shaking.loads.notching import DEEPEST, Limit, NotchedRun, ResponseLimit, notched_random, notched_sine
+from floatframe.shaking.loads.random_vibration import RandomRun, RandomTest, random_runs
+from floatframe.shaking.loads.shock import TimeRun, TimeTest, time_runs
+from floatframe.shaking.loads.sine import SineRun, SineTest, sine_run
+from floatframe.shaking.loads.uncertainty import Uncertainty
+from floatframe.shaking.structure.body import bases_of_body, shaken_body
+from floatframe.shaking.structure.damping import Damping
+from floatframe.shaking.structure.model import DIRECTIONS, ShakenModel
+from floatframe.shaking.structure.places import Observed
 
 __all__ = ["EffectiveMasses", "NotchRequest", "ShakeJob", "ShakeResult", "effective_masses", "shake"]
 
@@ -90,7 +90,10 @@ class ShakeResult:
 
 
 def effective_masses(model: ShakenModel) -> EffectiveMasses:
-    """Return the effective masses of all modes; those of the full model sum to the mass less what rides on the bases."""
+    """Return the effective masses of all modes.
+
+    Those of the full model sum to the mass less what rides on the bases.
+    """
     n_s = 6 * len(model.bases)
     return EffectiveMasses(
         model.frequencies,
@@ -157,7 +160,8 @@ def with_static_modes(model: ShakenModel, above: float) -> ShakenModel:
     n_residual = int((model.frequencies > above).sum())
     if n_residual == len(model.omega):
         raise ModelError(
-            f"shake: residual_above = {above:g} Hz lies below all modes (the first is at {model.frequencies[0]:.4g} Hz): "
+            f"shake: residual_above = {above:g} Hz lies below all modes (the first is at {model.frequencies[0]:.4g} "
+            "Hz): "
             "nothing would vibrate"
         )
     return replace(model, n_residual=n_residual)
@@ -169,7 +173,8 @@ def mass_notes(masses: EffectiveMasses) -> list[str]:
         return []
     carried = masses.cumulative[-1][:3]
     return [
-        f"direction {name}: the modes carry {100 * share:.1f} % of the mass; what is left rides on the base, or vibrates above "
+        f"direction {name}: the modes carry {100 * share:.1f} % of the mass; what is left rides on the base, or "
+        "vibrates above "
         "the last mode, and is in the forces rigidly"
         for name, share in zip(masses.directions, carried, strict=False)
         if share < LITTLE_MASS

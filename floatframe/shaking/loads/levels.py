@@ -15,7 +15,7 @@ from fe_models.foundation.paths import near_file
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
-from floatframe.shaking.model import STANDARD_GRAVITY, gravity_in
+from floatframe.shaking.structure.model import STANDARD_GRAVITY, gravity_in
 
 __all__ = ["ACCELERATIONS", "DENSITIES", "STROKES", "Level", "in_model", "level_rms", "read_level"]
 
@@ -54,19 +54,23 @@ class Level:
         f, values = np.asarray(self.frequencies, dtype=float), np.asarray(self.values, dtype=float)
         object.__setattr__(self, "unit", known_unit(self.unit, self.where))
         if f.ndim != 1 or f.shape != values.shape or len(f) < FEWEST:
-            raise ModelError(f"{self.where}: expected {FEWEST} rows (Hz, {self.unit}) at least, got {len(np.atleast_1d(f))}")
+            raise ModelError(
+                f"{self.where}: expected {FEWEST} rows (Hz, {self.unit}) at least, got {len(np.atleast_1d(f))}"
+            )
         names = self.rows or [f"row {k + 1}" for k in range(len(f))]
         for k, (frequency, value) in enumerate(zip(f, values, strict=True)):
             if not np.isfinite(frequency) or frequency <= 0:
                 raise ModelError(f"{self.where}: {names[k]}: frequency {frequency:g} Hz: expected a number above 0")
             if not np.isfinite(value) or value <= 0:
                 raise ModelError(
-                    f"{self.where}: {names[k]}: {value:g} {self.unit} at {frequency:g} Hz: a level must stay above 0 (it is "
+                    f"{self.where}: {names[k]}: {value:g} {self.unit} at {frequency:g} Hz: a level must stay above "
+                    "0 (it is "
                     "straight in log-log axes); end the table where the level ends"
                 )
             if k and frequency <= f[k - 1]:
                 raise ModelError(
-                    f"{self.where}: {names[k]}: {frequency:g} Hz after {f[k - 1]:g} Hz: frequencies must rise; give a step "
+                    f"{self.where}: {names[k]}: {frequency:g} Hz after {f[k - 1]:g} Hz: frequencies must rise; give "
+                    "a step "
                     "two frequencies close together"
                 )
         object.__setattr__(self, "frequencies", frozen(f))
@@ -133,7 +137,8 @@ def read_level(path: Path, unit: str, where: str) -> Level:
         raise ModelError(f"{where}: {path}: cannot be read: {error.strerror}{near_file(path)}") from error
     except UnicodeDecodeError:
         raise ModelError(f"{where}: {path}: expected a text file of two columns, Hz and {unit}") from None
-    rows, places = [], []
+    rows: list[tuple[float, float]] = []
+    places: list[str] = []
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
         if not words:
@@ -143,7 +148,9 @@ def read_level(path: Path, unit: str, where: str) -> Level:
         except ValueError:
             if not rows and len(words) >= 2 and not is_number(words[0]):
                 continue  # a heading
-            raise ModelError(f"{where}: {path}: line {number}: expected two numbers, Hz and {unit}, got {line[:60]!r}") from None
+            raise ModelError(
+                f"{where}: {path}: line {number}: expected two numbers, Hz and {unit}, got {line[:60]!r}"
+            ) from None
         rows.append((f, value))
         places.append(f"{path.name}, line {number}")
     table = np.array(rows).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Places of a body at which its motion and stress are observed: interfaces, nodes by number, positions, stress points."""
+"""Places of a body that are observed: interfaces, nodes, elements and sets by the user's numbers, stress points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,41 +6,44 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
+from cms.reduced_body.address import Address
 from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
 
-__all__ = ["QUANTITIES", "Observed", "Place", "found_place", "six_rows"]
+__all__ = ["QUANTITIES", "Observed", "Place", "found_places", "six_rows"]
 
 QUANTITIES = ("acceleration", "displacement", "stress")
-WAYS = ("interface", "node", "position", "point")
-NEAR = 1e-3  #: distance from a position to its node, by the size of the body, above which it is another place
+WAYS = ("interface", "node", "element", "set", "position", "point")
+MOST_NODES = 500  #: of an element or set
 
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """A place at which something is observed; one of interface, node, position and point says where.
+    """A place at which something is observed; one of interface, node, element, set, position and point says where.
 
-    The displacement is relative to the (first) base; the stress has its components in mesh axes.
+    An element or a set is each of its kept nodes. The displacement is relative to the (first) base; the stress has its
+    components in mesh axes.
     """
 
     name: str
     interface: str | None = None
-    node: int | None = None  #: number of a kept node
+    node: int | str | None = None  #: the user's number; "INSTANCE.number" where instances have the same numbers
+    element: int | str | None = None  #: likewise
+    set: str | None = None
     position: Array | Sequence[float] | None = None  #: mesh coordinates of a kept node, (3,) [m]
     point: str | None = None  #: stress point of the file, by name
     quantities: tuple[str, ...] = ()  #: of QUANTITIES; (): acceleration, at stress points stress
+    tolerance: float = TOLERANCE  #: how far a kept node may be from the position, of the size of the body
 
     def __post_init__(self) -> None:
         where = f"shake: output {self.name!r}"
         ways = [way for way in WAYS if getattr(self, way) is not None]
         if len(ways) != 1:
             raise ModelError(f"{where}: expected one of {', '.join(WAYS)}, got {', '.join(ways) or 'none'}")
-        if self.position is not None:
-            object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
         wanted = (self.quantities,) if isinstance(self.quantities, str) else tuple(self.quantities)
         for name in wanted:
             if name not in QUANTITIES:
@@ -55,18 +58,19 @@ class Observed:
 class Place:
     """A place found: its motion and stress over x = (d, theta, q) in mesh axes."""
 
-    words: str
+    name: str  #: of its outputs
+    words: str  #: where it is
     point: Array  #: mesh coordinates, (3,) [m]
     rows: Array  #: translation, and rotation where it is known, (3 or 6, 6 + n_q)
     stress: Array | None  #: xx yy zz yz xz xy, (6, 6 + n_q); None: not known
 
 
-def found_place(body: ReducedBody, each: Observed) -> Place:
-    """Return the place in a body.
+def found_places(body: ReducedBody, each: Observed) -> list[Place]:
+    """Return the places in a body: one, or each node of an element or a set.
 
     Raises
     ------
-    ModelError
+    ModelError, BodyError
         If there is no such place (with the nearest), or no stress where some is wanted.
     """
     where, frame = f"shake: output {each.name!r}", body.frame
@@ -74,46 +78,47 @@ def found_place(body: ReducedBody, each: Observed) -> Place:
         interface = body.interface(each.interface)
         point = frame.origin + frame.axes @ interface.position
         if "stress" in each.quantities:
-            raise ModelError(f"{where}: stress is known at nodes and stress points, not at interface {each.interface!r}")
-        rows = in_mesh_axes(body, six_rows(body, point, np.asarray(interface.Psi)))
-        return Place(f"interface {each.interface}", point, rows if interface.has_rotation else rows[:3], None)
-    if each.point is not None:
-        return stress_point(body, each, where)
-    node, away = node_of(body, each, where)
-    local = body.nodes[node]
-    rows = np.hstack([rigid_motion_of_points(local[None], np.zeros(3))[0], body.Phi[node]])
-    stress = None
-    if "stress" in each.quantities:
-        if body.stress is None:
-            raise ModelError(f"{where}: body {body.name!r} has no stress modes; reduce it with stress = true")
-        stress = stress_rows(body, np.asarray(body.stress[node]))
-    words = f"node {body.node_ids[node]}" + (f", {away:.3g} {body.units.length_symbol} away" if away > 0 else "")
-    return Place(words, frame.origin + frame.axes @ local, frame.axes @ rows, stress)
-
-
-def node_of(body: ReducedBody, each: Observed, where: str) -> tuple[int, float]:
-    """Return the index of a kept node, and how far it is from where it is asked for."""
-    numbers = body.node_ids
-    if each.node is not None:
-        found = np.flatnonzero(numbers == each.node)
-        if not len(found):
-            choices = [str(number) for number in numbers[np.argsort(np.abs(numbers - each.node))[:3]]]
             raise ModelError(
-                f"{where}: body {body.name!r} keeps no node {each.node}; the numbers nearest to it are {', '.join(choices)}"
+                f"{where}: stress is known at nodes and stress points, not at interface {each.interface!r}"
             )
-        return int(found[0]), 0.0
-    local = (np.asarray(each.position) - body.frame.origin) @ body.frame.axes
-    away = np.linalg.norm(body.nodes - local, axis=1)
-    node = int(np.argmin(away))
-    size = float(np.linalg.norm(np.ptp(body.nodes, axis=0)))
-    if away[node] > NEAR * size:
-        x, y, z = body.frame.origin + body.frame.axes @ body.nodes[node]
+        rows = in_mesh_axes(body, six_rows(body, point, np.asarray(interface.Psi)))
+        words = f"interface {each.interface}"
+        return [Place(each.name, words, point, rows if interface.has_rotation else rows[:3], None)]
+    if each.point is not None:
+        return [stress_point(body, each, where)]
+    found = Address(each.node, each.element, each.set, each.position, each.tolerance).find(body, where)
+    if len(found.rows) > MOST_NODES:
         raise ModelError(
-            f"{where}: position {np.asarray(each.position).tolist()} is {away[node]:.4g} {body.units.length_symbol} away "
-            f"from the nearest kept node, {numbers[node]} at [{x:.6g}, {y:.6g}, {z:.6g}]; give that position or node, or "
-            "keep the node you mean when the body is reduced"
+            f"{where}: {found.asked} has {len(found.rows)} kept nodes, expected up to {MOST_NODES}; name some of them"
         )
-    return node, float(away[node])
+    if "stress" in each.quantities and body.stress is None:
+        raise ModelError(f"{where}: body {body.name!r} has no stress modes; reduce it with stress = true")
+    single = len(found.rows) == 1
+    return [
+        node_place(
+            body,
+            int(row),
+            each,
+            each.name if single else f"{each.name} {name}",
+            found.words() if single else f"node {name}",
+        )
+        for row, name in zip(found.rows, found.names, strict=True)
+    ]
+
+
+def node_place(body: ReducedBody, row: int, each: Observed, name: str, words: str) -> Place:
+    """Return a kept node by its row; with rotations where the body keeps them."""
+    frame, local = body.frame, body.nodes[row]
+    turn = None if body.kept is None else body.kept.of_node(row)
+    Psi = np.concatenate([body.Phi[row], np.zeros((3, body.n_q)) if turn is None else turn])
+    point = frame.origin + frame.axes @ local
+    rows = in_mesh_axes(body, six_rows(body, point, Psi))
+    stress = (
+        stress_rows(body, np.asarray(body.stress[row]))
+        if "stress" in each.quantities and body.stress is not None
+        else None
+    )
+    return Place(name, words, point, rows[:3] if turn is None else rows, stress)
 
 
 def stress_point(body: ReducedBody, each: Observed, where: str) -> Place:
@@ -121,10 +126,19 @@ def stress_point(body: ReducedBody, each: Observed, where: str) -> Place:
     points = body.point_stress
     names = [] if points is None else list(points.names)
     if points is None or each.point not in names:
-        raise ModelError(f"{where}: body {body.name!r} has no stress point {quoted(str(each.point))}{nearest(str(each.point), names)}")
+        raise ModelError(
+            f"{where}: body {body.name!r} has no stress point "
+            f"{quoted(str(each.point))}{nearest(str(each.point), names)}"
+        )
     k = names.index(str(each.point))
     at = body.frame.origin + body.frame.axes @ points.positions[k]
-    return Place(f"stress point {each.point}", at, np.zeros((0, 6 + body.n_q)), stress_rows(body, np.asarray(points.modes[k])))
+    return Place(
+        each.name,
+        f"stress point {each.point}",
+        at,
+        np.zeros((0, 6 + body.n_q)),
+        stress_rows(body, np.asarray(points.modes[k])),
+    )
 
 
 def stress_rows(body: ReducedBody, modes: Array) -> Array:

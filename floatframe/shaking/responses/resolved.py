@@ -8,7 +8,7 @@ Between two modes a response is smooth; at a mode it is a peak of half-power wid
 and each panel has the points of Clenshaw and Curtis' rule with 12 intervals (extremes of a Chebyshev polynomial, ends
 and the peak itself among them). The rule with half of them is nested in it: the difference of both bounds the error.
 A pole of the response lies at i zeta f from its mode, hence no nearer to a panel than 4.2 in the sum of the half axes
-of its Bernstein ellipse, so that the error falls like 4.2^-12 = 3e-8 (Trefethen (2019)).
+of its Bernstein ellipse, so that the error falls like 4.2^-12 = 3e-8 (Trefethen (2008)).
 """
 
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ class ResolvedBand:
 
 
 def resolved_band(
-    first: float, last: float, modes: Array, damping: Array, corners: Sequence[float] = ()
+    first: float, last: float, modes: Array, damping: Array, corners: Sequence[float] | Array = ()
 ) -> ResolvedBand:
     """Return the points of a band.
 

@@ -4,12 +4,13 @@ Sine:    a(f) = min(level, limit_k(f) / |H_k(f)|)                     amplitudes
 Random:  S(f) = min(level, limit_k(f) / |H_k(f)|²)                    densities
          S(f) = min(level, c_k / |H_k(f)|²), c_k so that the rms is kept      rms
 
-Force limits hold the interface force as in flight, where the mounting gives way (Scharton (1997), NASA-HDBK-7004):
+Force limits hold the interface force as in flight, where the mounting gives way (Scharton (1997)):
 
     S_FF = C² M_0² S_AA               f < f_0
     S_FF = C² M_0² S_AA (f_0/f)^n     f >= f_0
 
-with the mass M_0, the frequency f_0 of the main mode, C of the mounting structure and n its roll-off (2 for densities); of
+with the mass M_0, the frequency f_0 of the main mode, C of the mounting structure and n its roll-off (2 for
+densities); of
 sine amplitudes the square root. The answer between the points is that of the resolved grid.
 """
 
@@ -23,11 +24,11 @@ from scipy.optimize import brentq
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
-from floatframe.shaking.levels import Level
-from floatframe.shaking.model import Output, ShakenModel
-from floatframe.shaking.random_test import RandomRun
-from floatframe.shaking.sine import SineRun
-from floatframe.shaking.uncertainty import Uncertainty
+from floatframe.shaking.loads.levels import Level
+from floatframe.shaking.loads.random_vibration import RandomRun
+from floatframe.shaking.loads.sine import SineRun
+from floatframe.shaking.loads.uncertainty import Uncertainty
+from floatframe.shaking.structure.model import Output, ShakenModel
 
 __all__ = ["ForceLimit", "Notch", "NotchedRun", "ResponseLimit", "notched_random", "notched_sine"]
 
@@ -49,12 +50,20 @@ class ResponseLimit:
     def __post_init__(self) -> None:
         given = [key for key in ("level", "table", "rms") if getattr(self, key) is not None]
         if len(given) != 1:
-            raise ModelError(f"notch {self.name or self.output!r}: expected one of level, table, rms, got {', '.join(given) or 'none'}")
+            raise ModelError(
+                f"notch {self.name or self.output!r}: expected one of level, table, rms, got "
+                f"{', '.join(given) or 'none'}"
+            )
         for value in (self.level, self.rms):
             if value is not None and not (math.isfinite(value) and value > 0):
-                raise ModelError(f"notch {self.name or self.output!r}: a limit of {value!r} cannot be kept by any input; expected a number above 0")
+                raise ModelError(
+                    f"notch {self.name or self.output!r}: a limit of {value!r} cannot be kept by any input; "
+                    "expected a number above 0"
+                )
         if not (math.isfinite(self.factor) and self.factor > 0):
-            raise ModelError(f"notch {self.name or self.output!r}: factor: expected a number above 0, got {self.factor!r}")
+            raise ModelError(
+                f"notch {self.name or self.output!r}: factor: expected a number above 0, got {self.factor!r}"
+            )
 
 
 @dataclass(frozen=True)
@@ -112,7 +121,9 @@ def column_of(outputs: Sequence[Output], limit: Limit) -> int:
     """Return the column of the output of a limit; `ModelError` with the nearest name if there is none."""
     names = [output.name for output in outputs]
     if limit.output not in names:
-        raise ModelError(f"notch {limit.name or limit.output!r}: no output {quoted(limit.output)}{nearest(limit.output, names)}")
+        raise ModelError(
+            f"notch {limit.name or limit.output!r}: no output {quoted(limit.output)}{nearest(limit.output, names)}"
+        )
     return names.index(limit.output)
 
 
@@ -122,7 +133,11 @@ def in_output_units(model: ShakenModel, output: Output, value: float) -> float:
 
 
 def notched_sine(
-    model: ShakenModel, run: SineRun, limits: Sequence[Limit], uncertainty: Uncertainty | None = None, deepest: float = DEEPEST
+    model: ShakenModel,
+    run: SineRun,
+    limits: Sequence[Limit],
+    uncertainty: Uncertainty | None = None,
+    deepest: float = DEEPEST,
 ) -> NotchedRun:
     """Return the notched input of a sine run.
 
@@ -146,14 +161,19 @@ def notched_sine(
         allowed[k] = np.divide(value, wide[:, column], out=np.full_like(value, np.inf), where=wide[:, column] > 0)
     notched, which = lowered(run.level, allowed)
     decibels = 20 * np.log10(notched / run.level)
-    found = stretches(run.frequencies, decibels, which, limits, of, [wide[:, column_of(run.outputs, limit)] * run.level for limit in limits])
+    found = stretches(
+        run.frequencies,
+        decibels,
+        which,
+        limits,
+        of,
+        [wide[:, column_of(run.outputs, limit)] * run.level for limit in limits],
+    )
     require_possible(found, deepest, f"sine {run.test!r}, {run.direction}")
     return NotchedRun(run.frequencies, run.level, notched, transfer * notched[:, None], found, None, None, of)
 
 
-def notched_random(
-    model: ShakenModel, run: RandomRun, limits: Sequence[Limit], deepest: float = DEEPEST
-) -> NotchedRun:
+def notched_random(model: ShakenModel, run: RandomRun, limits: Sequence[Limit], deepest: float = DEEPEST) -> NotchedRun:
     """Return the notched input of a random run of one direction; limits of density, then of rms."""
     if run.level.shape[1] != 1:
         raise ModelError(f"notch: random {run.test!r} drives several inputs at once; notches are made of one direction")
@@ -177,7 +197,9 @@ def notched_random(
         allowed[k] = np.divide(value, own, out=np.full_like(value, np.inf), where=own > 0)
     notched, which = lowered(level, allowed)
     decibels = 10 * np.log10(notched / level)
-    found = stretches(f, decibels, which, limits, of, [transfer[:, column_of(run.outputs, limit)] * level for limit in limits])
+    found = stretches(
+        f, decibels, which, limits, of, [transfer[:, column_of(run.outputs, limit)] * level for limit in limits]
+    )
     require_possible(found, deepest, f"random {run.test!r}, {run.direction}")
     sizes = transfer * notched[:, None]
     rms = np.sqrt(np.maximum(run.band.integral(sizes), 0.0))
@@ -264,7 +286,9 @@ def require_possible(notches: Sequence[Notch], deepest: float, where: str) -> No
     worst = max(notches, key=lambda notch: notch.depth, default=None)
     if worst is not None and worst.depth > deepest:
         raise ModelError(
-            f"{where}: {worst.reason} asks for a notch of {worst.depth:.1f} dB at {worst.deepest:.4g} Hz (the output would reach "
-            f"{worst.unnotched:.4g}, allowed {worst.limit:.4g}), more than the {deepest:g} dB that are allowed; check the "
+            f"{where}: {worst.reason} asks for a notch of {worst.depth:.1f} dB at {worst.deepest:.4g} Hz (the "
+            "output would reach "
+            f"{worst.unnotched:.4g}, allowed {worst.limit:.4g}), more than the {deepest:g} dB that are allowed; "
+            "check the "
             "limit and its unit, or raise deepest"
         )

@@ -2,7 +2,7 @@
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
-from floatframe.shaking.model import ShakenModel
+from floatframe.shaking.structure.model import ShakenModel
 
 __all__ = ["band_notes", "input_index", "require_damped"]
 
@@ -44,7 +44,9 @@ def band_notes(model: ShakenModel, last: float, where: str) -> list[str]:
         return []
     relation = "below" if f[-1] < last else "near"
     return [
-        f"{where}: the band ends at {last:g} Hz, the last mode with the bases held is at {f[-1]:.4g} Hz, {relation} its end: "
-        f"what the structure has between there and {MARGIN * last:.4g} Hz is left out but for its static part; reduce the "
+        f"{where}: the band ends at {last:g} Hz, the last mode with the bases held is at {f[-1]:.4g} Hz, {relation} "
+        "its end: "
+        f"what the structure has between there and {MARGIN * last:.4g} Hz is left out but for its static part; "
+        "reduce the "
         "body with more modes"
     ]

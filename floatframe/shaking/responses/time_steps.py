@@ -2,8 +2,9 @@
 
     eta_ddot + 2 zeta omega eta_dot + omega² eta = a(t),  a straight between t_n and t_n+1
 
-(1) x = (eta, eta_dot): x_n+1 = A x_n + B_0 a_n + B_1 a_n+1, from the exponential of the state matrix with a and its slope
-(2) without x: eta_n + c_1 eta_n-1 + c_2 eta_n-2 = Σ b_k a_n-k, c from the trace and determinant of A: a digital filter, whose
+(1) x = (eta, eta_dot): x_n+1 = A x_n + B_0 a_n + B_1 a_n+1, from the exponential of the states with a and its slope
+(2) without x: eta_n + c_1 eta_n-1 + c_2 eta_n-2 = Σ b_k a_n-k, c from the trace and determinant of A: a digital
+filter, whose
     initial values put x_0 and a_0 right
 """
 
@@ -14,7 +15,7 @@ import scipy.linalg as la
 from scipy.signal import lfilter
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.shaking.model import ShakenModel
+from floatframe.shaking.structure.model import ShakenModel
 
 __all__ = ["Motion", "base_motions", "histories", "oscillator"]
 

@@ -1,7 +1,9 @@
 """Shock response spectra: the largest answer of single masses to an acceleration of their base.
 
-A mass on the frequency f with amplification Q: z its motion relative to the base, a = -(2 zeta omega z_dot + omega² z) its
-absolute acceleration. Spectra are max |a|, max |z|, and the pseudo-velocity omega max |z|; primary over the time that is
+A mass on the frequency f with amplification Q: z its motion relative to the base, a = -(2 zeta omega z_dot + omega²
+z) its
+absolute acceleration. Spectra are max |a|, max |z|, and the pseudo-velocity omega max |z|; primary over the time
+that is
 given, residual beyond it, where the mass vibrates freely and its largest value follows from its state in closed form.
 """
 
@@ -11,7 +13,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
-from floatframe.shaking.time_steps import oscillator
+from floatframe.shaking.responses.time_steps import oscillator
 
 __all__ = ["KINDS", "octave_frequencies", "shock_response_spectrum"]
 
@@ -34,7 +36,13 @@ def octave_frequencies(first: float, last: float, per_octave: int = 12) -> Array
 
 
 def shock_response_spectrum(
-    acceleration: Array, h: float, frequencies: Array, Q: float = 10.0, kind: str = "acceleration", *, residual: bool = True
+    acceleration: Array,
+    h: float,
+    frequencies: Array,
+    Q: float = 10.0,
+    kind: str = "acceleration",
+    *,
+    residual: bool = True,
 ) -> Array:
     """Return the shock response spectrum of an acceleration that is straight between its samples, (n_f,).
 
@@ -49,8 +57,8 @@ def shock_response_spectrum(
     Q
         Amplification, 1/(2 zeta).
     kind
-        "acceleration" (absolute, in the unit of the base), "displacement" (relative) or "pseudo-velocity", in its unit times s²
-        and s.
+        "acceleration" (absolute, in the unit of the base), "displacement" (relative) or "pseudo-velocity", in its unit
+        times s² and s.
     residual
         Whether what comes after the last sample counts, the base then being unaccelerated.
     """

@@ -3,8 +3,8 @@
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.shaking.model import Output, ShakenModel
-from floatframe.shaking.stresses import cycle_von_mises
+from floatframe.shaking.responses.stresses import cycle_von_mises
+from floatframe.shaking.structure.model import Output, ShakenModel
 
 __all__ = ["scalar_outputs", "scalar_sizes", "stress_groups"]
 

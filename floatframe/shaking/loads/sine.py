@@ -1,14 +1,18 @@
 """Sine tests: responses to a level over frequency, in the steady state and with the transient of the sweep itself.
 
 A sweep s_ddot = Re(F(t) exp(i phi(t))), phi_dot = 2 pi f, f = f_1 2^(R t), is answered by Re(w), w the response to
-F exp(i phi): |w| is its envelope. In eigenvectors of the state matrix each state follows p_dot = mu p + c F exp(i phi), and over a step h
+F exp(i phi): |w| is its envelope. In eigenvectors of the state matrix each state follows p_dot = mu p + c F exp(i
+phi), and over a step h
 
     p(h) = exp(mu h) p(0) + c ∫_0^h exp(mu (h - t)) G(t) exp(i phi_dot(0) t) dt exp(i phi(0)),   G = F exp(i r)
 
-with r the phase beyond the frequency at its start, ½ phi_ddot t² about 0.001. G is smooth whatever the frequency: a cubic through four
-points, whose moments with the exponentials are exact. The step follows the sweep, 0.05 / sqrt(phi_ddot), not the oscillation.
+with r the phase beyond the frequency at its start, ½ phi_ddot t² about 0.001. G is smooth whatever the frequency: a
+cubic through four
+points, whose moments with the exponentials are exact. The step follows the sweep, 0.05 / sqrt(phi_ddot), not the
+oscillation.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,12 +21,12 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
-from floatframe.shaking.inputs import input_index, require_damped
-from floatframe.shaking.levels import Level, in_model
-from floatframe.shaking.model import Output, ShakenModel, moving, response
-from floatframe.shaking.resolved import resolved_band
-from floatframe.shaking.scalars import scalar_outputs, scalar_sizes
-from floatframe.shaking.uncertainty import Uncertainty
+from floatframe.shaking.loads.inputs import input_index, require_damped
+from floatframe.shaking.loads.levels import Level, in_model
+from floatframe.shaking.loads.uncertainty import Uncertainty
+from floatframe.shaking.responses.resolved import resolved_band
+from floatframe.shaking.responses.scalars import scalar_outputs, scalar_sizes
+from floatframe.shaking.structure.model import Output, ShakenModel, moving, response
 
 __all__ = ["SineRun", "SineTest", "sine_run", "sweep_envelope"]
 
@@ -43,7 +47,9 @@ class SineTest:
     def __post_init__(self) -> None:
         where = f"shake: sine {self.name!r}"
         if self.level.is_density:
-            raise ModelError(f"{where}: level: unit {self.level.unit} is that of a random test; expected g, m/s2, mm, ...")
+            raise ModelError(
+                f"{where}: level: unit {self.level.unit} is that of a random test; expected g, m/s2, mm, ..."
+            )
         if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
             raise ModelError(f"{where}: rate: expected octaves a minute above 0, got {self.rate!r}")
         if not self.directions:
@@ -62,7 +68,9 @@ class SineRun:
     sizes: Array  #: amplitudes, steady, (n_f, n_out) [units of the model]
     transfer: Array  #: complex response of the outputs of the model per unit of input, (n_f, n_rows)
     uncertain: Array  #: amplitudes with uncertainty, (n_f, n_out)
-    static: Array  #: quasi-static amplitudes, as if nothing vibrated: at the lowest frequency, by the level, (n_f, n_out)
+    static: (
+        Array  #: quasi-static amplitudes, as if nothing vibrated: at the lowest frequency, by the level, (n_f, n_out)
+    )
     swept_frequencies: Array = field(default_factory=lambda: np.zeros(0))  #: of the sweep, (n_t,) [Hz]
     swept: Array | None = None  #: envelopes during the sweep, (n_t, n_out)
     rate: float | None = None  #: octaves a minute
@@ -83,9 +91,7 @@ class SineRun:
         return None if self.swept is None else np.asarray(self.swept.max(axis=0))
 
 
-def sine_run(
-    model: ShakenModel, test: SineTest, direction: str, uncertainty: Uncertainty | None = None
-) -> SineRun:
+def sine_run(model: ShakenModel, test: SineTest, direction: str, uncertainty: Uncertainty | None = None) -> SineRun:
     """Return the responses to a sine test in one direction.
 
     Raises
@@ -137,7 +143,9 @@ def sweep_envelope(model: ShakenModel, k: int, test: SineTest, step: float = STE
     where, rate = f"shake: sine {test.name!r}", test.rate
     assert rate is not None
     if model.B[:2, :, k].any() or model.D[:2, :, k].any():
-        raise ModelError(f"{where}: rate: several bases that move against each other are swept in steady state only; leave rate out")
+        raise ModelError(
+            f"{where}: rate: several bases that move against each other are swept in steady state only; leave rate out"
+        )
     growth = rate / 60 * math.log(2.0)  # of the frequency [1/s]
     f, t = sweep_times(test, growth, step, where)
     sign = -1.0 if test.downward else 1.0
@@ -185,13 +193,16 @@ def sweep_times(test: SineTest, growth: float, step: float, where: str) -> tuple
     corners = test.level.frequencies[::-1] if test.downward else test.level.frequencies
     f, t = [np.array([corners[0]])], [np.zeros(1)]
     now = 0.0
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
+    for a, b in itertools.pairwise(corners):
         duration = abs(math.log(b / a)) / growth
         # equal steps of sqrt(f): dt sqrt(phi_ddot) is then the same for all
         n = math.ceil(2 * abs(math.sqrt(2 * math.pi * b / growth) - math.sqrt(2 * math.pi * a / growth)) / step)
         n = max(n, math.ceil(duration * growth / 0.05), 8)
         if n > MOST_STEPS:
-            raise ModelError(f"{where}: rate: {test.rate:g} octaves a minute take {n:.1e} steps; leave it out: so slow a sweep is steady")
+            raise ModelError(
+                f"{where}: rate: {test.rate:g} octaves a minute take {n:.1e} steps; leave it out: so slow a sweep "
+                "is steady"
+            )
         own = np.linspace(math.sqrt(a), math.sqrt(b), n + 1)[1:] ** 2
         own[-1] = b
         f.append(own)

@@ -1,4 +1,4 @@
-"""Shocks and transients: histories of the bases and of forces, what the outputs do, and their shock response spectra."""
+"""Shocks and transients: histories of bases and forces, what the outputs do, and shock response spectra."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,14 +8,14 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
-from floatframe.shaking.inputs import input_index
-from floatframe.shaking.model import Output, ShakenModel
-from floatframe.shaking.pulses import Synthesis
-from floatframe.shaking.response_spectrum import octave_frequencies, shock_response_spectrum
-from floatframe.shaking.scalars import scalar_outputs, stress_groups
-from floatframe.shaking.stresses import VON_MISES
-from floatframe.shaking.time_steps import base_motions, histories
-from floatframe.shaking.uncertainty import Uncertainty
+from floatframe.shaking.loads.inputs import input_index
+from floatframe.shaking.loads.pulses import Synthesis
+from floatframe.shaking.loads.uncertainty import Uncertainty
+from floatframe.shaking.responses.response_spectrum import octave_frequencies, shock_response_spectrum
+from floatframe.shaking.responses.scalars import scalar_outputs, stress_groups
+from floatframe.shaking.responses.stresses import VON_MISES
+from floatframe.shaking.responses.time_steps import base_motions, histories
+from floatframe.shaking.structure.model import Output, ShakenModel
 
 __all__ = ["SpectrumRequest", "TimeRun", "TimeTest", "time_run", "time_runs"]
 
@@ -48,7 +48,9 @@ class TimeTest:
     history: Array | None = None  #: acceleration in SI, (n_t,) [m/s², rad/s²]
     directions: Sequence[str] = ("x", "y", "z")
     inputs: Mapping[str, Array] | None = None  #: by name, in SI [m/s², rad/s², N, N m], (n_t,) each
-    after: float | None = None  #: how long to go on after the end [s]; None: 10 cycles of the lowest mode, of a transient not at all
+    after: float | None = (
+        None  #: how long to go on after the end [s]; None: 10 cycles of the lowest mode, of a transient not at all
+    )
     spectra: SpectrumRequest = field(default_factory=SpectrumRequest)
     kind: str = "transient"  #: "shock" or "transient", for the report
     words: str = ""  #: what the history is
@@ -58,13 +60,17 @@ class TimeTest:
         where = f"shake: {self.kind} {self.name!r}"
         t = np.asarray(self.time, dtype=float)
         if (self.history is None) == (self.inputs is None):
-            raise ModelError(f"{where}: expected either a history (one direction after the other) or inputs (all at once)")
+            raise ModelError(
+                f"{where}: expected either a history (one direction after the other) or inputs (all at once)"
+            )
         if t.ndim != 1 or len(t) < 2 or not np.isfinite(t).all():
             raise ModelError(f"{where}: time: expected two finite times at least, got {t.shape}")
         if (np.diff(t) <= 0).any():
             k = int(np.flatnonzero(np.diff(t) <= 0)[0])
             raise ModelError(f"{where}: time: row {k + 2}: {t[k + 1]:g} s after {t[k]:g} s; expected rising times")
-        for name, values in (self.inputs or {"history": self.history}).items():
+        for name, values in (
+            {"history": self.history} if self.history is not None else dict(self.inputs or {})
+        ).items():
             values = np.asarray(values, dtype=float)
             if values.shape != t.shape:
                 raise ModelError(f"{where}: {name}: expected {len(t)} values, one a time, got {values.shape}")
@@ -137,11 +143,15 @@ def time_run(
     n_t = math.ceil((given[-1] + after) / h) + 1
     if n_t > MOST_SAMPLES:
         raise ModelError(
-            f"{where}: {n_t:.2g} samples are needed for the highest mode, {f[-1]:.4g} Hz, over {given[-1] + after:.4g} s, expected "
+            f"{where}: {n_t:.2g} samples are needed for the highest mode, {f[-1]:.4g} Hz, over "
+            f"{given[-1] + after:.4g} s, expected "
             f"up to {MOST_SAMPLES:.0e}; let higher modes answer statically (residual_above), or shorten the history"
         )
     rows = np.stack(
-        [model_factor(model, int(k)) * np.asarray(v, dtype=float) for k, v in zip(columns, inputs.values(), strict=True)]
+        [
+            model_factor(model, int(k)) * np.asarray(v, dtype=float)
+            for k, v in zip(columns, inputs.values(), strict=True)
+        ]
     )
     t, values, is_exact = sampled(given, rows, h, after)
     if not is_exact:

@@ -1,5 +1,6 @@
-"""Damping of the modes with the bases held: one ratio, a table over frequency, bands, single modes, or that of the body."""
+"""Damping of the modes with the bases held: by ratio, table over frequency, band, single mode, or the body's own."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -45,12 +46,16 @@ class Damping:
             if len(row) != 2:
                 raise ModelError(f"damping: table: expected rows (Hz, ratio), got {list(row)!r}")
         f = [float(row[0]) for row in self.table]
-        for k, (low, high) in enumerate(zip(f, f[1:], strict=False)):
+        for k, (low, high) in enumerate(itertools.pairwise(f)):
             if not 0 < low < high:
-                raise ModelError(f"damping: table: frequencies must rise above 0: row {k + 2} has {high:g} after {low:g}")
+                raise ModelError(
+                    f"damping: table: frequencies must rise above 0: row {k + 2} has {high:g} after {low:g}"
+                )
         for row in self.bands:
             if len(row) != 3 or not 0 <= row[0] < row[1]:
-                raise ModelError(f"damping: bands: expected rows (from Hz, to Hz, ratio) with from < to, got {list(row)!r}")
+                raise ModelError(
+                    f"damping: bands: expected rows (from Hz, to Hz, ratio) with from < to, got {list(row)!r}"
+                )
         ratios = [self.ratio or 0.0, *(row[-1] for row in self.table), *(row[-1] for row in self.bands)]
         for value in [*ratios, *self.modes.values()]:
             if not (math.isfinite(value) and 0 <= value < 1):
@@ -77,7 +82,8 @@ class Damping:
         if np.isnan(zeta).any():
             k = int(np.flatnonzero(np.isnan(zeta))[0])
             raise ModelError(
-                f"damping: mode {k + 1} at {frequencies[k]:.4g} Hz is in none of the bands and no ratio is given for all; "
+                f"damping: mode {k + 1} at {frequencies[k]:.4g} Hz is in none of the bands and no ratio is given "
+                "for all; "
                 "give a ratio besides, or a band that holds it"
             )
         return zeta
@@ -87,7 +93,11 @@ class Damping:
         """Say what it is."""
         if self.own:
             return "damping of the model itself"
-        parts = [] if self.ratio is None else [f"{100 * self.ratio:g} % of critical (Q = {1 / (2 * self.ratio):.4g})" if self.ratio else "none"]
+        parts = (
+            []
+            if self.ratio is None
+            else [f"{100 * self.ratio:g} % of critical (Q = {1 / (2 * self.ratio):.4g})" if self.ratio else "none"]
+        )
         parts += [f"table of {len(self.table)} frequencies"] * bool(len(self.table))
         parts += [f"{len(self.bands)} bands"] * bool(len(self.bands))
         parts += [f"{len(self.modes)} modes by number"] * bool(self.modes)

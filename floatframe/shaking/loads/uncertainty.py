@@ -1,6 +1,7 @@
 """What a model is not trusted for: factors on its responses, and frequencies that may lie elsewhere.
 
-With a share delta of the frequencies, the response at f is the largest of the transfer functions between f/(1 + delta) and
+With a share delta of the frequencies, the response at f is the largest of the transfer functions between f/(1 +
+delta) and
 f/(1 - delta), under the level at f: as if the model had been stretched along the axis by up to delta.
 """
 
@@ -28,11 +29,15 @@ class Uncertainty:
         rows = [(0.0, math.inf, self.factor, self.frequency), *self.bands]
         for row in rows:
             if len(row) != 4 or not row[0] < row[1]:
-                raise ModelError(f"uncertainty: bands: expected rows (from Hz, to Hz, factor, share), got {list(row)!r}")
+                raise ModelError(
+                    f"uncertainty: bands: expected rows (from Hz, to Hz, factor, share), got {list(row)!r}"
+                )
             if not (math.isfinite(row[2]) and row[2] >= 1):
                 raise ModelError(f"uncertainty: factor: expected a number of 1 or more, got {row[2]!r}")
             if not 0 <= row[3] < 0.5:
-                raise ModelError(f"uncertainty: frequency: expected a share between 0 and 0.5 (0.05 for 5 %), got {row[3]!r}")
+                raise ModelError(
+                    f"uncertainty: frequency: expected a share between 0 and 0.5 (0.05 for 5 %), got {row[3]!r}"
+                )
 
     @property
     def is_none(self) -> bool:
@@ -72,6 +77,7 @@ class Uncertainty:
             return "none"
         rows = [(0.0, math.inf, self.factor, self.frequency), *self.bands]
         return "; ".join(
-            f"{'' if high == math.inf else f'{low:g} to {high:g} Hz: '}factor {factor:g}, frequencies ±{100 * share:g} %"
+            f"{'' if high == math.inf else f'{low:g} to {high:g} Hz: '}factor {factor:g}, frequencies "
+            f"±{100 * share:g} %"
             for low, high, factor, share in rows
         )

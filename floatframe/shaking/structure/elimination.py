@@ -35,9 +35,7 @@ class Held:
     V_0: Array  #: shapes without mass, of unit stiffness, (n_x, n_0)
 
 
-def held_by_bases(
-    where: str, M: Array, K: Array, G: Array, R: Array, scale: Array, rigid: Array | None = None
-) -> Held:
+def held_by_bases(where: str, M: Array, K: Array, G: Array, R: Array, scale: Array, rigid: Array | None = None) -> Held:
     """Return the motions of a structure whose rows G x follow the motions s of bases, G x = R s.
 
     Parameters
@@ -79,10 +77,10 @@ def held_by_bases(
     except np.linalg.LinAlgError as error:
         raise ModelError(f"{where}: no modes with its bases held: {error}") from error
     omega2 = np.einsum("kq,kl,lq->q", Z, K_N, Z)
-    order = np.lexsort((omega2, ~is_massive))
+    order = np.lexsort((omega2, np.logical_not(is_massive)))
     Z, omega2, is_massive = Z[:, order], omega2[order], is_massive[order]
-    V = N @ Z
-    return Held(T, V[:, is_massive], np.sqrt(omega2[is_massive]), V[:, ~is_massive] / np.sqrt(omega2[~is_massive]))
+    V, static = N @ Z, np.logical_not(is_massive)
+    return Held(T, V[:, is_massive], np.sqrt(omega2[is_massive]), V[:, static] / np.sqrt(omega2[static]))
 
 
 def require_held(where: str, K_N: Array, N: Array) -> None:
@@ -94,7 +92,8 @@ def require_held(where: str, K_N: Array, N: Array) -> None:
     free = int((energy <= FREE * max(energy[-1], np.finfo(float).tiny)).sum())
     if free:
         raise ModelError(
-            f"{where}: its bases do not hold it: {free} motion{'s' if free > 1 else ''} without energy remain{'' if free > 1 else 's'} "
+            f"{where}: its bases do not hold it: {free} motion{'s' if free > 1 else ''} without energy "
+            f"remain{'' if free > 1 else 's'} "
             "while they stand still; give a base an interface with rotations, or one more interface"
         )
 

@@ -1,7 +1,8 @@
 """A reduced body on bases: its interfaces driven, its free rigid motion beside its modes.
 
-x = (d, theta, q): translation and rotation of the body frame, which nothing but the bases holds, and its modes, with the
-mass and stiffness of docs/theory.md §6 at rest. Of a body that is held already the ground is the base: it moves d and
+x = (d, theta, q): translation and rotation of the body frame, which nothing but the bases holds, and its modes, with
+the mass and stiffness of docs/theory.md §6 at rest. Of a body that is held already the ground is the base: it moves
+d and
 theta.
 """
 
@@ -18,10 +19,10 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.units import Units
 from floatframe.errors import ModelError
-from floatframe.shaking.damping import Damping
-from floatframe.shaking.elimination import Held, held_by_bases
-from floatframe.shaking.model import DIRECTIONS, Base, Output, ShakenModel, rigid_rows
-from floatframe.shaking.places import Observed, Place, found_place, in_mesh_axes, six_rows
+from floatframe.shaking.structure.damping import Damping
+from floatframe.shaking.structure.elimination import Held, held_by_bases
+from floatframe.shaking.structure.model import DIRECTIONS, Base, Output, ShakenModel, rigid_rows
+from floatframe.shaking.structure.places import Observed, Place, found_places, in_mesh_axes, six_rows
 
 __all__ = ["bases_of_body", "force_outputs", "shaken_body"]
 
@@ -44,11 +45,15 @@ def bases_of_body(
     points = points or {}
     if body.is_held:
         if bases not in (None, GROUND, {GROUND: ()}):
-            raise ModelError(f'{where} is held to the ground, which is its only base: leave base out, or write "{GROUND}"')
+            raise ModelError(
+                f'{where} is held to the ground, which is its only base: leave base out, or write "{GROUND}"'
+            )
         return (Base(GROUND, (), np.asarray(points.get(GROUND, body.frame.origin), dtype=float)),)
     if bases is None:
         if len(names) != 1:
-            raise ModelError(f"{where} has the interfaces {', '.join(names) or '(none)'}: name the one that is the base")
+            raise ModelError(
+                f"{where} has the interfaces {', '.join(names) or '(none)'}: name the one that is the base"
+            )
         bases = names[0]
     if isinstance(bases, str):
         bases = {bases: (bases,)}
@@ -141,7 +146,9 @@ def shaken_body(
         outputs=tuple(output for row in rows for output in row.outputs),
         mass=held.T.T @ M @ held.T,
         field=stress_field(on),
-        field_labels=() if body.stress is None else tuple(f"node {number}" for number in body.node_ids),
+        field_labels=()
+        if body.stress is None
+        else tuple(f"node {body.node_name(row)}" for row in range(len(body.nodes))),
     )
 
 
@@ -179,20 +186,21 @@ def base_rows(on: OnBases) -> list[OutputRows]:
 
 
 def observed_rows(on: OnBases, each: Observed) -> list[OutputRows]:
-    """Return the outputs of a place."""
-    place, units, n_s = found_place(on.body, each), on.body.units, on.held.T.shape[1]
+    """Return the outputs of a place, or of the nodes of an element or set."""
+    units, n_s = on.body.units, on.held.T.shape[1]
     found = []
-    for wish in each.quantities:
-        if wish == "acceleration":
-            found.append(rows_of(on, motion_outputs(each, place, wish, units), place.rows, 2, place.rows @ on.held.T))
-        elif wish == "displacement":
-            own = np.zeros((len(place.rows), n_s))
-            if len(on.bases) > 1:  # less what the first base alone would carry along; nothing is left with one base
-                own = place.rows @ on.held.T
-                own[:, :6] -= rigid_rows(place.point, on.bases[0])[: len(own)]
-            found.append(rows_of(on, motion_outputs(each, place, wish, units), place.rows, 0, own))
-        elif place.stress is not None:
-            found.append(rows_of(on, stress_outputs(each, place, units), place.stress, 0, place.stress @ on.held.T))
+    for place in found_places(on.body, each):
+        for wish in each.quantities:
+            if wish == "acceleration":
+                found.append(rows_of(on, motion_outputs(place, wish, units), place.rows, 2, place.rows @ on.held.T))
+            elif wish == "displacement":
+                own = np.zeros((len(place.rows), n_s))
+                if len(on.bases) > 1:  # less what the first base alone would carry along; nothing is left with one base
+                    own = place.rows @ on.held.T
+                    own[:, :6] -= rigid_rows(place.point, on.bases[0])[: len(own)]
+                found.append(rows_of(on, motion_outputs(place, wish, units), place.rows, 0, own))
+            elif place.stress is not None:
+                found.append(rows_of(on, stress_outputs(place, units), place.stress, 0, place.stress @ on.held.T))
     return found
 
 
@@ -251,7 +259,7 @@ def held_points(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Ar
 
 
 def sizes_of(body: ReducedBody) -> Array:
-    """Return how far x moves the body by a length of about one: 1, 1 by its size, 1 by the largest shape, (6 + n_q,)."""
+    """Return sizes of x that move the body by about a length of one, (6 + n_q,)."""
     length = float(np.linalg.norm(np.ptp(body.nodes, axis=0))) or 1.0
     largest = np.abs(body.Phi).max(axis=(0, 1), initial=0.0)
     for interface in body.interfaces:
@@ -311,17 +319,17 @@ def force_outputs(name: str, place: str, units: Units) -> list[Output]:
     ]
 
 
-def motion_outputs(each: Observed, place: Place, quantity: str, units: Units) -> list[Output]:
+def motion_outputs(place: Place, quantity: str, units: Units) -> list[Output]:
     """Return the outputs of a motion: three translations, and rotations where there are any."""
     turning = {"acceleration": "angular acceleration", "displacement": "rotation"}[quantity]
     kinds = [quantity] * 3 + [turning] * (len(place.rows) - 3)
     return [
-        Output(f"{each.name} {kind} {axis[-1]}", kind, unit_of(kind, units), f"{each.name} {kind}", place.words)
+        Output(f"{place.name} {kind} {axis[-1]}", kind, unit_of(kind, units), f"{place.name} {kind}", place.words)
         for kind, axis in zip(kinds, DIRECTIONS, strict=False)
     ]
 
 
-def stress_outputs(each: Observed, place: Place, units: Units) -> list[Output]:
+def stress_outputs(place: Place, units: Units) -> list[Output]:
     """Return the six components of a stress."""
-    group = f"{each.name} stress"
+    group = f"{place.name} stress"
     return [Output(f"{group} {c}", "stress", unit_of("stress", units), group, place.words) for c in STRESS_COMPONENTS]

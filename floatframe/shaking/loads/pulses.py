@@ -1,8 +1,9 @@
 """Shock pulses of test specifications, and accelerations made for a shock response spectrum.
 
-A wavelet a sin(2 pi f t) sin(2 pi f t/N), 0 <= t <= N/(2 f), N odd and 3 or more, begins and ends at rest: neither velocity nor
+A wavelet a sin(2 pi f t) sin(2 pi f t/N), 0 <= t <= N/(2 f), N odd and 3 or more, begins and ends at rest: neither
+velocity nor
 displacement is left. One a frequency of the target, with amplitudes corrected by what the spectrum of their sum lacks,
-again and again (Ferebee et al. (2008)).
+again and again.
 """
 
 import math
@@ -12,8 +13,8 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
-from floatframe.shaking.levels import Level
-from floatframe.shaking.response_spectrum import shock_response_spectrum
+from floatframe.shaking.loads.levels import Level
+from floatframe.shaking.responses.response_spectrum import shock_response_spectrum
 
 __all__ = ["PULSES", "Synthesis", "pulse", "synthesised"]
 
@@ -50,12 +51,13 @@ def pulse(kind: str, amplitude: float, duration: float, *, edge: float = EDGE) -
         y = np.sin(np.pi * x)
         y[-1] = 0.0
     else:
-        x, y = {
+        corners: dict[str, tuple[list[float], list[float]]] = {
             "terminal-peak": ([0, 0.999, 1], [0, 1, 0]),
             "initial-peak": ([0, 0.001, 1], [0, 1, 0]),
             "triangle": ([0, 0.5, 1], [0, 1, 0]),
             "trapezoid": ([0, edge, 1 - edge, 1], [0, 1, 1, 0]) if edge < 0.5 else ([0, 0.5, 1], [0, 1, 0]),
-        }[kind]
+        }
+        x, y = (np.array(each, dtype=float) for each in corners[kind])
     return np.asarray(x, dtype=float) * duration, np.asarray(y, dtype=float) * amplitude
 
 
@@ -95,7 +97,8 @@ def synthesised(target: Level, Q: float = 10.0, duration: float | None = None) -
     duration = 5 / target.first if duration is None else duration
     if not duration * target.first >= 1.5:
         raise ModelError(
-            f"{where}: duration {duration:g} s holds less than three half-cycles of the first frequency, {target.first:g} Hz; "
+            f"{where}: duration {duration:g} s holds less than three half-cycles of the first frequency, "
+            f"{target.first:g} Hz; "
             f"expected {1.5 / target.first:.4g} s or more"
         )
     n = max(2, math.ceil(WAVELETS_PER_OCTAVE * math.log2(target.last / target.first)) + 1)
@@ -119,4 +122,4 @@ def synthesised(target: Level, Q: float = 10.0, duration: float | None = None) -
         amplitude = amplitude * (wanted / reached) ** 0.6
     a = best @ waves
     fine = np.geomspace(target.first, target.last, 2 * n - 1)
-    return Synthesis(t, a, fine, target.at(fine), shock_response_spectrum(a, h, fine, Q))
+    return Synthesis(np.asarray(t, dtype=float), a, fine, target.at(fine), shock_response_spectrum(a, h, fine, Q))

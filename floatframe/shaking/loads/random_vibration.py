@@ -14,13 +14,13 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
-from floatframe.shaking.inputs import input_index, require_damped
-from floatframe.shaking.levels import Level, in_model, level_rms
-from floatframe.shaking.model import Output, ShakenModel, driven, modal_response, response
-from floatframe.shaking.resolved import ResolvedBand, resolved_band
-from floatframe.shaking.scalars import scalar_outputs, stress_groups
-from floatframe.shaking.stresses import VON_MISES, RandomVonMises, random_von_mises, von_mises_density
-from floatframe.shaking.uncertainty import Uncertainty
+from floatframe.shaking.loads.inputs import input_index, require_damped
+from floatframe.shaking.loads.levels import Level, in_model, level_rms
+from floatframe.shaking.loads.uncertainty import Uncertainty
+from floatframe.shaking.responses.resolved import ResolvedBand, resolved_band
+from floatframe.shaking.responses.scalars import scalar_outputs, stress_groups
+from floatframe.shaking.responses.stresses import VON_MISES, RandomVonMises, random_von_mises, von_mises_density
+from floatframe.shaking.structure.model import Output, ShakenModel, driven, modal_response, response
 
 __all__ = ["CrossSpectrum", "Miles", "RandomRun", "RandomTest", "input_density", "random_run", "random_runs"]
 
@@ -67,7 +67,9 @@ class RandomTest:
             raise ModelError(f"{where}: duration: expected seconds above 0, got {self.duration!r}")
         for each in self.cross:
             if not 0 <= each.coherence <= 1:
-                raise ModelError(f"{where}: coherence of {each.a} and {each.b}: expected 0 to 1, got {each.coherence!r}")
+                raise ModelError(
+                    f"{where}: coherence of {each.a} and {each.b}: expected 0 to 1, got {each.coherence!r}"
+                )
 
     @property
     def band(self) -> tuple[float, float]:
@@ -149,10 +151,14 @@ def random_run(
     density = densities(G, groups)
     rms2 = band.integral(density)
     rms = np.sqrt(np.maximum(rms2, 0.0))
-    crossings = np.sqrt(np.divide(band.integral(f[:, None] ** 2 * density), rms2, out=np.zeros_like(rms2), where=rms2 > 0))
+    crossings = np.sqrt(
+        np.divide(band.integral(f[:, None] ** 2 * density), rms2, out=np.zeros_like(rms2), where=rms2 > 0)
+    )
     wide = densities(uncertainty_of(uncertainty, f, G, density_in, len(columns)), groups)
     of_places = {
-        model.outputs[rows.start].group: random_von_mises(band.integral(np.einsum("fai,fbi->fab", G[:, rows], G[:, rows].conj()).real))
+        model.outputs[rows.start].group: random_von_mises(
+            band.integral(np.einsum("fai,fbi->fab", G[:, rows], G[:, rows].conj()).real)
+        )
         for rows in groups
     }  # fmt: skip
     single = len(columns) == 1 and model.rates[columns[0]] == 2
@@ -184,9 +190,7 @@ def si_factor(level: Level, model: ShakenModel, k: int) -> float:
     return float(np.sqrt(one.in_si(level.frequencies[:1])[0] * factor))
 
 
-def input_density(
-    model: ShakenModel, test: RandomTest, acting: Mapping[int, tuple[str, Level]], f: Array
-) -> Array:
+def input_density(model: ShakenModel, test: RandomTest, acting: Mapping[int, tuple[str, Level]], f: Array) -> Array:
     """Return the spectral matrix of the inputs that act, (n_f, n_act, n_act) complex [units of the model² per Hz].
 
     Raises
@@ -217,7 +221,8 @@ def input_density(
     least = float(np.linalg.eigvalsh(gamma)[0])
     if least < -ROUNDING:
         raise ModelError(
-            f"{where}: the coherences and phases contradict each other (eigenvalue {least:.3g} of their matrix is below 0): "
+            f"{where}: the coherences and phases contradict each other (eigenvalue {least:.3g} of their matrix is "
+            "below 0): "
             "no signals have them; if a follows b and b follows c, the phase from a to c is their sum"
         )
     return np.asarray(size[:, :, None] * gamma * size[:, None, :])
@@ -264,7 +269,11 @@ def miles_of(model: ShakenModel, k: int, level: Level) -> tuple[Miles, ...]:
         if level.first <= f <= level.last:
             density = float(level.in_si(np.array([f]))[0] * factor / model.gravity**2)
             Q = 1 / (2 * zeta)
-            found.append(Miles(mode + 1, float(f), float(Q), density, math.sqrt(math.pi / 2 * f * Q * density), float(shares[mode])))
+            found.append(
+                Miles(
+                    mode + 1, float(f), float(Q), density, math.sqrt(math.pi / 2 * f * Q * density), float(shares[mode])
+                )
+            )
     return tuple(found)
 
 
@@ -280,7 +289,10 @@ def von_mises_field(model: ShakenModel, band: ResolvedBand, columns: Sequence[in
         unit = np.zeros((3, len(columns), len(columns)))
         unit[0] = np.eye(len(columns))
         own = driven(unit, model.rates[list(columns)], omega) @ root
-        moved, stress_modes = np.concatenate([moved, own], axis=1), np.concatenate([of_modes, of_s[:, :, columns]], axis=2)
+        moved, stress_modes = (
+            np.concatenate([moved, own], axis=1),
+            np.concatenate([of_modes, of_s[:, :, columns]], axis=2),
+        )
     covariance = np.einsum("f,fki,fli->kl", band.weights, moved, moved.conj(), optimize=True).real
     values, axes = np.linalg.eigh(covariance)
     L = axes * np.sqrt(np.maximum(values, 0.0))

@@ -1,0 +1,248 @@
+"""The command shake: a structure on a base that is moved."""
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import guarded, output_path, print_table, say, stages
+
+if TYPE_CHECKING:
+    from floatframe.shaking.loads.levels import Level
+    from floatframe.shaking.shake import ShakeJob, ShakeResult
+
+__all__ = ["register"]
+
+KINDS = (".html", ".json", ".csv")
+SHOWN = 14  #: outputs of a run that are printed
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command("shake")(shake_command)
+
+
+@guarded
+def shake_command(
+    file: Annotated[Path, typer.Argument(help="A shake file (TOML), see docs/shake.md, or a modal file (.h5).")],
+    outputs: Annotated[
+        list[Path], typer.Option("--output", "-o", help="A .html, .json or .csv file; repeatable; default: all three.")
+    ] = [],  # noqa: B006
+    base: Annotated[str | None, typer.Option(help="Of a modal file: the interface on the base.")] = None,
+    q_factor: Annotated[
+        float | None, typer.Option("--Q", help="Of a modal file: amplification of all modes; default 25.")
+    ] = None,
+    sine: Annotated[
+        str | None, typer.Option(help='Of a modal file: level in g, "5:1,100:1" (Hz:g), or a file.')
+    ] = None,
+    rate: Annotated[float | None, typer.Option(help="Sweep rate in octaves a minute; none: steady.")] = None,
+    random: Annotated[
+        str | None, typer.Option(help='Of a modal file: density in g2/Hz, "20:0.01,2000:0.01", or a file.')
+    ] = None,
+    shock: Annotated[
+        str | None, typer.Option(help='Of a modal file: pulse, "half-sine:50:0.011" (g, seconds).')
+    ] = None,
+    directions: Annotated[str, typer.Option(help="Base directions, each a run of its own.")] = "x,y,z",
+    at: Annotated[list[str], typer.Option("--at", help="Interface or node number that is observed; repeatable.")] = [],  # noqa: B006
+    json: Annotated[
+        bool, typer.Option("--json", help="Write the record as JSON to the terminal, for other programs.")
+    ] = False,
+) -> None:
+    """Shake a structure on its base: sine, random, shock, transient; loads, stresses, spectra, notches.
+
+    Without -o tower.toml gives tower.shake.html, .json and .csv. Of a modal file all other interfaces are observed.
+
+    Example: floatframe shake tower.toml
+
+    Example: floatframe shake tower.h5 --base foot --Q 25 --sine 5:1,100:1 --rate 2 --random
+    20:0.01,80:0.04,350:0.04,2000:0.007
+    """
+    from fe_models.foundation.paths import replace_file
+    from floatframe.errors import ModelError
+    from floatframe.shaking.page import shake_html
+    from floatframe.shaking.record import shake_csv, shake_record
+    from floatframe.shaking.shake import shake
+
+    given = {"--base": base, "--Q": q_factor, "--sine": sine, "--rate": rate, "--random": random, "--shock": shock}
+    if file.suffix == ".toml":
+        from floatframe.shaking.shake_file import read_shake
+
+        named = [key for key, value in given.items() if value is not None] + ["--at"] * bool(at)
+        if named:
+            raise ModelError(f"{', '.join(named)}: of a modal file; {file} says all of it itself")
+        job = read_shake(file)
+    else:
+        job = job_of_options(file, base, q_factor, sine, rate, random, shock, directions, at)
+    inputs = (file, Path(job.source)) if job.source else (file,)
+    paths = [output_path(path, None, ModelError, overwrite_of=inputs) for path in outputs]
+    for path in paths:
+        if path.suffix.lower() not in KINDS:
+            raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(KINDS)}")
+    if not paths and not json:
+        paths = [
+            output_path(None, file.with_suffix(f".shake{kind}"), ModelError, overwrite_of=inputs) for kind in KINDS
+        ]
+    with stages() as clock, clock(f"{job.structure.name}: shaken"):
+        result = shake(job)
+    if json:
+        typer.echo(json_module.dumps(shake_record(result), indent=1))
+    else:
+        print_result(result)
+    for path in paths:
+        kind = path.suffix.lower()
+        if kind == ".html":
+            content = shake_html(result)
+        elif kind == ".json":
+            content = json_module.dumps(shake_record(result), indent=1) + "\n"
+        else:
+            content = shake_csv(result)
+        replace_file(path, content.encode())
+        if not json:
+            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def job_of_options(
+    file: Path, base: str | None, q_factor: float | None, sine: str | None, rate: float | None, random: str | None,
+    shock: str | None, directions: str, at: list[str],
+) -> "ShakeJob":  # fmt: skip
+    """Return the job that options make of a modal file."""
+    import cms
+    from floatframe.errors import ModelError
+    from floatframe.shaking.loads.levels import ACCELERATIONS
+    from floatframe.shaking.loads.pulses import pulse
+    from floatframe.shaking.loads.random_vibration import RandomTest
+    from floatframe.shaking.loads.shock import TimeTest
+    from floatframe.shaking.loads.sine import SineTest
+    from floatframe.shaking.shake import ShakeJob
+    from floatframe.shaking.structure.body import bases_of_body
+    from floatframe.shaking.structure.damping import Damping
+    from floatframe.shaking.structure.places import Observed
+
+    body = cms.read(file)
+    wanted = tuple(part.strip() for part in directions.split(","))
+    if rate is not None and sine is None:
+        raise ModelError("--rate: belongs to --sine")
+    shocks = []
+    if shock is not None:
+        try:
+            kind, amplitude, duration = shock.split(":")
+            t, a = pulse(kind, float(amplitude), float(duration))
+        except ValueError as error:
+            if isinstance(error, ModelError):
+                raise
+            raise ModelError(f'--shock {shock}: expected pulse:g:seconds, such as "half-sine:50:0.011"') from None
+        words = f"{kind} of {float(amplitude):g} g, {1e3 * float(duration):g} ms"
+        shocks.append(TimeTest("shock", t, a * ACCELERATIONS["g"], wanted, kind="shock", words=words))
+    names = [interface.name for interface in body.interfaces]
+    held = {name for each in bases_of_body(body, base) for name in each.holds}
+    places = [
+        Observed(name, interface=name)
+        if name in names
+        else Observed(f"node {name}", node=int(name) if name.isdecimal() else name)
+        for name in at or [name for name in names if name not in held]
+    ]
+    return ShakeJob(
+        body,
+        base,
+        damping=Damping(Q=25.0 if q_factor is None else q_factor),
+        outputs=places,
+        sine=() if sine is None else (SineTest("sine", level(sine, "g", "--sine"), wanted, rate),),
+        random=() if random is None else (RandomTest("random", level(random, "g2/Hz", "--random"), wanted),),
+        shock=tuple(shocks),
+        source=str(file),
+    )
+
+
+def level(words: str, unit: str, where: str) -> "Level":
+    """Return a level of the command line: "Hz:level,Hz:level", or a file."""
+    from floatframe.errors import ModelError
+    from floatframe.shaking.loads.levels import Level, read_level
+
+    if ":" not in words or Path(words).is_file():
+        return read_level(Path(words), unit, where)
+    try:
+        rows = [[float(number) for number in part.split(":")] for part in words.split(",")]
+    except ValueError:
+        raise ModelError(f'{where} {words}: expected "Hz:level,Hz:level" in {unit}, or a file of two columns') from None
+    return Level.of(rows, unit, where)
+
+
+def print_result(result: "ShakeResult") -> None:
+    """Print conversions, main modes, the largest outputs of every run and the notches."""
+    from floatframe.shaking.record import conversions, table_rows
+
+    model, masses = result.model, result.masses
+    for line in conversions(model):
+        say(line)
+    for base in model.bases:
+        x = ", ".join(f"{value:.6g}" for value in base.point)
+        say(f"base {base.name}: holds {', '.join(base.holds) or 'the body, to the ground'}; forces about [{x}]")
+    say(f"damping: {result.job.damping.words}; uncertainty: {result.job.uncertainty.words}")
+    main = [k for k in range(len(masses.frequencies)) if masses.share[k].max() > 0.02][:15]
+    print_table(
+        "Modes with the base held that move more than 2 % of a mass or inertia [%]",
+        ("mode>", "Hz>", "damping>", *(f"{name.partition(':')[2]}>" for name in masses.directions[:6])),
+        [
+            (
+                str(k + 1),
+                f"{masses.frequencies[k]:.5g}",
+                f"{masses.damping[k]:.4g}",
+                *(f"{100 * s:.2f}" for s in masses.share[k, :6]),
+            )
+            for k in main
+        ]
+        + [("", "sum of all", "", *(f"{100 * s:.2f}" for s in masses.cumulative[-1, :6]))],
+    )
+    runs: dict[tuple[str, str, str], list[tuple[Any, ...]]] = {}
+    for row in table_rows(result):
+        runs.setdefault((row[1], row[0], row[2]), []).append(row)
+    for (kind, test, direction), rows in runs.items():
+        extra = [
+            (name, c)
+            for name, c in (("3 sigma>", 10), ("quasi-static>", 11), ("swept>", 12), ("notched>", 13))
+            if any(r[c] is not None for r in rows)
+        ]
+        print_table(
+            f"{kind.capitalize()} {test}, {direction}",
+            ("output", "unit", f"{rows[0][7]}>", "at", "with uncertainty>", *(name for name, _ in extra)),
+            [
+                (
+                    r[3],
+                    r[5],
+                    f"{r[6]:.5g}",
+                    r[8],
+                    f"{r[9]:.5g}",
+                    *("" if r[c] is None else f"{r[c]:.5g}" for _, c in extra),
+                )
+                for r in rows[:SHOWN]
+            ],
+        )
+        if len(rows) > SHOWN:
+            say(f"... and {len(rows) - SHOWN} more outputs, in the files written")
+    for run in result.time:
+        for name, v, d in zip(run.inputs, run.velocity_left, run.displacement_left, strict=True):
+            say(
+                f"{run.kind} {run.test}, {name}: the base is left with {v:.5g} "
+                f"{model.units.length_symbol}/{model.units.time_symbol} and {d:.5g} {model.units.length_symbol}"
+            )
+        if run.synthesis is not None:
+            say(
+                f"{run.kind} {run.test}: spectrum reached within {run.synthesis.decibels.min():+.2f} to "
+                f"{run.synthesis.decibels.max():+.2f} dB of its target"
+            )
+    notches = [
+        (
+            f"{kind} {test}, {direction}",
+            f"{n.first:.5g} to {n.last:.5g}",
+            f"{n.deepest:.5g}",
+            f"{n.depth:.2f}",
+            n.reason,
+        )
+        for (kind, test, direction), run in result.notched.items()
+        for n in run.notches
+    ]
+    if notches:
+        print_table("Notches", ("run", "Hz", "deepest at>", "dB>", "reason"), notches)
+    for note in result.notes:
+        typer.echo(f"note: {note}", err=True)
