@@ -55,9 +55,12 @@ class System:
     events: Sequence[Named] = field(default=(), kw_only=True)  #: what a run does when a value passes a level
     fmus: Sequence[Named] = field(default=(), kw_only=True)  #: units of other programs, see `co_simulate`
     source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
+    data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of the signals it was made with
 
     def __post_init__(self) -> None:
-        for part in ("bodies", "joints", "forces", "couplers", "sensors", "inputs", "outputs", "events", "fmus"):
+        for part in (
+            "bodies", "joints", "forces", "couplers", "sensors", "inputs", "outputs", "events", "fmus", "data_files",
+        ):  # fmt: skip
             object.__setattr__(self, part, tuple(getattr(self, part)))
         among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
         object.__setattr__(self, "couplers", (*self.couplers, *among))
@@ -82,9 +85,9 @@ class System:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files it was read from: the system file and the modal files of its bodies."""
+        """The files it was read from: the system file, the modal files of its bodies, measured signals."""
         sources = [body.source for body in self.bodies if isinstance(body, FlexibleBody)]
-        return tuple(source for source in (self.source, *sources) if source)
+        return tuple(source for source in (self.source, *sources, *self.data_files) if source)
 
     def body(self, name: str) -> Body:
         """Return the body of that name; `ModelError` with the choices if there is none."""

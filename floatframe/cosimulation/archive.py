@@ -117,17 +117,19 @@ def write_fmu(
 
 
 def resource_files(system: Path, content: Mapping[str, Any]) -> dict[str, bytes]:
-    """Return the system file, with modal files beside it, and these files, by name."""
+    """Return the system file, with modal files and signals beside it, and these files, by name."""
     files: dict[str, bytes] = {}
     changed = json.loads(json.dumps(content))
     taken: dict[Path, str] = {}
-    for section in changed.get("bodies", {}).values():
-        if "file" in section:
-            source = (system.parent / section["file"]).resolve()
-            if source not in taken:
-                taken[source] = f"body_{len(taken) + 1}_{identifier_of(source.stem)}{source.suffix}"
-                files[taken[source]] = source.read_bytes()
-            section["file"] = taken[source]
+    for kind in ("bodies", "signals"):
+        for section in changed.get(kind, {}).values():
+            if "file" in section:
+                source = (system.parent / section["file"]).resolve()
+                if source not in taken:
+                    word = "body" if kind == "bodies" else "signal"
+                    taken[source] = f"{word}_{len(taken) + 1}_{identifier_of(source.stem)}{source.suffix}"
+                    files[taken[source]] = source.read_bytes()
+                section["file"] = taken[source]
     for table in ("fmu", "fmus", "cosimulation"):
         changed.pop(table, None)
     changed.setdefault("system", {}).setdefault("name", system.stem)

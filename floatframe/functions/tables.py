@@ -92,7 +92,7 @@ def quintic_table(t: Array, values: Array) -> TimeFunction:
     return between(np.append(begins, t[-1]), c, (values[0], rates[0]), (values[-1], rates[1]))
 
 
-def acceleration_table(t: Array, acceleration: Array, position: float = 0.0, velocity: float = 0.0) -> TimeFunction:
+def acceleration_table(t: Array, values: Array, position: float = 0.0, velocity: float = 0.0) -> TimeFunction:
     """Return the position whose acceleration is given by straight lines through a table, integrated exactly twice.
 
     With slope s of a piece and x the time from its beginning (0): a = a0 + s x, v = v0 + a0 x + s x²/2,
@@ -103,8 +103,8 @@ def acceleration_table(t: Array, acceleration: Array, position: float = 0.0, vel
     ----------
     t
         Times, rising, (n_t,) [s].
-    acceleration
-        Of the coordinate, (n_t,) [m/s² or rad/s²].
+    values
+        Acceleration of the coordinate, (n_t,) [m/s² or rad/s²].
     position, velocity
         Of the coordinate at t[0] [m, m/s or rad, rad/s].
 
@@ -113,7 +113,7 @@ def acceleration_table(t: Array, acceleration: Array, position: float = 0.0, vel
     ModelError
         If times do not rise, or numbers are not finite.
     """
-    t, a = checked_table("acceleration table", t, acceleration, 2)
+    t, a = checked_table("acceleration table", t, values, 2)
     u0, v0 = number("acceleration table: position", position), number("acceleration table: velocity", velocity)
     x = np.diff(t)
     slope = np.diff(a) / x

@@ -1,5 +1,6 @@
 """Tables of the system file for forces: [forces.NAME]."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 
 import numpy as np
@@ -8,6 +9,7 @@ from pydantic import Field, model_validator
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
 from fe_models.foundation.words import nearest
 from floatframe.bodies.markers import Place
+from floatframe.errors import ModelError
 from floatframe.forces import (
     FORCES,
     BodyLoad,
@@ -23,8 +25,9 @@ from floatframe.forces.bushing import DEFORMATIONS
 from floatframe.forces.sphere_contact import DISSIPATIONS
 from floatframe.system_file.coordinate_section import CoordinateSection, marker_of
 from floatframe.system_file.keys import Name, NotNegative, NotNegativeOrSix, NumberOrSix, Positive
-from floatframe.system_file.motion_section import MotionSection
+from floatframe.system_file.motion_section import MotionSection, require_quantity
 from floatframe.system_file.place_key import PlaceOnBody
+from floatframe.system_file.signal_section import SignalFunction
 
 __all__ = ["ForceSection", "force_of"]
 
@@ -53,6 +56,9 @@ KEYS_OF_FORCES = {
     ),
     "user-force": ("coordinates", "forces", "rates", "states", "parameters", "functions"),
 }  # fmt: skip
+
+
+Signals = Mapping[str, SignalFunction] | None  #: of a file, by name
 
 
 class ForceSection(Table):
@@ -156,7 +162,7 @@ def contact_of(name: str, section: ForceSection) -> SphereContact:
     return SphereContact(name, a, b, **{k: getattr(section, k) for k in keys if getattr(section, k) is not None})
 
 
-def user_force_of(name: str, section: ForceSection) -> UserForce:
+def user_force_of(name: str, section: ForceSection, signals: Signals = None) -> UserForce:
     """Return the user force of a table."""
     return UserForce(
         name,
@@ -165,14 +171,22 @@ def user_force_of(name: str, section: ForceSection) -> UserForce:
         section.rates or {},
         section.states or {},
         section.parameters or {},
-        {key: table.function() for key, table in (section.functions or {}).items()},
+        {key: table.function(signals) for key, table in (section.functions or {}).items()},
     )
 
 
-def force_of(name: str, section: ForceSection) -> Force:
-    """Return the force of a table."""
+def force_of(name: str, section: ForceSection, signals: Signals = None) -> Force:
+    """Return the force of a table; `signals`: those of the file by name."""
+    if section.motor is not None:
+        require_quantity(f"forces.{name}.motor", section.motor, signals, ("force", "moment", "number"))
+    laws = {"characteristic": section.characteristic} | {
+        f"characteristics.{key}": table for key, table in (section.characteristics or {}).items()
+    }
+    for key, law in laws.items():
+        if law is not None and any(True for _ in law.signals()):
+            raise ModelError(f"forces.{name}.{key}: a function of a deformation, expected no signal over time")
     functions = {
-        key: None if table is None else table.function()
+        key: None if table is None else table.function(signals)
         for key, table in (("amplitude", section.amplitude), ("characteristic", section.characteristic),
                            ("motor", section.motor))
     }  # fmt: skip
@@ -181,7 +195,7 @@ def force_of(name: str, section: ForceSection) -> Force:
     if section.type == "sphere-contact":
         return contact_of(name, section)
     if section.type == "user-force":
-        return user_force_of(name, section)
+        return user_force_of(name, section, signals)
     if section.type == "body-load":
         assert section.body is not None  # checked by the table
         assert section.load_case is not None

@@ -1,5 +1,6 @@
 """Tables of the system file for joints and couplers: [joints.NAME], [couplers.NAME]."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -13,8 +14,9 @@ from floatframe.joints import JOINTS, Joint
 from floatframe.joints.coordinate_coupler import CoordinateCoupler
 from floatframe.system_file.coordinate_section import CoordinateSection, marker_of
 from floatframe.system_file.keys import Name, Positive
-from floatframe.system_file.motion_section import MotionSection
+from floatframe.system_file.motion_section import MotionSection, require_quantity
 from floatframe.system_file.place_key import PlaceOnBody
+from floatframe.system_file.signal_section import SignalFunction
 
 __all__ = ["CouplerSection", "JointSection", "coupler_of", "joint_of"]
 
@@ -97,7 +99,7 @@ class CouplerSection(Table):
     )
 
 
-def joint_of(name: str, section: JointSection) -> Joint:
+def joint_of(name: str, section: JointSection, signals: Mapping[str, SignalFunction] | None = None) -> Joint:
     """Return the joint of a table; an end without marker lies where the other end is placed."""
     ends: list[Place] = []
     for body, place, triad in (
@@ -109,14 +111,20 @@ def joint_of(name: str, section: JointSection) -> Joint:
     for key in KEYS_OF_JOINTS[section.type]:
         value = getattr(section, key)
         if key == "motions":
-            options[key] = {coordinate: table.function() for coordinate, table in (value or {}).items()}
+            for coordinate, table in (value or {}).items():
+                expected = ("angle",) if coordinate.startswith("angle") else ("length",)
+                require_quantity(f"joints.{name}.motions.{coordinate}", table, signals, expected)
+            options[key] = {coordinate: table.function(signals) for coordinate, table in (value or {}).items()}
         elif value is not None:
             options[key] = value if isinstance(value, float | bool | list) else np.array(value)
     return JOINTS[section.type](name, ends[0], ends[1], **options)
 
 
-def coupler_of(name: str, section: CouplerSection) -> CoordinateCoupler:
+def coupler_of(
+    name: str, section: CouplerSection, signals: Mapping[str, SignalFunction] | None = None
+) -> CoordinateCoupler:
     """Return the coupler of a table."""
     constant = section.constant
     terms = [(term.found(), term.factor) for term in section.terms]
-    return CoordinateCoupler(name, terms, constant.function() if isinstance(constant, MotionSection) else constant)
+    return CoordinateCoupler(name, terms, constant.function(signals) if isinstance(constant, MotionSection) else
+    constant)

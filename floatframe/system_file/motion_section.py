@@ -1,6 +1,7 @@
 """Tables of the system file for functions of time: [joints.NAME.motions.COORDINATE]."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from inspect import signature
 from typing import Any
 
@@ -8,7 +9,8 @@ from pydantic import Field, model_validator
 
 from fe_models.foundation.toml_file import Table, choice
 from fe_models.foundation.words import nearest
-from floatframe.errors import ModelError
+from floatframe.errors import ModelError, SignalError
+from floatframe.functions.tables import INTERPOLATIONS, acceleration_table, interpolated
 from floatframe.functions.time_functions import (
     TimeFunction,
     constant,
@@ -17,11 +19,19 @@ from floatframe.functions.time_functions import (
     piecewise,
     polynomial_of_time,
     smooth_step,
-    table,
 )
-from floatframe.system_file.keys import Number, Numbers
+from floatframe.system_file.keys import Name, Number, Numbers
+from floatframe.system_file.signal_section import SignalFunction, function_named
 
-__all__ = ["TIME_FUNCTIONS", "MotionSection"]
+__all__ = ["TIME_FUNCTIONS", "MotionSection", "require_quantity"]
+
+
+def measured_signal(signal: TimeFunction, factor: float = 1.0) -> TimeFunction:
+    """Return a measured signal times a factor."""
+    pieces = signal.pieces.copy()
+    pieces[:, :7] *= factor
+    return replace(signal, pieces=pieces)
+
 
 TIME_FUNCTIONS: dict[str, Callable[..., TimeFunction]] = {
     "constant": constant,
@@ -29,7 +39,9 @@ TIME_FUNCTIONS: dict[str, Callable[..., TimeFunction]] = {
     "harmonic": harmonic,
     "smooth-step": smooth_step,
     "cycloidal-spin-up": cycloidal_spin_up,
-    "table": table,
+    "table": interpolated,
+    "acceleration-table": acceleration_table,
+    "signal": measured_signal,
     "piecewise": piecewise,
 }
 
@@ -53,6 +65,13 @@ class MotionSection(Table):
     duration: Number | None = Field(None, description="a number above 0, the duration of the spin-up")
     t: Numbers | None = Field(None, description="a list of rising times; piecewise: where each piece begins")
     values: Numbers | None = Field(None, description="a list of values, one for each time")
+    interpolation: choice("interpolation", lambda: tuple(INTERPOLATIONS)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(INTERPOLATIONS)}; default cubic"
+    )
+    position: Number | None = Field(None, description="a number, the position at the first time; default 0")
+    velocity: Number | None = Field(None, description="a number, the velocity at the first time; default 0")
+    signal: Name | None = Field(None, description="the name of a table [signals.NAME]")
+    factor: Number | None = Field(None, description="a number, by which the signal is multiplied; default 1")
     pieces: list["MotionSection"] | None = Field(
         None, description="a list of tables, a function of the time since its beginning for each time of t"
     )
@@ -66,16 +85,38 @@ class MotionSection(Table):
         for key, parameter in allowed.items():
             if parameter.default is parameter.empty and getattr(self, key) is None:
                 raise ValueError(f"{key}: missing; expected {type(self).model_fields[key].description}")
+        if any(True for _ in self.signals()):  # known when all of the file is
+            return self
         try:
             self.function()
         except ModelError as error:
             raise ValueError(str(error)) from None
         return self
 
-    def function(self) -> TimeFunction:
-        """Return the function of the table."""
+    def signals(self) -> Iterator[str]:
+        """Yield the names of the signals it is made of, those of its pieces too."""
+        if self.signal is not None:
+            yield self.signal
+        for piece in self.pieces or ():
+            yield from piece.signals()
+
+    def function(self, signals: Mapping[str, SignalFunction] | None = None) -> TimeFunction:
+        """Return the function of the table; `signals`: those of the file by name."""
         make = TIME_FUNCTIONS[self.type]
         given: dict[str, Any] = {key: getattr(self, key) for key in signature(make).parameters}
         if self.pieces is not None:
-            given["pieces"] = [piece.function() for piece in self.pieces]
+            given["pieces"] = [piece.function(signals) for piece in self.pieces]
+        if self.signal is not None:
+            given["signal"] = function_named(self.signal, signals or {}).function
         return make(**{key: value for key, value in given.items() if value is not None})
+
+
+def require_quantity(
+    where: str, section: MotionSection, signals: Mapping[str, SignalFunction] | None, expected: tuple[str, ...]
+) -> None:
+    """Raise `SignalError` if a table takes a signal that measures something else than is expected there."""
+    for name in section.signals():
+        found = function_named(name, signals or {}).quantity
+        if found not in expected:
+            hint = "; integrate = true makes a motion of an acceleration" if found.endswith("acceleration") else ""
+            raise SignalError(f"{where}: expected {' or '.join(expected)}, but signal {name!r} is: {found}{hint}")

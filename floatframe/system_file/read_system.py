@@ -42,6 +42,7 @@ from floatframe.system_file.joints import CouplerSection, JointSection, coupler_
 from floatframe.system_file.keys import Name
 from floatframe.system_file.run_section import RunOptions, RunSection
 from floatframe.system_file.sensor_section import SensorSection
+from floatframe.system_file.signal_section import SignalSection, signal_functions
 from floatframe.system_file.unit_hints import unit_hints
 
 __all__ = ["RunOptions", "read_system"]
@@ -70,6 +71,7 @@ class SystemFile(Table):
     joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")
     couplers: dict[str, CouplerSection] = Field({}, description="tables [couplers.NAME]")
     forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
+    signals: dict[str, SignalSection] = Field({}, description="tables [signals.NAME]")
     sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
     inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
     outputs: dict[str, OutputSection] = Field({}, description="tables [outputs.NAME]")
@@ -124,9 +126,10 @@ def read_system(
     try:
         units = unit_system(data.system.units)
         bodies = [body_of(name, section, files, units) for name, section in data.bodies.items()]
-        joints = [joint_of(name, section) for name, section in data.joints.items()]
-        couplers = [coupler_of(name, section) for name, section in data.couplers.items()]
-        forces: list[Force] = [force_of(name, section) for name, section in data.forces.items()]
+        signals = signal_functions(data.signals, units)
+        joints = [joint_of(name, section, signals) for name, section in data.joints.items()]
+        couplers = [coupler_of(name, section, signals) for name, section in data.couplers.items()]
+        forces: list[Force] = [force_of(name, section, signals) for name, section in data.forces.items()]
         if any(data.system.gravity):
             forces.insert(0, Gravity(np.array(data.system.gravity)))
         name = data.system.name or path.stem
@@ -138,9 +141,13 @@ def read_system(
             events=[section.event(key) for key, section in data.events.items()],
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
             source=str(path.resolve()),
+            data_files=tuple(dict.fromkeys(str(section.file) for section in data.signals.values())),
         )  # fmt: skip
         _ = compiled_system(system)  # markers and interfaces are looked up here
         require_events(system)
+        for signal in signals.values():
+            if signal.notes:
+                log.warning("%s: signal %s: %s", path, signal.name, "; ".join(signal.notes))
         for hint in unit_hints(system):
             log.warning("%s: %s", path, hint)
     except (FloatframeError, CmsError) as error:
