@@ -310,9 +310,7 @@ def accept_command(
 
     raise typer.Exit(
         run_accept(
-            AcceptRequest(
-                file, full, deck, program, tuple(density or ()), band, most_dofs, strict, tuple(output or ())
-            )
+            AcceptRequest(file, full, deck, program, tuple(density or ()), band, most_dofs, strict, tuple(output or ()))
         )
     )
 

@@ -8,7 +8,7 @@ FORMATS = (
     FileFormat(
         "external superelement (EXTSEOUT)", "Nastran", "reduced body", (".op4", ".pch", ".asm"), reads=True,
         key="nastran", tried="NX Nastran (sample of pyYeti)",
-        lost="3C, 4C, 5C unless masses are beside; rows of element forces and stresses; structural damping",
+        lost="3C, 4C, 5C unless masses are beside; forces of elements of unknown items; structural damping",
     ),
     FileFormat(
         "CMS superelement", "ANSYS", "reduced body", (".sub",), reads=True, key="matrices",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cms.importers.element_rows import ForeignRows, force_rows, motion_rows, stress_rows
 from cms.importers.superelement import RecoveryRows, Superelement
 from fe_models.foundation.arrays import Array
 from fe_models.importers.nastran_matrices.superelement import SCALAR, NastranSuperelement, read_superelement
@@ -43,9 +44,16 @@ def nastran_superelement(
         usable = (rows[:, 1] != SCALAR) & ~np.isin(rows[:, 0], raw.displacement.unplaced)
         recovery = RecoveryRows(rows[usable], raw.displacement.matrix[usable])
         numbers |= {int(number) for number in rows[usable, 0]}
-    for what, given in (("element forces (MEF1)", raw.forces), ("element stresses (MES1)", raw.stresses)):
-        if given is not None:
-            notes.append(f"{what}: {len(given.elements)} rows are not taken over")
+    tables: dict[str, ForeignRows] = {}
+    if recovery is not None:
+        tables["displacements"] = motion_rows(recovery.dofs, recovery.matrix)
+    if raw.forces is not None:
+        of_elements, lost = force_rows(raw.forces.elements, raw.forces.matrix)
+        notes += lost
+        if of_elements.names:
+            tables["element forces"] = of_elements
+    if raw.stresses is not None:
+        tables["element stresses"] = stress_rows(raw.stresses.elements, raw.stresses.matrix)
     kept = np.array(sorted(numbers), dtype=np.int64)
     n_loads = raw.loads.shape[1]
     return Superelement(
@@ -57,6 +65,7 @@ def nastran_superelement(
         node_numbers=kept,
         nodes=np.array([positions[int(number)] for number in kept]).reshape(-1, 3),
         recovery=recovery,
+        tables=tables,
         loads={f"load {k + 1}": raw.loads[:, k] for k in range(n_loads) if raw.loads[:, k].any()},
         program="Nastran",
         provenance={

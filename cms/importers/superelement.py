@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cms.errors import ForeignBodyError
+from cms.importers.element_rows import ForeignRows
 from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
 from fe_models.foundation.copies import FrozenMapping, frozen_copies
 from fe_models.importers.matrices.foreign_matrices import SCALAR, ForeignMatrices, pair_keys
@@ -52,6 +53,7 @@ class Superelement:
     nodes: Array  #: places in basic axes, (n_nodes, 3)
     D: Array | None = None  #: viscous damping, (n_dof, n_dof)
     recovery: RecoveryRows | None = None
+    tables: Mapping[str, ForeignRows] = field(default_factory=dict)  #: further rows by name: forces, stresses
     loads: Mapping[str, Array] = field(default_factory=dict)  #: name -> forces over the rows, (n_dof,)
     program: str = ""  #: that wrote the files
     provenance: Mapping[str, str] = field(default_factory=dict)  #: files, digests, what was assumed
@@ -83,6 +85,10 @@ class Superelement:
             if load.shape != (n,) or not np.isfinite(load).all():
                 raise ForeignBodyError(f"{where}: load {name!r}: expected {n} finite forces, got shape {load.shape}")
         put(self, "loads", FrozenMapping(loads))
+        put(self, "tables", FrozenMapping(dict(self.tables)))
+        for name, rows in self.tables.items():
+            if rows.matrix.shape[1] != n:
+                raise ForeignBodyError(f"{where}: {name}: expected rows over {n} dofs, got shape {rows.matrix.shape}")
         put(self, "provenance", FrozenMapping(dict(self.provenance)))
         placed = [self.dofs[self.dofs[:, 1] != SCALAR, 0]]
         if self.recovery is not None:

@@ -12,10 +12,14 @@ from cms.families.rigid_modes import geometric_rigid_modes
 from cms.importers.inertia import Inertia, completed, moments_of_masses
 from cms.importers.superelement import RecoveryRows, Superelement, listed
 from cms.mode_set import ModeSet
+from cms.recovery.interface_rows import PartOfTable
+from cms.recovery.load_columns import LoadColumns
+from cms.recovery.matrices import table_of
 from cms.reduced_basis.damping import Damping
 from cms.reduced_basis.finishing import finish
 from cms.reduced_basis.frames import Frame, TisserandFrame, frame_condition
 from cms.reduced_body.invariants import INERTIA_TERMS, Moments
+from cms.reduced_body.recovery_table import RecoveryTable
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody
 from cms.reduction import assembled
 from fe_models.body.fe_body import FEBody, Interface, Recovery
@@ -95,8 +99,29 @@ def body_of_superelement(element: Superelement, options: ImportOptions) -> Reduc
     return replace(
         reduced,
         node_ids=element.node_numbers,
+        recovery=tables_of(element, body, finished.Phi, reduced),
         provenance=dict(reduced.provenance) | record | {"node ids": f"numbers of {element.program or 'the files'}"},
     )
+
+
+def tables_of(element: Superelement, body: FEBody, Phi: Array, reduced: ReducedBody) -> dict[str, RecoveryTable]:
+    """Return the further rows of a superelement over z = (d, theta, q): all is in its span, nothing is truncated.
+
+    The files say what x is there, x = T x' with x' the dofs of the body (`static_part`).
+    """
+    tables: dict[str, RecoveryTable] = {}
+    if not element.tables:
+        return tables
+    frame = reduced.frame
+    Psi_B = geometric_rigid_modes(body, origin=frame.origin) @ np.kron(np.eye(2), frame.axes)
+    motion = static_part(element, f"superelement {element.name!r}") @ np.hstack([Psi_B, Phi])
+    none = LoadColumns((), np.zeros((0, 3)), np.zeros(0, dtype=bool))
+    for name, rows in element.tables.items():
+        dynamic = np.zeros((3, len(rows.names), motion.shape[1]))
+        dynamic[0] = rows.matrix @ motion
+        part = PartOfTable(rows.names, dynamic, np.zeros((len(rows.names), 0)))
+        tables[name] = table_of(reduced, name, [part], none, f"{rows.about}; nothing beyond what the files leave out")
+    return tables
 
 
 def fe_body_of_superelement(element: Superelement, options: ImportOptions) -> FEBody:

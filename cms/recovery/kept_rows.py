@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from cms.errors import RecoveryError
+from cms.errors import BodyError, RecoveryError
 from cms.frame_conversion import six_motions
 from cms.recovery.blocks import RowName
 from cms.recovery.interface_rows import PartOfTable
 from cms.recovery.load_columns import SPIN, LoadColumns
 from cms.recovery.request import OF_MOTION, Rows, motion_dimensions
 from cms.reduced_basis.stress_modes import turned_stress
+from cms.reduced_body.address import Address
 from cms.reduced_body.recovery_table import N_RIGID, spin_accelerations
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
@@ -82,8 +83,10 @@ def motion_rows(body: ReducedBody, rows: Rows, order: int, loads: LoadColumns) -
             continue
         for k in kept_nodes(body, at).tolist():
             rigid = rigid_motion_of_points(body.nodes[k][None], np.zeros(3))[0]
-            number = int(body.node_ids[k])
-            add("node", number, str(number), body.nodes[k], np.hstack([rigid, body.Phi[k]]))
+            motion, turn = np.hstack([rigid, body.Phi[k]]), rotation_of(body, k)
+            if turn is not None:
+                motion = np.vstack([motion, np.hstack([np.zeros((3, 3)), np.eye(3), turn])])
+            add("node", number_of(body, k), name_of(body, k), body.nodes[k], motion)
     whole = np.concatenate(values)
     if body.is_held:
         whole[:, :N_RIGID] = 0.0
@@ -102,15 +105,16 @@ def stress_rows(body: ReducedBody, rows: Rows) -> tuple[list[RowName], Array]:
             places = [("point", -1, points[k]) for k in found]
             stress = np.asarray(body.point_stress.modes)[found]
         else:
-            kept = kept_nodes(body, at)
+            kept = kept_nodes(body, at, skin=True)
             if body.stress is None:
                 raise RecoveryError(f"body {body.name!r}: recovery of stress: its file holds none of the nodes")
-            places = [("node", int(body.node_ids[k]), str(body.node_ids[k])) for k in kept]
             stress = np.asarray(body.stress)[kept]
-            silent = [place for place, own in zip(places, stress, strict=True) if not own.any()]
-            if silent:
+            shows = stress.any(axis=(1, 2))
+            kept, stress = kept[shows], stress[shows]
+            places = [("node", number_of(body, k), name_of(body, k)) for k in kept.tolist()]
+            if not len(kept):
                 raise RecoveryError(
-                    f"body {body.name!r}: node {silent[0][2]} shows no stress: it is a reference node or on the axis "
+                    f"body {body.name!r}: node {at} shows no stress: it is a reference node or on the axis "
                     "of a beam; take a node of the solid or shell, or a stress point"
                 )
         names += [RowName("stress", *place, word, STRESS) for place in places for word in STRESS_COMPONENTS]
@@ -119,19 +123,51 @@ def stress_rows(body: ReducedBody, rows: Rows) -> tuple[list[RowName], Array]:
     return names, np.hstack([np.zeros((len(values), N_RIGID)), values])
 
 
-def kept_nodes(body: ReducedBody, at: str | int) -> IntArray:
-    """Return the rows of a kept node by its number, or of the members of an interface."""
-    if isinstance(at, str):
-        found = next((each.members for each in body.interfaces if each.name == at), None)
-        choices = [each.name for each in body.interfaces]
-        if found is None:
-            raise RecoveryError(
-                f"body {body.name!r}: recovery: no node set or interface {quoted(at)}{nearest(at, choices)}"
-            )
-        return found
-    found = np.flatnonzero(body.node_ids == at)
-    if not len(found):
-        raise RecoveryError(
-            f"body {body.name!r}: recovery: node {at} is not among the {len(body.node_ids)} that the reduced body keeps"
-        )
-    return found[:1]
+def kept_nodes(body: ReducedBody, at: str | int, *, skin: bool = False) -> IntArray:
+    """Return the rows of a kept node by its number, of a set, of the members of an interface.
+
+    Parameters
+    ----------
+    skin
+        Whether the points of a skin that move with the nodes are among them.
+    """
+    where = f"body {body.name!r}: recovery"
+    interface = next((each for each in body.interfaces if each.name == at), None)
+    if interface is not None:
+        return interface.members
+    if isinstance(at, int) and not body.numbering.nodes.size:
+        found = np.flatnonzero(body.node_ids == at)
+        if not len(found):
+            raise RecoveryError(f"{where}: node {at} is not among the {len(body.node_ids)} that the reduced body keeps")
+        return found[:1]
+    is_set = isinstance(at, str) and at in body.numbering.set_names
+    if isinstance(at, str) and not is_set and at.rpartition(".")[0] not in body.numbering.instances:
+        choices = [*(each.name for each in body.interfaces), *body.numbering.set_names]
+        raise RecoveryError(f"{where}: no node set or interface {quoted(at)}{nearest(at, choices)}")
+    try:
+        address = Address(set=at) if isinstance(at, str) and is_set else Address(node=at)
+        rows = address.find(body, "recovery").rows
+        if skin and not is_set:
+            return body.numbering.rows_of_node(where, at)
+    except BodyError as error:
+        raise RecoveryError(str(error)) from error
+    return rows
+
+
+def name_of(body: ReducedBody, row: int) -> str:
+    """Return what a kept node is called; a point of a skin by its node and its count among those that are kept."""
+    numbering, name = body.numbering, body.node_name(row)
+    if numbering.on_skin.size and numbering.on_skin[row]:
+        same = np.flatnonzero((numbering.nodes == numbering.nodes[row]) & (numbering.on_skin == 1))
+        return f"{name} skin {int(np.searchsorted(same, row)) + 1}"
+    return name
+
+
+def number_of(body: ReducedBody, row: int) -> int:
+    """Return the user's number of a kept node, its index in the model where there is none."""
+    return int(body.numbering.nodes[row] if body.numbering.nodes.size else body.node_ids[row])
+
+
+def rotation_of(body: ReducedBody, row: int) -> Array | None:
+    """Return the rotation of a kept node in B, (3, n_q); None if the body does not know it."""
+    return None if body.kept is None else body.kept.of_node(row)

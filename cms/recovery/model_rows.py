@@ -130,7 +130,7 @@ def stress_block(body: FEBody, rows: Rows) -> Block:
                 f"body {body.name!r}: recovery of {rows.quantity}: the model knows no stress at nodes (bare matrices, "
                 "or beams without a skin); ask for forces in its elements"
             )
-        nodes += places.nodes(at).tolist()
+        nodes += shown(body, places, at, places.nodes(at, skin=True)).tolist()
     for node in nodes:
         number, word = places.number(node), places.word(node)
         names += [RowName(rows.quantity, "node", number, word, c, dimensions) for c in STRESS_COMPONENTS]
@@ -138,8 +138,6 @@ def stress_block(body: FEBody, rows: Rows) -> Block:
         word = places.point_names[point]
         names += [RowName(rows.quantity, "point", -1, word, c, dimensions) for c in STRESS_COMPONENTS]
     rows_of_nodes = np.array(nodes, dtype=np.int64)
-    if len(rows_of_nodes):
-        require_stress(body, places, rows_of_nodes)
     compliance = node_compliances(body, rows_of_nodes) if is_strain else None
     return Block(tuple(names), 0, stress_values(body, rows_of_nodes, points, compliance))
 
@@ -169,19 +167,26 @@ def stress_values(
     return values
 
 
-def require_stress(body: FEBody, places: "Places", nodes: IntArray) -> None:
-    """Raise `RecoveryError` if a node shows no stress whatever the body does: reference nodes, axes of beams."""
+def shown(body: FEBody, places: Places, at: str | int, nodes: IntArray) -> IntArray:
+    """Return those of some nodes that show stress when the body deforms: no reference nodes, no axes of beams.
+
+    Raises
+    ------
+    RecoveryError
+        If there is none.
+    """
     u = np.random.default_rng(0).standard_normal((body.n_dof, 1))
     assert body.element_model is not None
     on_mesh = np.zeros((len(body.nodes), 6, 1))
-    shown = body.element_model.nodal_stress(body.mesh_displacement(u), nodes=np.unique(nodes))
-    on_mesh[: len(shown)] = shown
-    silent = nodes[~on_mesh[nodes].any(axis=(1, 2))]
-    if len(silent):
+    stress = body.element_model.nodal_stress(body.mesh_displacement(u), nodes=np.unique(nodes))
+    on_mesh[: len(stress)] = stress
+    found = nodes[on_mesh[nodes].any(axis=(1, 2))]
+    if not len(found):
         raise RecoveryError(
-            f"body {body.name!r}: node {places.word(int(silent[0]))} shows no stress: it is a reference node or on the "
-            "axis of a beam; take a node of the solid or shell, a stress point, or the forces in the beams"
+            f"body {body.name!r}: node {places.word(int(nodes[0]))} ({at!r}) shows no stress: it is a reference node "
+            "or on the axis of a beam; take a node of the solid or shell, a stress point, or the forces in the beams"
         )
+    return found
 
 
 # Elements -------------------------------------------------------------------------------------------------------------
@@ -196,10 +201,9 @@ def element_block(body: FEBody, rows: Rows) -> Block:
             f"body {body.name!r}: recovery of {rows.quantity}: it has no such elements"
             + (f"; it has {', '.join(known)}" if known else ": solids and bare matrices have stress or nothing")
         )
-    chosen = [(group, elements_of(body, rows, group, groups)) for group in groups]
-    chosen = [(group, elements) for group, elements in chosen if len(elements)]
+    chosen = [(group, elements) for group, elements in elements_of(body, rows, groups) if len(elements)]
     names = [
-        RowName(rows.quantity, "element", k, f"{group.part} {k}".strip(), component, dimensions)
+        RowName(rows.quantity, "element", int(group.numbers[k]), group.names[k], component, dimensions)
         for group, elements in chosen
         for k in elements.tolist()
         for component, dimensions in zip(group.components, group.dimensions, strict=True)
@@ -207,35 +211,37 @@ def element_block(body: FEBody, rows: Rows) -> Block:
 
     def values(u: Array) -> Array:
         mesh = body.mesh_displacement(u)
-        return np.concatenate([group.forces(mesh, rows).reshape(-1, u.shape[1]) for group, rows in chosen])
+        return np.concatenate([group.forces(mesh, own).reshape(-1, u.shape[1]) for group, own in chosen])
 
     return Block(tuple(names), 0, values)
 
 
-def elements_of(body: FEBody, rows: Rows, group: ElementGroup, groups: list[ElementGroup]) -> IntArray:
-    """Return the elements of a group that were asked for: all, by number, by the name of the group."""
+def elements_of(body: FEBody, rows: Rows, groups: list[ElementGroup]) -> list[tuple[ElementGroup, IntArray]]:
+    """Return the elements of each group that were asked for, in their order: all, by name or number, by set or part.
+
+    Where elements have no numbers, a number is the index in the only group there is.
+    """
     if not rows.at:
-        return np.arange(group.count)
-    found: list[int] = []
+        return [(group, np.arange(group.count)) for group in groups]
+    found: list[tuple[ElementGroup, IntArray]] = []
     for at in rows.at:
-        if isinstance(at, str):
-            parts = [each.part for each in groups]
-            if at not in parts:
-                raise RecoveryError(
-                    f"body {body.name!r}: recovery of {rows.quantity}: no elements {quoted(at)}{nearest(at, parts)}"
-                )
-            if at == group.part:
-                found += range(group.count)
-            continue
-        if len(groups) > 1:
+        here = [(group, members) for group in groups if len(members := members_of(group, at, len(groups) == 1))]
+        if not here:
+            known = [name for group in groups for name in (*group.groups, group.part, *group.names) if name]
             raise RecoveryError(
-                f"body {body.name!r}: recovery of {rows.quantity}: element {at} may be of "
-                f"{', '.join(each.part for each in groups)}; name one of these, or leave at out for all"
+                f"body {body.name!r}: recovery of {rows.quantity}: no element, set or part {quoted(str(at))}"
+                f"{nearest(str(at), list(dict.fromkeys(known)))}"
             )
-        if not 0 <= at < group.count:
-            raise RecoveryError(
-                f"body {body.name!r}: recovery of {rows.quantity}: no element {at}; they are numbered 0 to "
-                f"{group.count - 1}"
-            )
-        found.append(at)
-    return np.array(list(dict.fromkeys(found)), dtype=np.int64)
+        found += here
+    return found
+
+
+def members_of(group: ElementGroup, at: str | int, is_only: bool) -> IntArray:
+    """Return the elements of a group that a name or number means; none if it has none."""
+    if isinstance(at, str):
+        if at in group.groups:
+            return group.groups[at]
+        return np.arange(group.count) if at and at == group.part else np.flatnonzero(np.array(group.names) == at)
+    if (group.numbers >= 0).any():
+        return np.flatnonzero(group.numbers == at)
+    return np.array([at] if is_only and 0 <= at < group.count else [], dtype=np.int64)

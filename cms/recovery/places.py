@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cms.errors import RecoveryError
+from cms.errors import BodyError, RecoveryError
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.foundation.arrays import IntArray
 from fe_models.foundation.words import nearest, quoted
@@ -25,33 +25,66 @@ class Places:
         """Return the stress points of that name, or whose names begin with it as whole words."""
         return [k for k, name in enumerate(self.point_names) if name == at or name.startswith(f"{at} ")]
 
-    def nodes(self, at: str | int) -> IntArray:
-        """Return the rows of a node, of the members of an interface.
+    def nodes(self, at: str | int, *, skin: bool = False) -> IntArray:
+        """Return the rows of a node by its number, of a set, of the members of an interface.
+
+        Parameters
+        ----------
+        at
+            The user's number, or the index where the body knows no numbers; "INSTANCE.number"; a name.
+        skin
+            Whether the points of a skin that move with the nodes are among them.
 
         Raises
         ------
         RecoveryError
             If there is none.
         """
-        if isinstance(at, str):
-            interface = self.interface(at)
-            if interface is None:
-                choices = [each.name for each in self.body.interfaces]
+        numbering, where = self.body.numbering, f"body {self.body.name!r}: recovery"
+        if isinstance(at, int) and not numbering.nodes.size:
+            if not 0 <= at < len(self.body.nodes):
                 raise RecoveryError(
-                    f"body {self.body.name!r}: recovery: no node set or interface {quoted(at)}{nearest(at, choices)}"
+                    f"{where}: no node {at}; the body knows no numbers, and its indices are 0 to "
+                    f"{len(self.body.nodes) - 1}"
                 )
+            return np.array([at], dtype=np.int64)
+        try:
+            if isinstance(at, str):
+                return self._named(at, where, skin)
+            rows = numbering.rows_of_node(where, at)
+        except BodyError as error:
+            raise RecoveryError(str(error)) from error
+        return rows if skin else rows[:1]
+
+    def _named(self, at: str, where: str, skin: bool) -> IntArray:
+        """Return the rows of a set, an interface or "INSTANCE.number"."""
+        numbering = self.body.numbering
+        interface = self.interface(at)
+        if interface is not None:
             return interface.nodes
-        if not 0 <= at < len(self.body.nodes):
-            raise RecoveryError(
-                f"body {self.body.name!r}: recovery: no node {at}; they are counted from 0 to "
-                f"{len(self.body.nodes) - 1}"
-            )
-        return np.array([at], dtype=np.int64)
+        if at in numbering.set_names:
+            named = numbering.named_set(where, at)
+            rows = named.members if named.kind == "nodes" else np.unique(self.body.surface[named.members])
+            if skin or not numbering.on_skin.size:
+                return rows
+            own = rows[numbering.on_skin[rows] == 0]
+            return own if len(own) else rows
+        if at.rpartition(".")[0] in numbering.instances:
+            rows = numbering.rows_of_node(where, at)
+            return rows if skin else rows[:1]
+        choices = [*(each.name for each in self.body.interfaces), *numbering.set_names]
+        raise RecoveryError(f"{where}: no node set or interface {quoted(at)}{nearest(at, choices)}")
 
     def word(self, node: int) -> str:
-        """Return what a node is called."""
-        return str(node)
+        """Return what a node is called; a point of a skin by its node and its count among those there."""
+        numbering = self.body.numbering
+        name = numbering.node_name(node)
+        if numbering.on_skin.size and numbering.on_skin[node]:
+            same = np.flatnonzero((numbering.nodes == numbering.nodes[node]) & (numbering.on_skin == 1))
+            return f"{name} skin {int(np.searchsorted(same, node)) + 1}"
+        return name
 
     def number(self, node: int) -> int:
-        """Return the number of a node."""
-        return node
+        """Return the user's number of a node, its index where the body knows none."""
+        numbers = self.body.numbering.nodes
+        return int(numbers[node]) if numbers.size else node

@@ -4,7 +4,7 @@ Each group of elements of one kind says which numbers it has and how they are na
 stand side by side, in the order of the parts.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from fe_models.beams.attachments import spring_motion
 from fe_models.beams.model import BeamModel
 from fe_models.body.fe_body import FEBody
+from fe_models.body.numbering import NONE
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Dimensions
 from fe_models.shells.elements import ShellCells
@@ -41,39 +42,93 @@ class ElementGroup:
 
     quantity: str
     part: str  #: kind of cells, and the part of a body of several; "" where it need not be told
-    count: int  #: elements, numbered from 0
+    names: tuple[str, ...]  #: what the user calls each element; "part 1 3", its index, where it has no number
+    numbers: IntArray  #: of the user, -1 for none, (n,)
+    groups: Mapping[str, IntArray]  #: sets of the user -> elements that are in them
     components: tuple[str, ...]
     dimensions: tuple[Dimensions, ...]  #: of each component
     forces: Callable[[Array, IntArray], Array]  #: of columns over the mesh dofs and elements, (n, n_components, k)
 
+    @property
+    def count(self) -> int:
+        """Number of elements."""
+        return len(self.names)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where the model of a part stands in the body."""
+
+    part: str
+    rows: slice  #: of the mesh dofs
+    first_node: int
+    n_nodes: int
+
 
 def element_groups(body: FEBody) -> tuple[ElementGroup, ...]:
     """Return the groups of elements of a body whose forces are known; none of bare matrices and solids."""
-    model = body.element_model
-    return () if model is None else tuple(_groups(model, "", slice(None)))
+    if body.element_model is None:
+        return ()
+    return tuple(_groups(body, body.element_model, _Place("", slice(None), 0, len(body.nodes))))
 
 
-def _groups(model: object, part: str, rows: slice) -> Iterator[ElementGroup]:
-    """Yield the groups of a model whose dofs are these rows of the mesh dofs of the body."""
+def _groups(body: FEBody, model: object, at: _Place) -> Iterator[ElementGroup]:
+    """Yield the groups of a model."""
     if isinstance(model, WeldedModel):
-        for k, (each, own) in enumerate(zip(model.parts, mesh_rows(model.n_mesh_dof), strict=True)):
-            yield from _groups(each, f"part {k + 1}", own)
+        first = np.cumsum([0, *model.n_nodes]).tolist()
+        for k, (each, rows) in enumerate(zip(model.parts, mesh_rows(model.n_mesh_dof), strict=True)):
+            yield from _groups(body, each, _Place(f"part {k + 1}", rows, first[k], model.n_nodes[k]))
     elif isinstance(model, StiffenedModel):
-        yield from _groups(model.shell, part, slice(0, model.shell.n_mesh_dof))
-        yield from _groups(model.frame, part, slice(model.shell.n_mesh_dof, model.n_mesh_dof))
+        shell, frame = model.shell.n_mesh_dof, model.n_mesh_dof
+        n = model.shell.n_nodes + len(model.shell.skin.points)
+        yield from _groups(body, model.shell, _Place(at.part, slice(0, shell), at.first_node, n))
+        yield from _groups(body, model.frame, _Place(at.part, slice(shell, frame), at.first_node + n, at.n_nodes - n))
     elif isinstance(model, ShellModel):
-        for group in model.groups:
-            name = " ".join(word for word in (part, group.kind) if word)
-            dimensions = (PER_LENGTH,) * 3 + (BENDING,) * 3 + (PER_LENGTH,) * 2
-            forces = _shell_resultants(group, rows)
-            yield ElementGroup("shell resultant", name, len(group.cells), SHELL, dimensions, forces)
+        dimensions = (PER_LENGTH,) * 3 + (BENDING,) * 3 + (PER_LENGTH,) * 2
+        triangles = _triangles(body, at, model.skin.cell_of, sum(len(group.cells) for group in model.groups))
+        cells = np.cumsum([0, *(len(group.cells) for group in model.groups)]).tolist()
+        for group, begin, end in zip(model.groups, cells[:-1], cells[1:], strict=True):
+            part = " ".join(word for word in (at.part, group.kind) if word)
+            named = _named(body, part, triangles[begin:end])
+            forces = _shell_resultants(group, at.rows)
+            yield ElementGroup("shell resultant", part, *named, SHELL, dimensions, forces)
     elif isinstance(model, BeamModel):
+        six = (FORCE,) * 3 + (MOMENT,) * 3
         if len(model.dofs):
-            forces = _section_forces(model, rows)
-            yield ElementGroup("beam force", part, len(model.dofs), BEAM, ((FORCE,) * 3 + (MOMENT,) * 3) * 2, forces)
+            named = _named(body, at.part, _triangles(body, at, model.skin.line_of, len(model.dofs)))
+            yield ElementGroup("beam force", at.part, *named, BEAM, six * 2, _section_forces(model, at.rows))
         if model.springs:
-            forces = _spring_forces(model, rows)
-            yield ElementGroup("spring force", part, len(model.springs), SPRING, (FORCE,) * 3 + (MOMENT,) * 3, forces)
+            named = _named(body, at.part, np.full(len(model.springs), NONE))
+            yield ElementGroup("spring force", at.part, *named, SPRING, six, _spring_forces(model, at.rows))
+
+
+def _triangles(body: FEBody, at: _Place, element_of: IntArray, count: int) -> IntArray:
+    """Return a triangle of the surface of the body for each element of a part, -1 where it made none, (count,)."""
+    found = np.full(count, NONE)
+    inside = (body.surface >= at.first_node) & (body.surface < at.first_node + at.n_nodes)
+    own = np.flatnonzero(inside.all(axis=1))
+    if len(own) == len(element_of):  # else another part shares its nodes, and which is whose is not known
+        found[element_of[::-1]] = own[::-1]
+    return found
+
+
+def _named(body: FEBody, part: str, triangles: IntArray) -> tuple[tuple[str, ...], IntArray, Mapping[str, IntArray]]:
+    """Return names, numbers and sets of elements by the triangle of each."""
+    numbering = body.numbering
+    numbers = np.full(len(triangles), NONE)
+    has = triangles != NONE
+    if numbering.elements.size:
+        numbers[has] = numbering.elements[triangles[has]]
+    names = tuple(
+        f"{part} {k}".strip() if number == NONE else numbering.element_name(int(triangle))
+        for k, (number, triangle) in enumerate(zip(numbers, triangles, strict=True))
+    )
+    sets = {
+        each.name: np.flatnonzero(has & np.isin(triangles, each.members))
+        for each in numbering.sets
+        if each.kind == "elements"
+    }
+    return names, numbers, {name: members for name, members in sets.items() if len(members)}
 
 
 def _section_forces(model: BeamModel, rows: slice) -> Callable[[Array, IntArray], Array]:

@@ -219,7 +219,7 @@ def test_net_forces_of_a_rigid_acceleration_are_mass_times_acceleration():
     assert_allclose(y[table.rows("net force")[:6]], expected, rtol=0, atol=1e-11 * np.abs(expected).max())
     for k, node in enumerate(NODES):
         c = full().nodes[node] - center
-        rows = table.rows(f"node {node} acceleration")
+        rows = table.rows(f"node index {node} acceleration")
         assert_allclose(y[rows], a + np.cross(alpha, c), rtol=1e-12, atol=1e-12)
         assert len(rows) == 3, k
 
@@ -234,7 +234,7 @@ def test_a_spinning_body_has_the_acceleration_towards_its_axis():
     y = table.values(np.zeros(6 + body.n_q), p=p)
     c = full().nodes[NODES[0]] - body.frame.origin
     expected = np.cross(omega, np.cross(omega, c))
-    assert_allclose(y[table.rows(f"node {NODES[0]} acceleration")], expected, rtol=1e-12, atol=1e-12)
+    assert_allclose(y[table.rows(f"node index {NODES[0]} acceleration")], expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("frame", ["tisserand", "turned", "nodal"])
@@ -258,7 +258,7 @@ def test_loads_of_the_body_are_those_of_the_model(frame):
 def test_strain_is_the_compliance_times_stress():
     table = reduced("craig-bampton").recovery["all"]
     node = NODES[0]
-    stress, strain = (table.dynamic[0][table.rows(f"node {node} {what}")] for what in ("stress", "strain"))
+    stress, strain = (table.dynamic[0][table.rows(f"node index {node} {what}")] for what in ("stress", "strain"))
     E, nu = STEEL.E, STEEL.nu
     for k in range(3):
         others = stress.sum(axis=0) - stress[k] - stress[3:].sum(axis=0)
