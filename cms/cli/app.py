@@ -388,6 +388,29 @@ def compare_command(
     )
 
 
+@app.command("correlate")
+@guarded
+def correlate_command(
+    file: Annotated[Path, typer.Argument(help="Correlation file (TOML), see docs/test_and_model.md.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
+    updated_job: Annotated[
+        Path | None, typer.Option(help="Job with the updated values to write, beside the job.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the numbers as JSON, for other programs.")] = False,
+) -> None:
+    """Compare measured modes with a model: points, pairs, MAC, COMAC, orthogonality; update the job to them.
+
+    Updates where the file has a table [update]. Without -o the page stands beside the file: rod_test.html.
+
+    Example: cms correlate rod_test.toml
+
+    Example: cms correlate rod_test.toml -o report.html --updated-job rod_updated.toml
+    """
+    from cms.cli.verdicts.correlate import CorrelateRequest, run_correlate
+
+    run_correlate(CorrelateRequest(file, output, updated_job, json))
+
+
 @app.command("split")
 @guarded
 def split_command(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fe_models.foundation.toml_file import read_toml
+from fe_models.foundation.toml_file import first_key, read_toml
 from fe_models.foundation.words import nearest, quoted
 from floatframe.cosimulation.unit import Unit
 from floatframe.errors import FloatframeError, ModelError, SystemFileError
@@ -21,7 +21,6 @@ from floatframe.results.sensors import (
     VonMisesSensor,
 )
 from floatframe.system import System
-from floatframe.system_file.changed_content import first_key
 from floatframe.system_file.read_system import read_system
 from floatframe.system_file.run_section import RunOptions, required_run
 

@@ -136,9 +136,8 @@ def read_system_keys(study: Study) -> None:
     """Raise `SystemFileError` if a key path leads nowhere."""
     from pathlib import Path
 
-    from fe_models.foundation.toml_file import read_toml
+    from fe_models.foundation.toml_file import changed, read_toml
     from floatframe.errors import SystemFileError
-    from floatframe.system_file.changed_content import changed
 
     content = read_toml(Path(study.system), SystemFileError)
     for parameter in study.parameters:

@@ -20,7 +20,7 @@ from pydantic import Field, model_validator
 
 from cms.errors import CmsError
 from cms.reduced_body.reduced_body import ReducedBody
-from fe_models.foundation.toml_file import Table, Vector3, choice, read_toml, validated
+from fe_models.foundation.toml_file import Table, Vector3, changed, choice, read_toml, validated
 from fe_models.foundation.units import UNIT_SYSTEMS, unit_system
 from fe_models.foundation.words import nearest
 from floatframe.bodies.ground import GROUND
@@ -33,7 +33,6 @@ from floatframe.forces import (
 from floatframe.motion.events import require_events
 from floatframe.system import REDUNDANT, System
 from floatframe.system_file.bodies import BodySection, body_of
-from floatframe.system_file.changed_content import changed
 from floatframe.system_file.channel_section import InputSection, OutputSection
 from floatframe.system_file.cosimulation_section import CosimulationSection, FmuSection, ForeignSection
 from floatframe.system_file.event_section import EventSection

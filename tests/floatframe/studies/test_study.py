@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
+from fe_models.foundation.toml_file import changed
 from floatframe import GeneralizedAlpha, SystemFileError, integrate
 from floatframe.cli.app import app
 from floatframe.results.sensors import measured
 from floatframe.studies.study import run_study
 from floatframe.studies.study_file import read_study
-from floatframe.system_file.changed_content import changed
 from floatframe.system_file.read_system import read_system
 from tests.floatframe.cli.test_analyses import PENDULUM
 

@@ -1,0 +1,131 @@
+"""The command `cms correlate`: measured modes beside those of a model, and the job updated to them."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from cms.cli.console import output_path, print_table, say, stages
+
+if TYPE_CHECKING:
+    from cms.correlation.correlate import Correlation
+    from cms.correlation.update import Parameter, Update
+    from fe_models.foundation.arrays import Array
+
+__all__ = ["CorrelateRequest", "run_correlate"]
+
+
+@dataclass(frozen=True)
+class CorrelateRequest:
+    """The arguments of the command."""
+
+    file: Path
+    output: Path | None
+    updated: Path | None
+    as_json: bool
+
+
+def run_correlate(request: CorrelateRequest) -> None:
+    """Compare, update where the file says so, print pairs and parameters, write page and updated job."""
+    from cms.correlation.correlation_file import read_correlation, run_correlation
+    from cms.correlation.errors import CorrelationError
+    from cms.correlation.report import correlation_page
+    from fe_models.foundation.paths import replace_files
+
+    asked = read_correlation(request.file)
+    inputs = [path for path in (request.file, asked.test.file, asked.model.job, asked.model.body) if path is not None]
+    page = None
+    if request.output is not None or not request.as_json:
+        page = output_path(
+            request.output, request.file.with_suffix(".html"), CorrelationError, overwrite_of=inputs, needs_file=True
+        )
+        if page.suffix.lower() != ".html":
+            raise CorrelationError(f"--output {page}: expected .html")
+    job = None
+    if request.updated is not None:
+        if asked.update is None or asked.model.job is None:
+            raise CorrelationError("--updated-job: the file has no table [update]")
+        job = output_path(request.updated, "", CorrelationError, overwrite_of=inputs, needs_file=True)
+        if job.resolve().parent != asked.model.job.resolve().parent:
+            raise CorrelationError(
+                f"--updated-job {job}: expected a file beside {asked.model.job}, whose paths are relative to its folder"
+            )
+    with stages() as clock:
+        result = run_correlation(asked, clock)
+    contents = {}
+    if page is not None:
+        contents[page] = correlation_page(result).encode()
+    if job is not None and result.update is not None and asked.model.job is not None:
+        contents[job] = updated_text(asked.model.job, result.update.parameters, result.update.values).encode()
+    try:
+        replace_files(contents)
+    except OSError as error:
+        raise CorrelationError(f"cannot be written: {error.strerror or error}; check folder and space") from error
+    last = result.correlation if result.update is None else result.update.after
+    if request.as_json:
+        record = {"before" if result.update else "correlation": result.correlation.as_dict()}
+        if result.update is not None:
+            record |= {"after": last.as_dict(), "update": result.update.as_dict()}
+        record["damping"] = [  # type: ignore[assignment]
+            {"kind": fit.kind, "values": fit.values.tolist(), "spread": fit.spread.tolist(), "misfit": fit.misfit}
+            for fit in result.damping
+        ]
+        typer.echo(json.dumps(record, indent=2))
+        return
+    print_pairs(last, "updated model" if result.update else "model")
+    if result.update is not None:
+        print_parameters(result.update)
+    for fit in result.damping:
+        say(f"damping, {fit.kind}: {', '.join(f'{v:.4g}' for v in fit.values)}, misfit {100 * fit.misfit:.2g} %")
+    for path in contents:
+        say(f"wrote {path}")
+
+
+def print_pairs(c: "Correlation", what: str) -> None:
+    """Print one row a measured mode."""
+    partner = {pair.measured: (pair, off) for pair, off in zip(c.pairs, c.errors, strict=True)}
+    rows = []
+    for k, f in enumerate(c.measured.frequencies):
+        row = (str(k + 1), f"{f:.6g}", "none", "", "", f"{c.mac[k].max():.3f}")
+        if k in partner:
+            pair, off = partner[k]
+            computed = f"{c.model.frequencies[pair.computed]:.6g}"
+            row = (str(k + 1), f"{f:.6g}", str(pair.computed + 1), computed, f"{100 * off:+.2f}", f"{pair.mac:.3f}")
+        rows.append(row)
+    headings = ("measured>", "Hz>", "computed>", "Hz>", "error %>", "MAC>")
+    print_table(f"{c.model.name}: modes of the test and of the {what}", headings, rows)
+
+
+def print_parameters(update: "Update") -> None:
+    """Print the updated parameters with their spread."""
+    u = update
+    rows = [
+        (p.path, f"{p.start:.6g}", f"{v:.6g}", f"{100 * s:.2g}", f"{100 * told:.0f}")
+        for p, v, s, told in zip(u.parameters, u.values, u.spread, u.determined, strict=True)
+    ]
+    print_table("Updated", ("parameter", "start>", "updated>", "spread %>", "told by the test %>"), rows)
+    if not u.is_converged:
+        say("the update did not converge; look at the parameters that the test does not tell")
+
+
+def updated_text(path: Path, parameters: "tuple[Parameter, ...]", values: "Array") -> str:
+    """Return the text of a job with the updated values, its comments and order as they are."""
+    from cms.correlation.errors import CorrelationError
+    from fe_models.foundation.extras import extra_module
+    from fe_models.foundation.toml_file import first_key
+
+    tomlkit = extra_module("tomlkit", extra="modal-test", purpose="write the updated job with its comments")
+    document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
+    for parameter, value in zip(parameters, values, strict=True):
+        here, left = document, parameter.path
+        while True:
+            key, rest = first_key(here, left)
+            if rest is None:
+                break
+            if key is None:
+                raise CorrelationError(f"{path}: the key path {parameter.path!r} is not there")
+            here, left = here[key], rest
+        here[int(left) if isinstance(here, list) else left] = float(f"{value:.8g}")
+    return str(tomlkit.dumps(document))

@@ -1,0 +1,5 @@
+"""Test and model: measured modes beside those of a model, and the model updated to them."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
