@@ -1,12 +1,13 @@
-from .analyses import Channel as Channel
-from .analyses import CoordinateChannel as CoordinateChannel
+from .analyses import BaseMotion as BaseMotion
+from .analyses import Column as Column
+from .analyses import DriveMotion as DriveMotion
 from .analyses import Equilibrium as Equilibrium
 from .analyses import FrequencyResponse as FrequencyResponse
 from .analyses import InverseDynamics as InverseDynamics
 from .analyses import LinearSystem as LinearSystem
 from .analyses import Locus as Locus
 from .analyses import NamedStateSpace as NamedStateSpace
-from .analyses import StressChannel as StressChannel
+from .analyses import ParameterInput as ParameterInput
 from .analyses import SystemModes as SystemModes
 from .analyses import campbell as campbell
 from .analyses import drive_forces as drive_forces
@@ -104,7 +105,9 @@ from .results.place_motion import largest_von_mises as largest_von_mises
 from .results.place_motion import nodal_stress as nodal_stress
 from .results.place_motion import point_motion as point_motion
 from .results.sensors import AngleSensor as AngleSensor
+from .results.sensors import Channel as Channel
 from .results.sensors import ControlSensor as ControlSensor
+from .results.sensors import CoordinateChannel as CoordinateChannel
 from .results.sensors import CoordinateSensor as CoordinateSensor
 from .results.sensors import CouplerSensor as CouplerSensor
 from .results.sensors import DisplacementSensor as DisplacementSensor
@@ -115,6 +118,7 @@ from .results.sensors import MomentumSensor as MomentumSensor
 from .results.sensors import PlaceSensor as PlaceSensor
 from .results.sensors import ReactionSensor as ReactionSensor
 from .results.sensors import StrainGauge as StrainGauge
+from .results.sensors import StressChannel as StressChannel
 from .results.sensors import StressSensor as StressSensor
 from .results.sensors import VonMisesSensor as VonMisesSensor
 from .results.sensors import measured as measured

@@ -4,8 +4,9 @@ from floatframe.analyses.driven.driven_motion import frozen_bodies, quasi_static
 from floatframe.analyses.driven.inverse_dynamics import InverseDynamics, drive_forces, inverse_dynamics, with_motors
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium, steady_rotation
-from floatframe.analyses.linear.channels import Channel, CoordinateChannel, StressChannel
+from floatframe.analyses.linear.channels import Column
 from floatframe.analyses.linear.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies
+from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.parameter_study import Locus, campbell, root_locus
 from floatframe.analyses.linear.state_space import NamedStateSpace, named_state_space, write_state_space
@@ -14,15 +15,16 @@ from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.sweep import sweep
 
 __all__ = [
-    "Channel",
-    "CoordinateChannel",
+    "BaseMotion",
+    "Column",
+    "DriveMotion",
     "Equilibrium",
     "FrequencyResponse",
     "InverseDynamics",
     "LinearSystem",
     "Locus",
     "NamedStateSpace",
-    "StressChannel",
+    "ParameterInput",
     "SystemModes",
     "campbell",
     "drive_forces",

@@ -8,36 +8,145 @@ Small motions about a state in which every body turns with a constant angular ve
 
 with Omega = diag(omega~, omega~, 0) and Omega' = diag(omega~, 0, 0) for every body. The equations of motion become
 
-    M eta + C nu + K xi - Jᵀ dw = 0      bodies
-    G_x xi + G_v nu + V dw = 0           rows: V = 0 and G_v = 0 for what joints hold
+    M eta + C nu + K xi - Jᵀ dw = F s            bodies
+    G_x xi + G_v nu + V dw + E s + E' s' = 0     rows: V = 0 and G_v = 0 for what joints hold
 
 (derivation: docs/analyses.md, "Small motions about a steady one"). Rows with V, which say what a wrench is (a moment
-about a free axis, the tension of a spring), are solved for their wrench and put into K and C here.
+about a free axis, the tension of a spring), are solved for their wrench. With Z a basis of what they leave open,
+V_f Z = 0, and r the left side of the bodies without Jᵀ Z lam,
+
+    dw = -V_f⁺ (G_f xi + G_vf nu + E_f s + E'_f s') + Z lam,   Jᵀ Z lam = r,
+
+so that r follows from motions alone, and wrenches are linear in xi, nu, eta and s.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array
+from floatframe.errors import ModelError
 from floatframe.joints.rows import is_held
 from floatframe.kernels.model import Model
 from floatframe.kernels.work import Work
 from floatframe.rotations import tilde
 from floatframe.start.newton_equations import linearized
 
-__all__ = ["Tangents", "held_rows", "tangents", "turning_matrices"]
+__all__ = ["Inputs", "Tangents", "Wrenches", "held_rows", "settled", "tangents", "turning_matrices"]
+
+CANCELLED = 1e-10  #: of terms: what is left of their sum is rounding
+RANK = 1e-10  #: singular value, relative to the largest, below which one repeats others
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """How inputs s enter the equations."""
+
+    F: Array  #: generalised forces on the bodies, body axes, (n_u, n_s)
+    E: Array  #: in the rows, (n_w, n_s)
+    E_rate: Array  #: their rates in the rows, (n_w, n_s)
 
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """Matrices of small motions; unknowns in body axes, dense."""
+    """Matrices of small motions; unknowns in body axes, dense. Rows that say what a wrench is are eliminated."""
 
     M: Array  #: (n_u, n_u)
     C: Array  #: (n_u, n_u)
     K: Array  #: (n_u, n_u)
     G: Array  #: what the joints hold, (n_held, n_u)
+    J: Array  #: from wrenches to the forces on bodies, (n_w, n_u)
+    G_x: Array  #: all rows by positions, (n_w, n_u)
+    G_v: Array  #: by velocities, (n_w, n_u)
+    V: Array  #: by wrenches, (n_w, n_w)
+    holds: NDArray[np.bool_]  #: which rows hold something, (n_w,) bool
+    soft: Array  #: compliance of held rows that share their reactions, zero for all others, (n_w,)
+    by_rows: Array  #: V_f⁺, (n_w, n_free)
+
+    def body_forces(self, inputs: Inputs) -> tuple[Array, Array]:
+        """Return the forces of inputs and of their rates on the bodies, rows eliminated, (n_u, n_s) each."""
+        to_bodies = self.J.T @ self.by_rows
+        free = ~self.holds
+        return inputs.F - to_bodies @ inputs.E[free], -to_bodies @ inputs.E_rate[free]
+
+    def open_wrenches(self) -> tuple[Array, Array]:
+        """Return Z, (n_w, n_open), and (Jᵀ Z)⁺, (n_open, n_u); reactions that repeat others share by their compliance.
+
+        Raises
+        ------
+        ModelError
+            If reactions cannot be told apart, and the system does not say how they share.
+        """
+        V = self.V[~self.holds]
+        scale = np.maximum(np.abs(V).max(axis=0, initial=0.0), 1.0)
+        Z = la.null_space(V / scale, rcond=RANK) / scale[:, None] if len(V) else np.eye(len(self.V))
+        if not Z.shape[1]:
+            return Z, np.zeros((0, self.J.shape[1]))
+        Z /= np.linalg.norm(Z, axis=0)
+        JZ = self.J.T @ Z
+        size = np.linalg.norm(JZ, axis=0)
+        if (size <= RANK * size.max()).any():  # a multiplier that moves nothing
+            size = np.maximum(size, RANK * size.max())
+        left, values, right = la.svd(JZ / size, full_matrices=False)
+        known = values > RANK * values[0]
+        back = (right[known].T / values[known]) @ left[:, known].T / size[:, None]
+        if known.all():
+            return Z, back
+        repeated = la.null_space(JZ / size, rcond=RANK) / size[:, None]
+        sharing = (self.soft > 0) & self.holds
+        weights = self.V[sharing] / np.sqrt(self.soft[sharing])[:, None]  # sqrt(soft) times the multipliers
+        by_share = weights @ Z @ repeated
+        if np.linalg.matrix_rank(by_share) < repeated.shape[1]:
+            raise ModelError(
+                "reactions of constraints that repeat others cannot be told apart: take the constraints out, or give "
+                'the system redundant = "minimum-norm"'
+            )
+        return Z, back - repeated @ np.linalg.lstsq(by_share, weights @ Z @ back, rcond=None)[0]
+
+    def wrenches(self, inputs: Inputs, Omega: Array, Omega_t: Array) -> "Wrenches":
+        """Return dw as linear in xi, xi', xi'' and s, s'."""
+        free, D = ~self.holds, self.full(Omega, Omega_t)
+        force, force_rate = self.body_forces(inputs)
+        Z, back = self.open_wrenches()
+        Q = Z @ back
+        G_x, G_v = self.G_x[free], self.G_v[free]
+        E, E_rate = inputs.E[free], inputs.E_rate[free]
+        return Wrenches(
+            x=sum_of_products((Q, D[0]), (-self.by_rows, G_x), (-self.by_rows, G_v @ Omega)),
+            v=sum_of_products((Q, D[1]), (-self.by_rows, G_v)),
+            a=sum_of_products((Q, D[2])),
+            s=sum_of_products((-Q, force), (-self.by_rows, E)),
+            s_rate=sum_of_products((-Q, force_rate), (-self.by_rows, E_rate)),
+        )
+
+    def full(self, Omega: Array, Omega_t: Array) -> tuple[Array, Array, Array]:
+        """Return the matrices of xi, xi' and xi'' in the equations of the bodies."""
+        by_rate = self.C + self.M @ (Omega + Omega_t)
+        return self.K + self.C @ Omega + self.M @ Omega_t @ Omega, by_rate, self.M
+
+
+@dataclass(frozen=True, eq=False)
+class Wrenches:
+    """dw = x xi + v xi' + a xi'' + s s + s_rate s'."""
+
+    x: Array  #: (n_w, n_u)
+    v: Array  #: (n_w, n_u)
+    a: Array  #: (n_w, n_u)
+    s: Array  #: (n_w, n_s)
+    s_rate: Array  #: (n_w, n_s)
+
+
+def settled(result: Array, *products: tuple[Array, Array]) -> Array:
+    """Return a sum of products A B with zeros where what is left is rounding of what cancelled."""
+    size = sum(np.abs(A) @ np.abs(B) for A, B in products)
+    return np.where(np.abs(result) <= CANCELLED * size, 0.0, result)
+
+
+def sum_of_products(*products: tuple[Array, Array]) -> Array:
+    """Return Σ A B, settled."""
+    return settled(np.asarray(sum(A @ B for A, B in products)), *products)
 
 
 def held_rows(model: Model) -> np.ndarray:
@@ -53,14 +162,15 @@ def tangents(model: Model, work: Work) -> Tangents:
     K = la.block_diag(*by_position.H)
     C = la.block_diag(*by_both.H) - K
     G, G_v = by_position.G.toarray(), by_both.G.toarray() - by_position.G.toarray()
+    J, V = by_position.J.toarray(), by_position.V.toarray()
     holds = held_rows(model)
+    by_rows = np.linalg.pinv(V[~holds]) if (~holds).any() else np.zeros((len(V), 0))
     if (~holds).any():
         # dw = -V⁺ (G_x xi + G_v nu): reactions along what joints hold do no work in motions they allow
-        V = by_position.V.toarray()[~holds]
-        to_bodies = by_position.J.toarray().T @ np.linalg.pinv(V)
+        to_bodies = J.T @ by_rows
         K += to_bodies @ G[~holds]
         C += to_bodies @ G_v[~holds]
-    return Tangents(M, C, K, G[holds])
+    return Tangents(M, C, K, G[holds], J, G, G_v, V, holds, np.asarray(model.rows.soft), by_rows)
 
 
 def turning_matrices(model: Model, work: Work) -> tuple[Array, Array]:

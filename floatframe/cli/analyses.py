@@ -10,7 +10,7 @@ from cms.cli.console import guarded, output_path, print_table, say, stages, vect
 
 if TYPE_CHECKING:
     from floatframe.analyses import Equilibrium, LinearSystem, SystemModes
-    from floatframe.analyses.linear.channels import AnyChannel
+    from floatframe.analyses.linear.channels import AnyInput, AnyOutput
     from floatframe.pictures.body_colors import BodyColor
     from floatframe.system import System
 
@@ -245,8 +245,8 @@ def linearized(
     axis: str,
     center: str,
     *,
-    inputs: "tuple[AnyChannel, ...]" = (),
-    outputs: "tuple[AnyChannel, ...]" = (),
+    inputs: "tuple[AnyInput, ...]" = (),
+    outputs: "tuple[AnyOutput, ...]" = (),
 ) -> "LinearSystem":
     """Return the system linearised about rest, or about a steady rotation."""
     import numpy as np

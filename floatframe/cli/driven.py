@@ -138,8 +138,8 @@ def driven_motion(file: Path, output: Path | None, suffix: str, elastic: str) ->
 
 def coordinates_record(system: "System", motion: "Trajectory") -> dict[str, Any]:
     """Return ranges of all joint coordinates, and forces of the driven ones, in plain types."""
-    from floatframe.analyses.joint_rates import driven_coordinates
     from floatframe.results.joint_coordinates import joint_coordinates
+    from floatframe.small_motions.joint_rates import driven_coordinates
 
     driven = driven_coordinates(system)
     return {

@@ -11,7 +11,7 @@ from floatframe.cli.analyses import Axis, Center, Speed, SystemArgument, lineari
 
 if TYPE_CHECKING:
     from floatframe.analyses import LinearSystem
-    from floatframe.analyses.linear.channels import AnyChannel
+    from floatframe.analyses.linear.channels import AnyInput, AnyOutput
     from floatframe.analyses.linear.frequency_response import FrequencyResponse
     from floatframe.system import System
 
@@ -131,21 +131,22 @@ def response_command(
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
-def chosen(system: "System", texts: list[str], default: "tuple[AnyChannel, ...] | Any") -> "tuple[AnyChannel, ...]":
+def chosen(system: "System", texts: list[str], default: Any) -> Any:
     """Return the channels named on the command line, or those of the system."""
     return tuple(channel_of(system, text) for text in texts) if texts else tuple(default)
 
 
-def channel_of(system: "System", text: str) -> "AnyChannel":
+def channel_of(system: "System", text: str) -> "AnyInput | AnyOutput":
     """Return a channel by the name of an input or output, "joint.coordinate" or "body/interface:component"."""
     import numpy as np
 
     from fe_models.foundation.words import nearest
-    from floatframe.analyses.linear.channels import Channel, CoordinateChannel, channels_of
+    from floatframe.analyses.linear.channels import inputs_of, outputs_of
     from floatframe.bodies.markers import Marker
     from floatframe.errors import ModelError
+    from floatframe.results.sensors.channels import Channel, CoordinateChannel
 
-    named = {channel.name: channel for channel in channels_of((*system.outputs, *system.inputs))}
+    named = {channel.name: channel for channel in (*outputs_of(system.outputs), *inputs_of(system.inputs))}
     if text in named:
         return named[text]
     joint, _, coordinate = text.rpartition(".")

@@ -12,11 +12,12 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
-from floatframe.analyses.linear.channels import Channel, channel_units, channels_of
+from floatframe.analyses.linear.channels import channel_unit, inputs_of
 from floatframe.compiling.system import CompiledSystem
 from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad, JointForce, PointForce
 from floatframe.functions.time_functions import TimeFunction, constant
+from floatframe.results.sensors.channels import Channel, CoordinateChannel
 from floatframe.results.sensors.measurement import unit_words
 from floatframe.system import System
 
@@ -42,6 +43,11 @@ class HeldInput:
         return [(self.name, self.unit), (f"{self.name}.rate", per_time[0]), (f"{self.name}.acceleration", per_time[1])]
 
 
+def force_channels(system: System) -> list[Channel | CoordinateChannel]:
+    """Return the inputs of a system that are forces; its drives are inputs by themselves, bases have none in time."""
+    return [each for each in inputs_of(system.inputs) if isinstance(each, Channel | CoordinateChannel)]
+
+
 def is_constant(function: TimeFunction | float | None) -> bool:
     """Return whether a function of time is the same number always."""
     return not isinstance(function, TimeFunction) or (len(function.begins) == 1 and not function.pieces[0, 1:7].any())
@@ -59,8 +65,8 @@ def input_choices(system: System) -> dict[str, HeldInput]:
 
 def found_inputs(system: System) -> Iterator[HeldInput]:
     """Yield the inputs that forces, drives and channels of a system offer."""
-    for channel in channels_of(system.inputs):
-        unit = channel_units(system, channel)[1]
+    for channel in force_channels(system):
+        unit = channel_unit(system, channel)
         yield HeldInput(channel.name, unit, f"force or torque of the input {channel.name}", 0.0)
     for force in system.forces:
         if isinstance(force, PointForce | BodyLoad):
@@ -119,7 +125,7 @@ def with_held_inputs(system: System, names: Sequence[str] | None = None) -> tupl
         motions = dict(getattr(joint, "motions", {}))
         driven = {c: held[f"joints.{joint.name}.{c}"] for c in motions if f"joints.{joint.name}.{c}" in held}
         joints.append(replace(joint, motions=motions | driven) if driven else joint)  # type: ignore[arg-type]
-    for channel in channels_of(system.inputs):
+    for channel in force_channels(system):
         if channel.name in held:
             forces += channel_forces(channel, held[channel.name])
     return replace(system, forces=forces, joints=joints, inputs=()), tuple(taken)

@@ -12,16 +12,18 @@ from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose,
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.joints import Joint
-from floatframe.joints.rows import MOMENT, RelativePlace
+from floatframe.joints.rows import MOMENT, SPAN, TWIST_B, RelativePlace, RowCoordinate
 from floatframe.joints.sliding import SlidingJoint
 from floatframe.results.full_turns import through_turns
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
 from floatframe.results.sliding_place import sliding_place
 from floatframe.results.trajectory import Trajectory
 from floatframe.rotations import cross, dot
+from floatframe.small_motions.rows import Rows
+from floatframe.small_motions.small_motions import SmallMotions
 from floatframe.system import System
 
-__all__ = ["CoordinateMotion", "joint_coordinate", "joint_coordinates"]
+__all__ = ["CoordinateMotion", "force_rows", "joint_coordinate", "joint_coordinates"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +63,10 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
             f"joint_coordinate: joint {joint!r} has no coordinate {coordinate!r}"
             f"{nearest(coordinate, list(found.coordinates))}"
         )
-    placed = compiled_system(system).placed
-    ends = joint_markers(system, found, placed)
+    ends = joint_markers(system, found, compiled_system(system).placed)
     if isinstance(found, SlidingJoint):
         return sliding_motion(system, trajectory, found, ends[1])
-    (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q_of(system)) for end in ends)
-    rows = found.rows(A_a, A_b, r_b - r_a)
-    own = next(row.coordinate for row in rows if row.coordinate is not None and row.coordinate.name == coordinate)
+    own = row_coordinate(system, found, ends, coordinate)
     a, b = (end_motion(system, trajectory, end) for end in ends)
     place = RelativePlace(a.axes, b.axes, b.position - a.position)
     slip = b.velocity - a.velocity - cross(a.omega, place.d)
@@ -77,6 +76,38 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     if own.is_angle:
         value = through_turns(trajectory, f"coordinate {joint}.{coordinate}", angle_of(own, *ends), value, rate)
     return CoordinateMotion(a.t, value, rate, own.force(place, w), own.is_angle)
+
+
+def row_coordinate(system: System, joint: Joint, ends: tuple[MarkerData, MarkerData], name: str) -> RowCoordinate:
+    """Return a coordinate of a joint with its directions, as placed."""
+    (r_a, A_a), (r_b, A_b) = (marker_pose(end, compiled_system(system).placed, n_q_of(system)) for end in ends)
+    rows = joint.rows(A_a, A_b, r_b - r_a)
+    return next(row.coordinate for row in rows if row.coordinate is not None and row.coordinate.name == name)
+
+
+def force_rows(small: SmallMotions, joint: str, coordinate: str) -> Rows | None:
+    """Return the change of the force along a coordinate: -E · dw - w · dE, one row; None along a deformed line.
+
+    E turns with the marker that holds it, or with the line of the points of a distance.
+    """
+    found = next(each for each in small.system.joints if each.name == joint)
+    if isinstance(found, SlidingJoint):
+        return None
+    ends = joint_markers(small.system, found, small.compiled.placed)
+    own = row_coordinate(small.system, found, ends, coordinate)
+    a, b = (small.place(end, joint) for end in ends)
+    d = b.position - a.position
+    E = own.direction(RelativePlace(a.axes, b.axes, d))
+    first = small.wrench(joint).start
+    loads = [(slice(first + part, first + part + 3), factor) for part, factor in own.parts]
+    w = np.sum([factor * small.work.state.w[place] for place, factor in loads], axis=0)
+    rows = small.by_motion(np.zeros((1, small.n_x)))
+    for place, factor in loads:
+        rows = rows - small.by_wrench(place, factor).turned(E)
+    if own.kind == SPAN:
+        return rows - (b.moved - a.moved).turned((w - (w @ E) * E) / np.linalg.norm(d))
+    holder = b if own.kind == TWIST_B else a
+    return rows - holder.turned.turned(np.cross(E, w))
 
 
 def sliding_motion(

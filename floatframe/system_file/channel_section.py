@@ -5,14 +5,8 @@ from pydantic import Field, model_validator
 
 from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.toml_file import Table, Vector3, choice
-from floatframe.analyses.linear.channels import (
-    QUANTITIES,
-    RATES,
-    AnyChannel,
-    Channel,
-    CoordinateChannel,
-    StressChannel,
-)
+from floatframe.analyses.linear.channels import AnyOutput
+from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, StressChannel
 from floatframe.system_file.place_key import MeasuredPlace, marker_at
 
 __all__ = ["InputSection", "OutputSection"]
@@ -54,7 +48,7 @@ class InputSection(Table):
             raise ValueError("coordinate: missing; expected a coordinate of the joint")
         return self
 
-    def channel(self, name: str, rate: int = 0) -> AnyChannel:
+    def channel(self, name: str, rate: int = 0) -> Channel | CoordinateChannel:
         """Return the channel of the table."""
         if self.way() == "joint":
             return CoordinateChannel(name, str(self.joint), str(self.coordinate), rate)
@@ -82,7 +76,7 @@ class OutputSection(InputSection):
             raise ValueError("a stress needs body and position: where it is")
         return self
 
-    def output(self, name: str) -> AnyChannel:
+    def output(self, name: str) -> AnyOutput:
         """Return the channel of the table as an output."""
         if self.way() == "component":
             return StressChannel(name, str(self.body), str(self.component), np.array(self.position))

@@ -16,12 +16,12 @@ from typing import Any
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven.driven_motion import Elasticity, quasi_static_bodies
 from floatframe.analyses.driven.kinematics import kinematics
-from floatframe.analyses.joint_rates import driven_coordinates
 from floatframe.errors import ModelError
 from floatframe.forces import JointForce
 from floatframe.functions.time_functions import table
 from floatframe.results.joint_coordinates import CoordinateMotion, joint_coordinate
 from floatframe.results.trajectory import Trajectory
+from floatframe.small_motions.joint_rates import driven_coordinates
 from floatframe.state import State
 from floatframe.system import System
 

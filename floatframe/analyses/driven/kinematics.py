@@ -14,7 +14,6 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.driven.driven_freedoms import SingularityGuard, free_coordinates
 from floatframe.analyses.driven.driven_motion import ELASTICITY, Elasticity, Instant, frozen_bodies
-from floatframe.analyses.joint_rates import driven_coordinates
 from floatframe.analyses.observed_state import observed_state
 from floatframe.compiling.file_frames import rows_of_file
 from floatframe.compiling.system import CompiledSystem, compiled_system
@@ -27,6 +26,7 @@ from floatframe.motion.integration import head_of, joint_rows
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.results.writer import ResultsPlace, ResultsWriter
+from floatframe.small_motions.joint_rates import driven_coordinates
 from floatframe.start.constraint_words import conflict_of_drives
 from floatframe.start.freedoms import constraint_mobility
 from floatframe.start.initial import assembled, checked

@@ -1,198 +1,146 @@
-"""Channels: named scalars as inputs (a force, a torque) and outputs (a motion, a stress) of a linearised system."""
+"""Inputs and outputs of a linearised system: what acts on it, and which columns of sensors are observed."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import cast
+from dataclasses import dataclass
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.components import STRESS_COMPONENTS
-from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.analyses.joint_rates import coordinate_rows
-from floatframe.analyses.marker_jacobian import marker_jacobian
-from floatframe.bodies.marker_shape import node_shape
-from floatframe.bodies.markers import Marker, body_name
-from floatframe.checked_values import array_of_shape, unit_vector
-from floatframe.compiling.markers import MarkerData, find_body, find_marker
-from floatframe.compiling.system import CompiledSystem
+from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
-from floatframe.kernels.work import Work
-from floatframe.results.sensors.places import is_at_node, nearest_node
-from floatframe.results.sensors.stresses import flexible_body, modes_at
-from floatframe.rotations import euler_parameters
-from floatframe.state import State
+from floatframe.results.sensors.channels import VALUE, Channel, CoordinateChannel, StressChannel
+from floatframe.results.sensors.measurement import Measurement
+from floatframe.results.trajectory import Trajectory
+from floatframe.small_motions.rows import LinearColumns, Rows, joined
+from floatframe.small_motions.small_motions import SmallMotions
 from floatframe.system import Named, System
 
 __all__ = [
-    "AnyChannel",
-    "Channel",
-    "CoordinateChannel",
-    "StressChannel",
-    "channel_rows",
-    "channel_units",
-    "channels_of",
+    "AnyInput",
+    "AnyOutput",
+    "Column",
+    "Observed",
+    "channel_unit",
+    "inputs_of",
+    "observed",
+    "outputs_of",
+    "require_input",
 ]
 
-QUANTITIES = ("translation", "rotation")
-RATES = ("displacement", "velocity", "acceleration")
+
+class AnyOutput(Protocol):
+    """A sensor: what it measures over time, and what it sees of small motions."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return named columns over time."""
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the same columns by small motions, as far as they are linear."""
 
 
-@frozen_copies
+AnyInput = Channel | CoordinateChannel | DriveMotion | BaseMotion | ParameterInput
+
+
 @dataclass(frozen=True, eq=False)
-class Channel:
-    """The motion of a marker along a direction: displacement [m], or rotation [rad] about it.
+class Column:
+    """One column of a sensor as an output."""
 
-    On a flexible body the marker is an interface, or a position in mesh axes: the kept node nearest to it.
-
-    As an input it is the force [N], or moment [N m], that does work on it. With `relative_to`, the motion against
-    that marker, and the opposite force on it.
-    """
-
-    name: str
-    marker: Marker
-    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: ground axes, (3,)
-    quantity: str = "translation"  #: or "rotation"
-    relative_to: Marker | None = None
-    rate: int = 0  #: as an output: 0 displacement, 1 velocity, 2 acceleration, seen from the turning system
+    sensor: AnyOutput
+    column: str  #: such as "force x"
+    name: str = ""  #: default: "sensor.column"
 
     def __post_init__(self) -> None:
-        where = f"channel {self.name!r}"
-        object.__setattr__(self, "direction", unit_vector(f"{where}: direction", self.direction))
-        if self.quantity not in QUANTITIES:
-            raise ModelError(f"{where}: quantity: expected one of {', '.join(QUANTITIES)}, got {self.quantity!r}")
-        require_rate(where, self.rate)
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.sensor.name}.{self.column}")
 
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return the column over time."""
+        found = self.sensor.measure(system, trajectory)
+        self.require(list(found.columns))
+        return Measurement(self.name, found.t, {VALUE: found.columns[self.column]}, {VALUE: found.units[self.column]})
 
-@frozen_copies
-@dataclass(frozen=True, eq=False)
-class CoordinateChannel:
-    """A joint coordinate; as an input the force or torque along it."""
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the column by small motions; `ModelError` where it is not linear."""
+        found = self.sensor.linear(small)
+        self.require([*found.columns, *found.not_linear])
+        if self.column in found.not_linear:
+            raise ModelError(f"output {self.name!r} is not linear here: {found.not_linear[self.column]}")
+        return LinearColumns({VALUE: found.columns[self.column]}, {VALUE: found.units[self.column]}, {})
 
-    name: str
-    joint: str
-    coordinate: str
-    rate: int = 0  #: as an output: 0 value, 1 its rate, 2 its second rate
-
-    def __post_init__(self) -> None:
-        require_rate(f"channel {self.name!r}", self.rate)
-
-
-@frozen_copies
-@dataclass(frozen=True, eq=False)
-class StressChannel:
-    """A stress component at a node of a flexible body, in axes of its frame; an output only."""
-
-    name: str
-    body: str
-    component: str  #: xx, yy, zz, yz, xz or xy
-    position: Array  #: mesh axes; the kept node nearest to it is taken, (3,) [m]
-
-    def __post_init__(self) -> None:
-        where = f"channel {self.name!r}"
-        object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
-        if self.component not in STRESS_COMPONENTS:
+    def require(self, choices: list[str]) -> None:
+        """Raise `ModelError` with the nearest name if the sensor has no such column."""
+        if self.column not in choices:
             raise ModelError(
-                f"{where}: component: expected one of {', '.join(STRESS_COMPONENTS)}, got {self.component!r}"
+                f"sensor {self.sensor.name!r}: no column {quoted(self.column)}{nearest(self.column, choices)}"
             )
 
 
-AnyChannel = Channel | CoordinateChannel | StressChannel
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """Outputs by small motions."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    rows: Rows  #: a row an output
+    values: Array  #: in the steady motion, (n_outputs,)
+    left_out: dict[str, str]  #: columns that are not linear about it, and why
 
 
-def channels_of(carried: Iterable[Named]) -> tuple[AnyChannel, ...]:
-    """Return the inputs or outputs that a system carries as channels: it knows their names only."""
-    return cast(tuple[AnyChannel, ...], tuple(carried))
-
-
-def require_rate(where: str, rate: int) -> None:
-    """Raise `ModelError` unless a rate is 0, 1 or 2."""
-    if rate not in (0, 1, 2):
-        raise ModelError(f"{where}: rate: expected 0, 1 or 2 ({', '.join(RATES)}), got {rate!r}")
-
-
-def channel_rows(system: System, compiled: CompiledSystem, work: Work, channels: tuple[AnyChannel, ...]) -> Array:
-    """Return the derivative of the channels by the unknowns of small motions (body axes), (n_channels, n_u).
+def observed(small: SmallMotions, outputs: Iterable[AnyOutput]) -> Observed:
+    """Return the columns of outputs by small motions; a sensor of one column goes by its own name.
 
     Raises
     ------
     ModelError
-        With the nearest name, if a channel is at a place or joint that does not exist.
+        If an output names what does not exist, a column asked for is not linear, or two outputs have one name.
     """
-    rows = np.zeros((len(channels), int(compiled.model.bodies.u0[-1])))
-    for row, channel in zip(rows, channels, strict=True):
-        if isinstance(channel, Channel):
-            for sign, marker in ((1.0, channel.marker), (-1.0, channel.relative_to)):
-                if marker is not None:
-                    row += sign * marker_row(system, compiled, work, channel, marker)
-        elif isinstance(channel, CoordinateChannel):
-            row += coordinate_row(system, compiled, work, channel)
-        else:
-            row += stress_row(system, compiled, channel)
-    return rows
+    names: list[str] = []
+    units: list[str] = []
+    rows = [small.by_motion(np.zeros((0, small.n_x)))]
+    values: list[float] = []
+    left_out: dict[str, str] = {}
+    for output in outputs:
+        linear, now = output.linear(small), output.measure(small.system, small.now)
+        is_single = len(linear.columns) + len(linear.not_linear) == 1
+        named = {column: output.name if is_single else f"{output.name}.{column}" for column in linear.units}
+        left_out |= {named[column]: why for column, why in linear.not_linear.items()}
+        for column, row in linear.columns.items():
+            if named[column] in names:
+                raise ModelError(f"linearize: two outputs are called {named[column]!r}; give each its own name")
+            names.append(named[column])
+            units.append(linear.units[column])
+            rows.append(row)
+            values.append(float(now.columns[column][0]))
+    return Observed(tuple(names), tuple(units), joined(rows), np.array(values), left_out)
 
 
-def marker_row(system: System, compiled: CompiledSystem, work: Work, channel: Channel, marker: Marker) -> Array:
-    """Return the row of one marker of a channel, (n_u,)."""
-    row = np.zeros(int(compiled.model.bodies.u0[-1]))
-    data = channel_marker(system, channel, marker)
-    if data.body >= 0:
-        u = slice(int(compiled.model.bodies.u0[data.body]), int(compiled.model.bodies.u0[data.body + 1]))
-        first = 0 if channel.quantity == "translation" else 3
-        row[u] = channel.direction @ marker_jacobian(compiled, work, data)[first : first + 3]
-    return row
+def inputs_of(carried: Iterable[Named]) -> tuple[AnyInput, ...]:
+    """Return the inputs that a system carries: it knows their names only."""
+    return cast(tuple[AnyInput, ...], tuple(carried))
 
 
-def channel_marker(system: System, channel: Channel, marker: Marker) -> MarkerData:
-    """Return a marker of a channel; on a flexible body a position stands for the kept node nearest to it."""
-    where = f"channel {channel.name!r}: marker"
-    if not is_at_node(system, marker):
-        return find_marker(system, where, marker)
-    name = body_name(marker.body)
-    body = flexible_body(system, where, name)
-    if channel.quantity == "rotation":
-        raise ModelError(
-            f"channel {channel.name!r}: nodes keep no rotations: take an interface of flexible body {name!r}, "
-            f"{', '.join(interface.name for interface in body.reduced.interfaces)}, in place of a position"
-        )
-    node = nearest_node(body, np.asarray(marker.position))
-    return MarkerData(find_body(system, where, name), node_shape(body.moved, node, is_stiffened=body.is_stiffened))
+def outputs_of(carried: Iterable[Named]) -> tuple[AnyOutput, ...]:
+    """Return the outputs that a system carries: it knows their names only."""
+    return cast(tuple[AnyOutput, ...], tuple(carried))
 
 
-def coordinate_row(system: System, compiled: CompiledSystem, work: Work, channel: CoordinateChannel) -> Array:
-    """Return the row of a joint coordinate, (n_u,)."""
-    state = State(work.state.r, np.array([euler_parameters(R) for R in work.state.R]), work.state.q, work.state.u)
-    rows = coordinate_rows(system, compiled, work, state)
-    name = f"{channel.joint}.{channel.coordinate}"
-    if name not in rows:
-        raise ModelError(f"channel {channel.name!r}: no joint coordinate {quoted(name)}{nearest(name, list(rows))}")
-    return rows[name]
-
-
-def stress_row(system: System, compiled: CompiledSystem, channel: StressChannel) -> Array:
-    """Return the row of a stress component, (n_u,)."""
-    body = flexible_body(system, f"channel {channel.name}", channel.body)
-    row = np.zeros(int(compiled.model.bodies.u0[-1]))
-    i = compiled.body_names.index(channel.body)
-    modes = modes_at(body, channel.name, channel.position, None)
-    if body.mean_axes is not None:
-        modes = modes @ body.mean_axes.Z
-    row[int(compiled.model.bodies.u0[i]) + 6 : int(compiled.model.bodies.u0[i + 1])] = modes[
-        STRESS_COMPONENTS.index(channel.component)
-    ]
-    return row
-
-
-def channel_units(system: System, channel: AnyChannel) -> tuple[str, str]:
-    """Return the units of a channel as an output and as an input."""
-    units = system.units
+def require_input(channel: Any) -> None:
+    """Raise `ModelError` unless a channel can act."""
     if isinstance(channel, StressChannel):
-        return units.stress_symbol, "-"
-    if isinstance(channel, Channel):
-        is_angle = channel.quantity == "rotation"
-    else:
-        is_angle = channel.coordinate.startswith("angle")
-    per_time = ("", f"/{units.time_symbol}", f"/{units.time_symbol}²")[channel.rate]
-    force = f"{units.force_symbol} {units.length_symbol}" if is_angle else units.force_symbol
-    return ("rad" if is_angle else units.length_symbol) + per_time, force
+        raise ModelError(f"linearize: channel {channel.name!r} is a stress: expected a force or torque as an input")
+    if not isinstance(channel, AnyInput):
+        raise ModelError(
+            f"linearize: {getattr(channel, 'name', channel)!r} is no input: expected a Channel or CoordinateChannel (a "
+            "force along it), DriveMotion, BaseMotion or ParameterInput"
+        )
+
+
+def channel_unit(system: System, channel: AnyInput) -> str:
+    """Return the unit of an input."""
+    return channel.force_units(system.units)

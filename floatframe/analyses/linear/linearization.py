@@ -5,21 +5,37 @@ With N a basis of the motions the joints allow (G N = 0) and the matrices of `ta
     xi = N z,  nu = N z_dot + Omega N z
     M_z = Nᵀ M N,  C_z = Nᵀ (C N + M (Omega + Omega') N),  K_z = Nᵀ (K + C Omega + M Omega' Omega) N
 
-N does not change in time, because in body axes nothing does.
+N does not change in time, because in body axes nothing does. Inputs s enter as forces, or move what joints hold:
+G Y + E = 0, and xi = N z + Y s with the Y that needs no force besides, the quasi-static shape, where K_z is regular:
+
+    M_z z'' + C_z z' + K_z z = B s + B_rate s' + B_acceleration s''
+    y = L z + L_rate z' + L_acceleration z'' + D s + D_rate s' + D_acceleration s''
+
+Outputs see wrenches too, which follow from both (`system_matrices`).
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg as la
+from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, frozen
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium
-from floatframe.analyses.joint_rates import coordinate_rows
-from floatframe.analyses.linear.channels import AnyChannel, StressChannel, channel_rows, channel_units, channels_of
-from floatframe.analyses.system_matrices import tangents, turning_matrices
+from floatframe.analyses.linear.channels import (
+    AnyInput,
+    AnyOutput,
+    channel_unit,
+    inputs_of,
+    observed,
+    outputs_of,
+    require_input,
+)
+from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, base_columns, input_columns, input_rate
+from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.system_matrices import Inputs, Tangents, settled, tangents, turning_matrices
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
 from floatframe.compiling.system import compiled_system
@@ -27,6 +43,8 @@ from floatframe.errors import ModelError
 from floatframe.forces import UserForce
 from floatframe.kernels.work import new_work
 from floatframe.results.sensors.measurement import unit_words
+from floatframe.small_motions.joint_rates import coordinate_rows
+from floatframe.small_motions.small_motions import SmallMotions
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.system import System
 
@@ -36,6 +54,7 @@ if TYPE_CHECKING:
 __all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which one repeats others
+TINY = float(np.finfo(float).tiny)
 MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion has no mass
 
 
@@ -50,31 +69,56 @@ class NamedMotions:
     time_unit: str
 
 
+def empty() -> Array:
+    """Return what stands for a matrix of zeros until its size is known."""
+    return np.zeros((0, 0))
+
+
 @dataclass(frozen=True, eq=False)
 class LinearSystem:
-    """M z_ddot + C z_dot + K z = B s,  y = L d^r z/dt^r: small motions z about a steady one, inputs s, outputs y."""
+    """Small motions z about a steady one, inputs s and outputs y; n_s inputs.
+
+    M z'' + C z' + K z = B s + B_rate s' + B_acceleration s''
+    y = L z + L_rate z' + L_acceleration z'' + D s + D_rate s' + D_acceleration s''
+    """
 
     equilibrium: Equilibrium
     M: Array  #: (n_z, n_z)
     C: Array  #: with gyroscopic terms, (n_z, n_z)
     K: Array  #: with geometric, centrifugal and circulatory terms, (n_z, n_z)
-    B: Array  #: (n_z, n_inputs)
+    B: Array  #: (n_z, n_s)
     L: Array  #: (n_outputs, n_z)
-    N: Array  #: motions of the bodies (translation and rotation in body axes, modes), (n_u, n_z)
+    N: Array  #: motions of the bodies (translation and rotation in body axes, modes) by z, (n_u, n_z)
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     body_names: tuple[str, ...]
     body_masses: tuple[Array, ...]  #: mass matrix of each body, (6 + n_q, 6 + n_q)
-    rates: tuple[int, ...] = ()  #: r of each output: 0 displacement, 1 velocity, 2 acceleration; (): all 0
-    input_units: tuple[str, ...] = ()
+    B_rate: Array = field(default_factory=empty)  #: (n_z, n_s)
+    B_acceleration: Array = field(default_factory=empty)  #: (n_z, n_s)
+    L_rate: Array = field(default_factory=empty)  #: (n_outputs, n_z)
+    L_acceleration: Array = field(default_factory=empty)  #: (n_outputs, n_z)
+    D: Array = field(default_factory=empty)  #: (n_outputs, n_s)
+    D_rate: Array = field(default_factory=empty)  #: (n_outputs, n_s)
+    D_acceleration: Array = field(default_factory=empty)  #: (n_outputs, n_s)
+    Y: Array = field(default_factory=empty)  #: motions of the bodies by s beside those of z, (n_u, n_s)
+    input_rates: tuple[int, ...] = ()  #: r: the input is the r-th derivative of s; 0 for forces
+    input_units: tuple[str, ...] = ()  #: of the inputs
     output_units: tuple[str, ...] = ()
+    output_values: Array = field(default_factory=empty)  #: outputs in the steady motion, (n_outputs,)
+    left_out: Mapping[str, str] = field(default_factory=dict)  #: columns of outputs that are not linear here, and why
     motions: NamedMotions | None = None  #: of which states can be made, see `state_space`
 
     def __post_init__(self) -> None:
-        for name in ("M", "C", "K", "B", "L", "N"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        if not self.rates:
-            object.__setattr__(self, "rates", (0,) * len(self.outputs))
+        n_z, n_s, n_y = self.M.shape[0], len(self.inputs), len(self.outputs)
+        shapes: dict[str, tuple[int, ...]] = {"B": (n_z, n_s), "L": (n_y, n_z), "D": (n_y, n_s)}
+        shapes |= {"Y": (self.N.shape[0], n_s), "output_values": (n_y,)}
+        for name in ("M", "C", "K", "N", *COEFFICIENTS, "Y", "output_values"):
+            array = np.asarray(getattr(self, name), dtype=float)
+            if not array.size and name not in ("M", "C", "K", "N"):
+                array = np.zeros(shapes[name.split("_")[0] if name in COEFFICIENTS else name])
+            object.__setattr__(self, name, frozen(array))
+        if not self.input_rates:
+            object.__setattr__(self, "input_rates", (0,) * n_s)
 
     @property
     def n_z(self) -> int:
@@ -89,14 +133,27 @@ class LinearSystem:
             first += len(mass)
 
     def with_mass(self) -> tuple["LinearSystem", Array]:
-        """Return the system without its massless motions, which follow the others statically, and z by its motions."""
+        """Return the system without its massless motions, which follow the others statically, and z by its motions.
+
+        What outputs see of these with inputs goes into D, D_rate and D_acceleration; third rates of inputs are left
+        out, and damping along motions without mass.
+        """
         dynamic, static = self.motions_with_and_without_mass()
         if not static.shape[1]:
             return self, np.eye(self.n_z)
-        T = dynamic - static @ la.solve(static.T @ self.K @ static, static.T @ self.K @ dynamic)
+        K_s = static.T @ self.K @ static
+        T = dynamic - static @ la.solve(K_s, static.T @ self.K @ dynamic)
         parts = {name: T.T @ getattr(self, name) @ T for name in ("M", "C", "K")}
+        parts |= {name: T.T @ getattr(self, name) for name in ("B", "B_rate", "B_acceleration")}
+        parts |= {name: getattr(self, name) @ T for name in ("L", "L_rate", "L_acceleration", "N")}
+        by_input = [static @ la.solve(K_s, static.T @ B) for B in (self.B, self.B_rate, self.B_acceleration)]
+        parts["D"] = self.D + self.L @ by_input[0]
+        parts["D_rate"] = self.D_rate + self.L @ by_input[1] + self.L_rate @ by_input[0]
+        parts["D_acceleration"] = (
+            self.D_acceleration + self.L @ by_input[2] + self.L_rate @ by_input[1] + self.L_acceleration @ by_input[0]
+        )
         motions = None if self.motions is None else replace(self.motions, rows=self.motions.rows @ T)
-        return replace(self, **parts, B=T.T @ self.B, L=self.L @ T, N=self.N @ T, motions=motions), T
+        return replace(self, **parts, Y=self.Y + self.N @ by_input[0], motions=motions), T
 
     def motions_with_and_without_mass(self) -> tuple[Array, Array]:
         """Return bases of z: motions with mass (orthonormal by it), and those without, (n_z, n) each."""
@@ -109,55 +166,134 @@ class LinearSystem:
         return scale[:, None] * vectors[:, is_massive], static
 
     def feedthrough(self) -> Array:
-        """Return the displacement outputs that follow inputs at once, over motions without mass, (n_outputs, n_inputs).
+        """Return the part of outputs that follows inputs at once, D of the state space, (n_outputs, n_inputs).
 
-        Their velocities would be derivatives of the inputs, which a state space cannot hold: they are left out.
+        Velocities of motions without mass would be derivatives of the inputs, which a state space cannot hold: they
+        are left out.
         """
-        _, S = self.motions_with_and_without_mass()
-        if not S.shape[1] or not self.B.shape[1]:
-            return np.zeros((len(self.outputs), len(self.inputs)))
-        D = self.L @ S @ la.solve(S.T @ self.K @ S, S.T @ self.B)
-        return np.asarray(D * (np.array(self.rates) == 0)[:, None])
+        return np.asarray(self.state_space().D)
+
+    def kept_inputs(self) -> list[tuple[int, int]]:
+        """Return (input, r) of each derivative of s that a state space needs as a state, with the input above it."""
+        return [(k, r) for k, rate in enumerate(self.input_rates) for r in range(rate) if self.sees_input(k, rate - 1)]
+
+    def sees_input(self, k: int, most: int) -> bool:
+        """Return whether anything depends on a derivative of s of input k up to one, zero if that is below zero."""
+        parts = [(self.B, self.D), (self.B_rate, self.D_rate), (self.B_acceleration, self.D_acceleration)]
+        return any(part[:, k].any() for pair in parts[: most + 1] for part in pair)
 
     def state_space(self) -> "StateSpace":
-        """Return A, B, C, D over the state (z, z_dot) of the motions with mass, as `scipy.signal.StateSpace`."""
+        """Return A, B, C, D over the state (z, z_dot) of the motions with mass, as `scipy.signal.StateSpace`.
+
+        An input that is a velocity or acceleration adds what is below it as states (see `kept_inputs`), where anything
+        depends on that.
+
+        Raises
+        ------
+        ModelError
+            If an input is a displacement or velocity on whose derivative the motion depends.
+        """
         from scipy.signal import StateSpace
 
         system, _ = self.with_mass()
-        n = system.n_z
+        system.require_states()
+        n, n_s, kept = system.n_z, len(system.inputs), system.kept_inputs()
         factor = la.cho_factor(system.M)
-        A = np.zeros((2 * n, 2 * n))
-        A[:n, n:] = np.eye(n)
-        A[n:, :n] = -la.cho_solve(factor, system.K)
-        A[n:, n:] = -la.cho_solve(factor, system.C)
-        B = np.vstack([np.zeros((n, system.B.shape[1])), la.cho_solve(factor, system.B)])
-        C = np.hstack([system.L, np.zeros_like(system.L)])
-        D = self.feedthrough()
-        for k, rate in enumerate(self.rates):
-            if rate == 2:
-                D[k] = C[k] @ A @ B
-            for _ in range(rate):
-                C[k] = C[k] @ A
+        n_x = 2 * n + len(kept)
+        # s, s', s'' over the state x and the inputs u
+        by_x, by_u = np.zeros((3, n_s, n_x)), np.zeros((3, n_s, n_s))
+        for k, rate in enumerate(system.input_rates):
+            by_u[rate, k, k] = 1.0
+        for j, (k, r) in enumerate(kept):
+            by_x[r, k, 2 * n + j] = 1.0
+        of_s = [la.cho_solve(factor, B) for B in (system.B, system.B_rate, system.B_acceleration)]
+        A, B = np.zeros((n_x, n_x)), np.zeros((n_x, n_s))
+        A[:n, n : 2 * n] = np.eye(n)
+        A[n : 2 * n, :n] = -la.cho_solve(factor, system.K)
+        A[n : 2 * n, n : 2 * n] = -la.cho_solve(factor, system.C)
+        A[n : 2 * n] += sum(b @ x for b, x in zip(of_s, by_x, strict=True))
+        B[n : 2 * n] = sum(b @ u for b, u in zip(of_s, by_u, strict=True))
+        for j, (k, r) in enumerate(kept):
+            above = r + 1
+            A[2 * n + j], B[2 * n + j] = by_x[above, k], by_u[above, k]
+        C = np.hstack([system.L, system.L_rate, np.zeros((len(system.outputs), len(kept)))])
+        C += system.L_acceleration @ A[n : 2 * n]
+        D = system.L_acceleration @ B[n : 2 * n]
+        for part, x, u in zip((system.D, system.D_rate, system.D_acceleration), by_x, by_u, strict=True):
+            C, D = C + part @ x, D + part @ u
         return StateSpace(A, B, C, D)
 
+    def require_states(self) -> None:
+        """Raise `ModelError` if a motion that is an input would have to be differentiated for the equations."""
+        for k, rate in enumerate(self.input_rates):
+            above = (self.B_rate, self.B_acceleration)[rate:] if rate < 2 else ()
+            is_force = rate == 0 and not self.Y[:, k].any()
+            if not is_force and any(part[:, k].any() for part in above):
+                raise ModelError(
+                    f"state space: input {self.inputs[k]!r} is a {('displacement', 'velocity')[rate]}, and inertia or "
+                    "damping needs its derivatives: give it as an acceleration (rate = 2), or take the "
+                    "frequency response"
+                )
+
     def response(self, frequencies: Array) -> Array:
-        """Return the frequency response y/s at frequencies [Hz], (n_frequencies, n_outputs, n_inputs), complex."""
+        """Return the frequency response y/s at frequencies [Hz], (n_frequencies, n_outputs, n_inputs), complex.
+
+        At frequency zero a constant velocity or acceleration has an endless displacement: infinite where an output
+        depends on that.
+        """
         H = np.empty((len(frequencies), len(self.outputs), len(self.inputs)), complex)
+        rates = np.array(self.input_rates, dtype=int)
         for k, omega in enumerate(2 * np.pi * np.asarray(frequencies, dtype=float)):
+            s = 1j * omega
+            if omega == 0 and rates.any():
+                H[k] = self.response_at_rest()
+                continue
             try:
-                H[k] = self.L @ np.linalg.solve(self.K + 1j * omega * self.C - omega**2 * self.M, self.B)
+                z = np.linalg.solve(
+                    self.K + s * self.C + s**2 * self.M, self.B + s * self.B_rate + s**2 * self.B_acceleration
+                )
+                H[k] = (self.L + s * self.L_rate + s**2 * self.L_acceleration) @ z
+                H[k] += self.D + s * self.D_rate + s**2 * self.D_acceleration
             except np.linalg.LinAlgError:  # an undamped resonance, met exactly
                 H[k] = np.inf
-            H[k] *= ((1j * omega) ** np.array(self.rates, dtype=int))[:, None]
+            if rates.any():
+                H[k] /= s**rates
         return H
+
+    def response_at_rest(self) -> Array:
+        """Return the response at frequency zero, where inputs are rates: the term of s^r of the series of y in s."""
+        by_order: list[Array] = []
+        z: list[Array] = []
+        for order, (B, D) in enumerate(zip((self.B, self.B_rate, self.B_acceleration),
+                                           (self.D, self.D_rate, self.D_acceleration), strict=True)):  # fmt: skip
+            load = B.copy()
+            if order > 0:
+                load = load - self.C @ z[order - 1]
+            if order > 1:
+                load = load - self.M @ z[order - 2]
+            try:
+                z.append(np.asarray(np.linalg.solve(self.K, load), dtype=float))
+            except np.linalg.LinAlgError:
+                return np.full((len(self.outputs), len(self.inputs)), np.inf, complex)
+            rows = (self.L, self.L_rate, self.L_acceleration)
+            terms = [(rows[i], z[order - i]) for i in range(order + 1)]
+            by_order.append(settled(D + sum(L @ x for L, x in terms), *terms, (np.eye(len(D)), D)))
+        H = np.empty((len(self.outputs), len(self.inputs)), complex)
+        for k, rate in enumerate(self.input_rates):
+            H[:, k] = by_order[rate][:, k]
+            H[np.any([order[:, k] != 0 for order in by_order[:rate]], axis=0), k] = np.inf
+        return H
+
+
+COEFFICIENTS = ("B", "B_rate", "B_acceleration", "L", "L_rate", "L_acceleration", "D", "D_rate", "D_acceleration")
 
 
 def linearize(
     system: System,
     about: Equilibrium | None = None,
     *,
-    inputs: Sequence[AnyChannel] | None = None,
-    outputs: Sequence[AnyChannel] | None = None,
+    inputs: Sequence[AnyInput] | None = None,
+    outputs: Sequence[AnyOutput] | None = None,
 ) -> LinearSystem:
     """Linearise a system about an equilibrium or a steady rotation.
 
@@ -167,19 +303,21 @@ def linearize(
         The system.
     about
         As `static_equilibrium` or `steady_rotation` returns it; the equilibrium at rest by default.
-    inputs, outputs
-        Channels; a channel can be both. Their directions turn with a steady rotation. None: those of the system.
+    inputs
+        Channels (forces along them), `DriveMotion`, `BaseMotion`, `ParameterInput`. None: those of the system.
+    outputs
+        Sensors (an output for each column that is linear here, see `LinearSystem.left_out`), columns of them (`Column`)
+        and channels; directions turn with a steady rotation. None: those of the system.
 
     Raises
     ------
     ModelError
-        If nothing can move, or a channel is at a place that does not exist.
+        If nothing can move, a channel is at a place that does not exist, or a column asked for is not linear here.
     """
-    inputs = channels_of(system.inputs) if inputs is None else tuple(inputs)
-    outputs = channels_of(system.outputs) if outputs is None else tuple(outputs)
+    inputs = inputs_of(system.inputs) if inputs is None else tuple(inputs)
+    outputs = outputs_of(system.outputs) if outputs is None else tuple(outputs)
     for channel in inputs:
-        if isinstance(channel, StressChannel):
-            raise ModelError(f"linearize: channel {channel.name!r} is a stress: expected a force or torque as an input")
+        require_input(channel)
     with_states = [force.name for force in system.forces if isinstance(force, UserForce) and force.states]
     if with_states:
         raise ModelError(
@@ -193,30 +331,95 @@ def linearize(
     set_iterate(work, state, u_dot, about.w)
     shown = small_motions_of_file(compiled, state.q)
     parts = tangents(model, work)
+    small = SmallMotions(
+        system, compiled, work, state, about.omega, snapshot(system, about), base_columns(system, inputs)
+    )
+    by_inputs = input_columns(small, inputs)
     Omega, Omega_t = turning_matrices(model, work)
     N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.bodies.u0[:-1]])
     if N.shape[1] == 0:
         raise ModelError(f"system {system.name!r}: its joints and drives allow no motion; nothing can be linearised")
+    D_0, D_1, D_2 = parts.full(Omega, Omega_t)
+    K_z = N.T @ D_0 @ N
+    force, force_rate = parts.body_forces(by_inputs)
+    moves = np.array([isinstance(channel, DriveMotion | BaseMotion) for channel in inputs], dtype=bool)
+    Y, size = motions_of_inputs(small, parts, by_inputs, N, K_z, D_0, moves)
+    seen = observed(small, outputs)
+    w = parts.wrenches(by_inputs, Omega, Omega_t) if seen.rows.w.any() else None
+    rows = seen.rows
+    of_motions = [rows.x[:, : small.n_u], rows.v[:, : small.n_u], rows.a[:, : small.n_u]]
+    of_inputs = [rows.x[:, small.n_u :], rows.v[:, small.n_u :], rows.a[:, small.n_u :]]
+    if w is not None:
+        of_motions = [own + rows.w @ part for own, part in zip(of_motions, (w.x, w.v, w.a), strict=True)]
+        of_inputs[0], of_inputs[1] = of_inputs[0] + rows.w @ w.s, of_inputs[1] + rows.w @ w.s_rate
     by_bodies = la.block_diag(*shown) @ N
+    one = np.eye(len(rows))
+    coefficients = {
+        "B": without_rounding(N, force, D_0, Y, size),
+        "B_rate": without_rounding(N, force_rate, D_1, Y, size),
+        "B_acceleration": -N.T @ (D_2 @ Y),
+        "L": of_motions[0] @ N,
+        "L_rate": of_motions[1] @ N,
+        "L_acceleration": of_motions[2] @ N,
+        "D": settled(of_inputs[0] + of_motions[0] @ Y, (of_motions[0], size), (one, of_inputs[0])),
+        "D_rate": settled(of_inputs[1] + of_motions[1] @ Y, (of_motions[1], size), (one, of_inputs[1])),
+        "D_acceleration": settled(of_inputs[2] + of_motions[2] @ Y, (of_motions[2], size), (one, of_inputs[2])),
+    }
     return LinearSystem(
         about,
-        M=N.T @ parts.M @ N,
-        C=N.T @ (parts.C + parts.M @ (Omega + Omega_t)) @ N,
-        K=N.T @ (parts.K + parts.C @ Omega + parts.M @ Omega_t @ Omega) @ N,
-        B=(channel_rows(system, compiled, work, inputs) @ N).T,
-        L=channel_rows(system, compiled, work, outputs) @ N,
+        M=N.T @ D_2 @ N,
+        C=N.T @ D_1 @ N,
+        K=K_z,
+        **coefficients,
         N=by_bodies,
+        Y=la.block_diag(*shown) @ Y,
         inputs=tuple(channel.name for channel in inputs),
-        outputs=tuple(channel.name for channel in outputs),
+        outputs=seen.names,
         body_names=compiled.body_names,
         body_masses=tuple(
             seen_from(T, mass) for T, mass in zip(shown, linearized(model, work, 1.0, 0.0, 0.0).H, strict=True)
         ),
-        rates=tuple(getattr(channel, "rate", 0) for channel in outputs),
-        input_units=tuple(channel_units(system, channel)[1] for channel in inputs),
-        output_units=tuple(channel_units(system, channel)[0] for channel in outputs),
+        input_rates=tuple(input_rate(channel) for channel in inputs),
+        input_units=tuple(channel_unit(system, channel) for channel in inputs),
+        output_units=seen.units,
+        output_values=seen.values,
+        left_out=seen.left_out,
         motions=named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N),
     )
+
+
+def motions_of_inputs(
+    small: SmallMotions, parts: Tangents, by_inputs: Inputs, N: Array, K_z: Array, D_0: Array, moves: NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Return Y, (n_u, n_s): G Y + E = 0, with no force along what K_z resists; and the sizes of its terms.
+
+    A base that carries everything moves it as one, Y rigid; other motions begin with the smallest Y. moves: which
+    inputs are motions, (n_s,) bool; forces move nothing by themselves.
+    """
+    E = by_inputs.E[parts.holds]
+    Y = np.zeros((small.n_u, E.shape[1]))
+    free, _ = parts.body_forces(by_inputs)
+    for k, base in enumerate(small.bases):
+        if base.moved:
+            rigid = small.rigid(base)
+            if np.abs(parts.G @ rigid + E[:, k]).max(initial=0.0) <= RANK * max(1.0, np.abs(E[:, k]).max(initial=0.0)):
+                Y[:, k] = rigid
+                continue
+        if moves[k] and E[:, k].any():
+            Y[:, k] = -np.linalg.lstsq(parts.G, E[:, k], rcond=RANK)[0]
+    size = np.abs(Y)
+    if moves.any():
+        load = without_rounding(N, free[:, moves], D_0, Y[:, moves], size[:, moves])
+        scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(K_z)), np.abs(K_z).max(initial=0.0) * RANK + TINY))
+        shift = scale[:, None] * np.linalg.lstsq(scale[:, None] * K_z * scale, scale[:, None] * load, rcond=RANK)[0]
+        Y[:, moves] += N @ shift
+        size[:, moves] += np.abs(N) @ np.abs(shift)
+    return Y, size
+
+
+def without_rounding(N: Array, force: Array, D: Array, Y: Array, size: Array) -> Array:
+    """Return Nᵀ (force - D Y) with zeros where what is left is rounding of what cancelled; size: of the terms of Y."""
+    return settled(N.T @ (force - D @ Y), (N.T, force), (N.T, np.abs(D) @ size))
 
 
 def named_motions(system: System, by_bodies: Array, of_joints: dict[str, Array], N: Array) -> NamedMotions:

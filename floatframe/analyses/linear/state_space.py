@@ -76,7 +76,7 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
     (1) motions without mass are taken out, which follow the others
     (2) joint coordinates are chosen, then modal coordinates, then motions of body frames, each time the one of which
         most is new to those chosen before, by the mass matrix, until there are as many as independent motions
-    (3) they and their rates are the states.
+    (3) they and their rates are the states, and after them what is below inputs that are velocities or accelerations.
 
     Raises
     ------
@@ -93,24 +93,33 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
     chosen = independent_rows(rows, system.M, motions)  # (2)
     R = rows[chosen]
     space, n = linear.state_space(), len(chosen)
-    T = la.block_diag(R, R)  # (3)
+    kept = system.kept_inputs()
+    T = la.block_diag(R, R, np.eye(len(kept)))  # (3)
     backward = np.linalg.inv(T)  # well conditioned by (2)
     A = T @ space.A @ backward
-    A[:n] = np.eye(n, 2 * n, k=n)  # as it is but for rounding
+    A[:n] = np.eye(n, len(A), k=n)  # as it is but for rounding
     names = [motions.names[k] for k in chosen]
     units = [motions.units[k] for k in chosen]
+    of_inputs = [kept_name(linear, k, r, motions.time_unit) for k, r in kept]
     return NamedStateSpace(
         A=A,
         B=T @ space.B,
         C=space.C @ backward,
         D=space.D,
-        states=(*names, *(f"{name} rate" for name in names)),
-        state_units=(*units, *(f"{unit}/{motions.time_unit}" for unit in units)),
+        states=(*names, *(f"{name} rate" for name in names), *(name for name, _ in of_inputs)),
+        state_units=(*units, *(f"{unit}/{motions.time_unit}" for unit in units), *(unit for _, unit in of_inputs)),
         inputs=linear.inputs,
         input_units=linear.input_units,
         outputs=linear.outputs,
         output_units=linear.output_units,
     )
+
+
+def kept_name(linear: LinearSystem, k: int, r: int, time_unit: str) -> tuple[str, str]:
+    """Return name and unit of the state that is an integral of input k: s itself or s'."""
+    per_time = ("", f"/{time_unit}", f"/{time_unit}²")
+    of_s = linear.input_units[k].removesuffix(per_time[linear.input_rates[k]])
+    return f"{linear.inputs[k]} {('displacement', 'velocity')[r]}", of_s + per_time[r]
 
 
 def independent_rows(rows: Array, M: Array, motions: NamedMotions) -> list[int]:
@@ -151,7 +160,9 @@ def write_state_space(linear: LinearSystem, path: Path) -> NamedStateSpace:
     space = named_state_space(linear)
     arrays = {
         "A": space.A, "B": space.B, "C": space.C, "D": space.D, "M_z": linear.M, "C_z": linear.C, "K_z": linear.K,
-        "B_z": linear.B, "L": linear.L, "N": linear.N,
+        "B_z": linear.B, "B_rate_z": linear.B_rate, "B_acceleration_z": linear.B_acceleration, "L": linear.L,
+        "L_rate": linear.L_rate, "L_acceleration": linear.L_acceleration, "D_z": linear.D, "D_rate_z": linear.D_rate,
+        "D_acceleration_z": linear.D_acceleration, "N": linear.N, "Y": linear.Y, "output_values": linear.output_values,
     }  # fmt: skip
     parts = ("states", "state_units", "inputs", "input_units", "outputs", "output_units")
     replace_file(path, WRITERS[kind](arrays, {part: getattr(space, part) for part in parts}))

@@ -5,6 +5,7 @@ from typing import cast
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
+from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.coordinate_elements import ControlSensor, CouplerSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
 from floatframe.results.sensors.measurement import Measurement
@@ -16,7 +17,9 @@ from floatframe.system import System
 __all__ = [
     "SENSORS",
     "AngleSensor",
+    "Channel",
     "ControlSensor",
+    "CoordinateChannel",
     "CoordinateSensor",
     "CouplerSensor",
     "DisplacementSensor",
@@ -29,6 +32,7 @@ __all__ = [
     "ReactionSensor",
     "Sensor",
     "StrainGauge",
+    "StressChannel",
     "StressSensor",
     "VonMisesSensor",
     "measured",
@@ -39,7 +43,9 @@ __all__ = [
 
 Sensor = (
     AngleSensor
+    | Channel
     | ControlSensor
+    | CoordinateChannel
     | CoordinateSensor
     | CouplerSensor
     | DisplacementSensor
@@ -50,6 +56,7 @@ Sensor = (
     | PlaceSensor
     | ReactionSensor
     | StrainGauge
+    | StressChannel
     | StressSensor
     | VonMisesSensor
 )

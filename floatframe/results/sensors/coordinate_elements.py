@@ -10,8 +10,11 @@ from floatframe.errors import ModelError
 from floatframe.forces import UserForce
 from floatframe.joints.rows import kind_of
 from floatframe.results.coordinate_elements import coupler_motion, user_force_motion
+from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement, unit_words
 from floatframe.results.trajectory import Trajectory
+from floatframe.small_motions.rows import LinearColumns, Rows
+from floatframe.small_motions.small_motions import SmallMotions
 from floatframe.system import System
 
 __all__ = ["ControlSensor", "CouplerSensor"]
@@ -27,9 +30,7 @@ class CouplerSensor:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the columns "value 1", "rate 1", "force 1", "value 2", ..."""
-        names = [coupler.name for coupler in system.couplers]
-        if self.of not in names:
-            raise ModelError(f"sensor {self.name!r}: no coupler {quoted(self.of)}{nearest(self.of, names)}")
+        names = self.coupler_names(system)
         found = coupler_motion(system, trajectory, self.of)
         columns: dict[str, Array] = {}
         units: dict[str, str] = {}
@@ -38,6 +39,25 @@ class CouplerSensor:
             columns |= dict(zip(own, (found.value[:, k], found.rate[:, k], found.force[:, k]), strict=True))
             units |= dict(zip(own, coordinate_units(system, is_angle), strict=True))
         return Measurement(self.name, trajectory.t, columns, units)
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return all columns: they are unknowns beside the wrenches."""
+        model = small.compiled.model
+        k = self.coupler_names(small.system).index(self.of)
+        columns: dict[str, Rows] = {}
+        for p in range(int(model.elements.coordinate0[k]), int(model.elements.coordinate0[k + 1])):
+            n, row = p - int(model.elements.coordinate0[k]) + 1, int(model.coordinates.row[p])
+            force = small.by_wrench([int(model.elements.core[k])], float(model.coordinates.factor[p]))
+            columns |= {f"value {n}": small.by_wrench([row]), f"rate {n}": small.by_wrench([row + 1])}
+            columns[f"force {n}"] = force
+        return scalar_columns(columns, dict(self.measure(small.system, small.now).units))
+
+    def coupler_names(self, system: System) -> list[str]:
+        """Return the names of the couplers; `ModelError` with the nearest one if the sensor's is not among them."""
+        names = [coupler.name for coupler in system.couplers]
+        if self.of not in names:
+            raise ModelError(f"sensor {self.name!r}: no coupler {quoted(self.of)}{nearest(self.of, names)}")
+        return names
 
 
 @frozen_copies
@@ -50,12 +70,8 @@ class ControlSensor:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the columns "phi", "phi_dot", "phi force", ..., and states by their names (without unit)."""
-        forces = [force for force in system.forces if isinstance(force, UserForce)]
-        names = [force.name for force in forces]
-        if self.of not in names:
-            raise ModelError(f"sensor {self.name!r}: no user force {quoted(self.of)}{nearest(self.of, names)}")
+        forces, k = self.user_forces(system)
         found = user_force_motion(system, trajectory, self.of)
-        k = names.index(self.of)
         columns: dict[str, Array] = {}
         units: dict[str, str] = {}
         for name, is_angle in zip(forces[k].coordinates, angles_of(system, len(system.couplers) + k), strict=True):
@@ -67,6 +83,27 @@ class ControlSensor:
         columns |= found.states
         units |= dict.fromkeys(found.states, "-")
         return Measurement(self.name, trajectory.t, columns, units)
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return all columns: they are unknowns beside the wrenches. States are none: see `linearize`."""
+        model = small.compiled.model
+        forces, u = self.user_forces(small.system)
+        k, acting = len(small.system.couplers) + u, list(forces[u].forces)
+        columns: dict[str, Rows] = {}
+        for p, name in enumerate(forces[u].coordinates, start=int(model.elements.coordinate0[k])):
+            row = int(model.coordinates.row[p])
+            columns |= {name: small.by_wrench([row]), f"{name}_dot": small.by_wrench([row + 1])}
+            if name in acting:
+                columns[f"{name} force"] = small.by_wrench([int(model.elements.core[k]) + acting.index(name)])
+        return scalar_columns(columns, dict(self.measure(small.system, small.now).units))
+
+    def user_forces(self, system: System) -> tuple[list[UserForce], int]:
+        """Return the user forces and which is that of the sensor; `ModelError` with the nearest name if none is."""
+        forces = [force for force in system.forces if isinstance(force, UserForce)]
+        names = [force.name for force in forces]
+        if self.of not in names:
+            raise ModelError(f"sensor {self.name!r}: no user force {quoted(self.of)}{nearest(self.of, names)}")
+        return forces, names.index(self.of)
 
 
 def angles_of(system: System, k: int) -> list[bool]:

@@ -7,21 +7,28 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.words import nearest, quoted
-from floatframe.compiling.markers import find_marker, joint_markers
+from floatframe.compiling.markers import MarkerData, find_marker, joint_markers
 from floatframe.compiling.pair_forces import bushing_markers
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import Bushing
-from floatframe.results.joint_coordinates import end_motion, joint_coordinate
+from floatframe.joints.rows import MOMENT
+from floatframe.results.joint_coordinates import end_motion, force_rows, joint_coordinate
 from floatframe.results.recovery import require_same_modes
+from floatframe.results.sensors.linear_columns import NO_SIZE, scalar_columns, vector_linear
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
 from floatframe.results.sensors.stresses import flexible_body
 from floatframe.results.trajectory import Energies, Trajectory
+from floatframe.rotations import tilde
+from floatframe.small_motions.rows import LinearColumns
+from floatframe.small_motions.small_motions import SmallMotions
+from floatframe.start.newton_equations import linearized
 from floatframe.system import System
 
 __all__ = ["AXES", "CoordinateSensor", "EnergySensor", "ModeSensor", "MomentumSensor", "ReactionSensor"]
 
 AXES = ("ground", "marker")
+NOTHING = 1e-12  #: of the largest wrench: rounding
 ENERGIES = (*Energies.__dataclass_fields__, "total", "balance")
 
 
@@ -40,22 +47,11 @@ class ReactionSensor:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return force and moment over time: components and sizes."""
-        choices = list(trajectory.connection_names)
-        if self.of not in choices:
-            raise ModelError(f"sensor {self.name!r}: no joint or spring {quoted(self.of)}{nearest(self.of, choices)}")
+        self.require_connection(list(trajectory.connection_names))
         reaction = trajectory.reaction(self.of)
         vectors = {"force ": reaction.force, "moment ": reaction.moment}
         if self.axes == "marker":
-            joint = next((each for each in system.joints if each.name == self.of), None)
-            if joint is not None:
-                end = joint_markers(system, joint, compiled_system(system).placed)[0]
-            else:
-                spring = next(each for each in system.forces if getattr(each, "name", "") == self.of)
-                if isinstance(spring, Bushing):
-                    end = bushing_markers(system, spring, compiled_system(system).placed)[0]
-                else:
-                    end = find_marker(system, f"force {self.of!r}: marker_a", spring.marker_a)  # type: ignore[union-attr]
-            A = end_motion(system, trajectory, end).axes
+            A = end_motion(system, trajectory, self.end_a(system)).axes
             vectors = {key: np.einsum("tba,tb->ta", A, values) for key, values in vectors.items()}
         columns: dict[str, Array] = {}
         units: dict[str, str] = {}
@@ -64,6 +60,43 @@ class ReactionSensor:
             columns |= more
             units |= unit
         return Measurement(self.name, trajectory.t, columns, units)
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return force and moment by small motions and wrenches: in marker axes Aᵀ (dF + F × theta_A)."""
+        self.require_connection(list(small.now.connection_names))
+        own, reaction = small.wrench(self.of), small.now.reaction(self.of)
+        found = []
+        for key, first, value in (("force ", 0, reaction.force[0]), ("moment ", MOMENT, reaction.moment[0])):
+            rows = small.by_motion(np.zeros((3, small.n_x)))
+            if own.stop - own.start >= first + 3:
+                rows = small.by_wrench(slice(own.start + first, own.start + first + 3))
+            if self.axes == "marker":
+                place = small.place(self.end_a(small.system), self.of)
+                rows = (rows + place.turned.turned(tilde(value))).turned(place.axes.T)
+                value = place.axes.T @ value
+            unit = unit_words(small.system.units, key.strip())
+            found.append(vector_linear(rows, value, unit, prefix=key, least=NOTHING * small.largest_wrench))
+        force, moment = found
+        return LinearColumns(
+            {**force.columns, **moment.columns},
+            {**force.units, **moment.units},
+            {**force.not_linear, **moment.not_linear},
+        )
+
+    def require_connection(self, choices: list[str]) -> None:
+        """Raise `ModelError` with the nearest name if there is no such joint or spring."""
+        if self.of not in choices:
+            raise ModelError(f"sensor {self.name!r}: no joint or spring {quoted(self.of)}{nearest(self.of, choices)}")
+
+    def end_a(self, system: System) -> MarkerData:
+        """Return marker A of the joint or spring."""
+        joint = next((each for each in system.joints if each.name == self.of), None)
+        if joint is not None:
+            return joint_markers(system, joint, compiled_system(system).placed)[0]
+        spring = next(each for each in system.forces if getattr(each, "name", "") == self.of)
+        if isinstance(spring, Bushing):
+            return bushing_markers(system, spring, compiled_system(system).placed)[0]
+        return find_marker(system, f"force {self.of!r}: marker_a", spring.marker_a)  # type: ignore[union-attr]
 
 
 @frozen_copies
@@ -88,6 +121,15 @@ class CoordinateSensor:
             {key: unit_words(system.units, what) for key, what in units.items()},
         )
 
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return value and rate by small motions, and the force by wrenches besides."""
+        value = small.joint_coordinate(self.joint, self.coordinate, f"sensor {self.name!r}")
+        force = force_rows(small, self.joint, self.coordinate)
+        units, columns = dict(self.measure(small.system, small.now).units), {"value": value, "rate": value.rate}
+        if force is None:
+            return LinearColumns(columns, units, {"force": "the force along a line that deforms with its place"})
+        return scalar_columns(columns | {"force": force}, units)
+
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
@@ -100,6 +142,14 @@ class EnergySensor:
         """Return all energies over time."""
         columns = {part: getattr(trajectory.energies, part) for part in ENERGIES}
         return Measurement(self.name, trajectory.t, columns, dict.fromkeys(columns, unit_words(system.units, "energy")))
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return no column: energies are of second order."""
+        return LinearColumns(
+            {},
+            dict.fromkeys(ENERGIES, unit_words(small.system.units, "energy")),
+            dict.fromkeys(ENERGIES, "energies are of second order in small motions"),
+        )
 
 
 @frozen_copies
@@ -117,6 +167,23 @@ class MomentumSensor:
         )
         return Measurement(self.name, trajectory.t, linear[0] | angular[0], linear[1] | angular[1])
 
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return both by small motions about a state at rest: Σ R m v and Σ R j + r × R m v of M u = (m v, j, ...)."""
+        found = self.measure(small.system, small.now)
+        if small.is_turning:
+            why = dict.fromkeys(found.columns, "the momentum of a system that turns: linearise it at rest")
+            return LinearColumns({}, found.units, why)
+        x = np.zeros((6, small.n_x))
+        masses = linearized(small.compiled.model, small.work, 1.0, 0.0, 0.0).H
+        for i, mass in enumerate(masses):
+            r, R = small.work.state.r[i], small.work.state.R[i]
+            linear, own = R @ mass[:3], R @ mass[3:6]
+            x[:, small.unknowns(i)] = np.vstack([linear, own + tilde(r) @ linear])
+        rows = small.by_motion(x).rate
+        columns = {f"{kind} {axis}": rows[3 * k + j] for k, kind in enumerate(("linear", "angular"))
+                   for j, axis in enumerate("xyz")}  # fmt: skip
+        return LinearColumns(columns, found.units, {f"{kind} size": NO_SIZE for kind in ("linear", "angular")})
+
 
 @frozen_copies
 @dataclass(frozen=True, eq=False)
@@ -131,8 +198,18 @@ class ModeSensor:
         """Return the coordinate and its rate over time."""
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
-        if not 1 <= self.mode <= body.reduced.n_q:
-            raise ModelError(f"sensor {self.name!r}: mode: expected 1 to {body.reduced.n_q}, got {self.mode}")
+        self.require_mode(body.reduced.n_q)
         motion, unit = trajectory.body(self.body), unit_words(system.units, "modal")
         columns = {"q": motion.q[:, self.mode - 1], "q_dot": motion.q_dot[:, self.mode - 1]}
         return Measurement(self.name, trajectory.t, columns, {"q": unit, "q_dot": f"{unit}/{system.units.time_symbol}"})
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the coordinate and its rate by small motions."""
+        self.require_mode(flexible_body(small.system, self.name, self.body).reduced.n_q)
+        row = small.coordinates(self.body)[self.mode - 1]
+        return scalar_columns({"q": row, "q_dot": row.rate}, dict(self.measure(small.system, small.now).units))
+
+    def require_mode(self, n_q: int) -> None:
+        """Raise `ModelError` unless the body has such a mode."""
+        if not 1 <= self.mode <= n_q:
+            raise ModelError(f"sensor {self.name!r}: mode: expected 1 to {n_q}, got {self.mode}")

@@ -15,7 +15,7 @@ from fe_models.body.kept_nodes import TOLERANCE
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.flexible_body import FlexibleBody
-from floatframe.bodies.marker_shape import MarkerShape, is_turning, node_shape
+from floatframe.bodies.marker_shape import MarkerShape, interface_shape, is_turning, node_shape
 from floatframe.bodies.markers import Marker, body_name
 from floatframe.checked_values import unit_vector
 from floatframe.compiling.counted_angles import CountedAngle, angle_of
@@ -25,8 +25,12 @@ from floatframe.joints.rows import TWIST, RowCoordinate
 from floatframe.results.full_turns import through_turns
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.place_motion import PlaceMotion, angle_and_rate, node_motion, normals_of_axis
+from floatframe.results.sensors.linear_columns import scalar_columns, vector_linear
 from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
 from floatframe.results.trajectory import Trajectory
+from floatframe.rotations import left_jacobian, rotation_log, tilde
+from floatframe.small_motions.rows import LinearColumns, Rows
+from floatframe.small_motions.small_motions import SmallMotions, SmallPlace
 from floatframe.system import System
 
 __all__ = [
@@ -40,7 +44,11 @@ __all__ = [
     "nearest_node",
     "node_marker",
     "place_motion",
+    "require_turning",
+    "small_place",
 ]
+
+STILL = 1e-12  #: of a length or angle, beside the size of the system: rounding
 
 TURNING = ("rotation-vector", "angular-velocity")  #: quantities of the axes of a place
 PLACE_QUANTITIES = {
@@ -64,6 +72,27 @@ def place_motion(system: System, trajectory: Trajectory, where: str, marker: Mar
         body, found = found_nodes(system, where, marker)
         return node_motion(trajectory, body.name, body.reduced, found.rows)
     return end_motion(system, trajectory, find_marker(system, where, marker))
+
+
+def small_place(small: SmallMotions, where: str, marker: Marker) -> SmallPlace:
+    """Return the place of a marker and how it moves; on a flexible body a position or number stands for a kept node.
+
+    A node whose rotation is not kept turns with the frame of its body's file.
+
+    Raises
+    ------
+    ModelError
+        If the marker names what does not exist.
+    """
+    if not is_at_node(small.system, marker):
+        return small.place(find_marker(small.system, where, marker))
+    body, found = found_nodes(small.system, where, marker)
+    place = small.place(node_marker(small.system, where, marker))
+    frame = small.frame_place(body.name)
+    seen = node_shape(body.reduced, found.rows, is_stiffened=body.is_stiffened)
+    axes = frame.axes @ seen.pose(small.now.body(body.name).q[0])[1]
+    turns = is_turning(body.reduced, found.rows)
+    return SmallPlace(place.position, axes, place.moved, place.turned if turns else frame.turned)
 
 
 def is_at_node(system: System, marker: Marker) -> bool:
@@ -164,6 +193,60 @@ class PlaceSensor:
         columns, units = vector_columns(values, unit_words(system.units, PLACE_QUANTITIES[self.quantity]))
         return Measurement(self.name, trajectory.t, columns, units)
 
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return x, y, z and size by small motions, in axes that turn with the steady motion."""
+        where = f"sensor {self.name!r}"
+        value = self.measure(small.system, small.now).columns
+        if self.relative_to is None:
+            if self.quantity == "rotation-vector" and small.is_turning:
+                raise ModelError(
+                    f"{where}: a rotation vector against the ground is not linear about a steady rotation, which turns "
+                    "it without end; give relative_to a body that turns along"
+                )
+            rows = absolute_rows(small, small_place(small, f"{where}: marker", self.marker), self.quantity)
+        else:
+            place = small_place(small, f"{where}: marker", self.marker)
+            other = small_place(small, f"{where}: relative_to", self.relative_to)
+            rows = relative_rows(place, other, self.quantity)
+        unit = unit_words(small.system.units, PLACE_QUANTITIES[self.quantity])
+        least = STILL * (1.0 if self.quantity == "rotation-vector" else small.compiled.length)
+        if self.quantity in ("velocity", "acceleration", "angular-velocity"):
+            least = STILL * small.speed_scale ** (2 if self.quantity == "acceleration" else 1)
+        return vector_linear(rows, np.array([value[axis][0] for axis in "xyz"]), unit, least=least)
+
+
+def absolute_rows(small: SmallMotions, place: SmallPlace, quantity: str) -> Rows:
+    """Return three rows of a quantity of a place, in axes that turn with the steady motion."""
+    if quantity == "rotation-vector":
+        return place.turned.turned(inverse_left_jacobian(place.axes))
+    if quantity == "angular-velocity":
+        return place.turned.rate
+    rows = place.moved
+    if quantity in ("velocity", "acceleration"):
+        rows = small.velocity(rows)
+    return small.velocity(rows) if quantity == "acceleration" else rows
+
+
+def inverse_left_jacobian(A: Array) -> Array:
+    """Return the change of the rotation vector of a matrix by a small rotation before it, (3, 3)."""
+    return np.asarray(np.linalg.inv(left_jacobian(rotation_log(A))), dtype=float)
+
+
+def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
+    """Return three rows of a quantity of a place as another place sees it, which it does not move against now.
+
+    d(Aᵀ (p - p_o)) = Aᵀ (dp - dp_o + (p - p_o) × theta_o)
+    """
+    back = other.axes.T
+    if quantity in TURNING:
+        turn = (place.turned - other.turned).turned(back)
+        return turn.rate if quantity == "angular-velocity" else turn.turned(inverse_left_jacobian(back @ place.axes))
+    arm = tilde(place.position - other.position)
+    rows = (place.moved - other.moved + other.turned.turned(arm)).turned(back)
+    for _ in range(("position", "velocity", "acceleration").index(quantity)):
+        rows = rows.rate
+    return rows
+
 
 def absolute(place: PlaceMotion, quantity: str) -> Array:
     """Return a quantity of a place in ground axes, (n_t, 3)."""
@@ -231,6 +314,18 @@ class AngleSensor:
         angle = through_turns(trajectory, f"sensor {self.name!r}", self.counted_angle(system), value, rate)
         return Measurement(self.name, trajectory.t, {"angle": angle}, {"angle": "rad"})
 
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the angle by small motions: C (Y · dD) - S (X · dD) over C² + S², dD = (theta_B - theta_A) × D."""
+        a, b = (
+            small_place(small, f"sensor {self.name!r}: {key}", marker)
+            for key, marker in (("marker_a", self.marker_a), ("marker_b", self.marker_b))
+        )
+        x, y = normals_of_axis(self.axis)
+        X, Y, D = a.axes @ x, a.axes @ y, b.axes @ x
+        C, S = X @ D, Y @ D
+        across = np.cross(D, C * Y - S * X) / (C**2 + S**2)
+        return scalar_columns({"angle": (b.turned - a.turned).turned(across)}, {"angle": "rad"})
+
     def counted_angle(self, system: System) -> CountedAngle:
         """Return the angle as a run counts its turns: that of the bodies, undeformed."""
         ends = [
@@ -254,16 +349,28 @@ class DisplacementSensor:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return x, y, z and size over time."""
-        name = body_name(self.marker.body)
-        body = next((each for each in system.bodies if each.name == name), None)
-        if not isinstance(body, FlexibleBody):
-            find_marker(system, f"sensor {self.name!r}: marker", self.marker)  # names an unknown body
-            raise ModelError(f"sensor {self.name!r}: body {name!r} is not flexible; it has no elastic displacement")
-        if is_at_node(system, self.marker):
-            _, found = found_nodes(system, f"sensor {self.name!r}: marker", self.marker)
-            moved = trajectory.body(name).q @ body.reduced.Phi[found.rows].mean(axis=0).T
-        else:
-            end = find_marker(system, f"sensor {self.name!r}: marker", self.marker)
-            moved = end.shape.deformation(trajectory.body(name).q)[:, :3]
+        body, shape = self.shape_of(system)
+        moved = shape.deformation(trajectory.body(body.name).q)[:, :3]
         columns, units = vector_columns(moved, system.units.length_symbol)
         return Measurement(self.name, trajectory.t, columns, units)
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return x, y, z and size by small motions."""
+        body, shape = self.shape_of(small.system)
+        q = small.now.body(body.name).q[0]
+        rows = small.coordinates(body.name).turned(shape.shapes(q)[:3])
+        least = STILL * small.compiled.length
+        return vector_linear(rows, shape.deformation(q)[:3], small.system.units.length_symbol, least=least)
+
+    def shape_of(self, system: System) -> tuple[FlexibleBody, MarkerShape]:
+        """Return the body and the marker of the sensor, in the frame of its file."""
+        name, where = body_name(self.marker.body), f"sensor {self.name!r}: marker"
+        if is_at_node(system, self.marker):
+            body, found = found_nodes(system, where, self.marker)
+            return body, node_shape(body.reduced, found.rows, is_stiffened=False)
+        find_marker(system, where, self.marker)  # names an unknown body or interface
+        of_system = next((each for each in system.bodies if each.name == name), None)
+        if not isinstance(of_system, FlexibleBody):
+            raise ModelError(f"sensor {self.name!r}: body {name!r} is not flexible; it has no elastic displacement")
+        assert self.marker.interface is not None  # so it is found
+        return of_system, interface_shape(of_system.reduced, self.marker.interface, is_stiffened=of_system.is_stiffened)

@@ -18,12 +18,20 @@ from floatframe.checked_values import array_of_shape, number, unit_vector
 from floatframe.errors import ModelError
 from floatframe.results.place_motion import largest_von_mises, stress_modes
 from floatframe.results.recovery import require_same_modes
+from floatframe.results.sensors.linear_columns import scalar_columns
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.sensors.places import found_at
 from floatframe.results.trajectory import Trajectory
+from floatframe.small_motions.rows import LinearColumns, Rows
+from floatframe.small_motions.small_motions import SmallMotions
 from floatframe.system import System
 
 __all__ = ["ElongationSensor", "StrainGauge", "StressSensor", "VonMisesSensor", "address_of"]
+
+UNLOADED = "von Mises' stress has no slope where there is no stress"
+#: von Mises' stress is the root of sᵀ P s, s = xx, yy, zz, yz, xz, xy; this is the block of the first three
+MISES = np.array([[1, -0.5, -0.5], [-0.5, 1, -0.5], [-0.5, -0.5, 1]])
+ROUNDING = 1e-12  #: of a stress beside those of which it is the sum
 
 
 def flexible_body(system: System, sensor: str, name: str) -> FlexibleBody:
@@ -90,6 +98,16 @@ def with_position(sensor: "StressSensor | StrainGauge") -> None:
         object.__setattr__(sensor, "position", position)
 
 
+def von_mises_rows(modes: Array, q: Array, coordinates: Rows) -> Rows | None:
+    """Return the row of von Mises' stress about a stress modes @ q, (6,), or None where that is zero."""
+    stress = modes @ q
+    value = float(von_mises(stress[None])[0])
+    if value <= ROUNDING * float(np.linalg.norm(modes) * np.linalg.norm(q)):
+        return None
+    by_stress = np.concatenate([MISES @ stress[:3], 3 * stress[3:]]) / value
+    return coordinates.turned(by_stress @ modes)
+
+
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class StressSensor:
@@ -116,24 +134,37 @@ class StressSensor:
         """Return the components and von Mises' stress over time."""
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
-        address = address_of(self)
-        places: tuple[str, ...] = ()
-        if address is None:
-            modes = modes_at(body, self.name, None, self.point)
-        else:
-            stress_modes(body.name, body.reduced)
-            found = found_at(body, f"sensor {self.name!r}", address, of_stress=True)
-            row = int(found.rows[0])
-            if len(found.rows) > 1:
-                largest, where = largest_von_mises(trajectory, self.body, body.reduced, rows=found.rows)
-                row = int(where[int(largest.argmax())])
-            modes = np.asarray(stress_modes(body.name, body.reduced)[row])
-            places = (f"{found.words()}; measured at node {body.reduced.node_name(row)}",)
+        modes, places = self.modes_of(body, trajectory)
         stress = stress_of(modes[None], trajectory.body(self.body).q)[0].T
         columns = {component: stress[:, k] for k, component in enumerate(STRESS_COMPONENTS)}
         columns["von Mises"] = von_mises(stress)
         units = dict.fromkeys(columns, system.units.stress_symbol)
         return Measurement(self.name, trajectory.t, columns, units, places)
+
+    def modes_of(self, body: FlexibleBody, trajectory: Trajectory) -> tuple[Array, tuple[str, ...]]:
+        """Return the stress modes of the place, (6, n_q), and words for it; of several the worst of a motion."""
+        address = address_of(self)
+        if address is None:
+            return modes_at(body, self.name, None, self.point), ()
+        modes = stress_modes(body.name, body.reduced)
+        found = found_at(body, f"sensor {self.name!r}", address, of_stress=True)
+        row = int(found.rows[0])
+        if len(found.rows) > 1:
+            largest, where = largest_von_mises(trajectory, self.body, body.reduced, rows=found.rows)
+            row = int(where[int(largest.argmax())])
+        return np.asarray(modes[row]), (f"{found.words()}; measured at node {body.reduced.node_name(row)}",)
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the components by small motions, and von Mises' stress where there is a stress."""
+        body = flexible_body(small.system, self.name, self.body)
+        (modes, _), q = self.modes_of(body, small.now), small.coordinates(self.body)
+        rows = q.turned(modes)
+        columns = {component: rows[k] for k, component in enumerate(STRESS_COMPONENTS)}
+        units = dict.fromkeys((*columns, "von Mises"), small.system.units.stress_symbol)
+        sum_of_all = von_mises_rows(modes, small.now.body(self.body).q[0], q)
+        if sum_of_all is None:
+            return LinearColumns(columns, units, {"von Mises": UNLOADED})
+        return scalar_columns(columns | {"von Mises": sum_of_all}, units)
 
 
 @frozen_copies
@@ -176,6 +207,20 @@ class VonMisesSensor:
         words = () if hot is None else (f"largest at {node_words(reduced, hot)}",)
         return Measurement(self.name, trajectory.t, columns, units, (*((found.words(),) if found else ()), *words))
 
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return von Mises' stress by small motions at the node where it is largest now."""
+        body = flexible_body(small.system, self.name, self.body)
+        units = dict(self.measure(small.system, small.now).units)
+        address = address_of(self)
+        rows = None if address is None else found_at(body, f"sensor {self.name!r}", address, of_stress=True).rows
+        _, where = largest_von_mises(small.now, self.body, body.reduced, rows=rows)
+        modes = np.asarray(stress_modes(self.body, body.reduced)[int(where[0])])
+        row = von_mises_rows(modes, small.now.body(self.body).q[0], small.coordinates(self.body))
+        not_linear = {column: "numbers of nodes have no slope" for column in units if column != "largest"}
+        if row is None:
+            return LinearColumns({}, units, not_linear | {"largest": UNLOADED})
+        return LinearColumns({"largest": row}, units, not_linear)
+
 
 def node_words(reduced: ReducedBody, row: int) -> str:
     """Say name and place of a kept node, in mesh axes."""
@@ -213,12 +258,21 @@ class StrainGauge:
         """Return the strain over time."""
         body = flexible_body(system, self.name, self.body)
         require_same_modes(trajectory, self.body, body.reduced)
+        strain = trajectory.body(self.body).q @ self.strain_modes(body)
+        return Measurement(self.name, trajectory.t, {"strain": strain}, {"strain": "-"})
+
+    def strain_modes(self, body: FlexibleBody) -> Array:
+        """Return the strain by the modal coordinates, (n_q,)."""
         modes = modes_at(body, self.name, None, self.point, address=address_of(self))
         x, y, z = self.direction @ body.reduced.frame.axes
         along = np.array([x * x, y * y, z * z, 2 * y * z, 2 * x * z, 2 * x * y]) @ modes
-        strain = ((1 + self.poisson) * along - self.poisson * modes[:3].sum(axis=0)) / self.young
-        q = trajectory.body(self.body).q
-        return Measurement(self.name, trajectory.t, {"strain": q @ strain}, {"strain": "-"})
+        return np.asarray(((1 + self.poisson) * along - self.poisson * modes[:3].sum(axis=0)) / self.young)
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the strain by small motions."""
+        body = flexible_body(small.system, self.name, self.body)
+        row = small.coordinates(self.body).turned(self.strain_modes(body))
+        return scalar_columns({"strain": row}, {"strain": "-"})
 
 
 @frozen_copies
@@ -253,14 +307,27 @@ class ElongationSensor:
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the mean strain between the nodes over time."""
         body = flexible_body(system, self.name, self.body)
-        reduced: ReducedBody = body.reduced
-        require_same_modes(trajectory, self.body, reduced)
-        a, b = (each.rows for each in self.ends(body))
-        if np.array_equal(a, b):
-            raise ModelError(f"sensor {self.name!r}: both positions are nearest to one node; take them further apart")
-        d = reduced.nodes[b].mean(axis=0) - reduced.nodes[a].mean(axis=0)
-        change = trajectory.body(self.body).q @ (reduced.Phi[b].mean(axis=0) - reduced.Phi[a].mean(axis=0)).T
+        require_same_modes(trajectory, self.body, body.reduced)
+        d, by_q = self.line(body)
+        change = trajectory.body(self.body).q @ by_q.T
         length = np.linalg.norm(d)
         # |d + c| - |d| without the loss of digits of the difference
         grown = (2 * change @ d + (change**2).sum(axis=1)) / (np.linalg.norm(d + change, axis=1) + length)
         return Measurement(self.name, trajectory.t, {"strain": grown / length}, {"strain": "-"})
+
+    def line(self, body: FlexibleBody) -> tuple[Array, Array]:
+        """Return the line from node to node, undeformed, (3,), and its change by the modal coordinates, (3, n_q)."""
+        reduced: ReducedBody = body.reduced
+        a, b = (each.rows for each in self.ends(body))
+        if np.array_equal(a, b):
+            raise ModelError(f"sensor {self.name!r}: both positions are nearest to one node; take them further apart")
+        by_q = np.asarray(reduced.Phi[b].mean(axis=0) - reduced.Phi[a].mean(axis=0))
+        return np.asarray(reduced.nodes[b].mean(axis=0) - reduced.nodes[a].mean(axis=0)), by_q
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the strain by small motions, about the line as it is now."""
+        body = flexible_body(small.system, self.name, self.body)
+        d, by_q = self.line(body)
+        now = d + by_q @ small.now.body(self.body).q[0]
+        row = small.coordinates(self.body).turned(now @ by_q / (np.linalg.norm(now) * np.linalg.norm(d)))
+        return scalar_columns({"strain": row}, {"strain": "-"})

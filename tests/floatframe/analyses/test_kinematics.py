@@ -35,7 +35,6 @@ from floatframe import (
     static_equilibrium,
     steady_rotation,
 )
-from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.analyses.snapshot import snapshot
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import constant, harmonic, polynomial_of_time
@@ -43,6 +42,7 @@ from floatframe.kernels.work import new_work
 from floatframe.mechanisms import double_pendulum, four_bar, slider_crank
 from floatframe.results.joint_coordinates import joint_coordinates
 from floatframe.rotations import rotation_matrix
+from floatframe.small_motions.joint_rates import coordinate_rows
 from floatframe.start.newton_equations import set_iterate
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 from tests.floatframe.test_bad_input import parallelogram

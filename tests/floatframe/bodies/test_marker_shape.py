@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatframe.analyses.marker_jacobian import marker_jacobian
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.ground import GROUND
 from floatframe.bodies.marker_shape import BodyFrameMotion, interface_shape, marker_motion, motion_in_body
@@ -17,6 +16,7 @@ from floatframe.joints import SphericalJoint
 from floatframe.kernels.entry import evaluate_and_linearize, rates_of_constraints
 from floatframe.kernels.work import new_work
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_matrix
+from floatframe.small_motions.marker_jacobian import marker_jacobian
 from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
 from floatframe.system import System

@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe import JointForce, Marker, RigidBody, System
-from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import compiled_system
 from floatframe.joints import JOINTS, CylindricalJoint, DistanceJoint, ScrewJoint, UniversalJoint
@@ -13,6 +12,7 @@ from floatframe.joints.rows import ROW_KINDS, RelativePlace, is_held, is_held_le
 from floatframe.kernels.entry import evaluate_and_linearize
 from floatframe.kernels.work import new_work
 from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.small_motions.joint_rates import coordinate_rows
 from floatframe.start.newton_equations import displaced, in_ground_axes, set_iterate
 from floatframe.state import State
 from tests.floatframe.joints.test_every_joint import CASES, pair

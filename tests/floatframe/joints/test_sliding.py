@@ -30,13 +30,13 @@ from floatframe import (
     mobility,
     static_equilibrium,
 )
-from floatframe.analyses.joint_rates import coordinate_rows
 from floatframe.bodies.mode_choice import frozen_to_rigid
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import polynomial_of_time
 from floatframe.kernels.work import new_work
 from floatframe.results.joint_coordinates import joint_coordinate
 from floatframe.results.place_motion import interface_motion, point_motion
+from floatframe.small_motions.joint_rates import coordinate_rows
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.system_file.read_system import read_system
 

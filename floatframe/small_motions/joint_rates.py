@@ -3,13 +3,13 @@
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.marker_jacobian import marker_jacobian
 from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import CompiledSystem
 from floatframe.joints import SlidingJoint
 from floatframe.joints.rows import RelativePlace
 from floatframe.kernels.work import Work
 from floatframe.rotations import tilde
+from floatframe.small_motions.marker_jacobian import marker_jacobian
 from floatframe.state import State
 from floatframe.system import System
 

@@ -1,0 +1,275 @@
+"""Inputs of a linearised system: forces along channels, motions of drives and bases, parameters of user forces.
+
+Each enters the equations of `system_matrices` in its own way, s its value:
+
+    force along y = J xi          F = Jᵀ, along a free joint coordinate E = 1 in the row of its joint
+    drive, g(x, f(t)) = 0         E = ∂g/∂f, the rate of the row for f = t while nothing moves
+    base, a rigid motion s of markers on the ground: E, E' = the rows by their places and by their velocities
+    parameter p of Q = f(x, v, p)   E = -∂f/∂p
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest, quoted
+from floatframe.analyses.system_matrices import Inputs
+from floatframe.bodies.coordinates import JointCoordinate
+from floatframe.checked_values import array_of_shape, unit_vector
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import ModelError
+from floatframe.forces import UserForce
+from floatframe.functions.time_functions import TimeFunction, constant, polynomial_of_time
+from floatframe.joints.rows import kind_of
+from floatframe.kernels.work import new_work
+from floatframe.results.sensors.channels import QUANTITIES, RATES, CoordinateChannel, rate_unit
+from floatframe.small_motions.small_motions import BaseColumn, SmallMotions
+from floatframe.start.newton_equations import linearized, set_iterate
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["BaseMotion", "DriveMotion", "ParameterInput", "base_columns", "input_columns", "input_rate"]
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class DriveMotion:
+    """The prescribed motion of a joint coordinate as an input: its change about the steady value, or a rate of it."""
+
+    name: str
+    joint: str
+    coordinate: str
+    rate: int = 2  #: the input is 0 the value, 1 its rate, 2 its second rate
+
+    def __post_init__(self) -> None:
+        require_input_rate(f"input {self.name!r}", self.rate)
+
+    def force_units(self, units: Units) -> str:
+        """Return its unit."""
+        return rate_unit(units, self.coordinate.startswith("angle"), self.rate)
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class BaseMotion:
+    """A motion of the base on which a system stands: of the ground side of its joints, springs and bushings.
+
+    Several bases are several inputs, each with its `joints`; coordinates of a joint that couplers and user forces take
+    go with it. All else of the ground stays where it is: gravity, and places against which sensors measure.
+    """
+
+    name: str
+    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: ground axes, (3,)
+    quantity: str = "translation"  #: or "rotation", about the direction
+    about: Array = field(default_factory=lambda: np.zeros(3))  #: a point of the axis of a rotation, (3,) [m]
+    joints: Sequence[str] | None = None  #: joints, springs, bushings, couplers, user forces that move; None: all
+    rate: int = 2  #: the input is 0 the displacement, 1 the velocity, 2 the acceleration
+
+    def __post_init__(self) -> None:
+        where = f"input {self.name!r}"
+        object.__setattr__(self, "direction", unit_vector(f"{where}: direction", self.direction))
+        object.__setattr__(self, "about", array_of_shape(f"{where}: about", self.about, (3,)))
+        if self.joints is not None:
+            object.__setattr__(self, "joints", tuple(self.joints))
+        if self.quantity not in QUANTITIES:
+            raise ModelError(f"{where}: quantity: expected one of {', '.join(QUANTITIES)}, got {self.quantity!r}")
+        require_input_rate(where, self.rate)
+
+    def force_units(self, units: Units) -> str:
+        """Return its unit."""
+        return rate_unit(units, self.quantity == "rotation", self.rate)
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ParameterInput:
+    """A parameter of the expressions of a user force as an input: its change about the value it has."""
+
+    name: str
+    force: str  #: name of the user force
+    parameter: str
+
+    def force_units(self, units: Units) -> str:
+        """Return its unit: that of the parameter, which nobody says."""
+        return "1"
+
+
+def require_input_rate(where: str, rate: int) -> None:
+    """Raise `ModelError` unless a rate is 0, 1 or 2."""
+    if rate not in (0, 1, 2):
+        raise ModelError(f"{where}: rate: expected 0, 1 or 2 ({', '.join(RATES)}), got {rate!r}")
+
+
+def input_rate(channel: Any) -> int:
+    """Return which rate of its motion an input is; 0 for forces."""
+    return channel.rate if isinstance(channel, DriveMotion | BaseMotion) else 0
+
+
+def base_columns(system: System, inputs: Sequence[Any]) -> tuple[BaseColumn, ...]:
+    """Return what each input moves of the ground: of some connections, or nothing."""
+    return tuple(base_column(system, each) if isinstance(each, BaseMotion) else BaseColumn() for each in inputs)
+
+
+def base_column(system: System, base: BaseMotion) -> BaseColumn:
+    """Return what a base moves; `ModelError` if it names what does not stand on the ground, or nothing does."""
+    compiled = compiled_system(system)
+    model, names = compiled.model, compiled.connection_names
+    on_ground = {
+        names[c] for c, body in zip(model.markers.connection, model.markers.body, strict=True) if c >= 0 and body < 0
+    }
+    for name in base.joints or ():
+        if name not in on_ground:
+            what = "does not stand on the ground" if name in names else "is not there"
+            hint = nearest(name, sorted(on_ground))
+            raise ModelError(f"input {base.name!r}: joint or force {quoted(name)} {what}{hint}")
+    moved = frozenset(on_ground if base.joints is None else base.joints)
+    if not moved:
+        raise ModelError(f"input {base.name!r}: nothing stands on the ground that a base could move")
+    key = "translation" if base.quantity == "translation" else "rotation"
+    return BaseColumn(moved, **{key: base.direction}, about=base.about)
+
+
+def input_columns(small: SmallMotions, channels: Sequence[Any]) -> Inputs:
+    """Return how inputs enter the equations, a column each.
+
+    Raises
+    ------
+    ModelError
+        If an input names what does not exist, or a base moves under a system that turns.
+    """
+    columns = [column_of(small, k, channel) for k, channel in enumerate(channels)]
+    empty = [np.zeros((small.n_u, 0)), np.zeros((small.n_w, 0)), np.zeros((small.n_w, 0))]
+    return Inputs(*(np.column_stack([none, *column]) for none, column in
+                    zip(empty, zip(*columns, strict=True), strict=True))) if columns else Inputs(*empty)  # fmt: skip
+
+
+def column_of(small: SmallMotions, k: int, channel: Any) -> tuple[Array, Array, Array]:
+    """Return the column of input k: forces on bodies, (n_u,), and its part and that of its rate in the rows, (n_w,)."""
+    F, E, E_rate = np.zeros(small.n_u), np.zeros(small.n_w), np.zeros(small.n_w)
+    if isinstance(channel, DriveMotion):
+        E = drive_rows(small, channel)
+    elif isinstance(channel, BaseMotion):
+        E, E_rate = base_rows(small, small.bases[k], channel)
+    elif isinstance(channel, ParameterInput):
+        E = parameter_rows(small, channel)
+    elif isinstance(channel, CoordinateChannel) and (row := free_row(small, channel)) is not None:
+        E[row] = 1.0
+    else:
+        F = replace(channel, rate=0).linear(small).columns["value"].x[0, : small.n_u]
+    return F, E, E_rate
+
+
+def free_row(small: SmallMotions, channel: CoordinateChannel) -> int | None:
+    """Return the row that says what acts along a free coordinate, force + Q = 0; None where none does, as in screws.
+
+    A force there is one of the joint, so that its reaction holds it, as that of a `JointForce`.
+    """
+    rows = small.compiled.model.rows.kind
+    for k, own in enumerate(zip(small.compiled.owners, small.compiled.coordinates, strict=True)):
+        kind = kind_of(rows[k])
+        if own == (channel.joint, channel.coordinate) and (kind.is_free or kind.is_loaded):
+            return k
+    return None
+
+
+def drive_rows(small: SmallMotions, drive: DriveMotion) -> Array:
+    """Return the rates of rows at rest while a drive moves with unit rate and all others stand still, (n_w,)."""
+    from floatframe.kernels.entry import rates_of_constraints
+
+    system = small.system
+    driven = [f"{j.name}.{c}" for j in system.joints for c in getattr(j, "motions", {})]
+    wanted = f"{drive.joint}.{drive.coordinate}"
+    if wanted not in driven:
+        raise ModelError(
+            f"input {drive.name!r}: no driven coordinate {quoted(wanted)}{nearest(wanted, driven)}; prescribe it in "
+            "[joints.NAME.motions.COORDINATE], or take the force along it as the input"
+        )
+
+    def held(joint: Any) -> Any:
+        motions = {c: constant(f(0.0)) for c, f in getattr(joint, "motions", {}).items()}
+        if joint.name == drive.joint:
+            motions[drive.coordinate] = polynomial_of_time([joint.motions[drive.coordinate](0.0), 1.0])
+        return replace(joint, motions=motions) if motions else joint
+
+    couplers = [
+        replace(each, constant=constant(each.constant(0.0))) if isinstance(each.constant, TimeFunction) else each
+        for each in system.couplers
+    ]
+    moved = replace(system, joints=[held(joint) for joint in system.joints], couplers=couplers)
+    model = compiled_system(moved).model
+    work = new_work(model)
+    still = State(small.state.r, small.state.p, small.state.q, np.zeros_like(small.state.u))
+    set_iterate(work, still, w=small.work.state.w)
+    linearized(model, work, 1.0, 0.0, 1.0)
+    return rates_of_constraints(model, work)[0]
+
+
+def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tuple[Array, Array]:
+    """Return E and E' of a base: the rows by its markers, P of joints/rows/kinds.py."""
+    from floatframe.kernels.entry import evaluate_and_linearize
+
+    if small.is_turning:
+        raise ModelError(
+            f"input {channel.name!r}: a base moves under a system at rest; about a steady rotation take "
+            "drives and forces"
+        )
+    model, work = small.compiled.model, small.work
+    evaluate_and_linearize(model, work, 0.0, 0.0, 1.0)
+    E, E_rate = np.zeros(small.n_w), np.zeros(small.n_w)
+    for m in moved_markers(small, base):
+        c = int(model.markers.connection[m])
+        rows, P = small.wrench(small.compiled.connection_names[c]), work.connections.P[m]
+        size, motion = rows.stop - rows.start, base.at(work.markers.r[m])
+        E[rows] += P[:size, :6] @ motion
+        E_rate[rows] += P[:size, 6:12] @ motion
+    return E, E_rate
+
+
+def moved_markers(small: SmallMotions, base: BaseColumn) -> list[int]:
+    """Return the markers on the ground that a base moves; coordinates of joints in couplers go with their joints."""
+    model, names = small.compiled.model, small.compiled.connection_names
+    owners = [names[c] if c >= 0 else "" for c in model.markers.connection]
+    user_forces = [force for force in small.system.forces if isinstance(force, UserForce)]
+    coordinates = [c for coupler in small.system.couplers for c, _ in coupler.terms]
+    coordinates += [c for force in user_forces for c in force.coordinates.values()]
+    for own, a, b in zip(coordinates, model.coordinates.a, model.coordinates.b, strict=True):
+        if isinstance(own, JointCoordinate):
+            owners[a] = owners[b] = own.joint
+    return [m for m, body in enumerate(model.markers.body) if body < 0 and owners[m] in base.moved]
+
+
+def parameter_rows(small: SmallMotions, channel: ParameterInput) -> Array:
+    """Return -∂f/∂p in the rows of a user force, (n_w,): f by the value of a state that takes the place of p."""
+    forces = [force for force in small.system.forces if isinstance(force, UserForce)]
+    names = [force.name for force in forces]
+    if channel.force not in names:
+        hint = nearest(channel.force, names)
+        raise ModelError(f"input {channel.name!r}: no user force {quoted(channel.force)}{hint}")
+    force = forces[names.index(channel.force)]
+    p = channel.parameter
+    if p not in force.parameters:
+        raise ModelError(
+            f"input {channel.name!r}: user force {force.name!r} has no parameter {quoted(p)}"
+            f"{nearest(p, list(force.parameters))}"
+        )
+    freed = replace(
+        force,
+        parameters={key: value for key, value in force.parameters.items() if key != p},
+        states={p: force.parameters[p]},
+        rates={p: "0"},
+    )
+    system = replace(
+        small.system, forces=[freed if each is force else each for each in small.system.forces], inputs=(), outputs=()
+    )
+    compiled, own = compiled_system(system), small.wrench(force.name)
+    work, w = new_work(compiled.model), np.insert(small.work.state.w, own.stop, (force.parameters[p], 0.0, 0.0))
+    set_iterate(work, small.state, w=w)
+    V = linearized(compiled.model, work, 0.0, 0.0, 1.0).V.toarray()
+    E = np.zeros(small.n_w)
+    E[own] = V[own, own.stop]
+    return E

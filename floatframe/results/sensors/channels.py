@@ -1,0 +1,203 @@
+"""Channels: named scalars as inputs (a force, a torque) and outputs (a motion, a stress) of a linearised system.
+
+As outputs they are sensors of one column, named "value".
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.components import STRESS_COMPONENTS
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import Units
+from floatframe.bodies.markers import Marker
+from floatframe.checked_values import array_of_shape, unit_vector
+from floatframe.errors import ModelError
+from floatframe.results.joint_coordinates import joint_coordinate
+from floatframe.results.sensors.linear_columns import scalar_columns
+from floatframe.results.sensors.measurement import Measurement, unit_words
+from floatframe.results.sensors.places import place_motion, require_turning, small_place
+from floatframe.results.sensors.stresses import StressSensor
+from floatframe.results.trajectory import Trajectory
+from floatframe.small_motions.rows import LinearColumns
+from floatframe.small_motions.small_motions import SmallMotions, SmallPlace
+from floatframe.system import System
+
+__all__ = ["QUANTITIES", "RATES", "VALUE", "Channel", "CoordinateChannel", "StressChannel"]
+
+QUANTITIES = ("translation", "rotation")
+RATES = ("displacement", "velocity", "acceleration")
+VALUE = "value"  #: the name of the one column
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """The motion of a marker along a direction: displacement [m] from the start, or rotation [rad] about it.
+
+    On a flexible body the marker is an interface, or a position in mesh axes: the kept node nearest to it.
+
+    As an input it is the force [N], or moment [N m], that does work on it. With `relative_to`, the motion against
+    that marker, and the opposite force on it.
+    """
+
+    name: str
+    marker: Marker
+    direction: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))  #: ground axes, (3,)
+    quantity: str = "translation"  #: or "rotation"
+    relative_to: Marker | None = None
+    rate: int = 0  #: as an output: 0 displacement, 1 velocity, 2 acceleration, seen from the turning system
+
+    def __post_init__(self) -> None:
+        where = f"channel {self.name!r}"
+        object.__setattr__(self, "direction", unit_vector(f"{where}: direction", self.direction))
+        if self.quantity not in QUANTITIES:
+            raise ModelError(f"{where}: quantity: expected one of {', '.join(QUANTITIES)}, got {self.quantity!r}")
+        require_rate(where, self.rate)
+
+    @property
+    def markers(self) -> list[tuple[float, Marker]]:
+        """The marker, and the one against which it is seen, with their signs."""
+        return [(sign, each) for sign, each in ((1.0, self.marker), (-1.0, self.relative_to)) if each is not None]
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return the motion along the direction over time; displacements and rotations since the first time."""
+        total = np.zeros(len(trajectory.t))
+        for sign, marker in self.markers:
+            where = f"channel {self.name!r}: marker"
+            if self.quantity == "rotation":
+                require_turning(system, where, marker)
+            place = place_motion(system, trajectory, where, marker)
+            if self.quantity == "translation":
+                moved = (place.position - place.position[0], place.velocity, place.acceleration)[self.rate]
+            elif self.rate == 0:
+                moved = Rotation.from_matrix(place.axes @ place.axes[0].T).as_rotvec()
+            else:
+                alpha = np.zeros_like(place.omega) if place.alpha is None else place.alpha
+                moved = (place.omega, alpha)[self.rate - 1]
+            total += sign * moved @ self.direction
+        return Measurement(self.name, trajectory.t, {VALUE: total}, {VALUE: self.units(system.units)})
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the motion along the direction by small motions, seen from the turning system."""
+        rows = small.by_motion(np.zeros((1, small.n_x)))
+        for sign, marker in self.markers:
+            place = self.place(small, marker)
+            rows = rows + (place.moved if self.quantity == "translation" else place.turned).turned(
+                sign * self.direction
+            )
+        for _ in range(self.rate):
+            rows = rows.rate
+        return scalar_columns({VALUE: rows}, {VALUE: self.units(small.system.units)})
+
+    def place(self, small: SmallMotions, marker: Marker) -> SmallPlace:
+        """Return how a marker of the channel moves; `ModelError` for the rotation of a node that keeps none."""
+        where = f"channel {self.name!r}: marker"
+        if self.quantity == "rotation":
+            require_turning(small.system, where, marker)
+        return small_place(small, where, marker)
+
+    def units(self, units: Units) -> str:
+        """Return its unit as an output."""
+        return rate_unit(units, self.quantity == "rotation", self.rate)
+
+    def force_units(self, units: Units) -> str:
+        """Return its unit as an input."""
+        return unit_words(units, "moment" if self.quantity == "rotation" else "force")
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class CoordinateChannel:
+    """A joint coordinate; as an input the force or torque along it."""
+
+    name: str
+    joint: str
+    coordinate: str
+    rate: int = 0  #: as an output: 0 value, 1 its rate, 2 its second rate
+
+    def __post_init__(self) -> None:
+        require_rate(f"channel {self.name!r}", self.rate)
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return the coordinate or its rate over time; its second rate by none: results hold it for bodies only."""
+        if self.rate == 2:
+            raise ModelError(
+                f"channel {self.name!r}: a second rate of a joint coordinate is no part of results over time; take "
+                'measure = "velocity", or the acceleration of a place'
+            )
+        found = joint_coordinate(system, trajectory, self.joint, self.coordinate)
+        value = (found.value, found.rate)[self.rate]
+        return Measurement(self.name, trajectory.t, {VALUE: value}, {VALUE: self.units(system.units)})
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the coordinate by small motions."""
+        rows = small.joint_coordinate(self.joint, self.coordinate, f"channel {self.name!r}")
+        for _ in range(self.rate):
+            rows = rows.rate
+        return scalar_columns({VALUE: rows}, {VALUE: self.units(small.system.units)})
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether the coordinate is an angle; distances and places along axes are not."""
+        return self.coordinate.startswith("angle")
+
+    def units(self, units: Units) -> str:
+        """Return its unit as an output."""
+        return rate_unit(units, self.is_angle, self.rate)
+
+    def force_units(self, units: Units) -> str:
+        """Return its unit as an input."""
+        return unit_words(units, "moment" if self.is_angle else "force")
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class StressChannel:
+    """A stress component at a node of a flexible body, in axes of its frame; an output only."""
+
+    name: str
+    body: str
+    component: str  #: xx, yy, zz, yz, xz or xy
+    position: Array  #: mesh axes; the kept node nearest to it is taken, (3,) [m]
+
+    def __post_init__(self) -> None:
+        where = f"channel {self.name!r}"
+        object.__setattr__(self, "position", array_of_shape(f"{where}: position", self.position, (3,)))
+        if self.component not in STRESS_COMPONENTS:
+            raise ModelError(
+                f"{where}: component: expected one of {', '.join(STRESS_COMPONENTS)}, got {self.component!r}"
+            )
+
+    @property
+    def sensor(self) -> StressSensor:
+        """The sensor of all components."""
+        return StressSensor(self.name, self.body, position=self.position)
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return the component over time."""
+        found = self.sensor.measure(system, trajectory)
+        return Measurement(self.name, found.t, {VALUE: found.columns[self.component]}, {VALUE: found.units["xx"]})
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the component by small motions."""
+        found = self.sensor.linear(small)
+        return scalar_columns({VALUE: found.columns[self.component]}, {VALUE: found.units[self.component]})
+
+    def units(self, units: Units) -> str:
+        """Return its unit."""
+        return units.stress_symbol
+
+
+def require_rate(where: str, rate: int) -> None:
+    """Raise `ModelError` unless a rate is 0, 1 or 2."""
+    if rate not in (0, 1, 2):
+        raise ModelError(f"{where}: rate: expected 0, 1 or 2 ({', '.join(RATES)}), got {rate!r}")
+
+
+def rate_unit(units: Units, is_angle: bool, rate: int) -> str:
+    """Return the unit of a distance or angle, or of one of its rates."""
+    per_time = ("", f"/{units.time_symbol}", f"/{units.time_symbol}²")[rate]
+    return ("rad" if is_angle else units.length_symbol) + per_time

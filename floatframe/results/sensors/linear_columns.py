@@ -1,0 +1,28 @@
+"""Columns of linear outputs by the names of those that are measured over time."""
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.small_motions.rows import LinearColumns, Rows
+
+__all__ = ["NO_SIZE", "scalar_columns", "vector_linear"]
+
+NO_SIZE = "its size has no slope where the vector is zero"
+
+
+def vector_linear(rows: Rows, value: Array, unit: str, *, prefix: str = "", least: float = 0.0) -> LinearColumns:
+    """Return the columns x, y, z and size of a vector, see `vector_columns`: three rows, its value now, (3,).
+
+    least: what counts as zero beside rounding; the size of such a vector is not linear.
+    """
+    columns = {f"{prefix}{axis}": rows[k] for k, axis in enumerate("xyz")}
+    units = dict.fromkeys((*columns, f"{prefix}size"), unit)
+    size = float(np.linalg.norm(value))
+    if size <= least:
+        return LinearColumns(columns, units, {f"{prefix}size": NO_SIZE})
+    return LinearColumns(columns | {f"{prefix}size": rows.turned(value / size)}, units, {})
+
+
+def scalar_columns(columns: dict[str, Rows], units: dict[str, str]) -> LinearColumns:
+    """Return columns of one row each, all of them linear."""
+    return LinearColumns(columns, units, {})

@@ -1,0 +1,74 @@
+"""Linear rows over small motions: what an output is of them.
+
+    y = X x + V x' + A x'' + W dw
+
+with x = (xi, s): the small motions of all bodies, and of what inputs move (bases, drives), and dw the change of the
+wrenches of the connections; all in axes that turn with a steady rotation.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.rotations import tilde
+
+__all__ = ["LinearColumns", "Rows", "joined"]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of outputs, each (n_rows, ...)."""
+
+    x: Array  #: by small motions, (n_rows, n_x)
+    v: Array  #: by their rates, (n_rows, n_x)
+    a: Array  #: by their second rates, (n_rows, n_x)
+    w: Array  #: by wrenches, (n_rows, n_w)
+
+    def __add__(self, other: "Rows") -> "Rows":
+        """Return the sum, row by row."""
+        return Rows(self.x + other.x, self.v + other.v, self.a + other.a, self.w + other.w)
+
+    def __sub__(self, other: "Rows") -> "Rows":
+        """Return the difference, row by row."""
+        return Rows(self.x - other.x, self.v - other.v, self.a - other.a, self.w - other.w)
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.x)
+
+    def __getitem__(self, chosen: int | slice | list[int]) -> "Rows":
+        """Return some of the rows."""
+        part = slice(chosen, chosen + 1) if isinstance(chosen, int) else chosen
+        return Rows(self.x[part], self.v[part], self.a[part], self.w[part])
+
+    def turned(self, A: Array) -> "Rows":
+        """Return A times the rows, (len(A), ...)."""
+        A = np.atleast_2d(A)
+        return Rows(A @ self.x, A @ self.v, A @ self.a, A @ self.w)
+
+    def crossed(self, a: Array) -> "Rows":
+        """Return the rows of y × a for a constant vector a, of three rows y."""
+        return self.turned(-tilde(np.asarray(a)))
+
+    @property
+    def rate(self) -> "Rows":
+        """The rows of y', of rows of motions alone."""
+        assert not self.a.any()  # third rates are no part of small motions
+        assert not self.w.any()
+        return Rows(np.zeros_like(self.x), self.x, self.v, self.w)
+
+
+def joined(parts: list[Rows]) -> Rows:
+    """Return rows one below the other."""
+    return Rows(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("x", "v", "a", "w")))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearColumns:
+    """What a sensor sees of small motions: named columns as those of its measurement, each with its unit."""
+
+    columns: Mapping[str, Rows]  #: one row each
+    units: Mapping[str, str]
+    not_linear: Mapping[str, str]  #: the other columns of its measurement, and why they are not linear here

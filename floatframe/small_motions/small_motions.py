@@ -1,0 +1,188 @@
+"""Small motions about an equilibrium or a steady rotation, as sensors and channels ask about them.
+
+Unknowns x = (xi, s): for each body translation and rotation of its frame in body axes and its modal coordinates, in the
+frame in which the engine moves it, then the motions s that inputs prescribe: of bases (the ground side of connections)
+and of drives. Everything is said in axes that turn with the steady motion and coincide with ground axes now: there a
+point p = p_0 + J x has the absolute velocity p' + Omega × p and the acceleration p'' + 2 Omega × p' + Omega × (Omega ×
+p).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from floatframe.compiling.file_frames import small_motions_of_file
+from floatframe.compiling.markers import MarkerData, marker_pose, n_q_of
+from floatframe.compiling.system import CompiledSystem
+from floatframe.errors import ModelError
+from floatframe.kernels.work import Work
+from floatframe.results.trajectory import Trajectory
+from floatframe.rotations import rotation_matrix, tilde
+from floatframe.small_motions.joint_rates import coordinate_rows
+from floatframe.small_motions.marker_jacobian import marker_jacobian
+from floatframe.small_motions.rows import Rows
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["BaseColumn", "SmallMotions", "SmallPlace"]
+
+
+@dataclass(frozen=True, eq=False)
+class BaseColumn:
+    """What an input prescribes: a rigid motion of the ground side of some connections; a drive moves none of them."""
+
+    moved: frozenset[str] = frozenset()  #: names of connections
+    translation: Array | None = None  #: ground axes, (3,); None: zero
+    rotation: Array | None = None  #: rotation vector, ground axes, (3,); None: zero
+    about: Array | None = None  #: a point that the rotation leaves where it is, ground axes, (3,); None: the origin
+
+    def at(self, point: Array) -> Array:
+        """Return translation and rotation at a point, ground axes, (6,)."""
+        d = np.zeros(3) if self.translation is None else self.translation
+        turn = np.zeros(3) if self.rotation is None else self.rotation
+        arm = point - (np.zeros(3) if self.about is None else self.about)
+        return np.concatenate([d + np.cross(turn, arm), turn])
+
+
+@dataclass(frozen=True, eq=False)
+class SmallPlace:
+    """A place with axes, and how it moves."""
+
+    position: Array  #: ground axes, (3,)
+    axes: Array  #: columns, (3, 3)
+    moved: Rows  #: its translation, three rows
+    turned: Rows  #: rotation of its axes, ground axes, three rows
+
+
+@dataclass(frozen=True, eq=False)
+class SmallMotions:
+    """A steady motion, and the small ones about it."""
+
+    system: System
+    compiled: CompiledSystem
+    work: Work  #: evaluated at it
+    state: State  #: of the engine
+    omega: Array  #: of the steady rotation, ground axes, (3,) [rad/s]
+    now: Trajectory  #: the steady motion as a motion of one time: what sensors measure now
+    bases: tuple[BaseColumn, ...] = ()  #: of each input
+
+    @property
+    def n_u(self) -> int:
+        """Number of small motions of the bodies."""
+        return int(self.compiled.model.bodies.u0[-1])
+
+    @property
+    def n_x(self) -> int:
+        """Number of small motions of bodies and inputs."""
+        return self.n_u + len(self.bases)
+
+    @property
+    def n_w(self) -> int:
+        """Number of wrench components."""
+        return int(self.compiled.model.connections.w0[-1])
+
+    @property
+    def is_turning(self) -> bool:
+        """Whether the steady motion turns."""
+        return bool(self.omega.any())
+
+    @property
+    def speed_scale(self) -> float:
+        """The largest speed of the steady motion; zero at rest [1/s times length]."""
+        return float(np.linalg.norm(self.omega)) * self.compiled.length
+
+    def by_motion(self, x: Array) -> Rows:
+        """Return rows of small motions, given by those of the bodies (n, n_u) or of all (n, n_x)."""
+        x = np.atleast_2d(x)
+        whole = np.zeros((len(x), self.n_x))
+        whole[:, : x.shape[1]] = x
+        zero = np.zeros_like(whole)
+        return Rows(whole, zero, zero, np.zeros((len(x), self.n_w)))
+
+    def by_wrench(self, rows: Sequence[int] | slice, factor: float = 1.0) -> Rows:
+        """Return rows of components of the wrenches by a factor."""
+        w = factor * np.eye(self.n_w)[rows]
+        zero = np.zeros((len(w), self.n_x))
+        return Rows(zero, zero, zero, w)
+
+    def velocity(self, rows: Rows) -> Rows:
+        """Return the absolute velocity of a place whose translation is given."""
+        return rows.rate + rows.turned(tilde(self.omega))
+
+    def acceleration(self, rows: Rows) -> Rows:
+        """Return the absolute acceleration of a place whose translation is given."""
+        return self.velocity(self.velocity(rows))
+
+    def pose(self, end: MarkerData) -> tuple[Array, Array]:
+        """Return position (3,) and axes (3, 3) of a marker, ground axes."""
+        return marker_pose(end, self.state, n_q_of(self.system))
+
+    def place(self, end: MarkerData, connection: str = "") -> SmallPlace:
+        """Return a marker and how it moves; one on the ground with the bases of its connection."""
+        position, axes = self.pose(end)
+        x = np.zeros((6, self.n_x))
+        if end.body >= 0:
+            x[:, self.unknowns(end.body)] = marker_jacobian(self.compiled, self.work, end)
+        else:
+            for k, base in enumerate(self.bases):
+                if connection in base.moved:
+                    x[:, self.n_u + k] = base.at(position)
+        rows = self.by_motion(x)
+        return SmallPlace(position, axes, rows[:3], rows[3:])
+
+    def unknowns(self, body: int) -> slice:
+        """Return which small motions are those of a body."""
+        u0 = self.compiled.model.bodies.u0
+        return slice(int(u0[body]), int(u0[body + 1]))
+
+    def of_file(self, name: str) -> tuple[Rows, Array]:
+        """Return the small motions of a body in the frame of its file, (6 + n_q) rows, and R_GB of that frame."""
+        i = self.compiled.body_names.index(name)
+        x = np.zeros((6 + int(self.compiled.model.bodies.n_q[i]), self.n_x))
+        x[:, self.unknowns(i)] = small_motions_of_file(self.compiled, self.state.q)[i]
+        return self.by_motion(x), rotation_matrix(self.now.body(name).p[0])
+
+    def coordinates(self, name: str) -> Rows:
+        """Return the modal coordinates of a body in the frame of its file, n_q rows."""
+        return self.of_file(name)[0][6:]
+
+    def frame_place(self, name: str) -> SmallPlace:
+        """Return the frame of a body's file and how it moves."""
+        rows, R = self.of_file(name)
+        return SmallPlace(self.now.body(name).r[0], R, rows[:3].turned(R), rows[3:6].turned(R))
+
+    def joint_coordinate(self, joint: str, coordinate: str, where: str) -> Rows:
+        """Return the change of a joint coordinate, one row; `ModelError` with the nearest name if there is none."""
+        rows = coordinate_rows(self.system, self.compiled, self.work, self.state)
+        name = f"{joint}.{coordinate}"
+        if name not in rows:
+            raise ModelError(f"{where}: no joint coordinate {quoted(name)}{nearest(name, list(rows))}")
+        x = np.zeros(self.n_x)
+        x[: self.n_u] = rows[name]
+        for k, base in enumerate(self.bases):
+            if joint in base.moved:  # a motion of both sides leaves it as it is
+                x[self.n_u + k] = -rows[name] @ self.rigid(base)
+        return self.by_motion(x)
+
+    def rigid(self, base: BaseColumn) -> Array:
+        """Return the small motions of all bodies that move as a base does, (n_u,)."""
+        x = np.zeros(self.n_u)
+        for i, (r, R) in enumerate(zip(self.work.state.r, self.work.state.R, strict=True)):
+            u0 = self.unknowns(i).start
+            motion = base.at(r)
+            x[u0 : u0 + 3], x[u0 + 3 : u0 + 6] = R.T @ motion[:3], R.T @ motion[3:]
+        return x
+
+    def wrench(self, connection: str) -> slice:
+        """Return where the wrench of a connection stands among all."""
+        c = self.compiled.connection_names.index(connection)
+        w0 = self.compiled.model.connections.w0
+        return slice(int(w0[c]), int(w0[c + 1]))
+
+    @property
+    def largest_wrench(self) -> float:
+        """The largest component of all wrenches now: what counts as none beside it is rounding."""
+        return float(np.abs(self.work.state.w).max(initial=0.0))
