@@ -26,7 +26,6 @@ from floatframe import (
     integrate,
 )
 from floatframe.analyses import (
-    Channel,
     campbell,
     linearize,
     root_locus,
@@ -40,6 +39,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.mechanisms import slider_crank
 from floatframe.mechanisms.rods import slender_inertia
 from floatframe.results.place_motion import interface_motion
+from floatframe.results.sensors import Channel
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
 from floatframe.start.newton_equations import displaced
 from floatframe.state import State
