@@ -1,5 +1,7 @@
 """Channels at a position of a flexible body: its nearest kept node, as sensors have it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -40,6 +42,16 @@ def test_a_node_at_an_interface_moves_and_is_pushed_as_the_interface(body, weigh
     assert_allclose(node.C, interface.C, rtol=0, atol=1e-9 * np.abs(interface.C).max())
 
 
-def test_nodes_keep_no_rotations(body):
-    with pytest.raises(ModelError, match="nodes keep no rotations: take an interface of flexible body 'bar'"):
-        linearize(held(body, 0.0), outputs=[Channel("turn", Marker("bar", position=(0, 0, 0)), (0, 1, 0), "rotation")])
+def test_a_kept_rotation_at_an_interface_is_that_of_the_interface(body):
+    end, system = body.interfaces[1], held(body, 0.0)
+    position = body.frame.origin + body.frame.axes @ end.position
+    turn = [Channel("turn", marker, (0, 1, 0), "rotation") for marker in (
+        Marker("bar", position=position), Marker("bar", end.name))]  # fmt: skip
+    node, interface = (linearize(system, inputs=[each], outputs=[each]) for each in turn)
+    assert_allclose(node.B, interface.B, rtol=0, atol=1e-9 * np.abs(interface.B).max())
+
+
+def test_nodes_without_rotations_say_so(body):
+    bare = replace(body, kept=None)
+    with pytest.raises(ModelError, match="of flexible body 'bar' keeps no rotation; keep it"):
+        linearize(held(bare, 0.0), outputs=[Channel("turn", Marker("bar", position=(0, 0, 0)), (0, 1, 0), "rotation")])
