@@ -87,7 +87,7 @@ def is_name(dotted):
     return False
 
 
-NAME = r"(?:Mac|Mc)?[A-ZÉ][a-zéüø]+(?:-[A-ZÉ]?[a-zéüø]+)*"
+NAME = r"(?:Mac|Mc|O')?[A-ZÉ][a-zéüø]+(?:-[A-ZÉ]?[a-zéüø]+)*"
 CITED = re.compile(rf"\b({NAME})(?:(?:, | & | and |, & ){NAME})*(?: et al\.?)?(?:,? \(|,? )((?:19|20)\d\d)\b")
 MONTHS = "January February March April May June July August September October November December"
 PROGRAMS = {"Abaqus", "Nastran", "Ansys", "Adams"}  #: whose versions are years
@@ -99,7 +99,7 @@ def sources():
     """Return (family name of the first author, year) of the bibliography."""
     text = (ROOT / "docs" / "bibliography.md").read_text(encoding="utf-8")
     return {
-        (plain(name), year) for name, year in re.findall(r"^([^\W\d_][\w-]*)[^\n]*?\((\d{4})\)\.", text, re.MULTILINE)
+        (plain(name), year) for name, year in re.findall(r"^([^\W\d_][\w'-]*)[^\n]*?\((\d{4})\)\.", text, re.MULTILINE)
     }
 
 

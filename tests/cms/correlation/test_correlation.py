@@ -343,7 +343,7 @@ def test_file_command_page_and_updated_job(folder, specimen, rows, tmp_path, cap
         ('path = "materials.steel.young"', 'path = "materials.stel.young"'): "'steel'",
         ("frequency_spread = 0.002", "frequency_spread = 0"): "above 0",
         ('file = "modes.unv"', 'file = "modes.unvv"'): "modes.unvv",
-        ('job = "bar.toml"', 'body = "bar.h5"'): "bar.h5",
+        ('job = "bar.toml"', 'body = "bar.h5"'): "give job instead of body",
     }.items():
         bad = write(tmp_path / "bad.toml", FILE.replace(*change))
         assert run(monkeypatch, ["correlate", str(bad)]) == 2
