@@ -29,7 +29,7 @@ def is_mbsim(path: Path, head: bytes) -> bool:
     try:
         with h5py.File(path, "r") as file:
             return all(name in file for name in NEEDED[1:4])
-    except OSError:
+    except (OSError, RuntimeError):  # the second of damaged tables inside
         return False
 
 

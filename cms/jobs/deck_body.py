@@ -313,7 +313,7 @@ def _pressure(body: FEBody, joined: "Joined", mesh: "Mesh", name: str, table: An
     alone = replace(
         body, M=_empty(len(dofs)), K=_empty(len(dofs)), D=None, nodes=mesh.nodes, dofs=dofs,
         surface=np.zeros((0, 3), np.int64), element_model=None, recovery=None, load_cases=(), stress_points=None,
-        node_volumes=None, interfaces=(), numbering=Numbering(),
+        node_volumes=None, interfaces=(), numbering=Numbering(), kept=np.zeros(0, np.int64),
     )  # fmt: skip
     f = pressure_load(alone, mesh, name, FaceGroup(table.faces[0], tuple(table.faces[1:])), table.pressure).f.reshape(
         -1, 3

@@ -78,7 +78,8 @@ class CouplingSection(Table):
 
     node: Name = Field(description="the name of a group that holds one node, which follows")
     members: dict[str, MemberWeight] = Field(
-        description="a table {group = weight of each of its nodes}: one number, for translations, or a list of six"
+        min_length=1,
+        description="a table {group = weight of each of its nodes}: one number, for translations, or a list of six",
     )
     components: Components = Field(ALL, description="components of the node that follow, ux to rz; default: all")
 

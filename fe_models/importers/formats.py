@@ -24,7 +24,7 @@ FORMATS = (
         reads=True,
         key="cms job",
         tried="decks of MSC Nastran 2020",
-        lost="layers, tapered beams, released ends, RBE1, scalar points: each listed with its count",
+        lost="smeared layers, tapered beams, released ends, RBE1, scalar points: each listed with its count",
     ),
     FileFormat(
         "CDB",
@@ -44,7 +44,7 @@ FORMATS = (
         reads=True,
         key="cms job",
         tried="decks of ccx 2.20",
-        lost="contact, nonlinear and anisotropic materials, layers, steps: each listed with its count",
+        lost="contact, nonlinear materials, steps: each listed with its count",
     ),
     FileFormat(
         "bulk data",

@@ -1,6 +1,6 @@
 """The campaign runs every case in a worker process with a limit of time, and counts what became of it.
 
-    python -m tests --campaign                     everything: 1000 bad inputs, 100 kills
+    python -m tests --campaign                     everything: 1400 bad inputs, 100 kills
     python -m tests --campaign jobs 147            one case, its verdict in words
 
 A hang is a case beyond `LIMIT` seconds; a worker that ends is a traceback of its case. The exit code is 0 if there is
@@ -30,6 +30,9 @@ FAMILIES: dict[str, tuple[str, int]] = {  # what it is -> the function of a case
     "heads": ("tests.campaign.files:head_case", 90),
     "expressions": ("tests.campaign.expressions:expression_case", 100),
     "commands": ("tests.campaign.commands:command_case", 100),
+    "decks": ("tests.campaign.imports:deck_case", 150),
+    "matrices": ("tests.campaign.imports:matrix_case", 150),
+    "bodies": ("tests.campaign.imports:body_case", 100),
     "kills": ("tests.campaign.kills:kill_case", 100),
 }
 LIMIT = 60.0  #: seconds of a case

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fe_models.errors import MatrixError
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import SYMMETRY_DEFECT, Array, IntArray
 from fe_models.importers.ansys_matrices.records import AnsysFile
 
 __all__ = ["SCALAR", "AnsysSuperelement", "read_sub"]
@@ -96,6 +96,14 @@ def read_sub(path: str | Path) -> AnsysSuperelement:
     mass = float(file.reals(int(header[MASS_AT]), "mass and centre")[0]) if header[MASS_AT] > 0 else None
     if mass and M is not None:
         _require_mass(where, M, dofs, mass)  # (4)
+    for kind, matrix in matrices.items():
+        defect = np.abs(matrix - matrix.T).max()
+        if not defect <= SYMMETRY_DEFECT * np.abs(matrix).max():
+            name = {HAS_STIFFNESS: "stiffness", HAS_MASS: "mass", HAS_DAMPING: "damping"}[kind]
+            raise MatrixError(
+                f"{where}: expected a symmetric {name}, got |A - A.T| = {defect:.1e} beside a largest entry of "
+                f"{np.abs(matrix).max():.1e}: the file is damaged"
+            )
     return AnsysSuperelement(
         where, matrices[HAS_STIFFNESS], M, matrices.get(HAS_DAMPING), dofs, positions, systems, loads, mass or None
     )

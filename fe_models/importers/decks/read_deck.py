@@ -10,6 +10,7 @@ from fe_models.importers.decks.abaqus.whole_deck import read_abaqus_deck
 from fe_models.importers.decks.ansys.cdb import read_cdb_deck
 from fe_models.importers.decks.deck import Deck
 from fe_models.importers.decks.nastran.whole_deck import read_nastran_deck
+from fe_models.importers.raw_mesh import require_nodes
 
 __all__ = ["DECK_FORMATS", "read_deck"]
 
@@ -55,7 +56,9 @@ def read_deck(path: str | Path, *, program: str | None = None) -> Deck:
     if program is not None and reader is not read_abaqus_deck:
         raise MeshError(f"{where}: program = {program!r} belongs to decks of Abaqus and CalculiX (.inp); leave it out")
     try:
-        return reader(path, data) if program is None else reader(path, data, program=program)
+        deck = reader(path, data) if program is None else reader(path, data, program=program)
+        require_nodes(where, deck.mesh)
+        return deck
     except FeModelsError:
         raise
     except Exception as error:  # whatever a damaged file does to a reader, the user gets one message

@@ -121,7 +121,7 @@ def test_the_job_of_a_deck_of_nastran_has_its_mass_and_its_loads(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("CELAS2,70,5.+3,1,1,2,1", "PCOMP,1,,,,,,,", "1 PCOMP: this card is not known here"),
+        ("CELAS2,70,5.+3,1,1,2,1", "PCOMPG,1,,,,,,,", "1 PCOMPG: this card is not known here"),
         ("RBE2,60,9,123456,5,6,7,8", "RBE1,60,9,123456", "1 RBE1: this card is not known here"),
         ("PSOLID,1,9", "PSOLID,2,9", "1 CHEXA: property 1 is not known here"),
         ("CONM2", "CONM1", "1 CONM1: this card is not known here"),
@@ -142,6 +142,11 @@ def test_cards_with_mass_or_stiffness_are_refused_by_name(tmp_path, old, new, wo
     deck = read_deck(deck_of(tmp_path, DECK.replace(old, new)))
     with pytest.raises(ValueError, match=words):
         deck.ledger.require_whole()
+
+
+def test_a_mean_motion_of_no_grids_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="expected weights, components and grids, got none"):
+        read_deck(deck_of(tmp_path, DECK.replace("RBE2,60,9,123456,5,6,7,8", "RBE3,60,,9,123456")))
 
 
 @pytest.mark.parametrize(

@@ -126,6 +126,7 @@ READERS = {FULL: read_full, SUB: read_sub}
         (SUB, 105 + 10, 0, "expected a stiffness"),
         (SUB, 105 + 21, 2**30, "truncated"),
         (SUB, 105 + 21, 6108 + 495, "says a mass of 2.1195e"),  # one record on: mass in place of stiffness
+        (SUB, 6108 + 2 + 201, 0x43000000, "expected a symmetric stiffness"),  # K[0, 100]
         (SUB, 930, -5, "expected numbers from 1"),
         (SUB, 930, 1910, "two rows are the same dof"),
         (SUB, 924, 20, "labels 1 to 6"),

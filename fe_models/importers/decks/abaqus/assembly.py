@@ -16,7 +16,9 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from fe_models.importers.abaqus_deck import DeckBlock
 
-__all__ = ["flat_assembly"]
+__all__ = ["TURNED", "flat_assembly"]
+
+TURNED = "TURNED WITH ITS INSTANCE"  #: parameter added here: the nine numbers of R, of equations in its axes
 
 SETS = {"NSET": "NSET", "ELSET": "ELSET", "NODE": "NSET", "ELEMENT": "ELSET"}  #: keyword -> parameter with its name
 NAMES = (
@@ -140,15 +142,52 @@ def _placed(block: DeckBlock, instance: str, offset: int, R: Array, t: Array) ->
             x = R @ np.array([float(word or 0) for word in [*words[1:4], "0", "0", "0"][:3]]) + t
             lines.append(", ".join([words[0], *(repr(float(value)) for value in x)]))
         return replace(block, parameters=parameters, lines=lines)
-    if block.keyword in ("EQUATION", "MPC") and (offset or not np.array_equal(R, np.eye(3))):
-        raise MeshError(
-            f"{block.place}: *{block.keyword} inside a part of which instance {quoted(instance)} is turned or not the "
-            "first: its numbers and directions are not taken to instances; write it into *ASSEMBLY"
-        )
+    if block.keyword == "EQUATION":
+        turned = {} if np.array_equal(R, np.eye(3)) else {TURNED: " ".join(repr(float(x)) for x in R.ravel())}
+        return replace(block, parameters=parameters | turned, lines=_equations(block, instance, offset))
+    if block.keyword == "MPC":
+        return replace(block, parameters=parameters, lines=_mpcs(block, instance, offset, bool(np.any(t))))
     if block.keyword not in SETS and block.keyword in ("SURFACE", "BOUNDARY", "NODAL THICKNESS"):
         lines = [_prefixed(line, instance, offset) for line in block.lines]
         return replace(block, parameters=parameters, lines=lines)
     return replace(block, parameters=parameters)
+
+
+def _equations(block: DeckBlock, instance: str, offset: int) -> list[str]:
+    """Return the lines of *EQUATION, a line each for the number of terms and for every term."""
+    words = [word.strip() for line in block.lines for word in line.rstrip(", ").split(",")]
+    lines, at = [], 0
+    while at < len(words):
+        n = int(words[at]) if words[at].isdigit() else 0
+        if not 0 < n <= (len(words) - at - 1) // 3:
+            raise MeshError(
+                f"{block.place}: *EQUATION: expected a number of terms, then node, component, coefficient of each; got "
+                f"{', '.join(words[at : at + 4])}"
+            )
+        rows = [words[k : k + 3] for k in range(at + 1, at + 1 + 3 * n, 3)]
+        lines += [str(n), *(", ".join([_named(node, instance, offset), c, value]) for node, c, value in rows)]
+        at += 1 + 3 * n
+    return lines
+
+
+def _mpcs(block: DeckBlock, instance: str, offset: int, is_moved: bool) -> list[str]:
+    """Return the lines of *MPC: a kind, unless the line goes on, and nodes or sets."""
+    lines = []
+    for line in block.lines:
+        kind, *words = [word.strip() for word in line.rstrip(", ").split(",")]
+        if kind.upper() == "MEANROT" and is_moved:
+            raise MeshError(
+                f"{block.place}: *MPC, MEANROT inside a part of which instance {quoted(instance)} is moved: its last "
+                "node says an axis by its coordinates, which move along; write it into *ASSEMBLY"
+            )
+        head = _named(kind, instance, offset) if kind.isdigit() and kind != "0" else kind
+        lines.append(", ".join([head, *(_named(word, instance, offset) for word in words)]))
+    return lines
+
+
+def _named(word: str, instance: str, offset: int) -> str:
+    """Return a node number or set of the part as it is called in the deck."""
+    return str(int(word) + offset) if word.isdigit() else f"{instance}.{word}" if word else word
 
 
 def _turned_points(block: DeckBlock, R: Array, t: Array) -> str:
@@ -163,7 +202,7 @@ def _prefixed(line: str, instance: str, offset: int) -> str:
     """Return a line whose first word is a set or a number of the part."""
     first, comma, rest = line.partition(",")
     word = first.strip()
-    return f"{int(word) + offset if word.isdigit() else f'{instance}.{word}'}{comma}{rest}"
+    return f"{_named(word, instance, offset)}{comma}{rest}"
 
 
 def _numbered(block: DeckBlock, offset: int, instance: str) -> DeckBlock:

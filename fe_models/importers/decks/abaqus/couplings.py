@@ -5,6 +5,7 @@ from scipy.linalg import qr
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
+from fe_models.importers.decks.abaqus.assembly import TURNED
 from fe_models.importers.decks.abaqus.draft import Draft
 from fe_models.importers.decks.abaqus.elements import faces_of
 from fe_models.importers.decks.abaqus.multipoint import LINEARISED, read_linearised
@@ -43,6 +44,8 @@ def read_coupling(here: str, block: DeckBlock, draft: Draft) -> None:
 def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
     """Lines: number of terms; then node, component, coefficient of each, up to four a line."""
     words = [word.strip() for line in block.lines for word in line.rstrip(", ").split(",")]
+    turn = block.parameters.get(TURNED)
+    axes = None if turn is None else np.array(turn.split(), dtype=float).reshape(3, 3).T
     at = 0
     while at < len(words):
         n = int(words[at])
@@ -58,27 +61,29 @@ def _equations(here: str, block: DeckBlock, draft: Draft) -> None:
                 break
             terms.append((int(nodes[0]), int(component) - 1, float(coefficient)))
         else:
-            draft.raw_equations.append(terms)
+            draft.raw_equations.append((terms, axes))
 
 
 def equations_in_basic_axes(draft: Draft) -> None:
     """Make the equations of a deck those of its nodes in basic axes.
 
-    (1) a component of a node with axes R of its own is R[c] · u; terms of the same component are added
+    (1) a component of a node with axes R of its own, or those of its instance, is R[c] · u; terms of the same component
+        are added
     (2) equations of which the first terms are components of one such node are solved together for as many of its
         components in basic axes, those that are determined best, so that these give way
     """
     together: dict[tuple[int, int], list[dict[tuple[int, int], float]]] = {}
-    for k, terms in enumerate(draft.raw_equations):
+    for k, (terms, of_instance) in enumerate(draft.raw_equations):
         node, component, _ = terms[0]
         row: dict[tuple[int, int], float] = {}
         for other, c, a in terms:
             first = c - c % 3
-            axes = draft.transformed.get(other)
+            axes = draft.transformed.get(other, of_instance)
             parts = [(c, 1.0)] if axes is None else [(first + j, float(axes[c % 3, j])) for j in range(3)]
             for j, r in parts:
                 row[other, j] = row.get((other, j), 0.0) + a * r  # (1)
-        key = (node, component // 3) if node in draft.transformed else (-1 - k, 0)
+        is_turned = node in draft.transformed or of_instance is not None
+        key = (node, component // 3) if is_turned else (-1 - k, 0)
         together.setdefault(key, []).append(row)
     for (node, block), rows in together.items():
         if node < 0:

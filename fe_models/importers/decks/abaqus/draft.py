@@ -64,7 +64,8 @@ class Draft:
     springs: list[DeckSpring] = field(default_factory=list)
     rigid: list[RigidGroup] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)
-    raw_equations: list[list[tuple[int, int, float]]] = field(default_factory=list)  #: in the axes of their nodes
+    #: terms in the axes of their nodes, and the axes of nodes without own ones as rows (None: basic axes)
+    raw_equations: list[tuple[list[tuple[int, int, float]], Array | None]] = field(default_factory=list)
     equations: list[Equation] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
     points: dict[str, PointElements] = field(default_factory=dict)  #: by set in upper case

@@ -202,6 +202,10 @@ def _mean(model: NastranModel, card: Card) -> None:
         why = "with UM, or with weights of single components along axes of their own (CD)"
         model.ledger.refuse("RBE3", why)
         return
+    if not weights:
+        raise MeshError(
+            f"{card.where} {card.text(1)}: expected weights, components and grids, got none; it is cut short"
+        )
     name = f"rbe3_{card.text(1)}"
     alike: dict[tuple[float, ...], list[int]] = {}
     for number, six in weights.items():

@@ -8,6 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.importers.bulk_data.cards import Card
 from fe_models.importers.decks.deck import DeckMass, DeckMaterial, DeckSpring, LineSection, ShellSection, SolidSection
+from fe_models.importers.decks.nastran.layups import layered_shells, sheet_material
 from fe_models.importers.decks.nastran.model import NastranModel
 
 __all__ = ["BARS", "SHELLS", "SOLIDS", "read_sections"]
@@ -23,7 +24,11 @@ def read_sections(model: NastranModel) -> None:
     """Take materials, then every kind of element with its property."""
     for card in model.of("MAT1"):
         _material(model, card)
-    properties = {card.integer(1): card for card in model.of("PSOLID", "PSHELL", "PBAR", "PBARL", "PBEAM", "PBEAML")}
+    for card in model.of("MAT8"):
+        sheet_material(model, card)
+    properties = {
+        card.integer(1): card for card in model.of("PSOLID", "PSHELL", "PCOMP", "PBAR", "PBARL", "PBEAM", "PBEAML")
+    }
     rods = {card.integer(1): card for card in model.of("PROD")}
     by_property: dict[int, list[Card]] = {}
     for card in model.of(*SOLIDS, *SHELLS, *BARS):
@@ -70,6 +75,9 @@ def _solids(model: NastranModel, known: Card, cards: list[Card]) -> None:
 
 def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     pid = known.text(1)
+    if known.name == "PCOMP":
+        layered_shells(model, known, cards, _OFFSET_FIELD)
+        return
     if known.name != "PSHELL":
         model.ledger.refuse(cards[0].name, f"property {pid} is {known.name}", count=len(cards))
         return
@@ -77,6 +85,11 @@ def _shells(model: NastranModel, known: Card, cards: list[Card]) -> None:
     if not is_plain or not known.text(3):
         why = f"PSHELL {pid} is no homogeneous plate of one thickness (MID1 = MID2, 12I/T³ = 1)"
         model.ledger.refuse("PSHELL", why, count=len(cards))
+        return
+    if isinstance(getattr(model.materials.get(known.text(2)), "young", None), tuple):
+        model.ledger.refuse(
+            "PSHELL", f"property {pid}: of an orthotropic material; write it as PCOMP", count=len(cards)
+        )
         return
     thickness = known.real(3)
     offsets: dict[float, list[Card]] = {}
@@ -230,8 +243,9 @@ def _rod(model: NastranModel, card: Card, rods: dict[int, Card]) -> None:
             return
         nodes, mid, A, J, nsm = (3, 4), known.text(2), known.real(3), known.real(4, 0.0), known.real(6, 0.0)
     material = model.materials.get(mid)
-    if material is None or material.young is None or material.poisson is None:
-        model.ledger.refuse(card.name, f"material {mid} is not known here")
+    E, nu = (None, None) if material is None else (material.young, material.poisson)
+    if material is None or not isinstance(E, float) or not isinstance(nu, float):
+        model.ledger.refuse(card.name, f"material {mid} is not known here, or not isotropic")
         return
     numbers = [card.integer(k) for k in nodes]
     ends = [model.point(card, number) for number in numbers]
@@ -242,9 +256,6 @@ def _rod(model: NastranModel, card: Card, rods: dict[int, Card]) -> None:
     y = y / np.linalg.norm(y)
     rows = (x, y, np.cross(x, y))
     triad = tuple((float(a[0]), float(a[1]), float(a[2])) for a in rows)
-    E, nu = material.young, material.poisson
-    assert isinstance(E, float)
-    assert isinstance(nu, float)
     G = E / (2 * (1 + nu))
     names = [model.group(card, [number]) for number in numbers]
     stiffness = (E * A / L, 0.0, 0.0, G * J / L, 0.0, 0.0)

@@ -415,7 +415,40 @@ def test_a_set_of_an_instance_is_not_one_of_the_same_name_elsewhere(tmp_path):
         deck_of(tmp_path, PART.replace("*END ASSEMBLY", surface).replace("*END ASSEMBLY", tie))
 
 
-@pytest.mark.parametrize("lines", ["*EQUATION\n2\n1, 1, 1., 2, 1, -1.\n", "*MPC\nTIE, 1, 2\n"])
-def test_equations_of_a_part_are_refused_where_its_instances_would_misread_them(tmp_path, lines):
-    with pytest.raises(MeshError, match=r"inside a part of which instance 'Bar-2' is turned or not the first"):
-        deck_of(tmp_path, PART.replace("*END PART", f"{lines}*END PART"))
+def test_equations_and_couplings_of_parts_are_those_of_their_instances(tmp_path):
+    """Bar-2 is turned by 90 degrees about z: what is x in the part is y there, and y is -x."""
+    lines = "*EQUATION\n2\n1, 1, 1., tip,\n1, -2.\n3\n1, 2, 1., 2, 3, 4., 3, 1, 5.\n*MPC\nPIN, 2, 3\n"
+    deck = deck_of(tmp_path, PART.replace("*END PART", lines + "*END PART"))
+    terms = [equation.terms for equation in deck.equations]
+    pins = [each for each in terms if each[0][0] in ("node_3", "node_13", "node_2", "node_12")]
+    assert sorted({name for each in pins for name, _, _ in each}) == ["node_12", "node_13", "node_2", "node_3"]
+    assert len(pins) == 6
+    first, second, *turned = [each for each in terms if each not in pins]
+    assert first == (("node_1", 0, 1.0), ("node_4", 0, -2.0))
+    assert second == (("node_1", 1, 1.0), ("node_2", 2, 4.0), ("node_3", 0, 5.0))
+    rows = [{term[:2]: term[2] / each[0][2] for term in each} for each in turned]
+    expected = [
+        {("node_11", 1): 1.0, ("node_14", 1): -2.0},
+        {("node_11", 0): 1.0, ("node_12", 2): -4.0, ("node_13", 1): -5.0},
+    ]
+    for row, known in zip(sorted(rows, key=len), expected, strict=True):
+        assert row == pytest.approx(known, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("*EQUATION\n3\n1, 1, 1., 2, 1, -1.\n", "expected a number of terms"),
+        ("*EQUATION\ntip, 1, 1.\n", "expected a number of terms"),
+        ("*MPC\nMEANROT, 1, 1, 1, 2, 2, 2, 3\n", "instance 'Bar-2' is moved"),
+    ],
+)
+def test_constraints_of_parts_that_cannot_be_placed_are_refused(tmp_path, lines, words):
+    with pytest.raises(MeshError, match=words):
+        deck_of(tmp_path, PART.replace("*END PART", lines + "*END PART"))
+
+
+@pytest.mark.parametrize("word", ["nan", "-inf", "1e999"])
+def test_coordinates_that_are_no_numbers_are_refused(tmp_path, word):
+    with pytest.raises(MeshError, match="expected finite coordinates"):
+        deck_of(tmp_path, DECK.replace("4, 0, 1, 0", f"4, {word}, 1, 0"))
