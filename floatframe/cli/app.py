@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli import analyses, cosimulation, driven, linear, shake, sweep
+from floatframe.cli import analyses, cosimulation, driven, linear, shake, spectra, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -317,8 +317,15 @@ def plot_command(
     file: ResultsFile,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to write (.png, .svg, .pdf).")] = None,
     sensors: Annotated[
-        list[str], typer.Option("--sensor", "-s", help="Only this sensor, sensor.column or joint.coordinate.")
+        list[str],
+        typer.Option("--sensor", "-s", help="Only this sensor, sensor.column or joint.coordinate; * and ? are wild."),
     ] = [],  # noqa: B006
+    kind: Annotated[
+        str,
+        typer.Option("--as", help="Spectra: psd, amplitude, octave, third-octave, orders, waterfall; default: time."),
+    ] = "",
+    resolution: Annotated[float | None, typer.Option(help="Of spectra: distance of lines in Hz.")] = None,
+    rotation: Annotated[str, typer.Option(help="Of orders: sensor with the angle or speed of the rotation.")] = "",
 ) -> None:
     """Plot the motion: positions, energies, elastic displacement, reactions, energy error, joint drift, sensors.
 
@@ -327,6 +334,8 @@ def plot_command(
     Example: floatframe plot swing.h5 -o swing.png
 
     Example: floatframe plot swing.h5 --sensor tip --sensor hinge.angle
+
+    Example: floatframe plot swing.h5 --sensor "tip*" --as psd
     """
     import io
 
@@ -336,14 +345,18 @@ def plot_command(
     from floatframe.pictures.animation import bodies_of
     from floatframe.pictures.overview import plot_overview
     from floatframe.pictures.sensor_plots import plot_sensors
-    from floatframe.results.sensors import measured, measurement_of
+    from floatframe.results.sensor_choice import chosen_measurements
+    from floatframe.results.sensors import measured
     from floatframe.results.trajectory import read_results
 
     trajectory = read_results(file)
     path = output_path(output, file.with_suffix(".png"), ResultsError, overwrite_of=(file, *trajectory.files))
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg", "pdf"):
+    ending = path.suffix.lower().removeprefix(".")
+    if ending not in ("png", "svg", "pdf"):
         raise ResultsError(f"--output {path}: expected a file name that ends in .png, .svg or .pdf")
+    if kind:
+        spectra.plot_as(trajectory, sensors, kind, path, resolution=resolution, rotation=rotation)
+        return
     try:
         bodies = bodies_of(trajectory)
     except CmsError as error:  # the motion can be plotted without its bodies
@@ -354,12 +367,12 @@ def plot_command(
     if sensors:
         if system is None:
             raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
-        chosen = [measurement_of(system, trajectory, name) for name in sensors]
+        chosen = chosen_measurements(system, trajectory, sensors)
         figure = plot_sensors(chosen, title=system.name, time_symbol=system.units.time_symbol)
     else:
         found = [] if system is None else [*measured(system, trajectory).values()]
         figure = plot_overview(trajectory, bodies, found)
-    figure.savefig(picture, format=kind, dpi=130)
+    figure.savefig(picture, format=ending, dpi=130)
     replace_file(path, picture.getvalue())
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
@@ -415,7 +428,13 @@ def animate_command(
 @guarded
 def export_command(
     file: ResultsFile,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="A .csv table, or a .pvd series.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="A .csv table, a .pvd series, or RPC III (.rsp, .drv, .tim).")
+    ] = None,
+    sensors: Annotated[
+        list[str],
+        typer.Option("--sensor", "-s", help="Only this sensor, sensor.column or joint.coordinate; * and ? are wild."),
+    ] = [],  # noqa: B006
     every: Annotated[int, typer.Option(min=1, help="Take every so many output times (.pvd).")] = 1,
 ) -> None:
     """Write a motion for other programs: a table with all sensors, or deformed surfaces with stress for ParaView.
@@ -425,17 +444,28 @@ def export_command(
     Example: floatframe export swing.h5 -o swing.csv
 
     Example: floatframe export swing.h5 -o swing.pvd --every 10
+
+    Example: floatframe export swing.h5 --sensor "wheel*" -o drive.rsp
     """
     from floatframe.errors import ResultsError
     from floatframe.pictures.animation import bodies_of
     from floatframe.results.export import export_csv, export_vtk
+    from floatframe.results.sensor_choice import chosen_measurements
     from floatframe.results.trajectory import read_results
+    from floatframe.signals.rpc_file import write_rpc
 
     trajectory = read_results(file)
     path = output_path(output, file.with_suffix(".csv"), ResultsError, overwrite_of=(file, *trajectory.files))
     bodies = bodies_of(trajectory)
     if path.suffix.lower() == ".csv":
-        export_csv(trajectory, path, bodies, known_system(trajectory))
+        system = known_system(trajectory)
+        if sensors and system is None:
+            raise ResultsError("--sensor: the system file of the run is gone, or the run was made in Python")
+        chosen = None if system is None or not sensors else chosen_measurements(system, trajectory, sensors)
+        export_csv(trajectory, path, bodies, system, chosen=chosen)
+        say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    elif path.suffix.lower() in (".rsp", ".drv", ".tim", ".rpc"):
+        write_rpc(spectra.sensor_signals(trajectory, sensors), path)
         say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
     elif path.suffix.lower() == ".pvd":
         with stages(remaining=True) as clock, clock("surfaces") as advance:
@@ -444,11 +474,12 @@ def export_command(
             )
         say(f"wrote {path} and {len(written) - 1} surfaces in {path.with_suffix('')}")
     else:
-        raise ResultsError(f"--output {path}: expected a file name that ends in .csv or .pvd")
+        raise ResultsError(f"--output {path}: expected a file name that ends in .csv, .pvd, .rsp, .drv or .tim")
 
 
 analyses.register(app)
 linear.register(app)
+spectra.register(app)
 driven.register(app)
 sweep.register(app)
 shake.register(app)

@@ -1,7 +1,7 @@
 """Motions for other programs: a table (CSV), and a series of deformed surfaces for ParaView (PVD and VTU)."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -15,6 +15,7 @@ from floatframe.errors import ResultsError
 from floatframe.results.place_motion import interface_motion
 from floatframe.results.recovery import elastic_displacements, nodal_displacements, require_same_modes
 from floatframe.results.sensors import measured, sensor_of, sensors_of
+from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
 from floatframe.rotations import rotation_matrix
 from floatframe.system import System
@@ -67,14 +68,27 @@ def motion_table(
     return table
 
 
+def sensor_table(trajectory: Trajectory, chosen: Sequence[Measurement]) -> dict[str, Array]:
+    """Return the time and the columns of measurements by name with unit, each (n_t,)."""
+    table: dict[str, Array] = {f"t [{trajectory.units.time_symbol}]": trajectory.t}
+    for measurement in chosen:
+        table |= dict(zip(measurement.headers, measurement.columns.values(), strict=True))
+    return table
+
+
 def export_csv(
     trajectory: Trajectory,
     path: str | os.PathLike[str],
     bodies: Mapping[str, ReducedBody] | None = None,
     system: System | None = None,
+    *,
+    chosen: Sequence[Measurement] | None = None,
 ) -> None:
-    """Write `motion_table` as comma-separated values, with 17 digits, so that every number reads back as it was."""
-    table = motion_table(trajectory, bodies, system)
+    """Write `motion_table` as comma-separated values, with 17 digits, so that every number reads back as it was.
+
+    With `chosen` only the time and what these sensors measured.
+    """
+    table = motion_table(trajectory, bodies, system) if chosen is None else sensor_table(trajectory, chosen)
     names = [f'"{name}"' if "," in name else name for name in table]
     rows = np.column_stack(list(table.values()))
     lines = [",".join(names), *(",".join(repr(float(value)) for value in row) for row in rows)]

@@ -125,7 +125,7 @@ def sensor_of(system: System, name: str) -> Sensor:
 
 
 def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measurement:
-    """Return what "sensor", "joint.coordinate" or one column "sensor.column" measured on a motion of the system.
+    """Return what "sensor", "joint.coordinate" or one column of them, "sensor.column", measured on a motion.
 
     Raises
     ------
@@ -134,7 +134,8 @@ def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measure
     """
     owner, _, column = name.rpartition(".")
     names = [sensor.name for sensor in system.sensors]
-    if name in names or owner not in names:
+    coordinates = [f"{joint.name}.{c}" for joint in system.joints for c in joint.coordinates]
+    if name in names or name in coordinates or owner not in (*names, *coordinates):
         sensor = sensor_of(system, name)
         return measured(system, trajectory, [sensor])[sensor.name]
     whole = measured(system, trajectory, [sensor_of(system, owner)])[owner]

@@ -1,0 +1,69 @@
+"""Which sensors of a system are meant: names, columns, wildcards."""
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ModelError
+from floatframe.results.sensors import measured, measurement_of, sensor_of, sensors_of
+from floatframe.results.sensors.measurement import Measurement
+from floatframe.results.trajectory import Trajectory
+from floatframe.system import System
+
+__all__ = ["chosen_measurements"]
+
+WILD = "*?"
+
+
+def chosen_measurements(system: System, trajectory: Trajectory, names: Sequence[str]) -> list[Measurement]:
+    """Return what the sensors of some names measured, each once, in the order of the names.
+
+    A name is that of a sensor, a column "sensor.column", or a coordinate "joint.coordinate"; * stands for any letters
+    and ? for one, in names of sensors and coordinates, and where none fits in "sensor.column".
+
+    Raises
+    ------
+    ModelError
+        With every name that fits nothing, and the nearest to each.
+    """
+    coordinates = [f"{joint.name}.{c}" for joint in system.joints for c in joint.coordinates]
+    known = [*(sensor.name for sensor in sensors_of(system)), *coordinates]
+    whole: dict[str, Measurement] | None = None
+    found: dict[str, Measurement] = {}
+    missing: list[str] = []
+    for name in names:
+        fitting = [each for each in known if fnmatchcase(each, pattern_of(name))] if is_wild(name, known) else []
+        if fitting:
+            found |= measured(system, trajectory, [sensor_of(system, each) for each in fitting if each not in found])
+            continue
+        if not is_wild(name, known):
+            try:
+                found[name] = measurement_of(system, trajectory, name)
+            except ModelError as error:
+                missing.append(str(error))
+            continue
+        if whole is None:
+            whole = measured(system, trajectory)
+        columns = [
+            Measurement(f"{key}.{column}", one.t, {column: one.columns[column]}, {column: one.units[column]})
+            for key, one in whole.items()
+            for column in one.columns
+            if fnmatchcase(f"{key}.{column}", pattern_of(name))
+        ]
+        if not columns:
+            missing.append(f"{quoted(name)}: no sensor, column or coordinate fits{nearest(name, known)}")
+        found |= {column.sensor: column for column in columns}
+    if missing:
+        lines = missing if len(missing) == 1 else ["", *(f"  {each}" for each in missing)]
+        raise ModelError(f"system {system.name!r}: sensors that are not there: " + "\n".join(lines))
+    return list(found.values())
+
+
+def is_wild(name: str, known: Sequence[str]) -> bool:
+    """Whether a name is a pattern, not a name of the system that holds such a letter."""
+    return any(letter in name for letter in WILD) and name not in known
+
+
+def pattern_of(name: str) -> str:
+    """Return a pattern in which brackets are letters."""
+    return name.replace("[", "[[]")
