@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 __all__ = ["info_command", "info_record", "print_body"]
 
+MOST_SETS = 20  #: that are listed
+
 
 def info_record(file: Path, units: str | None = None, mass_at: str | None = None) -> str:
     """Return what is in a modal file as JSON text, with the effective masses at an interface if one is named."""
@@ -58,6 +60,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
             else []
         ),
         ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
+        *numbering_rows(record["numbering"]),
         ("stress of modes", stress_words(record["stress"])),
         ("geometric stiffness", "spin, accelerations, interface loads" if record["geometric_stiffness"] else "none"),
         *([("quadratic modes", "second order at the kept nodes")] if record["quadratic_modes"] else []),
@@ -80,6 +83,14 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("name", "kind", "nodes>", f"position in B [{length}]"),
         [(i["name"], i["kind"], i["nodes"], vector_words(i["position"], size)) for i in record["interfaces"]],
     )
+    if sets := record["numbering"]["sets"]:
+        print_table(
+            "Sets of the mesh",
+            ("name", "of", "in the mesh>", "kept>"),
+            [(each["name"], each["kind"], each["size"], each["kept"]) for each in sets[:MOST_SETS]],
+        )
+        if len(sets) > MOST_SETS:
+            say(f"and {len(sets) - MOST_SETS} further sets: cms info --json lists all\n")
     force = body.units.force_symbol
     if record["load_cases"]:
         print_table(
@@ -92,6 +103,23 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         )
     if everything:
         print_table("Provenance", ("", ""), list(record["provenance"].items()))
+
+
+def numbering_rows(record: Any) -> list[tuple[str, str]]:
+    """Return what the user's numbers cover, and which points turn."""
+    rows = []
+    for what in ("nodes", "elements"):
+        found = record[what]
+        words = "not on record: told by index" if found is None else (
+            f"{found['count']}, from {found['from']} to {found['to']}"
+        )  # fmt: skip
+        if what == "nodes" or found is not None:
+            rows.append((f"{what} of the mesh", words))
+    if record["instances"]:
+        rows.append(("instances", ", ".join(record["instances"])))
+    if points := record["points_with_rotations"]:
+        rows.append(("nodes that turn", ", ".join(f"{count} by {word}" for word, count in points.items())))
+    return rows
 
 
 def turned_axes(axes: Any) -> list[tuple[str, Any]]:

@@ -69,7 +69,8 @@ def variables(model: InterfaceModel, request: Request) -> dict[str, Any]:
     if len(body.nodes):
         n = len(model.K)
         values |= {"R": model.recovery().reshape(-1, n), "R_nodes": model.mesh_positions()}
-        values["R_numbers"] = np.asarray(body.node_ids, dtype=float)[:, None] + 1
+        numbers = body.numbering.nodes if body.numbering.nodes.size else body.node_ids + 1
+        values["R_numbers"] = np.asarray(numbers, dtype=float)[:, None]
     if len(body.surface):
         values["R_triangles"] = np.asarray(body.surface, dtype=float) + 1
     return {name: value for name, value in values.items() if np.size(value)}

@@ -26,9 +26,10 @@ def make_mbsim(request: Request) -> Made:
             file.create_dataset(name, data=values, track_times=False)
         for k, line in enumerate(request.header()):
             file.attrs.create(f"header {k + 1}", line.encode("ascii"))
-        for name, row in all_nodes(body).of_interface.items():
-            file.attrs.create(f"interface {name}", row + 1)
-    return Made({request.path: image.getvalue()}, all_nodes(body).notes())
+        nodes = all_nodes(body)
+        for name, row in nodes.of_interface.items():
+            file.attrs.create(f"interface {name}", int(nodes.numbers[row]))
+    return Made({request.path: image.getvalue()}, nodes.notes())
 
 
 def datasets(body: ReducedBody) -> dict[str, Array]:

@@ -6,9 +6,9 @@ import numpy as np
 
 from cms.errors import ExportError
 from cms.exporters.interface_model import InterfaceModel, interface_model
-from cms.exporters.nodes import all_nodes
+from cms.exporters.nodes import all_nodes, user_numbers
 from cms.exporters.writer import Made, Request
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.importers.nastran_matrices.write_op4 import op4_parts
 
 __all__ = ["make_dmig", "make_op4"]
@@ -43,6 +43,7 @@ def make_op4(request: Request) -> Made:
         path.with_suffix(".pch"): pch.encode("ascii"),
     }
     notes = [f"interface {node.interface}: GRID {k + 1}" for k, node in enumerate(model.nodes)]
+    notes += recovery_numbers(model)[1] if len(model.body.nodes) else ()
     return Made(files, (*notes, *load_notes(model, "PX")))
 
 
@@ -112,9 +113,25 @@ def superelement_lines(model: InterfaceModel) -> Iterator[str]:
     yield from aset_lines(pairs)
     yield from spoint_lines(model)
     if len(model.body.nodes):
-        for k, position in enumerate(model.mesh_positions()):
-            yield from grid(FIRST_NODE + k, position)
-        yield from recovery_table(len(model.body.nodes), len(model.K))
+        numbers, _ = recovery_numbers(model)
+        for number, position in zip(numbers, model.mesh_positions(), strict=True):
+            yield from grid(int(number), position)
+        yield from recovery_table(numbers, len(model.K))
+
+
+def recovery_numbers(model: InterfaceModel) -> tuple[IntArray, tuple[str, ...]]:
+    """Return the GRIDs of the kept nodes, and in words whose they are: those of the mesh, or from `FIRST_NODE` on.
+
+    They must not be those of the interfaces, 1, 2, ..., nor those of the SPOINTs of the modes.
+    """
+    numbers, words = user_numbers(model.body)
+    plain = FIRST_NODE + np.arange(len(numbers))
+    if model.body.numbering.nodes.size and words[0].startswith("numbers of nodes are"):
+        taken = np.concatenate([np.arange(len(model.nodes)) + 1, FIRST_SCALAR + np.arange(model.n_modes)])
+        if not np.isin(numbers, taken).any():
+            return numbers, ("GRIDs of the kept nodes are those of the mesh",)
+        words = ("numbers of the mesh are those of the interfaces, 1, 2, ..., or of the SPOINTs of the modes, too",)
+    return plain, (*words, f"GRIDs of the kept nodes: {FIRST_NODE} and so on")
 
 
 def six_rows(model: InterfaceModel) -> Array:
@@ -131,13 +148,14 @@ def six_rows(model: InterfaceModel) -> Array:
     return np.concatenate([model.recovery(), turned], axis=1).reshape(6 * n, -1)
 
 
-def recovery_table(n_nodes: int, n_columns: int) -> Iterator[str]:
-    """Yield the table TUG1: head, columns, and the first of six rows of MUG1 for each kept node."""
+def recovery_table(numbers: IntArray, n_columns: int) -> Iterator[str]:
+    """Yield the table TUG1: head, columns, and the first of six rows of MUG1 for each kept node by its number."""
+    n_nodes = len(numbers)
     yield from continued("DTI", [f"{word:<8}" for word in ("TUG1", 0, 6 * n_nodes, n_columns, 32767, 0, 7, 0)])
     yield from continued("", [f"{word:<8}" for word in ("", "PHIP", 7, "", "", "REAL", "", 1, "ENDREC")][1:])
     columns = [f"{word:<8}" for k in range(n_columns) for word in (k + 1, "0.00000")]
     yield from continued("DTI", [f"{'TUG1':8}", f"{1:<8}", *columns, "ENDREC"])
-    entries = [f"{word:<8}" for k in range(n_nodes) for word in (1, FIRST_NODE + k, 6, 6 * k + 1)]
+    entries = [f"{word:<8}" for k, number in enumerate(numbers) for word in (1, int(number), 6, 6 * k + 1)]
     yield from continued("DTI", [f"{'TUG1':8}", f"{2:<8}", *[" " * 8] * 6])
     yield from continued("", [f"{word:<8}" for word in ("TYPE", "ID", "COMP", "ROW") * 2] + [*entries, "ENDREC"])
 

@@ -5,32 +5,37 @@ from dataclasses import dataclass
 import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.body.numbering import NONE
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["NodeList", "all_nodes", "interface_nodes", "reference_row"]
+__all__ = ["NodeList", "all_nodes", "interface_nodes", "reference_row", "user_numbers"]
+
+MOST = 99_999_999  #: eight digits, which all formats hold
 
 
 @dataclass(frozen=True, eq=False)
 class NodeList:
     """Nodes in B with the motion of each for a unit of every mode."""
 
-    numbers: IntArray  #: (n,), from 1
+    numbers: IntArray  #: (n,), above 0
     positions: Array  #: (n, 3) [m]
     Phi: Array  #: translation, (n, 3, n_q)
     Psi: Array  #: rotation, (n, 3, n_q) [1/m]; zero where it is not known
     has_rotation: np.ndarray  #: whether it is known, (n,)
     of_interface: dict[str, int]  #: row of the reference point of each interface
+    words: tuple[str, ...] = ()  #: whose the numbers are
 
     def notes(self) -> tuple[str, ...]:
         """Return 'interface left: node 17', one for each, and what is not known of the others."""
-        found = tuple(f"interface {name}: node {self.numbers[row]}" for name, row in self.of_interface.items())
+        at = (f"interface {name}: node {self.numbers[row]}" for name, row in self.of_interface.items())
+        found = (*self.words, *at)
         unknown = int((~self.has_rotation).sum())
         if not unknown:
             return found
         return (
             *found,
-            f"rotations are known at interfaces and at members of rigid ones; those of {unknown} other nodes are "
-            "written as zero: attach frames to the nodes of the interfaces",
+            "rotations are known at interfaces, at members of rigid ones and at nodes that are kept with them; those "
+            f"of {unknown} other nodes are written as zero: attach frames to the nodes of the interfaces",
         )
 
 
@@ -49,9 +54,10 @@ def interface_nodes(body: ReducedBody) -> NodeList:
 
 
 def all_nodes(body: ReducedBody) -> NodeList:
-    """Return the kept nodes, numbered 1, 2, ... as they are kept, and then reference points that are none of them.
+    """Return the kept nodes by their numbers in the user's mesh, and then reference points that are none of them.
 
-    Members of a rigid interface turn with it; so does its reference node. The rotation of other nodes is not on record.
+    Where these numbers are missing or repeated they are 1, 2, ... as they are kept (`user_numbers`). Members of a rigid
+    interface turn with it; so does its reference node, and nodes that are kept with rotations.
     """
     n, q = len(body.nodes), body.n_q
     added = interface_nodes(body)
@@ -69,14 +75,51 @@ def all_nodes(body: ReducedBody) -> NodeList:
             extra.append(k)
         else:
             rows[interface.name] = at
+    if body.kept is not None:
+        turning_too = [k for k, word in enumerate(body.kept.source) if word != "unknown"]
+        at_nodes = body.kept.nodes[turning_too]
+        fresh = ~known[at_nodes]
+        Psi[at_nodes[fresh]] = body.kept.rotation[turning_too][fresh]
+        known[at_nodes] = True
+    numbers, words = user_numbers(body, len(extra))
     return NodeList(
-        np.arange(1, n + len(extra) + 1),
+        numbers,
         np.concatenate([body.nodes, added.positions[extra]]),
         np.concatenate([body.Phi, added.Phi[extra]]),
         np.concatenate([Psi, added.Psi[extra]]),
         np.concatenate([known, added.has_rotation[extra]]),
         rows,
+        words,
     )
+
+
+def user_numbers(body: ReducedBody, n_more: int = 0, *, most: int = MOST) -> tuple[IntArray, tuple[str, ...]]:
+    """Return numbers of the kept nodes and of n_more points behind them, and in words whose they are.
+
+    The user's numbers where each kept node has one of its own; nodes without one (reference points) follow the largest.
+    Else 1, 2, ..., which is said.
+
+    Parameters
+    ----------
+    most
+        The greatest number that the format holds.
+    """
+    n = len(body.nodes)
+    own = body.numbering.nodes
+    plain = np.arange(1, n + n_more + 1)
+    if not own.size:
+        return plain, ()
+    is_named = own != NONE
+    named = own[is_named]
+    if len(np.unique(named)) < len(named):
+        why = "instances" if body.numbering.instances else "nodes and the points of their skin"
+        return plain, (f"nodes are numbered 1, 2, ...: {why} share numbers of the mesh",)
+    n_free = int((~is_named).sum()) + n_more
+    if not len(named) or named.min() < 1 or named.max() + n_free > most:
+        return plain, (f"nodes are numbered 1, 2, ...: those of the mesh are not from 1 to {most - n_free}",)
+    numbers = np.concatenate([own, np.full(n_more, NONE)])
+    numbers[numbers == NONE] = named.max() + 1 + np.arange(n_free)
+    return numbers, ("numbers of nodes are those of the mesh",)
 
 
 def reference_row(body: ReducedBody, k: int) -> int | None:

@@ -12,7 +12,7 @@ from cms.reduced_body.reduced_body import ReducedBody
 from cms.reduced_body.stress import von_mises
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["make_vtk"]
+__all__ = ["make_vtk", "numbers_of_cells", "numbers_of_nodes"]
 
 LARGEST = 0.05  #: displacement of a drawn mode over the size of the body
 STRESS_ORDER = [0, 1, 2, 5, 3, 4]  #: xx yy zz xy yz xz, from our xx yy zz yz xz xy
@@ -36,11 +36,13 @@ def make_vtk(request: Request) -> Made:
         shape = body.Phi[:, :, k] @ body.frame.axes.T
         largest = float(np.linalg.norm(shape, axis=1).max(initial=0.0))
         q = LARGEST * size / largest if largest * size > 0 else 1.0
-        fields = {"displacement": q * shape, **stress_fields(body, k, q)}
+        fields = {"displacement": q * shape, **stress_fields(body, k, q), **numbers_of_nodes(body)}
         hertz = body.frequencies[k] / body.units.time
         whole = {"q": np.array([q]), "frequency": np.array([hertz])}
         name = path.with_name(f"{path.stem}_{k + 1}.vtu")
-        files[name] = unstructured_grid(points, body.surface, fields, whole, request.header())
+        files[name] = unstructured_grid(
+            points, body.surface, fields, whole, request.header(), numbers_of_cells(body)
+        )
         entries.append(f'<DataSet timestep="{k + 1}" file={quoteattr(name.name)}/>')
     collection = ['<VTKFile type="Collection" version="0.1">', "<Collection>", *entries, "</Collection>", "</VTKFile>"]
     files[path] = ("\n".join(['<?xml version="1.0"?>', *comment(request.header()), *collection]) + "\n").encode("utf-8")
@@ -57,8 +59,27 @@ def stress_fields(body: ReducedBody, k: int, q: float) -> dict[str, Array]:
     return {"stress": stress[:, STRESS_ORDER], "von Mises stress": von_mises(stress)}
 
 
+def numbers_of_nodes(body: ReducedBody) -> dict[str, IntArray]:
+    """Return the user's numbers of the kept nodes, -1 for none, and which instance they are of."""
+    arrays = {"node": body.numbering.nodes, "node instance": body.numbering.node_instance}
+    return {name: numbers for name, numbers in arrays.items() if numbers.size}
+
+
+def numbers_of_cells(body: ReducedBody) -> dict[str, IntArray]:
+    """Return the user's numbers of the elements behind the triangles, -1 for none, and which instance they are of."""
+    if not len(body.surface):
+        return {}
+    arrays = {"element": body.numbering.elements, "element instance": body.numbering.element_instance}
+    return {name: numbers for name, numbers in arrays.items() if numbers.size}
+
+
 def unstructured_grid(
-    points: Array, triangles: IntArray, fields: Mapping[str, Array], whole: Mapping[str, Array], header: tuple[str, ...]
+    points: Array,
+    triangles: IntArray,
+    fields: Mapping[str, np.ndarray],
+    whole: Mapping[str, Array],
+    header: tuple[str, ...],
+    of_cells: Mapping[str, IntArray],
 ) -> bytes:
     """Return a .vtu file with numbers in base64: triangles, or the points alone where there are none."""
     cells = np.asarray(triangles) if len(triangles) else np.arange(len(points))[:, None]
@@ -73,6 +94,7 @@ def unstructured_grid(
         data_array("connectivity", cells.reshape(-1)), data_array("offsets", per * np.arange(1, n + 1)),
         data_array("types", np.full(n, kind, dtype=np.uint8)), "</Cells>", "<PointData>",
         *(data_array(name, values) for name, values in fields.items()), "</PointData>",
+        "<CellData>", *(data_array(name, values) for name, values in of_cells.items()), "</CellData>",
         "</Piece>", "</UnstructuredGrid>", "</VTKFile>",
     ]  # fmt: skip
     return ("\n".join(lines) + "\n").encode("utf-8")

@@ -45,7 +45,8 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
             str(job.body.name), parts, raw.nodes, _constraints(job, raw), numbers=numbers, node_sets=raw.node_sets
         )
         record = {**joined.body.provenance, "deck": str(path), "deck sha256": file_digest(path)}
-        body = replace(joined.body, provenance=record)
+        numbering = joined.body.numbering.with_instances(raw.instances, raw.instance_step)
+        body = replace(joined.body, provenance=record, numbering=numbering)
         _require_used_groups(job, raw, joined)
         body = body.with_load_cases(*_load_cases(job, raw, joined, meshes))
         return body.with_interfaces(*[_interface(name, each, raw, joined) for name, each in job.interfaces.items()])

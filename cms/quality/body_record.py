@@ -7,7 +7,8 @@ import numpy as np
 
 from cms.reduced_body.invariants import Moments
 from cms.reduced_body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array
+from fe_models.body.numbering import NONE, NamedSet
+from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["body_record", "body_size", "central_inertia", "effective_mass_record", "in_hertz"]
 
@@ -92,9 +93,38 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
         "geometric_stiffness": body.geometric is not None,
         "quadratic_modes": body.quadratic is not None,
         "kept_nodes": len(body.nodes),
+        "numbering": numbering_record(body),
         "surface_triangles": len(body.surface),
         "provenance": dict(body.provenance),
     }
+
+
+def numbering_record(body: ReducedBody) -> dict[str, Any]:
+    """Return what the user's numbers cover, the sets, and the points with rotations, in plain types."""
+    numbering = body.numbering
+    sources = () if body.kept is None else body.kept.source
+    return {
+        "nodes": range_of(numbering.nodes),
+        "elements": range_of(numbering.elements),
+        "instances": list(numbering.instances),
+        "sets": [
+            {"name": each.name, "kind": each.kind, "size": each.size, "kept": kept_of_set(body, each)}
+            for each in numbering.sets
+        ],
+        "points_with_rotations": {word: sources.count(word) for word in dict.fromkeys(sources)},
+    }
+
+
+def range_of(numbers: IntArray) -> dict[str, int] | None:
+    """Return how many different numbers there are, the least and the greatest; None if there are none."""
+    known = np.unique(numbers[numbers != NONE])
+    return {"count": len(known), "from": int(known[0]), "to": int(known[-1])} if len(known) else None
+
+
+def kept_of_set(body: ReducedBody, named: NamedSet) -> int:
+    """Return how many nodes or elements of a set the file keeps."""
+    numbers = body.numbering.nodes if named.kind == "nodes" else body.numbering.elements
+    return len(np.unique(numbers[named.members])) if numbers.size else len(named.members)
 
 
 def effective_mass_record(body: ReducedBody, at: str) -> dict[str, Any]:

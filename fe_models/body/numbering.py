@@ -230,6 +230,22 @@ class Numbering:
         taken = {name: getattr(self, name) for name in ("nodes", "on_skin", "node_instance")}
         return replace(self, **{name: a[rows] if a.size else a for name, a in taken.items()}, sets=tuple(sets))
 
+    def with_instances(self, instances: tuple[str, ...], step: int) -> "Numbering":
+        """Return the numbering of a deck whose k-th instance has k step added to its numbers, taken off again.
+
+        Numbers beyond those of the last instance are of the assembly itself, and belong to none.
+        """
+        if not instances or not step:
+            return self
+        told: dict[str, IntArray] = {}
+        for name, of in (("node_instance", "nodes"), ("element_instance", "elements")):
+            numbers = getattr(self, of)
+            if numbers.size:
+                at = np.where(numbers == NONE, NONE, numbers // step)
+                told[name] = np.where(at < len(instances), at, NONE)
+                told[of] = np.where(numbers == NONE, NONE, numbers % step)
+        return replace(self, instances=instances, **told)  # type: ignore[arg-type]
+
     def without_indices(self, indices: IntArray) -> "Numbering":
         """Return the numbering without numbers of nodes that say no more than these indices, (n_nodes,)."""
         if np.array_equal(self.nodes, indices) and not self.instances and not self.on_skin.any():

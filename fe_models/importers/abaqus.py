@@ -117,6 +117,8 @@ class DeckMesh:
     spelling: dict[str, str]  #: of sets, as they first appear: by "NSET name" and "ELSET name"
     ignored: dict[str, int]  #: element type -> how many
     notes: tuple[str, ...] = ()
+    instances: tuple[str, ...] = ()  #: whose numbers were moved, the k-th by k `instance_step`
+    instance_step: int = 0
 
     def rows_of(self, numbers: IntArray) -> IntArray:
         """Return the rows of node numbers, -1 where there is none."""
@@ -224,7 +226,15 @@ def raw_mesh_of(mesh: DeckMesh, notes: list[str]) -> RawMesh:
     }
     notes = [*notes, *mesh.notes]
     notes += [f"{count} {name} elements were left out: no part of the solid" for name, count in mesh.ignored.items()]
-    return RawMesh(mesh.coordinates, tuple(raw_blocks), sets, mesh.node_numbers, notes=tuple(notes))
+    return RawMesh(
+        mesh.coordinates,
+        tuple(raw_blocks),
+        sets,
+        mesh.node_numbers,
+        notes=tuple(notes),
+        instances=mesh.instances,
+        instance_step=mesh.instance_step,
+    )
 
 
 def _take(here: str, block: DeckBlock, content: _Content, node_sets: _Sets, element_sets: _Sets) -> None:

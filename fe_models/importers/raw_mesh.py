@@ -37,6 +37,8 @@ class RawMesh:
     node_numbers: IntArray | None = None  #: numbers of the nodes in the file, (n_nodes,)
     repeats_are_memberships: bool = False  #: Gmsh 2.2 lists a cell once for every group it is in
     notes: tuple[str, ...] = ()
+    instances: tuple[str, ...] = ()  #: of a deck that repeats numbers: the k-th has k `instance_step` added to them
+    instance_step: int = 0  #: 0: numbers are those of the deck
 
 
 def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:

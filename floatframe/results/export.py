@@ -9,7 +9,8 @@ import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.reduced_body.stress import stress_of, von_mises
-from fe_models.foundation.arrays import Array
+from fe_models.body.numbering import NONE
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.paths import replace_file
 from floatframe.errors import ResultsError
 from floatframe.results.place_motion import interface_motion
@@ -105,7 +106,8 @@ def export_vtk(
 ) -> list[Path]:
     """Write the deformed surfaces of the bodies given as a series for ParaView: one .pvd and a folder of .vtu files.
 
-    Point data: elastic displacement in ground axes, and the von Mises stress where every body knows it.
+    Point data: elastic displacement in ground axes, and the von Mises stress where every body knows it; "node" and, of
+    cells, "element": the numbers in the user's meshes, -1 where there is none.
 
     Parameters
     ----------
@@ -143,6 +145,7 @@ def export_vtk(
     triangles = np.concatenate([b.surface + k for b, k in zip(drawn.values(), starts[:-1], strict=True)])
     number = np.repeat(np.arange(len(drawn)), [len(body.surface) for body in drawn.values()])
     has_stress = all(body.stress is not None for body in drawn.values())
+    by_node, by_cell = numbers_of(list(drawn.values()))
     rows = range(0, len(trajectory.t), every)
     written, entries = [path], []
     for done, i in enumerate(rows):
@@ -155,12 +158,12 @@ def export_vtk(
             displacement.append(elastic @ R.T)
             if has_stress and body.stress is not None:
                 stress.append(von_mises(stress_of(body.stress, motion.q[i])))
-        data = {"elastic displacement": np.concatenate(displacement)}
+        data = {"elastic displacement": np.concatenate(displacement), **by_node}
         if has_stress:
             data["von Mises stress"] = np.concatenate(stress)
         file = folder / f"{i:06d}.vtu"
         meshio.Mesh(
-            np.concatenate(points), [("triangle", triangles)], point_data=data, cell_data={"body": [number]}
+            np.concatenate(points), [("triangle", triangles)], point_data=data, cell_data={"body": [number], **by_cell}
         ).write(file)
         written.append(file)
         time = float(trajectory.t[i])
@@ -170,3 +173,17 @@ def export_vtk(
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
     replace_file(path, (head + "\n".join(entries) + "\n</Collection>\n</VTKFile>\n").encode())
     return written
+
+
+def numbers_of(bodies: list[ReducedBody]) -> tuple[dict[str, IntArray], dict[str, list[IntArray]]]:
+    """Return the user's numbers of nodes and elements of several bodies as data of points and cells; none: nothing."""
+    nodes = [filled(body.numbering.nodes, len(body.nodes)) for body in bodies]
+    elements = [filled(body.numbering.elements, len(body.surface)) for body in bodies]
+    by_node = {"node": np.concatenate(nodes)} if any(body.numbering.nodes.size for body in bodies) else {}
+    by_cell = {"element": [np.concatenate(elements)]} if any(body.numbering.elements.size for body in bodies) else {}
+    return by_node, by_cell
+
+
+def filled(numbers: IntArray, n: int) -> IntArray:
+    """Return numbers, or n times none."""
+    return numbers if numbers.size else np.full(n, NONE)

@@ -5,7 +5,13 @@ from typing import Any
 import numpy as np
 
 from fe_models.foundation.arrays import IntArray
-from fe_models.importers.objects.meshio_mesh import groups_of_values, upright_wedges
+from fe_models.importers.objects.meshio_mesh import (
+    CELL_NUMBERS,
+    NODE_NUMBERS,
+    groups_of_values,
+    numbers_among,
+    upright_wedges,
+)
 from fe_models.importers.raw_mesh import RawBlock, RawMesh
 
 __all__ = ["raw_from_pyvista"]
@@ -27,8 +33,9 @@ def raw_from_pyvista(grid: Any) -> RawMesh:
     nodes = np.asarray(grid.points, dtype=float)
     types = np.asarray(grid.celltypes)
     groups: dict[str, IntArray] = {}
+    numbers = numbers_among(grid.cell_data, CELL_NUMBERS, len(types))
     for name in grid.cell_data:
-        if not name.startswith("vtk"):
+        if not name.startswith("vtk") and (numbers is None or name not in CELL_NUMBERS):
             groups |= groups_of_values(name, np.asarray(grid.cell_data[name]))
     blocks = []
     for number, connectivity in grid.cells_dict.items():
@@ -38,10 +45,11 @@ def raw_from_pyvista(grid: Any) -> RawMesh:
         place[rows] = np.arange(len(rows))
         mine = {name: place[members][place[members] >= 0] for name, members in groups.items()}
         cells = upright_wedges(kind, nodes, np.asarray(connectivity, dtype=np.int64))
-        blocks.append(RawBlock(kind, cells, {name: members for name, members in mine.items() if members.size}))
+        own = {name: members for name, members in mine.items() if members.size}
+        blocks.append(RawBlock(kind, cells, own, None if numbers is None else numbers[rows]))
     node_sets = {}
     for name in grid.point_data:
         values = np.asarray(grid.point_data[name])
         if values.ndim == 1 and values.dtype.kind in "iub" and set(np.unique(values)) == {0, 1}:
             node_sets[name] = np.flatnonzero(values)
-    return RawMesh(nodes, tuple(blocks), node_sets)
+    return RawMesh(nodes, tuple(blocks), node_sets, numbers_among(grid.point_data, NODE_NUMBERS, len(nodes)))

@@ -7,6 +7,7 @@ where a line names `INSTANCE.17`, the number of that node stands.
 
 import re
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -32,7 +33,16 @@ NAMES = (
 )  #: parameters that name something of a part
 
 
-def flat_assembly(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock], list[str]]:
+class FlatAssembly(NamedTuple):
+    """A deck with its instances written out."""
+
+    blocks: list[DeckBlock]
+    notes: list[str]  #: how numbers follow from those of the deck
+    instances: tuple[str, ...] = ()  #: whose numbers were moved, the k-th by k step; none where numbers are the deck's
+    step: int = 0
+
+
+def flat_assembly(where: str, blocks: list[DeckBlock]) -> FlatAssembly:
     """Return the blocks of a deck with its instances written out, and how their numbers follow from those of the deck.
 
     Raises
@@ -42,7 +52,7 @@ def flat_assembly(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock],
     """
     parts, instances, own, model = _sorted(where, blocks)
     if not instances:
-        return (blocks if not parts else [*(b for part in parts.values() for b in part), *model]), []
+        return FlatAssembly(blocks if not parts else [*(b for part in parts.values() for b in part), *model], [])
     inside = [b for part in parts.values() for b in part] + [b for _, extra in instances for b in extra] + own
     step = 10 ** len(str(max([_largest(block) for block in inside] or [1])))
     out: list[DeckBlock] = []
@@ -65,7 +75,11 @@ def flat_assembly(where: str, blocks: list[DeckBlock]) -> tuple[list[DeckBlock],
     out = [_resolved(block, offsets) for block in [*out, *model]]
     words = [f"{name}: numbers of the deck + {offset}" for name, offset in offsets.items()]
     words.append(f"nodes of the assembly: + {len(instances) * step}")
-    return out, [f"instances are written out; {'; '.join(words[:8])}"] if len(instances) > 1 or own else []
+    has_own_nodes = any(block.keyword == "NODE" for block in own)
+    if len(instances) == 1 and not has_own_nodes:
+        return FlatAssembly(out, [f"instances are written out; {'; '.join(words[:8])}"] if own else [])
+    names = tuple(head.parameters.get("NAME", "") for head, _ in instances)
+    return FlatAssembly(out, [f"instances are written out; {'; '.join(words[:8])}"], names, step)
 
 
 def _sorted(

@@ -84,8 +84,9 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
         raise MeshError(f"{where}: unknown program {program!r}; expected one of {', '.join(PROGRAMS)}")
     blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent)
     refuse_unread(where, blocks)
-    blocks, notes = flat_assembly(where, blocks)
-    mesh = deck_mesh(where, blocks)
+    flat = flat_assembly(where, blocks)
+    blocks, notes = flat.blocks, flat.notes
+    mesh = replace(deck_mesh(where, blocks), instances=flat.instances, instance_step=flat.step)
     draft = Draft(where, program, mesh, Ledger(where))
     for note in (*notes, *mesh.notes):
         word = note.split()[0]
