@@ -113,10 +113,13 @@ from .results.sensors import CouplerSensor as CouplerSensor
 from .results.sensors import DisplacementSensor as DisplacementSensor
 from .results.sensors import ElongationSensor as ElongationSensor
 from .results.sensors import EnergySensor as EnergySensor
+from .results.sensors import InterfaceForceSensor as InterfaceForceSensor
 from .results.sensors import ModeSensor as ModeSensor
 from .results.sensors import MomentumSensor as MomentumSensor
 from .results.sensors import PlaceSensor as PlaceSensor
 from .results.sensors import ReactionSensor as ReactionSensor
+from .results.sensors import RecoverySensor as RecoverySensor
+from .results.sensors import SpringSensor as SpringSensor
 from .results.sensors import StrainGauge as StrainGauge
 from .results.sensors import StressChannel as StressChannel
 from .results.sensors import StressSensor as StressSensor

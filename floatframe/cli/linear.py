@@ -17,15 +17,16 @@ if TYPE_CHECKING:
 
 __all__ = ["register"]
 
+MOST_LEFT_OUT = 6  #: columns that are told one by one
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 Inputs = Annotated[
     list[str],
-    typer.Option("--input", "-i", help="A force: a name of [inputs], joint.coordinate, body/interface:x."),
+    typer.Option("--input", "-i", help="A name of [inputs]; a force: joint.coordinate, body/interface:x."),
 ]
 Outputs = Annotated[
     list[str],
-    typer.Option("--out", "-m", help="What is observed: a name of [outputs], or as --input; repeatable."),
+    typer.Option("--out", "-m", help="A name of [outputs] or [sensors], sensor.column, or as --input; repeatable."),
 ]
 
 
@@ -47,8 +48,9 @@ def linearize_command(
 ) -> None:
     """Linearise a system: the state space A, B, C, D with names, and M, C, K of its independent motions, into a file.
 
-    Inputs and outputs are those of the tables [inputs] and [outputs] of the system, unless named here; a place is
-    written body/interface:component, with x, y, z, rx, ry, rz. Without -o crane.toml gives crane.npz.
+    Inputs and outputs are those of the tables [inputs] and [outputs] of the system, unless named here: sensors by their
+    names, one column of them as sensor.column; a place is written body/interface:component, with x, y, z, rx, ry, rz.
+    Without -o crane.toml gives crane.npz.
 
     Example: floatframe linearize crane.toml -o crane.mat
 
@@ -70,6 +72,7 @@ def linearize_command(
         outputs=chosen(model, outputs, model.outputs),
     )
     space = write_state_space(linear, path)
+    print_left_out(linear)
     say(f"{linear.n_z} independent motions, {len(space.A)} states, {len(linear.inputs)} inputs, "
         f"{len(linear.outputs)} outputs")  # fmt: skip
     if not linear.inputs or not linear.outputs:
@@ -118,6 +121,7 @@ def response_command(
         inputs=chosen(model, inputs, model.inputs),
         outputs=chosen(model, outputs, model.outputs),
     )
+    print_left_out(linear)
     seconds = model.units.time
     first, last = band_of(band, linear, seconds)
     response = frequency_response(linear, resolved_frequencies(linear, first * seconds, last * seconds, n=points))
@@ -131,6 +135,14 @@ def response_command(
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 
 
+def print_left_out(linear: "LinearSystem") -> None:
+    """Say which columns of sensors are not linear about the steady motion."""
+    for name, why in list(linear.left_out.items())[:MOST_LEFT_OUT]:
+        say(f"left out: {name}, not linear here: {why}")
+    if len(linear.left_out) > MOST_LEFT_OUT:
+        say(f"and {len(linear.left_out) - MOST_LEFT_OUT} more columns that are not linear here")
+
+
 def chosen(system: "System", texts: list[str], default: Any) -> Any:
     """Return the channels named on the command line, or those of the system."""
     return tuple(channel_of(system, text) for text in texts) if texts else tuple(default)
@@ -141,14 +153,20 @@ def channel_of(system: "System", text: str) -> "AnyInput | AnyOutput":
     import numpy as np
 
     from fe_models.foundation.words import nearest
-    from floatframe.analyses.linear.channels import inputs_of, outputs_of
+    from floatframe.analyses.linear.channels import AnyInput, AnyOutput, Column, inputs_of, outputs_of
     from floatframe.bodies.markers import Marker
     from floatframe.errors import ModelError
+    from floatframe.results.sensors import sensors_of
     from floatframe.results.sensors.channels import Channel, CoordinateChannel
 
-    named = {channel.name: channel for channel in (*outputs_of(system.outputs), *inputs_of(system.inputs))}
+    named: dict[str, AnyInput | AnyOutput] = {}
+    for each in (*sensors_of(system), *outputs_of(system.outputs), *inputs_of(system.inputs)):
+        named[each.name] = each
     if text in named:
         return named[text]
+    owner, _, column = text.rpartition(".")
+    if owner in named:
+        return Column(named[owner], column)  # type: ignore[arg-type]
     joint, _, coordinate = text.rpartition(".")
     coordinates = [f"{each.name}.{name}" for each in system.joints for name in each.coordinates]
     if text in coordinates:
@@ -158,7 +176,7 @@ def channel_of(system: "System", text: str) -> "AnyInput | AnyOutput":
     if not body or component not in DIRECTIONS:
         hint = nearest(text, [*named, *coordinates]) if "/" not in text and ":" not in text else ""
         raise ModelError(
-            f"channel {text!r}: expected a name of [inputs] or [outputs], joint.coordinate, or "
+            f"channel {text!r}: expected a name of [inputs], [outputs] or [sensors], joint.coordinate, or "
             f"body/interface:component (interfaces only of flexible bodies) with one of {', '.join(DIRECTIONS)}{hint}"
         )
     index = DIRECTIONS.index(component)

@@ -22,8 +22,8 @@ from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.file_frames import rows_of_file
+from floatframe.compiling.interface_loads import Load, Wrench, amplitudes, in_body, loads_on_interfaces
 from floatframe.compiling.system import CompiledSystem, compiled_system
-from floatframe.forces import PointForce
 from floatframe.joints.rows import is_held
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.model import JOINT, STIFFNESS
@@ -35,25 +35,6 @@ from floatframe.system import System
 __all__ = ["ValidityWatch"]
 
 N_INERTIAL = 12  #: amplitudes of inertial loads: 3 accelerations, 3 angular accelerations, 6 products
-
-
-@dataclass(frozen=True, eq=False)
-class Wrench:
-    """Where the wrench on an interface is found."""
-
-    interface: int
-    sign: float
-    force: int  #: first column in w
-    moment: int  #: first column in w, -1 for none
-
-
-@dataclass(frozen=True, eq=False)
-class Load:
-    """A point force on an interface."""
-
-    interface: int
-    force: PointForce
-    triad: Array  #: undeformed axes of the marker in the body frame, (3, 3)
 
 
 @dataclass(eq=False)
@@ -85,7 +66,7 @@ class ValidityWatch:
         self.bodies = [watched(i, body, omega) for (i, body), omega in zip(elastic, frequencies, strict=True)]
         for part in self.bodies:
             if len(part.norms):
-                find_loads(system, part)
+                part.wrenches, part.loads = loads_on_interfaces(system, part.index)
 
     @property
     def notes(self) -> tuple[ValidityNote, ...]:
@@ -147,7 +128,8 @@ class ValidityWatch:
             lam[:, 6 + k] = (1 if a == b else 2) * omega[:, a] * omega[:, b]
         for wrench in part.wrenches:
             o = N_INERTIAL + 6 * wrench.interface
-            lam[:, o : o + 3] += wrench.sign * in_body(R, rows.w[:, wrench.force : wrench.force + 3])
+            if wrench.force >= 0:
+                lam[:, o : o + 3] += wrench.sign * in_body(R, rows.w[:, wrench.force : wrench.force + 3])
             if wrench.moment >= 0:
                 lam[:, o + 3 : o + 6] += wrench.sign * in_body(R, rows.w[:, wrench.moment : wrench.moment + 3])
         for load in part.loads:
@@ -262,44 +244,6 @@ def estimated_interface_loads(reduced: ReducedBody) -> Array:
             slopes = np.cross(e, np.asarray(interface.Psi[3:]), axisb=0)
             own[:3] = e[:, None, None] * (length / 2 * slopes @ slopes.T)
     return K
-
-
-def find_loads(system: System, part: Watched) -> None:
-    """Write where the wrenches on the interfaces of a body are found."""
-    model = compiled_system(system).model
-    n = part.body.reduced.n_q
-    forces = [force for force in system.forces if isinstance(force, PointForce)]
-    load_of = {int(m): force for m, force in zip(model.loads.marker, forces, strict=True)}
-    for m in np.flatnonzero((model.markers.body == part.index) & (model.markers.psi0 >= 0)):
-        o = int(model.markers.psi0[m])
-        own = model.markers.psi[o : o + 6 * n].reshape(6, n)
-        interface = next(k for k, i in enumerate(part.body.moved.interfaces) if np.array_equal(i.Psi, own))
-        c = int(model.markers.connection[m])
-        if c >= 0:
-            w0, moment = int(model.connections.w0[c]), int(model.markers.moment[m])
-            part.wrenches.append(
-                Wrench(interface, float(model.markers.sign[m]), w0, w0 + moment if moment >= 0 else -1)
-            )
-        elif int(m) in load_of:
-            part.loads.append(Load(interface, load_of[int(m)], np.asarray(model.markers.triad[m])))
-
-
-def amplitudes(load: Load, t: Array, R: Array) -> Array:
-    """Return force and moment of a point force in body axes, (n_t, 6); a follower turns with the undeformed marker."""
-    force = load.force
-    factor = np.ones(len(t)) if force.amplitude is None else np.array([force.amplitude(x) for x in t])
-    six = []
-    for vector in (force.force, force.torque):
-        if force.is_follower:
-            six.append(np.broadcast_to(load.triad @ vector, (len(t), 3)))
-        else:
-            six.append(in_body(R, np.broadcast_to(vector, (len(t), 3))))
-    return factor[:, None] * np.concatenate(six, axis=1)
-
-
-def in_body(R: Array, vectors: Array) -> Array:
-    """Return vectors in body axes, (n_t, 3)."""
-    return np.asarray(np.einsum("tba,tb->ta", R, vectors))
 
 
 def rotations(p: Array) -> Array:

@@ -27,7 +27,7 @@ from floatframe.small_motions.rows import Rows
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["BaseColumn", "SmallMotions", "SmallPlace"]
+__all__ = ["BaseColumn", "InputForce", "SmallMotions", "SmallPlace"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,15 @@ class BaseColumn:
         turn = np.zeros(3) if self.rotation is None else self.rotation
         arm = point - (np.zeros(3) if self.about is None else self.about)
         return np.concatenate([d + np.cross(turn, arm), turn])
+
+
+@dataclass(frozen=True, eq=False)
+class InputForce:
+    """Force and moment of an input of size one at an interface of a flexible body."""
+
+    body: str
+    interface: str
+    wrench: Array  #: ground axes, (6,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +77,7 @@ class SmallMotions:
     omega: Array  #: of the steady rotation, ground axes, (3,) [rad/s]
     now: Trajectory  #: the steady motion as a motion of one time: what sensors measure now
     bases: tuple[BaseColumn, ...] = ()  #: of each input
+    forces: tuple[tuple[InputForce, ...], ...] = ()  #: of each input, at interfaces
 
     @property
     def n_u(self) -> int:

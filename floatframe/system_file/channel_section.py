@@ -1,11 +1,18 @@
-"""Tables of the system file for the linearised system: [inputs.NAME] (forces) and [outputs.NAME] (what is observed)."""
+"""Tables of the system file for the linearised system: [inputs.NAME], what acts; [outputs.NAME], what is observed."""
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.toml_file import Table, Vector3, choice
-from floatframe.analyses.linear.channels import AnyOutput
+from fe_models.foundation.words import nearest, quoted
+from floatframe.analyses.linear.channels import AnyInput, AnyOutput, Column
+from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
+from floatframe.errors import ModelError
+from floatframe.results.sensors import Sensor
 from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, StressChannel
 from floatframe.system_file.place_key import MeasuredPlace, marker_at
 
@@ -14,12 +21,18 @@ __all__ = ["InputSection", "OutputSection"]
 WAYS = {  # keys that go together: the first one tells which way it is
     "joint": ("joint", "coordinate"),
     "component": ("component", "body", "position"),
+    "sensor": ("sensor", "column"),
     "body": ("body", "marker", "direction", "quantity", "relative_to", "relative_marker"),
+}
+INPUT_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up to "|" are needed
+    "base": ("|", "direction", "quantity", "about", "joints", "measure"),
+    "drive": ("joint", "coordinate", "|", "measure"),
+    "parameter": ("force", "parameter", "|"),
 }
 
 
-class InputSection(Table):
-    """[inputs.NAME]: a force or torque at a place, or along a joint coordinate."""
+class ChannelSection(Table):
+    """A place with a direction, or a joint coordinate."""
 
     body: str | None = Field(None, description='the name of a body, or "ground"')
     marker: MeasuredPlace | None = Field(None, description="an interface, or a position [x, y, z] in the body")
@@ -40,15 +53,11 @@ class InputSection(Table):
         for key in type(self).model_fields:
             if key != "measure" and getattr(self, key) is not None and key not in WAYS[way]:
                 raise ValueError(f"the keys {way} and {key} do not go together; with {way}: {', '.join(WAYS[way][1:])}")
+        if way == "joint" and self.coordinate is None:
+            raise ValueError("coordinate: missing; expected a coordinate of the joint")
         return way
 
-    @model_validator(mode="after")
-    def _fits(self) -> "InputSection":
-        if self.way() == "joint" and self.coordinate is None:
-            raise ValueError("coordinate: missing; expected a coordinate of the joint")
-        return self
-
-    def channel(self, name: str, rate: int = 0) -> Channel | CoordinateChannel:
+    def place_or_coordinate(self, name: str, rate: int = 0) -> Channel | CoordinateChannel:
         """Return the channel of the table."""
         if self.way() == "joint":
             return CoordinateChannel(name, str(self.joint), str(self.coordinate), rate)
@@ -59,25 +68,79 @@ class InputSection(Table):
         )
 
 
-class OutputSection(InputSection):
-    """[outputs.NAME]: a motion of a place or joint coordinate, or a stress."""
+class InputSection(ChannelSection):
+    """[inputs.NAME]: a force or torque; with type a motion of the base, of a drive, or a parameter of a user force."""
+
+    type: choice("type of input", lambda: tuple(INPUT_TYPES)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(INPUT_TYPES)}; without: a force or torque"
+    )
+    measure: choice("measure", lambda: RATES) | None = Field(  # type: ignore[valid-type]
+        None, description=f"of a base or drive, one of {', '.join(RATES)}; default: {RATES[2]}"
+    )
+    about: Vector3 | None = Field(None, description="a point of the axis about which a base turns, [x, y, z]")
+    joints: list[str] | None = Field(None, description="joints and forces whose ground side moves; default: all")
+    force: str | None = Field(None, description="the name of a user force")
+    parameter: str | None = Field(None, description="a parameter of its expressions")
+
+    @model_validator(mode="after")
+    def _fits(self) -> "InputSection":
+        if self.type is None:
+            if self.measure is not None:
+                raise ValueError("measure: a force has none; expected type = \"base\" or \"drive\" beside it")
+            self.way()
+            return self
+        keys = INPUT_TYPES[self.type]
+        allowed, needed = [key for key in keys if key != "|"], keys[: keys.index("|")]
+        for key in type(self).model_fields:
+            if key != "type" and getattr(self, key) is not None and key not in allowed:
+                raise ValueError(f"an input of type {self.type} has no key {key}{nearest(key, allowed)}")
+        for key in needed:
+            if getattr(self, key) is None:
+                raise ValueError(f"{key}: missing; expected {type(self).model_fields[key].description}")
+        return self
+
+    def channel(self, name: str) -> AnyInput:
+        """Return the input of the table."""
+        rate = RATES.index(self.measure or RATES[2])
+        if self.type == "drive":
+            return DriveMotion(name, str(self.joint), str(self.coordinate), rate)
+        if self.type == "parameter":
+            return ParameterInput(name, str(self.force), str(self.parameter))
+        if self.type == "base":
+            about, direction = np.array(self.about or (0.0, 0.0, 0.0)), np.array(self.direction or (1.0, 0.0, 0.0))
+            return BaseMotion(name, direction, self.quantity or QUANTITIES[0], about, self.joints, rate)
+        return self.place_or_coordinate(name)
+
+
+class OutputSection(ChannelSection):
+    """[outputs.NAME]: a sensor or a column of one, a motion of a place or joint coordinate, or a stress."""
 
     measure: choice("measure", lambda: RATES) = Field(  # type: ignore[valid-type]
-        "displacement", description=f"one of {', '.join(RATES)}"
+        RATES[0], description=f"one of {', '.join(RATES)}"
     )
     component: choice("stress component", lambda: STRESS_COMPONENTS) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(STRESS_COMPONENTS)}: the output is a stress"
     )
     position: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the nearest node is taken")
+    sensor: str | None = Field(None, description="the name of a table [sensors.NAME]")
+    column: str | None = Field(None, description='a column of the sensor, such as "force x"; default: all')
 
     @model_validator(mode="after")
-    def _fits_stress(self) -> "OutputSection":
+    def _fits(self) -> "OutputSection":
         if self.way() == "component" and (self.body is None or self.position is None):
             raise ValueError("a stress needs body and position: where it is")
         return self
 
-    def output(self, name: str) -> AnyOutput:
-        """Return the channel of the table as an output."""
-        if self.way() == "component":
+    def output(self, name: str, sensors: Sequence[Sensor]) -> AnyOutput:
+        """Return the output of the table; `ModelError` with the nearest name if there is no such sensor."""
+        way = self.way()
+        if way == "sensor":
+            names = [sensor.name for sensor in sensors]
+            if self.sensor not in names:
+                hint = nearest(str(self.sensor), names)
+                raise ModelError(f"outputs.{name}: no sensor {quoted(str(self.sensor))}{hint}")
+            found = sensors[names.index(self.sensor)]
+            return replace(found, name=name) if self.column is None else Column(found, self.column, name)
+        if way == "component":
             return StressChannel(name, str(self.body), str(self.component), np.array(self.position))
-        return self.channel(name, RATES.index(self.measure))
+        return self.place_or_coordinate(name, RATES.index(self.measure))

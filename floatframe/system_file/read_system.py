@@ -136,7 +136,7 @@ def read_system(
         system = System(
             bodies, joints, forces, units, name, data.system.redundant, couplers, sensors=sensors,
             inputs=[section.channel(key) for key, section in data.inputs.items()],
-            outputs=[section.output(key) for key, section in data.outputs.items()],
+            outputs=[section.output(key, sensors) for key, section in data.outputs.items()],
             events=[section.event(key) for key, section in data.events.items()],
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
             source=str(path.resolve()),

@@ -17,15 +17,19 @@ from floatframe.results.sensors import (
     DisplacementSensor,
     ElongationSensor,
     EnergySensor,
+    InterfaceForceSensor,
     ModeSensor,
     MomentumSensor,
     PlaceSensor,
     ReactionSensor,
+    RecoverySensor,
     Sensor,
+    SpringSensor,
     StrainGauge,
     StressSensor,
     VonMisesSensor,
 )
+from floatframe.results.sensors.body_loads import INTERFACE_AXES
 from floatframe.results.sensors.loads import AXES
 from floatframe.results.sensors.places import PLACE_QUANTITIES
 from floatframe.system_file.place_key import (
@@ -51,9 +55,12 @@ SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up 
     "displacement": ("body", "|", *AT),
     "elongation": ("body", "position_a", "position_b", "|", "tolerance"),
     "energy": ("|",),
+    "interface-force": ("body", "interface", "|", "axes"),
     "mode": ("body", "mode", "|"),
     "momentum": ("|",),
     "reaction": ("of", "|", "axes"),
+    "recovery": ("body", "table", "|", "rows"),
+    "spring": ("of", "|"),
     "strain": ("body", "direction", "young", "poisson", "|", "position", "point", "node", "tolerance"),
     "stress": ("body", "|", "position", "point", *MESH, "tolerance"),
     "von-mises": ("body", "|", *MESH),
@@ -82,8 +89,11 @@ class SensorSection(Table):
     joint: str | None = Field(None, description="the name of a joint")
     coordinate: str | None = Field(None, description="a coordinate of the joint")
     of: str | None = Field(None, description="the name of a joint or spring-damper; of a coupler, of a user force")
-    axes: choice("kind of axes", lambda: AXES) | None = Field(  # type: ignore[valid-type]
-        None, description=f"one of {', '.join(AXES)}"
+    interface: str | None = Field(None, description="the name of an interface of the body")
+    table: str | None = Field(None, description="the name of a recovery table of the modal file")
+    rows: list[str] | None = Field(None, description="labels of rows, or how they begin; default: all")
+    axes: choice("kind of axes", lambda: (*AXES, "body")) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join(AXES)}; of an interface force {', '.join(INTERFACE_AXES)}"
     )
     mode: int | None = Field(None, description="a whole number, the mode, from 1")
     position: Vector3 | None = Field(None, description="a position in the body, [x, y, z]: the node there")
@@ -149,9 +159,12 @@ BY_KEYS: dict[str, Any] = {  # sensors whose fields are the keys of their table
     "coordinate": CoordinateSensor,
     "coupler": CouplerSensor,
     "energy": EnergySensor,
+    "interface-force": InterfaceForceSensor,
     "mode": ModeSensor,
     "momentum": MomentumSensor,
     "reaction": ReactionSensor,
+    "recovery": RecoverySensor,
+    "spring": SpringSensor,
     "strain": StrainGauge,
     "stress": StressSensor,
     "von-mises": VonMisesSensor,

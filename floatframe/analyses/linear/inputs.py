@@ -20,6 +20,7 @@ from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.system_matrices import Inputs
 from floatframe.bodies.coordinates import JointCoordinate
+from floatframe.bodies.markers import body_name
 from floatframe.checked_values import array_of_shape, unit_vector
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
@@ -27,13 +28,21 @@ from floatframe.forces import UserForce
 from floatframe.functions.time_functions import TimeFunction, constant, polynomial_of_time
 from floatframe.joints.rows import kind_of
 from floatframe.kernels.work import new_work
-from floatframe.results.sensors.channels import QUANTITIES, RATES, CoordinateChannel, rate_unit
-from floatframe.small_motions.small_motions import BaseColumn, SmallMotions
+from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, rate_unit
+from floatframe.small_motions.small_motions import BaseColumn, InputForce, SmallMotions
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["BaseMotion", "DriveMotion", "ParameterInput", "base_columns", "input_columns", "input_rate"]
+__all__ = [
+    "BaseMotion",
+    "DriveMotion",
+    "ParameterInput",
+    "base_columns",
+    "input_columns",
+    "input_rate",
+    "interface_forces",
+]
 
 
 @frozen_copies
@@ -113,6 +122,21 @@ def input_rate(channel: Any) -> int:
 def base_columns(system: System, inputs: Sequence[Any]) -> tuple[BaseColumn, ...]:
     """Return what each input moves of the ground: of some connections, or nothing."""
     return tuple(base_column(system, each) if isinstance(each, BaseMotion) else BaseColumn() for each in inputs)
+
+
+def interface_forces(inputs: Sequence[Any]) -> tuple[tuple[InputForce, ...], ...]:
+    """Return what each input does at interfaces of flexible bodies."""
+    found = []
+    for channel in inputs:
+        forces = []
+        for sign, marker in channel.markers if isinstance(channel, Channel) else ():
+            if marker.interface is not None:
+                wrench = np.zeros(6)
+                first = 0 if channel.quantity == "translation" else 3
+                wrench[first : first + 3] = sign * channel.direction
+                forces.append(InputForce(body_name(marker.body), marker.interface, wrench))
+        found.append(tuple(forces))
+    return tuple(found)
 
 
 def base_column(system: System, base: BaseMotion) -> BaseColumn:

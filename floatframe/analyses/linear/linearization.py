@@ -33,7 +33,14 @@ from floatframe.analyses.linear.channels import (
     outputs_of,
     require_input,
 )
-from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, base_columns, input_columns, input_rate
+from floatframe.analyses.linear.inputs import (
+    BaseMotion,
+    DriveMotion,
+    base_columns,
+    input_columns,
+    input_rate,
+    interface_forces,
+)
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.system_matrices import Inputs, Tangents, settled, tangents, turning_matrices
 from floatframe.bodies.flexible_body import FlexibleBody
@@ -332,7 +339,14 @@ def linearize(
     shown = small_motions_of_file(compiled, state.q)
     parts = tangents(model, work)
     small = SmallMotions(
-        system, compiled, work, state, about.omega, snapshot(system, about), base_columns(system, inputs)
+        system,
+        compiled,
+        work,
+        state,
+        about.omega,
+        snapshot(system, about),
+        base_columns(system, inputs),
+        interface_forces(inputs),
     )
     by_inputs = input_columns(small, inputs)
     Omega, Omega_t = turning_matrices(model, work)

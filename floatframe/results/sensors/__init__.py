@@ -5,6 +5,7 @@ from typing import cast
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
+from floatframe.results.sensors.body_loads import InterfaceForceSensor, RecoverySensor, SpringSensor
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.coordinate_elements import ControlSensor, CouplerSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
@@ -25,12 +26,15 @@ __all__ = [
     "DisplacementSensor",
     "ElongationSensor",
     "EnergySensor",
+    "InterfaceForceSensor",
     "Measurement",
     "ModeSensor",
     "MomentumSensor",
     "PlaceSensor",
     "ReactionSensor",
+    "RecoverySensor",
     "Sensor",
+    "SpringSensor",
     "StrainGauge",
     "StressChannel",
     "StressSensor",
@@ -51,10 +55,13 @@ Sensor = (
     | DisplacementSensor
     | ElongationSensor
     | EnergySensor
+    | InterfaceForceSensor
     | ModeSensor
     | MomentumSensor
     | PlaceSensor
     | ReactionSensor
+    | RecoverySensor
+    | SpringSensor
     | StrainGauge
     | StressChannel
     | StressSensor
@@ -69,10 +76,13 @@ SENSORS = {
     "displacement": DisplacementSensor,
     "elongation": ElongationSensor,
     "energy": EnergySensor,
+    "interface-force": InterfaceForceSensor,
     "mode": ModeSensor,
     "momentum": MomentumSensor,
     "place": PlaceSensor,
     "reaction": ReactionSensor,
+    "recovery": RecoverySensor,
+    "spring": SpringSensor,
     "strain": StrainGauge,
     "stress": StressSensor,
     "von-mises": VonMisesSensor,

@@ -21,6 +21,7 @@ from floatframe import (
     ElongationSensor,
     FlexibleBody,
     Gravity,
+    InterfaceForceSensor,
     JointCoordinate,
     JointForce,
     Marker,
@@ -34,6 +35,7 @@ from floatframe import (
     RevoluteJoint,
     RigidBody,
     SpringDamper,
+    SpringSensor,
     State,
     StrainGauge,
     StressSensor,
@@ -102,6 +104,9 @@ def sensors():
           if k or what not in TURNING),
         *(PlaceSensor(f"seen {what}", places[1], what, places[2]) for what in PLACE_QUANTITIES),
         *(ReactionSensor(f"{of} {axes}", of, axes) for of in LOADED for axes in ("ground", "marker")),
+        *(InterfaceForceSensor(f"on {end} {axes}", "arm", end, axes) for end in ("end_a", "end_b")
+          for axes in ("ground", "body")),
+        SpringSensor("spring", "stay"),
         AngleSensor("angle", places[2], places[1], axis=(0.6, 0, 0.8)),
         ControlSensor("control", "control"), CouplerSensor("gear", "gear"),
         CoordinateSensor("root angle", "root", "angle"), CoordinateSensor("axle angle", "axle", "angle"),
@@ -217,6 +222,7 @@ def rotor_sensors():
         *(PlaceSensor(f"seen {what}", places[1], what, places[2]) for what in PLACE_QUANTITIES),
         *(ReactionSensor(f"{of} {axes}", of, axes) for of in ("main", "knuckle", "tie", "root", "cage")
           for axes in ("ground", "marker")),
+        InterfaceForceSensor("on blade", "blade", "end_b", "body"), SpringSensor("spring", "tie"),
         StressSensor("stress", "blade", position=node), VonMisesSensor("vm", "blade"),
         AngleSensor("angle", places[2], places[1]), DisplacementSensor("bend", places[2]),
     ]  # fmt: skip

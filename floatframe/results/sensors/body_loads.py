@@ -1,0 +1,312 @@
+"""Sensors of what acts on bodies: the whole force on an interface, springs along their line, recovery rows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cms.errors import BodyError
+from cms.reduced_body.recovery_table import RecoveryTable
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.compiling.interface_loads import Load, amplitudes, in_body, loads_on_interfaces
+from floatframe.compiling.markers import MarkerData, find_marker
+from floatframe.errors import ModelError
+from floatframe.forces import BodyLoad, Gravity, SpringDamper
+from floatframe.functions.time_functions import TimeFunction
+from floatframe.results.joint_coordinates import end_motion
+from floatframe.results.recovery import require_same_modes
+from floatframe.results.sensors.linear_columns import scalar_columns, vector_linear
+from floatframe.results.sensors.measurement import Measurement, unit_words, vector_columns
+from floatframe.results.sensors.stresses import flexible_body
+from floatframe.results.trajectory import Trajectory
+from floatframe.rotations import dot, rotation_matrix, tilde
+from floatframe.small_motions.rows import LinearColumns, Rows, joined
+from floatframe.small_motions.small_motions import SmallMotions
+from floatframe.system import System
+
+__all__ = ["INTERFACE_AXES", "InterfaceForceSensor", "RecoverySensor", "SpringSensor"]
+
+INTERFACE_AXES = ("ground", "body")
+NOTHING = 1e-12  #: of the largest wrench: rounding
+
+
+def interface_loads(system: System, trajectory: Trajectory, body: FlexibleBody) -> Array:
+    """Return force and moment on each interface at its point, axes of the body frame, (n_interfaces, n_t, 6)."""
+    i = list(trajectory.body_names).index(body.name)
+    wrenches, loads = loads_on_interfaces(system, i)
+    R, w = rotation_matrix(trajectory.body(body.name).p), trajectory.source.read("w")
+    total = np.zeros((len(body.reduced.interfaces), len(trajectory.t), 6))
+    for wrench in wrenches:
+        for part, first in ((0, wrench.force), (3, wrench.moment)):
+            if first >= 0:
+                total[wrench.interface, :, part : part + 3] += wrench.sign * in_body(R, w[:, first : first + 3])
+    for load in loads:
+        total[load.interface] += amplitudes(in_file(body, load), trajectory.t, R)
+    return total
+
+
+def in_file(body: FlexibleBody, load: Load) -> Load:
+    """Return a load with the axes of its marker in the frame of the body's file."""
+    axes = body.reduced.frame.axes.T @ body.moved.frame.axes
+    return Load(load.interface, load.force, axes @ load.triad)
+
+
+def interface_load_rows(small: SmallMotions, body: FlexibleBody) -> list[Rows]:
+    """Return the change of force and moment on each interface, ground axes, six rows each."""
+    wrenches, loads = loads_on_interfaces(small.system, small.compiled.body_names.index(body.name))
+    zero = small.by_motion(np.zeros((6, small.n_x)))
+    found = [zero for _ in body.reduced.interfaces]
+    for wrench in wrenches:
+        parts = [
+            small.by_wrench(slice(first, first + 3), wrench.sign) if first >= 0 else zero[:3]
+            for first in (wrench.force, wrench.moment)
+        ]
+        found[wrench.interface] = found[wrench.interface] + joined(parts)
+    for k, forces in enumerate(small.forces):
+        for push in forces:
+            if push.body == body.name and push.interface in interface_names(body):
+                x = np.zeros((6, small.n_x))
+                x[:, small.n_u + k] = push.wrench
+                own = interface_names(body).index(push.interface)
+                found[own] = found[own] + small.by_motion(x)
+    frame = small.frame_place(body.name)
+    for load in loads:
+        if load.force.is_follower:  # it turns with the undeformed marker, as `amplitudes` has it
+            six = amplitudes(in_file(body, load), np.zeros(1), frame.axes[None])[0]
+            turned = [frame.turned.turned(-tilde(frame.axes @ part)) for part in (six[:3], six[3:])]
+            found[load.interface] = found[load.interface] + joined(turned)
+    return found
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class InterfaceForceSensor:
+    """The whole force and moment on a flexible body through an interface: of joints, springs and point forces there.
+
+    The moment is about the point of the interface. Forces there that are inputs of a linearised system count as well.
+    """
+
+    name: str
+    body: str
+    interface: str
+    axes: str = "ground"  #: or "body", those of the body frame
+
+    def __post_init__(self) -> None:
+        if self.axes not in INTERFACE_AXES:
+            choices = ", ".join(INTERFACE_AXES)
+            raise ModelError(f"sensor {self.name!r}: axes: expected one of {choices}, got {self.axes!r}")
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return force and moment over time: components and sizes."""
+        body, k = self.place(system)
+        require_same_modes(trajectory, body.name, body.reduced)
+        six = interface_loads(system, trajectory, body)[k]
+        if self.axes == "ground":
+            R = rotation_matrix(trajectory.body(body.name).p)
+            six = np.concatenate([np.einsum("tab,tb->ta", R, part) for part in (six[:, :3], six[:, 3:])], axis=1)
+        columns: dict[str, Array] = {}
+        units: dict[str, str] = {}
+        for key, values in (("force", six[:, :3]), ("moment", six[:, 3:])):
+            more, unit = vector_columns(values, unit_words(system.units, key), prefix=f"{key} ")
+            columns |= more
+            units |= unit
+        return Measurement(self.name, trajectory.t, columns, units)
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return force and moment by wrenches; in body axes Rᵀ (dF + F × theta)."""
+        body, k = self.place(small.system)
+        rows, frame = interface_load_rows(small, body)[k], small.frame_place(body.name)
+        now = self.measure(small.system, small.now).columns
+        found = []
+        for first, key in ((0, "force"), (3, "moment")):
+            value, part = np.array([now[f"{key} {axis}"][0] for axis in "xyz"]), rows[first : first + 3]
+            if self.axes == "body":
+                part = (part + frame.turned.turned(tilde(frame.axes @ value))).turned(frame.axes.T)
+            unit = unit_words(small.system.units, key)
+            found.append(vector_linear(part, value, unit, prefix=f"{key} ", least=NOTHING * small.largest_wrench))
+        force, moment = found
+        return LinearColumns(
+            {**force.columns, **moment.columns},
+            {**force.units, **moment.units},
+            {**force.not_linear, **moment.not_linear},
+        )
+
+    def place(self, system: System) -> tuple[FlexibleBody, int]:
+        """Return the body and the number of the interface; `ModelError` with the nearest name if it is not there."""
+        body = flexible_body(system, self.name, self.body)
+        names = [interface.name for interface in body.reduced.interfaces]
+        if self.interface not in names:
+            raise ModelError(
+                f"sensor {self.name!r}: flexible body {body.name!r} has no interface {quoted(self.interface)}"
+                f"{nearest(self.interface, names)}"
+            )
+        return body, names.index(self.interface)
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class SpringSensor:
+    """A spring-damper along its line: length, its rate, and the tension, negative where it pushes."""
+
+    name: str
+    of: str  #: name of the spring-damper
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return length, rate and tension over time."""
+        a, b = (end_motion(system, trajectory, end) for end in self.ends(system))
+        d = b.position - a.position
+        length = np.linalg.norm(d, axis=1)
+        e = d / np.where(length > 0, length, 1.0)[:, None]
+        force = trajectory.reaction(self.of).force
+        columns = {"length": length, "rate": dot(e, b.velocity - a.velocity), "tension": dot(e, force)}
+        return Measurement(self.name, trajectory.t, columns, self.units(system))
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return all columns: along the line d, e · d(r_B - r_A) and e · dF, since F is along e."""
+        a, b = (small.place(end, self.of) for end in self.ends(small.system))
+        d = b.position - a.position
+        length = float(np.linalg.norm(d))
+        if length == 0.0:
+            why = "a line of length zero has no direction"
+            return LinearColumns({}, self.units(small.system), dict.fromkeys(("length", "rate", "tension"), why))
+        row, first = (b.moved - a.moved).turned(d / length), small.wrench(self.of).start
+        tension = small.by_wrench(slice(first, first + 3)).turned(d / length)
+        return scalar_columns({"length": row, "rate": row.rate, "tension": tension}, self.units(small.system))
+
+    def ends(self, system: System) -> list[MarkerData]:
+        """Return both markers; `ModelError` with the nearest name if there is no such spring."""
+        springs = {force.name: force for force in system.forces if isinstance(force, SpringDamper)}
+        if self.of not in springs:
+            hint = nearest(self.of, list(springs))
+            raise ModelError(f"sensor {self.name!r}: no spring-damper {quoted(self.of)}{hint}")
+        spring = springs[self.of]
+        return [find_marker(system, f"force {self.of!r}", end) for end in (spring.marker_a, spring.marker_b)]
+
+    def units(self, system: System) -> dict[str, str]:
+        """Return the units of the columns."""
+        return {"length": unit_words(system.units, "length"), "rate": unit_words(system.units, "speed"),
+                "tension": unit_words(system.units, "force")}  # fmt: skip
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class RecoverySensor:
+    """Rows of a recovery table of a flexible body: motions, stresses and forces with their residual static parts.
+
+    y = D_0 z + D_1 z' + D_2 z'' + L p, see `cms.reduced_body.recovery_table`: z' and z'' are velocities and
+    accelerations of the body frame in its axes and the rates of q, p gravity, spin, the loads on interfaces and load
+    cases. Places in the moving body count from its frame: z begins with zeros.
+    """
+
+    name: str
+    body: str
+    table: str  #: name of the recovery table in the modal file
+    rows: Sequence[str] = ()  #: labels or their beginnings; none: all rows
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return the rows over time, by their labels."""
+        body, table, rows = self.found(system)
+        require_same_modes(trajectory, body.name, body.reduced)
+        motion = trajectory.body(body.name)
+        R = rotation_matrix(motion.p)
+        z = np.concatenate([np.zeros((len(motion.t), 6)), motion.q], axis=1)
+        rate = np.concatenate([in_body(R, motion.v), motion.omega_B, motion.q_dot], axis=1)
+        second = np.concatenate([in_body(R, motion.v_dot), motion.omega_B_dot, motion.q_ddot], axis=1)
+        values = table.values(z, rate, second, self.loads(system, trajectory, body, table))[:, rows]
+        columns = {table.labels[row]: values[:, k] for k, row in enumerate(rows)}
+        return Measurement(self.name, trajectory.t, columns, {table.labels[row]: table.units[row] for row in rows})
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return the rows by small motions and wrenches about a state at rest."""
+        body, table, rows = self.found(small.system)
+        units = {table.labels[row]: table.units[row] for row in rows}
+        if small.is_turning:
+            why = "recovery rows about a steady rotation: linearise the system at rest"
+            return LinearColumns({}, units, dict.fromkeys(units, why))
+        z, R = small.of_file(body.name)
+        frame = small.frame_place(body.name)
+        own = small.by_motion(np.concatenate([np.zeros((6, small.n_x)), z.x[6:]]))
+        y = own.turned(table.dynamic[0][rows]) + z.rate.turned(table.dynamic[1][rows])
+        y = y + z.rate.rate.turned(table.dynamic[2][rows])
+        turning = frame.turned
+        on_interfaces, now = interface_load_rows(small, body), interface_loads(small.system, small.now, body)[:, 0]
+        for column, load in enumerate(table.loads):
+            factor = table.static[rows, column][:, None]
+            name, _, component = load.rpartition(" ")
+            if name == "gravity":
+                g = gravity_of(small.system)
+                y = y + turning.turned(tilde(g)).turned(R.T)[axis_of(component)].turned(factor)
+            elif component in SIX and name in interface_names(body):
+                k, j = interface_names(body).index(name), SIX.index(component)
+                first = 3 * (j // 3)
+                value = R @ now[k, first : first + 3]
+                part = on_interfaces[k][first : first + 3] + turning.turned(tilde(value))
+                y = y + part.turned(R.T)[j % 3].turned(factor)
+        return LinearColumns({table.labels[row]: y[k] for k, row in enumerate(rows)}, units, {})
+
+    def found(self, system: System) -> tuple[FlexibleBody, RecoveryTable, IntArray]:
+        """Return the body, its table and which rows; `ModelError` with the nearest name if they are not there."""
+        body = flexible_body(system, self.name, self.body)
+        tables = body.reduced.recovery
+        if self.table not in tables:
+            raise ModelError(
+                f"sensor {self.name!r}: body {body.name!r} has no recovery table {quoted(self.table)}"
+                f"{nearest(self.table, list(tables))}"
+            )
+        table = tables[self.table]
+        if not self.rows:
+            return body, table, np.arange(table.n_rows)
+        try:
+            return body, table, np.unique(np.concatenate([table.rows(wanted) for wanted in self.rows]))
+        except BodyError as error:
+            raise ModelError(f"sensor {self.name!r}: {error}") from error
+
+    def loads(self, system: System, trajectory: Trajectory, body: FlexibleBody, table: RecoveryTable) -> Array:
+        """Return the amplitudes of the loads over time, (n_t, n_loads); `ModelError` for one that a run has not."""
+        motion = trajectory.body(body.name)
+        R, omega = rotation_matrix(motion.p), motion.omega_B
+        on_interfaces = interface_loads(system, trajectory, body)
+        p = np.zeros((len(motion.t), len(table.loads)))
+        for column, load in enumerate(table.loads):
+            name, _, component = load.rpartition(" ")
+            if name == "gravity":
+                p[:, column] = in_body(R, np.broadcast_to(gravity_of(system), (len(p), 3)))[:, axis_of(component)]
+            elif name == "spin":
+                a, b = ("xyz".index(letter) for letter in component)
+                p[:, column] = (1 if a == b else 2) * omega[:, a] * omega[:, b]
+            elif component in SIX and name in interface_names(body):
+                p[:, column] = on_interfaces[interface_names(body).index(name), :, SIX.index(component)]
+            elif load.startswith("load case "):
+                cases = [force for force in system.forces if isinstance(force, BodyLoad)]
+                for force in cases:
+                    if load == f"load case {force.load_case}" and named(force.body) == body.name:
+                        assert isinstance(force.amplitude, TimeFunction)  # a load case makes one of a number
+                        p[:, column] += [force.amplitude(t) for t in motion.t]
+        return p
+
+
+SIX = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+def named(body: object) -> str:
+    """Return the name of a body given by itself or by its name."""
+    return body if isinstance(body, str) else str(getattr(body, "name", ""))
+
+
+def interface_names(body: FlexibleBody) -> list[str]:
+    """Return the names of the interfaces of a body."""
+    return [interface.name for interface in body.reduced.interfaces]
+
+
+def axis_of(component: str) -> int:
+    """Return the number of the axis x, y or z."""
+    return "xyz".index(component)
+
+
+def gravity_of(system: System) -> Array:
+    """Return the acceleration of free fall, ground axes, (3,)."""
+    fall = [force.acceleration for force in system.forces if isinstance(force, Gravity)]
+    return np.sum([np.zeros(3), *fall], axis=0)

@@ -1,0 +1,116 @@
+"""Recovery rows as sensors and outputs: against states near by, and against the forces of the joints on the body."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+from floatframe import (
+    GROUND,
+    BaseMotion,
+    FixedJoint,
+    FlexibleBody,
+    Gravity,
+    InterfaceForceSensor,
+    Marker,
+    ModelError,
+    PlaceSensor,
+    PointForce,
+    RecoverySensor,
+    RevoluteJoint,
+    SpringDamper,
+    System,
+    consistent_state,
+    linearize,
+    measured,
+    snapshot,
+    static_equilibrium,
+)
+from tests.cms.second_order.test_geometric_reduction import bar_of_beams
+from tests.floatframe.analyses.test_linear_sensors import compare
+
+
+@pytest.fixture(scope="module")
+def bar():
+    coupled = cms.couple(bar_of_beams(6))
+    end = coupled.interfaces[1].name
+    rows = (cms.Rows("acceleration", at=(end,)), cms.Rows("interface force"), cms.Rows("net force", about=(0, 0, 0)))
+    asked = [cms.RecoveryRequest("instruments", rows=rows)]
+    return cms.reduce(coupled, cms.craig_bampton(coupled, n_modes=3), recovery=asked)
+
+
+def held(bar, *forces):
+    root, tip = (interface.name for interface in bar.interfaces)
+    joint = RevoluteJoint("hinge", GROUND, Marker("bar", root), axis=(0, 1, 0))
+    stay = SpringDamper("stay", Marker(GROUND, position=(0.3, 0.2, 2.0)), Marker("bar", tip), 3e4, 20.0)
+    return System([FlexibleBody("bar", bar)], [joint], [Gravity((0, 0, -9.81)), stay, *forces])
+
+
+def test_rows_are_linear_outputs(bar):
+    system = held(bar)
+    about = static_equilibrium(system, tolerance=1e-12)
+    sensors = [RecoverySensor("rows", "bar", "instruments")]
+    linear = linearize(system, about, outputs=sensors)
+    assert len(linear.outputs) == bar.recovery["instruments"].n_rows
+    compare(system, about, linear, sensors, size=1e-6, tolerance=1e-5)
+
+
+def test_recovered_interface_forces_and_accelerations_are_those_of_joints_and_places(bar):
+    """What the rows say of the body's own motion against what acts on it and how its end moves, at rest and pushed."""
+    tip = bar.interfaces[1].name
+    system = held(bar, PointForce("push", Marker("bar", tip), force=(30.0, -20.0, 50.0), torque=(1.0, 2.0, 3.0)))
+    made = consistent_state(system)
+    now = snapshot(system, made.state, made.u_dot, made.w)
+    sensors = [
+        RecoverySensor("rows", "bar", "instruments"),
+        *(InterfaceForceSensor(each.name, "bar", each.name, "body") for each in bar.interfaces),
+        PlaceSensor("place", Marker("bar", tip), "acceleration"),
+    ]
+    found = measured(system, now, sensors)
+    table, rows = bar.recovery["instruments"], found["rows"].columns
+    frame = bar.frame.axes
+    checked = 0
+    for label, quantity, component in zip(table.labels, table.quantities, table.components, strict=True):
+        for interface in bar.interfaces:
+            if quantity == "interface force" and interface.name in label:
+                own = found[interface.name].columns
+                force, moment = (frame @ [own[f"{key} {x}"][0] for x in "xyz"] for key in ("force", "moment"))
+                expected = dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), [*force, *moment], strict=True))
+                assert_allclose(rows[label][0], expected[component], rtol=1e-6, atol=1e-6 * np.abs(force).max())
+                checked += 1
+    assert checked == 12
+
+
+def test_what_is_not_there_is_refused_by_name(bar):
+    for sensor, words in (
+        (RecoverySensor("r", "bar", "instrument"), "did you mean 'instruments'"),
+        (RecoverySensor("r", "bar", "instruments", rows=("nothing",)), "r"),
+        (InterfaceForceSensor("f", "bar", "stat"), "no interface 'stat'"),
+    ):
+        with pytest.raises(ModelError, match=words):
+            linearize(held(bar), outputs=[sensor])
+
+
+@pytest.mark.parametrize("quantity", ["translation", "rotation"])
+def test_interface_forces_under_moving_bases_are_those_of_the_craig_bampton_matrices(bar, quantity):
+    """Both ends clamped, one of them driven: F = Z_bb - Z_be Z_ee⁻¹ Z_eb with Z = K - omega² M over (u_b, eta)."""
+    joints = [FixedJoint(each.name, GROUND, Marker("bar", each.name)) for each in bar.interfaces]
+    direction = np.array([0.0, 0.6, 0.8])
+    end = bar.interfaces[1]
+    place = bar.frame.origin + bar.frame.axes @ end.position
+    base = BaseMotion("base", direction, quantity, place, joints=(end.name,), rate=0)
+    outputs = [InterfaceForceSensor(each.name, "bar", each.name) for each in bar.interfaces]
+    linear = linearize(System([FlexibleBody("bar", bar)], joints), inputs=[base], outputs=outputs)
+    matrices, n_b = cms.craig_bampton_matrices(bar), 12
+    for f in (0.0, 30.0, 400.0):
+        Z = np.asarray(matrices.K) - (2 * np.pi * f) ** 2 * np.asarray(matrices.M)
+        bb, be, ee = Z[:n_b, :n_b], Z[:n_b, n_b:], Z[n_b:, n_b:]
+        u = np.zeros(n_b)
+        u[6 if quantity == "translation" else 9 :][:3] = direction
+        expected = (bb - be @ np.linalg.solve(ee, be.T)) @ u
+        found = linear.response([f])[0, :, 0].real
+        for k, each in enumerate(bar.interfaces):
+            for first, key in ((0, "force"), (3, "moment")):
+                part = [found[linear.outputs.index(f"{each.name}.{key} {x}")] for x in "xyz"]
+                size = np.abs(expected).max()
+                assert_allclose(part, expected[6 * k + first : 6 * k + first + 3], rtol=1e-6, atol=1e-6 * size)
