@@ -289,3 +289,64 @@ def test_mistakes_in_channels_are_answered(pendulum, old, new, words):
 ])  # fmt: skip
 def test_commands_refuse_what_they_cannot_do(pendulum, words, message):
     assert message in run(words[0], pendulum, *words[1:], code=2)
+
+
+SHAKEN = PENDULUM.replace(
+    "\n[run]",
+    """
+[sensors.load]
+type = "reaction"
+of = "hinge"
+
+[inputs.shake]
+type = "base"
+direction = [1, 0, 0]
+
+[outputs.side]
+sensor = "load"
+column = "force x"
+
+[outputs.bearing]
+sensor = "load"
+
+[run]""",
+)
+
+
+def test_files_name_sensors_as_outputs_and_bases_as_inputs(pendulum):
+    """A rod that hangs on a hinge shaken sideways with a: force x on the ground m a (1 + s² l c/(s² + g c)), ..."""
+    pendulum.write_text(SHAKEN)
+    path = pendulum.with_suffix(".npz")
+    text = run("linearize", pendulum, "-o", path)
+    with np.load(path) as data:
+        names, units = list(data["outputs"]), list(data["output_units"])
+        A, B, C, D = (data[name] for name in "ABCD")
+    assert names[0] == "side"
+    assert names[1:4] == [f"bearing.force {axis}" for axis in "xyz"]
+    assert units[0] == "N"
+    assert "left out: bearing.moment size" in text
+    s = 2j * np.pi * 0.7
+    H = C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D
+    m, J, c, g = 2.0, 1 / 6 + 0.5, 0.5, 9.81
+    turn = -m * c / (J * s**2 + m * g * c)  # by the acceleration of the hinge
+    assert_allclose(H[0, 0], -m * (1 + c * s**2 * turn), rtol=1e-9)
+    for name in ("side", "load.force x", "bearing.force x"):
+        csv_path = pendulum.with_suffix(".csv")
+        run("response", pendulum, "--band", "0.7:0.9", "-m", name, "-o", csv_path)
+        with open(csv_path, newline="") as file:
+            rows = list(csv.reader(file))
+        assert_allclose(float(rows[1][1]), abs(H[0, 0]), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ('sensor = "load"\ncolumn', 'sensor = "lod"\ncolumn', "no sensor 'lod'; did you mean 'load'"),
+    ('column = "force x"', 'column = "force u"', "no column 'force u'"),
+    ('column = "force x"', 'column = "moment size"', "is not linear here"),
+    ('type = "base"', 'type = "bse"', "did you mean 'base'"),
+    ('type = "base"', 'type = "base"\nbody = "rod"', "an input of type base has no key body"),
+    ('type = "base"\ndirection = [1, 0, 0]', 'type = "drive"\njoint = "hinge"', "coordinate: missing"),
+])  # fmt: skip
+def test_mistakes_in_outputs_of_sensors_are_answered(pendulum, old, new, words):
+    assert SHAKEN.count(old) == 1
+    pendulum.write_text(SHAKEN.replace(old, new))
+    assert words in run("linearize", pendulum, code=2)
