@@ -26,6 +26,7 @@ from floatframe.kernels.work import new_work
 from floatframe.motion.event_steps import EventWatch
 from floatframe.motion.events import require_times_of_events
 from floatframe.motion.jumps import jumps_of_steps, over_jumps
+from floatframe.motion.knots import knot_words
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
 from floatframe.motion.step_advice import step_advice
 from floatframe.motion.validity_watch import ValidityWatch
@@ -132,6 +133,8 @@ def integrate(
     advice = step_advice(system, step)
     if advice is not None and advice.n_followed == 0:
         log.warning("system %r: %s", system.name, advice.words)
+    for words in knot_words(system, t_start, step, n_total):
+        log.warning("system %r: %s", system.name, words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
     head = replace(head, angles=compiled_system(system).angles)
     watch = EventWatch(system, head) if system.events else None
