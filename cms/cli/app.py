@@ -183,6 +183,35 @@ def export_command(
     run_export(ExportRequest(file, to, units, nodes, output, tuple(load or ())))
 
 
+@app.command("recovery")
+@guarded
+def recovery_command(
+    file: ModalFile,
+    table: Annotated[str | None, typer.Option(help="Name of the table; needed where there are several.")] = None,
+    rows: Annotated[
+        Path | None, typer.Option(help="TOML file with tables of rows that the body knows without its model.")
+    ] = None,
+    over: Annotated[
+        str, typer.Option(help="modes: over rigid motion and q; interfaces: Craig-Bampton, over interfaces and modes.")
+    ] = "modes",
+    units: Annotated[str | None, typer.Option(help="Unit system of the numbers; default: that of the body.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File: .npz, .mat, .op4, .csv, or .h5 with the tables added.")
+    ] = None,
+) -> None:
+    """List the recovery rows of a modal file, or write them: accelerations, stresses, element and interface forces.
+
+    Example: cms recovery tower.h5
+
+    Example: cms recovery tower.h5 --table instruments --over interfaces -o instruments.mat
+
+    Example: cms recovery outboard.h5 --rows accelerations.toml -o accelerations.csv
+    """
+    from cms.cli.exchange.recovery import RecoveryCommand, run_recovery
+
+    run_recovery(RecoveryCommand(file, table, rows, over, units, output))
+
+
 @app.command("import")
 @guarded
 def import_command(

@@ -91,6 +91,15 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         )
         if len(sets) > MOST_SETS:
             say(f"and {len(sets) - MOST_SETS} further sets: cms info --json lists all\n")
+    if record["recovery"]:
+        print_table(
+            "Recovery tables (cms recovery lists their rows)",
+            ("name", "rows>", "of", "loads of the static part>"),
+            [
+                (t["name"], t["rows"], ", ".join(f"{n} {what}" for what, n in t["quantities"].items()), t["loads"])
+                for t in record["recovery"]
+            ],
+        )
     force = body.units.force_symbol
     if record["load_cases"]:
         print_table(

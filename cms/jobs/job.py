@@ -24,6 +24,7 @@ from cms.jobs.reduction_table import ReductionSection, mode_set_options, named_i
 from cms.jobs.shell_tables import ShellSection, check_shells
 from cms.jobs.tables.material_table import MaterialSection
 from cms.jobs.tables.mesh_size_table import MeshSizeSection, check_mesh_size
+from cms.jobs.tables.recovery_section import RecoverySection
 from fe_models.body.fe_body import INTERFACE_KINDS
 from fe_models.body.load_cases import LOAD_CASE_KINDS
 from fe_models.foundation.paths import near_file
@@ -346,6 +347,7 @@ class Job(Table):
     equations: dict[str, EquationSection] = Field({}, description="tables [equations.NAME] of a deck")
     interfaces: dict[str, InterfaceSection] = Field({}, description="tables [interfaces.NAME]")
     load_cases: dict[str, LoadCaseSection] = Field({}, description="tables [load_cases.NAME]")
+    recovery: dict[str, RecoverySection] = Field({}, description="tables [recovery.NAME] with rows")
     reduction: ReductionSection = Field(description="a table [reduction] with set and n_modes or cutoff")
     damping: DampingSection | None = Field(
         None, description="a table [damping] with ratio, ratios, ramp, or alpha and beta"

@@ -12,6 +12,7 @@ from fe_models.body.fe_body import FEBody
 from fe_models.foundation.stages import Stages
 
 if TYPE_CHECKING:
+    from cms.families.families import Families
     from cms.mode_set import ModeSet
     from cms.second_order.unit_states import UnitStates
 
@@ -42,7 +43,7 @@ def reduce_job(
     >>> body = cms.reduce_job("rod.toml")                                          # doctest: +SKIP
     >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
     """
-    from cms.reduction import reduce
+    from cms.families.families import Families
     from cms.second_order.unit_states import require_geometric_stiffness
 
     job = job if isinstance(job, Job) else read_job(Path(job))
@@ -50,37 +51,55 @@ def reduce_job(
     coupled = job_body(job, stages, on_report=on_report)
     if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
         require_geometric_stiffness(coupled)  # before the long work
-    modes, states = modes_and_states(job, coupled, stages)
+    if job.recovery:
+        with Families(coupled) as families:  # the static part of recovery rows needs the factorisation
+            return reduced(job, families, stages, *modes_and_states(job, families, stages))
+    return reduced(job, coupled, stages, *with_own_factorisation(job, coupled, stages))
+
+
+def reduced(
+    job: Job, source: "FEBody | Families", stages: Stages, modes: "ModeSet", states: "UnitStates | None"
+) -> ReducedBody:
+    """Reduce the body of a job to its modes."""
+    from cms.families.sharing import body_of
+    from cms.jobs.tables.recovery_section import requests_of
+    from cms.reduction import reduce
+
     with stages("reduce"):
         return reduce(
-            coupled,
+            source,
             modes,
-            frame=frame_of(job, held=coupled.is_held),
+            frame=frame_of(job, held=body_of(source).is_held),
             damping=None if job.damping is None else job.damping.damping,
             stress=job.reduction.stress is not False,
             quadratic=bool(job.reduction.quadratic_modes),
             geometric=False if states is None else states,
+            recovery=requests_of(job.recovery),
         )
 
 
-def modes_and_states(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSet, UnitStates | None]":
-    """Make what needs the factorisation, which is freed before the reduction: that needs the memory.
-
-    The static states of unit loads are for the geometric stiffness; None where it is left out or not known.
-    """
+def with_own_factorisation(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSet, UnitStates | None]":
+    """Make what needs the factorisation, which is freed before the reduction: that needs the memory."""
     from cms.families.families import Families
+
+    with Families(coupled) as families:
+        return modes_and_states(job, families, stages)
+
+
+def modes_and_states(job: Job, families: "Families", stages: Stages) -> "tuple[ModeSet, UnitStates | None]":
+    """Return the mode set and the static states of unit loads.
+
+    These are for the geometric stiffness; None where it is left out or not known.
+    """
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
     from cms.second_order.unit_states import has_geometric_stiffness, unit_states
 
     wanted = job.reduction.geometric_stiffness
     if wanted is None:
-        wanted = has_geometric_stiffness(coupled)
-    with Families(coupled) as families:
-        with stages(f"mode set {job.reduction.set}"):
-            modes = job_mode_set(families, reduction_of(job, coupled))
-        if not wanted and not job.reduction.quadratic_modes:
-            return modes, None
-        with stages("static states"):
-            return modes, unit_states(
-                families, frame=moving_frame_of(job), spread=job.reduction.spread_loads is not False
-            )
+        wanted = has_geometric_stiffness(families.body)
+    with stages(f"mode set {job.reduction.set}"):
+        modes = job_mode_set(families, reduction_of(job, families.body))
+    if not wanted and not job.reduction.quadratic_modes:
+        return modes, None
+    with stages("static states"):
+        return modes, unit_states(families, frame=moving_frame_of(job), spread=job.reduction.spread_loads is not False)

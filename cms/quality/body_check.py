@@ -16,6 +16,7 @@ from cms.quality.of_body.interface_motions import (
     check_rigid_interfaces,
 )
 from cms.quality.of_body.mesh_order import check_mesh_order
+from cms.quality.of_body.recovery_rows import check_recovery_forces, check_recovery_motions
 from cms.quality.of_body.step_size import check_damping, check_dropped_columns, check_step_size
 from cms.quality.of_body.symmetry import check_definiteness, check_kinetic_energy, check_symmetry
 from cms.quality.of_body.unit_hints import check_units
@@ -37,6 +38,8 @@ BODY_CHECKS = (
     check_interface_places,
     check_interface_motions,
     check_energy_shares,
+    check_recovery_motions,
+    check_recovery_forces,
     check_driven_mass,
     check_buckling,
     check_mesh_order,

@@ -92,6 +92,16 @@ def body_record(body: ReducedBody) -> dict[str, Any]:
         },
         "geometric_stiffness": body.geometric is not None,
         "quadratic_modes": body.quadratic is not None,
+        "recovery": [
+            {
+                "name": table.name,
+                "rows": table.n_rows,
+                "quantities": {name: table.quantities.count(name) for name in dict.fromkeys(table.quantities)},
+                "loads": len(table.loads),
+                "truncated": table.truncated,
+            }
+            for table in body.recovery.values()
+        ],
         "kept_nodes": len(body.nodes),
         "numbering": numbering_record(body),
         "surface_triangles": len(body.surface),

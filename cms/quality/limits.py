@@ -56,6 +56,14 @@ LIMITS: dict[str, Limit] = {
         "add constraint or attachment modes: joints at these interfaces meet a body that cannot follow",
     ),
     "energy-shares": Limit("energy shares of the sources sum to one", 1e-9, 1e-3, REDUCE_AGAIN),
+    "recovery-motions": Limit(
+        "recovery rows of motions follow a rigid motion", 1e-6, 1e-4,
+        "the rows are of another place, frame or unit than they say; make the table again",
+    ),
+    "recovery-forces": Limit(
+        "recovery rows of stress and forces in a rigid motion", 1e-6, 1e-3,
+        "the rows are of another body or in axes of other nodes; make the table again",
+    ),
     "driven-mass": Limit("mass that does not vibrate when one interface is driven", None, None, ""),
     "buckling": Limit(
         "unit loads over the loads that buckle the body", 1.0, None,
