@@ -3,7 +3,7 @@
 Between two modes a response is smooth; at a mode it is a peak of half-power width 2 zeta f. The band is cut
 
     at its ends, at the corners of the levels, and at thirds of an octave,
-    at every mode f, and at f (1 ± zeta k), k = 1, 3, 9, 27,
+    at every mode f, and at f (1 ± zeta k), k = 1, 3, 9, ... until zeta k reaches a tenth,
 
 and each panel has the points of Clenshaw and Curtis' rule with 12 intervals (extremes of a Chebyshev polynomial, ends
 and the peak itself among them). The rule with half of them is nested in it: the difference of both bounds the error.
@@ -23,7 +23,8 @@ from floatframe.errors import ModelError
 __all__ = ["ResolvedBand", "resolved_band"]
 
 INTERVALS = 12  #: of a panel; even, so that half of them is a rule too
-SPREAD = (1.0, 3.0, 9.0, 27.0)  #: half-widths of a peak at which panels end
+GROWTH = 3.0  #: of the distance from a peak from the end of one panel to that of the next
+WIDEST = 0.1  #: distance over frequency at which panels of the octaves take over
 PER_OCTAVE = 3
 LEAST_DAMPING = 1e-4  #: ratio by which a peak is resolved at least
 APART = 1e-9  #: relative distance of edges that are one
@@ -63,9 +64,7 @@ def resolved_band(
     if not 0 < first < last:
         raise ModelError(f"shake: expected a rising band above 0 Hz, got {first:g} to {last:g}")
     n = max(1, int(np.ceil(PER_OCTAVE * np.log2(last / first))))
-    width = np.maximum(damping, LEAST_DAMPING)
-    spread = np.array([-k for k in SPREAD[::-1]] + [0.0, *SPREAD])
-    around = (modes[:, None] * (1 + width[:, None] * spread)).ravel()
+    around = np.concatenate([np.zeros(0), *(edges_around(f, zeta) for f, zeta in zip(modes, damping, strict=True))])
     edges = np.concatenate([np.geomspace(first, last, n + 1), around, np.asarray(corners, dtype=float)])
     edges = np.sort(edges[(edges > first * (1 + APART)) & (edges < last * (1 - APART))])
     edges = np.concatenate([[first], edges, [last]])
@@ -83,6 +82,14 @@ def resolved_band(
         coarse[own] += size[k] * half
     f[0], f[-1] = first, last
     return ResolvedBand(f, weights, coarse)
+
+
+def edges_around(f: float, zeta: float) -> Array:
+    """Return the ends of panels about a mode, from it outwards by powers of GROWTH of its half-width [Hz]."""
+    width = max(zeta, LEAST_DAMPING)
+    n = max(0, int(np.ceil(np.log(WIDEST / width) / np.log(GROWTH))))
+    away = width * GROWTH ** np.arange(n + 1)
+    return np.asarray(f * np.concatenate([1 - away[away < 1], [1.0], 1 + away]))
 
 
 @cache

@@ -1,0 +1,131 @@
+"""Shocks: pulses, what they leave, histories made for spectra, and runs against pyYeti."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from floatframe.errors import ModelError
+from floatframe.shaking.loads.levels import Level
+from floatframe.shaking.loads.pulses import pulse, synthesised
+from floatframe.shaking.loads.shock import SpectrumRequest, TimeTest, time_runs
+from floatframe.shaking.loads.uncertainty import Uncertainty
+from floatframe.shaking.responses.response_spectrum import shock_response_spectrum
+from tests.floatframe.shaking.single_mass import ACCELERATION, DISPLACEMENT, masses
+
+G = 9.80665
+
+
+@pytest.mark.parametrize(
+    ("kind", "share"),
+    [("half-sine", 2 / np.pi), ("terminal-peak", 0.5), ("initial-peak", 0.5), ("triangle", 0.5), ("trapezoid", 0.9)],
+)
+def test_a_pulse_leaves_its_velocity_change(kind, share):
+    t, a = pulse(kind, 40.0, 0.011)
+    run = time_runs(masses([80.0], 0.05), TimeTest("s", t, a, ("z",), kind="shock"))[0]
+    assert_allclose(run.velocity_left, [40.0 * 0.011 * share], rtol=1e-5)
+    assert run.t[-1] > 0.011 + 9.9 / 80.0
+
+
+def test_outputs_are_those_of_pyyeti_on_the_same_samples():
+    from pyyeti.ode import SolveUnc
+
+    model = masses([80.0, 95.0], 0.03, [1.0, 0.6])
+    t, a = pulse("half-sine", 40.0, 0.011)
+    run = time_runs(model, TimeTest("s", t, a, ("z",), kind="shock"))[0]
+    assert not run.notes
+    h = float(run.t[1])
+    solver = SolveUnc(np.ones(2), np.diag(model.C), model.omega**2, h)
+    motion = solver.tsolve(np.outer(model.B[2, :, 2], run.input_values[0]))
+    expected = model.E[0] @ motion.d + model.E[2] @ motion.a + np.outer(model.D[2, :, 2], run.input_values[0])
+    assert_allclose(run.values, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    spectrum = run.spectra["mass acceleration z"][10.0]
+    assert_allclose(
+        spectrum, shock_response_spectrum(run.values[ACCELERATION], h, run.spectra_frequencies, 10.0), rtol=1e-12
+    )
+
+
+def test_histories_meet_the_closed_form_of_a_step():
+    model = masses([5.0], 0.0)
+    t = np.array([0.0, 0.35])
+    run = time_runs(model, TimeTest("s", t, np.array([2.0, 2.0]), ("z",), after=0.0))[0]
+    omega = 2 * np.pi * 5
+    assert_allclose(run.values[DISPLACEMENT], -2.0 / omega**2 * (1 - np.cos(omega * run.t)), rtol=0, atol=1e-12)
+
+
+def test_unequal_times_are_told():
+    run = time_runs(
+        masses([5.0], 0.01), TimeTest("s", np.array([0, 0.1, 0.1 + np.pi / 30]), np.array([0, 1.0, 0]), ("z",))
+    )[0]
+    assert any("unequal times were sampled anew" in note for note in run.notes)
+
+
+def test_uncertain_frequencies_give_the_largest_of_three_runs():
+    t, a = pulse("half-sine", 40.0, 0.011)
+    test = TimeTest("s", t, a, ("z",), kind="shock")
+    runs = [time_runs(model, test)[0].peaks for model in (masses([f], 0.02) for f in (72.0, 80.0, 88.0))]
+    own = time_runs(masses([80.0], 0.02), test, Uncertainty(1.25, 0.1))[0]
+    assert_allclose(own.uncertain, 1.25 * np.max(runs, axis=0), rtol=2e-3)
+
+
+def test_a_history_for_a_spectrum_meets_it_and_leaves_nothing():
+    target = Level.of([(100, 50.0), (1000, 1000.0), (2000, 1000.0)])
+    made = synthesised(target, 10.0)
+    assert np.abs(made.decibels).max() < 1.0
+    from pyyeti import srs
+
+    other = srs.srs(
+        made.acceleration, 1 / made.time[1], made.frequencies, 10.0, rolloff="none", time="total", parallel="no"
+    )
+    below = made.frequencies < 900  # both look at 20 samples a cycle and more there
+    assert_allclose(made.reached[below], other[below], rtol=1.5e-2)
+    run = time_runs(masses([300.0], 0.05), TimeTest("p", made.time, made.acceleration * G, ("z",), kind="shock"))[0]
+    largest = np.abs(np.cumsum(made.acceleration)).max() * made.time[1] * G
+    assert abs(run.velocity_left[0]) < 1e-3 * largest
+    again = shock_response_spectrum(made.acceleration, made.time[1], made.frequencies, 10.0)
+    assert_allclose(again, made.reached, rtol=1e-12)
+
+
+def test_a_time_too_short_for_a_spectrum_is_refused():
+    with pytest.raises(ModelError, match="less than three half-cycles"):
+        synthesised(Level.of([(10, 1.0), (100, 10.0)]), 10.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"time": [0, 1, 1], "history": [0, 1, 0]}, "row 3: 1 s after 1 s"),
+        ({"time": [0, 1, 2], "history": [0, 1]}, "expected 3 values"),
+        ({"time": [0, 1, 2], "history": [0, np.nan, 1]}, "row 2 is no number"),
+        ({"time": [0, 1, 2]}, "either a history"),
+        ({"time": [0], "history": [0]}, "two finite times"),
+    ],
+)
+def test_histories_that_make_no_sense_are_refused(given, words):
+    with pytest.raises(ModelError, match=words):
+        TimeTest("s", np.array(given["time"]), None if "history" not in given else np.array(given["history"]))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (("sine", 1, 1), "expected one of"),
+        (("triangle", 1, 0), "seconds above 0"),
+        (("triangle", 0, 1), "other than 0"),
+    ],
+)
+def test_pulses_that_make_no_sense_are_refused(given, words):
+    with pytest.raises(ModelError, match=words):
+        pulse(*given)
+
+
+def test_too_many_samples_are_refused_with_the_remedy():
+    model = masses([1.0, 1e6], 0.01)
+    with pytest.raises(ModelError, match="residual_above"):
+        time_runs(model, TimeTest("s", np.array([0, 1.0]), np.array([0, 1.0]), ("z",)))
+    run = time_runs(
+        replace(model, n_residual=1),
+        TimeTest("s", np.array([0, 1.0]), np.array([0, 1.0]), ("z",), spectra=SpectrumRequest(first=1, last=5)),
+    )
+    assert len(run[0].t) < 1000
