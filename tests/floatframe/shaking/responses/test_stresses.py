@@ -20,7 +20,7 @@ def test_rms_and_quantile_are_those_of_samples():
     rng = np.random.default_rng(5)
     L = rng.normal(size=(6, 6))
     found = random_von_mises(L @ L.T)
-    sample = von_mises((rng.normal(size=(400_000, 6)) @ L.T))
+    sample = von_mises(rng.normal(size=(400_000, 6)) @ L.T)
     assert_allclose(found.rms, np.sqrt((sample**2).mean()), rtol=5e-3)
     assert_allclose(found.quantile, np.quantile(sample, 0.9973002), rtol=1e-2)
     assert_allclose(von_mises_density((L @ L.T)[None]), found.rms**2, rtol=1e-12)
