@@ -18,6 +18,8 @@ from floatframe.shaking.structure.body import bases_of_body, shaken_body
 from floatframe.shaking.structure.damping import Damping
 from floatframe.shaking.structure.model import DIRECTIONS, ShakenModel
 from floatframe.shaking.structure.places import Observed
+from floatframe.shaking.structure.system import bases_of_system, shaken_system
+from floatframe.system import System
 
 __all__ = ["EffectiveMasses", "NotchRequest", "ShakeJob", "ShakeResult", "effective_masses", "shake"]
 
@@ -38,9 +40,12 @@ class NotchRequest:
 class ShakeJob:
     """What is shaken, how, and what is wanted."""
 
-    structure: ReducedBody
-    base: Mapping[str, Sequence[str]] | str | None = None  #: name -> interfaces that it holds, or one interface
-    points: Mapping[str, Array] = field(default_factory=dict)  #: reference points of bases, mesh coordinates
+    structure: ReducedBody | System
+    #: name -> what it holds: interfaces of a body; joints, springs and bushings of a system. Or one of them
+    base: Mapping[str, Sequence[str]] | str | None = None
+    points: Mapping[str, Array] = field(
+        default_factory=dict
+    )  #: reference points of bases, coordinates of mesh or ground
     damping: Damping = field(default_factory=lambda: Damping(ratio=0.02))
     outputs: Sequence[Observed] = ()
     sine: Sequence[SineTest] = ()
@@ -116,9 +121,8 @@ def shake(job: ShakeJob) -> ShakeResult:
     if not (job.sine or job.random or job.shock):
         raise ModelError("shake: no test is given: expected a sine, random, shock or transient test")
     forces = [name for test in job.shock for name in (test.inputs or {}) if not is_base_input(job, name)]
-    bases = bases_of_body(job.structure, job.base, job.points)
-    model = shaken_body(job.structure, bases, job.damping, job.outputs, tuple(dict.fromkeys(forces)))
-    notes: list[str] = []
+    model = model_of(job, tuple(dict.fromkeys(forces)))
+    notes: list[str] = list(model.notes)
     if job.residual_above is not None:
         model = with_static_modes(model, job.residual_above)
         notes.append(
@@ -146,6 +150,15 @@ def shake(job: ShakeJob) -> ShakeResult:
                 notched[key] = notched_random(model, run, request.limits, request.deepest)
     notes += [note for run in times for note in run.notes]
     return ShakeResult(job, model, masses, sines, randoms, times, notched, tuple(dict.fromkeys(notes)))
+
+
+def model_of(job: ShakeJob, forces: tuple[str, ...]) -> ShakenModel:
+    """Return the structure of a job on its bases."""
+    if isinstance(job.structure, System):
+        bases = bases_of_system(job.structure, job.base, job.points)
+        return shaken_system(job.structure, bases, job.damping, job.outputs, forces)
+    bases = bases_of_body(job.structure, job.base, job.points)
+    return shaken_body(job.structure, bases, job.damping, job.outputs, forces)
 
 
 def is_base_input(job: ShakeJob, name: str) -> bool:

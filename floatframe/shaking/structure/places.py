@@ -17,7 +17,7 @@ from floatframe.errors import ModelError
 __all__ = ["QUANTITIES", "Observed", "Place", "found_places", "six_rows"]
 
 QUANTITIES = ("acceleration", "displacement", "stress")
-WAYS = ("interface", "node", "element", "set", "position", "point")
+WAYS = ("interface", "node", "element", "set", "position", "point", "sensor")
 MOST_NODES = 500  #: of an element or set
 
 
@@ -38,6 +38,8 @@ class Observed:
     point: str | None = None  #: stress point of the file, by name
     quantities: tuple[str, ...] = ()  #: of QUANTITIES; (): acceleration, at stress points stress
     tolerance: float = TOLERANCE  #: how far a kept node may be from the position, of the size of the body
+    body: str | None = None  #: of a system: on which body; "position" is then also one on a rigid body
+    sensor: str | None = None  #: of a system: a sensor of it, by name, in place of a place
 
     def __post_init__(self) -> None:
         where = f"shake: output {self.name!r}"
@@ -74,6 +76,8 @@ def found_places(body: ReducedBody, each: Observed) -> list[Place]:
         If there is no such place (with the nearest), or no stress where some is wanted.
     """
     where, frame = f"shake: output {each.name!r}", body.frame
+    if each.sensor is not None or each.body not in (None, body.name):
+        raise ModelError(f"{where}: sensors and other bodies are those of a system; this is body {body.name!r} alone")
     if each.interface is not None:
         interface = body.interface(each.interface)
         point = frame.origin + frame.axes @ interface.position
