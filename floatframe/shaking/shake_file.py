@@ -9,9 +9,10 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 import cms
 from fe_models.body.kept_nodes import TOLERANCE
+from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import Table, Vector3, choice, read_toml, validated
-from floatframe.errors import ModelError, SystemFileError
+from floatframe.errors import ModelError, SignalError, SystemFileError
 from floatframe.shaking.loads.levels import ACCELERATIONS, OF_OUTPUT, Level, read_level
 from floatframe.shaking.loads.notching import DEEPEST, ForceLimit, Limit, ResponseLimit
 from floatframe.shaking.loads.pulses import EDGE, PULSES, pulse, synthesised
@@ -21,8 +22,14 @@ from floatframe.shaking.loads.sine import SineTest
 from floatframe.shaking.loads.uncertainty import Uncertainty
 from floatframe.shaking.responses.response_spectrum import KINDS
 from floatframe.shaking.shake import NotchRequest, ShakeJob
+from floatframe.shaking.structure.body import bases_of_body
 from floatframe.shaking.structure.damping import Damping
 from floatframe.shaking.structure.places import QUANTITIES, Observed
+from floatframe.signals.read_signals import read_signals
+from floatframe.signals.signal_units import unit_factor
+from floatframe.signals.signals import Signal
+from floatframe.system import System
+from floatframe.system_file.read_system import read_system
 
 __all__ = ["read_shake"]
 
@@ -59,17 +66,19 @@ class BaseSection(Table):
 
     interface: str | None = Field(None, description="the interface that the base holds")
     interfaces: Names = Field((), description="the interfaces that the base holds, a list of names")
+    joints: Names = Field((), description="of a system: the joints, springs and bushings on the ground that it holds")
     point: Vector3 | None = Field(None, description="the reference point, [x, y, z] in mesh coordinates")
 
     @model_validator(mode="after")
     def _one(self) -> "BaseSection":
-        if self.interface is not None and self.interfaces:
-            raise ValueError("expected either interface or interfaces, got both")
+        given = [key for key in ("interface", "interfaces", "joints") if getattr(self, key)]
+        if len(given) > 1:
+            raise ValueError(f"expected one of interface, interfaces, joints, got {' and '.join(given)}")
         return self
 
     def holds(self) -> tuple[str, ...]:
-        """Return the interfaces."""
-        return (self.interface,) if self.interface is not None else self.interfaces
+        """Return the interfaces or joints."""
+        return (self.interface,) if self.interface is not None else self.interfaces or self.joints
 
 
 class DampingSection(Table):
@@ -107,6 +116,8 @@ class OutputSection(Table):
     position: Vector3 | None = Field(None, description="the place of a kept node, [x, y, z] in mesh coordinates")
     point: str | None = Field(None, description="the name of a stress point")
     quantities: Names = Field((), description=f"a list of {', '.join(QUANTITIES)}")
+    body: str | None = Field(None, description="of a system: the name of the body")
+    sensor: str | None = Field(None, description="of a system: the name of one of its sensors")
     tolerance: Annotated[float, Field(ge=0)] = Field(
         TOLERANCE, description="a number of 0 or more: how far the node may be from position, of the size of the body"
     )
@@ -178,6 +189,22 @@ class ShockSection(Table):
         return self
 
 
+class TransientSection(Table):
+    """[transient.NAME]: measured or computed histories, all at once."""
+
+    file: Annotated[Path, BeforeValidator(file_beside)] = Field(
+        description="a file with time histories: .csv, .mat, .rsp"
+    )
+    time: str | None = Field(None, description="the name of the column of times; default: found by its name")
+    rate: float | None = Field(None, description="a number above 0, samples a second, where the file has no times")
+    inputs: dict[str, str] = Field(
+        description='columns of the file by input: "base:x", "interface:x" (a force), "load case NAME"'
+    )
+    unit: str | None = Field(None, description="the unit of the accelerations; default: that of the file")
+    force_unit: str | None = Field(None, description="the unit of the forces; default: that of the file")
+    after: float | None = Field(None, description="a number of 0 or more, seconds that are looked at after the end")
+
+
 class NotchSection(Table):
     """[notch.NAME]."""
 
@@ -224,7 +251,8 @@ class ModesSection(Table):
 class ShakeFile(Table):
     """A shake file."""
 
-    body: Annotated[Path, BeforeValidator(file_beside)] = Field(description="the path of a modal file")
+    body: Annotated[Path, BeforeValidator(file_beside)] | None = Field(None, description="the path of a modal file")
+    system: Annotated[Path, BeforeValidator(file_beside)] | None = Field(None, description="the path of a system file")
     units: str | None = Field(None, description="a unit system for numbers and results; default: that of the body")
     title: str = Field("", description="a title, text")
     base: str | BaseSection | None = Field(None, description="an interface, or a table [base]")
@@ -236,14 +264,17 @@ class ShakeFile(Table):
     sine: dict[str, SineSection] = Field(default_factory=dict, description="tables [sine.NAME]")
     random: dict[str, RandomSection] = Field(default_factory=dict, description="tables [random.NAME]")
     shock: dict[str, ShockSection] = Field(default_factory=dict, description="tables [shock.NAME]")
+    transient: dict[str, TransientSection] = Field(default_factory=dict, description="tables [transient.NAME]")
     notch: dict[str, NotchSection] = Field(default_factory=dict, description="tables [notch.NAME]")
     spectra: SpectraSection = Field(default_factory=SpectraSection, description="a table [spectra]")  # type: ignore[arg-type]
 
     @model_validator(mode="after")
     def _fits(self) -> "ShakeFile":
+        if (self.body is None) == (self.system is None):
+            raise ValueError("expected either body, a modal file, or system, a system file")
         if self.base is not None and self.bases:
             raise ValueError("expected either base or tables [bases.NAME], got both")
-        if not (self.sine or self.random or self.shock):
+        if not (self.sine or self.random or self.shock or self.transient):
             raise ValueError(
                 "expected one table at least: [sine.NAME], [random.NAME], [shock.NAME] or [transient.NAME]"
             )
@@ -262,21 +293,28 @@ def read_shake(path: str | os.PathLike[str]) -> ShakeJob:
     """
     path = Path(path)
     data = validated(ShakeFile, read_toml(path, SystemFileError), path, SystemFileError, context=path.parent)
-    body = cms.read(data.body, units=data.units)
+    if data.body is not None:
+        structure: cms.ReducedBody | System = cms.read(data.body, units=data.units)
+    else:
+        if data.units is not None:
+            raise SystemFileError(f"{path}: units: of a modal file; a system file says its own")
+        structure, _ = read_system(str(data.system))
     try:
-        return job_of(data, body)
+        return job_of(data, structure)
     except ModelError as error:
         raise SystemFileError(f"{path}: {error}") from error
 
 
-def job_of(data: ShakeFile, body: cms.ReducedBody) -> ShakeJob:
+def job_of(data: ShakeFile, structure: cms.ReducedBody | System) -> ShakeJob:
     """Return the job of a checked file."""
     base, points = bases_of(data)
+    if isinstance(structure, cms.ReducedBody):
+        bases_of_body(structure, base, points)  # a name that does not exist is told before what follows from it
     spectra = SpectrumRequest(
         data.spectra.Q, data.spectra.kind, data.spectra.first, data.spectra.last, data.spectra.per_octave
     )
     return ShakeJob(
-        structure=body,
+        structure=structure,
         base=base,
         points=points,
         damping=damping_of(data.damping),
@@ -291,12 +329,15 @@ def job_of(data: ShakeFile, body: cms.ReducedBody) -> ShakeJob:
             for name, each in data.sine.items()
         ),
         random=tuple(random_of(name, each) for name, each in data.random.items()),
-        shock=tuple(shock_of(name, each, spectra) for name, each in data.shock.items()),
+        shock=(
+            *(shock_of(name, each, spectra) for name, each in data.shock.items()),
+            *(transient_of(data, name, spectra) for name in data.transient),
+        ),
         notch=notches_of(data),
         uncertainty=Uncertainty(data.uncertainty.factor, data.uncertainty.frequency, data.uncertainty.bands),
         residual_above=data.modes.residual_above,
         title=data.title,
-        source=str(data.body),
+        source=str(data.body or data.system),
     )
 
 
@@ -358,8 +399,48 @@ def shock_of(name: str, section: ShockSection, spectra: SpectrumRequest) -> Time
         t, a = synthesis.time, synthesis.acceleration
         words = f"wavelets made for a spectrum of Q = {section.Q:g}"
     else:
-        raise ModelError(f"{where}: file: no reader")
+        assert section.file is not None
+        signals = read_signals(section.file)
+        if section.column is None and len(signals.names) != 1:
+            raise ModelError(f"{where}: column: {section.file} has {', '.join(signals.names)}: name one")
+        signal = signals[section.column or signals.names[0]]
+        t, a = signal.time, in_si(signal, section.unit, "m/s^2", where) / si
+        words = f"{signal.name} of {section.file.name}"
     return TimeTest(name, t, a * si, section.directions, None, section.after, spectra, "shock", words, synthesis)
+
+
+def transient_of(data: ShakeFile, name: str, spectra: SpectrumRequest) -> TimeTest:
+    """Return a transient: columns of a file as accelerations of bases and forces."""
+    section, where = data.transient[name], f"transient.{name}"
+    signals = read_signals(section.file, time=section.time, rate=section.rate)
+    if not section.inputs:
+        raise ModelError(f"{where}: inputs: expected one column at least, of {', '.join(signals.names)}")
+    held = bases_of(data)[0]
+    bases = {held} if isinstance(held, str) else set(held or ())
+    values = {}
+    for key, column in section.inputs.items():
+        signal, place = signals[column], key.rpartition(":")[0]
+        turns = key.rpartition(":")[2].startswith("r")
+        if key.startswith("load case "):
+            values[key] = np.asarray(signal.values)
+        elif not place or place in bases or not bases:
+            values[key] = in_si(signal, section.unit, "rad/s^2" if turns else "m/s^2", where)
+        else:
+            values[key] = in_si(signal, section.force_unit, "N m" if turns else "N", where)
+    words = f"{', '.join(section.inputs.values())} of {section.file.name}"
+    return TimeTest(name, signals.time, None, (), values, section.after, spectra, "transient", words)
+
+
+def in_si(signal: Signal, unit: str | None, si: str, where: str) -> Array:
+    """Return the values of a signal in an SI unit; `ModelError` if neither the file nor the table says its own."""
+    if unit is None and not signal.unit:
+        raise ModelError(f"{where}: {signal.name}: the file names no unit; give unit")
+    try:
+        return np.asarray(signal.values) * unit_factor(unit or signal.unit, si)
+    except SignalError as error:
+        raise ModelError(
+            f"{where}: {signal.name}: {error}; name the input as base:direction or interface:direction"
+        ) from error
 
 
 def notches_of(data: ShakeFile) -> tuple[NotchRequest, ...]:

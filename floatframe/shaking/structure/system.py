@@ -23,6 +23,7 @@ from floatframe.bodies.markers import Marker, body_name
 from floatframe.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
+from floatframe.forces import Gravity
 from floatframe.results.sensors import PlaceSensor, ReactionSensor, StressSensor
 from floatframe.rotations import rotation_matrix
 from floatframe.shaking.structure.body import force_outputs, unit_of
@@ -34,6 +35,7 @@ from floatframe.system import System
 
 __all__ = ["bases_of_system", "shaken_system"]
 
+MARKERS = ("marker_a", "marker_b")
 SYMMETRIC = 1e-8  #: of M and K, by their size: less is rounding
 FREE = 1e-10  #: omega² over the highest, below which nothing holds a motion
 ROUNDING = 1e-9  #: of a motion that the base carries rigidly
@@ -41,11 +43,8 @@ ROUNDING = 1e-9  #: of a motion that the base carries rigidly
 
 def grounded(system: System) -> dict[str, object]:
     """Return what stands on the ground: joints and forces with a marker there, by name."""
-    return {
-        each.name: each
-        for each in (*system.joints, *system.forces)
-        if any(is_ground(getattr(each, key, None)) for key in ("marker_a", "marker_b"))
-    }
+    named = [*system.joints, *(force for force in system.forces if not isinstance(force, Gravity))]
+    return {each.name: each for each in named if any(is_ground(getattr(each, key, None)) for key in MARKERS)}
 
 
 def is_ground(place: object) -> bool:

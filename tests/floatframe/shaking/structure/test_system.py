@@ -24,7 +24,9 @@ F = np.array([1.0, 8.0, 31.0, 90.0, 400.0])
 @pytest.fixture(scope="module")
 def rod():
     part = cms.couple(beam(n=3))
-    return cms.reduce(part, cms.craig_bampton(part, n_modes=6), frame=cms.NodalFrame("left"), damping=cms.ModalDamping(0.03))
+    return cms.reduce(
+        part, cms.craig_bampton(part, n_modes=6), frame=cms.NodalFrame("left"), damping=cms.ModalDamping(0.03)
+    )
 
 
 def on_ground(rod, *extra, **more):
@@ -45,7 +47,10 @@ def test_a_body_fixed_in_a_system_is_the_body_alone(rod):
         expected, found = response(alone, F)[:, chosen], response(model, F)
         assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(expected).max(axis=(0, 2), keepdims=True).max())
         for k, output in enumerate(model.outputs):
-            assert_allclose(found[:, k], expected[:, k], rtol=0, atol=1e-6 * np.abs(expected[:, k]).max() + 1e-12), output
+            (
+                assert_allclose(found[:, k], expected[:, k], rtol=0, atol=1e-6 * np.abs(expected[:, k]).max() + 1e-12),
+                output,
+            )
         shares = (model.B[2] ** 2).sum(axis=0), (alone.B[2] ** 2).sum(axis=0)
         assert_allclose(*shares, rtol=1e-6, atol=1e-9 * shares[1].max())
 
@@ -53,8 +58,14 @@ def test_a_body_fixed_in_a_system_is_the_body_alone(rod):
 def test_net_force_of_two_bases_is_the_mass_times_the_acceleration_of_the_whole(rod):
     block = ff.RigidBody("block", 2.0, np.eye(3) * 0.01, position=(1.0, 0.0, 0.0))
     weld = ff.FixedJoint("weld", ff.Marker("rod", "right"), ff.Marker("block"))
-    spring = ff.Bushing("spring", ff.Marker(ff.GROUND, position=(1.0, 0, 0)), ff.Marker("block"), np.diag([1e4] * 3 + [50.0] * 3), np.diag([5.0] * 3 + [0.1] * 3))
-    system = on_ground(rod, spring, bodies=[block], joints=[weld])
+    spring = ff.Bushing(
+        "spring",
+        ff.Marker(ff.GROUND, position=(1.0, 0, 0)),
+        ff.Marker("block"),
+        np.diag([1e4] * 3 + [50.0] * 3),
+        np.diag([5.0] * 3 + [0.1] * 3),
+    )
+    system = on_ground(rod, ff.Gravity((0, 0, -9.81)), spring, bodies=[block], joints=[weld])
     bases = bases_of_system(system, {"a": ("foot",), "b": ("spring",)})
     model = shaken_system(system, bases, Damping(own=True), [Observed("block", body="block", position=(0, 0, 0))])
     names = [output.name for output in model.outputs]
@@ -80,7 +91,9 @@ def test_a_shock_is_that_of_the_time_integration_of_a_driven_base(rod):
     run = time_runs(model, TimeTest("s", t, a, ("z",), after=0.02))[0]
     table = ff.RigidBody("table", 1.0, np.eye(3))
     drive = acceleration_table(np.append(t, 0.1), np.append(a, 0.0))
-    slide = ff.PrismaticJoint("slide", ff.Marker(ff.GROUND), ff.Marker("table"), axis=(0, 0, 1), motions={"distance": drive})
+    slide = ff.PrismaticJoint(
+        "slide", ff.Marker(ff.GROUND), ff.Marker("table"), axis=(0, 0, 1), motions={"distance": drive}
+    )
     foot = ff.FixedJoint("foot", ff.Marker("table"), ff.Marker("rod", "left"))
     driven = ff.System([ff.FlexibleBody("rod", rod, stiffening=False), table], [slide, foot])
     motion = ff.integrate(driven, ff.GeneralizedAlpha(rho_inf=0.9), t_end=0.04, h=2e-5, output_every=10)
@@ -99,7 +112,9 @@ def test_a_shock_is_that_of_the_time_integration_of_a_driven_base(rod):
 def test_the_job_takes_a_system_and_its_sensors(rod):
     system = replace(on_ground(rod), sensors=[ff.ReactionSensor("load", "foot")])
     level = ff.Level.of([(5, 1.0), (60, 1.0)])
-    job = ff.ShakeJob(system, damping=Damping(Q=20), outputs=[Observed("load", sensor="load")], sine=[ff.SineTest("s", level, ("z",))])
+    job = ff.ShakeJob(
+        system, damping=Damping(Q=20), outputs=[Observed("load", sensor="load")], sine=[ff.SineTest("s", level, ("z",))]
+    )
     run = ff.shake(job).sine[0]
     names = [output.name for output in run.outputs]
     assert_allclose(run.sizes[:, names.index("load force z")], run.sizes[:, names.index("base force z")], rtol=1e-9)
