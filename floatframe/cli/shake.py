@@ -1,6 +1,7 @@
 """The command shake: a structure on a base that is moved."""
 
 import json as json_module
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -222,6 +223,8 @@ def print_result(result: "ShakeResult") -> None:
             say(f"... and {len(rows) - SHOWN} more outputs, in the files written")
     for run in result.time:
         for name, v, d in zip(run.inputs, run.velocity_left, run.displacement_left, strict=True):
+            if math.isnan(v):  # a force
+                continue
             say(
                 f"{run.kind} {run.test}, {name}: the base is left with {v:.5g} "
                 f"{model.units.length_symbol}/{model.units.time_symbol} and {d:.5g} {model.units.length_symbol}"

@@ -112,7 +112,7 @@ def summary_section(result: ShakeResult) -> Section:
             factor, unit = in_tables(result.model, run.outputs[k])
             rows.append(
                 [
-                    Cell(f"{run.test}, {run.direction}" if n == 0 else "", "name"),
+                    Cell(f"{kind_of(run)} {run.test}, {run.direction}" if n == 0 else "", "name"),
                     Cell(run.outputs[k].name, note=run.outputs[k].place),
                     Cell(number(factor * peaks[k]), "n"),
                     Cell(number(factor * uncertain[k]), "n"),
@@ -128,6 +128,11 @@ def summary_section(result: ShakeResult) -> Section:
         table(["run", "output", "value>", "with uncertainty>", "unit", "what it is"], rows) + notes,
         "The largest output of each kind in every run, before notching.",
     )
+
+
+def kind_of(run: SineRun | RandomRun | TimeRun) -> str:
+    """Return the kind of the test of a run."""
+    return run.kind if isinstance(run, TimeRun) else "sine" if isinstance(run, SineRun) else "random"
 
 
 def every_run(result: ShakeResult):
@@ -203,7 +208,7 @@ def kind_charts(result: ShakeResult, run, peaks, key: str, chart) -> tuple[str, 
                 height=400,
             )
         )
-    return "".join(figures), charts
+    return f'<div class="grid">{"".join(figures)}</div>', charts
 
 
 def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:

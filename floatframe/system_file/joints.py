@@ -126,5 +126,6 @@ def coupler_of(
     """Return the coupler of a table."""
     constant = section.constant
     terms = [(term.found(), term.factor) for term in section.terms]
-    return CoordinateCoupler(name, terms, constant.function(signals) if isinstance(constant, MotionSection) else
-    constant)
+    return CoordinateCoupler(
+        name, terms, constant.function(signals) if isinstance(constant, MotionSection) else constant
+    )
