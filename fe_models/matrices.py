@@ -194,10 +194,11 @@ def require_freedom(body: FEBody, *, held: bool) -> None:
         if held:
             raise BodyError(f"{where}: held: K answers no rigid-body motion, so the body is free; remove held")
         return
-    mistake = mistake_of(body.K, body.M, body.nodes, body.dofs, forces, with_rows=not held)
+    called = body.numbering.called
+    mistake = mistake_of(body.K, body.M, body.nodes, body.dofs, forces, with_rows=not held, called=called)
     if mistake is not None:
         raise BodyError(f"{where}: these are not the matrices of a free body: {mistake}")
-    words = support_words(forces, body.dofs, body.units.time)
+    words = support_words(forces, body.dofs, body.units.time, called=called)
     if not held:
         raise BodyError(
             f"{where}: these are not the matrices of a free body: {words}. Release it; or if it is meant to be held "

@@ -225,7 +225,10 @@ class Families:
         extra = self.body.dofs[self._partition[1]]
         return (
             *boundary_labels(self.body, family),
-            *(f"{family} node {node} {MOTION_COMPONENTS[component]}" for node, component in extra),
+            *(
+                f"{family} node {self.body.numbering.called(node)} {MOTION_COMPONENTS[component]}"
+                for node, component in extra
+            ),
         )
 
     def held_groups(self, family: str) -> tuple[str, ...]:

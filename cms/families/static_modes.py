@@ -155,7 +155,8 @@ def boundary_labels(body: FEBody, family: str) -> tuple[str, ...]:
     for interface in body.interfaces:
         for dof in interface.dofs if interface.dofs is not None else ():
             node, component = body.dofs[dof]
-            at_node = f" node {node}" if interface.kind == "nodes" and len(interface.nodes) > 1 else ""
+            is_one_of_many = interface.kind == "nodes" and len(interface.nodes) > 1
+            at_node = f" node {body.numbering.called(node)}" if is_one_of_many else ""
             labels.append(f"{family} {interface.name}{at_node} {MOTION_COMPONENTS[component]}")
     return tuple(labels)
 

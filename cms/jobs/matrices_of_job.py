@@ -85,5 +85,5 @@ def interfaces_on(job: Job, geometry: "Mesh | NodeCloud") -> tuple[Interface, ..
         interfaces.append(
             node_interface(geometry, name, chosen, section.kind, section.reference, triad, np.maximum(weights, 0.0))
         )
-    check_overlap(interfaces)
+    check_overlap(interfaces, numbers=geometry.node_numbers)
     return tuple(interfaces)

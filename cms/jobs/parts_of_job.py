@@ -46,7 +46,7 @@ def interfaces_of(job: Job, mesh: "Mesh") -> tuple[Interface, ...]:
     from fe_models.solids.interfaces import check_overlap
 
     interfaces = tuple(interface_of(name, section, mesh) for name, section in job.interfaces.items())
-    check_overlap(interfaces)
+    check_overlap(interfaces, numbers=mesh.node_numbers)
     return interfaces
 
 

@@ -182,8 +182,9 @@ def _require_known_nodes(
         used[nodes] = True
     loose = np.flatnonzero(~used)
     if loose.size:
+        first = mesh.node_numbers[loose[0]] if mesh.node_numbers.size else loose[0]
         raise BeamError(
-            f"{loose.size} nodes belong to no line, point mass, spring or link, first node {loose[0]}: they would make "
+            f"{loose.size} nodes belong to no line, point mass, spring or link, first node {first}: they would make "
             "the stiffness singular; remove them"
         )
 

@@ -270,7 +270,7 @@ def _require_dofs(body: FEBody, interfaces: list[Interface]) -> None:
         if len(without):
             raise BodyError(
                 f"body {body.name!r}: interface {interface.name!r}: {len(without)} member nodes have no dofs, first "
-                f"node {without[0]}: they follow a rigid link; take the node that leads them"
+                f"node {body.numbering.called(without[0])}: they follow a rigid link; take the node that leads them"
             )
 
 

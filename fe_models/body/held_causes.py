@@ -4,6 +4,8 @@ A support answers translations where it stands. Rows in another order answer eve
 order; nodes that are not where K has them answer turns alone; a penalty stands out on the diagonal.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as sla
@@ -13,6 +15,8 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import node_list
 
 __all__ = ["mistake_of", "support_words"]
+
+Called = Callable[[int], str]  #: what the user calls a node, by its index
 
 PENALTY = 1e6  #: of the median of the diagonal, in a row that answers with nearly all of its stiffness
 ALONE = 0.9  #: share of a row that counts as nearly all
@@ -24,7 +28,14 @@ APART = 1e-3  #: distance from a node to its true place over the size of the bod
 
 
 def mistake_of(
-    K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces, *, with_rows: bool
+    K: sp.csc_array,
+    M: sp.csc_array,
+    nodes: Array,
+    dofs: IntArray,
+    forces: RigidForces,
+    *,
+    with_rows: bool,
+    called: Called = str,
 ) -> str | None:
     """Return in words what is wrong with matrices that are not free; None if a support explains them.
 
@@ -40,6 +51,8 @@ def mistake_of(
         `rigid_forces` of these matrices.
     with_rows
         Whether missing rows are a mistake; where the body is said to be held they are its support.
+    called
+        What messages call a node, by its index.
     """
     diagonal = np.abs(K.diagonal())
     median = float(np.median(diagonal[diagonal > 0])) if (diagonal > 0).any() else 1.0
@@ -47,10 +60,9 @@ def mistake_of(
     if is_penalty.any():  # (1)
         k = int(np.argmax(np.where(is_penalty, diagonal, 0.0)))
         return (
-            f"K has {diagonal[k]:.3g} on the diagonal of row {k} (node {dofs[k, 0]}, component {dofs[k, 1]}), the "
-            "median "
-            f"is {median:.3g}: a support by penalty ({int(is_penalty.sum())} such rows), which costs the digits of "
-            "everything beside it; give the matrices without it"
+            f"K has {diagonal[k]:.3g} on the diagonal of row {k} (node {called(dofs[k, 0])}, component {dofs[k, 1]}), "
+            f"the median is {median:.3g}: a support by penalty ({int(is_penalty.sum())} such rows), which costs the "
+            "digits of everything beside it; give the matrices without it"
         )
     if order := fitting_order(K, M, nodes, dofs):  # (2)
         return f"the rows are in {order} order and dofs list another; list the dofs in the order of the rows"
@@ -59,15 +71,14 @@ def mistake_of(
             return f"the nodes are in {words}: times {factor:.6g} everything fits; mend the nodes"
     turns_only = not forces.is_answered[:3].any() and bool(forces.is_possible[:3].all())
     if turns_only and (dofs[forces.rows, 1] < 3).any():  # (3)
-        moved = moved_words(K, nodes, dofs, forces)
+        moved = moved_words(K, nodes, dofs, forces, called)
         return f"K answers turns and no translation: nodes are not where K has them{moved}"
     missing = missing_rows(dofs, len(nodes))
     if with_rows and len(missing):  # (4)
         node, component = missing[0]
         return (
-            f"{len(missing)} rows that other nodes have are missing, such as component {component} of node {node}: "
-            "rows "
-            "taken out hold the body to the ground; give all rows, or say that the body is held"
+            f"{len(missing)} rows that other nodes have are missing, such as component {component} of node "
+            f"{called(node)}: rows taken out hold the body to the ground; give all rows, or say that the body is held"
         )
     return None
 
@@ -82,7 +93,7 @@ def fitting_order(K: sp.csc_array, M: sp.csc_array, nodes: Array, dofs: IntArray
     return ""
 
 
-def moved_words(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces) -> str:
+def moved_words(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForces, called: Called) -> str:
     """Say which nodes are elsewhere, as far as that can be told."""
     suspected = np.unique(dofs[forces.rows, 0])
     S = np.flatnonzero(np.isin(dofs[:, 0], suspected))
@@ -110,9 +121,10 @@ def moved_words(K: sp.csc_array, nodes: Array, dofs: IntArray, forces: RigidForc
     if len(wrong) == 2:
         a, b = wrong
         if max(np.linalg.norm(place[a] - nodes[b]), np.linalg.norm(place[b] - nodes[a])) < APART * distance.max():
-            return f": nodes {a} and {b} are exchanged; mend their order in nodes or in dofs"
+            return f": nodes {called(a)} and {called(b)} are exchanged; mend their order in nodes or in dofs"
     return (
-        f": {len(wrong)} of them, {node_list(wrong[:3].tolist(), nodes)}; by K node {wrong[0]} belongs to "
+        f": {len(wrong)} of them, {node_list(wrong[:3].tolist(), nodes, called)}; by K node {called(wrong[0])} belongs "
+        "to "
         f"({', '.join(f'{x:.6g}' for x in place[wrong[0]])})"
     )
 
@@ -125,12 +137,12 @@ def missing_rows(dofs: IntArray, n_nodes: int) -> list[tuple[int, int]]:
     return [(int(node), int(component)) for node, component in np.argwhere(~has & wanted)]
 
 
-def support_words(forces: RigidForces, dofs: IntArray, time: float) -> str:
+def support_words(forces: RigidForces, dofs: IntArray, time: float, *, called: Called = str) -> str:
     """Return in words where a body is held and how stiffly; time: [s] of its time unit."""
     row, motion = forces.place
     n_nodes = len(np.unique(dofs[forces.rows, 0]))
     return (
         f"{len(forces.rows)} rows of {n_nodes} nodes answer rigid-body motion by up to "
-        f"{forces.largest.max():.1e} of the stiffest entry, most at node {dofs[row, 0]} for {MOTIONS[motion]}; "
+        f"{forces.largest.max():.1e} of the stiffest entry, most at node {called(dofs[row, 0])} for {MOTIONS[motion]}; "
         f"the body would swing at {forces.swing.max() / time:.3g} Hz"
     )

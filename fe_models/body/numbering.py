@@ -108,6 +108,10 @@ class Numbering:
             return f"index {row}"
         return self._name(int(self.nodes[row]), self.node_instance, row)
 
+    def called(self, row: int) -> str:
+        """Return what messages call a node: as `node_name`; where nodes have no numbers at all its row."""
+        return self.node_name(int(row)) if self.nodes.size else str(int(row))
+
     def element_name(self, triangle: int) -> str:
         """Return what the user calls the element behind a triangle; of one without number "of triangle 7"."""
         if not self.elements.size or self.elements[triangle] == NONE:

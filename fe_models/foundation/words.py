@@ -1,6 +1,6 @@
 """Words for messages: the choices there are, and the one that was probably meant."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 
 import numpy as np
@@ -30,9 +30,9 @@ def shortened(text: str, longest: int = LONGEST) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
-def node_list(nodes: Iterable[int], positions: NDArray[np.float64]) -> str:
-    """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message."""
-    return ", ".join(f"node {n} at ({', '.join(f'{x:.6g}' for x in positions[n])})" for n in nodes)
+def node_list(nodes: Iterable[int], positions: NDArray[np.float64], called: Callable[[int], str] = str) -> str:
+    """Return 'node 3 at (0, 1, 2.5), node 7 at (…)' for a message; called: what the user calls a node."""
+    return ", ".join(f"node {called(n)} at ({', '.join(f'{x:.6g}' for x in positions[n])})" for n in nodes)
 
 
 def quoted(value: object) -> str:

@@ -81,6 +81,7 @@ def read_tables(nodes: str | Path, lines: str | Path) -> LineMesh:
         source=f"{node_path}, {line_path}",
         digest=sha256((node_digest + line_digest).encode()).hexdigest(),
         node_numbers=np.array(list(place))[keep],
+        line_numbers=line_numbers(line_rows),
         notes=(f"{len(only_third)} nodes only orient lines and were left out",) if len(only_third) else (),
     )
     elements = np.array([_integer(row, "elements") if row.get("elements") else 1 for row in line_rows])
@@ -88,6 +89,16 @@ def read_tables(nodes: str | Path, lines: str | Path) -> LineMesh:
         row = line_rows[int(np.argmax(elements < 1))]
         raise MeshError(f"{row['where']}: column elements: expected a whole number from 1 on, got {row['elements']!r}")
     return mesh if (elements == 1).all() else divide_lines(mesh, elements)
+
+
+def line_numbers(rows: list[dict[str, str]]) -> IntArray:
+    """Return the numbers of the column `line`, (n_lines,); none where a line has none."""
+    if not all(row.get("line") for row in rows):
+        return np.zeros(0, np.int64)
+    numbers = np.array([_integer(row, "line") for row in rows])
+    if len(np.unique(numbers)) < len(numbers) or numbers.min() < 0:
+        raise MeshError(f"{rows[0]['where']}: column line: expected a number from 0 of its own for each line")
+    return numbers
 
 
 def _table(path: Path, columns: tuple[str, ...], required: tuple[str, ...]) -> tuple[list[dict[str, str]], str]:

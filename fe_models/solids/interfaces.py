@@ -121,15 +121,19 @@ def nodes_interface(
     return _interface(mesh, name, "nodes", _members(name, mesh, selection), selection, reference, triad)
 
 
-def check_overlap(interfaces: Sequence[Interface]) -> None:
-    """Raise `InterfaceError` if two interfaces have a name or nodes in common; it names the pairs and counts."""
+def check_overlap(interfaces: Sequence[Interface], *, numbers: IntArray | None = None) -> None:
+    """Raise `InterfaceError` if two interfaces have a name or nodes in common; it names the pairs and counts.
+
+    numbers: of the nodes in the user's mesh, (n_nodes,); None or empty: messages have indices.
+    """
     shared = []
     for first, second in combinations(interfaces, 2):
         if first.name == second.name:
             raise InterfaceError(f"interfaces: two are named {first.name!r}; give each its own name")
         common = np.intersect1d(first.nodes, second.nodes)
         if common.size:
-            shared.append(f"{first.name!r} and {second.name!r} share {common.size} nodes (first node {common[0]})")
+            node = common[0] if numbers is None or not numbers.size else numbers[common[0]]
+            shared.append(f"{first.name!r} and {second.name!r} share {common.size} nodes (first node {node})")
     if shared:
         raise InterfaceError(
             f"interfaces: {'; '.join(shared)}; a node can follow only one interface: make the "

@@ -10,15 +10,19 @@ from fe_models.beams.beam_property import BeamProperty
 from fe_models.beams.body import beam_body
 from fe_models.beams.sections import Rectangle
 from fe_models.body.couplings import couple
+from fe_models.body.fe_body import Interface
 from fe_models.body.kept_nodes import keep_nodes
 from fe_models.body.numbering import NONE, NamedSet, Numbering, numbering_side_by_side
-from fe_models.errors import BodyError
+from fe_models.errors import BodyError, InterfaceError, MeshError
 from fe_models.foundation.units import unit_system
+from fe_models.importers.tables import read_tables
+from fe_models.matrices import body_from_matrices
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.body import shell_body
 from fe_models.shells.shell_property import ShellProperty
 from fe_models.solids.body import solid_body
+from fe_models.solids.interfaces import check_overlap
 from fe_models.weld import weld
 from tests.bodies import STEEL, box_mesh
 
@@ -149,3 +153,29 @@ def test_nodes_are_kept_by_number_set_and_position():
         keep_nodes(body, [[0.6, 0.5, 0.5]])
     with pytest.raises(BodyError, match="expected the number of a node, the name of a set, or"):
         keep_nodes(body, [[1.0, 2.0]])
+
+
+def test_lines_of_a_table_have_the_numbers_of_its_column(tmp_path):
+    (tmp_path / "nodes.csv").write_text("node,x,y,z\n5,0,0,0\n9,1,0,0\n2,2,0,0\n")
+    (tmp_path / "lines.csv").write_text("line,node1,node2,elements\n70,5,9,2\n31,9,2,1\n")
+    mesh = read_tables(tmp_path / "nodes.csv", tmp_path / "lines.csv")
+    assert_array_equal(mesh.line_numbers, [70, 70, 31])
+    assert_array_equal(mesh.node_numbers, [5, 9, 2, -1])
+    body = beam_body(mesh, BeamProperty(Rectangle(0.03, 0.02), STEEL), name="frame", units=UNITS)
+    triangles = body.surface[body.numbering.triangles_of_element("test", 31)]
+    assert body.nodes[triangles][..., 0].min() == 1.0
+    (tmp_path / "lines.csv").write_text("line,node1,node2\n70,5,9\n70,9,2\n")
+    with pytest.raises(MeshError, match="a number from 0 of its own for each line"):
+        read_tables(tmp_path / "nodes.csv", tmp_path / "lines.csv")
+
+
+def test_messages_about_members_have_the_numbers_of_the_mesh():
+    mesh = scrambled(box_mesh(2, 1, 1))
+    shared = [Interface(name, "rigid", np.array([3, 4, 7]), np.zeros(3)) for name in ("a", "b")]
+    with pytest.raises(InterfaceError, match=rf"share 3 nodes \(first node {mesh.node_numbers[3]}\)"):
+        check_overlap(shared, numbers=mesh.node_numbers)
+    body = solid_body(mesh, STEEL, name="box", units=UNITS)
+    held = body.K + 1e9 * abs(body.K).max() * np.eye(1, body.n_dof, 3).T @ np.eye(1, body.n_dof, 3)
+    with pytest.raises(BodyError, match=rf"row 3 \(node {mesh.node_numbers[1]}, component 0\)"):
+        body_from_matrices(body.M, held, body.nodes, body.dofs, name="box", units=UNITS, surface=body.surface,
+                           numbering=body.numbering)  # fmt: skip
