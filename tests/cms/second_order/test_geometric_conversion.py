@@ -16,6 +16,7 @@ from fe_models.beams.beam_property import BeamProperty
 from fe_models.beams.body import beam_body
 from fe_models.beams.interfaces import NodeIndices, line_interface
 from fe_models.beams.sections import Rectangle
+from fe_models.body.numbering import Numbering
 from fe_models.loads import gravity_load
 from fe_models.meshes.line_mesh import LineMesh
 from fe_models.weld import weld
@@ -200,14 +201,17 @@ def test_a_file_of_an_older_version_keeps_its_matrices_and_refuses(tmp_path, mad
 
     from cms.cli.app import app
 
-    cms.write(as_before_version_4(made["tisserand"]), tmp_path / "bar.h5")
+    unnumbered = replace(made["tisserand"], numbering=Numbering())
+    cms.write(as_before_version_4(unnumbered), tmp_path / "bar.h5")
     assert (tmp_path / "bar.h5").read_bytes().startswith(b"floatframe modal-file 2\n")
     assert cms.read(tmp_path / "bar.h5").geometric.spread is None
     refused = CliRunner().invoke(app, ["frame", str(tmp_path / "bar.h5"), "--to", "buckens"])
     assert refused.exit_code != 0
     assert not (tmp_path / "bar_buckens.h5").exists()
-    cms.write(made["tisserand"], tmp_path / "bar.h5")
+    cms.write(unnumbered, tmp_path / "bar.h5")
     assert (tmp_path / "bar.h5").read_bytes().startswith(b"floatframe modal-file 4\n")
+    cms.write(made["tisserand"], tmp_path / "bar.h5")  # with the sets of its mesh
+    assert (tmp_path / "bar.h5").read_bytes().startswith(b"floatframe modal-file 5\n")
 
 
 def test_the_file_keeps_every_number(tmp_path, made):
