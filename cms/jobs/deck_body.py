@@ -45,6 +45,7 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
             str(job.body.name), parts, raw.nodes, _constraints(job, raw), numbers=numbers, node_sets=raw.node_sets
         )
         record = {**joined.body.provenance, "deck": str(path), "deck sha256": file_digest(path)}
+        record |= {f"file {name}": digest for name, digest in raw.included.items()}
         numbering = joined.body.numbering.with_instances(raw.instances, raw.instance_step)
         body = replace(joined.body, provenance=record, numbering=numbering)
         _require_used_groups(job, raw, joined)

@@ -200,6 +200,7 @@ def _provenance(
     record = {
         "mesh": mesh.source,
         "mesh sha256": mesh.digest,
+        **{f"file {path}": digest for path, digest in mesh.included.items()},
         "nodes": str(len(mesh.nodes)),
         "lines": str(len(mesh.lines)),
     }

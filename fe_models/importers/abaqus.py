@@ -8,7 +8,7 @@ that are not understood here, are refused.
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -146,8 +146,9 @@ def read_abaqus(path: Path, data: bytes) -> RawMesh:
         If the deck makes or moves nodes or elements in a way that is not understood here, or is damaged.
     """
     where = f"mesh {path}"
-    blocks, notes = mesh_blocks(where, data.decode("utf-8", "replace"), path.parent)
-    return raw_mesh_of(deck_mesh(where, blocks), notes)
+    included: dict[str, str] = {}
+    blocks, notes = mesh_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
+    return replace(raw_mesh_of(deck_mesh(where, blocks), notes), included=included)
 
 
 def deck_mesh(where: str, blocks: list[DeckBlock]) -> DeckMesh:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 from fe_models.errors import MeshError
@@ -44,7 +45,7 @@ class DeckBlock:
         return [word for line in self.lines for word in (w.strip() for w in line.split(",")) if word]
 
 
-def deck_blocks(where: str, text: str, folder: Path) -> list[DeckBlock]:
+def deck_blocks(where: str, text: str, folder: Path, included: dict[str, str] | None = None) -> list[DeckBlock]:
     """Return all blocks of a deck, files that it includes put in (*INCLUDE, and INPUT= of a keyword).
 
     Parameters
@@ -55,19 +56,24 @@ def deck_blocks(where: str, text: str, folder: Path) -> list[DeckBlock]:
         Of the deck.
     folder
         Against which names of included files are taken.
+    included
+        Is filled: path of each included file -> its sha256.
 
     Raises
     ------
     MeshError
         If the text is no deck, or an included file is missing or includes itself.
     """
-    blocks = list(_blocks(where, _lines(where, text, folder, ())))
+    files = _Files(folder, {} if included is None else included)
+    blocks = list(_blocks(where, _lines(where, text, files, ())))
     if not blocks:
         raise MeshError(f"{where}: expected an Abaqus deck (keyword lines such as *NODE), got {text[:30]!r}")
     return blocks
 
 
-def mesh_blocks(where: str, text: str, folder: Path) -> tuple[list[DeckBlock], list[str]]:
+def mesh_blocks(
+    where: str, text: str, folder: Path, included: dict[str, str] | None = None
+) -> tuple[list[DeckBlock], list[str]]:
     """Return the blocks of a deck that concern its mesh, and in words what was left out.
 
     Raises
@@ -75,7 +81,7 @@ def mesh_blocks(where: str, text: str, folder: Path) -> tuple[list[DeckBlock], l
     MeshError
         If the text is no deck, has several parts, moves its instance, or makes nodes or elements by keywords.
     """
-    blocks = deck_blocks(where, text, folder)
+    blocks = deck_blocks(where, text, folder, included)
     refuse_unread(where, blocks)
     blocks, notes = _one_part(where, blocks)
     return blocks, notes + _left_out(blocks)
@@ -88,7 +94,13 @@ class _Line:
     file: str
 
 
-def _lines(where: str, text: str, folder: Path, files: tuple[Path, ...]) -> Iterator[_Line]:
+@dataclass(frozen=True)
+class _Files:
+    folder: Path
+    included: dict[str, str]  #: path -> sha256
+
+
+def _lines(where: str, text: str, of: _Files, files: tuple[Path, ...]) -> Iterator[_Line]:
     """Yield the lines of a deck that say something, those of included files in their place."""
     name = files[-1].name if files else ""
     pending = ""
@@ -102,14 +114,14 @@ def _lines(where: str, text: str, folder: Path, files: tuple[Path, ...]) -> Iter
                 pending = head
                 continue
             pending = ""
-            yield from _with_input(where, _Line(head, number, name), folder, files)
+            yield from _with_input(where, _Line(head, number, name), of, files)
         else:
             yield _Line(line, number, name)
     if pending:
-        yield from _with_input(where, _Line(pending, number, name), folder, files)
+        yield from _with_input(where, _Line(pending, number, name), of, files)
 
 
-def _with_input(where: str, line: _Line, folder: Path, files: tuple[Path, ...]) -> Iterator[_Line]:
+def _with_input(where: str, line: _Line, of: _Files, files: tuple[Path, ...]) -> Iterator[_Line]:
     """Yield a keyword line and, where it names a file, the lines of that."""
     keyword, parameters = _head(line.text)
     if keyword != "INCLUDE":
@@ -119,17 +131,18 @@ def _with_input(where: str, line: _Line, folder: Path, files: tuple[Path, ...]) 
         if keyword == "INCLUDE":
             raise MeshError(f"{where}, line {line.number}: *INCLUDE: expected INPUT=file, got none")
         return
-    path = folder / given
+    path = of.folder / given
     if path in files or len(files) >= DEEPEST:
         raise MeshError(f"{where}, line {line.number}: *{keyword}: {path} includes itself, or files nest too deeply")
     try:
-        text = path.read_bytes().decode("utf-8", "replace")
+        data = path.read_bytes()
     except OSError as error:
         raise MeshError(
             f"{where}, line {line.number}: *{keyword}, INPUT={given}: {path} cannot be read: "
             f"{error.strerror or error}{near_file(path)}"
         ) from error
-    yield from _lines(where, text, folder, (*files, path))
+    of.included[str(path)] = sha256(data).hexdigest()
+    yield from _lines(where, data.decode("utf-8", "replace"), of, (*files, path))
 
 
 _WITH_INPUT = ("NODE", "ELEMENT", "NSET", "ELSET", "AMPLITUDE", "BOUNDARY", "CLOAD", "DLOAD", "SURFACE", "EQUATION")

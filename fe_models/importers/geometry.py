@@ -52,6 +52,7 @@ def geometry_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh | NodeCloud
         {group: {kind: np.concatenate(parts) for kind, parts in by.items()} for group, by in faces.items()},
         source=str(path),
         digest=digest,
+        included=raw.included,
         node_numbers=np.zeros(0, np.int64) if raw.node_numbers is None else raw.node_numbers,
         notes=raw.notes,
     )

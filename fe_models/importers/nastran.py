@@ -65,7 +65,8 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
         damaged.
     """
     where = f"mesh {path}"
-    text = bulk_text(where, path, data.decode("utf-8", "replace"))
+    included: dict[str, str] = {}
+    text = bulk_text(where, path, data.decode("utf-8", "replace"), included)
     placing: list[Card] = []  # what says where grid points are
     cells: dict[tuple[str, int, str], tuple[list[int], list[list[str]]]] = {}  # card, nodes, property -> elements
     noted: dict[str, int] = {}
@@ -108,7 +109,7 @@ def read_nastran(path: Path, data: bytes) -> RawMesh:
     if BEGIN.search(text) and not END.search(text):
         notes.append("BEGIN BULK without ENDDATA at the end: is the file complete?")
     positions = np.array([points[number] for number in listed])
-    return RawMesh(positions, tuple(blocks), node_numbers=numbers_of_nodes, notes=tuple(notes))
+    return RawMesh(positions, tuple(blocks), node_numbers=numbers_of_nodes, notes=tuple(notes), included=included)
 
 
 def nodes_of(here: str, card: str, given: list[str]) -> tuple[int, list[str]]:

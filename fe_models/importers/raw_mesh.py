@@ -39,6 +39,7 @@ class RawMesh:
     notes: tuple[str, ...] = ()
     instances: tuple[str, ...] = ()  #: of a deck that repeats numbers: the k-th has k `instance_step` added to them
     instance_step: int = 0  #: 0: numbers are those of the deck
+    included: Mapping[str, str] = field(default_factory=dict)  #: files that the file includes -> their sha256
 
 
 def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
@@ -88,6 +89,7 @@ def mesh_from_raw(raw: RawMesh, path: Path, digest: str) -> Mesh:
         node_sets,
         source=str(path),
         digest=digest,
+        included=raw.included,
         node_numbers=np.zeros(0, np.int64) if raw.node_numbers is None else raw.node_numbers,
         cell_numbers=numbers,
         notes=tuple(notes),

@@ -96,6 +96,7 @@ def shell_mesh_from_raw(
         node_sets={name: members for name, members in node_sets.items() if len(members)},
         source=str(path),
         digest=digest,
+        included=raw.included,
         node_numbers=np.zeros(0, np.int64) if raw.node_numbers is None else raw.node_numbers[used],
         cell_numbers=numbers,
         line_numbers=line_numbers[kept] if line_numbers.size else line_numbers,

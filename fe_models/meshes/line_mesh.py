@@ -31,6 +31,7 @@ class LineMesh:
     offsets: Array | None = None  #: from node to end of the axis, mesh axes, (n_lines, 2, 3) [m]; None: zero
     source: str = ""  #: file it was read from, or how it was made
     digest: str = ""  #: sha256 of that file
+    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)  #: files that it includes -> their sha256
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
     line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_lines,); or none
     notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
@@ -39,6 +40,7 @@ class LineMesh:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
         put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
+        put(self, "included", FrozenMapping(self.included))
         put(self, "node_numbers", frozen_int(self.node_numbers))
         put(self, "line_numbers", frozen_int(self.line_numbers))
         for name in ("line_sets", "node_sets"):

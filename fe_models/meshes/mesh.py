@@ -38,6 +38,7 @@ class Mesh:
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
     source: str = ""  #: file it was read from, or how it was made
     digest: str = ""  #: sha256 of that file
+    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)  #: files that it includes -> their sha256
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
     cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
     notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
@@ -46,6 +47,7 @@ class Mesh:
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
+        put(self, "included", FrozenMapping(self.included))
         put(self, "node_numbers", frozen_int(self.node_numbers))
         put(self, "notes", tuple(self.notes))
         for name in ("cells", "faces", "cell_numbers"):

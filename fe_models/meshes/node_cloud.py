@@ -21,12 +21,14 @@ class NodeCloud:
     face_sets: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)  #: group -> type -> nodes of faces
     source: str = ""  #: file it was read from
     digest: str = ""  #: sha256 of that file
+    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)  #: files that it includes -> their sha256
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
     notes: tuple[str, ...] = ()  #: what the reader left out or changed, in words
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
+        put(self, "included", FrozenMapping(self.included))
         put(self, "node_numbers", frozen_int(self.node_numbers))
         put(self, "notes", tuple(self.notes))
         put(self, "node_sets", FrozenMapping({group: frozen_int(n) for group, n in self.node_sets.items()}))

@@ -33,6 +33,7 @@ class ShellMesh:
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)  #: group -> nodes
     source: str = ""  #: file it was read from, or how it was made
     digest: str = ""  #: sha256 of that file
+    included: Mapping[str, str] = field(default_factory=dict, kw_only=True)  #: files that it includes -> their sha256
     node_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_nodes,); or none
     cell_numbers: Mapping[str, IntArray] = field(default_factory=dict)  #: type -> numbers in the file, (n_cells,)
     line_numbers: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))  #: in the file, (n_lines,); or none
@@ -42,6 +43,7 @@ class ShellMesh:
         put = object.__setattr__
         put(self, "nodes", frozen(self.nodes))
         put(self, "lines", frozen_int(np.asarray(self.lines).reshape(-1, 2)))
+        put(self, "included", FrozenMapping(self.included))
         put(self, "node_numbers", frozen_int(self.node_numbers))
         put(self, "line_numbers", frozen_int(self.line_numbers))
         put(self, "notes", tuple(self.notes))

@@ -219,6 +219,7 @@ def _number(mesh: ShellMesh, node: int) -> int:
 
 def _provenance(mesh: ShellMesh, used: tuple[AnyShellProperty, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
     record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
+    record |= {f"file {path}": digest for path, digest in mesh.included.items()}
     record |= {f"cells {kind}": str(len(cells)) for kind, cells in mesh.cells.items() if len(cells)}
     for number, item in enumerate(used):
         count = sum(int((index == number).sum()) for index in of_cell.values())

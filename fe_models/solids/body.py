@@ -246,6 +246,7 @@ def node_volumes(mesh: Mesh) -> Array:
 def provenance(mesh: Mesh, materials: tuple[AnyMaterial, ...], of_cell: Mapping[str, IntArray]) -> dict[str, str]:
     """Say where the body came from: mesh, digest, elements, materials and the version of scikit-fem."""
     record = {"mesh": mesh.source, "mesh sha256": mesh.digest, "nodes": str(len(mesh.nodes))}
+    record |= {f"file {path}": digest for path, digest in mesh.included.items()}
     record |= dict(mesh.origin)
     record |= {f"cells {kind}": str(len(cells)) for kind, cells in mesh.cells.items() if len(cells)}
     for number, material in enumerate(materials):

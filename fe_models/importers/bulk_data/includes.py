@@ -1,5 +1,6 @@
 """The text of a deck of Nastran with the files that it includes."""
 
+from hashlib import sha256
 from pathlib import Path
 
 from fe_models.errors import MeshError
@@ -10,8 +11,17 @@ __all__ = ["bulk_text"]
 DEEPEST = 10  #: levels of files that include files
 
 
-def bulk_text(where: str, path: Path, text: str, files: tuple[Path, ...] = ()) -> str:
+def bulk_text(where: str, path: Path, text: str, included: dict[str, str], files: tuple[Path, ...] = ()) -> str:
     """Return a deck with its includes put in, and without the BEGIN BULK and ENDDATA of these.
+
+    Parameters
+    ----------
+    where, path, text
+        For messages; of the deck.
+    included
+        Is filled: path of each included file -> its sha256.
+    files
+        The files that this one is included in.
 
     Raises
     ------
@@ -34,12 +44,13 @@ def bulk_text(where: str, path: Path, text: str, files: tuple[Path, ...] = ()) -
             if other in files or other == path or len(files) >= DEEPEST:
                 raise MeshError(f"{where}: INCLUDE {name}: includes itself, or files nest too deeply")
             try:
-                inner = other.read_bytes().decode("utf-8", "replace")
+                inner = other.read_bytes()
             except OSError as error:
                 raise MeshError(
                     f"{where}: INCLUDE {name}: {other} cannot be read: {error.strerror or error}{near_file(other)}"
                 ) from error
-            out.append(bulk_text(where, other, inner, (*files, path)))
+            included[str(other)] = sha256(inner).hexdigest()
+            out.append(bulk_text(where, other, inner.decode("utf-8", "replace"), included, (*files, path)))
         elif head.startswith("ENDDATA") and not is_first:
             break
         elif head.startswith("BEGIN") and "SUPER" in head:

@@ -136,7 +136,7 @@ def body_from_foreign(
         notes.append(note)
     files = dict(read.files)
     if geometry is not None and geometry.digest:
-        files[geometry.source] = geometry.digest
+        files |= {geometry.source: geometry.digest, **geometry.included}
     record = {"mesh": ", ".join(files)} | {f"file {path}": digest for path, digest in files.items()}
     record |= {"program": read.program} if read.program else {}
     record |= (

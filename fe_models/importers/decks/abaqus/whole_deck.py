@@ -82,7 +82,8 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
     where = f"deck {path}"
     if program not in PROGRAMS:
         raise MeshError(f"{where}: unknown program {program!r}; expected one of {', '.join(PROGRAMS)}")
-    blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent)
+    included: dict[str, str] = {}
+    blocks = deck_blocks(where, data.decode("utf-8", "replace"), path.parent, included)
     refuse_unread(where, blocks)
     flat = flat_assembly(where, blocks)
     blocks, notes = flat.blocks, flat.notes
@@ -109,7 +110,8 @@ def read_abaqus_deck(path: Path, data: bytes, *, program: str = "calculix") -> D
             if isinstance(error, MeshError):
                 raise
             raise MeshError(f"{here}: cannot be understood ({error}); first line below: {block.lines[:1]}") from error
-    return _finished(path, draft)
+    deck = _finished(path, draft)
+    return replace(deck, mesh=replace(deck.mesh, included=included))
 
 
 def _take(here: str, block: DeckBlock, draft: Draft, step: str) -> None:

@@ -1,6 +1,7 @@
 """Whole decks of Nastran: bulk data with their includes, by the cards of `fe_models.importers.bulk_data`."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,8 @@ def read_nastran_deck(path: Path, data: bytes) -> Deck:
         If the deck is damaged. What cannot be taken over is in the ledger.
     """
     where = f"deck {path}"
-    text = bulk_text(where, path, data.decode("utf-8", "replace"))
+    included: dict[str, str] = {}
+    text = bulk_text(where, path, data.decode("utf-8", "replace"), included)
     cards: dict[str, list[Card]] = {}
     for card in read_cards(where, text):
         cards.setdefault(card.name, []).append(card)
@@ -55,8 +57,9 @@ def read_nastran_deck(path: Path, data: bytes) -> Deck:
             model.ledger.refuse(name, "this card is not known here", count=len(found))
         else:
             model.ledger.note(name, "belongs to the analysis, not to the body", count=len(found))
+    mesh = replace(_mesh(model), included=included)
     return Deck(
-        path, "nastran", _mesh(model), model.ledger, model.materials, tuple(model.solids), tuple(model.shells),
+        path, "nastran", mesh, model.ledger, model.materials, tuple(model.solids), tuple(model.shells),
         tuple(model.lines), tuple(model.masses), tuple(model.springs), tuple(model.rigid), tuple(model.couplings),
         tuple(model.equations), tuple(model.supports), tuple(model.loads),
     )  # fmt: skip
