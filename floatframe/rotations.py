@@ -15,7 +15,7 @@ compiled, in kernels/rotation.py; a test holds both to each other.
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, tilde
 
 __all__ = [
     "cross",
@@ -54,14 +54,6 @@ def dot(a: Array, b: Array) -> Array:
 def turned(R: Array, a: Array) -> Array:
     """Return R a for stacks of matrices and vectors."""
     return (R @ a[..., None])[..., 0]
-
-
-def tilde(a: Array) -> Array:
-    """Return the matrix of a cross product, (..., 3, 3): tilde(a) @ b = a × b."""
-    a = np.asarray(a)
-    S = np.zeros((*a.shape, 3), np.result_type(a, float))
-    S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = a[..., 0], a[..., 1], a[..., 2]
-    return S - np.swapaxes(S, -1, -2)
 
 
 def rotation_matrix(p: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from cms.exporters.nodes import reference_row
 from cms.exporters.writer import Made, Request
 from cms.reduced_body.reduced_body import ReducedBody
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, tilde
 
 __all__ = ["make_exudyn"]
 
@@ -70,11 +70,11 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
         "Mtt": moments.m * np.eye(3),
         "totalMass": np.array(moments.m),
         "chiU": moments.center_of_mass,
-        "chiUtilde": skew(moments.center_of_mass),
+        "chiUtilde": tilde(moments.center_of_mass),
         "mPsiTildePsi": moments.C4.transpose(0, 2, 1).reshape(3 * n, n),
         "mPsiTildePsiTilde": moments.C5.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n),
         "mPhitTPsi": moments.C1,
-        "mPhitTPsiTilde": side_by_side(skew(moments.C1.T)),
+        "mPhitTPsiTilde": side_by_side(tilde(moments.C1.T)),
         "mXRefTildePsi": -moments.C2,
         "mXRefTildePsiTilde": side_by_side(moments.C3),
         "fileVersion": np.array(FILE_VERSION),
@@ -86,11 +86,6 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
 def references(body: ReducedBody) -> list[int | None]:
     """Return the kept node that is the reference point of each interface, None where there is none."""
     return [reference_row(body, k) for k in range(len(body.interfaces))]
-
-
-def skew(vectors: Array) -> Array:
-    """Return the matrices v~ with v~ w = v × w, (..., 3, 3), of vectors (..., 3)."""
-    return np.asarray(np.cross(np.asarray(vectors)[..., None, :], np.eye(3)).swapaxes(-1, -2))
 
 
 def side_by_side(matrices: Array) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 
 from fe_models.beams.slices import Slices, second_moments
 from fe_models.errors import BeamError
-from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int
+from fe_models.foundation.arrays import Array, IntArray, frozen, frozen_int, tilde
 
 __all__ = ["PointMass", "RigidLink", "Spring"]
 
@@ -111,9 +111,7 @@ def point_slices(nodes: Array, masses: tuple[PointMass, ...]) -> Slices:
     offset = np.array([item.offset for item in masses]).reshape(n, 3)
     principal = [second_moments(item.inertia) for item in masses]
     motion = np.tile(np.eye(6), (n, 1, 1, 1))
-    from fe_models.beams.axes import skew
-
-    motion[:, 0, :3, 3:] = -skew(offset)
+    motion[:, 0, :3, 3:] = -tilde(offset)
     return Slices(
         position=(nodes[at] + offset)[:, None],
         mass=np.array([item.mass for item in masses]).reshape(n, 1),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fe_models.errors import BeamError
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, tilde
 from fe_models.meshes.line_mesh import LineMesh
 
 __all__ = ["LineGeometry", "line_geometry"]
@@ -34,7 +34,7 @@ class LineGeometry:
             T[:, rows : rows + 3, rows : rows + 3] = R.transpose(0, 2, 1)
             T[:, rows + 3 : rows + 6, rows + 3 : rows + 6] = R.transpose(0, 2, 1)
             # u_end = u_node + theta × lever
-            T[:, rows : rows + 3, rows + 3 : rows + 6] = -R.transpose(0, 2, 1) @ skew(levers[:, end])
+            T[:, rows : rows + 3, rows + 3 : rows + 6] = -R.transpose(0, 2, 1) @ tilde(levers[:, end])
         self.T = T
 
 
@@ -91,13 +91,6 @@ def line_geometry(mesh: LineMesh, orientations: Array, section_offsets: Array) -
     R = np.stack([x, y, np.cross(x, y)], axis=2)  # (3)
     shift = np.einsum("nab,nb->na", R[:, :, 1:], section_offsets)  # (4)
     return LineGeometry(ends + shift[:, None], levers + shift[:, None], R)
-
-
-def skew(v: Array) -> Array:
-    """Return v~ with v~ w = v × w, (n, 3, 3), of vectors (n, 3)."""
-    S = np.zeros((len(v), 3, 3))
-    S[:, 0, 1], S[:, 0, 2], S[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return S - S.transpose(0, 2, 1)
 
 
 def _node(mesh: LineMesh, line: int) -> int:

@@ -18,10 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.beams.attachments import Spring, spring_matrix
-from fe_models.beams.axes import skew
 from fe_models.beams.slices import Slices
 from fe_models.body.mass_loads import MassLoads, rotation_work
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, tilde
 
 __all__ = [
     "BeamLines", "line_geometric_stiffness", "point_geometric_stiffness", "slice_forces", "spring_geometric_stiffness",
@@ -161,8 +160,3 @@ def differentiation(xi: Array) -> Array:
     values = xi[:, None] ** powers
     slopes = powers * xi[:, None] ** np.maximum(powers - 1, 0)
     return np.asarray(np.linalg.solve(values.T, slopes.T).T)
-
-
-def tilde(v: Array) -> Array:
-    """Return v~ with v~ w = v × w, (..., 3, 3), of vectors (..., 3)."""
-    return skew(v.reshape(-1, 3)).reshape(*v.shape, 3)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.errors import BodyError
 
-__all__ = ["Array", "IntArray", "frozen", "frozen_int", "require_finite", "require_shape", "symmetric_csc"]
+__all__ = ["Array", "IntArray", "frozen", "frozen_int", "require_finite", "require_shape", "symmetric_csc", "tilde"]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -75,3 +75,11 @@ def symmetry_defect(csc: sp.csc_array) -> float:
     x = np.random.default_rng(0).uniform(0.5, 1.5, csc.shape[0])
     defect = np.abs(csc @ x - csc.T @ x).max()
     return float(defect / scale) if scale else 0.0
+
+
+def tilde(a: Array) -> Array:
+    """Return the matrix of a cross product, (..., 3, 3), of vectors (..., 3): tilde(a) @ b = a × b."""
+    a = np.asarray(a)
+    S = np.zeros((*a.shape, 3), np.result_type(a, float))
+    S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = a[..., 0], a[..., 1], a[..., 2]
+    return S - np.swapaxes(S, -1, -2)

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.beams.axes import skew
 from fe_models.beams.slices import Slices
 from fe_models.errors import ShellError
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array, IntArray, tilde
 from fe_models.shells.geometry import CellPlanes, cell_planes
 from fe_models.shells.laminate import ShellLaw, shell_law
 from fe_models.shells.quad import quad_strains
@@ -107,7 +106,7 @@ class ShellCells:
         motion[:, :, :3] = translations(planes, shape.values, shape.side_values, shape, DRILLING_SHARE[self.kind])
         for a in range(3, 6):
             motion[:, :, a, :, a] = shape.values
-        motion[:, :, :3] -= np.einsum("nab,npbcd->npacd", skew(arm), motion[:, :, 3:])
+        motion[:, :, :3] -= np.einsum("nab,npbcd->npacd", tilde(arm), motion[:, :, 3:])
         moments = np.zeros((n, p, 3))
         moments[:, :, 2] = mass * self.by_law(lambda law: law.spread, rows)[:, None]
         return Slices(
@@ -241,9 +240,9 @@ def translations(planes: CellPlanes, N: Array, E: Array, shape: FlatShape, share
     normal = planes.R[:, :, 2]
     kept = np.eye(3) - (1 - share) * normal[:, :, None] * normal[:, None, :]
     for corner in range(c):
-        u[:, :, :, corner, 3:] -= N[:, :, corner, None, None] * skew(planes.levers[:, corner])[:, None]
+        u[:, :, :, corner, 3:] -= N[:, :, corner, None, None] * tilde(planes.levers[:, corner])[:, None]
     for side, (i, j) in enumerate(shape.sides):
-        arm = skew(planes.corners[:, j] - planes.corners[:, i]) @ kept / 8
+        arm = tilde(planes.corners[:, j] - planes.corners[:, i]) @ kept / 8
         bulge = E[:, :, side, None, None] * arm[:, None]
         u[:, :, :, j, 3:] += bulge
         u[:, :, :, i, 3:] -= bulge
@@ -283,5 +282,5 @@ def _times_blocks(B: Array, planes: CellPlanes) -> Array:
     for k in range(c):
         force = np.ascontiguousarray(blocks[:, :, k, :3]) @ Rt
         out[:, k, :, :3] = force
-        out[:, k, :, 3:] = np.ascontiguousarray(blocks[:, :, k, 3:]) @ Rt - force @ skew(planes.levers[:, k])
+        out[:, k, :, 3:] = np.ascontiguousarray(blocks[:, :, k, 3:]) @ Rt - force @ tilde(planes.levers[:, k])
     return out.transpose(0, 2, 1, 3).reshape(n, p, s, d)

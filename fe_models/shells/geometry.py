@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.beams.axes import skew
-from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.arrays import Array, IntArray, frozen, tilde
 
 __all__ = ["CellPlanes", "cell_planes"]
 
@@ -33,7 +32,7 @@ class CellPlanes:
         for k in range(c):
             at = slice(6 * k, 6 * k + 3), slice(6 * k + 3, 6 * k + 6)
             T[:, at[0], at[0]] = T[:, at[1], at[1]] = Rt
-            T[:, at[0], at[1]] = -Rt @ skew(self.levers[:, k])
+            T[:, at[0], at[1]] = -Rt @ tilde(self.levers[:, k])
         return T
 
     def __getitem__(self, rows: slice | IntArray) -> "CellPlanes":

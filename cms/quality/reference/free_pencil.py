@@ -7,7 +7,7 @@ import numpy as np
 from cms.reduced_basis.finishing import elastic_eigenvectors
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
-from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.arrays import Array, frozen, tilde
 
 __all__ = [
     "FreePencil", "free_elastic_modes", "free_pencil", "has_inertia", "port_rows", "whole_pencil", "whole_port_rows",
@@ -45,7 +45,7 @@ def whole_pencil(reduced: ReducedBody) -> FreePencil:
     moments, n = reduced.moments, reduced.n_q
     M = np.zeros((6 + n, 6 + n))
     M[:3, :3] = moments.m * np.eye(3)
-    M[3:6, :3] = skew(moments.S)
+    M[3:6, :3] = tilde(moments.S)
     M[:3, 3:6] = M[3:6, :3].T
     M[3:6, 3:6] = moments.J0
     M[:3, 6:], M[3:6, 6:] = moments.C1, moments.C2
@@ -115,8 +115,3 @@ def whole_port_rows(reduced: ReducedBody, name: str) -> Array:
     rows[3:, 3:6] = np.eye(3)
     rows[:, 6:] = interface.Psi
     return rows
-
-
-def skew(v: Array) -> Array:
-    """Return v~ with v~ w = v × w, (3, 3)."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

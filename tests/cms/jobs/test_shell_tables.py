@@ -250,7 +250,7 @@ def test_a_bad_job_of_layers_is_refused(job_file, old, new, words):
 
 def test_an_orthotropic_material_belongs_to_layers(job_file):
     text = LAYUP.replace('material = "tin"', 'material = "ply"')
-    with pytest.raises(JobError, match=r"materials.ply: it is not isotropic; shells of one thickness \(not of layers\)"):
+    with pytest.raises(JobError, match=r"ply: it is not isotropic; shells of one thickness \(not of layers\)"):
         job_body(read_job(job_file(text)))
 
 
