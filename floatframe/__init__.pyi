@@ -62,6 +62,8 @@ from .forces import SphereContact as SphereContact
 from .forces import SpringDamper as SpringDamper
 from .forces import UserForce as UserForce
 from .functions.time_functions import TimeFunction as TimeFunction
+from .gradients import Sensitivities as Sensitivities
+from .gradients import sensitivities as sensitivities
 from .integrators import EnergyDecaying as EnergyDecaying
 from .integrators import EnergyMomentum as EnergyMomentum
 from .integrators import GeneralizedAlpha as GeneralizedAlpha

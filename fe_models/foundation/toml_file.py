@@ -19,6 +19,7 @@ from fe_models.foundation.words import nearest, quoted, shortened
 
 __all__ = [
     "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "files_named", "first_key", "read_toml", "validated",
+    "value_of",
 ]  # fmt: skip
 
 
@@ -221,26 +222,39 @@ def changed(
     """
     result = copy.deepcopy(dict(content))
     for path, value in changes.items():
-        here: Any = result
-        left = path
-        while True:
-            key, rest = first_key(here, left)
-            if rest is None:
-                break
-            if key is None:
-                choices = list(here) if isinstance(here, dict) else [str(k) for k in range(len(here))]
-                name = left.split(".")[0]
-                raise error(f"{where}: the key path {path!r}: there is no {quoted(name)}{nearest(name, choices)}")
-            here, left = here[key], rest
-            if not isinstance(here, dict | list):
-                raise error(f"{where}: the key path {path!r} goes on after a value: {here!r}")
-        if isinstance(here, list):
-            if not left.isdigit() or int(left) >= len(here):
-                raise error(f"{where}: the key path {path!r}: expected an index of 0 to {len(here) - 1}, got {left!r}")
-            here[int(left)] = value
-        else:
-            here[left] = value
+        holder, key = holder_of(result, path, where, error)
+        holder[key] = value
     return result
+
+
+def value_of(content: Mapping[str, Any], path: str, where: str, error: type[Exception]) -> Any:
+    """Return the value at a key path of the content of a file; `error` with the nearest name if there is none."""
+    holder, key = holder_of(dict(content), path, where, error)
+    if isinstance(holder, dict) and key not in holder:
+        raise error(f"{where}: the key path {path!r}: there is no {quoted(key)}{nearest(key, list(holder))}")
+    return holder[key]
+
+
+def holder_of(content: dict[str, Any], path: str, where: str, error: type[Exception]) -> tuple[Any, Any]:
+    """Return the table or list that holds the value at a key path, and its key, which may be new, or index."""
+    here: Any = content
+    left = path
+    while True:
+        key, rest = first_key(here, left)
+        if rest is None:
+            break
+        if key is None:
+            choices = list(here) if isinstance(here, dict) else [str(k) for k in range(len(here))]
+            name = left.split(".")[0]
+            raise error(f"{where}: the key path {path!r}: there is no {quoted(name)}{nearest(name, choices)}")
+        here, left = here[key], rest
+        if not isinstance(here, dict | list):
+            raise error(f"{where}: the key path {path!r} goes on after a value: {here!r}")
+    if isinstance(here, list):
+        if not left.isdigit() or int(left) >= len(here):
+            raise error(f"{where}: the key path {path!r}: expected an index of 0 to {len(here) - 1}, got {left!r}")
+        return here, int(left)
+    return here, left
 
 
 def first_key(here: dict[str, Any] | list[Any], path: str) -> tuple[Any, str | None]:
