@@ -8,7 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import IntArray
 from fe_models.importers.abaqus_deck import DeckBlock
-from fe_models.importers.decks.abaqus.draft import Draft
+from fe_models.importers.decks.abaqus.draft import Draft, PointElements
 from fe_models.importers.decks.abaqus.elements import PLANE, SOLID_RULES
 from fe_models.importers.decks.abaqus.layups import layers_of_block
 from fe_models.importers.decks.abaqus.materials import numbers, read_orientation, read_transform
@@ -234,9 +234,29 @@ def _springs(here: str, block: DeckBlock, draft: Draft) -> None:
         k = numbers(block.lines[-1])[0]
         for row in of_set.rows.values():
             draft.springs.append(_axial(here, draft, row, k))
+    elif of_set.kind == "SPRING1":
+        why = "a spring to the ground; put it between bodies in the system file"
+        draft.ledger.refuse(of_set.kind, why, count=n)
     else:
-        why = "a spring to the ground" if of_set.kind == "SPRING1" else "a spring between single components"
-        draft.ledger.refuse(of_set.kind, f"{why}; put it between bodies in the system file", count=n)
+        _component_springs(here, block, draft, of_set)
+
+
+def _component_springs(here: str, block: DeckBlock, draft: Draft, of_set: PointElements) -> None:
+    """Take SPRING2 between the same component of two nodes at one place; others would turn the body by their force."""
+    first, second = (int(number) for number in (numbers(block.lines[0]) * 2)[:2])
+    k = numbers(block.lines[-1])[0]
+    for row in of_set.rows.values():
+        ends = draft.mesh.coordinates[draft.mesh.rows_of(np.array(row))]
+        if first != second or not 1 <= first <= 6 or np.abs(ends[1] - ends[0]).max() > 0:
+            why = "between nodes at different places, or between different components"
+            draft.ledger.refuse("SPRING2", why, line=block.line_number)
+        elif "ORIENTATION" in block.parameters or draft.transformed.keys() & set(row):
+            draft.ledger.refuse("SPRING2", "along axes of its own (ORIENTATION, *TRANSFORM)", line=block.line_number)
+        else:
+            along = [0.0] * 6
+            along[first - 1] = k
+            names = [draft.node_group(here, [number]) for number in row]
+            draft.springs.append(DeckSpring((names[0], names[1]), tuple(along)))
 
 
 def _axial(here: str, draft: Draft, row: tuple[int, ...], k: float) -> DeckSpring:

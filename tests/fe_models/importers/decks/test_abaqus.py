@@ -452,3 +452,29 @@ def test_constraints_of_parts_that_cannot_be_placed_are_refused(tmp_path, lines,
 def test_coordinates_that_are_no_numbers_are_refused(tmp_path, word):
     with pytest.raises(MeshError, match="expected finite coordinates"):
         deck_of(tmp_path, DECK.replace("4, 0, 1, 0", f"4, {word}, 1, 0"))
+
+
+SPRING2 = "*ELEMENT, TYPE=SPRING2, ELSET=coil\n5, 7, 40\n"
+
+
+@pytest.mark.parametrize(
+    ("place", "components", "words"),
+    [
+        ("1, 1, 1", "5, 5", ""),
+        ("1, 1, 1", "2", ""),
+        ("1, 1, 1.5", "2, 2", "1 SPRING2 .*: between nodes at different places"),
+        ("1, 1, 1", "2, 3", "1 SPRING2 .*or between different components"),
+    ],
+)
+def test_springs_between_components_join_nodes_at_one_place(tmp_path, place, components, words):
+    text = DECK.replace("30, 0, 0, 5\n", f"30, 0, 0, 5\n40, {place}\n")
+    text = text.replace("*ELEMENT, TYPE=SPRINGA, ELSET=coil\n5, 7, 20\n", SPRING2)
+    deck = deck_of(tmp_path, text.replace("*SPRING, ELSET=coil\n\n1000.", f"*SPRING, ELSET=coil\n{components}\n1000."))
+    if words:
+        with pytest.raises(MeshError, match=words):
+            deck.ledger.require_whole()
+        return
+    deck.ledger.require_whole()
+    (spring,) = deck.springs
+    assert spring.nodes == ("node_7", "node_40")
+    assert spring.stiffness == tuple(1000.0 * (k == int(components[0]) - 1) for k in range(6))
