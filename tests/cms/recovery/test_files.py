@@ -270,3 +270,24 @@ def test_bad_tables_and_files_are_refused(tmp_path):
     with pytest.raises(cms.CmsError, match="no row 'node 3 velocty'"):
         table.rows("node 3 velocty")
     assert not list(tmp_path.iterdir())
+
+
+def test_forces_of_a_driven_base_are_those_of_pyyeti():
+    """Its frequency response of Craig-Bampton matrices on a moving boundary, beside our rows of the same motion."""
+    cb = pytest.importorskip("pyyeti.cb")
+    body = without_points(reduced("craig-bampton", "turned"))
+    matrices = cms.craig_bampton_matrices(body)
+    rows = matrices.recover("all")
+    n_b, frequencies = matrices.n_b, np.array([5.0, 60.0, 190.0, 400.0, 1500.0])
+    motion = np.zeros((n_b, len(frequencies)))
+    motion[:] = matrices.rigid @ np.array([1.0, -0.5, 2.0, 3.0, 1.0, -2.0])[:, None]  # both ends on one shaker
+    with np.errstate(all="ignore"):
+        found = cb.cbtf(matrices.M, matrices.D, matrices.K, motion, frequencies, np.arange(n_b))
+    y = rows.values(found.d.T, found.v.T, found.a.T)
+    force = y[:, rows.table.rows("interface force")]
+    assert_allclose(force, found.frc.T, rtol=0, atol=1e-8 * np.abs(found.frc).max())
+    net = y[:, rows.table.rows("net force")[:6]]
+    from tests.cms.recovery.test_matrices import POINT
+
+    about = cms.craig_bampton_matrices(body, about=POINT).rigid
+    assert_allclose(net, found.frc.T @ about, rtol=0, atol=1e-8 * np.abs(net).max())
