@@ -11,6 +11,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import damage, nearest, quoted
 from floatframe.errors import SignalError
 from floatframe.signals.csv_file import RawTable
+from floatframe.signals.mat_elements import sound_variables
 
 __all__ = ["read_mat"]
 
@@ -76,7 +77,10 @@ def content_5(path: Path) -> dict[str, Any]:
     """Return the variables of a file of version 5: arrays, text, dictionaries for structures."""
     import scipy.io
 
-    found = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False, chars_as_strings=True)
+    wanted = sound_variables(str(path), path.read_bytes())
+    found = scipy.io.loadmat(
+        path, variable_names=wanted, squeeze_me=True, struct_as_record=False, chars_as_strings=True
+    )
     return {name: plain_5(value) for name, value in found.items() if not name.startswith("__")}
 
 

@@ -156,3 +156,25 @@ def test_damaged_matlab_files_are_refused(tmp_path):
     scipy.io.savemat(tmp_path / "c.mat", {"t": t, "x": t * 1j})
     with pytest.raises(SignalError, match="expected real numbers"):
         read_signals(tmp_path / "c.mat")
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_altered_bytes_of_a_matlab_file_are_refused_or_change_numbers_alone(tmp_path, is_packed):
+    """SciPy's reader would take the program along with some of them; tags and sizes are walked through before."""
+    t = np.arange(40) / 100
+    path = tmp_path / "a.mat"
+    content = {"t": t, "x": np.sin(t), "s": {"values": np.cos(t), "unit": "g"}}
+    scipy.io.savemat(path, content, do_compression=is_packed)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(0)
+    refused = 0
+    for _ in range(150):
+        altered = bytearray(whole)
+        for place in rng.integers(124, len(whole), 3):
+            altered[place] = rng.integers(0, 256)
+        path.write_bytes(bytes(altered))
+        try:
+            assert len(read_signals(path).time) == 40
+        except SignalError:
+            refused += 1
+    assert refused > 30
