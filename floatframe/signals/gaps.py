@@ -18,6 +18,7 @@ __all__ = ["without_gaps"]
 FEW = 20  #: samples below which steps that differ are taken as meant
 MOST_STEPS = 4  #: different steps that are a change of the rate; more are a step that follows something
 COMMON = 0.9  #: of the steps that must be alike for the others to be gaps
+MOST_COUNTED = 1e12  #: samples of a gap
 ALIKE = 0.02  #: of a step by which rounded times may let it differ
 
 
@@ -111,7 +112,7 @@ def with_lost_samples(
     time: Array, values: Array, step: float, fill: float, place: Callable[[int], str]
 ) -> tuple[Array, Array, list[str]]:
     """Return times with those that are missing between, and NaN as their values."""
-    counts = np.round(np.diff(time) / step).astype(np.int64)
+    counts = np.minimum(np.round(np.diff(time) / step), MOST_COUNTED).astype(np.int64)
     wide = np.flatnonzero(counts > 1)
     if not len(wide):
         return time, values, []

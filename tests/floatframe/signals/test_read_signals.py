@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 
 from floatframe import SignalError
 from floatframe.signals import read_signals
+from floatframe.signals.mat_elements import sound_variables
 
 
 def written(tmp_path, text, name="a.csv"):
@@ -178,3 +179,20 @@ def test_altered_bytes_of_a_matlab_file_are_refused_or_change_numbers_alone(tmp_
         except SignalError:
             refused += 1
     assert refused > 30
+
+
+def test_numbers_that_do_not_fill_their_dimensions_are_found_before_the_reader(tmp_path):
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"x": np.arange(40.0)})
+    whole = path.read_bytes()
+    assert sound_variables("a.mat", whole) == ["x"]
+    place = whole.index(np.array([1, 40], dtype="<i4").tobytes())
+    altered = whole[:place] + np.array([1, 39], dtype="<i4").tobytes() + whole[place + 8 :]
+    with pytest.raises(SignalError, match=r"a.mat: array 'x': its numbers do not fill \(1, 39\); the file is damaged"):
+        sound_variables("a.mat", altered)
+
+
+def test_a_gap_of_no_end_is_refused(tmp_path):
+    t = [*(k / 1000 for k in range(60)), 1e300]
+    with pytest.raises(SignalError, match="line 62: samples are missing"):
+        read_signals(written(tmp_path, rows(t, range(61))))
