@@ -41,7 +41,7 @@ def slider_crank() -> None:
         system, run = read_system(Path(folder) / "crank.toml")
         motion = ff.integrate(system, run.integrator, t_end=run.t_end, h=run.h, output_every=2)
         film, n = Path(folder) / "film.gif", 38  # pictures of a turn, 15 a second, 100 times slower
-        animate(motion, drawn(system), film, speed=0.01, fps=15, magnification=1.0)
+        animate(motion, drawn(system), film, speed=0.01, fps=15, magnification=1.0, system=system)
         frames = [cut(frame) for frame in iio.imread(film)[-n:]]
     save_film(frames, HERE / "slider_crank.gif", fps=15)
 
@@ -52,7 +52,7 @@ def still(name: str, make: Callable[[], tuple[ff.System, float, float]]) -> None
     motion = ff.integrate(system, ff.GeneralizedAlpha(0.8), t_end=t_end, h=h, output_every=4)
     with tempfile.TemporaryDirectory() as folder:
         film = Path(folder) / "film.gif"
-        animate(motion, drawn(system), film, speed=t_end / 1.0, fps=12)
+        animate(motion, drawn(system), film, speed=t_end / 1.0, fps=12, system=system)
         save_still(cut(iio.imread(film)[-1]), HERE / f"{name}.png")
 
 

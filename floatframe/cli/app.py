@@ -419,7 +419,7 @@ def animate_command(
     with stages(remaining=True) as clock, clock("film") as advance:
         animate(
             trajectory, bodies, path, fps=fps, speed=speed, magnification=magnification, color=BODY_COLORS[color],
-            on_frame=lambda done, all_: advance(done / all_),
+            system=system, on_frame=lambda done, all_: advance(done / all_),
         )  # fmt: skip
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
 

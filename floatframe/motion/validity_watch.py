@@ -16,6 +16,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.linalg as la
 
+from cms.errors import CmsError
+from cms.frame_conversion import converted
+from cms.reduced_basis.frames import TisserandFrame
 from cms.reduced_body.geometric_stiffness import SPIN_PAIRS
 from cms.reduced_body.linear_range import LEFT_OUT, LINEAR, STIFFENED, Limits
 from cms.reduced_body.reduced_body import ReducedBody
@@ -34,6 +37,7 @@ from floatframe.system import System
 
 __all__ = ["ValidityWatch"]
 
+MOST_CONVERTED = 80  #: modes of a body of which the rotations against mean axes are found
 N_INERTIAL = 12  #: amplitudes of inertial loads: 3 accelerations, 3 angular accelerations, 6 products
 
 
@@ -48,6 +52,7 @@ class Watched:
     Psi_r: Array  #: rotations of the interfaces by q, (3 n, n_q)
     scaled: Array  #: K^(-1/2) K_j K^(-1/2) of all unit loads, (n_loads, n_q²); no rows where K is singular
     norms: Array  #: their largest |eigenvalue|, (n_loads,)
+    by_mean_axes: Array | None = None  #: rotations of the interfaces against mean axes by q, made when it is asked for
     wrenches: list[Wrench] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
 
@@ -86,15 +91,17 @@ class ValidityWatch:
                 if not largest > limit:
                     continue
                 key, t = (part.body.name, kind), float(rows.t[k])
+                remedied = in_mean_axes(part, self.coordinates(part, rows)) if kind == "rotation" else -1.0
                 if key not in self.found:
                     first = float(rows.t[int(np.argmax(values > limit))])
                     has_matrices = part.body.reduced.geometric is not None
                     self.found[key] = ValidityNote(
-                        *key, limit, largest, first, t, part.body.is_stiffened, has_matrices
+                        *key, limit, largest, first, t, part.body.is_stiffened, has_matrices, remedied
                     )  # fmt: skip
                     new.append(self.found[key])
                 elif largest > self.found[key].largest:
-                    self.found[key] = replace(self.found[key], largest=largest, t_largest=t)
+                    most = max(self.found[key].in_mean_axes, remedied)
+                    self.found[key] = replace(self.found[key], largest=largest, t_largest=t, in_mean_axes=most)
         return tuple(new)
 
     def measures(self, part: Watched, rows: Rows, told: Rows) -> list[tuple[str, Array]]:
@@ -103,8 +110,8 @@ class ValidityWatch:
         A rotation is that against the frame in which the engine moves the body, a load that of the frame of its file.
         """
         model = compiled_system(self.system).model
-        i, q0, u0 = part.index, int(model.bodies.q0[part.index]), int(model.bodies.u0[part.index])
-        q = rows.q[:, q0 : q0 + part.body.reduced.n_q]
+        i, u0 = part.index, int(model.bodies.u0[part.index])
+        q = self.coordinates(part, rows)
         omega = rows.u[:, u0 + 3 : u0 + 6]
         speed = np.linalg.norm(omega, axis=1) / part.frequency
         found = [("speed", speed)]
@@ -116,6 +123,11 @@ class ValidityWatch:
         if len(part.norms):
             found.append(("load", self.load_measure(part, told, i, u0)))
         return found
+
+    def coordinates(self, part: Watched, rows: Rows) -> Array:
+        """Return the modal coordinates of a body over the rows, (n_t, n_q)."""
+        q0 = int(compiled_system(self.system).model.bodies.q0[part.index])
+        return rows.q[:, q0 : q0 + part.body.reduced.n_q]
 
     def load_measure(self, part: Watched, rows: Rows, i: int, u0: int) -> Array:
         """Return the change of the stiffness by the loads; -1 in the rows where it is not looked for."""
@@ -144,6 +156,26 @@ class ValidityWatch:
             change = la.eigvalsh((lam[k] @ part.scaled).reshape(n, n))
             values[k] = -change[0] if part.body.is_stiffened else np.abs(change).max()
         return values
+
+
+def in_mean_axes(part: Watched, q: Array) -> float:
+    """Return the largest rotation of an interface against mean axes at coordinates (n_t, n_q) [rad]; -1: not known.
+
+    Not known where the body has mean axes already, has many modes (the way there takes long), or cannot go there.
+    """
+    reduced = part.body.reduced
+    if part.body.is_stiffened or reduced.frame.kind == "tisserand" or reduced.n_q > MOST_CONVERTED:
+        return -1.0
+    if part.by_mean_axes is None:
+        x, y, z = ((float(a), float(b), float(c)) for a, b, c in reduced.frame.axes.T)
+        try:
+            mean, change = converted(reduced, TisserandFrame(axes=(x, y, z)))
+        except CmsError:
+            return -1.0
+        turning = [np.asarray(interface.Psi[3:]) for interface in mean.interfaces if interface.has_rotation]
+        part.by_mean_axes = np.concatenate(turning) @ np.linalg.inv(change.Z)
+    angles = (q @ part.by_mean_axes.T).reshape(len(q), -1, 3)
+    return float(np.linalg.norm(angles, axis=2).max())
 
 
 def is_elastic(body: FlexibleBody) -> bool:

@@ -12,17 +12,23 @@ from cms.rendering import Drawing, Lines, Scene, Surface, Triad, render_animatio
 from cms.rendering.drawing import OnFrame
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.rigid_body import RigidBody
+from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.pictures.body_colors import DISPLACEMENT, BodyColor
 from floatframe.pictures.film_times import FilmTimes, film_times, round_below, speed_words, time_words
+from floatframe.pictures.glyphs import glyphs
 from floatframe.pictures.stage import box_of, ground_grid, view_axes
 from floatframe.results.recovery import nodal_displacements
 from floatframe.results.trajectory import BodyMotion, Trajectory
+from floatframe.system import System
 
 __all__ = ["animate", "bodies_of", "motion_scene"]
 
 VISIBLE = 0.02  #: share of a body's diagonal below which its displacement is drawn larger
 DRAWN = 0.06  #: share of the diagonal to which it is then enlarged, at most
+LARGEST = 0.2  #: half edge of the box of a rigid body, by the size of the scene
+HIDDEN = 0.1  #: share of a flexible body's nodes in a box from which that is drawn as glass
+GLASS = 0.35  #: its opacity
 TRAIL_COLOR, RIGID_COLOR = "#7d5ba6", "#9fb0bf"
 TRAIL_POINTS = 1500  #: of a trail, at most
 
@@ -37,6 +43,7 @@ def animate(
     magnification: float | None = None,
     up: Sequence[float] | None = None,
     color: BodyColor = DISPLACEMENT,
+    system: System | None = None,
     on_frame: OnFrame | None = None,
 ) -> Drawing:
     """Draw a motion into a film.
@@ -59,6 +66,9 @@ def animate(
         for a motion in the xy plane.
     color
         By what flexible bodies are coloured: `DISPLACEMENT` or `VON_MISES` of `floatframe.pictures.body_colors`.
+    system
+        The system of the motion: its joints, springs, dampers, bushings and contacts are drawn (see
+        `floatframe.pictures.glyphs`).
     on_frame
         Called with the number of frames drawn and of all.
 
@@ -68,7 +78,7 @@ def animate(
         If the trajectory has no rows, or a body does not fit it.
     """
     times = film_times(trajectory.t * trajectory.units.time, fps=fps, speed=speed, n_nodes=count_nodes(bodies))
-    scene = motion_scene(trajectory, bodies, times, magnification=magnification, up=up, color=color)
+    scene = motion_scene(trajectory, bodies, times, magnification=magnification, up=up, color=color, system=system)
     return render_animation(scene, path, fps=times.fps, on_frame=on_frame)
 
 
@@ -99,6 +109,7 @@ def motion_scene(
     magnification: float | None = None,
     up: Sequence[float] | None = None,
     color: BodyColor = DISPLACEMENT,
+    system: System | None = None,
 ) -> Scene:
     """Return the scene of a motion: surfaces, interfaces and their trails, ground; else as `animate`."""
     unknown = set(bodies) - set(trajectory.body_names)
@@ -134,18 +145,23 @@ def motion_scene(
                 lines.append(trail(path, rows))
         else:
             rigid = bodies.get(name)
-            corners, triangles = box_of(rigid if isinstance(rigid, RigidBody) else None, 0.04 * size)
+            own = rigid if isinstance(rigid, RigidBody) else None
+            most = np.inf if system is None else LARGEST * size
+            corners, triangles = box_of(own, 0.04 * size, most, connections(system, name))
             moved = r[:, None] + corners @ R.transpose(0, 2, 1)
-            surfaces.append(Surface(triangles, moved, color=RIGID_COLOR, name=name))
+            opacity = GLASS if hides_flexible(name, corners, frames, flexible) else 1.0
+            surfaces.append(Surface(triangles, moved, color=RIGID_COLOR, opacity=opacity, name=name))
             triads.append(Triad(r, R, 0.06 * size, name))
             lines.append(trail(motions[name].r, rows))
     points = np.concatenate([surface.nodes.reshape(-1, 3)[::7] for surface in surfaces])
     up_axis = up_of(trajectory, points) if up is None else np.asarray(up, dtype=float)
     direction, up_axis = view_axes(points, up_axis)
     ground, step = ground_grid(points, up_axis)
+    reach = max(size, 0.5 * float(np.linalg.norm(np.ptp(points, axis=0))))
+    drawn = () if system is None else glyphs(system, trajectory, rows, reach, magnification, up_axis)
     return Scene(
         surfaces=tuple(surfaces),
-        lines=(ground, *(line for line in lines if np.ptp(line.points, axis=(0, 1)).max() > 1e-3 * size)),
+        lines=(ground, *drawn, *(line for line in lines if np.ptp(line.points, axis=(0, 1)).max() > 1e-3 * size)),
         triads=tuple(triads),
         title=trajectory.head.system,
         captions=(
@@ -160,6 +176,28 @@ def motion_scene(
         up=up_axis,
         size=(960, 720),
     )
+
+
+def connections(system: System | None, name: str) -> Array | None:
+    """Return where a rigid body is met by joints and forces, in its frame, (n, 3); None for an unknown system."""
+    if system is None:
+        return None
+    markers, index = compiled_system(system).model.markers, [body.name for body in system.bodies].index(name)
+    return np.asarray(markers.position[markers.body == index])
+
+
+def hides_flexible(
+    name: str, corners: Array, frames: Mapping[str, tuple[Array, Array]], flexible: Mapping[str, ReducedBody]
+) -> bool:
+    """Whether nodes of a flexible body lie within the box of a rigid one in the first frame."""
+    (r, R), low, high = frames[name], corners.min(axis=0), corners.max(axis=0)
+    for other, body in flexible.items():
+        r_o, R_o = frames[other]
+        local = (r_o[0] + body.nodes @ R_o[0].T - r[0]) @ R[0]
+        inside = ((local > low) & (local < high)).all(axis=1)
+        if inside.mean() > HIDDEN:
+            return True
+    return False
 
 
 def rotations(p: Array) -> Array:

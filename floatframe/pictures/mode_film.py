@@ -161,7 +161,9 @@ def corners_of(system: System, i: int) -> Array:
     """Return corners of the box of a body in its frame, (8, 3)."""
     body = system.bodies[i]
     if not isinstance(body, FlexibleBody):
-        return box_of(body, 0.02 * compiled_system(system).length)[0]
+        length = compiled_system(system).length
+        markers = compiled_system(system).model.markers
+        return box_of(body, 0.02 * length, 0.2 * length, markers.position[markers.body == i])[0]
     low, high = body.reduced.nodes.min(axis=0), body.reduced.nodes.max(axis=0)
     half = np.maximum((high - low) / 2, 0.01 * compiled_system(system).length)
     return np.asarray((low + high) / 2 + box_of(None, 1.0)[0] * half)

@@ -12,8 +12,13 @@ __all__ = ["box_of", "ground_grid", "view_axes"]
 GRID_COLOR = "#cfd6dc"
 
 
-def box_of(body: RigidBody | None, half: float) -> tuple[Array, IntArray]:
+def box_of(
+    body: RigidBody | None, half: float, most: float = np.inf, connections: Array | None = None
+) -> tuple[Array, IntArray]:
     """Return corners in the body frame, (8, 3), and triangles of the box of the body's inertia; of a cube without.
+
+    Half edges are `most` at most, so that an inertia that stands for more than a box does not fill the picture; but
+    they reach as far as its connections, points in the body frame, (n, 3).
 
     A box with half edges a, b, c has I_1 = m/3 (b² + c²) and so on, so that a² = 3/(2m) (I_2 + I_3 - I_1).
     """
@@ -21,8 +26,10 @@ def box_of(body: RigidBody | None, half: float) -> tuple[Array, IntArray]:
     if body is not None:
         moments, axes = np.linalg.eigh(body.inertia)
         squares = 1.5 / body.mass * (moments.sum() - 2 * moments)
-        edges = np.maximum(np.sqrt(np.maximum(squares, 0.0)), 0.02 * half)
         center = body.center_of_mass
+        points = np.zeros((0, 3)) if connections is None else connections
+        reach = np.abs((points - center) @ axes).max(axis=0, initial=0.0)
+        edges = np.clip(np.sqrt(np.maximum(squares, 0.0)), 0.02 * half, np.maximum(most, reach))
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
     if np.linalg.det(axes) < 0:
         axes = -axes

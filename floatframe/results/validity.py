@@ -22,6 +22,7 @@ class ValidityNote:
     t_largest: float  #: [s]
     is_stiffened: bool
     has_matrices: bool  #: whether the reduced body holds geometric stiffness
+    in_mean_axes: float = -1.0  #: the same rotation against mean axes, where the body has another frame; -1: not known
 
     @property
     def what(self) -> str:
@@ -48,6 +49,16 @@ class ValidityNote:
         """Say what to do."""
         if self.kind == "inertia":
             return "import it with its full mass matrix, nodal masses, or mesh and density beside (cms import)"
+        if self.kind == "rotation" and 0 <= self.in_mean_axes < self.largest:
+            frame = "take mean axes (cms frame --to tisserand, [body] frame = \"tisserand\")"
+            if self.in_mean_axes <= self.limit:
+                return f"{frame}: there it turns by {self.in_mean_axes:.3g} rad, within the limit"
+            return f"{frame}: there it turns by {self.in_mean_axes:.3g} rad; then {self.next_action}"
+        return self.next_action
+
+    @property
+    def next_action(self) -> str:
+        """Say what to do where another frame does not help, or not enough."""
         if self.is_stiffened:
             more = "reduce it with more modes, or " if self.kind == "speed" else ""
             return f"{more}split it into parts (cms split, [body] part)"
@@ -81,6 +92,7 @@ def notes_from_json(text: str) -> tuple[ValidityNote, ...]:
     try:
         notes = json.loads(text)
         for note in notes:
+            note.setdefault("in_mean_axes", -1.0)  # of older files
             if set(note) != set(kinds) or note["kind"] not in KINDS:
                 raise ValueError
             if any(not isinstance(value, float | int if kinds[name] is float else kinds[name])

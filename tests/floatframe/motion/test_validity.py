@@ -153,6 +153,8 @@ def test_a_fast_spin_up_is_told_once_per_body_and_kind_with_what_to_do(tmp_path,
     assert "% (limit 10 %)" in told["off"]["load"].words
     note = told["off"]["speed"]
     assert_allclose(note.limit, LINEAR.speed)
+    if "rotation" in told["off"]:
+        assert told["off"]["rotation"].action.startswith("take mean axes (cms frame --to tisserand")
     assert note.t_first < note.t_largest
     lowest = 2 * np.pi * beam.frequencies.min()  # in the frame of the root, where it is fixed to the hub
     assert_allclose(note.largest, 30.0 / lowest, rtol=1e-3)
@@ -277,3 +279,20 @@ def test_an_equilibrium_tells_a_load_near_buckling_and_the_far_bend_above_it(cap
     above = under(1.9)
     assert set(above) == {"load", "rotation"}
     assert above["rotation"].largest > 1.0
+
+
+def test_the_advice_on_rotations_is_what_the_remedy_gives():
+    """The rotation against mean axes, as a run of the body in mean axes shows it; there nothing better is offered."""
+    told = {}
+    for name, frame in (("nodal", None), ("mean", cms.TisserandFrame())):
+        joint = FixedJoint("clamp", GROUND, Marker("beam", "root"))
+        push = PointForce("push", Marker("beam", "tip"), force=(0.0, 0.0, 150.0))
+        system = System([FlexibleBody("beam", soft_beam(frame), stiffening=False)], [joint], [push])
+        notes = static_equilibrium(system).validity
+        told[name] = {note.kind: note for note in notes}["rotation"]
+    nodal, mean = told["nodal"], told["mean"]
+    assert nodal.in_mean_axes < 0.8 * nodal.largest
+    assert_allclose(nodal.in_mean_axes, mean.largest, rtol=0.03)  # linear frames differ by the square of rotations
+    assert f"there it turns by {nodal.in_mean_axes:.3g} rad" in nodal.words
+    assert mean.in_mean_axes == -1.0
+    assert "mean axes" not in mean.words
