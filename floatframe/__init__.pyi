@@ -88,6 +88,11 @@ from .joints import SlidingJoint as SlidingJoint
 from .joints import SphericalJoint as SphericalJoint
 from .joints import UniversalJoint as UniversalJoint
 from .joints.coordinate_coupler import CoordinateCoupler as CoordinateCoupler
+from .laboratory.cases import Case as Case
+from .laboratory.cases import grid as grid
+from .laboratory.laboratory import LaboratoryResult as LaboratoryResult
+from .laboratory.laboratory import Reference as Reference
+from .laboratory.laboratory import study as study
 from .motion.events import Event as Event
 from .motion.foreign_units import Coupling as Coupling
 from .motion.foreign_units import ForeignUnit as ForeignUnit

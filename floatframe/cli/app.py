@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli import analyses, cosimulation, driven, gradient, linear, shake, spectra, sweep
+from floatframe.cli import analyses, cosimulation, driven, gradient, linear, shake, spectra, study, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -482,6 +482,7 @@ linear.register(app)
 spectra.register(app)
 driven.register(app)
 sweep.register(app)
+study.register(app)
 shake.register(app)
 gradient.register(app)
 cosimulation.register(app)

@@ -112,11 +112,11 @@ def print_parameters(update: "Update") -> None:
 
 def updated_text(path: Path, parameters: "tuple[Parameter, ...]", values: "Array") -> str:
     """Return the text of a job with the updated values, its comments and order as they are."""
+    import tomlkit
+
     from cms.correlation.errors import CorrelationError
-    from fe_models.foundation.extras import extra_module
     from fe_models.foundation.toml_file import first_key
 
-    tomlkit = extra_module("tomlkit", extra="modal-test", purpose="write the updated job with its comments")
     document = tomlkit.parse(path.read_text(encoding="utf-8-sig"))
     for parameter, value in zip(parameters, values, strict=True):
         here, left = document, parameter.path

@@ -1,0 +1,54 @@
+"""Cases of the laboratory: how a flexible body is described."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from floatframe.errors import ModelError
+
+__all__ = ["Case", "grid"]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One description of the body."""
+
+    mode_set: str = "craig-bampton"  #: name of a mode set, as in a job
+    n_modes: int = 10  #: vibration modes, of each part
+    frame: str = "tisserand"  #: "tisserand", "buckens", or "nodal:INTERFACE"
+    stiffening: bool = True  #: whether the geometric stiffness counts
+    parts: int = 1  #: of equal length, each with a frame of its own (mean axes where there are several)
+
+    def __post_init__(self) -> None:
+        kind, _, at = self.frame.partition(":")
+        if kind not in ("tisserand", "buckens", "nodal") or (kind == "nodal") != bool(at):
+            raise ModelError(f'case: frame: expected "tisserand", "buckens" or "nodal:INTERFACE", got {self.frame!r}')
+        if self.n_modes < 0 or self.parts < 1:
+            raise ModelError(f"case: expected modes from 0 and parts from 1, got {self.n_modes} and {self.parts}")
+
+    @property
+    def family(self) -> tuple[str, str, bool, int]:
+        """All but the number of modes."""
+        return (self.mode_set, self.frame, self.stiffening, self.parts)
+
+    @property
+    def words(self) -> str:
+        """The case in words, without the number of modes."""
+        parts = f", {self.parts} parts" if self.parts > 1 else ""
+        return f"{self.mode_set}, {self.frame}{'' if self.stiffening else ', linear'}{parts}"
+
+
+def grid(
+    *,
+    mode_sets: Sequence[str] = ("craig-bampton",),
+    n_modes: Sequence[int] = (10,),
+    frames: Sequence[str] = ("tisserand",),
+    stiffening: Sequence[bool] = (True,),
+    parts: Sequence[int] = (1,),
+) -> tuple[Case, ...]:
+    """Return every combination, numbers of modes running fastest; of several parts each has mean axes, once."""
+    made = [
+        Case(mode_set, n, frame if k == 1 else "tisserand", stiff, k)
+        for mode_set, frame, stiff, k, n in itertools.product(mode_sets, frames, stiffening, parts, n_modes)
+    ]
+    return tuple(dict.fromkeys(made))
