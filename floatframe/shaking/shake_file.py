@@ -118,6 +118,7 @@ class OutputSection(Table):
     quantities: Names = Field((), description=f"a list of {', '.join(QUANTITIES)}")
     body: str | None = Field(None, description="of a system: the name of the body")
     sensor: str | None = Field(None, description="of a system: the name of one of its sensors")
+    recovery: str | None = Field(None, description="of a body: the name of a recovery table in its modal file")
     tolerance: Annotated[float, Field(ge=0)] = Field(
         TOLERANCE, description="a number of 0 or more: how far the node may be from position, of the size of the body"
     )

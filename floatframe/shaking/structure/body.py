@@ -23,6 +23,7 @@ from floatframe.shaking.structure.damping import Damping
 from floatframe.shaking.structure.elimination import Held, held_by_bases
 from floatframe.shaking.structure.model import DIRECTIONS, Base, Output, ShakenModel, rigid_rows
 from floatframe.shaking.structure.places import Observed, Place, found_places, in_mesh_axes, six_rows
+from floatframe.shaking.structure.recovery_rows import interface_loads, recovery_outputs, recovery_table
 
 __all__ = ["bases_of_body", "force_outputs", "shaken_body"]
 
@@ -90,6 +91,7 @@ class OnBases:
     C: Array  #: zero where the damping is given by modes
     K: Array
     F: Array  #: loads of the forces, (n_x, n_f)
+    forces: tuple[str, ...]
     held: Held
 
 
@@ -122,7 +124,7 @@ def shaken_body(
         raise ModelError(f"{where}: nothing of it moves while its bases hold it: no mode with mass is left")
     F = np.column_stack([force_column(body, name) for name in forces]) if forces else np.zeros((len(M), 0))
     own = np.asarray(pencil.D) if damping.own else np.zeros_like(M)
-    on = OnBases(body, bases, M, own, K, F, held)
+    on = OnBases(body, bases, M, own, K, F, tuple(forces), held)
     n_s, n_f = held.T.shape[1], F.shape[1]
     if damping.own:
         C = held.V.T @ own @ held.V
@@ -188,6 +190,8 @@ def base_rows(on: OnBases) -> list[OutputRows]:
 def observed_rows(on: OnBases, each: Observed) -> list[OutputRows]:
     """Return the outputs of a place, or of the nodes of an element or set."""
     units, n_s = on.body.units, on.held.T.shape[1]
+    if each.recovery is not None:
+        return [table_rows(on, each)]
     found = []
     for place in found_places(on.body, each):
         for wish in each.quantities:
@@ -202,6 +206,21 @@ def observed_rows(on: OnBases, each: Observed) -> list[OutputRows]:
             elif place.stress is not None:
                 found.append(rows_of(on, stress_outputs(place, units), place.stress, 0, place.stress @ on.held.T))
     return found
+
+
+def table_rows(on: OnBases, each: Observed) -> OutputRows:
+    """Return the rows of a recovery table, with what the bases exert as its loads."""
+    table, bases = recovery_table(on.body, each), base_rows(on)[0]
+    by_lam, by_force = interface_loads(on.body, table, on.bases, on.forces)
+    dynamic, n_s = np.asarray(table.dynamic), on.held.T.shape[1]
+    E = dynamic @ on.held.V + by_lam @ bases.E
+    D = by_lam @ bases.D
+    follows_s = np.array(on.held.T)
+    follows_s[:, :6] -= rigid_motion(on.body, on.bases[0])  # nothing is left with one base
+    D[:2, :, :n_s] += dynamic[:2] @ follows_s
+    D[2, :, :n_s] += dynamic[2] @ on.held.T
+    D[0, :, n_s:] += by_force + dynamic[0] @ (on.held.V_0 @ (on.held.V_0.T @ on.F))
+    return OutputRows(recovery_outputs(each, table), E, D)
 
 
 def rows_of(on: OnBases, outputs: list[Output], by_x: Array, rate: int, by_s: Array) -> OutputRows:

@@ -17,7 +17,7 @@ from floatframe.errors import ModelError
 __all__ = ["QUANTITIES", "Observed", "Place", "found_places", "six_rows"]
 
 QUANTITIES = ("acceleration", "displacement", "stress")
-WAYS = ("interface", "node", "element", "set", "position", "point", "sensor")
+WAYS = ("interface", "node", "element", "set", "position", "point", "sensor", "recovery")
 MOST_NODES = 500  #: of an element or set
 
 
@@ -40,6 +40,7 @@ class Observed:
     tolerance: float = TOLERANCE  #: how far a kept node may be from the position, of the size of the body
     body: str | None = None  #: of a system: on which body; "position" is then also one on a rigid body
     sensor: str | None = None  #: of a system: a sensor of it, by name, in place of a place
+    recovery: str | None = None  #: of a body: a recovery table of it, by name: all of its rows
 
     def __post_init__(self) -> None:
         where = f"shake: output {self.name!r}"

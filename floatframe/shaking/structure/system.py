@@ -278,6 +278,8 @@ def observed_rows(system: System, about: Equilibrium, each: Observed) -> list[Ro
     where = f"shake: output {each.name!r}"
     if each.sensor is not None:
         return [sensor_rows(system, about, each)]
+    if each.recovery is not None:
+        raise ModelError(f"{where}: recovery tables are those of single bodies; this is a system")
     if each.body is None:
         raise ModelError(f"{where}: expected body: the name of one, {', '.join(body.name for body in system.bodies)}")
     way = {key: getattr(each, key) for key in ("position", "node", "element", "set") if getattr(each, key) is not None}

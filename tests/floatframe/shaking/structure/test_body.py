@@ -173,14 +173,44 @@ def test_stress_and_places_of_a_solid(solid):
     assert np.abs(H[:, a]).max() > 0
 
 
+def test_rows_of_a_recovery_table_are_the_outputs_of_the_same_places(part):
+    rows = (
+        cms.Rows("acceleration", at=("right",)),
+        cms.Rows("displacement", at=("right",)),
+        cms.Rows("net force", about=(0.0, 0.0, 0.0)),
+    )
+    request = cms.RecoveryRequest("table", rows=rows)  # of all modes there are: no static rest beside them
+    body = cms.reduce(part, cms.guyan(part), recovery=[request])
+    seen = [
+        Observed("tip", interface="right", quantities=("acceleration", "displacement")),
+        Observed("t", recovery="table"),
+    ]
+    model = shaken_body(
+        body, bases_of_body(body, "left", {"left": np.zeros(3)}), Damping(ratio=ZETA), seen, ("right:z",)
+    )
+    H, names = response(model, FREQUENCIES), [output.name for output in model.outputs]
+    labels = body.recovery["table"].labels
+    first, table = names.index("tip acceleration x"), names.index(labels[0])
+    for k in range(2):  # six accelerations, six displacements
+        own, other = H[:, table + 6 * k : table + 6 * k + 6], H[:, first + 6 * k : first + 6 * k + 6]
+        assert_allclose(own, other, rtol=0, atol=1e-9 * np.abs(other).max())
+    # the net force on the body about the origin: what the base and the further force exert
+    net = H[:, table + 12 : table + 18]
+    exerted = np.array(H[:, :6])
+    arm = np.array([1.0, 0.0, 0.0])
+    exerted[:, :, 6] += np.concatenate([[0, 0, 1.0], np.cross(arm, [0, 0, 1.0])])
+    assert_allclose(np.abs(net), np.abs(exerted), rtol=0, atol=1e-7 * np.abs(exerted).max())
+
+
 @pytest.mark.parametrize(
     ("wanted", "words"),
     [
+        ({"recovery": "tabel"}, "no recovery table"),
         ({"node": 10**6}, "1000000"),
         ({"position": (0.5, 0.5, 0.5)}, "Keep the node there"),
         ({"interface": "rigth"}, "right"),
         ({"point": "p"}, "no stress point"),
-        ({}, "expected one of interface, node, element, set, position, point"),
+        ({}, "expected one of interface, node, element"),
         ({"interface": "right", "quantities": ("stress",)}, "not at interface"),
         ({"node": 0, "quantities": ("strain",)}, "unknown quantity"),
     ],
