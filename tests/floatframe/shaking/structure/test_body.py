@@ -18,6 +18,7 @@ from tests.bodies import bar, beam, with_interfaces
 
 FREQUENCIES = np.array([1.0, 30.0, 77.0, 140.0, 400.0])
 ZETA = 0.03
+P = np.array([0.2, -0.1, 0.3])  #: a point of a base beside its interface
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +87,20 @@ def test_two_bases_moved_against_each_other_give_the_response_of_the_full_matric
     assert_allclose(H[:, net : net + 3], forces[:, :3] + forces[:, 6:9], rtol=0, atol=1e-9 * np.abs(forces[0]).max())
     moments = forces[:, 3:6] + forces[:, 9:12] + np.cross([1.0, 0, 0], forces[:, 6:9], axisb=1, axisc=1)
     assert_allclose(H[:, net + 3 : net + 6], moments, rtol=0, atol=1e-9 * np.abs(forces[0]).max())
+
+
+def test_another_point_of_the_base_turns_and_is_loaded_as_a_rigid_body(reduced):
+    tip = [Observed("tip", interface="right")]
+    at_zero, at_p = (
+        response(
+            shaken_body(reduced, bases_of_body(reduced, "left", {"left": point}), Damping(ratio=ZETA), tip), FREQUENCIES
+        )
+        for point in (np.zeros(3), P)
+    )
+    S = np.eye(6)  # motion of the point at zero with that at P: d + theta × (0 - P)
+    S[:3, 3:] = np.array([np.cross(theta, -P) for theta in np.eye(3)]).T
+    assert_allclose(at_p[:, -6:], at_zero[:, -6:] @ S, rtol=0, atol=1e-9 * np.abs(at_zero[:, -6:]).max())
+    assert_allclose(at_p[:, :6], S.T @ at_zero[:, :6] @ S, rtol=0, atol=1e-9 * np.abs(at_zero[:, :6]).max())
 
 
 def test_one_base_may_hold_two_interfaces(part, reduced):
@@ -185,9 +200,7 @@ def test_rows_of_a_recovery_table_are_the_outputs_of_the_same_places(part):
         Observed("tip", interface="right", quantities=("acceleration", "displacement")),
         Observed("t", recovery="table"),
     ]
-    model = shaken_body(
-        body, bases_of_body(body, "left", {"left": np.zeros(3)}), Damping(ratio=ZETA), seen, ("right:z",)
-    )
+    model = shaken_body(body, bases_of_body(body, "left", {"left": P}), Damping(ratio=ZETA), seen, ("right:z",))
     H, names = response(model, FREQUENCIES), [output.name for output in model.outputs]
     labels = body.recovery["table"].labels
     first, table = names.index("tip acceleration x"), names.index(labels[0])
@@ -197,6 +210,7 @@ def test_rows_of_a_recovery_table_are_the_outputs_of_the_same_places(part):
     # the net force on the body about the origin: what the base and the further force exert
     net = H[:, table + 12 : table + 18]
     exerted = np.array(H[:, :6])
+    exerted[:, 3:] += np.cross(P, exerted[:, :3], axisb=1, axisc=1)
     arm = np.array([1.0, 0.0, 0.0])
     exerted[:, :, 6] += np.concatenate([[0, 0, 1.0], np.cross(arm, [0, 0, 1.0])])
     assert_allclose(np.abs(net), np.abs(exerted), rtol=0, atol=1e-7 * np.abs(exerted).max())
