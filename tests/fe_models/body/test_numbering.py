@@ -17,7 +17,9 @@ from fe_models.errors import BodyError, InterfaceError, MeshError
 from fe_models.foundation.units import unit_system
 from fe_models.importers.tables import read_tables
 from fe_models.matrices import body_from_matrices
+from fe_models.meshes.boundary import boundary_owners, boundary_triangles
 from fe_models.meshes.line_mesh import LineMesh
+from fe_models.meshes.mesh import Mesh
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.shells.body import shell_body
 from fe_models.shells.shell_property import ShellProperty
@@ -179,3 +181,12 @@ def test_messages_about_members_have_the_numbers_of_the_mesh():
     with pytest.raises(BodyError, match=rf"row 3 \(node {mesh.node_numbers[1]}, component 0\)"):
         body_from_matrices(body.M, held, body.nodes, body.dofs, name="box", units=UNITS, surface=body.surface,
                            numbering=body.numbering)  # fmt: skip
+
+
+def test_cells_of_two_types_are_numbered_through():
+    one, two = box_mesh(1, 1, 1), box_mesh(1, 1, 1, kind="wedge")
+    nodes = np.concatenate([one.nodes, two.nodes + [3.0, 0.0, 0.0]])
+    mesh = Mesh(nodes, {"hexahedron": one.cells["hexahedron"], "wedge": two.cells["wedge"] + len(one.nodes)})
+    for triangle, cell in zip(boundary_triangles(mesh), boundary_owners(mesh), strict=True):
+        rows = mesh.cells["hexahedron"][cell] if cell == 0 else mesh.cells["wedge"][cell - 1]
+        assert set(triangle) <= set(rows)
