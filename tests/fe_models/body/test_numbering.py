@@ -185,7 +185,7 @@ def test_messages_about_members_have_the_numbers_of_the_mesh():
 
 def test_cells_of_two_types_are_numbered_through():
     one, two = box_mesh(1, 1, 1), box_mesh(1, 1, 1, kind="wedge")
-    nodes = np.concatenate([one.nodes, two.nodes + [3.0, 0.0, 0.0]])
+    nodes = np.concatenate([one.nodes, two.nodes + np.array([3.0, 0.0, 0.0])])
     mesh = Mesh(nodes, {"hexahedron": one.cells["hexahedron"], "wedge": two.cells["wedge"] + len(one.nodes)})
     for triangle, cell in zip(boundary_triangles(mesh), boundary_owners(mesh), strict=True):
         rows = mesh.cells["hexahedron"][cell] if cell == 0 else mesh.cells["wedge"][cell - 1]
