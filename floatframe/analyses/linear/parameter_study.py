@@ -1,13 +1,14 @@
 """System modes over a parameter: root locus and Campbell diagram, modes followed by their shapes."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
+from floatframe.analyses.linear.channels import AnyOutput
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.checked_values import array_of_shape, unit_vector
@@ -24,6 +25,9 @@ class Locus:
     parameter: str  #: its name, with its unit
     values: Array  #: (n_values,)
     eigenvalues: Array  #: (n_values, n_modes) complex [1/s]; NaN where a mode has no counterpart
+    outputs: tuple[str, ...] = ()  #: of `campbell`
+    output_units: tuple[str, ...] = ()
+    steady: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: their steady values, (n_values, n_outputs)
 
     @property
     def frequencies(self) -> Array:
@@ -92,6 +96,7 @@ def campbell(
     axis: Array | tuple[float, float, float] = (0.0, 0.0, 1.0),
     center: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
     n_modes: int | None = None,
+    outputs: Sequence[AnyOutput] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Locus:
     """Frequencies and damping of a system that turns steadily, over its speed, as seen from the turning system.
@@ -106,16 +111,26 @@ def campbell(
         Direction and a point of the axis of rotation, ground axes, (3,).
     n_modes
         How many modes to follow.
+    outputs
+        Sensors and channels whose steady values are kept (`Locus.steady`), such as bearing forces over the speed.
+        None: those of the system.
     progress
         Called with the numbers of speeds done and of all speeds.
     """
     axis = unit_vector("campbell: axis", axis)
     center = array_of_shape("campbell: center", center, (3,))
     last: list[Equilibrium] = []
+    seen: list[LinearSystem] = []
 
     def at(speed: float) -> LinearSystem:
         state = last[0].state if last else None
         last[:] = [steady_rotation(system, speed * axis, center=center, state=state)]
-        return linearize(system, last[0])
+        seen.append(linearize(system, last[0], inputs=(), outputs=outputs))
+        return seen[-1]
 
-    return root_locus(at, speeds, parameter="speed [rad/s]", n_modes=n_modes, progress=progress)
+    locus = root_locus(at, speeds, parameter="speed [rad/s]", n_modes=n_modes, progress=progress)
+    names = [name for name in seen[0].outputs if all(name in each.outputs for each in seen)]
+    columns = [seen[0].outputs.index(name) for name in names]
+    steady = [[float(each.output_values[each.outputs.index(name)]) for name in names] for each in seen]
+    units = tuple(seen[0].output_units[k] for k in columns)
+    return replace(locus, outputs=tuple(names), output_units=units, steady=np.array(steady))

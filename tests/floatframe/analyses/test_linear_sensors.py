@@ -42,6 +42,7 @@ from floatframe import (
     System,
     UserForce,
     VonMisesSensor,
+    campbell,
     consistent_state,
     linearize,
     measured,
@@ -279,3 +280,14 @@ def test_inputs_act_as_forces_of_their_size_at_once_and_in_equilibrium(rest, nam
         assert_allclose(slope[:, 0], difference, rtol=3e-6, atol=1e-8 * scale)
         assert scale > 1e-3
     assert_allclose(linear.feedthrough(), at_once, rtol=0, atol=1e-9 * np.abs(at_once).max())
+
+
+def test_a_campbell_diagram_keeps_the_steady_values_of_outputs():
+    """The bushing of the ball carries m omega² r, r as it gives way."""
+    speeds = [0.5, 1.0]
+    places = [ReactionSensor("cage", "cage"), PlaceSensor("ball", Marker("ball"))]
+    locus = campbell(rotor(), speeds, outputs=places)
+    table = dict(zip(locus.outputs, locus.steady.T, strict=True))
+    assert_allclose(np.hypot(table["cage.force x"], table["cage.force y"]),
+                    0.2 * np.square(speeds) * np.hypot(table["ball.x"], table["ball.y"]), rtol=1e-7)  # fmt: skip
+    assert locus.output_units[0] == "N"
