@@ -35,7 +35,7 @@ class CrossSpectrum:
     a: str
     b: str
     coherence: float  #: gamma², 0 to 1
-    phase: float = 0.0  #: of S_ab: positive where b is ahead of a [degrees]
+    phase: float = 0.0  #: of S_ab: positive where a is ahead of b [degrees]
 
 
 @dataclass(frozen=True, eq=False)

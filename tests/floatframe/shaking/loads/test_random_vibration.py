@@ -75,6 +75,20 @@ def test_cross_spectra_add_by_coherence_and_phase(coherence, phase, power):
     assert_allclose(both.rms**2, power * alone.rms**2, rtol=1e-9, atol=1e-9 * alone.rms.max() ** 2)
 
 
+def test_a_positive_phase_puts_the_first_input_ahead():
+    level = Level.of([(20, 0.01), (200, 0.01)], "g2/Hz")
+    model = masses([50.0], 0.02)
+    D = np.array(model.D)
+    D[2, ACCELERATION, 0] = 1.0  # x is felt at once
+    model = replace(model, D=D, mass=np.eye(6))
+    cross = [CrossSpectrum("z", "x", 1.0, 40.0)]
+    run = random_runs(model, RandomTest("r", levels={"z": level, "x": level}, cross=cross))[0]
+    H = run.transfer[:, ACCELERATION, 0]  # of z = exp(i (omega t + 40 degrees)), beside x = exp(i omega t)
+    assert_allclose(
+        run.density[:, ACCELERATION], 0.01 * G**2 * np.abs(H * np.exp(1j * np.radians(40)) + 1) ** 2, rtol=1e-9
+    )
+
+
 def test_contradicting_coherences_are_refused():
     level = Level.of([(20, 0.01), (200, 0.01)], "g2/Hz")
     cross = [CrossSpectrum(*pair, 1.0, phase) for pair, phase in ((("x", "y"), 0), (("y", "z"), 0), (("x", "z"), 90))]
