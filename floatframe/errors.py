@@ -7,6 +7,7 @@ from fe_models.foundation.errors import ReportedError
 __all__ = [
     "ConvergenceError",
     "CosimulationError",
+    "FatigueError",
     "FloatframeError",
     "ModelError",
     "ResultsError",
@@ -33,6 +34,10 @@ class ResultsError(FloatframeError, ValueError):
 
 class SignalError(FloatframeError, ValueError):
     """A file of signals, or what was asked of a signal, is not valid; the text names file, line and channel."""
+
+
+class FatigueError(FloatframeError, ValueError):
+    """An S-N curve, a load block or a fatigue file is not valid, or stresses lie beyond what they are known for."""
 
 
 class ConvergenceError(FloatframeError, RuntimeError):

@@ -1,0 +1,121 @@
+"""Spectra of modal coordinates, and the spectral moments of stresses that follow from a few small matrices."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.copies import frozen_copies
+from floatframe.errors import FatigueError
+
+__all__ = ["ORDERS", "ModalSpectra", "modal_moments", "spectra_of_history"]
+
+ORDERS = (0.0, 1.0, 2.0, 4.0)  #: of the spectral moments that the methods need
+HERMITIAN = 1e-8  #: defect of a cross spectrum, and its most negative eigenvalue, over its largest
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ModalSpectra:
+    """Stationary Gaussian motion of the modal coordinates: one-sided cross spectra, and how long it lasts."""
+
+    name: str
+    frequencies: Array  #: ascending, (n_f,) [Hz]
+    spectra: NDArray[np.complex128]  #: one-sided, G_kl(f) = G_lk(f)*, (n_f, n_q, n_q) [unit of q² / Hz]
+    duration: float  #: of one pass [s]
+    mean: Array | None = None  #: static modal coordinates, (n_q,); None: zero
+    repeats: float = 1.0
+    scale: float = 1.0  #: of the loads: spectra count with its square
+
+    def __post_init__(self) -> None:
+        where = f"spectrum {self.name!r}"
+        f = frozen(self.frequencies)
+        G = np.ascontiguousarray(self.spectra, dtype=np.complex128)
+        object.__setattr__(self, "frequencies", f)
+        object.__setattr__(self, "spectra", G)
+        if f.ndim != 1 or len(f) < 2 or G.ndim != 3 or G.shape != (len(f), G.shape[1], G.shape[1]):
+            raise FatigueError(
+                f"{where}: expected frequencies (n_f,) and cross spectra (n_f, n_q, n_q) at two frequencies or more, "
+                f"got {f.shape} and {G.shape}"
+            )
+        if not (np.isfinite(f).all() and np.isfinite(G).all()):
+            raise FatigueError(f"{where}: expected finite numbers, got NaN or infinity")
+        if f[0] < 0 or not (np.diff(f) > 0).all():
+            i = int(np.argmin(np.diff(f)))
+            raise FatigueError(
+                f"{where}: expected frequencies from 0 up that rise, got {f[i]:.6g} and then {f[i + 1]:.6g} Hz"
+            )
+        largest = np.abs(G).max()
+        defect = np.abs(G - G.conj().transpose(0, 2, 1)).max()
+        if defect > HERMITIAN * largest:
+            words = f"got a defect of {defect / largest:.1e} of the largest"
+            raise FatigueError(f"{where}: expected G_kl = conj(G_lk), {words}")
+        lowest = np.linalg.eigvalsh(G)[:, 0]
+        if lowest.min() < -HERMITIAN * largest:
+            i = int(np.argmin(lowest))
+            raise FatigueError(
+                f"{where}: at {f[i]:.6g} Hz the cross spectra have the eigenvalue {lowest[i]:.3g}: power below zero; "
+                "some combination of the modes would have a negative spectrum"
+            )
+        if self.mean is not None:
+            object.__setattr__(self, "mean", frozen(self.mean))
+            if self.mean.shape != G.shape[1:2]:
+                raise FatigueError(f"{where}: mean: expected {G.shape[1]} modal coordinates, got {self.mean.shape}")
+        for name in ("duration", "repeats"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise FatigueError(f"{where}: {name}: expected a number above 0, got {value:g}")
+        if not (math.isfinite(self.scale) and self.scale != 0):
+            raise FatigueError(f"{where}: scale: expected a number other than 0, got {self.scale:g}")
+
+
+def modal_moments(spectra: ModalSpectra, orders: Sequence[float] = ORDERS) -> Array:
+    """Return scale² times the integrals of f^m Re G over f, (n_orders, n_q, n_q), by the trapezoidal rule.
+
+    A stress a . S q, a row of numbers a, has the spectral moments (a S) M_m (a S).T: the imaginary parts cancel.
+    """
+    f, G = spectra.frequencies, spectra.spectra.real
+    widths = np.zeros(len(f))
+    widths[:-1] += 0.5 * np.diff(f)
+    widths[1:] += 0.5 * np.diff(f)
+    return np.stack([spectra.scale**2 * np.einsum("f,fkl->kl", widths * f**m, G) for m in orders])
+
+
+def spectra_of_history(
+    name: str, t: Array, q: Array, *, n_segment: int | None = None, duration: float | None = None
+) -> ModalSpectra:
+    """Return the cross spectra of a stationary modal history by Welch's method (Hann windows that overlap by half).
+
+    Parameters
+    ----------
+    t, q
+        Times at equal steps, (n_t,) [s], and modal coordinates, (n_t, n_q); their mean goes into `mean`.
+    n_segment
+        Times of a segment; None: an eighth of all.
+    duration
+        How long the motion lasts; None: as long as the history [s].
+
+    Raises
+    ------
+    FatigueError
+        If the times are not at equal steps.
+    """
+    from scipy.signal import csd
+
+    steps = np.diff(t)
+    if len(t) < 16 or not (steps > 0).all() or np.ptp(steps) > 1e-6 * steps.mean():
+        raise FatigueError(f"spectrum {name!r}: expected 16 times or more at equal steps")
+    n = len(t) // 8 if n_segment is None else n_segment
+    if not 8 <= n <= len(t):
+        raise FatigueError(f"spectrum {name!r}: n_segment: expected 8 to {len(t)}, got {n}")
+    mean = q.mean(axis=0)
+    n_q = q.shape[1]
+    G = np.zeros((n // 2 + 1, n_q, n_q), complex)
+    for k in range(n_q):
+        for j in range(k, n_q):
+            f, G[:, k, j] = csd(q[:, k] - mean[k], q[:, j] - mean[j], fs=1 / steps.mean(), nperseg=n)
+            G[:, j, k] = G[:, k, j].conj()
+    return ModalSpectra(name, f, G, float(t[-1] - t[0]) if duration is None else duration, mean)
