@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli import analyses, cosimulation, driven, gradient, linear, shake, spectra, study, sweep
+from floatframe.cli import analyses, cosimulation, driven, fatigue, gradient, linear, shake, spectra, study, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -485,4 +485,5 @@ sweep.register(app)
 study.register(app)
 shake.register(app)
 gradient.register(app)
+fatigue.register(app)
 cosimulation.register(app)

@@ -29,8 +29,8 @@ RESIDUES = {
     "half": "its ranges count as half cycles, as ASTM E1049 has it",
     "repeat": "the block follows itself without end: all cycles are whole",
 }
-TILE = 2**16  #: numbers of a row block: nodes of a tile times rows a node times times of a chunk, over 6
-CHUNK = 2048  #: times at once
+TILE = 32  #: nodes at once; of criteria with planes so many fewer as they have more rows than six
+CHUNK = 1024  #: times at once
 FIRST_BATCH, LAST_BATCH = 64, 8192  #: nodes between two looks at the bounds, twice as many each time
 
 Progress = Callable[[float], None]
@@ -101,8 +101,7 @@ def count_histories(
     )  # fmt: skip
     histories = [np.ascontiguousarray(block.scale * np.asarray(block.q).T) for block in blocks]
     rule = Rule(curve, mean_stress, criterion, residue, tuple(block.repeats for block in blocks))
-    size = max(1, TILE // (CHUNK * criterion.n_rows()))
-    size = max(size, 4) if not criterion.is_shear else 1
+    size = max(1, TILE * 6 // criterion.n_rows())
     greatest = 0.0
 
     def run(tile: IntArray) -> None:
@@ -198,10 +197,11 @@ def count_block(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]
     depths = np.zeros(m, np.int64)
     stack = np.empty((m, CHUNK + 64))
     values, flat = np.empty((n, CHUNK)), rows.reshape(-1, n_q)
+    room = np.empty(len(flat) * CHUNK)  # used again and again: fresh memory of this size costs more than the product
     for first in range(0, q.shape[1], CHUNK):
         chunk = q[:, first : first + CHUNK]
         width = chunk.shape[1]
-        components = flat @ chunk
+        components = np.matmul(flat, chunk, out=room[: len(flat) * width].reshape(len(flat), width))
         if scalar is not None:
             scalar(components.reshape(n, n_rows, width), values)
             components = values[:, :width]

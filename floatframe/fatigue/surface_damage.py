@@ -41,7 +41,7 @@ class FatigueResult:
     curve: SNCurve
     criterion: Criterion
     mean_stress: MeanStress
-    method: str  #: residue of rainflow counting in words, or spectral method
+    method: str  #: residue of rainflow counting, one of `RESIDUES`, or one of `SPECTRAL_METHODS`
     is_spectral: bool = False
     notes: tuple[str, ...] = ()
 
@@ -50,6 +50,11 @@ class FatigueResult:
             object.__setattr__(self, name, frozen(getattr(self, name)))
         for name in ("nodes", "plane"):
             object.__setattr__(self, name, frozen_int(getattr(self, name)))
+
+    @property
+    def method_words(self) -> str:
+        """How cycles were counted, in words."""
+        return f"spectral, {self.method}" if self.is_spectral else f"rainflow, residue: {RESIDUES[self.method]}"
 
     @property
     def damage(self) -> Array:
@@ -133,7 +138,7 @@ def history_damage(
             )
         notes.append(f"{words}; its first slope was continued")
     return result_of(body, chosen, [block.name for block in blocks], found, curve, criterion, mean_stress,
-                     f"rainflow, {RESIDUES[residue]}", is_spectral=False, notes=notes)  # fmt: skip
+                     residue, is_spectral=False, notes=notes)  # fmt: skip
 
 
 def spectral_damage(
@@ -178,7 +183,7 @@ def spectral_damage(
             )
         notes.append(f"{words}; its first slope was continued")
     return result_of(body, chosen, [each.name for each in spectra], found, curve, criterion, mean_stress,
-                     f"spectral, {method}", is_spectral=True, notes=notes)  # fmt: skip
+                     method, is_spectral=True, notes=notes)  # fmt: skip
 
 
 def places(body: ReducedBody, nodes: IntArray | None, criterion: Criterion) -> tuple[IntArray, Array | None]:
@@ -203,7 +208,7 @@ def stress_at(body: ReducedBody, nodes: IntArray) -> Array:
 def node_words(body: ReducedBody, node: int) -> str:
     """Return a node and its place in words."""
     x, y, z = body.frame.origin + body.frame.axes @ body.nodes[node]
-    return f"node {body.node_ids[node]} at ({x:.6g}, {y:.6g}, {z:.6g})"
+    return f"node {body.node_name(int(node))} at ({x:.6g}, {y:.6g}, {z:.6g})"
 
 
 def sampling_notes(found: Counted, blocks: Sequence[LoadBlock]) -> list[str]:

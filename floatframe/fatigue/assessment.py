@@ -1,0 +1,217 @@
+"""From a fatigue file to a result: the curve in units of the body, blocks from results files, spectra from .npz."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cms.modal_file.file import digest, read
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.errors import FatigueError
+from floatframe.fatigue.criteria import Criterion
+from floatframe.fatigue.cycle_kernels import collect
+from floatframe.fatigue.fatigue_file import STRESS_UNITS, BlockSection, FatigueFile, MaterialSection, SpectrumSection
+from floatframe.fatigue.history_damage import Progress
+from floatframe.fatigue.load_blocks import LoadBlock, block_of_results
+from floatframe.fatigue.mean_stress import MEAN_STRESS, MeanStress
+from floatframe.fatigue.planes import surface_nodes
+from floatframe.fatigue.sn_curve import SNCurve, basquin_curve, table_curve
+from floatframe.fatigue.spectra import ModalSpectra
+from floatframe.fatigue.surface_damage import FatigueResult, history_damage, spectral_damage
+from floatframe.results.trajectory import Trajectory, read_results
+
+__all__ = ["Assessment", "assess", "equivalent_repeats"]
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """A result with what its programme stands for."""
+
+    result: FatigueResult
+    given: FatigueFile
+    blocks: tuple[LoadBlock, ...]  #: empty for spectra
+
+    @property
+    def life(self) -> Array:
+        """Life in the unit of the programme, (n,)."""
+        return np.asarray(self.given.programme.amount * self.result.life)
+
+
+def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessment:
+    """Return the damage that a fatigue file asks for.
+
+    Raises
+    ------
+    FatigueError, ResultsError, BodyError
+        If files do not fit together, or as `history_damage` and `spectral_damage` raise.
+    """
+    body = read(given.body)
+    curve, mean_stress = curve_of(given, body), mean_stress_of(given, body)
+    section, counting = given.criterion, given.counting
+    criterion = Criterion(section.name, section.tensor, section.planes, section.findley_k)
+    nodes = nodes_of(given, body)
+    if given.spectra:
+        spectra = [spectra_of(each) for each in given.spectra]
+        result = spectral_damage(
+            body, spectra, curve, method=counting.method, criterion=criterion, mean_stress=mean_stress,
+            extrapolate=counting.extrapolate, nodes=nodes, progress=progress,
+        )  # fmt: skip
+        return Assessment(result, given, ())
+    blocks = [block_of(each, given, body) for each in given.blocks]
+    result = history_damage(
+        body, blocks, curve, criterion=criterion, mean_stress=mean_stress, residue=counting.residue,
+        negligible=counting.negligible, extrapolate=counting.extrapolate, nodes=nodes, progress=progress,
+    )  # fmt: skip
+    return Assessment(result, given, tuple(blocks))
+
+
+def stress_factor(material: MaterialSection, body: ReducedBody) -> float:
+    """Return the stress unit of a material over that of the body."""
+    units = body.units
+    return STRESS_UNITS[material.stress_unit] / units.to_si(mass=1, length=-1, time=-2)
+
+
+def curve_of(given: FatigueFile, body: ReducedBody) -> SNCurve:
+    """Return the S-N curve in stress units of the body, with survival and factors."""
+    section, unit = given.material.sn, stress_factor(given.material, body)
+    table = section.amplitudes or section.ranges
+    if table is not None:
+        half = 1.0 if section.amplitudes is not None else 0.5
+        assert isinstance(section.cycles, tuple)
+        amplitudes = [half * unit * value for value in table]
+        curve = table_curve(section.cycles, amplitudes, below=section.below, stress_ratio=section.stress_ratio)
+    else:
+        amplitude = section.amplitude if section.amplitude is not None else 0.5 * (section.range or 0.0)
+        assert isinstance(section.cycles, float)
+        curve = basquin_curve(
+            unit * amplitude, section.cycles, section.slope or 0.0, second_slope=section.second_slope,
+            below=section.below, stress_ratio=section.stress_ratio, least_cycles=section.least_cycles,
+        )  # fmt: skip
+    if given.survival is not None:
+        curve = curve.for_survival(given.survival, of_curve=section.survival, deviation=section.log_deviation or 0.0)
+    for name, factor in given.factors.items():
+        curve = curve.scaled(factor, f"factor {name}")
+    return curve
+
+
+def mean_stress_of(given: FatigueFile, body: ReducedBody) -> MeanStress:
+    """Return the correction with its strength in stress units of the body."""
+    name = given.criterion.mean_stress
+    key = MEAN_STRESS[name][1]
+    value = float(getattr(given.material, key)) if key else 0.0
+    if key in ("tensile_strength", "yield_strength", "fatigue_strength_coefficient"):
+        value *= stress_factor(given.material, body)
+    return MeanStress(name, value, given.criterion.credit_compression)
+
+
+def nodes_of(given: FatigueFile, body: ReducedBody) -> IntArray | None:
+    """Return the surface nodes of a set, None for all."""
+    if given.outputs.set is None:
+        return None
+    from cms.reduced_body.address import Address
+
+    found = Address(set=given.outputs.set).find(body, "outputs.set")
+    chosen = np.intersect1d(surface_nodes(body), found.rows)
+    if not len(chosen):
+        raise FatigueError(f"outputs.set = {given.outputs.set!r}: none of its nodes lies on the surface of the body")
+    return chosen
+
+
+def block_of(section: BlockSection, given: FatigueFile, body: ReducedBody) -> LoadBlock:
+    """Return the load block of a results file, after checking that it was computed with the body."""
+    trajectory = read_results(section.results)
+    name = section.name or section.results.stem
+    _, entry = trajectory.entry(section.body)
+    if entry.digest and entry.digest != digest(given.body):
+        raise FatigueError(
+            f"block {name!r}: body {section.body!r} of {section.results} was computed with another modal file "
+            f"({entry.source}) than {given.body}, or it has changed since; give that file, or run the motion again"
+        )
+    if trajectory.units != body.units:
+        body_q = body.units.to_si(length=2, mass=1) ** 0.5
+        factor = trajectory.units.to_si(length=2, mass=1) ** 0.5 / body_q  # q is a length times the root of a mass
+    else:
+        factor = 1.0
+    repeats = section.repeats
+    if section.match is not None:
+        repeats *= matched(section, trajectory, name)
+    block = block_of_results(
+        trajectory, section.body, name=name, repeats=repeats, scale=section.scale, times=section.times,
+        has_gaps=section.gaps,
+    )  # fmt: skip
+    return block if factor == 1 else LoadBlock(name, factor * block.q, block.t, repeats, section.scale, section.gaps)
+
+
+def matched(section: BlockSection, trajectory: Trajectory, name: str) -> float:
+    """Return how often a block comes so that a sensor of it has the pseudo-damage of a measured signal."""
+    from floatframe.results.sensors import measurement_of
+    from floatframe.signals.read_signals import read_signals
+    from floatframe.system_file.recorded_system import recorded_system
+
+    match = section.match
+    assert match is not None
+    system = recorded_system(trajectory)
+    if system is None:
+        raise FatigueError(f"block {name!r}: match: the system file of {section.results} is gone, with its sensors")
+    found = measurement_of(system, trajectory, match.sensor)
+    chosen = np.ones(len(trajectory.t), bool)
+    if section.times is not None:
+        chosen = (trajectory.t >= section.times[0]) & (trajectory.t <= section.times[1])
+    (column,) = found.columns
+    signal = read_signals(match.measured)[match.signal]
+    unit = found.units[column]
+    values = signal.values if not signal.unit or signal.unit == unit else signal.to(unit).values
+    return equivalent_repeats(values, section.scale * found.columns[column][chosen], match.slope)
+
+
+def equivalent_repeats(measured: Array, simulated: Array, slope: float) -> float:
+    """Return how often a simulated history comes in place of a measured one: the ratio of their pseudo-damages.
+
+    Pseudo-damage is the sum of n (range / 2)^slope over the rainflow cycles of the repeated history.
+
+    Parameters
+    ----------
+    measured, simulated
+        Histories of the same quantity, (n_t,), in one unit.
+
+    Raises
+    ------
+    FatigueError
+        If one of them has gaps or does not vary, or the slope is below 1.
+    """
+    if not slope >= 1:
+        raise FatigueError(f"equivalent repeats: slope: expected 1 or more, got {slope:g}")
+    sums = []
+    for name, history in (("measured", measured), ("simulated", simulated)):
+        values = np.ascontiguousarray(history, dtype=float)
+        if values.ndim != 1 or not np.isfinite(values).all():
+            raise FatigueError(f"equivalent repeats: {name} history: expected finite numbers (n_t,)")
+        cycles = collect(values, True)
+        sums.append(float(cycles[:, 2] @ (0.5 * np.abs(cycles[:, 0] - cycles[:, 1])) ** slope))
+        if sums[-1] == 0:
+            raise FatigueError(f"equivalent repeats: the {name} history does not vary")
+    return sums[0] / sums[1]
+
+
+def spectra_of(section: SpectrumSection) -> ModalSpectra:
+    """Return the spectra of an .npz file."""
+    name = section.name or section.file.stem
+    try:
+        with np.load(section.file, allow_pickle=False) as file:
+            content: dict[str, Any] = {key: file[key] for key in file.files}
+    except (OSError, ValueError, EOFError, KeyError) as error:
+        raise FatigueError(f"{section.file}: expected an .npz file of arrays: {error}") from None
+    missing = {"frequencies", "spectra"} - set(content)
+    if missing:
+        raise FatigueError(
+            f"{section.file}: expected the arrays frequencies (n_f,) and spectra (n_f, n_q, n_q), one-sided, and "
+            f"duration and mean if wanted; {', '.join(sorted(missing))} missing"
+        )
+    duration = section.duration if section.duration is not None else content.get("duration")
+    if duration is None or np.size(duration) != 1:
+        raise FatigueError(f"{section.file}: the duration is not known; give it in [[spectra]]: duration = seconds")
+    return ModalSpectra(
+        name, content["frequencies"], content["spectra"], float(np.asarray(duration).reshape(())), content.get("mean"),
+        section.repeats, section.scale,
+    )  # fmt: skip

@@ -1,0 +1,189 @@
+"""What is written of a result: a record, a table of the worst nodes, a surface for ParaView, a picture."""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cms.exporters.vtk import numbers_of_cells, numbers_of_nodes, unstructured_grid
+from cms.rendering import Drawing, Scene, Surface, Triad, render_picture
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.fatigue.assessment import Assessment
+from floatframe.fatigue.planes import surface_frames
+
+__all__ = ["csv_of", "fatigue_record", "fatigue_scene", "render_fatigue", "vtu_of"]
+
+DECADES = 6  #: of damage that the colours show, below the greatest; fewer where nodes below a share were left out
+NUMBERED = 3  #: places that the picture numbers
+
+
+def fatigue_record(made: Assessment) -> dict[str, Any]:
+    """Return the whole result in plain types: what it rests on, and the worst places."""
+    result, given = made.result, made.given
+    body, curve, programme = result.body, result.curve, given.programme
+    sources: Sequence[Any] = made.blocks or given.spectra
+    return {
+        "body": body.name,
+        "units": body.units.name,
+        "stress_unit": body.units.stress_symbol,
+        "life_unit": programme.unit,
+        "programme": {"amount": programme.amount, "unit": programme.unit, "target": programme.target},
+        "criterion": result.criterion.name,
+        "tensor": result.criterion.tensor,
+        "mean_stress": result.mean_stress.words,
+        "method": result.method_words,
+        "curve": {
+            "amplitude": list(map(float, curve.amplitude)),
+            "cycles": list(map(float, curve.cycles)),
+            "slope": list(map(float, curve.slope)),
+            "bottom": list(map(float, curve.bottom)),
+            "greatest": curve.greatest,
+            "stress_ratio": curve.stress_ratio,
+            "given_in": given.material.stress_unit,
+        },
+        "blocks": [
+            {"name": name, "repeats": each.repeats, "scale": each.scale}
+            for name, each in zip(result.block_names, sources, strict=True)
+        ],
+        "n_nodes": len(result.nodes),
+        "n_counted": int(result.is_counted.sum()),
+        "negligible": None if result.is_spectral else given.counting.negligible,
+        "notes": list(result.notes),
+        "damage": finite(result.damage[result.worst()].max(initial=0.0)),
+        "life": finite(made.life[result.worst()].min(initial=math.inf)),
+        "worst": [place_record(made, int(place)) for place in result.worst(given.outputs.worst)],
+    }
+
+
+def place_record(made: Assessment, place: int) -> dict[str, Any]:
+    """Return one place in plain types."""
+    result, body = made.result, made.result.body
+    node = int(result.nodes[place])
+    x, y, z = (float(value) for value in body.frame.origin + body.frame.axes @ body.nodes[node])
+    return {
+        "node": body.node_name(node),
+        "x": x,
+        "y": y,
+        "z": z,
+        "damage": float(result.damage[place]),
+        "life": finite(made.life[place]),
+        "largest_amplitude": float(result.largest[place]),
+        "cycles": float(result.cycles[place]),
+        "beyond": float(result.beyond[place]),
+        "plane": result.criterion.plane_words(int(result.plane[place])),
+        "of_blocks": {
+            name: float(value) for name, value in zip(result.block_names, result.block_damage[:, place], strict=True)
+        },
+    }
+
+
+def finite(value: float) -> float | None:
+    """Return a number, None for infinity: life without damage."""
+    return float(value) if math.isfinite(value) else None
+
+
+def csv_of(made: Assessment) -> str:
+    """Return the worst places as comma-separated values, with 17 digits."""
+    record = fatigue_record(made)
+    units = made.result.body.units
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    places = [f"{axis} [{units.length_symbol}]" for axis in "xyz"]
+    names = [f"damage of {name}" for name in made.result.block_names]
+    writer.writerow(["rank", "node", *places, "damage", f"life [{record['life_unit']}]",
+                     f"largest amplitude [{units.stress_symbol}]", "cycles", "beyond", "plane", *names])  # fmt: skip
+    for rank, each in enumerate(record["worst"], start=1):
+        row = [each[key] for key in ("x", "y", "z", "damage", "life", "largest_amplitude", "cycles", "beyond")]
+        numbers = ["inf" if value is None else repr(value) for value in row]
+        writer.writerow([rank, each["node"], *numbers, each["plane"], *map(repr, each["of_blocks"].values())])
+    return text.getvalue()
+
+
+def on_all_nodes(made: Assessment, values: Array, outside: float) -> Array:
+    """Return values of the places at all kept nodes, (n_kept,)."""
+    found = np.full(len(made.result.body.nodes), outside)
+    found[made.result.nodes] = values
+    return found
+
+
+def vtu_of(made: Assessment) -> bytes:
+    """Return the surface as a .vtu file in mesh coordinates: damage (its bound where a node was left out), life, ..."""
+    result, body = made.result, made.result.body
+    damage = result.damage_or_bound
+    life = np.minimum(made.life, 1e300)  # ParaView has no colours for infinity
+    fields: dict[str, Any] = {
+        "damage": on_all_nodes(made, damage, 0.0),
+        "log10 damage": on_all_nodes(made, np.log10(np.maximum(damage, 1e-300)), -300.0),
+        "life": on_all_nodes(made, life, 1e300),
+        "largest amplitude": on_all_nodes(made, result.largest, 0.0),
+        "is counted": on_all_nodes(made, result.is_counted.astype(float), 0.0),
+        **numbers_of_nodes(body),
+    }
+    header = (
+        f"damage and life of {body.name}; life in {made.given.programme.unit}; where is counted = 0, damage is an "
+        "upper bound and life a lower one",
+    )
+    points = body.frame.origin + body.nodes @ body.frame.axes.T
+    whole = {"programme": np.array([made.given.programme.amount])}
+    return unstructured_grid(points, body.surface, fields, whole, header, numbers_of_cells(body))
+
+
+def render_fatigue(made: Assessment, path: Path) -> Drawing:
+    """Draw damage on the surface into a PNG, seen from the side of the worst place."""
+    return render_picture(fatigue_scene(made), path)
+
+
+def fatigue_scene(made: Assessment) -> Scene:
+    """Return the scene: the surface coloured by log10 of damage, the worst places numbered."""
+    result, body = made.result, made.result.body
+    damage = result.damage_or_bound
+    top = math.log10(max(float(damage.max(initial=0.0)), 1e-300))
+    share = made.given.counting.negligible
+    low = top - (DECADES if result.is_counted.all() or not share else min(DECADES, -math.log10(share)))
+    scalars = on_all_nodes(made, np.maximum(np.log10(np.maximum(damage, 1e-300)), low), low)
+    points = body.frame.origin + body.nodes @ body.frame.axes.T
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    order = result.worst(made.given.outputs.worst)
+    worst = separated(points[result.nodes[order]], 0.08 * size)
+    labels = tuple(
+        Triad(points[result.nodes[order[k]]], np.eye(3), size=1e-6 * size, label=str(k + 1)) for k in worst[:NUMBERED]
+    )
+    direction, up = towards(made, order)
+    life = made.life[order[0]] if len(order) else math.inf
+    first = body.node_name(int(result.nodes[order[0]])) if len(order) else "none"
+    return Scene(
+        surfaces=(Surface(body.surface, points, scalars),),
+        triads=labels,
+        title=f"{body.name}: damage of one programme",
+        captions=(f"worst: node {first}, damage {10**top:.3g}", f"life {life:.4g} {made.given.programme.unit}"),
+        scalar_title="log10 damage",
+        scalar_range=(low, top),
+        direction=direction,
+        up=up,
+    )
+
+
+def separated(points: Array, distance: float) -> list[int]:
+    """Return rows in their order that lie at least so far from those taken before."""
+    taken: list[int] = []
+    for k, point in enumerate(points):
+        if all(np.linalg.norm(point - points[j]) > distance for j in taken):
+            taken.append(k)
+    return taken
+
+
+def towards(made: Assessment, order: IntArray) -> tuple[Array, Array]:
+    """Return the line of sight onto the worst place, a little from the side, and what points up."""
+    body = made.result.body
+    direction = np.array([-1.0, 2.0, -1.0])
+    if len(order):
+        normal = surface_frames(body, made.result.nodes[order[:1]])[0, 2] @ body.frame.axes.T
+        direction = -normal + 0.35 * direction / np.linalg.norm(direction)
+    direction = direction / np.linalg.norm(direction)
+    extent = np.ptp(body.nodes @ body.frame.axes.T, axis=0)
+    axes = [axis for axis in np.argsort(extent) if abs(direction[axis]) < 0.85]
+    return direction, np.eye(3)[axes[0]]
