@@ -1,6 +1,6 @@
 """From a fatigue file to a result: the curve in units of the body, blocks from results files, spectra from .npz."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from cms.modal_file.file import digest, read
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import FatigueError
 from floatframe.fatigue.criteria import Criterion
 from floatframe.fatigue.cycle_kernels import collect
@@ -16,10 +17,13 @@ from floatframe.fatigue.history_damage import Progress
 from floatframe.fatigue.load_blocks import LoadBlock, block_of_results
 from floatframe.fatigue.mean_stress import MEAN_STRESS, MeanStress
 from floatframe.fatigue.planes import surface_nodes
+from floatframe.fatigue.shaken import shaken_spectra
 from floatframe.fatigue.sn_curve import SNCurve, basquin_curve, table_curve
 from floatframe.fatigue.spectra import ModalSpectra
 from floatframe.fatigue.surface_damage import FatigueResult, history_damage, spectral_damage
 from floatframe.results.trajectory import Trajectory, read_results
+from floatframe.shaking.shake import shake
+from floatframe.shaking.shake_file import read_shake
 
 __all__ = ["Assessment", "assess", "equivalent_repeats"]
 
@@ -52,10 +56,12 @@ def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessmen
     criterion = Criterion(section.name, section.tensor, section.planes, section.findley_k)
     nodes = nodes_of(given, body)
     if given.spectra:
-        spectra = [spectra_of(each) for each in given.spectra]
+        spectra, stress = (
+            shaken_of(given, body) if given.spectra[0].shake else ([*map(spectra_of, given.spectra)], None)
+        )
         result = spectral_damage(
             body, spectra, curve, method=counting.method, criterion=criterion, mean_stress=mean_stress,
-            extrapolate=counting.extrapolate, nodes=nodes, progress=progress,
+            extrapolate=counting.extrapolate, nodes=nodes, stress=stress, progress=progress,
         )  # fmt: skip
         return Assessment(result, given, ())
     blocks = [block_of(each, given, body) for each in given.blocks]
@@ -194,8 +200,31 @@ def equivalent_repeats(measured: Array, simulated: Array, slope: float) -> float
     return sums[0] / sums[1]
 
 
+def shaken_of(given: FatigueFile, body: ReducedBody) -> tuple[list[ModalSpectra], Array]:
+    """Return the spectra of the runs of a random test of a shake file, and the stress over their coordinates."""
+    (section,) = given.spectra
+    assert section.shake is not None and section.test is not None  # noqa: PT018
+    job = read_shake(section.shake)
+    if digest(job.source) != digest(given.body) or job.structure.units != body.units:
+        raise FatigueError(
+            f"{section.shake}: expected it to shake {given.body} in the units of that file, got {job.source} in "
+            f"{job.structure.units.name}"
+        )
+    tests = {test.name: test for test in job.random}
+    if section.test not in tests:
+        raise FatigueError(f"{section.shake}: no random test {quoted(section.test)}{nearest(section.test, tests)}")
+    test = tests[section.test]
+    duration = section.duration if section.duration is not None else test.duration
+    if duration is None:
+        raise FatigueError(f"{section.shake}: the duration of random.{test.name} is not known; give it in [[spectra]]")
+    made = shake(replace(job, sine=(), random=(test,), shock=(), notch=(), outputs=()))
+    found = [shaken_spectra(made.model, test, run, duration) for run in made.random]
+    return [replace(each, repeats=section.repeats, scale=section.scale) for each, _ in found], found[0][1]
+
+
 def spectra_of(section: SpectrumSection) -> ModalSpectra:
     """Return the spectra of an .npz file."""
+    assert section.file is not None
     name = section.name or section.file.stem
     try:
         with np.load(section.file, allow_pickle=False) as file:

@@ -156,10 +156,18 @@ class SpectrumSection(Table):
     """[[spectra]]: cross spectra of the modal coordinates."""
 
     name: str = Field("", description="text; default: the name of the file")
-    file: InputFile = Field(description="an .npz file with frequencies, spectra, and duration, mean if wanted")
+    file: InputFile | None = Field(None, description="an .npz file with frequencies, spectra, and duration, mean")
+    shake: InputFile | None = Field(None, description="a shake file with a random test, in place of file")
+    test: str | None = Field(None, description="the name of the random test of a shake file")
     duration: Positive | None = Field(None, description="a number above 0 [s]; default: that of the file")
     repeats: Positive = Field(1.0, description="a number above 0")
     scale: float = Field(1.0, description="a number other than 0, of the loads")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "SpectrumSection":
+        if (self.file is None) == (self.shake is None) or (self.shake is None) != (self.test is None):
+            raise ValueError("expected either file, or shake and test")
+        return self
 
 
 class ProgrammeSection(Table):
@@ -203,6 +211,8 @@ class FatigueFile(Table):
     def _fits(self) -> "FatigueFile":
         if bool(self.blocks) == bool(self.spectra):
             raise ValueError("expected [[blocks]] or [[spectra]], " + ("got both" if self.blocks else "got neither"))
+        if any(each.shake for each in self.spectra) and len(self.spectra) > 1:
+            raise ValueError("[[spectra]]: a shake file has coordinates of its own: expected no other table beside it")
         need = MEAN_STRESS[self.criterion.mean_stress][1]
         if need and getattr(self.material, need) is None:
             raise ValueError(f'mean stress "{self.criterion.mean_stress}" needs material.{need}, which is missing')

@@ -26,6 +26,8 @@ def fatigue_record(made: Assessment) -> dict[str, Any]:
     result, given = made.result, made.given
     body, curve, programme = result.body, result.curve, given.programme
     sources: Sequence[Any] = made.blocks or given.spectra
+    if len(sources) != len(result.block_names):  # a shake file: a run a direction
+        sources = [*sources] * len(result.block_names)
     return {
         "body": body.name,
         "units": body.units.name,

@@ -29,6 +29,7 @@ class ModalSpectra:
     mean: Array | None = None  #: static modal coordinates, (n_q,); None: zero
     repeats: float = 1.0
     scale: float = 1.0  #: of the loads: spectra count with its square
+    weights: Array | None = None  #: of integrals over the frequencies, (n_f,) [Hz]; None: trapezoidal rule
 
     def __post_init__(self) -> None:
         where = f"spectrum {self.name!r}"
@@ -64,6 +65,10 @@ class ModalSpectra:
             object.__setattr__(self, "mean", frozen(self.mean))
             if self.mean.shape != G.shape[1:2]:
                 raise FatigueError(f"{where}: mean: expected {G.shape[1]} modal coordinates, got {self.mean.shape}")
+        if self.weights is not None:
+            object.__setattr__(self, "weights", frozen(self.weights))
+            if self.weights.shape != f.shape or not (np.isfinite(self.weights).all() and (self.weights >= 0).all()):
+                raise FatigueError(f"{where}: weights: expected {len(f)} numbers of 0 or more, one a frequency")
         for name in ("duration", "repeats"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
@@ -73,14 +78,15 @@ class ModalSpectra:
 
 
 def modal_moments(spectra: ModalSpectra, orders: Sequence[float] = ORDERS) -> Array:
-    """Return scale² times the integrals of f^m Re G over f, (n_orders, n_q, n_q), by the trapezoidal rule.
+    """Return scale² times the integrals of f^m Re G over f, (n_orders, n_q, n_q).
 
     A stress a . S q, a row of numbers a, has the spectral moments (a S) M_m (a S).T: the imaginary parts cancel.
     """
     f, G = spectra.frequencies, spectra.spectra.real
-    widths = np.zeros(len(f))
-    widths[:-1] += 0.5 * np.diff(f)
-    widths[1:] += 0.5 * np.diff(f)
+    widths = np.zeros(len(f)) if spectra.weights is None else spectra.weights
+    if spectra.weights is None:
+        widths[:-1] += 0.5 * np.diff(f)
+        widths[1:] += 0.5 * np.diff(f)
     return np.stack([spectra.scale**2 * np.einsum("f,fkl->kl", widths * f**m, G) for m in orders])
 
 

@@ -151,6 +151,7 @@ def spectral_damage(
     mean_stress: MeanStress = NO_CORRECTION,
     extrapolate: bool = False,
     nodes: IntArray | None = None,
+    stress: Array | None = None,
     progress: Progress | None = None,
 ) -> FatigueResult:
     """Return the damage on the surface of a body by a spectral method; else as `history_damage`.
@@ -161,10 +162,13 @@ def spectral_damage(
         One of `SPECTRAL_METHODS`.
     extrapolate
         Whether damage beyond the greatest amplitude of the curve may be more than a hundredth of all.
+    stress
+        Stress at the kept nodes in axes of B over the coordinates of the spectra, (n_kept, 6, n_q) [Pa per unit];
+        None: of the modes of the body.
     """
     chosen, frames = places(body, nodes, criterion)
     found = count_spectra(
-        stress_at(body, chosen), spectra, curve, method=method, criterion=criterion, mean_stress=mean_stress,
+        stress_at(body, chosen, stress), spectra, curve, method=method, criterion=criterion, mean_stress=mean_stress,
         frames=frames, progress=progress,
     )  # fmt: skip
     notes = list(curve.notes)
@@ -198,11 +202,14 @@ def places(body: ReducedBody, nodes: IntArray | None, criterion: Criterion) -> t
     return chosen, surface_frames(body, chosen) if criterion.needs_surface else None
 
 
-def stress_at(body: ReducedBody, nodes: IntArray) -> Array:
-    """Return the stress shapes of nodes, without a copy where they are all."""
-    assert body.stress is not None
+def stress_at(body: ReducedBody, nodes: IntArray, stress: Array | None = None) -> Array:
+    """Return stress shapes of nodes, those of the modes unless others are given; without a copy where they are all."""
+    shapes = body.stress if stress is None else stress
+    assert shapes is not None
+    if len(shapes) != len(body.nodes):
+        raise FatigueError(f"fatigue: stress: expected rows for {len(body.nodes)} kept nodes, got {len(shapes)}")
     is_all = len(nodes) == len(body.nodes) and bool((nodes == np.arange(len(nodes))).all())
-    return np.asarray(body.stress if is_all else body.stress[nodes])
+    return np.asarray(shapes if is_all else shapes[nodes])
 
 
 def node_words(body: ReducedBody, node: int) -> str:
