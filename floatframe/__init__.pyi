@@ -63,8 +63,8 @@ from .fatigue.shaken import shaken_damage as shaken_damage
 from .fatigue.sn_curve import SNCurve as SNCurve
 from .fatigue.sn_curve import basquin_curve as basquin_curve
 from .fatigue.sn_curve import table_curve as table_curve
-from .fatigue.spectra import ModalSpectra as ModalSpectra
-from .fatigue.spectra import spectra_of_history as spectra_of_history
+from .fatigue.spectral.spectra import ModalSpectra as ModalSpectra
+from .fatigue.spectral.spectra import spectra_of_history as spectra_of_history
 from .fatigue.surface_damage import FatigueResult as FatigueResult
 from .fatigue.surface_damage import history_damage as history_damage
 from .fatigue.surface_damage import spectral_damage as spectral_damage

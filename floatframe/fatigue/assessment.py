@@ -11,15 +11,15 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import FatigueError
 from floatframe.fatigue.criteria import Criterion
-from floatframe.fatigue.cycle_kernels import collect
 from floatframe.fatigue.fatigue_file import STRESS_UNITS, BlockSection, FatigueFile, MaterialSection, SpectrumSection
 from floatframe.fatigue.history_damage import Progress
+from floatframe.fatigue.kernels.cycle_kernels import collect
 from floatframe.fatigue.load_blocks import LoadBlock, block_of_results
 from floatframe.fatigue.mean_stress import MEAN_STRESS, MeanStress
 from floatframe.fatigue.planes import surface_nodes
 from floatframe.fatigue.shaken import shaken_spectra
 from floatframe.fatigue.sn_curve import SNCurve, basquin_curve, table_curve
-from floatframe.fatigue.spectra import ModalSpectra
+from floatframe.fatigue.spectral.spectra import ModalSpectra
 from floatframe.fatigue.surface_damage import FatigueResult, history_damage, spectral_damage
 from floatframe.results.trajectory import Trajectory, read_results
 from floatframe.shaking.shake import shake
@@ -56,9 +56,11 @@ def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessmen
     criterion = Criterion(section.name, section.tensor, section.planes, section.findley_k)
     nodes = nodes_of(given, body)
     if given.spectra:
-        spectra, stress = (
-            shaken_of(given, body) if given.spectra[0].shake else ([*map(spectra_of, given.spectra)], None)
-        )
+        stress: Array | None = None
+        if given.spectra[0].shake:
+            spectra, stress = shaken_of(given, body)
+        else:
+            spectra = [spectra_of(each) for each in given.spectra]
         result = spectral_damage(
             body, spectra, curve, method=counting.method, criterion=criterion, mean_stress=mean_stress,
             extrapolate=counting.extrapolate, nodes=nodes, stress=stress, progress=progress,

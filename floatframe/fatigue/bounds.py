@@ -100,7 +100,7 @@ def damage_bounds(
     lam: Array, total: Array, found: Envelope, criterion: Criterion, curve: SNCurve, mean_stress: MeanStress
 ) -> Array:
     """Return an upper bound of the damage of one pass of a block, (n,), from the stress bounds of its nodes."""
-    from floatframe.fatigue.cycle_kernels import cycle_rule, sums_of_reversals
+    from floatframe.fatigue.kernels.cycle_kernels import cycle_rule, sums_of_reversals
 
     rule, one = cycle_rule(curve, mean_stress), np.ones(1)
     of_sizes = np.zeros(len(total))

@@ -95,7 +95,7 @@ class Criterion:
 
     def scalar(self) -> Callable[[Array, Array], None] | None:
         """Return the kernel from components to the scalar; None: the rows are the histories already."""
-        from floatframe.fatigue import stress_kernels as kernels
+        from floatframe.fatigue.kernels import stress_kernels as kernels
 
         return {
             ("signed-von-mises", "full"): kernels.signed_von_mises,

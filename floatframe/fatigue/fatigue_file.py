@@ -13,7 +13,7 @@ from floatframe.fatigue.criteria import CRITERIA, TENSORS
 from floatframe.fatigue.history_damage import RESIDUES
 from floatframe.fatigue.mean_stress import MEAN_STRESS
 from floatframe.fatigue.sn_curve import BELOW
-from floatframe.fatigue.spectral_methods import SPECTRAL_METHODS
+from floatframe.fatigue.spectral.spectral_methods import SPECTRAL_METHODS
 
 __all__ = ["STRESS_UNITS", "FatigueFile", "read_fatigue"]
 

@@ -185,7 +185,7 @@ def count_tile(
 
 def count_block(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]:
     """Return damage (n, n_planes), counts (n, n_planes, 2) and largest amplitudes of one pass of a history."""
-    from floatframe.fatigue.cycle_kernels import close_block, cycle_rule, finish_block, push_block
+    from floatframe.fatigue.kernels.cycle_kernels import close_block, cycle_rule, finish_block, push_block
 
     if rule.criterion.is_shear:
         return count_shear(rows, q, rule)
@@ -219,8 +219,8 @@ def count_block(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]
 
 def count_shear(rows: Array, q: Array, rule: Rule) -> tuple[Array, Array, Array]:
     """Return what `count_block` does for cycles of shear with the normal stress beside them."""
-    from floatframe.fatigue.cycle_kernels import cycle_rule
-    from floatframe.fatigue.findley_kernels import close_findley, finish_findley, push_findley
+    from floatframe.fatigue.kernels.cycle_kernels import cycle_rule
+    from floatframe.fatigue.kernels.findley_kernels import close_findley, finish_findley, push_findley
 
     kernel_rule, k = cycle_rule(rule.curve, rule.mean_stress), float(rule.criterion.k)
     n, n_rows, _ = rows.shape

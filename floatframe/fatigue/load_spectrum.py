@@ -6,7 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.errors import FatigueError
-from floatframe.fatigue.cycle_kernels import collect, cycle_rule, equivalent_amplitude
+from floatframe.fatigue.kernels.cycle_kernels import collect, cycle_rule, equivalent_amplitude
 from floatframe.fatigue.load_blocks import LoadBlock
 from floatframe.fatigue.planes import surface_frames
 from floatframe.fatigue.surface_damage import FatigueResult

@@ -14,7 +14,7 @@ from floatframe.errors import FatigueError
 from floatframe.fatigue.criteria import Criterion
 from floatframe.fatigue.mean_stress import NO_CORRECTION, MeanStress
 from floatframe.fatigue.sn_curve import SNCurve
-from floatframe.fatigue.spectra import ModalSpectra
+from floatframe.fatigue.spectral.spectra import ModalSpectra
 from floatframe.fatigue.surface_damage import FatigueResult, spectral_damage
 from floatframe.shaking.loads.inputs import input_index
 from floatframe.shaking.loads.random_vibration import RandomRun, RandomTest, input_density, spectral_root

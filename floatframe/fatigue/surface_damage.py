@@ -15,8 +15,8 @@ from floatframe.fatigue.load_blocks import LoadBlock
 from floatframe.fatigue.mean_stress import NO_CORRECTION, MeanStress
 from floatframe.fatigue.planes import surface_frames, surface_nodes
 from floatframe.fatigue.sn_curve import SNCurve
-from floatframe.fatigue.spectra import ModalSpectra
-from floatframe.fatigue.spectral_damage import count_spectra
+from floatframe.fatigue.spectral.spectra import ModalSpectra
+from floatframe.fatigue.spectral.spectral_damage import count_spectra
 
 __all__ = ["FatigueResult", "history_damage", "spectral_damage"]
 

@@ -8,8 +8,8 @@ import rainflow
 from numpy.testing import assert_allclose
 
 from floatframe.fatigue.criteria import Criterion
-from floatframe.fatigue.cycle_kernels import collect
 from floatframe.fatigue.history_damage import count_histories
+from floatframe.fatigue.kernels.cycle_kernels import collect
 from floatframe.fatigue.load_blocks import LoadBlock
 from floatframe.fatigue.mean_stress import MeanStress
 from floatframe.fatigue.sn_curve import basquin_curve

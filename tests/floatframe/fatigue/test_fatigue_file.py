@@ -19,7 +19,7 @@ from floatframe.fatigue.load_blocks import LoadBlock, block_of_results
 from floatframe.fatigue.load_spectrum import cycles_at, exceedances
 from floatframe.fatigue.mean_stress import MeanStress
 from floatframe.fatigue.planes import surface_frames, surface_nodes
-from floatframe.fatigue.spectra import spectra_of_history
+from floatframe.fatigue.spectral.spectra import spectra_of_history
 from floatframe.fatigue.surface_damage import spectral_damage
 from tests.floatframe.results.test_sensors import BODY, TEXT
 

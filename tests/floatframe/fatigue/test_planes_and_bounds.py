@@ -9,12 +9,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from floatframe.errors import FatigueError
 from floatframe.fatigue.bounds import damage_bounds, envelope, stress_bounds
 from floatframe.fatigue.criteria import CRITERIA, Criterion, von_mises_root
-from floatframe.fatigue.cycle_kernels import collect
 from floatframe.fatigue.history_damage import count_histories
+from floatframe.fatigue.kernels.cycle_kernels import collect
+from floatframe.fatigue.kernels.stress_kernels import largest_principal, signed_von_mises
 from floatframe.fatigue.load_blocks import LoadBlock
 from floatframe.fatigue.mean_stress import MeanStress
 from floatframe.fatigue.sn_curve import basquin_curve
-from floatframe.fatigue.stress_kernels import largest_principal, signed_von_mises
 
 PERIOD = 720  #: times of one cycle
 PHASE = 2 * np.pi * np.arange(4 * PERIOD) / PERIOD

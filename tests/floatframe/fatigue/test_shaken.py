@@ -12,7 +12,7 @@ from cms.modal_file.file import write
 from floatframe.errors import FatigueError
 from floatframe.fatigue.criteria import Criterion
 from floatframe.fatigue.shaken import shaken_damage, shaken_spectra
-from floatframe.fatigue.spectral_damage import stress_moments
+from floatframe.fatigue.spectral.spectral_damage import stress_moments
 from tests.bodies import bar
 
 NODE = 5

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe.errors import FatigueError
-from floatframe.fatigue.cycle_kernels import cycle_rule, equivalent_amplitude
+from floatframe.fatigue.kernels.cycle_kernels import cycle_rule, equivalent_amplitude
 from floatframe.fatigue.mean_stress import MeanStress
 from floatframe.fatigue.sn_curve import basquin_curve, table_curve
 

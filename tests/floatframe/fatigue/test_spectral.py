@@ -14,9 +14,9 @@ from floatframe.fatigue.history_damage import count_histories
 from floatframe.fatigue.load_blocks import LoadBlock
 from floatframe.fatigue.mean_stress import MeanStress
 from floatframe.fatigue.sn_curve import basquin_curve
-from floatframe.fatigue.spectra import ModalSpectra, modal_moments, spectra_of_history
-from floatframe.fatigue.spectral_damage import count_spectra, stress_moments
-from floatframe.fatigue.spectral_methods import SPECTRAL_METHODS, damage_rates, widths
+from floatframe.fatigue.spectral.spectra import ModalSpectra, modal_moments, spectra_of_history
+from floatframe.fatigue.spectral.spectral_damage import count_spectra, stress_moments
+from floatframe.fatigue.spectral.spectral_methods import SPECTRAL_METHODS, damage_rates, widths
 
 #: numbers of FLife 2.3 for its own example: N S^k = 1.8e22, k = 7.3, 5 MPa² in 20-60 Hz and 2 MPa² in 100-120 Hz [s]
 FLIFE_LIVES = {

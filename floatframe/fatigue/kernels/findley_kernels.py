@@ -8,7 +8,7 @@ closes and, where the history has gone on since, a little more, which is on the 
 import numpy as np
 from numba import njit
 
-from floatframe.fatigue.cycle_kernels import CLOSED, OVER, damage_of
+from floatframe.fatigue.kernels.cycle_kernels import CLOSED, OVER, damage_of
 
 __all__ = ["count_findley", "push_findley"]
 

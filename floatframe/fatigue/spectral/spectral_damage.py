@@ -16,8 +16,8 @@ from floatframe.fatigue.history_damage import Counted, Progress
 from floatframe.fatigue.mean_stress import GERBER, LINE, NO_CORRECTION, NONE, MeanStress
 from floatframe.fatigue.planes import shear_pairs
 from floatframe.fatigue.sn_curve import SNCurve
-from floatframe.fatigue.spectra import ModalSpectra, modal_moments
-from floatframe.fatigue.spectral_methods import SPECTRAL_METHODS, damage_rates
+from floatframe.fatigue.spectral.spectra import ModalSpectra, modal_moments
+from floatframe.fatigue.spectral.spectral_methods import SPECTRAL_METHODS, damage_rates
 
 __all__ = ["count_spectra", "mean_factor", "stress_moments"]
 
@@ -151,7 +151,7 @@ def mean_value(stress: Array, rows: Array, spectra: ModalSpectra, criterion: Cri
     q = spectra.scale * np.asarray(spectra.mean)
     if criterion.name != "signed-von-mises":
         return np.asarray(rows @ q)
-    from floatframe.fatigue.stress_kernels import signed_von_mises
+    from floatframe.fatigue.kernels.stress_kernels import signed_von_mises
 
     found = np.empty((len(stress), 1))
     signed_von_mises(np.ascontiguousarray((stress @ q)[:, :, None]), found)

@@ -1,0 +1,1 @@
+"""Spectra of modal coordinates, distributions of amplitudes, and the damage that follows."""
