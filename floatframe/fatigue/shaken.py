@@ -46,7 +46,7 @@ def shaken_spectra(model: ShakenModel, test: RandomTest, run: RandomRun, duratio
         eta = np.concatenate([eta, driven(unit, model.rates, omega)], axis=1)
         of_modes = np.concatenate([of_modes, of_inputs], axis=2)
     moved = eta[:, :, columns] @ spectral_root(input_density(model, test, acting, f))
-    G = moved @ moved.conj().transpose(0, 2, 1)
+    G = np.asarray(moved @ moved.conj().transpose(0, 2, 1), dtype=np.complex128)
     return ModalSpectra(f"{run.test} {run.direction}", f, G, duration, weights=run.band.weights), of_modes
 
 

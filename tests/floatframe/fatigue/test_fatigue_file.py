@@ -279,3 +279,11 @@ def test_coarse_output_is_told(amplitude):
     found = history_damage(BODY, [LoadBlock("a", q)], basquin_curve(100.0, 1e6, 5, least_cycles=1e-9))
     assert any("4.0 output times a cycle" in note for note in found.notes)
     assert Criterion().name == found.criterion.name
+
+
+def test_a_motion_in_other_units_than_the_body_does_the_same_damage(file, folder):
+    expected = assess(read_fatigue(file)).result.damage
+    (folder / "metres.toml").write_text(TEXT.replace('"mm-t-s"', '"m-kg-s"'))
+    run("run", folder / "metres.toml")
+    changed(file, 'results = "spin.h5"', 'results = "metres.h5"')
+    assert_allclose(assess(read_fatigue(file)).result.damage, expected, rtol=1e-5)

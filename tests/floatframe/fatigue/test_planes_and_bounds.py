@@ -255,3 +255,34 @@ def test_the_cycles_of_a_plane_history_are_those_of_its_projection():
         damages.append(cycles[:, 2] @ CURVE.damage(np.abs(cycles[:, 0] - cycles[:, 1]) / 2))
     assert_allclose(found.total[0], max(damages), rtol=1e-10)
     assert found.plane[0] == int(np.argmax(damages))
+
+
+def test_findley_keeps_the_normal_stress_of_cycles_that_were_taken_out():
+    """Shear 0 3 1 2 -3 0: the normal stress is greatest within the inner cycle, and the outer one knows it."""
+    from floatframe.fatigue.history_damage import Rule, count_block
+
+    shear, normal = np.array([0.0, 3, 1, 2, -3, 0]), np.array([0.0, 0, 0, 7, 0, 0])
+    k = 0.3
+    modes = np.zeros((2, 3, 3))
+    modes[0, 0, 1] = modes[0, 1, 0] = 1.0
+    modes[1, 0, 0] = 1.0
+    criterion = Criterion("findley", n_planes=4, findley_k=k)
+    rows = criterion.rows(stress_of(modes), np.eye(3)[None])
+    q = np.ascontiguousarray(np.stack([shear, normal]))
+    damage, _, _ = count_block(rows, q, Rule(CURVE, MeanStress(), criterion, "half", (1.0,)))
+    ranges = [(1.0, 1.0, 7.0), (3.0, 0.5, 0.0), (6.0, 0.5, 7.0), (3.0, 0.5, 0.0)]  # range, count, largest normal
+    S = [2 * (size / 2 + k * high) / (k + math.sqrt(1 + k * k)) for size, _, high in ranges]
+    assert_allclose(damage[0, 0], CURVE.damage(np.array(S)) @ [n for _, n, _ in ranges], rtol=1e-12)
+
+
+def test_shear_out_of_a_surface_under_equal_tension_both_ways():
+    """sigma e1 e1 + sigma e2 e2: no shear across the surface, sigma / 2 on every plane at 45 degrees to it."""
+    modes = np.diag([70.0, 70.0, 0.0])[None]
+    assert_allclose(largest("shear", modes, np.sin(PHASE)[:, None], np.eye(3)), 70.0, rtol=1e-12)
+
+
+def test_bounds_add_up_over_repeats():
+    q = histories(1)
+    stress = np.random.default_rng(0).standard_normal((5, 6, 4))
+    once, often = (count_histories(stress, [LoadBlock("a", q, repeats=n)], CURVE).bound for n in (1, 250))
+    assert_allclose(often, 250 * once, rtol=1e-12)

@@ -210,3 +210,12 @@ def test_zhao_baker_says_where_it_does_not_hold():
     wide = moments_of(1 / (1 + (f / 0.5) ** 2), f)
     with pytest.raises(FatigueError, match=r"0.13 or more, got 0.0"):
         damage_rates(wide, basquin_curve(1.0, 1e6, 5), "zhao-baker")
+
+
+def test_von_mises_of_the_stress_in_the_surface_is_that_of_all_of_it_on_a_free_surface():
+    spectra = three_modes()
+    stress = np.random.default_rng(4).standard_normal((3, 6, 3))
+    stress[:, 2:5] = 0  # e3 is the normal
+    frames = np.tile(np.eye(3), (3, 1, 1))
+    full, plane = (stress_moments(stress, spectra, Criterion(tensor=tensor), frames) for tensor in ("full", "surface"))
+    assert_allclose(plane, full, rtol=1e-12)
