@@ -73,7 +73,9 @@ def machine(*forces):
     end = arm.reduced.interface("end_a").position
     inertia, middle = np.diag([0.02, 0.03, 0.04]), (0, 0.02, 0)
     block = RigidBody("block", 1.3, inertia, position=end + np.array([0.1, 0.0, -0.05]), center_of_mass=middle)
-    wheel = RigidBody("wheel", 0.4, np.diag([0.01, 0.01, 0.02]), position=end + np.array([0.1, 0.2, -0.05]))
+    overhang = (0.06, 0, 0)  # along its axle, which so carries a moment
+    place = end + np.array([0.1, 0.2, -0.05])
+    wheel = RigidBody("wheel", 0.4, np.diag([0.01, 0.02, 0.02]), position=place, center_of_mass=overhang)
     joints = [
         RevoluteJoint("root", GROUND, Marker("arm", "end_b"), axis=(0, 1, 0)),
         RevoluteJoint("axle", Marker("block", position=(0, 0.2, 0), triad=TURN), "wheel", axis=(1, 0, 0)),
