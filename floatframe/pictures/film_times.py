@@ -66,7 +66,7 @@ def speed_words(speed: float) -> str:
     """Return the speed of a film in words."""
     if speed == 1:
         return "in real time"
-    return f"{1 / speed:g} times slower than real time" if speed < 1 else f"{speed:g} times faster than real time"
+    return f"{1 / speed:.3g} times slower than real time" if speed < 1 else f"{speed:.3g} times faster than real time"
 
 
 def time_words(t: Array) -> tuple[str, ...]:

@@ -112,6 +112,7 @@ def test_round_below(value, expected):
 def test_speeds_and_times_read_well():
     assert speed_words(1.0) == "in real time"
     assert speed_words(0.02) == "50 times slower than real time"
+    assert speed_words(0.62) == "1.61 times slower than real time"
     assert speed_words(10.0) == "10 times faster than real time"
     assert time_words(np.array([0.0, 0.04, 0.08])) == ("t = 0.00 s", "t = 0.04 s", "t = 0.08 s")
 
