@@ -2,7 +2,7 @@
 
     eta_ddot + 2 zeta omega eta_dot + omega² eta = a(t),  a straight between t_n and t_n+1
 
-(1) x = (eta, eta_dot): x_n+1 = A x_n + B_0 a_n + B_1 a_n+1, from the exponential of the states with a and its slope
+(1) x = (eta, eta_dot): x_n+1 = A x_n + B_0 a_n + B_1 a_n+1, from the power series of the motion in a step
 (2) without x: eta_n + c_1 eta_n-1 + c_2 eta_n-2 = Σ b_k a_n-k, c from the trace and determinant of A: a digital
 filter, whose
     initial values put x_0 and a_0 right
@@ -18,6 +18,10 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.shaking.structure.model import ShakenModel
 
 __all__ = ["Motion", "base_motions", "histories", "oscillator"]
+
+LONGEST_STEP = 4.0  #: omega h up to which the series loses fewer than three digits
+MOST_TERMS = 80  #: of it
+SMALL = 1.0  #: of an exponent, below which differences would lose digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,23 +48,57 @@ def oscillator(omega: float, zeta: float, load: Array, h: float) -> Motion:
     a = np.asarray(load, dtype=float)
     if not len(a):
         return Motion(a, a, a)
-    states = np.zeros((4, 4))  # x, a, h a_dot
-    states[:2, :2] = [[0.0, h], [-(omega**2) * h, -2 * zeta * omega * h]]
-    states[1, 2], states[2, 3] = h, 1.0
-    step = la.expm(states)
-    A, B_1 = step[:2, :2], step[:2, 3]
-    B_0 = step[:2, 2] - B_1
-    c = np.array([1.0, -np.trace(A), la.det(A)])
+    (A_00, A_01, A_10, A_11), B_0, B_1 = step_of(omega, zeta, h)
+    c = np.array([1.0, -(A_00 + A_11), A_00 * A_11 - A_01 * A_10])
     # z² - tr z + det over adj(z - A) (B_0 + B_1 z): rows of the numerator by falling powers of z
-    adjugate = np.array([[-A[1, 1], A[0, 1]], [A[1, 0], -A[0, 0]]])
+    adjugate = ((-A_11, A_01), (A_10, -A_00))
     outputs = []
     for k in range(2):
-        b = np.array([B_1[k], B_0[k] + adjugate[k] @ B_1, adjugate[k] @ B_0])
+        left, right = adjugate[k]
+        b = np.array([B_1[k], B_0[k] + left * B_1[0] + right * B_1[1], left * B_0[0] + right * B_0[1]])
         x_1 = B_0[k] * a[0] + (B_1[k] * a[1] if len(a) > 1 else 0.0)
         start = [-b[0] * a[0], x_1 - b[1] * a[0] - (b[0] * a[1] if len(a) > 1 else 0.0)]
         outputs.append(lfilter(b, c, a, zi=np.array(start))[0])
     value, rate = outputs
     return Motion(value, rate, a - 2 * zeta * omega * rate - omega**2 * value)
+
+
+def step_of(omega: float, zeta: float, h: float) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+    """Return A by rows, B_0 and B_1 of x_n+1 = A x_n + B_0 a_n + B_1 a_n+1, from the power series of the motion.
+
+    In x = Σ c_k (t/h)^k the equation is (k+2)(k+1) c_k+2 = h² a_k - 2 zeta omega h (k+1) c_k+1 - (omega h)² c_k,
+    for the starts (1, 0) and (0, 1) and the loads 1 - t/h and t/h. It converges for every step; where omega h is so
+    large that its terms would cancel, the exponential of the states stands for it. No damping is special.
+    """
+    p, z = omega * h, 2 * zeta * omega * h
+    if max(p, z) > LONGEST_STEP:
+        states = np.zeros((4, 4))  # x, a, h a_dot
+        states[:2, :2] = [[0.0, h], [-(omega**2) * h, -z]]
+        states[1, 2], states[2, 3] = h, 1.0
+        step = la.expm(states)
+        B_1 = step[:2, 3]
+        return tuple(step[:2, :2].ravel()), tuple(step[:2, 2] - B_1), tuple(B_1)
+    ends = [
+        end_of_series(p, z, h, *start)
+        for start in ((1.0, 0.0, 0.0, 0.0), (0.0, h, 0.0, 0.0), (0.0, 0.0, 1.0, -1.0), (0.0, 0.0, 0.0, 1.0))
+    ]
+    return (ends[0][0], ends[1][0], ends[0][1], ends[1][1]), ends[2], ends[3]
+
+
+def end_of_series(
+    p: float, z: float, h: float, c: float, following: float, a: float, slope: float
+) -> tuple[float, float]:
+    """Return value and rate at the end of a step: c and `following` begin the series, a and its slope the load."""
+    value, rate, largest = c + following, following, abs(c) + abs(following)
+    load = (a * h * h, slope * h * h)
+    for k in range(MOST_TERMS):
+        own = (load[k] if k < 2 else 0.0) - z * (k + 1) * following - p * p * c
+        c, following = following, own / ((k + 2) * (k + 1))
+        value, rate = value + following, rate + (k + 2) * following
+        largest = max(largest, abs(following))
+        if k > 1 and (k + 2) * (abs(c) + abs(following)) <= 1e-18 * largest:
+            break
+    return value, rate / h
 
 
 def base_motions(acceleration: Array, h: float) -> Motion:
@@ -145,6 +183,13 @@ def coupled(model: ShakenModel, load: Array, h: float) -> tuple[Array, Array]:
 
 
 def exponentials(z: complex) -> tuple[complex, complex, complex]:
-    """Return exp(z), (exp(z) - 1)/z and (exp(z) - 1 - z)/z²."""
-    step = la.expm(np.array([[z, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]))
-    return step[0, 0], step[0, 1], step[0, 2]
+    """Return exp(z), (exp(z) - 1)/z and (exp(z) - 1 - z)/z²; for small z from the series of the last."""
+    if abs(z) > SMALL:
+        e = complex(np.exp(z))
+        return e, (e - 1) / z, (e - 1 - z) / z**2
+    term, phi_2 = 0.5 + 0j, 0.5 + 0j
+    for k in range(3, 30):
+        term *= z / k
+        phi_2 += term
+    phi_1 = 1 + z * phi_2
+    return 1 + z * phi_1, phi_1, phi_2

@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as la
 from numpy.testing import assert_allclose
 
-from floatframe.shaking.responses.time_steps import base_motions, histories, oscillator
+from floatframe.shaking.responses.time_steps import base_motions, exponentials, histories, oscillator, step_of
 from tests.floatframe.shaking.single_mass import masses
 
 
@@ -21,6 +21,30 @@ def test_an_oscillator_is_that_of_pyyeti(zeta):
     other = SolveUnc(np.ones(1), np.array([2 * zeta * omega]), np.array([omega**2]), h).tsolve(load[None])
     for mine, theirs in ((own.value, other.d[0]), (own.rate, other.v[0]), (own.second, other.a[0])):
         assert_allclose(mine, theirs, rtol=0, atol=1e-9 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.02, 1.0, 3.0])
+@pytest.mark.parametrize("p", [0.0, 1e-6, 0.1, 0.999, 2.0, 3.9, 4.1, 30.0])
+def test_a_step_is_the_exponential_of_the_states(p, zeta):
+    h = 0.013
+    omega = p / h
+    states = np.zeros((4, 4))
+    states[:2, :2] = [[0.0, h], [-(omega**2) * h, -2 * zeta * omega * h]]
+    states[1, 2], states[2, 3] = h, 1.0
+    step, (A, B_0, B_1) = la.expm(states), step_of(omega, zeta, h)
+    scale = np.array([1.0, max(omega, 1 / h)])
+    atol = 1e-12 * (1 + p)
+    assert_allclose(
+        np.reshape(A, (2, 2)) / scale[:, None] * scale, step[:2, :2] / scale[:, None] * scale, rtol=0, atol=atol
+    )
+    for mine, theirs in ((B_0, step[:2, 2] - step[:2, 3]), (B_1, step[:2, 3])):
+        assert_allclose(np.array(mine) / scale / h**2, theirs / scale / h**2, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("z", [1e-9, 0.3 + 0.4j, -0.99, 1.01j, -5 + 3j])
+def test_the_exponential_and_its_quotients(z):
+    step = la.expm(np.array([[z, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]))
+    assert_allclose(exponentials(z), step[0], rtol=1e-13)
 
 
 def test_a_ramp_from_rest_is_met_exactly_in_one_step():
