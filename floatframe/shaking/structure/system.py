@@ -24,7 +24,7 @@ from floatframe.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import Gravity
-from floatframe.results.sensors import PlaceSensor, ReactionSensor, StressSensor
+from floatframe.results.sensors import InterfaceForceSensor, PlaceSensor, ReactionSensor, SpringSensor, StressSensor
 from floatframe.rotations import rotation_matrix
 from floatframe.shaking.structure.body import force_outputs, unit_of
 from floatframe.shaking.structure.damping import Damping
@@ -119,8 +119,9 @@ def shaken_system(
 ) -> ShakenModel:
     """Return a system on its bases, linear about its equilibrium at rest.
 
-    With ratios, they take the place of all dampers, and of the forces of these on the base; with `own` the dampers and
-    the damping of the bodies act, and couple the modes.
+    With ratios, they take the place of all dampers; a mode's damping then acts where its stiffness does, so that a
+    reaction has 2 zeta/omega times the rate of its elastic part and the bases exert the rate of the momentum. With
+    `own` the dampers and the damping of the bodies act, and couple the modes.
 
     Raises
     ------
@@ -161,7 +162,11 @@ def shaken_system(
     E_rows, D_rows = [], []
     for row in rows:
         chosen = [at[column.name] for column in row.columns]
-        e, d = row.weights @ L[:, chosen] @ Z, row.weights @ D[:, chosen]
+        seen = L[:, chosen] @ Z
+        if not damping.own:
+            carried = [is_carried(column) for column in row.columns]
+            seen[1, carried] += seen[0, carried] * (np.diag(C) / omega**2)
+        e, d = row.weights @ seen, row.weights @ D[:, chosen]
         if row.is_relative:
             d[0, :, :6] -= rigid_rows(linear.output_values[chosen], bases[0])[:3]
         if len(bases) == 1 and row.outputs[0].kind in ("displacement", "rotation", "stress"):
@@ -182,6 +187,13 @@ def shaken_system(
         outputs=tuple(output for row in rows for output in row.outputs),
         mass=rigid_mass(linear, about.state, bases),
         notes=(f"system {system.name!r}: linear about its equilibrium at rest",),
+    )
+
+
+def is_carried(column: Column) -> bool:
+    """Whether an output is a force of connections, which carries the damping of a mode beside its elastic force."""
+    return isinstance(column.sensor, (ReactionSensor, InterfaceForceSensor)) or (
+        isinstance(column.sensor, SpringSensor) and column.column == "tension"
     )
 
 

@@ -55,6 +55,24 @@ def test_a_body_fixed_in_a_system_is_the_body_alone(rod):
         assert_allclose(*shares, rtol=1e-6, atol=1e-9 * shares[1].max())
 
 
+@pytest.mark.parametrize("frame", [cms.NodalFrame("left"), cms.TisserandFrame()], ids=["nodal", "mean axes"])
+def test_the_force_of_a_base_has_the_damping_of_the_modes_in_every_frame(frame):
+    part = cms.couple(beam(n=3))
+    body = cms.reduce(part, cms.craig_bampton(part, n_modes=6), frame=frame)
+    alone = shaken_body(body, bases_of_body(body, "left"), Damping(Q=5))
+    system = replace(on_ground(body), sensors=[ff.ReactionSensor("load", "foot")])
+    model = shaken_system(system, bases_of_system(system, None), Damping(Q=5), [Observed("load", sensor="load")])
+    f = alone.omega[:3] / (2 * np.pi)
+    force, mass = response(alone, f)[:, :6], float(body.moments.m)
+    found = response(model, f)
+    assert_allclose(found[:, :6], force, rtol=0, atol=1e-6 * np.abs(force).max(axis=(0, 2), keepdims=True).max())
+    names = [output.name for output in model.outputs]
+    mean = found[:, names.index("mean acceleration x") :][:, :3]
+    assert_allclose(mass * mean, force[:, :3], rtol=0, atol=1e-6 * np.abs(force[:, :3]).max())
+    load = found[:, [names.index(f"load force {axis}") for axis in "xyz"]]
+    assert_allclose(np.abs(load), np.abs(force[:, :3]), rtol=0, atol=1e-6 * np.abs(force[:, :3]).max())
+
+
 def test_net_force_of_two_bases_is_the_mass_times_the_acceleration_of_the_whole(rod):
     block = ff.RigidBody("block", 2.0, np.eye(3) * 0.01, position=(1.0, 0.0, 0.0))
     weld = ff.FixedJoint("weld", ff.Marker("rod", "right"), ff.Marker("block"))
