@@ -31,6 +31,7 @@ from fe_models.foundation.components import MOTION_COMPONENTS
 __all__ = ["BoundaryNode", "InterfaceModel", "interface_model"]
 
 RANK_TOLERANCE = 1e-9  #: singular values of the scaled map below this part of the greatest count as zero
+STILL = 1e-12  #: motion of the interfaces below this part of the largest of a mode is rounding: the frame holds them
 MASSLESS = 1e-14  #: mass of a fixed-interface mode of unit stiffness below this part of the greatest: none
 
 
@@ -146,7 +147,22 @@ def boundary_of(body: ReducedBody) -> tuple[tuple[BoundaryNode, ...], Array]:
             rows.append(turned[:, 6:] if body.is_held else turned)
             count += len(motion)
     width = body.n_q + (0 if body.is_held else 6)
-    return tuple(nodes), np.concatenate(rows) if rows else np.zeros((0, width))
+    B = np.concatenate(rows) if rows else np.zeros((0, width))
+    B[:, width - body.n_q :][:, still_modes(body, B[:, width - body.n_q :])] = 0.0
+    return tuple(nodes), B
+
+
+def still_modes(body: ReducedBody, motion: Array) -> Array:
+    """Return which modes move no interface but by rounding, (n_q,).
+
+    A frame at the only interface lets none of them move it. What is left there, 1e-19 and any direction, would
+    otherwise be scaled like a motion and take the place of the rigid ones.
+    """
+    if not len(motion) or not len(body.Phi):
+        return np.zeros(body.n_q, dtype=bool)
+    extent = max(float(np.ptp(body.nodes, axis=0).max()), np.finfo(float).tiny)  # rotations by lengths of the body
+    largest = np.abs(body.Phi).max(axis=(0, 1))
+    return np.asarray(np.abs(motion).max(axis=0) <= STILL * largest * max(1.0, 1 / extent))
 
 
 def places_of(body: ReducedBody, interface: ReducedInterface) -> list[tuple[Array, Array]]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cms.reduced_body.recovery_table import N_RIGID
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
@@ -29,6 +30,7 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
             f"with_modes: body {body.name!r} has modes 0 to {body.n_q - 1}, each to be named once, got {chosen}"
         )
     k = np.array(chosen, dtype=np.int64)
+    coordinates = np.concatenate([np.arange(N_RIGID), N_RIGID + k])
     moments = body.moments
 
     def square(matrix: Array) -> Array:
@@ -56,6 +58,9 @@ def with_modes(body: ReducedBody, modes: Sequence[int]) -> ReducedBody:
         load_cases=tuple(replace(case, h=case.h[k]) for case in body.load_cases),
         stress=None if body.stress is None else body.stress[:, :, k],
         point_stress=None,
+        recovery={
+            name: replace(table, dynamic=table.dynamic[:, :, coordinates]) for name, table in body.recovery.items()
+        },
         geometric=None if body.geometric is None else replace(body.geometric, spread=None).of_modes(k),
         quadratic=None if body.quadratic is None else np.asarray(body.quadratic)[:, :, k[:, None], k],
     )

@@ -1,5 +1,7 @@
 """The way back from diagonalised modes without rigid motion to a superelement over the interfaces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -123,3 +125,16 @@ def test_a_held_body_has_no_rigid_motion_added():
     K, M = V.T @ (held.K @ V), V.T @ (held.M @ V)
     assert_allclose(model.K[:6, :6], K[:6, :6], rtol=0, atol=1e-10 * np.abs(K).max())
     assert_allclose(model.M[:6, :6], M[:6, :6], rtol=0, atol=1e-9 * np.abs(M).max())
+
+
+def test_rounding_at_an_interface_that_the_frame_holds_is_no_motion(coupled):
+    """A nodal frame at the only interface: K_bb = 0 and the constraint modes are the rigid motions."""
+    alone = cms.couple(with_interfaces(bar(nx=6, material=RUBBER), bar(nx=6, material=RUBBER).interface("left")))
+    reduced = cms.reduce(alone, cms.craig_bampton(alone, n_modes=5), frame=cms.NodalFrame("left"), geometric=False)
+    noise = np.random.default_rng(0).normal(size=(6, reduced.n_q)) * 1e-18 * np.abs(reduced.Phi).max()
+    port = replace(reduced.interface("left"), Psi=noise)
+    rounded = interface_model(replace(reduced, interfaces=(port,)))
+    exact = interface_model(reduced)
+    assert_allclose(rounded.K, exact.K, rtol=0, atol=1e-9 * np.abs(exact.K).max())
+    assert_allclose(rounded.M, exact.M, rtol=0, atol=1e-9 * np.abs(exact.M).max())
+    assert_allclose(rounded.K[:6], 0, rtol=0, atol=1e-9 * np.abs(exact.K).max())
