@@ -1,5 +1,7 @@
 """Bodies that are held to the ground and say so: reduced, checked, compared, written, refused by a floating frame."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -17,6 +19,7 @@ from cms.quality.of_body.effective_mass import effective_mass
 from cms.quality.reduction_check import check_reduction
 from cms.quality.reference.port_model import file_response
 from cms.reduced_basis.frames import HeldFrame, TisserandFrame
+from fe_models.body.numbering import Numbering
 from fe_models.foundation.sealed_hdf5 import read_sealed
 from fe_models.foundation.units import unit_system
 from fe_models.matrices import body_from_matrices
@@ -97,6 +100,7 @@ def test_the_file_of_a_held_body_says_so_in_a_newer_version(reduced, tmp_path):
     assert again.is_held
     assert again.frame.kind == "held"
     free = cms.reduce(body := cms.couple(bar(nx=3, kind="hexahedron")), cms.guyan(body), geometric=False)
+    free = replace(free, numbering=Numbering(), kept=None)  # the mesh has sets, which older readers do not know
     cms.write(free, tmp_path / "free.h5")
     assert read_version(tmp_path / "free.h5") == 2  # what older readers know
 

@@ -46,7 +46,7 @@ n_modes = 4
 [recovery.drm]
 rows = [
     {quantity = "acceleration", at = [3, "tip"]},
-    {quantity = "beam force", at = [1]},
+    {quantity = "beam force", at = [12]},
     {quantity = "stress", at = 3, components = "xx"},
     {quantity = "interface force", at = "root"},
     {quantity = "net force", about = [0, 0, 0]},
@@ -87,7 +87,7 @@ def test_a_job_asks_for_rows_by_numbers_of_its_mesh(file):
     table = cms.read(file).recovery["drm"]
     assert "node 3 acceleration uy" in table.labels
     assert "interface tip acceleration rz" in table.labels
-    assert "element 1 beam force end B Mz" in table.labels
+    assert "element 12 beam force end B Mz" in table.labels
     skin = [label for label in table.labels if "stress" in label]
     assert skin[0].startswith("node 3 skin 1 stress")  # of the axis itself none is known
     assert {label.rpartition(" ")[2] for label in skin} == {"xx"}
@@ -107,7 +107,7 @@ def test_section_forces_of_a_beam_are_those_of_statics(file):
     h = sum(interface.Psi.T @ p[k : k + 6] for interface, k in zip(body.interfaces, (root, first), strict=True))
     z = np.concatenate([np.zeros(6), h / np.diag(body.K)])
     y = table.values(z, p=p)
-    found = {label.rpartition("force ")[2]: y[k] for k, label in enumerate(table.labels) if "element 1" in label}
+    found = {label.rpartition("force ")[2]: y[k] for k, label in enumerate(table.labels) if "element 12 " in label}
     for end, x in (("A", 0.25), ("B", 0.5)):
         arm = 1.0 - x
         mine = [found[f"end {end} {name}"] for name in ("N", "Mx")]
@@ -200,7 +200,7 @@ def full_place(body, name):
 
 def test_the_command_lists_writes_and_adds_rows(file, tmp_path):
     text = run("recovery", file)
-    assert "element 1 beam force end A N" in text
+    assert "element 12 beam force end A N" in text
     out = run("recovery", file, "--over", "interfaces", "--units", "mm-t-s", "-o", tmp_path / "drm.op4")
     assert "op4 holds no labels and units" in out
     assert (tmp_path / "drm_columns.csv").is_file()
@@ -229,10 +229,10 @@ def test_the_check_sees_rows_of_another_place_and_of_another_body(file, tmp_path
 
 
 BAD = {
-    '"beem force", at = [1]': ('"beam force", at = [1]', "beam force"),
-    '"beam force", at = [77]': ('"beam force", at = [1]', "no element, set or part '77'"),
-    '"shell resultant"': ('"beam force", at = [1]', "it has no such elements; it has beam force"),
-    '"strain", at = [3]': ('"beam force", at = [1]', "of no solid elements|shows no stress"),
+    '"beem force", at = [1]': ('"beam force", at = [12]', "beam force"),
+    '"beam force", at = [77]': ('"beam force", at = [12]', "no element, set or part '77'"),
+    '"shell resultant"': ('"beam force", at = [12]', "it has no such elements; it has beam force"),
+    '"strain", at = [3]': ('"beam force", at = [12]', "of no solid elements|shows no stress"),
     'at = [33, "tip"]': ('at = [3, "tip"]', "no node 33"),
     'at = ["tipp"]': ('at = [3, "tip"]', "did you mean 'tip'"),
     'components = "xz "': ('components = "xx"', "no component"),
