@@ -1,6 +1,8 @@
 """The shake file: what `floatframe shake` reads (docs/shake.md)."""
 
+import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -51,7 +53,26 @@ def file_beside(value: Any, info: ValidationInfo) -> Any:
 
 def rows_or_file(value: Any, info: ValidationInfo) -> Any:
     """Return rows as tuples, or the path of a file."""
-    return file_beside(value, info) if isinstance(value, str) else as_tuple(value)
+    return file_beside(value, info) if isinstance(value, str) else rows_of(2)(value)
+
+
+def rows_of(length: int) -> Callable[[Any], tuple[tuple[float, ...], ...]]:
+    """Return what makes rows of that many finite numbers of a list; ValueError with the row that is none."""
+
+    def rows(value: Any) -> tuple[tuple[float, ...], ...]:
+        if not isinstance(value, list | tuple):
+            raise ValueError(f"expected a list of rows of {length} numbers, [[...], ...], got {value!r}")
+        for number, row in enumerate(value, start=1):
+            if not (isinstance(row, list | tuple) and len(row) == length and all(is_number(each) for each in row)):
+                raise ValueError(f"row {number}: expected {length} finite numbers, [...], got {row!r}")
+        return tuple(tuple(float(each) for each in row) for row in value)
+
+    return rows
+
+
+def is_number(value: Any) -> bool:
+    """Whether an entry of the file is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 Number = float
@@ -88,8 +109,8 @@ class DampingSection(Table):
         None, description="a number from 0 to below 1, the ratio of critical damping of all modes"
     )
     Q: float | None = Field(None, description="a number above 0.5, the amplification 1/(2 ratio)")
-    table: Annotated[tuple[Row2, ...], BeforeValidator(as_tuple)] = Field((), description="rows [Hz, ratio]")
-    bands: Annotated[tuple[tuple[float, float, float], ...], BeforeValidator(as_tuple)] = Field(
+    table: Annotated[tuple[Row2, ...], BeforeValidator(rows_of(2))] = Field((), description="rows [Hz, ratio]")
+    bands: Annotated[tuple[tuple[float, float, float], ...], BeforeValidator(rows_of(3))] = Field(
         (), description="rows [from Hz, to Hz, ratio]"
     )
     modes: dict[str, float] = Field(default_factory=dict, description='ratios by mode number, { "1" = 0.02 }')
@@ -101,7 +122,7 @@ class UncertaintySection(Table):
 
     factor: float = Field(1.0, description="a number of 1 or more, on all responses")
     frequency: float = Field(0.0, description="a share from 0 to 0.5 by which frequencies may be off")
-    bands: Annotated[tuple[tuple[float, float, float, float], ...], BeforeValidator(as_tuple)] = Field(
+    bands: Annotated[tuple[tuple[float, float, float, float], ...], BeforeValidator(rows_of(4))] = Field(
         (), description="rows [from Hz, to Hz, factor, share]"
     )
 
