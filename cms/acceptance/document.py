@@ -84,7 +84,7 @@ def document_of(acceptance: Acceptance) -> Document:
     figures = [
         (f"{a.body.moments.m:.5g} {u.mass_symbol}", "mass"),
         (str(a.body.n_q), "elastic coordinates"),
-        (str(len(a.body.interfaces)), "interfaces"),
+        (str(len(a.body.interfaces)), "interface" if len(a.body.interfaces) == 1 else "interfaces"),
         (f"{hertz(band.highest)} Hz", "to be used up to" if band.is_compared else "to be used up to, by custom"),
     ]
     if math.isfinite(a.mesh_error.largest):
