@@ -74,7 +74,7 @@ def test_impossible_rigid_bodies_are_refused(arguments, words):
             "joint 'pin': marker_b: no body 'rot'; did you mean 'rod'",
         ),
         ([SphericalJoint("pin", GROUND, Marker("rod", "end_x"))], "has no interface 'end_x'; did you mean 'end_"),
-        ([SphericalJoint("pin", GROUND, Marker("rod"))], "needs an interface and no position .*; choices: end_a, end_b"),
+        ([SphericalJoint("pin", GROUND, Marker("rod"))], "needs an interface and no position .*choices: end_a, end_b"),
         ([SphericalJoint("pin", GROUND, Marker("bob", "end_a"))], "'bob' is not flexible"),
         ([SphericalJoint("pin", GROUND, "rod")], "expected a Marker at one end at least"),
         (

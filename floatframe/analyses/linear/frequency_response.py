@@ -62,7 +62,8 @@ def frequency_response(linear: LinearSystem, frequencies: Array) -> FrequencyRes
                 f"tables [{kind}.NAME] in the system file"
             )
     units = tuple(
-        tuple(f"{o}/({i})" if " " in i or "/" in i else f"{o}/{i}" for i in linear.input_units) for o in linear.output_units
+        tuple(f"{o}/({i})" if set(i) & {" ", "/"} else f"{o}/{i}" for i in linear.input_units)
+        for o in linear.output_units
     )
     return FrequencyResponse(f, linear.response(f), linear.inputs, linear.outputs, units)
 
