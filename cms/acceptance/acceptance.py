@@ -12,7 +12,7 @@ from cms.acceptance.range_of_use import RangeOfUse
 from cms.quality.body_record import body_record
 from cms.quality.mesh_convergence import MeshConvergence
 from cms.quality.mesh_refinement import MeshRefinement
-from cms.quality.of_body.effective_mass import DIRECTIONS, EffectiveMass
+from cms.quality.of_body.effective_mass import EffectiveMass, mass_record
 from cms.quality.record import QualityRecord, Verdict, plain, worst
 from cms.reduced_body.reduced_body import ReducedBody
 
@@ -109,20 +109,6 @@ class Acceptance:
             "left_out": None if self.left_out is None else [asdict(each) for each in self.left_out],
             "mesh_error": {"words": self.mesh_error.words, **mesh_record(self.mesh_error)},
         }
-
-
-def mass_record(found: EffectiveMass) -> dict[str, Any]:
-    """Return effective masses in plain types."""
-    return {
-        "at": found.at,
-        "directions": list(DIRECTIONS),
-        "frequencies_hz": found.frequencies.tolist(),
-        "mass": found.mass.tolist(),
-        "share": found.share.tolist(),
-        "cumulative_share": found.cumulative.tolist(),
-        "total": found.total.tolist(),
-        "remainder": found.remainder.tolist(),
-    }
 
 
 def mesh_record(error: MeshError) -> dict[str, Any]:

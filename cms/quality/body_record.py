@@ -139,19 +139,9 @@ def kept_of_set(body: ReducedBody, named: NamedSet) -> int:
 
 def effective_mass_record(body: ReducedBody, at: str) -> dict[str, Any]:
     """Return the effective masses while an interface is held and driven, in plain types; frequencies in Hz."""
-    from cms.quality.of_body.effective_mass import DIRECTIONS, effective_mass_at
+    from cms.quality.of_body.effective_mass import effective_mass_at, mass_record
 
-    found = effective_mass_at(body, at)
-    return {
-        "at": at,
-        "directions": list(DIRECTIONS),
-        "frequencies_hz": found.frequencies.tolist(),
-        "mass": found.mass.tolist(),
-        "share": found.share.tolist(),
-        "cumulative_share": found.cumulative.tolist(),
-        "total": found.total.tolist(),
-        "remainder": found.remainder.tolist(),
-    }
+    return mass_record(effective_mass_at(body, at))
 
 
 def _finite(value: Any) -> float | None:

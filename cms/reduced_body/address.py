@@ -8,7 +8,6 @@ import numpy as np
 from cms.errors import BodyError
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.kept_nodes import TOLERANCE
-from fe_models.body.numbering import NONE
 from fe_models.foundation.arrays import Array, IntArray, frozen
 from fe_models.foundation.words import quoted
 
@@ -170,8 +169,3 @@ def has_stress(reduced: ReducedBody) -> np.ndarray:
     if reduced.stress is None or not reduced.n_q:
         return np.full(len(reduced.nodes), reduced.stress is not None)
     return np.asarray(np.abs(reduced.stress).max(axis=(1, 2)) > 0)
-
-
-def has_number(reduced: ReducedBody, row: int) -> bool:
-    """Whether the user numbered a kept node."""
-    return bool(reduced.numbering.nodes.size and reduced.numbering.nodes[row] != NONE)

@@ -95,7 +95,7 @@ def shake_command(
         if kind == ".html":
             content = shake_html(result)
         elif kind == ".json":
-            content = json_module.dumps(shake_record(result), indent=1) + "\n"
+            content = json_module.dumps(shake_record(result), separators=(",", ":")) + "\n"
         else:
             content = shake_csv(result)
         replace_file(path, content.encode())

@@ -16,6 +16,9 @@ from floatframe.shaking.structure.model import Output, ShakenModel
 
 __all__ = ["COLUMNS", "NOTHING", "conversions", "in_tables", "shake_csv", "shake_record", "table_rows", "worst_nodes"]
 
+FEW = 50  #: numbers in a row, beyond which it is a curve
+DIGITS = 7  #: of the numbers of a curve
+
 NOTHING = 1e-9  #: of the largest output of a kind, below which a value is rounding
 COLUMNS = (
     "test",
@@ -100,8 +103,10 @@ def shake_record(result: ShakeResult) -> dict[str, Any]:
 
 
 def plain(values: Array) -> Any:
-    """Return numbers as lists; what is not finite as None."""
+    """Return numbers as lists; what is not finite as None; curves with `DIGITS` digits, as files are long."""
     array = np.asarray(values, dtype=float)
+    if array.ndim == 2 and array.shape[1] > FEW and np.isfinite(array).all():
+        return [[float(f"{value:.{DIGITS}g}") for value in row] for row in array.tolist()]
     listed = array.tolist()
     if np.isfinite(array).all():
         return listed

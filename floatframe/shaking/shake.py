@@ -9,7 +9,7 @@ from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array
 from floatframe.errors import ModelError
 from floatframe.shaking.loads.inputs import band_notes
-from floatframe.shaking.loads.notching import DEEPEST, Limit, NotchedRun, ResponseLimit, notched_random, notched_sine
+from floatframe.shaking.loads.notching import DEEPEST, Limit, NotchedRun, notched_random, notched_sine
 from floatframe.shaking.loads.random_vibration import RandomRun, RandomTest, random_runs
 from floatframe.shaking.loads.shock import TimeRun, TimeTest, time_runs
 from floatframe.shaking.loads.sine import SineRun, SineTest, sine_run
@@ -192,8 +192,3 @@ def mass_notes(masses: EffectiveMasses) -> list[str]:
         for name, share in zip(masses.directions, carried, strict=False)
         if share < LITTLE_MASS
     ]
-
-
-def limits_need(limit: Limit) -> str:
-    """Return the kind of test that a limit belongs to alone; "" for both."""
-    return "random" if isinstance(limit, ResponseLimit) and limit.rms is not None else ""

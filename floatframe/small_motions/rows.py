@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.rotations import tilde
 
 __all__ = ["LinearColumns", "Rows", "joined"]
 
@@ -47,10 +46,6 @@ class Rows:
         """Return A times the rows, (len(A), ...)."""
         A = np.atleast_2d(A)
         return Rows(A @ self.x, A @ self.v, A @ self.a, A @ self.w)
-
-    def crossed(self, a: Array) -> "Rows":
-        """Return the rows of y × a for a constant vector a, of three rows y."""
-        return self.turned(-tilde(np.asarray(a)))
 
     @property
     def rate(self) -> "Rows":

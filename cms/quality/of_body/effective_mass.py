@@ -1,6 +1,7 @@
 """Effective modal mass of a body driven at one interface, and what its modes leave out."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -13,7 +14,7 @@ from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
 from fe_models.foundation.arrays import Array, frozen
 
-__all__ = ["EffectiveMass", "check_driven_mass", "effective_mass", "effective_mass_at"]
+__all__ = ["EffectiveMass", "check_driven_mass", "effective_mass", "effective_mass_at", "mass_record"]
 
 DIRECTIONS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
@@ -45,6 +46,20 @@ class EffectiveMass:
     def remainder(self) -> Array:
         """Share of the mass that no mode represents, by direction, (6,); 0 where there is nothing to move."""
         return np.where(self.total > 0, 1.0 - self.share.sum(axis=0), 0.0)
+
+
+def mass_record(found: EffectiveMass) -> dict[str, Any]:
+    """Return effective masses in plain types."""
+    return {
+        "at": found.at,
+        "directions": list(DIRECTIONS),
+        "frequencies_hz": found.frequencies.tolist(),
+        "mass": found.mass.tolist(),
+        "share": found.share.tolist(),
+        "cumulative_share": found.cumulative.tolist(),
+        "total": found.total.tolist(),
+        "remainder": found.remainder.tolist(),
+    }
 
 
 def effective_mass_at(reduced: ReducedBody, at: str) -> EffectiveMass:

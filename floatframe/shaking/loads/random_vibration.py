@@ -112,11 +112,6 @@ class RandomRun:
     transfer: Array  #: complex, (n_f, n_rows, n_act)
     field: Array | None = None  #: rms of von Mises' stress at all kept nodes, (n_nodes,)
 
-    @property
-    def three_sigma(self) -> Array:
-        """3 rms, (n_out,)."""
-        return np.asarray(3 * self.rms)
-
 
 def random_runs(model: ShakenModel, test: RandomTest, uncertainty: Uncertainty | None = None) -> list[RandomRun]:
     """Return the runs of a test: one a direction, or one."""
