@@ -30,6 +30,8 @@ class FoundNodes:
     def words(self) -> str:
         """Say which place is taken, and how far it is from the one asked for."""
         x = ", ".join(f"{value:.6g}" for value in self.place)
+        if len(self.rows) == 1 and self.asked == f"node {self.names[0]}":
+            return f"{self.asked} at [{x}]"
         if len(self.rows) == 1:
             return f"{self.asked}: node {self.names[0]} at [{x}]" + (
                 f", {self.distance:.3g} away" if self.asked.startswith("[") else ""

@@ -116,7 +116,7 @@ def summary_section(result: ShakeResult) -> Section:
                     Cell(run.outputs[k].name, note=run.outputs[k].place),
                     Cell(number(factor * peaks[k]), "n"),
                     Cell(number(factor * uncertain[k]), "n"),
-                    Cell(unit),
+                    Cell(unit.replace(" ", "\u00a0")),
                     Cell(what),
                 ]
             )
@@ -236,7 +236,7 @@ def sine_section(result: ShakeResult, run: SineRun, number_: int) -> Section:
             cells.append(Cell(number(s * swept[k]), "n", note=f"{100 * swept[k] / run.peaks[k]:.1f} %"))
         if notched is not None:
             cells.append(Cell(number(s * notched.sizes[:, k].max()), "n"))
-        rows.append([*cells, Cell(unit)])
+        rows.append([*cells, Cell(unit.replace(" ", "\u00a0"))])
     words = f"Sine {run.frequencies[0]:g} to {run.frequencies[-1]:g} Hz"
     words += (
         ""
@@ -310,7 +310,7 @@ def random_section(result: ShakeResult, run: RandomRun, number_: int) -> Section
         cells.append(Cell(number(s * run.uncertain[k]), "n"))
         if notched is not None and notched.rms is not None:
             cells.append(Cell(number(s * notched.rms[k]), "n"))
-        rows.append([*cells, Cell(unit)])
+        rows.append([*cells, Cell(unit.replace(" ", "\u00a0"))])
     given = ", ".join(
         f"{name} {value * level_scale(result.model, name):.4g}{' g' if ':r' not in name else ''} rms"
         for name, value in zip(run.inputs, run.input_rms, strict=True)
@@ -398,7 +398,7 @@ def time_section(result: ShakeResult, run: TimeRun, number_: int) -> Section:
                 Cell(number(s * run.peaks[k]), "n"),
                 Cell(number(1e3 * run.peak_times[k]), "n"),
                 Cell(number(s * run.uncertain[k]), "n"),
-                Cell(unit),
+                Cell(unit.replace(" ", "\u00a0")),
             ]
         )
     length, second = result.model.units.length_symbol, result.model.units.time_symbol

@@ -165,7 +165,7 @@ def test_a_sensor_at_a_node_of_a_line_is_an_interface_there():
         ours = np.stack([found[name].columns[axis] for axis in "xyz"], axis=1)
         assert_allclose(ours, values, rtol=0, atol=1e-9 * np.abs(values).max())
     assert found["s"].columns["von Mises"].max() > 0  # of the skin: a line itself has no stress
-    assert taken_places(system)["a"] == ("node 60: node 60 at [0.625, 0, 0]",)
+    assert taken_places(system)["a"] == ("node 60 at [0.625, 0, 0]",)
     local = reduced.interface("middle").position
     assert_allclose(point_motion(motion, "bar", local, reduced=reduced).omega, exact.omega, rtol=0, atol=1e-9)
 
