@@ -270,7 +270,7 @@ def test_the_file_of_a_system_names_nodes_sets_and_elements_and_its_run_says_whi
     done = CliRunner().invoke(app, ["run", str(tmp_path / "bar.toml"), "-o", str(tmp_path / "out.h5")])
     assert done.exit_code == 0, done.output
     places = read_results(tmp_path / "out.h5").head.places
-    assert places["tip"] == (f"node {number}: node {number} at [1, 0, 0.04]",)
+    assert places["tip"] == (f"node {number} at [1, 0, 0.04]",)
     assert places["near"][0].startswith("[1, 0, 0.01]: node")
     assert places["near"][0].endswith("0.01 away")
     assert places["hot"] == ("set 'right': 8 nodes about [1, 0.02, 0.02]",)
