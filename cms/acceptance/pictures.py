@@ -1,20 +1,16 @@
 """Pictures of an acceptance: the body with its interfaces, and sums of effective mass."""
 
 import io
-import logging
-import tempfile
-from pathlib import Path
 
 import numpy as np
 
 from cms.quality.of_body.effective_mass import DIRECTIONS, EffectiveMass
 from cms.reduced_body.reduced_body import ReducedBody
-from cms.rendering import RenderError, Scene, Surface, Triad, render_picture
+from cms.rendering import Scene, Surface, Triad, render_picture
+from cms.report.png import png_of
 from cms.report.view import view_axes
 
 __all__ = ["body_picture", "mass_picture"]
-
-log = logging.getLogger(__name__)
 
 SIZE = (1280, 640)  #: of the picture of a body [px]
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#56B4E9", "#E69F00", "#CC79A7")
@@ -39,14 +35,7 @@ def body_picture(body: ReducedBody) -> bytes | None:
         up=up,
         size=SIZE,
     )
-    with tempfile.TemporaryDirectory(prefix="acceptance-") as folder:
-        path = Path(folder) / "body.png"
-        try:
-            render_picture(scene, path)
-        except RenderError as error:
-            log.warning("the acceptance goes without a picture of the body: %s", error)
-            return None
-        return path.read_bytes()
+    return png_of(lambda path: render_picture(scene, path), "the acceptance")
 
 
 def mass_picture(found: EffectiveMass) -> bytes:

@@ -1,7 +1,7 @@
 """Modes of the model that a test is compared with: of a full model as it stands free or held, or of a modal file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,7 +31,6 @@ class ModelModes:
     numbering: Numbering
     columns: Array | None = None  #: of a full model: the modes over its dofs, M-orthonormal, (n_dof, n)
     is_free: bool = True
-    #: mass of a full model over the translations that are asked for is not stored; see `criteria.test_mass`
 
     @property
     def size(self) -> float:
@@ -93,10 +92,3 @@ def modes_of_file(reduced: ReducedBody) -> ModelModes:
 def at_rows(model: ModelModes, rows: IntArray, directions: Array) -> Array:
     """Return the shapes at nodes along directions, (n_rows, n)."""
     return np.asarray(np.einsum("ra,rak->rk", directions, model.shapes[rows]))
-
-
-def with_modes(model: ModelModes, modes: Sequence[int]) -> ModelModes:
-    """Return some of the modes, by index from 0."""
-    keep = list(modes)
-    columns = None if model.columns is None else model.columns[:, keep]
-    return replace(model, frequencies=model.frequencies[keep], shapes=model.shapes[:, :, keep], columns=columns)

@@ -1,16 +1,13 @@
 """A result as one HTML page that works offline: life first, then what it rests on."""
 
 import base64
-import logging
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cms.rendering import RenderError
 from cms.report.charts import base_layout
 from cms.report.html import Cell, Section, figure, page, table, text
+from cms.report.png import png_of
 from floatframe.fatigue.assessment import Assessment
 from floatframe.fatigue.criteria import CRITERIA
 from floatframe.fatigue.load_spectrum import cycles_at, exceedances
@@ -19,8 +16,6 @@ from floatframe.fatigue.outputs import fatigue_record, render_fatigue
 __all__ = ["fatigue_html"]
 
 MOST_CYCLES = 1e10  #: that the S-N curve is drawn to
-
-log = logging.getLogger(__name__)
 
 
 def fatigue_html(made: Assessment) -> str:
@@ -70,14 +65,10 @@ def header(record: dict[str, Any]) -> str:
 
 def picture_section(made: Assessment) -> Section | None:
     """Damage on the surface."""
-    with tempfile.TemporaryDirectory(prefix="fatigue-") as folder:
-        path = Path(folder) / "damage.png"
-        try:
-            render_fatigue(made, path)
-        except RenderError as error:
-            log.warning("the page goes without the picture: %s", error)
-            return None
-        png = base64.b64encode(path.read_bytes()).decode()
+    drawn = png_of(lambda path: render_fatigue(made, path), "the page")
+    if drawn is None:
+        return None
+    png = base64.b64encode(drawn).decode()
     picture = f'<img src="data:image/png;base64,{png}" alt="damage on the surface" style="width:100%">'
     return Section(
         "surface", "Where it fails", "Surface", picture,
