@@ -1,3 +1,4 @@
+from . import shapes as shapes
 from .analyses import BaseMotion as BaseMotion
 from .analyses import Column as Column
 from .analyses import DriveMotion as DriveMotion

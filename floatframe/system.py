@@ -14,6 +14,7 @@ from floatframe.errors import ModelError
 from floatframe.forces import Force, Gravity
 from floatframe.joints import Joint
 from floatframe.joints.coordinate_coupler import CoordinateCoupler
+from floatframe.shapes.shape import Geometry, Shape, shape_tuple
 
 __all__ = ["Body", "Named", "System"]
 
@@ -54,6 +55,7 @@ class System:
     outputs: Sequence[Named] = field(default=(), kw_only=True)  #: what is then observed
     events: Sequence[Named] = field(default=(), kw_only=True)  #: what a run does when a value passes a level
     fmus: Sequence[Named] = field(default=(), kw_only=True)  #: units of other programs, see `co_simulate`
+    scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: what stands around: ground, road, track
     source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
     data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of the signals it was made with
 
@@ -66,6 +68,7 @@ class System:
         object.__setattr__(self, "couplers", (*self.couplers, *among))
         object.__setattr__(self, "joints", tuple(joint for joint in self.joints if joint not in among))
         where = f"system {self.name!r}"
+        object.__setattr__(self, "scene", shape_tuple(f"{where}: scene", self.scene))
         if self.redundant not in REDUNDANT:
             raise ModelError(f"{where}: redundant: expected one of {', '.join(REDUNDANT)}, got {self.redundant!r}")
         if not self.bodies:

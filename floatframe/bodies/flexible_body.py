@@ -1,5 +1,6 @@
 """A flexible body: a reduced body (modal file) with a place and a motion at the start."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -13,6 +14,7 @@ from floatframe.bodies.rigid_body import euler_parameters_from_user
 from floatframe.checked_values import array_of_shape
 from floatframe.errors import ModelError
 from floatframe.rotations import rotation_matrix
+from floatframe.shapes.shape import Geometry, Shape, shape_tuple
 
 __all__ = ["FlexibleBody"]
 
@@ -46,6 +48,8 @@ class FlexibleBody:
     #: whether inertia terms that the reduced body does not know (`Moments.missing`) are left out of the motion, which
     #: is then exact to first order in speeds and deformation; False: a body without them is refused
     leave_out_missing: bool = False
+    #: what it looks like besides its surface, in mesh axes or in those of interfaces
+    shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         where = f"flexible body {self.name!r}"
@@ -59,6 +63,8 @@ class FlexibleBody:
         for name in ("position", "velocity", "omega_B"):
             put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))
         put(self, "orientation", euler_parameters_from_user(f"{where}: orientation", self.orientation))
+        interfaces = [interface.name for interface in self.reduced.interfaces]
+        put(self, "shapes", shape_tuple(where, self.shapes, interfaces))
         n = self.reduced.n_q
         for name in ("q", "q_dot"):
             value = getattr(self, name) if np.size(getattr(self, name)) else np.zeros(n)

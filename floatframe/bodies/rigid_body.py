@@ -1,5 +1,6 @@
 """A rigid body from its mass properties."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,6 +9,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import array_of_shape, number
 from floatframe.errors import ModelError
+from floatframe.shapes.shape import Geometry, Shape, shape_tuple
 
 __all__ = ["RigidBody"]
 
@@ -34,6 +36,7 @@ class RigidBody:
     velocity: Array = field(default_factory=lambda: np.zeros(3))  #: of the frame origin, ground axes, (3,) [m/s]
     #: angular velocity in body axes, (3,) [rad/s]
     omega_B: Array = field(default_factory=lambda: np.zeros(3))  # noqa: N815
+    shapes: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: what it looks like, in the body frame
 
     def __post_init__(self) -> None:
         where = f"rigid body {self.name!r}"
@@ -43,6 +46,7 @@ class RigidBody:
         for name in ("center_of_mass", "position", "velocity", "omega_B"):
             put(self, name, array_of_shape(f"{where}: {name}", getattr(self, name), (3,)))
         put(self, "orientation", euler_parameters_from_user(f"{where}: orientation", self.orientation))
+        put(self, "shapes", shape_tuple(where, self.shapes))
         scale = np.abs(self.inertia).max()
         if np.abs(self.inertia - self.inertia.T).max() > 1e-9 * scale:
             raise ModelError(f"{where}: inertia: expected a symmetric tensor, got {self.inertia.tolist()}")

@@ -1,4 +1,4 @@
-"""Films of a computed motion: deformed bodies coloured by displacement, rigid ones as boxes, over a ground grid."""
+"""Films of a computed motion: deformed bodies coloured by displacement, rigid ones by shapes or boxes, on a ground."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,10 +17,12 @@ from floatframe.errors import ResultsError
 from floatframe.pictures.body_colors import DISPLACEMENT, BodyColor
 from floatframe.pictures.film_times import FilmTimes, film_times, round_below, speed_words, time_words
 from floatframe.pictures.glyphs import glyphs
+from floatframe.pictures.looks import looks_of, places_over
 from floatframe.pictures.stage import box_of, ground_grid, view_axes
 from floatframe.results.recovery import nodal_displacements
 from floatframe.results.trajectory import BodyMotion, Trajectory
-from floatframe.system import System
+from floatframe.shapes import Piece
+from floatframe.system import Body, System
 
 __all__ = ["animate", "bodies_of", "motion_scene"]
 
@@ -129,12 +131,20 @@ def motion_scene(
     if magnification is None:
         magnification = chosen_magnification(flexible, displacements)
     surfaces, triads, lines = [], [], []
+    named: dict[str, Body] = {name: body for name, body in bodies.items() if isinstance(body, RigidBody)}
+    named |= {} if system is None else {body.name: body for body in system.bodies}
     scalars = {name: color.values(body, motions[name].q[rows]) for name, body in flexible.items()}
     name_unit, unit_factor = color.unit(trajectory.units, largest_of(scalars))
     frames = {name: (motion.r[rows], rotations(motion.p[rows])) for name, motion in motions.items()}
     size = scene_size(flexible, frames)
     for name, (r, R) in frames.items():
         body = flexible.get(name)
+        looks = looks_of(named[name]) if name in named else ()
+        for look in looks:
+            at = places_over(look, r, R, motions[name].q[rows], magnification)
+            drawn_surfaces, drawn_lines = drawn_piece(look.piece, at, name)
+            surfaces += drawn_surfaces
+            lines += drawn_lines
         if body is not None and len(body.surface):
             moved = displacements[name]
             nodes = r[:, None] + (body.nodes + magnification * moved) @ R.transpose(0, 2, 1)
@@ -143,6 +153,8 @@ def motion_scene(
                 path = interface_path(motions[name], interface, magnification)
                 triads.append(Triad(path[rows], R @ interface.triad, 0.06 * size, interface.name))
                 lines.append(trail(path, rows))
+        elif looks:
+            lines.append(trail(motions[name].r, rows))
         else:
             rigid = bodies.get(name)
             own = rigid if isinstance(rigid, RigidBody) else None
@@ -153,22 +165,33 @@ def motion_scene(
             surfaces.append(Surface(triangles, moved, color=RIGID_COLOR, opacity=opacity, name=name))
             triads.append(Triad(r, R, 0.06 * size, name))
             lines.append(trail(motions[name].r, rows))
-    points = np.concatenate([surface.nodes.reshape(-1, 3)[::7] for surface in surfaces])
+    seen = [surface.nodes.reshape(-1, 3)[::7] for surface in surfaces]
+    points = np.concatenate([*seen, *(line.points.reshape(-1, 3)[::7] for line in lines)])
     up_axis = up_of(trajectory, points) if up is None else np.asarray(up, dtype=float)
     direction, up_axis = view_axes(points, up_axis)
     ground, step = ground_grid(points, up_axis)
+    around = () if system is None else tuple(piece for shape in system.scene for piece in shape.pieces())
+    for piece in around:
+        drawn_surfaces, drawn_lines = drawn_piece(piece, piece.nodes, "")
+        surfaces += drawn_surfaces
+        lines += drawn_lines
+    has_ground = any(piece.is_ground for piece in around)
     reach = max(size, 0.5 * float(np.linalg.norm(np.ptp(points, axis=0))))
     drawn = () if system is None else glyphs(system, trajectory, rows, reach, magnification, up_axis)
+    words = [speed_words(times.speed)]
+    if magnification != 1:
+        words.append(f"elastic displacement drawn {magnification:,.6g} times larger")
+    if not has_ground:
+        words.append(f"ground grid {step:g} {trajectory.units.length_symbol}")
     return Scene(
         surfaces=tuple(surfaces),
-        lines=(ground, *drawn, *(line for line in lines if np.ptp(line.points, axis=(0, 1)).max() > 1e-3 * size)),
+        lines=(
+            *(() if has_ground else (ground,)), *drawn,
+            *(line for line in lines if np.ptp(line.points.reshape(-1, 3), axis=0).max() > 1e-3 * size),
+        ),
         triads=tuple(triads),
         title=trajectory.head.system,
-        captions=(
-            f"{speed_words(times.speed)}; "
-            + (f"elastic displacement drawn {magnification:,.6g} times larger; " if magnification != 1 else "")
-            + f"ground grid {step:g} {trajectory.units.length_symbol}",
-        ),
+        captions=("; ".join(words),),
         frame_notes=time_words(trajectory.t[rows] * trajectory.units.time),
         scalar_title=color.title if flexible else "",
         scalar_unit=name_unit if flexible else "",
@@ -176,6 +199,20 @@ def motion_scene(
         up=up_axis,
         size=(960, 720),
     )
+
+
+def drawn_piece(piece: Piece, nodes: Array, name: str) -> tuple[list[Surface], list[Lines]]:
+    """Return a piece at its places, (n, 3) or (n_frames, n, 3), as surfaces and lines."""
+    color = piece.color or RIGID_COLOR
+    surfaces, lines = [], []
+    if len(piece.triangles):
+        has_edges = not piece.is_ground
+        surfaces.append(
+            Surface(piece.triangles, nodes, color=color, opacity=piece.opacity, has_edges=has_edges, name=name)
+        )
+    if len(piece.segments):
+        lines.append(Lines(piece.segments, nodes, color=color, width=2.2, opacity=piece.opacity))
+    return surfaces, lines
 
 
 def connections(system: System | None, name: str) -> Array | None:

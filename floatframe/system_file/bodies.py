@@ -22,6 +22,7 @@ from floatframe.errors import ModelError
 from floatframe.rotations import euler_parameters_of_rotation_vector
 from floatframe.system import Body
 from floatframe.system_file.keys import Count, Name, Numbers, Parameters4, Positive
+from floatframe.system_file.shape_section import ShapeSection
 
 __all__ = ["BodySection", "body_of"]
 
@@ -71,6 +72,7 @@ class BodySection(Table):
     leave_out_missing: bool | None = Field(
         None, description="true: move a body whose file lacks inertia terms without them"
     )
+    shapes: list[ShapeSection] = Field([], description="tables [[bodies.NAME.shapes]], what it looks like")
 
     @field_validator("file", mode="before")
     @classmethod
@@ -127,6 +129,7 @@ def body_of(name: str, section: BodySection, files: dict[Any, ReducedBody], unit
         "orientation": orientation,
         "velocity": section.velocity,
         "omega_B": section.omega_B,
+        "shapes": [each.shape for each in section.shapes],
     }
     if section.file is None:
         assert section.mass is not None  # checked by the table

@@ -41,6 +41,7 @@ from floatframe.system_file.joints import CouplerSection, JointSection, coupler_
 from floatframe.system_file.keys import Name
 from floatframe.system_file.run_section import RunOptions, RunSection
 from floatframe.system_file.sensor_section import SensorSection
+from floatframe.system_file.shape_section import ShapeSection
 from floatframe.system_file.signal_section import SignalSection, signal_functions
 from floatframe.system_file.unit_hints import unit_hints
 
@@ -78,6 +79,7 @@ class SystemFile(Table):
     fmu: FmuSection | None = Field(None, description="a table [fmu] with inputs, outputs and parameters")
     fmus: dict[str, ForeignSection] = Field({}, description="tables [fmus.NAME]")
     cosimulation: CosimulationSection | None = Field(None, description="a table [cosimulation] with step and scheme")
+    scene: list[ShapeSection] = Field([], description="tables [[scene]], what stands around: ground, road, track")
     run: RunSection | None = Field(None, description="a table [run] with t_end and h")
 
     @model_validator(mode="after")
@@ -139,6 +141,7 @@ def read_system(
             outputs=[section.output(key, sensors) for key, section in data.outputs.items()],
             events=[section.event(key) for key, section in data.events.items()],
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
+            scene=[section.shape for section in data.scene],
             source=str(path.resolve()),
             data_files=tuple(dict.fromkeys(str(section.file) for section in data.signals.values())),
         )  # fmt: skip

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.modal_file.file import digest, write
 from cms.rendering import render
+from floatframe import GeneralizedAlpha, System, integrate
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ResultsError
 from floatframe.pictures.animation import animate, bodies_of, motion_scene, trail
@@ -16,6 +17,7 @@ from floatframe.results.head import BodyEntry, Head
 from floatframe.results.results_file import MemorySource
 from floatframe.results.trajectory import Trajectory
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.shapes import Road, Wheel
 from tests.synthetic import synthetic_reduced_body
 
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -285,3 +287,17 @@ def test_bodies_that_do_not_fit_the_motion_are_refused(body):
         motion_scene(trajectory, {"rodd": body}, times)
     with pytest.raises(ResultsError, match="has 3 modes, but its motion 5"):
         motion_scene(trajectory, {"rod": replace(synthetic_reduced_body(n_q=3), surface=TETRAHEDRON)}, times)
+
+
+def test_shapes_of_bodies_and_surroundings_are_drawn_where_the_bodies_are():
+    wheel = RigidBody("wheel", 1.0, np.eye(3), position=(0, 0, 0.3), omega_B=(0, 2.0, 0), shapes=[Wheel(0.3, 0.1)])
+    system = System([wheel], scene=[Road([(-1, 0, 0), (1, 0, 0)], 1.0)])
+    motion = integrate(system, GeneralizedAlpha(0.8), 0.2, 1e-2)
+    times = film_times(motion.t, fps=25.0, speed=1.0, n_nodes=100)
+    scene = motion_scene(motion, {"wheel": wheel}, times, system=system)
+    tyre = next(surface for surface in scene.surfaces if surface.color == Wheel(0.3, 0.1).pieces()[0].color)
+    angle = 2.0 * motion.t[times.rows[-1]]
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    assert_allclose(tyre.nodes[-1], (tyre.nodes[0] - (0, 0, 0.3)) @ turn.T + (0, 0, 0.3), rtol=0, atol=1e-8)
+    assert any(surface.color == Road([(-1, 0, 0), (1, 0, 0)], 1.0).pieces()[0].color for surface in scene.surfaces)
+    assert "grid" not in scene.captions[0]

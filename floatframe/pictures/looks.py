@@ -1,0 +1,54 @@
+"""Shapes of bodies over a motion: where their nodes are, with the deformation of what carries them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.marker_shape import MarkerShape, interface_shape
+from floatframe.rotations import rotation_exp, turned
+from floatframe.shapes import Piece
+from floatframe.shapes.shape import Shape
+from floatframe.system import Body
+
+__all__ = ["Look", "carrier_of", "looks_of", "places_over"]
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A piece with what carries it in its body."""
+
+    piece: Piece  #: in the axes of the carrier
+    carrier: MarkerShape  #: in the body frame, as the results file has it
+
+
+def looks_of(body: Body) -> tuple[Look, ...]:
+    """Return the shapes of a body."""
+    return tuple(Look(piece, carrier_of(body, shape)) for shape in body.shapes for piece in shape.pieces())
+
+
+def carrier_of(body: Body, shape: Shape) -> MarkerShape:
+    """Return what carries a shape: an interface, the mesh axes of a flexible body, or the frame of a rigid one."""
+    if not isinstance(body, FlexibleBody):
+        return MarkerShape(np.zeros(3), np.eye(3))
+    if shape.interface is not None:
+        return interface_shape(body.reduced, shape.interface, is_stiffened=body.is_stiffened)
+    frame = body.reduced.frame
+    return MarkerShape(-frame.axes.T @ frame.origin, frame.axes.T)
+
+
+def places_over(look: Look, r: Array, R: Array, q: Array, magnification: float = 1.0) -> Array:
+    """Return the nodes of a piece in ground axes over a motion, (n_t, n, 3).
+
+    Parameters
+    ----------
+    r, R, q
+        Of its body: (n_t, 3), (n_t, 3, 3), (n_t, n_q).
+    magnification
+        How many times larger the displacement and rotation of its carrier are drawn.
+    """
+    d = magnification * look.carrier.deformation(q)
+    axes = rotation_exp(d[:, 3:]) @ look.carrier.triad
+    local = (look.carrier.position + d[:, :3])[:, None] + np.einsum("tab,nb->tna", axes, look.piece.nodes)
+    return np.asarray(r[:, None] + turned(R[:, None], local))

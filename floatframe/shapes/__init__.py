@@ -1,0 +1,61 @@
+"""What bodies, wheels, ground, rails and elements look like: plain data for films, pictures and pages.
+
+A *geometry* (box, cylinder, wheel, road, ...) knows its own axes and gives `Piece`s: triangles and lines of one colour.
+A `Shape` is a geometry with a place, a colour and, on a flexible body, the interface that carries it. Bodies carry
+shapes (`RigidBody(shapes=...)`, `FlexibleBody(shapes=...)`), a system its surroundings (`System(scene=...)`), and
+`Element.drawn()` returns `Drawn`, `Stretched` and `Arrow`, which follow the markers of the element. Nothing of it acts
+on a motion.
+"""
+
+from floatframe.shapes.drawn import Arrow, Drawn, Stretched
+from floatframe.shapes.grounds import Plane, Road, Terrain, Track
+from floatframe.shapes.line import Line
+from floatframe.shapes.mesh import Mesh
+from floatframe.shapes.piece import Piece
+from floatframe.shapes.prisms import Box, Extrusion
+from floatframe.shapes.rounds import Cylinder, Revolution, Sphere
+from floatframe.shapes.shape import Geometry, Shape
+from floatframe.shapes.sweeps import Tube
+from floatframe.shapes.wheels import RailWheel, Wheel
+
+__all__ = [
+    "GEOMETRIES",
+    "Arrow",
+    "Box",
+    "Cylinder",
+    "Drawn",
+    "Extrusion",
+    "Geometry",
+    "Line",
+    "Mesh",
+    "Piece",
+    "Plane",
+    "RailWheel",
+    "Revolution",
+    "Road",
+    "Shape",
+    "Sphere",
+    "Stretched",
+    "Terrain",
+    "Track",
+    "Tube",
+    "Wheel",
+]
+
+#: for the system file: the fields of each class are its keys
+GEOMETRIES = {
+    "box": Box,
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "revolution": Revolution,
+    "extrusion": Extrusion,
+    "tube": Tube,
+    "wheel": Wheel,
+    "rail-wheel": RailWheel,
+    "line": Line,
+    "mesh": Mesh,
+    "plane": Plane,
+    "terrain": Terrain,
+    "road": Road,
+    "track": Track,
+}

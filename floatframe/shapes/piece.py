@@ -1,0 +1,37 @@
+"""A piece of a drawing: triangles, or lines, of one colour."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["Piece", "joined", "shifted"]
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Triangles or lines of one colour, in the axes of what carries them."""
+
+    nodes: Array  #: (n, 3) [m]
+    triangles: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: outward ones turn left
+    segments: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: ends of lines
+    color: str = ""  #: "#rrggbb"; "": that of the shape, or of whatever carries it
+    opacity: float = 1.0
+    is_ground: bool = False  #: whether it takes no part in the size of what is seen
+
+
+def shifted(piece: Piece, position: Array, R: Array) -> Piece:
+    """Return the piece turned by R, (3, 3), then moved by position, (3,)."""
+    return replace(piece, nodes=piece.nodes @ np.asarray(R).T + np.asarray(position))
+
+
+def joined(pieces: list[Piece]) -> Piece:
+    """Return several pieces as one, with the colour of the first."""
+    starts = np.cumsum([0, *(len(piece.nodes) for piece in pieces)])
+    return replace(
+        pieces[0],
+        nodes=np.concatenate([piece.nodes for piece in pieces]),
+        triangles=np.concatenate([piece.triangles + s for piece, s in zip(pieces, starts, strict=False)]),
+        segments=np.concatenate([piece.segments + s for piece, s in zip(pieces, starts, strict=False)]),
+    )

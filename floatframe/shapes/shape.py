@@ -1,0 +1,107 @@
+"""A geometry with its place and colour: what a body, or the surroundings, look like."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from floatframe.checked_values import array_of_shape, number
+from floatframe.errors import ModelError
+from floatframe.rotations import rotation_exp
+from floatframe.shapes.piece import Piece, shifted
+
+__all__ = ["Geometry", "Shape", "shape_tuple"]
+
+COLOR = re.compile(r"#[0-9a-fA-F]{6}")
+#: words that may stand for colours
+NAMED = {
+    "steel": "#9aa7b3", "aluminium": "#c3cad0", "dark": "#3b4249", "black": "#24272b", "white": "#eef0f1",
+    "red": "#c4473a", "orange": "#d98a3d", "yellow": "#d9b84a", "green": "#5f9a63",
+    "blue": "#4a7fb5", "gold": "#c7a24a",
+}  # fmt: skip
+
+
+class Geometry(Protocol):
+    """What has a surface or lines of its own axes."""
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Return the pieces it is drawn by."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A geometry with place and colour.
+
+    Raises
+    ------
+    ModelError
+        If a number is not finite, or the colour is none.
+    """
+
+    geometry: Geometry
+    #: of its origin [m] in the axes of the body (of a flexible one those of its mesh), of the interface, of the ground
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    rotation_vector: Array = field(default_factory=lambda: np.zeros(3))  #: how it is turned in them, (3,) [rad]
+    color: str | None = None  #: "#rrggbb" or a name in `NAMED`; None: of its kind, else of its body
+    opacity: float = 1.0  #: 0 < opacity <= 1
+    interface: str | None = None  #: of a flexible body: what it is fixed to; None: the frame of the body
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        if not callable(getattr(self.geometry, "pieces", None)):
+            raise ModelError(f"shape: expected a geometry such as Box or Wheel, got {self.geometry!r}")
+        for name in ("position", "rotation_vector"):
+            put(self, name, array_of_shape(f"shape: {name}", getattr(self, name), (3,)))
+        put(self, "opacity", number("shape: opacity", self.opacity, above=0.0))
+        if self.opacity > 1:
+            raise ModelError(f"shape: opacity: expected a number up to 1, got {self.opacity:g}")
+        if self.color is not None:
+            put(self, "color", color_of(self.color))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Return its pieces in the axes of what carries it, with its colour and opacity where it has them."""
+        R = rotation_exp(self.rotation_vector)
+        return tuple(
+            replace(
+                shifted(piece, self.position, R), color=self.color or piece.color, opacity=self.opacity * piece.opacity
+            )
+            for piece in self.geometry.pieces()
+        )
+
+
+def color_of(text: str) -> str:
+    """Return "#rrggbb" of a colour; `ModelError` if it is none."""
+    if text in NAMED:
+        return NAMED[text]
+    if not isinstance(text, str) or not COLOR.fullmatch(text):
+        raise ModelError(f'shape: color: expected "#rrggbb" or one of {", ".join(NAMED)}, got {text!r}')
+    return text.lower()
+
+
+def shape_tuple(where: str, shapes: object, interfaces: Sequence[str] = ()) -> tuple[Shape, ...]:
+    """Return shapes as a tuple; a geometry among them becomes one at the origin.
+
+    Parameters
+    ----------
+    interfaces
+        To which they may be fixed.
+
+    Raises
+    ------
+    ModelError
+        If one of them is neither, or is fixed to an interface that does not exist.
+    """
+    if not isinstance(shapes, Sequence):
+        shapes = (shapes,)
+    found = []
+    for each in shapes:
+        shape = each if isinstance(each, Shape) else Shape(each)
+        if shape.interface is not None and shape.interface not in interfaces:
+            hint = nearest(shape.interface, interfaces) if interfaces else "; it has none"
+            raise ModelError(f"{where}: shapes: there is no interface {quoted(shape.interface)}{hint}")
+        found.append(shape)
+    return tuple(found)

@@ -1,0 +1,93 @@
+"""Outlines moved along a curve: bent tubes, rails."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.checked_values import number
+from floatframe.errors import ModelError
+from floatframe.shapes.grids import grid_triangles
+from floatframe.shapes.piece import Piece
+
+__all__ = ["Tube", "along", "points_3", "swept"]
+
+AROUND = 16  #: nodes of the circle of a tube
+
+
+@dataclass(frozen=True, eq=False)
+class Tube:
+    """A round bar along a line of points."""
+
+    points: Array  #: (n, 3) [m]
+    radius: float  #: [m]
+    is_closed: bool = False  #: whether the last point is joined to the first
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", points_3("tube: points", self.points, 2))
+        object.__setattr__(self, "radius", number("tube: radius", self.radius, above=0.0))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Return its surface."""
+        angle = 2 * np.pi * np.arange(AROUND) / AROUND
+        circle = self.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        axes = carried_axes(self.points, is_closed=self.is_closed)
+        return (swept(circle, self.points, axes, is_closed=self.is_closed),)
+
+
+def swept(outline: Array, points: Array, axes: Array, *, is_closed: bool = False, has_caps: bool = True) -> Piece:
+    """Return an outline, (m, 2), moved along a curve.
+
+    Parameters
+    ----------
+    outline
+        Turns left where the curve comes towards the eye.
+    points, axes
+        Of the curve: (n, 3), and (n, 3, 2): where both axes of the outline point.
+    """
+    m, n = len(outline), len(points)
+    nodes = (points[:, None] + np.einsum("nak,mk->nma", axes, outline)).reshape(-1, 3)
+    triangles = grid_triangles(n, m, closes_n=is_closed, closes_m=True)[:, ::-1]
+    if has_caps and not is_closed:
+        fan = np.stack([np.zeros(m - 2, np.int64), np.arange(1, m - 1), np.arange(2, m)], axis=1)
+        triangles = np.concatenate([triangles, fan[:, ::-1], fan + (n - 1) * m])
+    return Piece(nodes, triangles)
+
+
+def along(points: Array, *, is_closed: bool = False) -> Array:
+    """Return the unit direction of a line of points at each, (n, 3)."""
+    if is_closed:
+        d = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    else:
+        steps = np.diff(points, axis=0)
+        steps = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-300)
+        d = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+    return np.asarray(d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-300))
+
+
+def carried_axes(points: Array, *, is_closed: bool = False) -> Array:
+    """Return two axes across a line of points that turn about it as little as may be, (n, 3, 2)."""
+    d = along(points, is_closed=is_closed)
+    x = np.cross(d[0], np.eye(3)[int(np.argmin(np.abs(d[0])))])
+    found = []
+    for direction in d:
+        x = x - (x @ direction) * direction
+        x = x / np.linalg.norm(x)
+        found.append(np.stack([x, np.cross(direction, x)], axis=1))
+    return np.array(found)
+
+
+def points_3(where: str, values: Any, least: int) -> Array:
+    """Return finite points, (n, 3), read-only, no two following ones equal."""
+    try:
+        points = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        points = np.zeros(0)
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) < least or not np.isfinite(points).all():
+        raise ModelError(f"{where}: expected {least} or more finite points [x, y, z], got shape {points.shape}")
+    if len(points) > 1 and np.linalg.norm(np.diff(points, axis=0), axis=1).min() == 0:
+        k = int(np.linalg.norm(np.diff(points, axis=0), axis=1).argmin())
+        raise ModelError(f"{where}: points {k + 1} and {k + 2} are the same, {points[k].tolist()}; remove one")
+    points.flags.writeable = False
+    return points
