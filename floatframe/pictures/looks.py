@@ -25,7 +25,8 @@ class Look:
 
 def looks_of(body: Body) -> tuple[Look, ...]:
     """Return the shapes of a body."""
-    return tuple(Look(piece, carrier_of(body, shape)) for shape in body.shapes for piece in shape.pieces())
+    shapes = [shape for shape in body.shapes if isinstance(shape, Shape)]  # bodies make shapes of geometries
+    return tuple(Look(piece, carrier_of(body, shape)) for shape in shapes for piece in shape.pieces())
 
 
 def carrier_of(body: Body, shape: Shape) -> MarkerShape:

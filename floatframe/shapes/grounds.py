@@ -113,8 +113,9 @@ class Track:
         for name, share in (("rail_height", 0.115), ("sleeper_distance", 0.4)):
             given = getattr(self, name)
             put(self, name, share * self.gauge if given is None else number(f"track: {name}", given, above=0.0))
-        put(self, "cant", cants(self.cant, len(self.points)))
-        if np.abs(self.cant).max() >= self.gauge:
+        cant = cants(self.cant, len(self.points))
+        put(self, "cant", cant)
+        if np.abs(cant).max() >= self.gauge:
             raise ModelError(f"track: cant: expected less than the gauge {self.gauge:g}")
 
     def pieces(self) -> tuple[Piece, ...]:

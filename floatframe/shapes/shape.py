@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -82,7 +82,7 @@ def color_of(text: str) -> str:
     return text.lower()
 
 
-def shape_tuple(where: str, shapes: object, interfaces: Sequence[str] = ()) -> tuple[Shape, ...]:
+def shape_tuple(where: str, shapes: Any, interfaces: Sequence[str] = ()) -> tuple[Shape, ...]:
     """Return shapes as a tuple; a geometry among them becomes one at the origin.
 
     Parameters

@@ -296,7 +296,7 @@ def test_shapes_of_bodies_and_surroundings_are_drawn_where_the_bodies_are():
     times = film_times(motion.t, fps=25.0, speed=1.0, n_nodes=100)
     scene = motion_scene(motion, {"wheel": wheel}, times, system=system)
     tyre = next(surface for surface in scene.surfaces if surface.color == Wheel(0.3, 0.1).pieces()[0].color)
-    angle = 2.0 * motion.t[times.rows[-1]]
+    angle = 2.0 * (motion.t[times.rows[-1]] - motion.t[times.rows[0]])
     turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
     assert_allclose(tyre.nodes[-1], (tyre.nodes[0] - (0, 0, 0.3)) @ turn.T + (0, 0, 0.3), rtol=0, atol=1e-8)
     assert any(surface.color == Road([(-1, 0, 0), (1, 0, 0)], 1.0).pieces()[0].color for surface in scene.surfaces)
