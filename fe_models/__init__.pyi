@@ -85,6 +85,7 @@ from .meshes.split import Split as Split
 from .meshes.split import split_mesh as split_mesh
 from .meshes.unused_nodes import drop_unused_nodes as drop_unused_nodes
 from .planar import planar as planar
+from .recovery.element_points import element_points as element_points
 from .reports.mesh_report import MeshReport as MeshReport
 from .reports.mesh_report import report_mesh as report_mesh
 from .reports.report import Finding as Finding

@@ -60,6 +60,7 @@ from .fatigue.fatigue_file import read_fatigue as read_fatigue
 from .fatigue.load_blocks import LoadBlock as LoadBlock
 from .fatigue.load_blocks import block_of_results as block_of_results
 from .fatigue.mean_stress import MeanStress as MeanStress
+from .fatigue.places import FatigueMaterial as FatigueMaterial
 from .fatigue.shaken import shaken_damage as shaken_damage
 from .fatigue.sn_curve import SNCurve as SNCurve
 from .fatigue.sn_curve import basquin_curve as basquin_curve

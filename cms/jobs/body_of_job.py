@@ -42,10 +42,17 @@ def coupled_body(job: Job, body: FEBody) -> FEBody:
 
 
 def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
-    """Run a job up to the body whose interfaces are still to be coupled, with the nodes that it asks to be kept."""
+    """Run a job up to the body whose interfaces are still to be coupled, with the nodes and points it asks for."""
     from fe_models.body.kept_nodes import keep_nodes
 
-    return keep_nodes(made_body(job, stages, on_report), job.body.keep)
+    body = keep_nodes(made_body(job, stages, on_report), job.body.keep)
+    if not job.body.stress_points:
+        return body
+    from fe_models.recovery.element_points import element_points
+
+    if job.reduction.stress is False:
+        raise JobError("body.stress_points: with reduction.stress = false no stress is kept; remove one of them")
+    return element_points(body, job.body.stress_points)
 
 
 def made_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:

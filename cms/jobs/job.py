@@ -101,7 +101,16 @@ def kept(value: Any) -> tuple[Any, ...]:
     return tuple(entries)
 
 
+def elements_named(value: Any) -> tuple[Any, ...]:
+    """Return numbers of elements and names of sets; "all" alone is all of them."""
+    entries = value if isinstance(value, list) else [value]
+    if not entries or any(isinstance(each, bool) or not isinstance(each, int | str) or each == "" for each in entries):
+        raise ValueError('expected "all", or a list of numbers of elements and names of sets')
+    return tuple(entries)
+
+
 Keep = Annotated[tuple[Any, ...], BeforeValidator(kept)]
+StressPoints = Annotated[tuple[Any, ...], BeforeValidator(elements_named)]
 Names = Annotated[tuple[str, ...], BeforeValidator(names)]
 Nodes = Annotated[Name | tuple[int, ...], BeforeValidator(node_names)]
 FACES = "the name of a group of faces, of a CAD file also what they are (cylinder r=12), or a list of these"
@@ -170,6 +179,10 @@ class BodySection(Table):
     )
     incompatible_modes: bool = Field(False, description="true or false: bricks of eight nodes bend by internal modes")
     keep: Keep = Field((), description="a list of nodes that are kept: numbers, names of sets, positions [x, y, z]")
+    stress_points: StressPoints = Field(
+        (),
+        description='"all", or a list of elements, beams and shells, whose own stress is kept: numbers, names of sets',
+    )
     accept: Accepted = Field((), description=f"a list of findings to accept, of {', '.join(ACCEPTABLE)}")
 
     @field_validator("mesh", "deck", "geometry", "nodes", "lines", mode="before")

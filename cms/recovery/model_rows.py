@@ -225,7 +225,7 @@ def elements_of(body: FEBody, rows: Rows, groups: list[ElementGroup]) -> list[tu
         return [(group, np.arange(group.count)) for group in groups]
     found: list[tuple[ElementGroup, IntArray]] = []
     for at in rows.at:
-        here = [(group, members) for group in groups if len(members := members_of(group, at, len(groups) == 1))]
+        here = [(group, members) for group in groups if len(members := group.members(at, is_only=len(groups) == 1))]
         if not here:
             known = [name for group in groups for name in (*group.groups, group.part, *group.names) if name]
             raise RecoveryError(
@@ -234,14 +234,3 @@ def elements_of(body: FEBody, rows: Rows, groups: list[ElementGroup]) -> list[tu
             )
         found += here
     return found
-
-
-def members_of(group: ElementGroup, at: str | int, is_only: bool) -> IntArray:
-    """Return the elements of a group that a name or number means; none if it has none."""
-    if isinstance(at, str):
-        if at in group.groups:
-            return group.groups[at]
-        return np.arange(group.count) if at and at == group.part else np.flatnonzero(np.array(group.names) == at)
-    if (group.numbers >= 0).any():
-        return np.flatnonzero(group.numbers == at)
-    return np.array([at] if is_only and 0 <= at < group.count else [], dtype=np.int64)

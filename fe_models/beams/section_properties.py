@@ -33,6 +33,8 @@ class SectionProperties:
     loops: tuple[IntArray, ...] = ()  #: outline: points of the outer loop anticlockwise in (y, z), then of holes
     cap: IntArray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: triangles of the face with normal +x
     shear_center: tuple[float, float] = (0.0, 0.0)  #: (y, z) of the shear centre [m]
+    shows_shear: bool = True  #: whether `stress` has the shear stress of shear forces and torsion, or none
+    is_outline_known: bool = True  #: whether the points are those of the true section: else a rectangle is assumed
 
     def __post_init__(self) -> None:
         for name in ("A", "Iy", "Iz", "J", "A_sy", "A_sz"):

@@ -243,6 +243,8 @@ class GeneralSection:
             loops=(np.arange(len(points)),),
             cap=triangulate_polygon(points),
             shear_center=self.shear_center,
+            shows_shear=False,
+            is_outline_known=self.outline is not None,
         )
 
 

@@ -48,11 +48,32 @@ class ElementGroup:
     components: tuple[str, ...]
     dimensions: tuple[Dimensions, ...]  #: of each component
     forces: Callable[[Array, IntArray], Array]  #: of columns over the mesh dofs and elements, (n, n_components, k)
+    source: "ShellCells | BeamModel"  #: whose elements they are
+    rows: slice  #: of the mesh dofs of the body: those of the model behind them
+    first_node: int  #: of the body: where the nodes of that model begin
 
     @property
     def count(self) -> int:
         """Number of elements."""
         return len(self.names)
+
+    def members(self, at: str | int, *, is_only: bool) -> IntArray:
+        """Return the elements that a name or number means; none if the group has none.
+
+        Parameters
+        ----------
+        at
+            The number of an element; the name of an element, a set or the part.
+        is_only
+            Whether no other group is asked: then a number is the index where elements have no numbers.
+        """
+        if isinstance(at, str):
+            if at in self.groups:
+                return self.groups[at]
+            return np.arange(self.count) if at and at == self.part else np.flatnonzero(np.array(self.names) == at)
+        if (self.numbers >= 0).any():
+            return np.flatnonzero(self.numbers == at)
+        return np.array([at] if is_only and 0 <= at < self.count else [], dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -91,15 +112,19 @@ def _groups(body: FEBody, model: object, at: _Place) -> Iterator[ElementGroup]:
             part = " ".join(word for word in (at.part, group.kind) if word)
             named = _named(body, part, triangles[begin:end])
             forces = _shell_resultants(group, at.rows)
-            yield ElementGroup("shell resultant", part, *named, SHELL, dimensions, forces)
+            yield ElementGroup(
+                "shell resultant", part, *named, SHELL, dimensions, forces, group, at.rows, at.first_node
+            )
     elif isinstance(model, BeamModel):
         six = (FORCE,) * 3 + (MOMENT,) * 3
         if len(model.dofs):
             named = _named(body, at.part, _triangles(body, at, model.skin.line_of, len(model.dofs)))
-            yield ElementGroup("beam force", at.part, *named, BEAM, six * 2, _section_forces(model, at.rows))
+            forces = _section_forces(model, at.rows)
+            yield ElementGroup("beam force", at.part, *named, BEAM, six * 2, forces, model, at.rows, at.first_node)
         if model.springs:
             named = _named(body, at.part, np.full(len(model.springs), NONE))
-            yield ElementGroup("spring force", at.part, *named, SPRING, six, _spring_forces(model, at.rows))
+            forces = _spring_forces(model, at.rows)
+            yield ElementGroup("spring force", at.part, *named, SPRING, six, forces, model, at.rows, at.first_node)
 
 
 def _triangles(body: FEBody, at: _Place, element_of: IntArray, count: int) -> IntArray:

@@ -91,18 +91,27 @@ def write(made: "Assessment", record: dict[str, Any], path: Path, replace_file: 
         replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
 
 
+def sn_words(curve: dict[str, Any], unit: str) -> str:
+    """Return an S-N curve in a line."""
+    slopes = ", ".join(f"{slope:.4g}" for slope in curve["slope"])
+    return (
+        f"{curve['amplitude'][0]:.5g} {unit} at {curve['cycles'][0]:.4g} cycles, slopes {slopes}; given in "
+        f"{curve['given_in']}"
+    )
+
+
 def print_fatigue(record: dict[str, Any]) -> None:
     """Print what was assumed, and the worst nodes."""
-    curve, unit = record["curve"], record["stress_unit"]
-    slopes = ", ".join(f"{slope:.4g}" for slope in curve["slope"])
+    unit = record["stress_unit"]
+    n_points = record["n_points"]
     rows = [
         ("body", record["body"]),
         ("criterion", f"{record['criterion']}, mean stress {record['mean_stress']}"),
         ("counting", record["method"]),
-        ("S-N curve", f"{curve['amplitude'][0]:.5g} {unit} at {curve['cycles'][0]:.4g} cycles, slopes {slopes}; given "
-                      f"in {curve['given_in']}"),
+        *((f"S-N curve {each['name']}".strip(), sn_words(each["curve"], unit)) for each in record["materials"]),
         ("blocks", ", ".join(f"{each['name']} ({each['repeats']:.6g} times)" for each in record["blocks"])),
-        ("nodes", f"{record['n_nodes']}, of which {record['n_counted']} counted; the others cannot matter"),
+        ("nodes and stress points" if n_points else "nodes",
+         f"{record['n_nodes']}, of which {record['n_counted']} counted; the others cannot matter"),
         ("damage", "none" if not record["damage"] else f"{record['damage']:.4g} a programme"),
         ("life", "no end" if record["life"] is None else f"{record['life']:.5g} {record['life_unit']}"),
         *(("note", note) for note in record["notes"]),
@@ -110,10 +119,10 @@ def print_fatigue(record: dict[str, Any]) -> None:
     print_table("Fatigue", ("", ""), rows)
     print_table(
         "Worst nodes",
-        ("", "node", "place", "damage>", f"life [{record['life_unit']}]>", f"amplitude [{unit}]>", "plane"),
+        ("", "node", "material", "place", "damage>", f"life [{record['life_unit']}]>", f"amplitude [{unit}]>", "plane"),
         [
             (
-                str(rank), each["node"], f"({each['x']:.5g}, {each['y']:.5g}, {each['z']:.5g})",
+                str(rank), each["node"], each["material"], f"({each['x']:.5g}, {each['y']:.5g}, {each['z']:.5g})",
                 f"{each['damage']:.4g}",
                 "no end" if each["life"] is None else f"{each['life']:.5g}", f"{each['largest_amplitude']:.5g}",
                 each["plane"],

@@ -6,16 +6,25 @@ from typing import Any
 import numpy as np
 
 from cms.modal_file.file import digest, read
+from cms.reduced_body.address import Address
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import FatigueError
 from floatframe.fatigue.criteria import Criterion
-from floatframe.fatigue.fatigue_file import STRESS_UNITS, BlockSection, FatigueFile, MaterialSection, SpectrumSection
+from floatframe.fatigue.fatigue_file import (
+    STRESS_UNITS,
+    BlockSection,
+    FatigueFile,
+    MaterialSection,
+    PlacesSection,
+    SpectrumSection,
+)
 from floatframe.fatigue.history_damage import Progress
 from floatframe.fatigue.kernels.cycle_kernels import collect
 from floatframe.fatigue.load_blocks import LoadBlock, block_of_results
 from floatframe.fatigue.mean_stress import MEAN_STRESS, MeanStress
+from floatframe.fatigue.places import FatigueMaterial, point_number
 from floatframe.fatigue.planes import surface_nodes
 from floatframe.fatigue.shaken import shaken_spectra
 from floatframe.fatigue.sn_curve import SNCurve, basquin_curve, table_curve
@@ -51,10 +60,10 @@ def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessmen
         If files do not fit together, or as `history_damage` and `spectral_damage` raise.
     """
     body = read(given.body)
-    curve, mean_stress = curve_of(given, body), mean_stress_of(given, body)
+    materials = [material_of(key, each, given, body) for key, each in given.all_materials.items()]
     section, counting = given.criterion, given.counting
     criterion = Criterion(section.name, section.tensor, section.planes, section.findley_k)
-    nodes = nodes_of(given, body)
+    nodes, points = places_of(given, body)
     if given.spectra:
         stress: Array | None = None
         if given.spectra[0].shake:
@@ -62,14 +71,15 @@ def assess(given: FatigueFile, *, progress: Progress | None = None) -> Assessmen
         else:
             spectra = [spectra_of(each) for each in given.spectra]
         result = spectral_damage(
-            body, spectra, curve, method=counting.method, criterion=criterion, mean_stress=mean_stress,
-            extrapolate=counting.extrapolate, nodes=nodes, stress=stress, progress=progress,
+            body, spectra, None, others=materials, method=counting.method, criterion=criterion,
+            extrapolate=counting.extrapolate, nodes=nodes, points=points, stress=stress, progress=progress,
         )  # fmt: skip
         return Assessment(result, given, ())
     blocks = [block_of(each, given, body) for each in given.blocks]
     result = history_damage(
-        body, blocks, curve, criterion=criterion, mean_stress=mean_stress, residue=counting.residue,
-        negligible=counting.negligible, extrapolate=counting.extrapolate, nodes=nodes, progress=progress,
+        body, blocks, None, others=materials, criterion=criterion, residue=counting.residue,
+        negligible=counting.negligible, extrapolate=counting.extrapolate, nodes=nodes, points=points,
+        progress=progress,
     )  # fmt: skip
     return Assessment(result, given, tuple(blocks))
 
@@ -80,9 +90,20 @@ def stress_factor(material: MaterialSection, body: ReducedBody) -> float:
     return STRESS_UNITS[material.stress_unit] / units.to_si(mass=1, length=-1, time=-2)
 
 
-def curve_of(given: FatigueFile, body: ReducedBody) -> SNCurve:
-    """Return the S-N curve in stress units of the body, with survival and factors."""
-    section, unit = given.material.sn, stress_factor(given.material, body)
+def material_of(key: str, section: MaterialSection, given: FatigueFile, body: ReducedBody) -> FatigueMaterial:
+    """Return a material with its curve and strength in stress units of the body, and its places."""
+    curve = curve_of(section, given, body)
+    law = mean_stress_of(section, given, body)
+    if not isinstance(section, PlacesSection):
+        return FatigueMaterial(curve, law, (section.name or "the rest") if given.materials else "")
+    for name, factor in section.factors.items():
+        curve = curve.scaled(factor, f"factor {name}")
+    return FatigueMaterial(curve, law, key.removeprefix("materials."), *places_named(key, section, body))
+
+
+def curve_of(material: MaterialSection, given: FatigueFile, body: ReducedBody) -> SNCurve:
+    """Return an S-N curve in stress units of the body, with survival and the factors of all materials."""
+    section, unit = material.sn, stress_factor(material, body)
     table = section.amplitudes or section.ranges
     if table is not None:
         half = 1.0 if section.amplitudes is not None else 0.5
@@ -103,27 +124,86 @@ def curve_of(given: FatigueFile, body: ReducedBody) -> SNCurve:
     return curve
 
 
-def mean_stress_of(given: FatigueFile, body: ReducedBody) -> MeanStress:
+def mean_stress_of(material: MaterialSection, given: FatigueFile, body: ReducedBody) -> MeanStress:
     """Return the correction with its strength in stress units of the body."""
     name = given.criterion.mean_stress
     key = MEAN_STRESS[name][1]
-    value = float(getattr(given.material, key)) if key else 0.0
+    value = float(getattr(material, key)) if key else 0.0
     if key in ("tensile_strength", "yield_strength", "fatigue_strength_coefficient"):
-        value *= stress_factor(given.material, body)
+        value *= stress_factor(material, body)
     return MeanStress(name, value, given.criterion.credit_compression)
 
 
-def nodes_of(given: FatigueFile, body: ReducedBody) -> IntArray | None:
-    """Return the surface nodes of a set, None for all."""
-    if given.outputs.set is None:
-        return None
-    from cms.reduced_body.address import Address
+def places_named(key: str, section: PlacesSection, body: ReducedBody) -> tuple[IntArray, IntArray]:
+    """Return the kept nodes and the stress points that a material names."""
+    nodes: list[IntArray] = [np.zeros(0, np.int64)]
+    points: list[IntArray] = [np.zeros(0, np.int64)]
+    for name in section.sets:
+        of_nodes, of_points = places_of_set(body, name, f"{key}.sets")
+        nodes.append(of_nodes)
+        points.append(of_points)
+    for element in section.elements:
+        triangles = body.numbering.triangles_of_element(f"{key}.elements: body {body.name!r}", element)
+        nodes.append(np.unique(body.surface[triangles]))
+        points.append(points_of_elements(body, triangles))
+    for node in section.nodes:
+        nodes.append(Address(node=node).find(body, f"{key}.nodes", of_stress=True).rows)
+    known = () if body.point_stress is None else body.point_stress.names
+    for begin in section.points:
+        found = [k for k, name in enumerate(known) if name == begin or name.startswith(f"{begin} ")]
+        if not found:
+            has = "it has no stress points" if not known else f"{nearest(begin, known).removeprefix('; ')}"
+            raise FatigueError(f"{key}.points: body {body.name!r}: no stress point {quoted(begin)}: {has}")
+        points.append(np.array(found, dtype=np.int64))
+    return np.unique(np.concatenate(nodes)), np.unique(np.concatenate(points))
 
-    found = Address(set=given.outputs.set).find(body, "outputs.set")
-    chosen = np.intersect1d(surface_nodes(body), found.rows)
-    if not len(chosen):
+
+def places_of_set(body: ReducedBody, name: str, where: str) -> tuple[IntArray, IntArray]:
+    """Return the nodes of a set, and of a set of elements their stress points; of one of nodes, those at its nodes."""
+    rows = Address(set=name).find(body, where).rows
+    named = body.numbering.named_set(f"{where}: body {body.name!r}", name)
+    if named.kind == "elements":
+        return rows, points_of_elements(body, named.members)
+    called = {body.node_name(int(row)) for row in rows}
+    known = () if body.point_stress is None else body.point_stress.names
+    points = [
+        k
+        for k, point in enumerate(known)
+        if " node " in point and point.rpartition(" node ")[2].rpartition(" ")[0] in called
+    ]
+    return rows, np.array(points, dtype=np.int64)
+
+
+def points_of_elements(body: ReducedBody, triangles: IntArray) -> IntArray:
+    """Return the stress points of the elements behind some triangles: those that begin with their name."""
+    known = () if body.point_stress is None else body.point_stress.names
+    called = {body.numbering.element_name(int(triangle)) for triangle in triangles}
+    return np.array([k for k, name in enumerate(known) if element_of_point(name) in called], dtype=np.int64)
+
+
+def element_of_point(name: str) -> str | None:
+    """Return the element in the name of a stress point, "beam 17 end A point 0" or "part: shell 21 node 5 top"."""
+    words = name.rpartition(": ")[2].split(" ")
+    return words[1] if len(words) > 2 and words[0] in ("beam", "shell") else None
+
+
+def places_of(given: FatigueFile, body: ReducedBody) -> tuple[IntArray | None, IntArray | None]:
+    """Return the nodes and stress points to look at, None for all."""
+    wanted, none = given.outputs.places, np.zeros(0, np.int64)
+    if wanted == "points" and body.point_stress is None:
+        raise FatigueError(
+            f"outputs.places: body {body.name!r} has no stress points; reduce it with stress_points in the [body] of "
+            "its job"
+        )
+    if given.outputs.set is None:
+        everywhere = np.arange(point_number(body))
+        return none if wanted == "points" else None, none if wanted == "nodes" else everywhere
+    nodes, points = places_of_set(body, given.outputs.set, "outputs.set")
+    nodes = none if wanted == "points" or body.stress is None else np.intersect1d(surface_nodes(body), nodes)
+    points = none if wanted == "nodes" else points
+    if not len(nodes) + len(points):
         raise FatigueError(f"outputs.set = {given.outputs.set!r}: none of its nodes lies on the surface of the body")
-    return chosen
+    return nodes, points
 
 
 def block_of(section: BlockSection, given: FatigueFile, body: ReducedBody) -> LoadBlock:

@@ -15,11 +15,18 @@ from floatframe.fatigue.mean_stress import MEAN_STRESS
 from floatframe.fatigue.sn_curve import BELOW
 from floatframe.fatigue.spectral.spectral_methods import SPECTRAL_METHODS
 
-__all__ = ["STRESS_UNITS", "FatigueFile", "read_fatigue"]
+__all__ = ["PLACES", "STRESS_UNITS", "FatigueFile", "read_fatigue"]
 
 #: stress units of S-N curves -> [Pa]
 STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm^2": 1e6, "GPa": 1e9, "psi": 6894.757293168361,
                 "ksi": 6894757.293168361}  # fmt: skip
+
+#: which places are looked at, by name
+PLACES = {
+    "all": "nodes of the surface and stress points of elements",
+    "nodes": "nodes of the surface, whose stress is a mean over elements",
+    "points": "stress points, each of its own element",
+}
 
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
@@ -98,6 +105,22 @@ class MaterialSection(Table):
         None, description="a number from 0 to 1, M"
     )
     sn: CurveSection = Field(description="the table [material.sn]")
+
+
+class PlacesSection(MaterialSection):
+    """[materials.NAME]: a material with the places that have it."""
+
+    sets: list[str] = Field([], description="a list of names of sets of nodes or elements")
+    elements: list[int | str] = Field([], description="a list of numbers of elements")
+    nodes: list[int | str] = Field([], description="a list of numbers of nodes")
+    points: list[str] = Field([], description="a list of names of stress points, or of how they begin")
+    factors: dict[str, Positive] = Field({}, description="numbers above 0 by name, beside those of [factors]")
+
+    @model_validator(mode="after")
+    def _places(self) -> "PlacesSection":
+        if not (self.sets or self.elements or self.nodes or self.points):
+            raise ValueError("expected the places that have it: sets, elements, nodes or points")
+        return self
 
 
 class CriterionSection(Table):
@@ -182,14 +205,18 @@ class OutputsSection(Table):
     """[outputs]: what is looked at and shown."""
 
     worst: Annotated[int, Field(ge=1, le=10_000)] = Field(20, description="a whole number, 1 to 10000, nodes of tables")
-    set: str | None = Field(None, description="a set of the mesh; only its nodes on the surface are looked at")
+    set: str | None = Field(None, description="a set of the mesh; only its nodes and points are looked at")
+    places: choice("places", lambda: tuple(PLACES)) = Field(  # type: ignore[valid-type]
+        "all", description=f"one of {', '.join(PLACES)}"
+    )
 
 
 class FatigueFile(Table):
     """A fatigue file."""
 
     body: InputFile = Field(description="the path of a modal file, relative to this file")
-    material: MaterialSection = Field(description="the table [material]")
+    material: MaterialSection | None = Field(None, description="the table [material]")
+    materials: dict[str, PlacesSection] = Field({}, description="tables [materials.NAME], of the places they name")
     factors: dict[str, Positive] = Field({}, description="numbers above 0 by name, on the amplitudes of the curve")
     survival: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number from 0 to 1")
     criterion: CriterionSection = Field(
@@ -213,12 +240,21 @@ class FatigueFile(Table):
             raise ValueError("expected [[blocks]] or [[spectra]], " + ("got both" if self.blocks else "got neither"))
         if any(each.shake for each in self.spectra) and len(self.spectra) > 1:
             raise ValueError("[[spectra]]: a shake file has coordinates of its own: expected no other table beside it")
+        if not self.all_materials:
+            raise ValueError("material: missing; expected the table [material], or tables [materials.NAME]")
         need = MEAN_STRESS[self.criterion.mean_stress][1]
-        if need and getattr(self.material, need) is None:
-            raise ValueError(f'mean stress "{self.criterion.mean_stress}" needs material.{need}, which is missing')
-        if self.survival is not None and self.material.sn.log_deviation is None:
-            raise ValueError("survival: needs material.sn.log_deviation, the standard deviation of log10 N")
+        for key, material in self.all_materials.items():
+            if need and getattr(material, need) is None:
+                raise ValueError(f'mean stress "{self.criterion.mean_stress}" needs {key}.{need}, which is missing')
+            if self.survival is not None and material.sn.log_deviation is None:
+                raise ValueError(f"survival: needs {key}.sn.log_deviation, the standard deviation of log10 N")
         return self
+
+    @property
+    def all_materials(self) -> dict[str, MaterialSection]:
+        """The materials by their keys in the file, that of the rest first."""
+        rest = {} if self.material is None else {"material": self.material}
+        return {**rest, **{f"materials.{name}": each for name, each in self.materials.items()}}
 
 
 def read_fatigue(path: str | os.PathLike[str]) -> FatigueFile:

@@ -64,6 +64,7 @@ def count_histories(
     residue: str = "repeat",
     frames: Array | None = None,
     negligible: float = 1e-3,
+    greatest: float = 0.0,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Counted:
@@ -79,6 +80,8 @@ def count_histories(
         Tangents and normal of each place, (n, 3, 3), where the criterion needs them (`surface_frames`).
     negligible
         Places whose damage is proved to be below this share of the greatest are left out; 0: none.
+    greatest
+        Damage that was found at other places before.
     workers
         Threads; None: one a processor.
 
@@ -102,7 +105,6 @@ def count_histories(
     histories = [np.ascontiguousarray(block.scale * np.asarray(block.q).T) for block in blocks]
     rule = Rule(curve, mean_stress, criterion, residue, tuple(block.repeats for block in blocks))
     size = max(1, TILE * 6 // criterion.n_rows())
-    greatest = 0.0
 
     def run(tile: IntArray) -> None:
         count_tile(np.ascontiguousarray(stress[tile]), None if frames is None else frames[tile], histories, rule,

@@ -8,7 +8,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.errors import FatigueError
 from floatframe.fatigue.kernels.cycle_kernels import collect, cycle_rule, equivalent_amplitude
 from floatframe.fatigue.load_blocks import LoadBlock
-from floatframe.fatigue.planes import surface_frames
+from floatframe.fatigue.places import Places, frames_of_places, stress_of_places
 from floatframe.fatigue.surface_damage import FatigueResult
 
 __all__ = ["cycles_at", "exceedances"]
@@ -30,10 +30,10 @@ def cycles_at(result: FatigueResult, blocks: Sequence[LoadBlock], place: int) ->
     criterion, body = result.criterion, result.body
     if criterion.is_shear or result.is_spectral:
         raise FatigueError("cycles of a place: known for rainflow counts of signed-von-mises, principal and normal")
-    node = result.nodes[place : place + 1]
-    assert body.stress is not None
-    rows = criterion.rows(body.stress[node], surface_frames(body, node) if criterion.needs_surface else None)
-    rule, scalar = cycle_rule(result.curve, result.mean_stress), criterion.scalar()
+    places = Places(result.nodes, result.points, result.material, 0)
+    at, material = np.array([place]), result.materials[result.material[place]]
+    rows = criterion.rows(stress_of_places(body, places, at, None), frames_of_places(body, places, at, criterion))
+    rule, scalar = cycle_rule(material.curve, material.mean_stress), criterion.scalar()
     found = []
     for block in blocks:
         history = rows[0] @ (block.scale * np.asarray(block.q)).T

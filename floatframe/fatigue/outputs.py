@@ -11,12 +11,16 @@ import numpy as np
 
 from cms.exporters.vtk import numbers_of_cells, numbers_of_nodes, unstructured_grid
 from cms.rendering import Drawing, Scene, Surface, Triad, render_picture
+from fe_models.body.numbering import NONE
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.fatigue.assessment import Assessment
 from floatframe.fatigue.planes import surface_frames
+from floatframe.fatigue.sn_curve import SNCurve
+from floatframe.fatigue.surface_damage import FatigueResult
 
 __all__ = ["csv_of", "fatigue_record", "fatigue_scene", "render_fatigue", "vtu_of"]
 
+NEAR = 0.01  #: of the size of the body: a stress point is shown at the nearest node within
 DECADES = 6  #: of damage that the colours show, below the greatest; fewer where nodes below a share were left out
 NUMBERED = 3  #: places that the picture numbers
 
@@ -24,7 +28,7 @@ NUMBERED = 3  #: places that the picture numbers
 def fatigue_record(made: Assessment) -> dict[str, Any]:
     """Return the whole result in plain types: what it rests on, and the worst places."""
     result, given = made.result, made.given
-    body, curve, programme = result.body, result.curve, given.programme
+    body, programme = result.body, given.programme
     sources: Sequence[Any] = made.blocks or given.spectra
     if len(sources) != len(result.block_names):  # a shake file: a run a direction
         sources = [*sources] * len(result.block_names)
@@ -38,20 +42,24 @@ def fatigue_record(made: Assessment) -> dict[str, Any]:
         "tensor": result.criterion.tensor,
         "mean_stress": result.mean_stress.words,
         "method": result.method_words,
-        "curve": {
-            "amplitude": list(map(float, curve.amplitude)),
-            "cycles": list(map(float, curve.cycles)),
-            "slope": list(map(float, curve.slope)),
-            "bottom": list(map(float, curve.bottom)),
-            "greatest": curve.greatest,
-            "stress_ratio": curve.stress_ratio,
-            "given_in": given.material.stress_unit,
-        },
+        "curve": curve_record(result.curve, next(iter(given.all_materials.values())).stress_unit),
+        "materials": [
+            {
+                "name": material.name,
+                "n_places": int((result.material == number).sum()),
+                "mean_stress": material.mean_stress.words,
+                "curve": curve_record(material.curve, section.stress_unit),
+            }
+            for number, (material, section) in enumerate(
+                zip(result.materials, given.all_materials.values(), strict=True)
+            )
+        ],
         "blocks": [
             {"name": name, "repeats": each.repeats, "scale": each.scale}
             for name, each in zip(result.block_names, sources, strict=True)
         ],
         "n_nodes": len(result.nodes),
+        "n_points": int((result.points != NONE).sum()),
         "n_counted": int(result.is_counted.sum()),
         "negligible": None if result.is_spectral else given.counting.negligible,
         "notes": list(result.notes),
@@ -61,13 +69,27 @@ def fatigue_record(made: Assessment) -> dict[str, Any]:
     }
 
 
+def curve_record(curve: SNCurve, given_in: str) -> dict[str, Any]:
+    """Return an S-N curve in plain types, in stress units of the body."""
+    return {
+        "amplitude": list(map(float, curve.amplitude)),
+        "cycles": list(map(float, curve.cycles)),
+        "slope": list(map(float, curve.slope)),
+        "bottom": list(map(float, curve.bottom)),
+        "greatest": curve.greatest,
+        "stress_ratio": curve.stress_ratio,
+        "given_in": given_in,
+    }
+
+
 def place_record(made: Assessment, place: int) -> dict[str, Any]:
     """Return one place in plain types."""
-    result, body = made.result, made.result.body
-    node = int(result.nodes[place])
-    x, y, z = (float(value) for value in body.frame.origin + body.frame.axes @ body.nodes[node])
+    result = made.result
+    x, y, z = (float(value) for value in result.positions(np.array([place]))[0])
     return {
-        "node": body.node_name(node),
+        "node": result.name(place),
+        "place": result.words(place),
+        "material": result.materials[result.material[place]].name,
         "x": x,
         "y": y,
         "z": z,
@@ -96,20 +118,44 @@ def csv_of(made: Assessment) -> str:
     writer = csv.writer(text, lineterminator="\n")
     places = [f"{axis} [{units.length_symbol}]" for axis in "xyz"]
     names = [f"damage of {name}" for name in made.result.block_names]
-    writer.writerow(["rank", "node", *places, "damage", f"life [{record['life_unit']}]",
+    writer.writerow(["rank", "node", "material", *places, "damage", f"life [{record['life_unit']}]",
                      f"largest amplitude [{units.stress_symbol}]", "cycles", "beyond", "plane", *names])  # fmt: skip
     for rank, each in enumerate(record["worst"], start=1):
         row = [each[key] for key in ("x", "y", "z", "damage", "life", "largest_amplitude", "cycles", "beyond")]
         numbers = ["inf" if value is None else repr(value) for value in row]
-        writer.writerow([rank, each["node"], *numbers, each["plane"], *map(repr, each["of_blocks"].values())])
+        writer.writerow(
+            [rank, each["node"], each["material"], *numbers, each["plane"], *map(repr, each["of_blocks"].values())]
+        )
     return text.getvalue()
 
 
-def on_all_nodes(made: Assessment, values: Array, outside: float) -> Array:
-    """Return values of the places at all kept nodes, (n_kept,)."""
-    found = np.full(len(made.result.body.nodes), outside)
-    found[made.result.nodes] = values
-    return found
+def nodes_of_places(result: FatigueResult) -> tuple[IntArray, IntArray]:
+    """Return places and the kept nodes that show them: of a stress point the nearest one, if it is near.
+
+    Near is within a hundredth of the size of the body; other points are shown nowhere.
+    """
+    from scipy.spatial import cKDTree
+
+    at_points = np.flatnonzero(result.points != NONE)
+    at_nodes = np.flatnonzero(result.nodes != NONE)
+    if not len(at_points) or not len(result.body.nodes):
+        return at_nodes, np.asarray(result.nodes[at_nodes])
+    assert result.body.point_stress is not None
+    shown = np.unique(result.body.surface) if len(result.body.surface) else np.arange(len(result.body.nodes))
+    away, nearest = cKDTree(result.body.nodes[shown]).query(
+        result.body.point_stress.positions[result.points[at_points]]
+    )
+    near = away <= NEAR * np.linalg.norm(np.ptp(result.body.nodes, axis=0))
+    places = np.concatenate([at_nodes, at_points[near]])
+    return places, np.concatenate([result.nodes[at_nodes], shown[nearest[near]]])
+
+
+def on_all_nodes(made: Assessment, values: Array, outside: float, *, largest: bool = True) -> Array:
+    """Return values of the places at all kept nodes, (n_kept,): of several at a node the largest, or the least."""
+    places, nodes = nodes_of_places(made.result)
+    found = np.full(len(made.result.body.nodes), -np.inf if largest else np.inf)
+    (np.maximum if largest else np.minimum).at(found, nodes, values[places])
+    return np.where(np.isinf(found), outside, found)
 
 
 def vtu_of(made: Assessment) -> bytes:
@@ -120,7 +166,7 @@ def vtu_of(made: Assessment) -> bytes:
     fields: dict[str, Any] = {
         "damage": on_all_nodes(made, damage, 0.0),
         "log10 damage": on_all_nodes(made, np.log10(np.maximum(damage, 1e-300)), -300.0),
-        "life": on_all_nodes(made, life, 1e300),
+        "life": on_all_nodes(made, life, 1e300, largest=False),
         "largest amplitude": on_all_nodes(made, result.largest, 0.0),
         "is counted": on_all_nodes(made, result.is_counted.astype(float), 0.0),
         **numbers_of_nodes(body),
@@ -150,18 +196,17 @@ def fatigue_scene(made: Assessment) -> Scene:
     points = body.frame.origin + body.nodes @ body.frame.axes.T
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     order = result.worst(made.given.outputs.worst)
-    worst = separated(points[result.nodes[order]], 0.08 * size)
-    labels = tuple(
-        Triad(points[result.nodes[order[k]]], np.eye(3), size=1e-6 * size, label=str(k + 1)) for k in worst[:NUMBERED]
-    )
+    at = result.positions(order)
+    worst = separated(at, 0.08 * size)
+    labels = tuple(Triad(at[k], np.eye(3), size=1e-6 * size, label=str(k + 1)) for k in worst[:NUMBERED])
     direction, up = towards(made, order)
     life = made.life[order[0]] if len(order) else math.inf
-    first = body.node_name(int(result.nodes[order[0]])) if len(order) else "none"
+    first = result.words(int(order[0])) if len(order) else "none"
     return Scene(
         surfaces=(Surface(body.surface, points, scalars),),
         triads=labels,
         title=f"{body.name}: damage of one programme",
-        captions=(f"worst: node {first}, damage {10**top:.3g}", f"life {life:.4g} {made.given.programme.unit}"),
+        captions=(f"worst: {first}, damage {10**top:.3g}", f"life {life:.4g} {made.given.programme.unit}"),
         scalar_title="log10 damage",
         scalar_range=(low, top),
         direction=direction,
@@ -182,8 +227,10 @@ def towards(made: Assessment, order: IntArray) -> tuple[Array, Array]:
     """Return the line of sight onto the worst place, a little from the side, and what points up."""
     body = made.result.body
     direction = np.array([-1.0, 2.0, -1.0])
-    if len(order):
-        normal = surface_frames(body, made.result.nodes[order[:1]])[0, 2] @ body.frame.axes.T
+    places, nodes = nodes_of_places(made.result)
+    shown = nodes[places == order[0]] if len(order) else nodes[:0]
+    if len(shown) and len(body.surface):
+        normal = surface_frames(body, shown[:1])[0, 2] @ body.frame.axes.T
         direction = -normal + 0.35 * direction / np.linalg.norm(direction)
     direction = direction / np.linalg.norm(direction)
     extent = np.ptp(body.nodes @ body.frame.axes.T, axis=0)

@@ -1,7 +1,8 @@
 """Damage of a shaken body: the random test of `floatframe shake` gives the spectra, mode for mode.
 
-The modes with the bases held, eta, and the motion of the inputs are the coordinates: their stress at the kept nodes is
-the field of the model, and their cross spectra G = H S H^H are exact at the frequencies of the run, with its weights.
+The modes with the bases held, eta, and the motion of the inputs are the coordinates: their stress at kept nodes and
+stress points is the field of the model, and their cross spectra G = H S H^H are exact at the frequencies of the run,
+with its weights.
 """
 
 from collections.abc import Sequence
@@ -24,7 +25,9 @@ __all__ = ["shaken_damage", "shaken_spectra"]
 
 
 def shaken_spectra(model: ShakenModel, test: RandomTest, run: RandomRun, duration: float) -> tuple[ModalSpectra, Array]:
-    """Return the cross spectra of modes and inputs in a random run, and their stress at the kept nodes, (n, 6, n_q).
+    """Return the cross spectra of modes and inputs in a random run, and their stress at all places, (n, 6, n_q).
+
+    Places: the kept nodes, then the stress points.
 
     Raises
     ------

@@ -150,7 +150,10 @@ def shaken_body(
         field=stress_field(on),
         field_labels=()
         if body.stress is None
-        else tuple(f"node {body.node_name(row)}" for row in range(len(body.nodes))),
+        else (
+            *(f"node {body.node_name(row)}" for row in range(len(body.nodes))),
+            *(() if body.point_stress is None else body.point_stress.names),
+        ),
     )
 
 
@@ -235,10 +238,13 @@ def rows_of(on: OnBases, outputs: list[Output], by_x: Array, rate: int, by_s: Ar
 
 
 def stress_field(on: OnBases) -> tuple[Array, Array] | None:
-    """Return the stress of modes and inputs at all kept nodes."""
-    if on.body.stress is None:
+    """Return the stress of modes and inputs at all kept nodes, then at the stress points."""
+    parts = [] if on.body.stress is None else [np.asarray(on.body.stress)]
+    if on.body.point_stress is not None and on.body.stress is not None:
+        parts.append(np.asarray(on.body.point_stress.modes))
+    if not parts:
         return None
-    modes, n_q = np.asarray(on.body.stress), on.body.n_q
+    modes, n_q = parts[0] if len(parts) == 1 else np.concatenate(parts), on.body.n_q
     of_s = np.zeros((len(modes), 6, on.held.T.shape[1] + on.F.shape[1]))
     of_s[:, :, : on.held.T.shape[1]] = modes @ on.held.T[-n_q:]
     of_s[:, :, on.held.T.shape[1] :] = modes @ (on.held.V_0[-n_q:] @ (on.held.V_0.T @ on.F))

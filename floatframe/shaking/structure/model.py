@@ -71,11 +71,10 @@ class ShakenModel:
     D: Array  #: (3, n_out, n_s)
     outputs: tuple[Output, ...]
     mass: Array  #: rigid mass matrix about the points of the bases, (6 n_bases, 6 n_bases)
-    #: stress of the modes and of s at the kept nodes, xx yy zz yz xz xy, (n_nodes, 6, n_m) and (n_nodes, 6, n_s);
-    #: None: no
-    #: stress modes
+    #: stress of the modes and of s at the kept nodes, then at the stress points, xx yy zz yz xz xy, (n, 6, n_m) and
+    #: (n, 6, n_s); None: no stress modes
     field: tuple[Array, Array] | None = None
-    field_labels: tuple[str, ...] = ()  #: of those nodes, as the user numbers them
+    field_labels: tuple[str, ...] = ()  #: of those nodes and points, as the user names them
     n_residual: int = 0  #: modes from there on answer statically
     notes: tuple[str, ...] = ()
 

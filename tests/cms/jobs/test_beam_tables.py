@@ -103,6 +103,21 @@ def test_a_job_of_beams_makes_the_body_of_its_tables(job_file):
     assert len(reduced.surface) > 0
 
 
+def test_a_job_keeps_the_stress_of_its_beams_each_by_itself(job_file):
+    text = ROD.replace('units = "m-kg-s"', 'units = "m-kg-s"\nstress_points = ["rod"]')
+    reduced = reduce_job(read_job(job_file(text)))
+    points = reduced.point_stress
+    assert len(points.names) == N * 2 * 32  # inner and outer side of the wall, 16 points each
+    assert "warping" in reduced.provenance["stress points"]
+    radius = np.linalg.norm((points.positions @ reduced.frame.axes.T + reduced.frame.origin)[:, 1:], axis=1)
+    assert_allclose(np.unique(radius.round(9)), [0.017, 0.02], rtol=1e-9)
+    refused = text.replace("n_modes = 4", "n_modes = 4\nstress = false")
+    with pytest.raises(JobError, match="no stress is kept"):
+        reduce_job(read_job(job_file(refused)))
+    with pytest.raises(JobError, match='expected "all", or a list of numbers'):
+        read_job(job_file(text.replace('["rod"]', "[[1, 2]]")))
+
+
 def test_a_planar_job_has_three_dofs_a_node(job_file):
     body = job_body(read_job(job_file(ROD.replace('units = "m-kg-s"', 'units = "m-kg-s"\nplane = "zx"'))))
     assert set(body.dofs[body.dofs[:, 0] == 3, 1].tolist()) == {0, 2, 4}

@@ -1,0 +1,190 @@
+"""Stress points of elements: ends of beams at the points of their section, corners of shells on both faces.
+
+The stress at a node is a mean over the elements about it: where a frame branches, a bending moment is led in or a
+surface turns, parts of it cancel. An assessment looks at each element by itself:
+
+(1) beams: every point of the section at both ends, from the section forces of that element,
+    sigma_xx = N/A + My z/Iy - Mz y/Iz, tau of shear forces and Saint-Venant torsion; warping stresses are left out
+(2) shells: every corner of every cell at top and bottom, from the resultants carried linearly to the corner
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_models.beams.model import BeamModel
+from fe_models.body.fe_body import FEBody, StressPointModel
+from fe_models.errors import BeamError
+from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.errors import BodyError
+from fe_models.foundation.words import nearest, quoted
+from fe_models.recovery.element_forces import ElementGroup, element_groups
+from fe_models.shells.elements import ShellCells
+from fe_models.shells.model import BOTTOM, TOP
+
+__all__ = ["ElementPoints", "element_points"]
+
+FACES = {"top": TOP, "bottom": BOTTOM}
+ENDS = ("A", "B")
+ALL = "all"
+NOTE = "stress points"  #: key of the provenance
+
+
+@dataclass(frozen=True, eq=False)
+class BeamEnds:
+    """Points of the sections at both ends of lines; one section after the other."""
+
+    model: BeamModel
+    lines: IntArray  #: (n,)
+    names: tuple[str, ...]
+    positions: Array
+    rows: slice  #: of the mesh dofs
+
+    def stress(self, u: Array) -> Array:
+        """Return (1), (n_points, 6, k) [Pa]."""
+        forces = self.model.section_forces(u[self.rows])
+        parts = []
+        for own in lines_by_section(self.model, self.lines):
+            ends = [self.model.stress_at_end(own, forces[own, end]) for end in range(2)]
+            parts.append(np.stack(ends, axis=1).reshape(-1, 6, np.shape(u)[1]))
+        return np.concatenate(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class ShellCorners:
+    """Corners of cells at the top, then at the bottom, cell by cell."""
+
+    cells: ShellCells
+    chosen: IntArray  #: (n,)
+    names: tuple[str, ...]
+    positions: Array
+    rows: slice  #: of the mesh dofs
+
+    def stress(self, u: Array) -> Array:
+        """Return (2), (n_points, 6, k) [Pa]."""
+        of_mesh, k = np.asarray(u[self.rows]), np.shape(u)[1]
+        parts = []
+        for rows in self.cells.chunks():
+            own = self.chosen[(self.chosen >= rows.start) & (self.chosen < rows.stop)] - rows.start
+            if len(own):
+                resultants = self.cells.corner_resultants(of_mesh, rows)
+                faces = [self.cells.stress(resultants, rows, height)[own] for height in FACES.values()]
+                parts.append(np.stack(faces, axis=1).reshape(-1, 6, k))
+        return np.concatenate(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class ElementPoints:
+    """Stress points of elements, after those that the body had (`fe_models.body.fe_body.StressPointModel`)."""
+
+    parts: tuple[BeamEnds | ShellCorners, ...]
+    before: StressPointModel | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One per point: "beam 17 end A point 3", "shell 21 node 5 top", (n_points,)."""
+        own = () if self.before is None else tuple(self.before.names)
+        return (*own, *(name for part in self.parts for name in part.names))
+
+    @property
+    def positions(self) -> Array:
+        """Undeformed, mesh axes, (n_points, 3) [m]."""
+        own = [] if self.before is None else [self.before.positions]
+        return frozen(np.concatenate([*own, *(part.positions for part in self.parts)]))
+
+    def stress(self, u: Array) -> Array:
+        """Return the stress, (n_points, 6, k) [Pa], xx yy zz yz xz xy in mesh axes, of columns over the mesh dofs."""
+        own = [] if self.before is None else [self.before.stress(u)]
+        return np.concatenate([*own, *(part.stress(np.asarray(u)) for part in self.parts)])
+
+
+def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
+    """Return the body with stress points at the ends of beams and the corners of shells, each of its element alone.
+
+    Parameters
+    ----------
+    body
+        Of beams or shells, coupled or not, welded, joined or not.
+    at
+        Numbers of elements, names of their sets or of the part they belong to; "all".
+
+    Raises
+    ------
+    BodyError
+        If the body has no such elements, a name or number is unknown, or the section of a beam is given by its numbers
+        without an outline: its outer fibres are not known.
+    """
+    groups = [group for group in element_groups(body) if group.quantity != "spring force"]
+    where = f"body {body.name!r}: stress points"
+    if not groups:
+        raise BodyError(f"{where}: it has no beams and no shells; the stress of solids is that of their nodes")
+    chosen = [np.zeros(group.count, dtype=bool) for group in groups]
+    asked = (at,) if isinstance(at, str) else tuple(at)
+    for each in asked:
+        found = False
+        for group, mask in zip(groups, chosen, strict=True):
+            rows = np.arange(group.count) if each == ALL else group.members(each, is_only=len(groups) == 1)
+            mask[rows] = True
+            found |= len(rows) > 0
+        if not found:
+            known = [ALL, *(n for g in groups for n in (*g.groups, g.part, *g.names) if n)]
+            unique = list(dict.fromkeys(known))
+            raise BodyError(f"{where}: no beam or shell, set or part {quoted(str(each))}{nearest(str(each), unique)}")
+    if not any(mask.any() for mask in chosen):
+        raise BodyError(f"{where}: expected numbers of elements, names of sets, or {ALL!r}, got none")
+    parts: list[BeamEnds | ShellCorners] = []
+    notes = []
+    for group, mask in zip(groups, chosen, strict=True):
+        rows = np.flatnonzero(mask)
+        if not len(rows):
+            continue
+        if isinstance(group.source, ShellCells):
+            parts.append(shell_corners(body, group, group.source, rows))
+            continue
+        parts.append(beam_ends(where, group, group.source, rows))
+        words = "at beams warping stresses are left out"
+        if not all(group.source.sections[k].shows_shear for k in set(group.source.of_line[rows].tolist())):
+            words += ", and beams of general sections show no shear stress"
+        notes.append(words)
+    provenance = dict(body.provenance)
+    if notes:
+        provenance[NOTE] = max(notes, key=len)
+    return replace(body, stress_points=ElementPoints(tuple(parts), body.stress_points), provenance=provenance)
+
+
+def lines_by_section(model: BeamModel, lines: IntArray) -> list[IntArray]:
+    """Return some lines, those of one section together."""
+    of_line = np.asarray(model.of_line)[lines]
+    return [lines[of_line == number] for number in np.unique(of_line)]
+
+
+def beam_ends(where: str, group: ElementGroup, model: BeamModel, lines: IntArray) -> BeamEnds:
+    """Return the points of some lines of a group."""
+    names, places = [], []
+    for own in lines_by_section(model, lines):
+        section = model.sections[model.of_line[own[0]]]
+        if not section.is_outline_known:
+            raise BeamError(
+                f"{where}: beam {group.names[own[0]]} has a section given by its numbers, and no outline: its outer "
+                "fibres are not known; give outline = [[y, z], ...] in its table, or leave its elements out"
+            )
+        for line in own.tolist():
+            for end, word in enumerate(ENDS):
+                places.append(model.geometry.ends[line, end] + section.points @ model.geometry.R[line][:, 1:].T)
+                names += [f"beam {group.names[line]} end {word} point {k}" for k in range(len(section.points))]
+    return BeamEnds(model, lines, tuple(names), frozen(np.concatenate(places)), group.rows)
+
+
+def shell_corners(body: FEBody, group: ElementGroup, cells: ShellCells, rows: IntArray) -> ShellCorners:
+    """Return the corners of some cells of a group."""
+    arm = cells.t[rows, None] * cells.planes.R[rows][:, :, 2]
+    corners = cells.planes.corners[rows]
+    places = np.stack([corners + height * arm[:, None] for height in FACES.values()], axis=1)
+    names = [
+        f"shell {group.names[row]} node {body.numbering.called(group.first_node + node)} {face}"
+        for row in rows.tolist()
+        for face in FACES
+        for node in cells.cells[row].tolist()
+    ]
+    return ShellCorners(cells, rows, tuple(names), frozen(places.reshape(-1, 3)), group.rows)
