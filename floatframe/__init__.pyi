@@ -110,6 +110,10 @@ from .joints import UniversalJoint as UniversalJoint
 from .joints.coordinate_coupler import CoordinateCoupler as CoordinateCoupler
 from .laboratory.cases import Case as Case
 from .laboratory.cases import grid as grid
+from .laboratory.full_model import FullModel as FullModel
+from .laboratory.full_transient import FrameAcceleration as FrameAcceleration
+from .laboratory.full_transient import FullTransient as FullTransient
+from .laboratory.full_transient import full_transient as full_transient
 from .laboratory.laboratory import LaboratoryResult as LaboratoryResult
 from .laboratory.laboratory import Reference as Reference
 from .laboratory.laboratory import study as study

@@ -404,7 +404,8 @@ def compare_command(
 ) -> None:
     """Compare mode sets with the full model: which one is good enough, with how few modes, and why.
 
-    The full model is solved once and kept in the folder of the report, so that a repeat is quick.
+    The full model is solved once and kept in the folder of the report, so that a repeat is quick. In the motion of a
+    mechanism, frames, stiffening and parts among them: floatframe study (docs/laboratory.md).
 
     Example: cms compare rod.toml --sets craig-bampton,craig-bampton-ir,rubin --modes 0:30 -o compare
 
@@ -414,6 +415,18 @@ def compare_command(
 
     run_compare(
         CompareRequest(job, sets, modes, output, band, reference_modes, tuple(load or ()), pulse_at, motion, stills)
+    )
+
+
+@app.command("study", hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+@guarded
+def study_command(context: typer.Context) -> None:
+    """Name the command that studies a body in the motion of a mechanism: it belongs to the engine."""
+    from cms.errors import JobError
+
+    raise JobError(
+        f"cms study: a study runs the body in a mechanism: floatframe study {' '.join(context.args) or 'FILE'} "
+        "(docs/laboratory.md); mode sets of the body alone, against its full model: cms compare JOB"
     )
 
 

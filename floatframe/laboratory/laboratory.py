@@ -26,6 +26,7 @@ from floatframe.errors import ModelError
 from floatframe.integrators.carry import Integrator
 from floatframe.laboratory.bodies import BodyShelf
 from floatframe.laboratory.cases import Case
+from floatframe.laboratory.full_model import FullModel
 from floatframe.laboratory.substitution import with_body
 from floatframe.motion.integration import integrate
 from floatframe.results.sensors import measured
@@ -43,6 +44,21 @@ class Reference:
     words: str
     t: Array  #: (n_t,)
     columns: Mapping[str, Array]  #: "sensor column" -> (n_t,)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A motion of the mechanism with one description of the body."""
+
+    system: System
+    columns: Mapping[str, Array]  #: of the chosen sensors
+    t: Array  #: (n_t,)
+    seconds: float  #: processor time
+    notes: tuple[str, ...]  #: that the frame left its range
+
+    def reference(self, words: str) -> Reference:
+        """Return what was measured as a reference."""
+        return Reference(words, self.t, self.columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +136,7 @@ def study(
     integrator: Integrator,
     t_end: float,
     h: float,
-    reference: Case | Reference,
+    reference: Case | FullModel | Reference,
     sensors: Sequence[str] | None = None,
     cut: str = "rigid",
     stages: Stages | None = None,
@@ -137,7 +153,7 @@ def study(
     job
         Job file it is reduced by; mode set, number of modes and frame come from the cases.
     reference
-        A case that is finer than the others, or columns from elsewhere (a full model, an exact beam, another program).
+        A case that is finer than the others, the whole finite element model, or columns from elsewhere.
     sensors
         Names of the sensors that are compared; None: all.
     cut
@@ -162,30 +178,38 @@ def study(
         raise ModelError(f"study: sensors: expected some of {choices}; got {got}")
     if not cases:
         raise ModelError("study: expected at least one case")
-    found: dict[Case, tuple[System, dict[str, Array], Array, float, tuple[str, ...]]] = {}
+    found: dict[Case, Run] = {}
+    every = [*cases, reference] if isinstance(reference, Case) else cases
 
-    with BodyShelf(job, cut) as shelf, quiet():
+    with BodyShelf(job, cut, cases=every) as shelf, quiet():
 
-        def run(case: Case) -> None:
-            with stages(f"reduce {case.words}, {case.n_modes} modes"):
-                reduced = shelf.reduced(case)
-                changed = with_body(system, body, reduced, stiffening=case.stiffening)
-            with stages(f"run {case.words}, {case.n_modes} modes"):
-                if not found:
-                    integrate(changed, integrator, h, h)  # compiles
-                begun = time.process_time()
-                motion = integrate(changed, integrator, t_end, h)
-                seconds = time.process_time() - begun
+        def moved(changed: System) -> Run:
+            if not found:
+                integrate(changed, integrator, h, h)  # compiles
+            begun = time.process_time()
+            motion = integrate(changed, integrator, t_end, h)
+            seconds = time.process_time() - begun
             chosen = [sensor for sensor in changed.sensors if sensor.name in wanted]
             columns = {f"{name} {key}": values for name, each in measured(changed, motion, chosen).items()  # type: ignore[arg-type]
                        for key, values in each.columns.items()}  # fmt: skip
             notes = tuple(note.words for note in motion.validity)
-            found[case] = (changed, columns, np.asarray(motion.t), seconds, notes)
+            return Run(changed, columns, np.asarray(motion.t), seconds, notes)
+
+        def run(case: Case) -> None:
+            with stages(f"reduce {case.words}, {case.n_modes} modes"):
+                changed = with_body(system, body, shelf.reduced(case), stiffening=case.stiffening)
+            with stages(f"run {case.words}, {case.n_modes} modes"):
+                found[case] = moved(changed)
 
         if isinstance(reference, Case):
             run(reference)
-            _, columns, t, _, _ = found[reference]
-            told = Reference(f"{reference.words}, {reference.n_modes} modes", t, columns)
+            told = found[reference].reference(f"{reference.words}, {reference.n_modes} modes")
+        elif isinstance(reference, FullModel):
+            with stages("full model"):
+                whole = shelf.unreduced(reference)
+                told = moved(with_body(system, body, [whole], stiffening=whole.geometric is not None)).reference(
+                    f"{reference.words}, {whole.n_q} shapes"
+                )
         else:
             told = reference
         failures: dict[Case, str] = {}
@@ -198,16 +222,16 @@ def study(
                     failures[case] = str(error)
             if on_case is not None:
                 on_case(CaseResult(case, failure=failures.get(case, "")))
-    compared = compared_columns(told, [columns for _, columns, _, _, _ in found.values()])
+    compared = compared_columns(told, [each.columns for each in found.values()])
     for case in cases:
         if case in failures:
             results.append(CaseResult(case, failure=failures[case]))
             continue
-        changed, columns, t, seconds, notes = found[case]
+        changed, columns, t = (here := found[case]).system, here.columns, here.t
         at = {name: np.interp(t, told.t, told.columns[name]) for name in compared}
         scale = {name: float(np.ptp(told.columns[name])) for name in compared}
         richest = max((each for each in found if each.family == case.family), key=lambda each: each.n_modes)
-        rich = found[richest][1]
+        rich = found[richest].columns
         results.append(
             CaseResult(
                 case,
@@ -216,8 +240,8 @@ def study(
                 {name: distance(columns[name], at[name], scale[name]) for name in compared},
                 max(distance(columns[name], rich[name], scale[name]) for name in compared),
                 max(distance(rich[name], at[name], scale[name]) for name in compared),
-                seconds,
-                notes,
+                here.seconds,
+                here.notes,
             )
         )
     return LaboratoryResult(system.name, told.words, tuple(compared), tuple(results))

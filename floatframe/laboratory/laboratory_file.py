@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
@@ -11,6 +11,7 @@ from fe_models.foundation.stages import Stages
 from fe_models.foundation.toml_file import Table, read_toml, validated
 from floatframe.errors import ModelError
 from floatframe.laboratory.cases import Case, grid
+from floatframe.laboratory.full_model import MOST_DOFS, FullModel
 from floatframe.laboratory.laboratory import CaseResult, LaboratoryResult, Reference, study
 from floatframe.signals.read_signals import read_signals
 from floatframe.system_file.read_system import read_system
@@ -54,8 +55,10 @@ class VaryTable(Table):
 
 
 class ReferenceTable(Table):
-    """[reference]: a finer case, or a table of columns from elsewhere."""
+    """[reference]: the full model, a finer case, or a table of columns from elsewhere."""
 
+    kind: Literal["case", "full-model", "file"] | None = Field(None, description='"case", "full-model" or "file"')
+    most_dofs: int = Field(MOST_DOFS, ge=1, description="a whole number from 1, of a full model")
     file: Path | None = Field(None, description="the path of a table of time and sensor columns (.csv, .mat)")
     mode_set: str = Field("craig-bampton", description="the name of a mode set")
     n_modes: int = Field(10, ge=0, description="a whole number from 0")
@@ -70,9 +73,24 @@ class ReferenceTable(Table):
 
     @model_validator(mode="after")
     def _one(self) -> "ReferenceTable":
-        if self.file is not None and len(self.model_fields_set) > 1:
-            raise ValueError("expected a file, or a case; got both")
+        given = self.model_fields_set - {"kind"}
+        kind = self.kind or ("file" if self.file is not None else "case")
+        own = {"file": {"file"}, "full-model": {"most_dofs"}}.get(kind)
+        if kind == "file" and self.file is None:
+            raise ValueError('kind = "file": expected file = the path of a table')
+        others = given - own if own is not None else given & {"file", "most_dofs"}
+        if others:
+            raise ValueError(f'of a reference of kind "{kind}" expected no {", ".join(sorted(others))}')
         return self
+
+    @property
+    def asked(self) -> Case | FullModel | None:
+        """The reference that is computed; None: it is read from a file."""
+        if self.kind == "full-model":
+            return FullModel(self.most_dofs)
+        if self.file is not None:
+            return None
+        return Case(self.mode_set, self.n_modes, self.frame, self.stiffening, self.parts)
 
 
 class LaboratoryFile(Table):
@@ -113,10 +131,9 @@ def run_laboratory(
     system, given = read_system(asked.system)
     run = required_run(given, asked.system)
     table = asked.reference
-    reference: Case | Reference
-    if table.file is None:
-        reference = Case(table.mode_set, table.n_modes, table.frame, table.stiffening, table.parts)
-    else:
+    reference: Case | FullModel | Reference | None = table.asked
+    if reference is None:
+        assert table.file is not None
         signals = read_signals(table.file, uneven=True)
         columns = {name: signals.values[:, k] for k, name in enumerate(signals.names)}
         reference = Reference(str(table.file), signals.time, columns)

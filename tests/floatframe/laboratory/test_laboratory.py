@@ -5,23 +5,28 @@ A blade of 1 m on a pin that turns it by a smooth step, 8 rad in a second (lowes
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import cms
 import floatframe as ff
+from cms.families.families import Families
 from cms.jobs.reduce_job import reduce_job
 from cms.modal_file.file import write as write_body
 from floatframe.cli import main
 from floatframe.errors import ModelError
+from floatframe.laboratory.bodies import BodyShelf
 from floatframe.laboratory.figures import convergence_figure
+from floatframe.laboratory.full_model import all_dofs
 from floatframe.laboratory.laboratory import distance
 from floatframe.laboratory.laboratory_file import read_laboratory, run_laboratory
 from floatframe.laboratory.substitution import with_body
 from floatframe.results.sensors import measured
 from floatframe.system_file.read_system import read_system
-from tests.bodies import box_mesh
+from tests.bodies import bar, box_mesh
 from tests.decks import write_deck
 
 JOB = """
@@ -256,3 +261,74 @@ def test_command_and_picture(folder, result, tmp_path, capsys, monkeypatch):
     assert len(rows) == len(record["cases"]) == 4
     assert float(rows[0]["error"]) == pytest.approx(record["cases"][0]["error"])
     assert outputs[2].read_text().startswith("<?xml")
+
+
+def test_the_full_model_is_where_cases_lead(folder, tmp_path):
+    """Unreduced inside the system: distances from it fall with the modes, and the richest is almost it."""
+    system, run = read_system(folder / "spin.toml")
+    found = ff.study(
+        system, "blade", folder / "blade.toml", ff.grid(mode_sets=("craig-bampton-ir",), n_modes=(0, 2, 6)),
+        integrator=run.integrator, t_end=0.5, h=run.h, reference=ff.FullModel(), sensors=["tip", "load"],
+    )  # fmt: skip
+    errors = [row.error for row in found.cases]
+    assert errors[0] > errors[1] > errors[2] > 0
+    assert errors[2] < 1e-4
+    assert "full finite element model" in found.reference
+    with pytest.raises(ModelError, match=r"full model of body 'blade' has \d+ dofs, more than 20"):
+        ff.study(
+            system, "blade", folder / "blade.toml", [ff.Case(n_modes=1)], integrator=run.integrator, t_end=0.1, h=run.h,
+            reference=ff.FullModel(most_dofs=20),
+        )  # fmt: skip
+    text = LABORATORY[: LABORATORY.index("[reference]")]
+    for name in ("spin.toml", "blade.toml"):
+        text = text.replace(f'"{name}"', f'"{folder / name}"')
+    (tmp_path / "full.toml").write_text(text + '[reference]\nkind = "full-model"\nmost_dofs = 500\n')
+    assert read_laboratory(tmp_path / "full.toml").reference.asked == ff.FullModel(500)
+    (tmp_path / "both.toml").write_text(text + '[reference]\nkind = "full-model"\nn_modes = 5\n')
+    with pytest.raises(ModelError, match='kind "full-model" expected no n_modes'):
+        read_laboratory(tmp_path / "both.toml")
+
+
+def test_all_dofs_of_distributing_interfaces_follow_their_members():
+    """The frequencies of the body with all dofs are those of the model, multipliers and all."""
+    bodies = bar(nx=2)
+    ends = tuple(replace(i, kind="distributing") for i in bodies.interfaces)
+    body = cms.couple(replace(bodies, interfaces=ends))
+    reduced = cms.reduce(body, all_dofs(body))
+    with Families(body) as families:
+        expected = families.free_modes(12).frequencies
+    assert_allclose(reduced.free_frequencies[:12], expected, rtol=1e-7)
+    assert reduced.n_q == 3 * len(bar(nx=2).nodes) - 6
+
+
+def test_cases_share_one_factorisation_and_one_search_for_modes(folder, monkeypatch):
+    """Two sets, two frames, three numbers of modes; the bodies are those that a job reduces alone."""
+    from cms.families import families as module
+
+    counts = {"fix_interfaces": 0, "fixed_interface_modes": 0}
+    for name in counts:
+
+        def counted(*given, of=getattr(module, name), name=name):
+            counts[name] += 1
+            return of(*given)
+
+        monkeypatch.setattr(module, name, counted)
+    cases = ff.grid(
+        mode_sets=("craig-bampton", "craig-bampton-ir"), n_modes=(1, 2, 4), frames=("nodal:root", "tisserand")
+    )
+    with BodyShelf(folder / "blade.toml", cases=cases) as shelf:
+        bodies = {case: shelf.reduced(case)[0] for case in cases}
+        assert counts == {"fix_interfaces": 1, "fixed_interface_modes": 1}
+    alone = reduce_job(folder / "blade.toml")
+    shared = bodies[ff.Case("craig-bampton", 4, "nodal:root")]
+    assert_allclose(np.diag(shared.K), np.diag(alone.K), rtol=1e-9)
+    assert_allclose(shared.geometric.spin, alone.geometric.spin, rtol=0, atol=1e-6 * np.abs(alone.geometric.spin).max())
+
+
+def test_cms_study_names_the_command(capsys, monkeypatch):
+    from cms.cli.app import app
+
+    with pytest.raises(SystemExit) as end:
+        app(["study", "blade.toml"])
+    assert end.value.code == 2
+    assert "floatframe study blade.toml" in " ".join(capsys.readouterr().err.split())
