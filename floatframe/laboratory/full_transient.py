@@ -170,7 +170,7 @@ def full_transient(
                 reaction[k] = sum(X @ x for X, x in zip(rows_h, whole, strict=True)) - (F @ p[k])[held]
     ends = np.cumsum([0, *(len(boundary_dofs(body, name)) for name in moved)])
     forces = {name: reaction[:, a:b] for name, a, b in zip(moved, ends[:-1], ends[1:], strict=True)}
-    return FullTransient(t, *results, forces, len(i))
+    return FullTransient(t, results[0], results[1], results[2], forces, len(i))
 
 
 @dataclass(frozen=True)
