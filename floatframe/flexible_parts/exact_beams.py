@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.beams.model import BeamModel
+from fe_models.beams.slices import Slices
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 from floatframe.bodies.markers import Marker
@@ -126,11 +127,12 @@ def exact_beams(
             J = R @ ((mass * along + section) / (2 * pieces)) @ R.T
             for end, side in ((j, 1), (j + 1, -1)):
                 lumps[names[end]].add(mass / (2 * pieces), axis[end] + side * half / 2 * R[:, 0], J)
-            markers = [Marker(names[end], position=axis[end] - lumps[names[end]].place, triad=R) for end in (j, j + 1)]
-            rest = -K @ np.concatenate([L / pieces * E_X, np.zeros(3)])
-            springs.append(
-                Bushing(f"{name} element {k + 1}.{j + 1}", *markers, stiffness=K, damping=damping * K, preload=rest)
+            first, second = (
+                Marker(names[end], position=axis[end] - lumps[names[end]].place, triad=R) for end in (j, j + 1)
             )
+            rest = -K @ np.concatenate([L / pieces * E_X, np.zeros(3)])
+            called_ = f"{name} element {k + 1}.{j + 1}"
+            springs.append(Bushing(called_, first, second, stiffness=K, damping=damping * K, preload=rest))
     for piece in model.pieces[1:]:  # point masses
         for k, node in enumerate(piece.dofs[:, 0] // 6):
             E = piece.axes[k, 0] @ np.diag(piece.moments[k, 0]) @ piece.axes[k, 0].T
@@ -138,14 +140,14 @@ def exact_beams(
             lump.add(float(piece.mass[k, 0]), piece.position[k, 0], np.trace(E) * np.eye(3) - E)
     for k, spring in enumerate(model.springs):
         point = model.nodes[list(spring.nodes)].mean(axis=0) if spring.point is None else np.asarray(spring.point)
-        markers = [Marker(called[n], position=point - model.nodes[n], triad=spring.triad) for n in spring.nodes]
+        first, second = (Marker(called[n], position=point - model.nodes[n], triad=spring.triad) for n in spring.nodes)
         D = np.zeros((6, 6)) if spring.damping is None else spring.damping
-        springs.append(Bushing(f"{name} spring {k + 1}", *markers, stiffness=spring.stiffness, damping=D))
+        springs.append(Bushing(f"{name} spring {k + 1}", first, second, stiffness=spring.stiffness, damping=D))
 
     Rot = rotation_matrix(p)
     bodies = [
-        rigid_body(where, called_, lump, origin, p, v + Rot @ np.cross(omega, lump.place), omega)
-        for called_, lump in lumps.items()
+        rigid_body(where, node, lump, origin, p, v + Rot @ np.cross(omega, lump.place), omega)
+        for node, lump in lumps.items()
     ]
     places = {f"node {body.numbering.called(node)}": Marker(called[node]) for node in np.unique(of_nodes)}
     for interface in body.interfaces:
@@ -155,9 +157,8 @@ def exact_beams(
                 "its lines"
             )
         node = interface.nodes[0]
-        places[interface.name] = Marker(
-            called[node], position=interface.reference - model.nodes[node], triad=interface.triad
-        )
+        arm = interface.reference - model.nodes[node]
+        places[interface.name] = Marker(called[node], position=arm, triad=interface.triad)
     return FlexiblePart(name, tuple(bodies), (), tuple(springs), places)
 
 
@@ -192,15 +193,13 @@ def piece_stiffness(K_local: Array, L: float, pieces: int) -> Array:
     return np.asarray((K + K.T) / 2)
 
 
-def sectional_inertia(lines: object, k: int) -> Array:
+def sectional_inertia(lines: Slices, k: int) -> Array:
     """Return the inertia of all sections of a line about its axis, in its axes, (3, 3) [kg m²]."""
-    E = np.diag(lines.moments[k].sum(axis=0))  # type: ignore[attr-defined]
+    E = np.diag(lines.moments[k].sum(axis=0))
     return np.asarray(np.trace(E) * np.eye(3) - E)
 
 
-def rigid_body(
-    where: str, name: str, lump: Lump, origin: Array, p: Array, velocity: Array, omega: Array
-) -> RigidBody:
+def rigid_body(where: str, name: str, lump: Lump, origin: Array, p: Array, velocity: Array, omega: Array) -> RigidBody:
     """Return the body of a node."""
     center = np.asarray(lump.moment) / lump.mass if lump.mass > 0 else np.zeros(3)
     about = np.asarray(lump.inertia) - lump.mass * (center @ center * np.eye(3) - np.outer(center, center))
