@@ -18,8 +18,8 @@ from fe_models.foundation.paths import is_stream, near_file
 from fe_models.foundation.words import nearest, quoted, shortened
 
 __all__ = [
-    "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "files_named", "first_key", "read_toml", "validated",
-    "value_of",
+    "Matrix3", "Range", "Table", "Vector3", "changed", "choice", "describe", "files_named", "first_key", "read_toml",
+    "validated", "value_of",
 ]  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """From a fatigue file to a result: the curve in units of the body, blocks from results files, spectra from .npz."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +16,7 @@ from floatframe.fatigue.criteria import Criterion
 from floatframe.fatigue.fatigue_file import (
     STRESS_UNITS,
     BlockSection,
+    FactorSection,
     FatigueFile,
     MaterialSection,
     PlacesSection,
@@ -96,8 +98,7 @@ def material_of(key: str, section: MaterialSection, given: FatigueFile, body: Re
     law = mean_stress_of(section, given, body)
     if not isinstance(section, PlacesSection):
         return FatigueMaterial(curve, law, (section.name or "the rest") if given.materials else "")
-    for name, factor in section.factors.items():
-        curve = curve.scaled(factor, f"factor {name}")
+    curve = with_factors(curve, section.factors, section)
     return FatigueMaterial(curve, law, key.removeprefix("materials."), *places_named(key, section, body))
 
 
@@ -119,8 +120,17 @@ def curve_of(material: MaterialSection, given: FatigueFile, body: ReducedBody) -
         )  # fmt: skip
     if given.survival is not None:
         curve = curve.for_survival(given.survival, of_curve=section.survival, deviation=section.log_deviation or 0.0)
-    for name, factor in given.factors.items():
-        curve = curve.scaled(factor, f"factor {name}")
+    return with_factors(curve, given.factors, material)
+
+
+def with_factors(curve: SNCurve, factors: Mapping[str, float | FactorSection], material: MaterialSection) -> SNCurve:
+    """Return a curve with factors on its amplitudes, numbers or by formula."""
+    strength = (material.tensile_strength or 0.0) * STRESS_UNITS[material.stress_unit] / 1e6  # [MPa]
+    for name, factor in factors.items():
+        if isinstance(factor, FactorSection):
+            curve = curve.scaled(factor.value(strength), f"factor {name} ({factor.words})")
+        else:
+            curve = curve.scaled(factor, f"factor {name}")
     return curve
 
 

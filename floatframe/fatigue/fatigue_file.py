@@ -1,15 +1,17 @@
 """The fatigue file: what `floatframe fatigue` reads (docs/fatigue.md)."""
 
+import math
 import os
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
 
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Range, Table, choice, read_toml, validated
+from fe_models.foundation.toml_file import Range, Table, choice, describe, read_toml, validated
 from floatframe.errors import FatigueError
 from floatframe.fatigue.criteria import CRITERIA, TENSORS
+from floatframe.fatigue.factors import FACTOR_METHODS
 from floatframe.fatigue.history_damage import RESIDUES
 from floatframe.fatigue.mean_stress import MEAN_STRESS
 from floatframe.fatigue.sn_curve import BELOW
@@ -107,6 +109,54 @@ class MaterialSection(Table):
     sn: CurveSection = Field(description="the table [material.sn]")
 
 
+class FactorSection(Table):
+    """A factor by a formula, in place of a number."""
+
+    method: choice("formula", lambda: tuple(FACTOR_METHODS)) = Field(  # type: ignore[valid-type]
+        description=f"one of {', '.join(FACTOR_METHODS)}"
+    )
+    roughness: Annotated[float, Field(ge=0)] | None = Field(None, description="a number, Rz [micrometres]")
+    diameter: Positive | None = Field(None, description="a number above 0 [mm]")
+    group: str | None = Field(None, description="a group of materials")
+    survival: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number from 0.5 to below 1")
+
+    @model_validator(mode="after")
+    def _needs(self) -> "FactorSection":
+        needs = FACTOR_METHODS[self.method].needs
+        for key in ("roughness", "diameter", "group", "survival"):
+            if (getattr(self, key) is None) == (key in needs):
+                word = "is missing" if key in needs else "has no meaning here; remove it"
+                raise ValueError(f'method "{self.method}" needs {" and ".join(needs)}: {key} {word}')
+        return self
+
+    def value(self, tensile_strength: float) -> float:
+        """Return the factor for a tensile strength [MPa]."""
+        given = {key: getattr(self, key) for key in ("roughness", "diameter", "group", "survival")}
+        return FACTOR_METHODS[self.method].value(given, tensile_strength)
+
+    @property
+    def words(self) -> str:
+        """The formula and what went in."""
+        method = FACTOR_METHODS[self.method]
+        return f"{method.words}, " + ", ".join(f"{key} {getattr(self, key)}" for key in method.needs)
+
+
+def factor(value: Any) -> Any:
+    """Return a factor as a number, or as the table of its formula."""
+    if isinstance(value, dict):
+        try:
+            return FactorSection.model_validate(value)
+        except ValidationError as problem:
+            details = problem.errors(include_url=False)
+            raise ValueError("; ".join(describe(FactorSection, detail) for detail in details)) from None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise ValueError("expected a number above 0, or a table: method, and what its formula needs")
+    return float(value)
+
+
+Factor = Annotated[float | FactorSection, BeforeValidator(factor)]
+
+
 class PlacesSection(MaterialSection):
     """[materials.NAME]: a material with the places that have it."""
 
@@ -114,7 +164,7 @@ class PlacesSection(MaterialSection):
     elements: list[int | str] = Field([], description="a list of numbers of elements")
     nodes: list[int | str] = Field([], description="a list of numbers of nodes")
     points: list[str] = Field([], description="a list of names of stress points, or of how they begin")
-    factors: dict[str, Positive] = Field({}, description="numbers above 0 by name, beside those of [factors]")
+    factors: dict[str, Factor] = Field({}, description="numbers or formulas by name, beside those of [factors]")
 
     @model_validator(mode="after")
     def _places(self) -> "PlacesSection":
@@ -217,7 +267,7 @@ class FatigueFile(Table):
     body: InputFile = Field(description="the path of a modal file, relative to this file")
     material: MaterialSection | None = Field(None, description="the table [material]")
     materials: dict[str, PlacesSection] = Field({}, description="tables [materials.NAME], of the places they name")
-    factors: dict[str, Positive] = Field({}, description="numbers above 0 by name, on the amplitudes of the curve")
+    factors: dict[str, Factor] = Field({}, description="numbers or formulas by name, on the amplitudes of the curves")
     survival: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number from 0 to 1")
     criterion: CriterionSection = Field(
         default_factory=lambda: CriterionSection.model_validate({}), description="the table [criterion]"
@@ -246,6 +296,14 @@ class FatigueFile(Table):
         for key, material in self.all_materials.items():
             if need and getattr(material, need) is None:
                 raise ValueError(f'mean stress "{self.criterion.mean_stress}" needs {key}.{need}, which is missing')
+            own = material.factors if isinstance(material, PlacesSection) else {}
+            for name, each in {**self.factors, **own}.items():
+                if not isinstance(each, FactorSection):
+                    continue
+                if FACTOR_METHODS[each.method].needs_strength and material.tensile_strength is None:
+                    raise ValueError(f"factor {name}: {each.method} needs {key}.tensile_strength, which is missing")
+                if each.survival is not None and self.survival is not None:
+                    raise ValueError(f"factor {name} and survival count the scatter twice; take one of them")
             if self.survival is not None and material.sn.log_deviation is None:
                 raise ValueError(f"survival: needs {key}.sn.log_deviation, the standard deviation of log10 N")
         return self
