@@ -7,6 +7,7 @@ import numpy as np
 
 from cms.rendering.camera import Camera
 from cms.rendering.film import Image, average_of_blocks
+from cms.rendering.light import GLOSS, brightness
 from cms.rendering.scene import Lines, Scene, Surface, frame_of
 from cms.rendering.shape import colormap, smooth_neighbours, surface_edges, triangle_normals
 from fe_models.foundation.arrays import Array
@@ -14,8 +15,6 @@ from fe_models.foundation.arrays import Array
 __all__ = ["matplotlib_view"]
 
 OVERSAMPLING = 2  #: drawn so much larger without smoothing, then averaged: smoothed neighbours would show seams
-LIGHTS = ((np.array([-0.4, 0.65, -1.0]), 0.68), (np.array([0.9, 0.1, -0.9]), 0.3))  #: right, up, forward; strength
-AMBIENT = 0.28
 
 
 def matplotlib_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
@@ -106,8 +105,9 @@ class DrawnSurface:
         shading = self.smoothing @ normals
         shading /= np.maximum(np.linalg.norm(shading, axis=1, keepdims=True), 1e-300)
         shading = np.where(faces_eye[:, None], shading, -shading) @ camera.axes.T
-        light = AMBIENT + sum(strength * np.clip(shading @ unit(towards), 0, 1) for towards, strength in LIGHTS)
-        gloss = 0.18 * np.clip(shading @ unit(np.array([-0.3, 0.5, -0.85])), 0, 1) ** 24
+        shows_numbers = self.surface.scalars is not None
+        light = brightness(shading * np.array([1.0, 1.0, -1.0]), shows_numbers=shows_numbers)  # axes look forward
+        gloss = GLOSS[shows_numbers] * np.clip(shading @ unit(np.array([-0.3, 0.5, -0.85])), 0, 1) ** 24
         rgb = np.clip(self.face_colors(frame) * light[:, None] + gloss[:, None], 0, 1)
         return np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)
 

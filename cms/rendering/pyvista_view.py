@@ -7,6 +7,7 @@ import numpy as np
 
 from cms.rendering.camera import VIEW_ANGLE, Camera
 from cms.rendering.film import Image
+from cms.rendering.light import GLOSS, LIGHTS, ambient, diffuse
 from cms.rendering.scene import Lines, Scene, Surface, frame_of
 from cms.rendering.shape import FEATURE_ANGLE, colormap, surface_edges
 from fe_models.foundation.arrays import Array, IntArray
@@ -21,8 +22,9 @@ def pyvista_view(scene: Scene, camera: Camera) -> Callable[[int], Image]:
 
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=list(camera.size), lighting="none")
     plotter.set_background(scene.background)
-    for position, strength in (((-0.4, 0.65, 1.0), 0.8), ((0.9, 0.1, 0.9), 0.36), ((0.0, -1.0, 0.4), 0.12)):
-        light = pyvista.Light(position=position, focal_point=(0, 0, 0), light_type="camera light", intensity=strength)
+    for towards, strength in LIGHTS:
+        place = tuple(towards.tolist())
+        light = pyvista.Light(position=place, focal_point=(0, 0, 0), light_type="camera light", intensity=strength)
         plotter.add_light(light)
     colors = ListedColormap(colormap())
     updates = [add_surface(plotter, surface, scene, colors) for surface in scene.surfaces]
@@ -54,8 +56,12 @@ def add_surface(plotter: Any, surface: Surface, scene: Scene, colors: Any) -> Ca
         auto_orient_normals=False,
     )  # fmt: skip
     origin = np.asarray(mesh.point_data["node"])
-    look: dict[str, Any] = {"opacity": surface.opacity, "smooth_shading": False, "ambient": 0.28, "diffuse": 0.85,
-                            "specular": 0.25, "specular_power": 25.0, "show_scalar_bar": False}  # fmt: skip
+    shows_numbers = surface.scalars is not None
+    look: dict[str, Any] = {"opacity": surface.opacity, "smooth_shading": False,
+                            "ambient": ambient(shows_numbers=shows_numbers),
+                            "diffuse": diffuse(shows_numbers=shows_numbers),
+                            "specular": 1.4 * GLOSS[shows_numbers], "specular_power": 25.0,
+                            "show_scalar_bar": False}  # fmt: skip
     if surface.scalars is None:
         plotter.add_mesh(mesh, color=surface.color, **look)
     else:
