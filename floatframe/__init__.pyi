@@ -40,6 +40,8 @@ from .bodies.ground import Ground as Ground
 from .bodies.markers import Marker as Marker
 from .bodies.rigid_body import RigidBody as RigidBody
 from .cosimulation.coupled_motion import co_simulate as co_simulate
+from .elements import Element as Element
+from .elements import ElementLaw as ElementLaw
 from .equations import BodyEquations as BodyEquations
 from .equations import Equations as Equations
 from .equations import body_equations as body_equations
@@ -127,6 +129,8 @@ from .pictures.mode_film import animate_mode as animate_mode
 from .pictures.mode_film import draw_mode as draw_mode
 from .results.coordinate_elements import coupler_motion as coupler_motion
 from .results.coordinate_elements import user_force_motion as user_force_motion
+from .results.element_motion import ElementMotion as ElementMotion
+from .results.element_motion import element_motion as element_motion
 from .results.export import export_csv as export_csv
 from .results.export import export_vtk as export_vtk
 from .results.joint_coordinates import joint_coordinate as joint_coordinate
@@ -142,6 +146,7 @@ from .results.sensors import CoordinateChannel as CoordinateChannel
 from .results.sensors import CoordinateSensor as CoordinateSensor
 from .results.sensors import CouplerSensor as CouplerSensor
 from .results.sensors import DisplacementSensor as DisplacementSensor
+from .results.sensors import ElementSensor as ElementSensor
 from .results.sensors import ElongationSensor as ElongationSensor
 from .results.sensors import EnergySensor as EnergySensor
 from .results.sensors import InterfaceForceSensor as InterfaceForceSensor

@@ -10,6 +10,7 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.ground import GROUND
 from floatframe.bodies.rigid_body import RigidBody
+from floatframe.elements.element import Element
 from floatframe.errors import ModelError
 from floatframe.forces import Force, Gravity
 from floatframe.joints import Joint
@@ -50,6 +51,7 @@ class System:
     #: constraints that repeat others: "refuse" them by name, or share their reactions ("minimum-norm")
     redundant: str = "refuse"
     couplers: Sequence[CoordinateCoupler] = ()  #: between coordinates of joints
+    elements: Sequence[Element] = field(default=(), kw_only=True)  #: public elements, see `floatframe.elements`
     sensors: Sequence[Named] = field(default=(), kw_only=True)  #: what is measured on its motions
     inputs: Sequence[Named] = field(default=(), kw_only=True)  #: forces that act on it when it is linearised
     outputs: Sequence[Named] = field(default=(), kw_only=True)  #: what is then observed
@@ -61,7 +63,8 @@ class System:
 
     def __post_init__(self) -> None:
         for part in (
-            "bodies", "joints", "forces", "couplers", "sensors", "inputs", "outputs", "events", "fmus", "data_files",
+            "bodies", "joints", "forces", "couplers", "elements", "sensors", "inputs", "outputs", "events", "fmus",
+            "data_files",
         ):  # fmt: skip
             object.__setattr__(self, part, tuple(getattr(self, part)))
         among = tuple(joint for joint in self.joints if isinstance(joint, CoordinateCoupler))
@@ -75,7 +78,13 @@ class System:
             raise ModelError(f"{where}: expected at least one body, got none")
         require_names(f"{where}: bodies", [body.name for body in self.bodies], taken=(GROUND.name,))
         named = [force.name for force in self.forces if not isinstance(force, Gravity)]
-        require_names(f"{where}: joints and forces", [joint.name for joint in (*self.joints, *self.couplers)] + named)
+        for element in self.elements:
+            if not isinstance(element, Element):
+                raise ModelError(f"{where}: elements: expected a floatframe.elements.Element, got {element!r}")
+        named += [element.name for element in self.elements]
+        require_names(
+            f"{where}: joints, forces and elements", [joint.name for joint in (*self.joints, *self.couplers)] + named
+        )
         for kind in ("sensors", "inputs", "outputs", "events", "fmus"):
             require_names(f"{where}: {kind}", [each.name for each in getattr(self, kind)])
         for body in self.bodies:

@@ -26,6 +26,7 @@ from floatframe.compiling.markers import (
 )
 from floatframe.compiling.mass_checks import require_inertia
 from floatframe.compiling.pair_forces import add_pair_laws
+from floatframe.compiling.public_elements import PlacedLaw, add_public_elements
 from floatframe.forces import Gravity, PointForce, SpringDamper
 from floatframe.functions.time_functions import TimeFunction
 from floatframe.joints.rows import Row, kind_of
@@ -53,7 +54,8 @@ class CompiledSystem:
     body_names: tuple[str, ...]
     joint_names: tuple[str, ...]
     spring_names: tuple[str, ...]  #: of spring-dampers, then bushings and contacts
-    element_names: tuple[str, ...]  #: of couplers, then user forces
+    element_names: tuple[str, ...]  #: of couplers, then user forces, then public elements
+    laws: tuple[PlacedLaw, ...]  #: of public elements
     callbacks: tuple[Callback, ...]  #: users' functions that the kernels call
     owners: tuple[str, ...]  #: name of the connection of each row, (n_w,)
     placed: State  #: the state as given, before it is made consistent, in the frames of the engine
@@ -120,6 +122,8 @@ def compile_system(system: System) -> CompiledSystem:
     )
     pairs = add_pair_laws(system, made, functions)
     elements = add_coordinate_elements(system, made, functions)
+    public = add_public_elements(system, made, len(elements.states))
+    elements.states += public.states
     markers, rows = made.markers, made.rows
     loads = [force for force in system.forces if isinstance(force, PointForce)]
     load_marker = []
@@ -172,6 +176,7 @@ def compile_system(system: System) -> CompiledSystem:
         bushings=pairs.bushings,
         contacts=pairs.contacts,
         **elements.records(),
+        laws=public.record(0.0),
         **lines.records(),
         loads=filled(
             Loads(),
@@ -187,14 +192,15 @@ def compile_system(system: System) -> CompiledSystem:
     )
     length = system_length(markers, placed, n_q, model)
     soft = row_softness(system, rows, model.body_types, kind, length)
-    model = model._replace(rows=model.rows._replace(soft=soft))
+    model = model._replace(rows=model.rows._replace(soft=soft), laws=public.record(length))
     return CompiledSystem(
         model=model,
         body_names=tuple(body.name for body in system.bodies),
         joint_names=tuple(joint.name for joint in system.joints),
         spring_names=tuple(spring.name for spring in dampers) + pairs.names,
-        element_names=elements.names,
-        callbacks=tuple(elements.callbacks),
+        element_names=elements.names + public.names,
+        laws=tuple(public.placed),
+        callbacks=(*elements.callbacks, *public.callbacks),
         owners=tuple(made.owner),
         placed=placed,
         mean_axes=axes,

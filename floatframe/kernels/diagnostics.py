@@ -7,6 +7,7 @@ from floatframe.kernels.body import body_mass_product, modal_term
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.connection import row_rates
 from floatframe.kernels.connections.coupler import coupler_power
+from floatframe.kernels.connections.element_law import law_power
 from floatframe.kernels.connections.pair_force import pair_energy, pair_power
 from floatframe.kernels.connections.spring_damper import spring_tension
 from floatframe.kernels.connections.user_force import user_force_power
@@ -26,7 +27,7 @@ from floatframe.kernels.memory import (
     SPRINGS,
     STRAIN,
 )
-from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, JOINT, SPRING, STIFFNESS, USER_FORCE
+from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, DAMPING, ELEMENT, JOINT, SPRING, STIFFNESS, USER_FORCE
 from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import add, cross, dot, put, put_sum, scaled, sub, turned, turned_back, vector
 
@@ -82,6 +83,9 @@ def diagnose(model, work, out, drift):
             )
         elif model.connections.law[c] == BUSHING or model.connections.law[c] == CONTACT:
             out[SPRINGS] += pair_energy(model, work, c)
+        elif model.connections.law[c] == ELEMENT:
+            energy, _, _ = law_power(model, work, c)
+            out[SPRINGS] += energy
         if model.connections.law[c] != JOINT:
             continue
         a, b = model.connections.a[c], model.connections.b[c]
@@ -184,6 +188,10 @@ def power(model, work):
             loads += coupler_power(model, work, c)
         elif law == USER_FORCE:
             loads += user_force_power(model, work, c)
+        elif law == ELEMENT:
+            _, given, taken = law_power(model, work, c)
+            loads += given
+            dissipated += taken
         elif law == SPRING:
             i, springs = model.connections.item[c], model.springs
             _, length, rate = spring_tension(model, work, c)

@@ -20,6 +20,7 @@ __all__ = [
     "CONTACT",
     "COUPLER",
     "DAMPING",
+    "ELEMENT",
     "JOINT",
     "K_ROTATION",
     "K_TRANSLATION",
@@ -42,6 +43,7 @@ __all__ = [
     "Functions",
     "JointForces",
     "JointRows",
+    "Laws",
     "Lines",
     "Loads",
     "Markers",
@@ -53,7 +55,7 @@ __all__ = [
     "Users",
 ]
 
-JOINT, SPRING, BUSHING, CONTACT, COUPLER, USER_FORCE = range(6)  #: values of `Connections.law`
+JOINT, SPRING, BUSHING, CONTACT, COUPLER, USER_FORCE, ELEMENT = range(7)  #: values of `Connections.law`
 C1, C2, C3, S_AB, C4, MASS, STIFFNESS, DAMPING, K_TRANSLATION, K_ROTATION = range(10)  #: columns of `BodyTypes.block0`
 N_BLOCKS = 10
 
@@ -62,7 +64,7 @@ n_functions, n_pieces, n_springs, n_bushings = (Size(name) for name in ("functio
 n_contacts, n_forces, n_elements, n_x = (Size(name) for name in ("contacts", "joint forces", "elements", "coordinates"))
 n_lines, n_stations, n_users, n_states = (Size(name) for name in ("lines", "stations", "user forces", "states"))
 n_tapes, n_operations, n_loads, n_body_loads = (Size(name) for name in ("tapes", "operations", "loads", "body loads"))
-n_angles = Size("angles")
+n_angles, n_laws = Size("angles"), Size("laws")
 
 
 class Bodies(NamedTuple):
@@ -111,13 +113,13 @@ class Markers(NamedTuple):
 
 
 class Connections(NamedTuple):
-    """Joints, spring-dampers, bushings, contacts, couplers, user forces: what has rows and as many unknowns."""
+    """Joints, spring-dampers, bushings, contacts, couplers, user forces, elements: what has rows and unknowns."""
 
     size: IntArray = integer(n_c)  #: number of wrench components = rows
     w0: IntArray = integer(n_c + 1)  #: first of them
     a: IntArray = integer(n_c)  #: marker A
     b: IntArray = integer(n_c)  #: marker B
-    law: IntArray = integer(n_c)  #: JOINT, SPRING, BUSHING, CONTACT, COUPLER or USER_FORCE
+    law: IntArray = integer(n_c)  #: JOINT, SPRING, BUSHING, CONTACT, COUPLER, USER_FORCE or ELEMENT
     item: IntArray = integer(n_c)  #: number among the connections of its law
     has_rates: IntArray = integer(n_c)  #: whether its rows depend on velocities
 
@@ -243,8 +245,26 @@ class Users(NamedTuple):
     state0: IntArray = integer(n_users + 1)  #: first of its states
 
 
+class Laws(NamedTuple):
+    """Public elements: laws that are called by address, see connections/element_law.py."""
+
+    address: IntArray = integer(n_laws)  #: of the function of values
+    tangent: IntArray = integer(n_laws)  #: of the function of their derivatives
+    head: IntArray = integer(n_laws, 8)  #: markers, numbers of each, states, multipliers, outputs, data, which move, 0
+    data0: IntArray = integer(n_laws + 1)  #: first number of its data
+    data: Array = real(Size("numbers of laws"))
+    row0: IntArray = integer(n_laws + 1)  #: first of its rows of wrenches in `source` and `factor`
+    source: IntArray = integer(Size("wrench rows of laws"))  #: number of the wrench as the function writes it
+    factor: Array = real(Size("wrench rows of laws"))  #: by which it becomes the unknown of the row, 1 or -1
+    state0: IntArray = integer(n_laws + 1)  #: first of its states among all
+    length: Array = real(n_laws, unit="m")  #: over which the law changes
+    energy: IntArray = integer(n_laws)  #: outputs that are stored energy, power given and power lost, -1 for none
+    given: IntArray = integer(n_laws)
+    lost: IntArray = integer(n_laws)
+
+
 class States(NamedTuple):
-    """States of user forces."""
+    """States of user forces and elements."""
 
     row: IntArray = integer(n_states)  #: of its value; those of its rate and algorithmic rate follow
     start: Array = real(n_states, unit="that of the state")  #: value at the start
@@ -325,6 +345,7 @@ class Model(NamedTuple):
     lines: Lines = Lines()
     stations: Stations = Stations()
     users: Users = Users()
+    laws: Laws = Laws()
     states: States = States()
     tapes: Tapes = Tapes()
     loads: Loads = Loads()

@@ -19,6 +19,7 @@ __all__ = [
     "ContactWork",
     "Counted",
     "Iterate",
+    "LawWork",
     "LineWork",
     "MarkerWork",
     "PairWork",
@@ -34,6 +35,7 @@ __all__ = [
 
 n_q, n_u, n_x, n_most, most_rows = (Size(name) for name in ("n_q", "n_u", "n_x", "n_most", "most_rows"))
 n_inputs, n_outputs, n_gradients, n_results = (Size(name) for name in ("inputs", "outputs", "gradients", "results"))
+n_law_inputs, n_law_outputs, n_law_slopes = (Size(f"{name} of a law") for name in ("inputs", "outputs", "slopes"))
 
 
 class Iterate(NamedTuple):
@@ -171,8 +173,17 @@ class UserWork(NamedTuple):
     gradients: Array = real(n_gradients)  #: of the outputs by the inputs, row by row
 
 
+class LawWork(NamedTuple):
+    """One public element, see kernels/connections/element_law.py."""
+
+    inputs: Array = real(n_law_inputs)  #: t, motion of its markers, states, multipliers
+    outputs: Array = real(n_law_outputs)  #: wrenches, rates of states, what is held, what is seen
+    trial: Array = real(n_law_outputs)  #: the same along the motion
+    slopes: Array = real(n_law_slopes)  #: derivatives of all outputs but those seen by the variations, row by row
+
+
 class StateWork(NamedTuple):
-    """States of user forces in a step, see kernels/connections/user_force.py."""
+    """States of user forces and elements in a step, see kernels/connections/user_force.py."""
 
     base: Array = real(n_states)  #: known part of the value after the step
     rate_base: Array = real(n_states, unit="1/s")  #: known part of its algorithmic rate
@@ -231,6 +242,7 @@ class Work(NamedTuple):
     bushing: BushingWork = BushingWork()
     contact: ContactWork = ContactWork()
     users: UserWork = UserWork()
+    laws: LawWork = LawWork()
     states: StateWork = StateWork()
     tapes: TapeWork = TapeWork()
     solver: Solver = Solver()
@@ -260,11 +272,23 @@ def sizes_of(model: Model) -> dict[str, int]:
             "inputs": int(max(n_in, default=0)),
             "outputs": int(max(n_out, default=0)),
             "gradients": int(max(n_in, default=0) * max(n_out, default=0)),
+            **law_sizes(model.laws.head),
             "results": int(max(np.diff(model.tapes.operation0), default=0)),
             "numbers of H": int(bodies.h0[-1]),
             "numbers of blocks": int(model.elimination.n_store),
         }
     )
+
+
+def law_sizes(head: IntArray) -> dict[str, int]:
+    """Return the sizes of the arrays of a public element that suffice for all of them."""
+    n, width, n_z, n_lam, n_seen = head[:, :5].T
+    n_out = 6 * n + n_z + n_lam
+    return {
+        "inputs of a law": int(max(1 + n * width + n_z + n_lam, default=0)),
+        "outputs of a law": int(max(n_out + n_seen, default=0)),
+        "slopes of a law": int(max(n_out * (12 * n + n_z + n_lam), default=0)),
+    }
 
 
 def new_work(model: Model) -> Work:

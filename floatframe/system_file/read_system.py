@@ -35,6 +35,7 @@ from floatframe.system import REDUNDANT, System
 from floatframe.system_file.bodies import BodySection, body_of
 from floatframe.system_file.channel_section import InputSection, OutputSection
 from floatframe.system_file.cosimulation_section import CosimulationSection, FmuSection, ForeignSection
+from floatframe.system_file.element_section import element_of
 from floatframe.system_file.event_section import EventSection
 from floatframe.system_file.forces import ForceSection, force_of
 from floatframe.system_file.joints import CouplerSection, JointSection, coupler_of, joint_of
@@ -71,6 +72,7 @@ class SystemFile(Table):
     joints: dict[str, JointSection] = Field({}, description="tables [joints.NAME]")
     couplers: dict[str, CouplerSection] = Field({}, description="tables [couplers.NAME]")
     forces: dict[str, ForceSection] = Field({}, description="tables [forces.NAME]")
+    elements: dict[str, dict[str, Any]] = Field({}, description="tables [elements.NAME]")
     signals: dict[str, SignalSection] = Field({}, description="tables [signals.NAME]")
     sensors: dict[str, SensorSection] = Field({}, description="tables [sensors.NAME]")
     inputs: dict[str, InputSection] = Field({}, description="tables [inputs.NAME]")
@@ -131,12 +133,13 @@ def read_system(
         joints = [joint_of(name, section, signals) for name, section in data.joints.items()]
         couplers = [coupler_of(name, section, signals) for name, section in data.couplers.items()]
         forces: list[Force] = [force_of(name, section, signals) for name, section in data.forces.items()]
+        elements = [element_of(name, table, path.parent, signals) for name, table in data.elements.items()]
         if any(data.system.gravity):
             forces.insert(0, Gravity(np.array(data.system.gravity)))
         name = data.system.name or path.stem
         sensors = [section.sensor(key) for key, section in data.sensors.items()]
         system = System(
-            bodies, joints, forces, units, name, data.system.redundant, couplers, sensors=sensors,
+            bodies, joints, forces, units, name, data.system.redundant, couplers, elements=elements, sensors=sensors,
             inputs=[section.channel(key) for key, section in data.inputs.items()],
             outputs=[section.output(key, sensors) for key, section in data.outputs.items()],
             events=[section.event(key) for key, section in data.events.items()],

@@ -15,6 +15,7 @@ from floatframe.results.sensors import (
     CoordinateSensor,
     CouplerSensor,
     DisplacementSensor,
+    ElementSensor,
     ElongationSensor,
     EnergySensor,
     InterfaceForceSensor,
@@ -53,6 +54,7 @@ SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up 
     "coordinate": ("joint", "coordinate", "|"),
     "coupler": ("of", "|"),
     "displacement": ("body", "|", *AT),
+    "element": ("of", "|", "output"),
     "elongation": ("body", "position_a", "position_b", "|", "tolerance"),
     "energy": ("|",),
     "interface-force": ("body", "interface", "|", "axes"),
@@ -88,7 +90,8 @@ class SensorSection(Table):
     axis: Vector3 | None = Field(None, description="an axis in the axes of marker_a, [x, y, z]; default: z")
     joint: str | None = Field(None, description="the name of a joint")
     coordinate: str | None = Field(None, description="a coordinate of the joint")
-    of: str | None = Field(None, description="the name of a joint or spring-damper; of a coupler, of a user force")
+    of: str | None = Field(None, description="the name of a joint or spring-damper; of a coupler, user force, element")
+    output: str | None = Field(None, description="the name of an output, state or multiplier of the element")
     interface: str | None = Field(None, description="the name of an interface of the body")
     table: str | None = Field(None, description="the name of a recovery table of the modal file")
     rows: list[str] | None = Field(None, description="labels of rows, or how they begin; default: all")
@@ -158,6 +161,7 @@ BY_KEYS: dict[str, Any] = {  # sensors whose fields are the keys of their table
     "control": ControlSensor,
     "coordinate": CoordinateSensor,
     "coupler": CouplerSensor,
+    "element": ElementSensor,
     "energy": EnergySensor,
     "interface-force": InterfaceForceSensor,
     "mode": ModeSensor,

@@ -30,7 +30,8 @@ Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are 
 
 rho leads from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
 kernels/joints/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is
-COUPLE; SPAN is the distance of two points as a coordinate.
+COUPLE; SPAN is the distance of two points as a coordinate; LAW_LENGTH, LAW_ANGLE and LAW_RATE are what public elements
+hold.
 
 Joints whose points coincide need one moment (N = M), the others take the force at the point of B and have ARM rows.
 
@@ -55,6 +56,9 @@ __all__ = [
     "FORCE",
     "GAUGE",
     "GAUGE_B",
+    "LAW_ANGLE",
+    "LAW_LENGTH",
+    "LAW_RATE",
     "LINE",
     "LINE_FREE",
     "LINE_TURN",
@@ -92,7 +96,7 @@ __all__ = [
 #: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
 POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
 RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B, LINE, LINE_TURN, LINE_FREE = range(14, 25)
-EQUAL_TURN, BISECTOR = range(25, 27)
+EQUAL_TURN, BISECTOR, LAW_LENGTH, LAW_ANGLE, LAW_RATE = range(25, 30)
 NOTHING, POSITION, VELOCITY = range(3)  #: what a row holds
 FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
 NO_MOMENT = -1  #: in place of a part: nothing acts there
@@ -141,6 +145,9 @@ ROW_KINDS = (
     RowKind(LINE_FREE, "no force along a deformed line"),
     RowKind(EQUAL_TURN, "two shafts turn equally", POSITION),
     RowKind(BISECTOR, "moment along the bisector of two shafts"),
+    RowKind(LAW_LENGTH, "an element holds a length", POSITION, is_length=True),
+    RowKind(LAW_ANGLE, "an element holds an angle or a number", POSITION),
+    RowKind(LAW_RATE, "an element holds a velocity", VELOCITY, is_length=True),
 )
 
 HOLDS = np.array([kind.holds for kind in ROW_KINDS])

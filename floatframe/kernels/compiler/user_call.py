@@ -7,24 +7,35 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
-__all__ = ["call_user_function"]
+__all__ = ["call_law", "call_user_function"]
+
+
+def pointer_to(context, builder, array_type, value):
+    """Return the address of the first number of an array."""
+    number = context.get_data_type(array_type.dtype).as_pointer()
+    return builder.bitcast(make_array(array_type)(context, builder, value).data, number)
+
+
+def write_call(context, builder, signature, arguments):
+    """Write the call of the C function at the first argument, an address, with pointers to the arrays after it."""
+    pointers = [
+        pointer_to(context, builder, array_type, value)
+        for array_type, value in zip(signature.args[1:], arguments[1:], strict=True)
+    ]
+    kind = ir.FunctionType(ir.VoidType(), [pointer.type for pointer in pointers])
+    builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), pointers)
+    return context.get_dummy_value()
 
 
 def call_by_address(typing_context, address, inputs, outputs):
     """Call the C function void f(const double *inputs, double *outputs) at an address."""
+    return types.void(address, inputs, outputs), write_call
 
-    def generate(context, builder, signature, arguments):
-        number = ir.DoubleType().as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [number, number])
-        function = builder.inttoptr(arguments[0], kind.as_pointer())
-        pointers = []
-        for array_type, value in zip(signature.args[1:], arguments[1:], strict=True):
-            data = make_array(array_type)(context, builder, value).data
-            pointers.append(builder.bitcast(data, number))
-        builder.call(function, pointers)
-        return context.get_dummy_value()
 
-    return types.void(address, inputs, outputs), generate
+def call_law_by_address(typing_context, address, head, inputs, data, outputs):
+    """Call the C function void f(const int64 *head, const double *inputs, const double *data, double *outputs)."""
+    return types.void(address, head, inputs, data, outputs), write_call
 
 
 call_user_function: Any = intrinsic(call_by_address)  #: call_user_function(address, inputs, outputs) in kernels
+call_law: Any = intrinsic(call_law_by_address)  #: call_law(address, head, inputs, data, outputs) in kernels

@@ -9,6 +9,7 @@ of positions, so that redundant ones share their load.
 from floatframe.joints.rows.kinds import NOTHING, VELOCITY
 from floatframe.kernels.compiler.compilation import inner, small
 from floatframe.kernels.connections.coupler import coupler_derivatives, coupler_rates, coupler_rows
+from floatframe.kernels.connections.element_law import law_derivatives, law_rates, law_rows
 from floatframe.kernels.connections.pair_force import pair_derivatives, pair_rows
 from floatframe.kernels.connections.spring_damper import spring_derivatives, spring_rows
 from floatframe.kernels.connections.user_force import user_force_derivatives, user_force_rows
@@ -21,7 +22,7 @@ from floatframe.kernels.joints.row_formulas import (
     wrench_value,
 )
 from floatframe.kernels.marker import marker_acceleration_bias
-from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, JOINT, SPRING, USER_FORCE
+from floatframe.kernels.model import BUSHING, CONTACT, COUPLER, ELEMENT, JOINT, SPRING, USER_FORCE
 from floatframe.kernels.vector import dot, put, put_sum, scaled, sub, vector
 
 __all__ = ["connection_derivatives", "connection_rows", "constraint_rates", "row_rates"]
@@ -36,6 +37,9 @@ def connection_rows(model, work, c, c_k):
         return
     if law == USER_FORCE:
         user_force_rows(model, work, c, c_k)
+        return
+    if law == ELEMENT:
+        law_rows(model, work, c, c_k)
         return
     a, b, w0, size = model.connections.a[c], model.connections.b[c], model.connections.w0[c], model.connections.size[c]
     w, wrench = work.state.w[w0 : w0 + size], work.markers.wrench
@@ -76,6 +80,9 @@ def connection_derivatives(model, work, c, c_k):
         return
     if law == USER_FORCE:
         user_force_derivatives(model, work, c, c_k)
+        return
+    if law == ELEMENT:
+        law_derivatives(model, work, c, c_k)
         return
     a, b, w0, size = model.connections.a[c], model.connections.b[c], model.connections.w0[c], model.connections.size[c]
     P_a, P_b, V = work.connections.P[a], work.connections.P[b], work.connections.V[c]
@@ -157,3 +164,5 @@ def constraint_rates(model, work):
                 rate[k], bias[k] = row_rates(model, work, k, a, b)
         if model.connections.law[c] == COUPLER:
             coupler_rates(model, work, c, rate, bias)
+        elif model.connections.law[c] == ELEMENT:
+            law_rates(model, work, c, rate, bias)

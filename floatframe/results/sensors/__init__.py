@@ -8,6 +8,7 @@ from floatframe.errors import ModelError
 from floatframe.results.sensors.body_loads import InterfaceForceSensor, RecoverySensor, SpringSensor
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.coordinate_elements import ControlSensor, CouplerSensor
+from floatframe.results.sensors.elements import ElementSensor
 from floatframe.results.sensors.loads import CoordinateSensor, EnergySensor, ModeSensor, MomentumSensor, ReactionSensor
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.sensors.places import AngleSensor, DisplacementSensor, PlaceSensor
@@ -24,6 +25,7 @@ __all__ = [
     "CoordinateSensor",
     "CouplerSensor",
     "DisplacementSensor",
+    "ElementSensor",
     "ElongationSensor",
     "EnergySensor",
     "InterfaceForceSensor",
@@ -53,6 +55,7 @@ Sensor = (
     | CoordinateSensor
     | CouplerSensor
     | DisplacementSensor
+    | ElementSensor
     | ElongationSensor
     | EnergySensor
     | InterfaceForceSensor
@@ -74,6 +77,7 @@ SENSORS = {
     "coordinate": CoordinateSensor,
     "coupler": CouplerSensor,
     "displacement": DisplacementSensor,
+    "element": ElementSensor,
     "elongation": ElongationSensor,
     "energy": EnergySensor,
     "interface-force": InterfaceForceSensor,
@@ -115,7 +119,7 @@ def sensors_of(system: System) -> tuple[Sensor, ...]:
 
 
 def sensor_of(system: System, name: str) -> Sensor:
-    """Return a sensor of the system, or the joint coordinate "joint.coordinate" as one.
+    """Return a sensor of the system, or the joint coordinate "joint.coordinate" or "element.output" as one.
 
     Raises
     ------
@@ -126,11 +130,13 @@ def sensor_of(system: System, name: str) -> Sensor:
     for each in system.joints:
         if each.name == joint and coordinate in each.coordinates:
             return CoordinateSensor(name, joint, coordinate)
+    if joint in [element.name for element in system.elements]:
+        return ElementSensor(name, joint, coordinate)
     for sensor in sensors_of(system):
         if sensor.name == name:
             return sensor
     coordinates = [f"{each.name}.{c}" for each in system.joints for c in each.coordinates]
-    choices = [*(sensor.name for sensor in system.sensors), *coordinates]
+    choices = [*(sensor.name for sensor in system.sensors), *coordinates, *(each.name for each in system.elements)]
     raise ModelError(f"system {system.name!r}: no sensor or joint coordinate {quoted(name)}{nearest(name, choices)}")
 
 
@@ -145,7 +151,8 @@ def measurement_of(system: System, trajectory: Trajectory, name: str) -> Measure
     owner, _, column = name.rpartition(".")
     names = [sensor.name for sensor in system.sensors]
     coordinates = [f"{joint.name}.{c}" for joint in system.joints for c in joint.coordinates]
-    if name in names or name in coordinates or owner not in (*names, *coordinates):
+    elements = [element.name for element in system.elements]
+    if name in names or name in coordinates or owner in elements or owner not in (*names, *coordinates):
         sensor = sensor_of(system, name)
         return measured(system, trajectory, [sensor])[sensor.name]
     whole = measured(system, trajectory, [sensor_of(system, owner)])[owner]

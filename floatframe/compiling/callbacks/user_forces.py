@@ -1,4 +1,4 @@
-"""Users' functions as C functions that the kernels call by their address."""
+"""Functions of user forces as C functions that the kernels call by their address."""
 
 import ctypes
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ C_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double), ctypes.POIN
 class Callback:
     """A function with its address; what it raised last, since an error cannot pass through the kernels."""
 
-    name: str  #: of the force
+    name: str  #: of the force or element, in words
     address: int
     keeps: Any  #: what must live as long as the address is used
     error: BaseException | None = None
@@ -66,7 +66,7 @@ def compiled_callback(force: UserForce, n: int, n_forces: int, n_states: int) ->
             f"force {force.name!r}: its function cannot be compiled as function(t, x, v, z, Q, z_dot) with arrays of "
             f"numbers: {reason}"
         ) from error
-    return Callback(force.name, int(compiled.address or 0), compiled)
+    return Callback(f"force {force.name!r}", int(compiled.address or 0), compiled)
 
 
 def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> Callback:
@@ -74,7 +74,7 @@ def python_callback(force: UserForce, n: int, n_forces: int, n_states: int) -> C
     function = force.function
     assert function is not None  # the caller knows
     n_in, n_out = 1 + 2 * n + n_states, n_forces + n_states
-    callback = Callback(force.name, 0, None)
+    callback = Callback(f"force {force.name!r}", 0, None)
 
     def called(inputs: Any, outputs: Any) -> None:
         x = np.ctypeslib.as_array(inputs, (n_in,)).copy()
@@ -103,4 +103,4 @@ def raise_errors_of(callbacks: Sequence[Callback]) -> None:
             continue
         if not isinstance(error, Exception):  # an interrupt
             raise error
-        raise ModelError(f"force {callback.name!r}: its function raised {type(error).__name__}: {error}") from error
+        raise ModelError(f"{callback.name}: its function raised {type(error).__name__}: {error}") from error

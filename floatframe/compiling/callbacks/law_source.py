@@ -1,0 +1,97 @@
+"""A key of a compiled function that changes with everything it refers to: code, constants, other functions."""
+
+import hashlib
+from pathlib import Path
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+__all__ = ["digest_of"]
+
+
+class NoKeyError(Exception):
+    """Something has no key."""
+
+
+def digest_of(function: Any) -> int | None:
+    """Return a number above zero for a function of numba; None if it refers to what has no key."""
+    digest = hashlib.sha256()
+    try:
+        add_value(digest, function, set())
+    except NoKeyError:
+        return None
+    return int.from_bytes(digest.digest()[:7], "big") + 1
+
+
+def add_value(digest: Any, value: Any, seen: set[int]) -> None:
+    """Add what a name stands for."""
+    if id(value) in seen:
+        return
+    if isinstance(getattr(value, "py_func", None), FunctionType):  # of numba
+        seen.add(id(value))
+        digest.update(repr(sorted(getattr(value, "targetoptions", {}).items(), key=str)).encode())
+        add_function(digest, value.py_func, seen)
+    elif isinstance(value, FunctionType):  # overloaded for numba in its module, or known to it by name
+        seen.add(id(value))
+        add_function(digest, value, seen)
+        file = Path(value.__code__.co_filename)
+        if file.is_file():
+            digest.update(file.read_bytes())
+    elif isinstance(value, np.ndarray):
+        digest.update(repr((value.dtype, value.shape)).encode() + np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, bool | int | float | complex | str | bytes | type(None) | np.generic):
+        digest.update(repr((type(value).__name__, value)).encode())
+    elif isinstance(value, tuple):
+        digest.update(str(len(value)).encode())
+        for each in value:
+            add_value(digest, each, seen)
+    elif isinstance(value, BuiltinFunctionType | type | np.ufunc):
+        digest.update(f"{getattr(value, '__module__', '')}.{value.__name__}".encode())
+    else:
+        raise NoKeyError
+
+
+def add_function(digest: Any, function: FunctionType, seen: set[int]) -> None:
+    """Add the code of a function and all that its names stand for."""
+    add_code(digest, function.__code__)
+    for cell in function.__closure__ or ():
+        add_value(digest, cell.cell_contents, seen)
+    digest.update(repr(function.__defaults__).encode())
+    for name in names_of(function.__code__):
+        value = function.__globals__.get(name)
+        if isinstance(value, ModuleType):
+            add_members(digest, value, names_of(function.__code__), seen)
+        elif name in function.__globals__:
+            digest.update(name.encode())
+            add_value(digest, value, seen)
+
+
+def add_members(digest: Any, module: ModuleType, names: list[str], seen: set[int]) -> None:
+    """Add what a function may take from a module."""
+    digest.update(f"{module.__name__} {getattr(module, '__version__', '')}".encode())
+    if module.__name__.split(".")[0] in ("math", "cmath", "numpy", "numba"):
+        return
+    for name in names:
+        if name in vars(module):
+            digest.update(name.encode())
+            add_value(digest, vars(module)[name], seen)
+
+
+def names_of(code: CodeType) -> list[str]:
+    """Return the names that a code and those in it use, in a fixed order."""
+    found = list(code.co_names)
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            found += names_of(each)
+    return list(dict.fromkeys(found))
+
+
+def add_code(digest: Any, code: CodeType) -> None:
+    """Add the code of a function without the numbers of its lines."""
+    digest.update(code.co_code + repr((code.co_names, code.co_varnames, code.co_argcount)).encode())
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            add_code(digest, each)
+        else:
+            digest.update(repr(each).encode())

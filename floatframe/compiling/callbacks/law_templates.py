@@ -1,0 +1,168 @@
+"""C functions around the law of an element: its values, and its derivatives by a step along the imaginary axis or not.
+
+    void f(const int64 *head, const double *inputs, const double *data, double *outputs)
+
+head: numbers of markers n, of the motion of each, of states, multipliers, outputs and data, the markers that move as
+bits, 0. inputs: t, motions, states, multipliers. outputs: wrenches, rates of states, what is held, what is seen; or the
+derivatives of these but for the last, row by row, by dr, dphi, dv, domega of each marker, states, multipliers.
+
+The templates are filled in by `law_functions`: `law` stands for the function of the user.
+"""
+
+import numpy as np
+from numba import carray
+
+__all__ = ["complex_template", "difference_template", "given_template", "value_template"]
+
+HEAD = 8
+TINY = 1e-30  # step along the imaginary axis
+STEP = 1e-6  # of central differences, relative
+LEAST = 1e-9  # of states and multipliers near zero
+
+
+def law(*arguments):
+    """Stand for the function of the user."""
+
+
+def value_template(digest):
+    """Return the function that gives the values."""
+
+    def value(head_at, inputs_at, data_at, outputs_at):
+        head = carray(head_at, HEAD)
+        n, width, n_z, n_lam, n_seen, n_data = head[0], head[1], head[2], head[3], head[4], head[5]
+        o = 1 + n * width
+        inputs = carray(inputs_at, o + n_z + n_lam)
+        n_out = 6 * n + n_z + n_lam
+        out = carray(outputs_at, n_out + n_seen)
+        out[:] = 0.0 if digest else 1.0
+        x = inputs[1:o].reshape((n, width))
+        wrench = out[: 6 * n].reshape((n, 6))
+        law(
+            inputs[0], x, inputs[o : o + n_z], inputs[o + n_z :], carray(data_at, n_data), wrench,
+            out[6 * n : 6 * n + n_z], out[6 * n + n_z : n_out], out[n_out:],
+        )  # fmt: skip
+
+    return value
+
+
+def given_template(digest):
+    """Return the function that gives the derivatives as the user does."""
+
+    def slopes(head_at, inputs_at, data_at, slopes_at):
+        head = carray(head_at, HEAD)
+        n, width, n_z, n_lam, n_data = head[0], head[1], head[2], head[3], head[5]
+        o = 1 + n * width
+        inputs = carray(inputs_at, o + n_z + n_lam)
+        own = carray(slopes_at, (6 * n + n_z + n_lam, 12 * n + n_z + n_lam))
+        own[:, :] = 0.0 if digest else 1.0
+        x = inputs[1:o].reshape((n, width))
+        law(inputs[0], x, inputs[o : o + n_z], inputs[o + n_z :], carray(data_at, n_data), own)
+
+    return slopes
+
+
+def complex_template(digest):
+    """Return the function that takes the derivatives by a step along the imaginary axis."""
+
+    def slopes(head_at, inputs_at, data_at, slopes_at):
+        head = carray(head_at, HEAD)
+        n, width, n_z, n_lam, n_seen, n_data, moving = head[0], head[1], head[2], head[3], head[4], head[5], head[6]
+        o = 1 + n * width
+        inputs = carray(inputs_at, o + n_z + n_lam)
+        n_out, n_columns = 6 * n + n_z + n_lam, 12 * n + n_z + n_lam
+        own = carray(slopes_at, (n_out, n_columns))
+        own[:, :] = 0.0 if digest else 1.0
+        data = carray(data_at, n_data)
+        y = np.empty(o - 1 + n_z + n_lam, np.complex128)
+        for k in range(y.shape[0]):
+            y[k] = inputs[1 + k]
+        out = np.empty(n_out + n_seen, np.complex128)
+        x = y[: o - 1].reshape((n, width))
+        z, lam = y[o - 1 : o - 1 + n_z], y[o - 1 + n_z :]
+        wrench, z_dot, g = out[: 6 * n].reshape((n, 6)), out[6 * n : 6 * n + n_z], out[6 * n + n_z : n_out]
+        for k in range(n_columns):
+            m, j = k // 12, k % 12
+            if m < n:
+                if not (moving >> m) & 1:
+                    continue
+                first = 1 + m * width
+                if j < 3:
+                    x[m, j] += TINY * 1j
+                elif j < 6:  # dA = dphi × A, column by column
+                    b, c = (j - 2) % 3, (j - 1) % 3
+                    for i in range(3):
+                        x[m, 3 + 3 * b + i] -= TINY * inputs[first + 3 + 3 * c + i] * 1j
+                        x[m, 3 + 3 * c + i] += TINY * inputs[first + 3 + 3 * b + i] * 1j
+                else:
+                    x[m, 6 + j] += TINY * 1j
+            else:
+                y[o - 1 + k - 12 * n] += TINY * 1j
+            for i in range(out.shape[0]):
+                out[i] = 0.0
+            law(inputs[0], x, z, lam, data, wrench, z_dot, g, out[n_out:])
+            for i in range(n_out):
+                own[i, k] = out[i].imag / TINY
+            if m < n:
+                for i in range(18):
+                    x[m, i] = inputs[1 + m * width + i]
+            else:
+                y[o - 1 + k - 12 * n] = inputs[o + k - 12 * n]
+
+    return slopes
+
+
+def difference_template(digest):
+    """Return the function that takes the derivatives by central differences."""
+
+    def slopes(head_at, inputs_at, data_at, slopes_at):
+        head = carray(head_at, HEAD)
+        n, width, n_z, n_lam, n_seen, n_data, moving = head[0], head[1], head[2], head[3], head[4], head[5], head[6]
+        o = 1 + n * width
+        inputs = carray(inputs_at, o + n_z + n_lam)
+        n_out, n_columns = 6 * n + n_z + n_lam, 12 * n + n_z + n_lam
+        own = carray(slopes_at, (n_out, n_columns))
+        own[:, :] = 0.0 if digest else 1.0
+        data = carray(data_at, n_data)
+        y = inputs[1:].copy()
+        out = np.empty(n_out + n_seen)
+        x = y[: o - 1].reshape((n, width))
+        z, lam = y[o - 1 : o - 1 + n_z], y[o - 1 + n_z :]
+        wrench, z_dot, g = out[: 6 * n].reshape((n, 6)), out[6 * n : 6 * n + n_z], out[6 * n + n_z : n_out]
+        for k in range(n_columns):
+            m, j = k // 12, k % 12
+            if m < n and not (moving >> m) & 1:
+                continue
+            first = 1 + m * width
+            if m >= n:
+                h = STEP * abs(y[o - 1 + k - 12 * n]) + LEAST
+            elif 3 <= j < 6:
+                h = STEP
+            else:
+                at = first + j if j < 3 else first + 6 + j
+                h = STEP * max(1.0, abs(inputs[at]))
+            for side in range(2):
+                s = h if side == 0 else -h
+                if m >= n:
+                    y[o - 1 + k - 12 * n] = inputs[o + k - 12 * n] + s
+                elif j < 3:
+                    x[m, j] = inputs[first + j] + s
+                elif j >= 6:
+                    x[m, 6 + j] = inputs[first + 6 + j] + s
+                else:  # A turned by the rotation vector s e
+                    b, c = (j - 2) % 3, (j - 1) % 3
+                    sin, cos = np.sin(s), np.cos(s)
+                    for i in range(3):
+                        A_b, A_c = inputs[first + 3 + 3 * b + i], inputs[first + 3 + 3 * c + i]
+                        x[m, 3 + 3 * b + i] = cos * A_b - sin * A_c
+                        x[m, 3 + 3 * c + i] = sin * A_b + cos * A_c
+                out[:] = 0.0
+                law(inputs[0], x, z, lam, data, wrench, z_dot, g, out[n_out:])
+                for i in range(n_out):
+                    own[i, k] += out[i] / (2 * s)
+            if m < n:
+                for i in range(18):
+                    x[m, i] = inputs[first + i]
+            else:
+                y[o - 1 + k - 12 * n] = inputs[o + k - 12 * n]
+
+    return slopes

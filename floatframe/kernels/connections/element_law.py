@@ -1,0 +1,251 @@
+"""Public elements: wrenches, rates of states and what is held, as functions that are called by their address.
+
+The law of an element with n markers, states z and multipliers lam gives, from the motion x of the markers,
+
+    wrench (n, 6), z_dot = g(t, x, z, lam), h(t, x, z, lam) for each multiplier, and outputs that are only seen.
+
+Unknowns of its rows in this order: the parts of the wrenches that act, for each state its value, rate and algorithmic
+rate (`user_force`), the multipliers:
+
+    w - wrench = 0;   z - b - kappa g' = 0,   g' - g = 0,   a - b' - rho g' = 0;   h = 0
+
+A multiplier holds a position (h of places and time alone), a velocity, or nothing: then h = 0 is an equation like those
+of wrenches. Two ends whose forces are opposite share one unknown, with the factor -1 at the second.
+
+The derivatives come from one call, d(wrench, g, h)/d(dr, dphi, dv, domega of each marker, z, lam), row by row.
+"""
+
+from floatframe.joints.rows.kinds import NOTHING, POSITION, VELOCITY
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.user_call import call_law
+from floatframe.kernels.rotation import exp_matrix
+from floatframe.kernels.vector import add, matrix, norm, product, put, put_sum, scaled, vector
+
+__all__ = ["law_derivatives", "law_power", "law_rates", "law_rows", "law_values"]
+
+REACH = 5e-3  #: way along the motion on which rates are taken, as a part of the length over which the law changes
+#: of differences of sixth order at -3 to 3
+FIRST = (-1 / 60, 9 / 60, -45 / 60, 0.0, 45 / 60, -9 / 60, 1 / 60)
+SECOND = (2 / 180, -27 / 180, 270 / 180, -490 / 180, 270 / 180, -27 / 180, 2 / 180)
+
+
+@inner
+def law_inputs(model, work, c):
+    """Write t, the motion of the markers, states and multipliers into work.laws.inputs."""
+    i, first = model.connections.item[c], model.connections.a[c]
+    n, width = model.laws.head[i, 0], model.laws.head[i, 1]
+    x, markers = work.laws.inputs, work.markers
+    x[0] = work.state.time
+    for m in range(n):
+        o = 1 + m * width
+        put(x, o, vector(markers.r[first + m]))
+        for r in range(3):
+            for k in range(3):
+                x[o + 3 + 3 * r + k] = markers.A[first + m, r, k]
+        put(x, o + 12, vector(markers.v[first + m]))
+        put(x, o + 15, vector(markers.omega[first + m]))
+    o = 1 + n * width
+    k = model.connections.w0[c] + model.laws.row0[i + 1] - model.laws.row0[i]
+    for s in range(model.laws.head[i, 2]):
+        x[o + s] = work.state.w[k + 3 * s]
+    o += model.laws.head[i, 2]
+    k += 3 * model.laws.head[i, 2]
+    for j in range(model.laws.head[i, 3]):
+        x[o + j] = work.state.w[k + j]
+
+
+@inner
+def law_call(model, work, i, outputs):
+    """Write what the law i gives for the inputs."""
+    data = model.laws.data[model.laws.data0[i] : model.laws.data0[i + 1]]
+    call_law(model.laws.address[i], model.laws.head[i], work.laws.inputs, data, outputs)
+
+
+@inner
+def law_values(model, work, c):
+    """Write the outputs of element c at the iterate into work.laws.outputs."""
+    law_inputs(model, work, c)
+    law_call(model, work, model.connections.item[c], work.laws.outputs)
+
+
+@inner
+def law_rows(model, work, c, c_k):
+    """Write the residual of element c, and its wrenches."""
+    i, k = model.connections.item[c], model.connections.w0[c]
+    laws, w, g, out = model.laws, work.state.w, work.connections.g, work.laws.outputs
+    for m in range(model.connections.a[c], model.connections.a[c] + laws.head[i, 0]):
+        for part in range(0, 6, 3):
+            place = model.markers.force[m] if part == 0 else model.markers.moment[m]
+            if place >= 0:
+                put_sum(work.markers.wrench[m], part, scaled(model.markers.sign[m], vector(w[k + place :])))
+    law_values(model, work, c)
+    for j in range(laws.row0[i], laws.row0[i + 1]):
+        g[k] = c_k * (w[k] - laws.factor[j] * out[laws.source[j]])
+        k += 1
+    o, s = 6 * laws.head[i, 0], laws.state0[i]
+    for _ in range(laws.head[i, 2]):
+        g[k] = c_k * (w[k] - work.states.base[s] - work.states.kappa * w[k + 1])
+        g[k + 1] = c_k * (w[k + 1] - out[o])
+        g[k + 2] = c_k * (w[k + 2] - work.states.rate_base[s] - work.states.rho * w[k + 1])
+        o, s, k = o + 1, s + 1, k + 3
+    for _ in range(laws.head[i, 3]):
+        g[k] = out[o] * (c_k if model.rows.holds[k] == NOTHING else 1.0)
+        o, k = o + 1, k + 1
+
+
+@inner
+def law_derivatives(model, work, c, c_k):
+    """Write P at the markers and V of element c.
+
+    A velocity that is held has no position: for c_k = 0, where rows stand for velocities or accelerations, its P is
+    that by the velocities.
+    """
+    i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
+    size = model.connections.size[c]
+    laws, V, slopes = model.laws, work.connections.V[c], work.laws.slopes
+    n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
+    for r in range(size):
+        for j in range(size):
+            V[r, j] = 0.0
+        for m in range(a, a + n):
+            for j in range(12):
+                work.connections.P[m, r, j] = 0.0
+    law_inputs(model, work, c)
+    data = laws.data[laws.data0[i] : laws.data0[i + 1]]
+    call_law(laws.tangent[i], laws.head[i], work.laws.inputs, data, slopes)
+    n_columns = 12 * n + n_z + n_lam
+    r, states = 0, laws.row0[i + 1] - laws.row0[i]
+    for j in range(laws.row0[i], laws.row0[i + 1]):
+        own = slopes[laws.source[j] * n_columns : (laws.source[j] + 1) * n_columns]
+        V[r, r] = 1.0
+        add_slopes(work, V, a, n, n_z, n_lam, states, r, -c_k * laws.factor[j], -laws.factor[j], own)
+        r += 1
+    o = 6 * n
+    for _ in range(n_z):
+        own = slopes[o * n_columns : (o + 1) * n_columns]
+        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa
+        V[r + 1, r + 1] = 1.0
+        V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
+        add_slopes(work, V, a, n, n_z, n_lam, states, r + 1, -c_k, -1.0, own)
+        o, r = o + 1, r + 3
+    for _ in range(n_lam):
+        own = slopes[o * n_columns : (o + 1) * n_columns]
+        holds = model.rows.holds[w0 + r]
+        if holds == NOTHING:
+            add_slopes(work, V, a, n, n_z, n_lam, states, r, c_k, 1.0, own)
+        else:
+            held_slopes(work, V, a, n, n_z, n_lam, states, r, holds, c_k, own)
+        o, r = o + 1, r + 1
+
+
+@inner
+def add_slopes(work, V, a, n, n_z, n_lam, states, r, by_motion, by_unknown, own):
+    """Add derivatives of one output to row r of P and V, multiplied by a factor each."""
+    for m in range(n):
+        for j in range(12):
+            work.connections.P[a + m, r, j] = by_motion * own[12 * m + j]
+    for s in range(n_z):
+        V[r, states + 3 * s] += by_unknown * own[12 * n + s]
+    for j in range(n_lam):
+        V[r, states + 3 * n_z + j] += by_unknown * own[12 * n + n_z + j]
+
+
+@inner
+def held_slopes(work, V, a, n, n_z, n_lam, states, r, holds, c_k, own):
+    """Write the derivatives of what is held into row r of P and V."""
+    for m in range(n):
+        for j in range(12):
+            if holds == POSITION:
+                slope = own[12 * m + j] if j < 6 else 0.0
+            elif c_k > 0.0:
+                slope = own[12 * m + j]
+            else:
+                slope = own[12 * m + 6 + j] if j < 6 else 0.0
+            work.connections.P[a + m, r, j] = slope
+    if c_k > 0.0:
+        for s in range(n_z):
+            V[r, states + 3 * s] = own[12 * n + s] / c_k
+        for j in range(n_lam):
+            V[r, states + 3 * n_z + j] = own[12 * n + n_z + j] / c_k
+
+
+@inner
+def law_rates(model, work, c, rate, bias):
+    """Write the rates of what element c holds, and the second rates at zero u_dot, of its rows of multipliers.
+
+    From the values along the motion with the accelerations of `work.markers.bias`: differences of sixth order.
+    """
+    i, a, w0 = model.connections.item[c], model.connections.a[c], model.connections.w0[c]
+    size = model.connections.size[c]
+    laws = model.laws
+    n, n_z, n_lam = laws.head[i, 0], laws.head[i, 2], laws.head[i, 3]
+    is_held = False
+    for k in range(w0 + size - n_lam, w0 + size):
+        rate[k], bias[k] = 0.0, 0.0
+        is_held = is_held or model.rows.holds[k] != NOTHING
+    if not is_held:
+        return
+    law_values(model, work, c)
+    fastest = 0.0
+    for m in range(a, a + n):
+        b = work.markers.bias[m]
+        fastest = max(fastest, norm(vector(work.markers.v[m])) / laws.length[i], norm(vector(work.markers.omega[m])))
+        fastest = max(fastest, (norm(vector(b)) / laws.length[i]) ** 0.5, norm(vector(b[3:])) ** 0.5)
+    h = REACH / max(fastest, 1.0)
+    first_state = 1 + n * laws.head[i, 1]
+    for p in range(7):
+        e = (p - 3) * h
+        law_inputs(model, work, c)
+        x = work.laws.inputs
+        x[0] += e
+        for m in range(a, a + n):
+            o, b = 1 + (m - a) * laws.head[i, 1], work.markers.bias[m]
+            v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
+            put_sum(x, o, add(scaled(e, v), scaled(0.5 * e * e, vector(b))))
+            turn = exp_matrix(add(scaled(e, omega), scaled(0.5 * e * e, vector(b[3:]))))
+            A = product(turn, matrix(work.markers.A[m]))
+            for r in range(3):
+                put(x, o + 3 + 3 * r, A[r])
+            put_sum(x, o + 12, scaled(e, vector(b)))
+            put_sum(x, o + 15, scaled(e, vector(b[3:])))
+        for s in range(n_z):
+            x[first_state + s] += e * work.laws.outputs[6 * n + s]
+        law_call(model, work, i, work.laws.trial)
+        for j in range(n_lam):
+            k, value = w0 + size - n_lam + j, work.laws.trial[6 * n + n_z + j]
+            if model.rows.holds[k] == POSITION:
+                rate[k] += FIRST[p] * value / h
+                bias[k] += SECOND[p] * value / (h * h)
+            elif model.rows.holds[k] == VELOCITY:
+                bias[k] += FIRST[p] * value / h
+                if p == 3:
+                    rate[k] = value
+
+
+@inner
+def law_power(model, work, c):
+    """Return the energy that element c holds, the power it gives to the system, and what it takes; at the iterate.
+
+    Power on the bodies P_b = given - lost - d(energy)/dt. An element that names no energy holds none; what it then
+    does not name follows from P_b.
+    """
+    i, a = model.connections.item[c], model.connections.a[c]
+    laws = model.laws
+    law_values(model, work, c)
+    seen = 6 * laws.head[i, 0] + laws.head[i, 2] + laws.head[i, 3]
+    energy, given, lost = laws.energy[i], laws.given[i], laws.lost[i]
+    P_given = work.laws.outputs[seen + given] if given >= 0 else 0.0
+    P_lost = work.laws.outputs[seen + lost] if lost >= 0 else 0.0
+    if energy >= 0:
+        return work.laws.outputs[seen + energy], P_given, P_lost
+    on_bodies = 0.0
+    for m in range(a, a + laws.head[i, 0]):
+        o = 6 * (m - a)
+        for k in range(3):
+            on_bodies += work.laws.outputs[o + k] * work.markers.v[m, k]
+            on_bodies += work.laws.outputs[o + 3 + k] * work.markers.omega[m, k]
+    if given < 0:
+        return 0.0, on_bodies + P_lost, P_lost
+    if lost < 0:
+        return 0.0, P_given, P_given - on_bodies
+    return 0.0, P_given, P_lost

@@ -1,0 +1,88 @@
+"""Public elements over a motion: their outputs, states, multipliers and wrenches."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.compiling.callbacks import raise_errors_of
+from floatframe.compiling.callbacks.law_functions import called_law
+from floatframe.compiling.markers import MarkerData
+from floatframe.compiling.public_elements import PlacedLaw
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import ResultsError
+from floatframe.results.coordinate_elements import unknowns
+from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
+from floatframe.results.trajectory import Trajectory
+from floatframe.system import System
+
+__all__ = ["ElementMotion", "element_motion", "placed_law"]
+
+
+@dataclass(frozen=True, eq=False)
+class ElementMotion:
+    """What an element sees and does over time, by name, each (n_t,)."""
+
+    t: Array  #: (n_t,) [s]
+    outputs: Mapping[str, Array]
+    states: Mapping[str, Array]
+    multipliers: Mapping[str, Array]
+    wrench: Array  #: force and moment on the body of each marker, ground axes, (n_t, n_markers, 6) [N, N m]
+
+
+def placed_law(system: System, name: str, where: str = "element_motion") -> PlacedLaw:
+    """Return an element as it is compiled; `ResultsError` with the nearest name if there is none."""
+    laws = compiled_system(system).laws
+    names = [placed.element.name for placed in laws]
+    if name not in names:
+        raise ResultsError(f"{where}: no element {quoted(name)}{nearest(name, names)}")
+    return laws[names.index(name)]
+
+
+def element_motion(system: System, trajectory: Trajectory, name: str) -> ElementMotion:
+    """Return what a public element sees and does over a motion of the system.
+
+    States and multipliers are those of the motion; outputs and wrenches follow from them and from the motion of the
+    markers, by the law of the element.
+
+    Raises
+    ------
+    ResultsError
+        If there is no such element, or the motion is one of another system.
+    """
+    placed = placed_law(system, name)
+    w = unknowns(system, trajectory)
+    places = [marker_place(system, trajectory, marker) for marker in placed.markers]
+    inputs = np.column_stack([trajectory.t, *(motion_row(place) for place in places), w[:, placed.states],
+                              w[:, placed.multipliers]])  # fmt: skip
+    law = placed.law
+    out = called_law(placed.value.address, placed.head, np.asarray(law.data), inputs, placed.n_out + len(law.outputs))
+    raise_errors_of([placed.value])
+    n = len(placed.markers)
+    return ElementMotion(
+        trajectory.t,
+        {each: out[:, placed.n_out + k] for k, each in enumerate(law.outputs)},
+        {each: w[:, row] for each, row in zip(law.states, placed.states, strict=True)},
+        {each: w[:, row] for each, row in zip(law.multipliers, placed.multipliers, strict=True)},
+        out[:, : 6 * n].reshape(-1, n, 6),
+    )
+
+
+def marker_place(system: System, trajectory: Trajectory, marker: MarkerData) -> PlaceMotion:
+    """Return the motion of a marker of an element."""
+    if marker.body < 0:
+        return still_place(trajectory.t, marker.shape)
+    body = system.bodies[marker.body]
+    if isinstance(body, FlexibleBody):
+        motion, _ = as_moved(trajectory, body.name, body.reduced)
+    else:
+        motion = trajectory.body(body.name)
+    return shape_motion(motion, marker.shape)
+
+
+def motion_row(place: PlaceMotion) -> Array:
+    """Return position, axes row by row, velocity and angular velocity, (n_t, 18)."""
+    return np.column_stack([place.position, place.axes.reshape(-1, 9), place.velocity, place.omega])
