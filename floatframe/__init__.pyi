@@ -75,6 +75,7 @@ from .fatigue.surface_damage import spectral_damage as spectral_damage
 from .flexible_parts import FlexiblePart as FlexiblePart
 from .flexible_parts import corotational as corotational
 from .flexible_parts import finite_segments as finite_segments
+from .flexible_parts.exact_beams import exact_beams as exact_beams
 from .forces import BodyLoad as BodyLoad
 from .forces import Bushing as Bushing
 from .forces import Gravity as Gravity
@@ -112,6 +113,7 @@ from .joints import UniversalJoint as UniversalJoint
 from .joints.coordinate_coupler import CoordinateCoupler as CoordinateCoupler
 from .laboratory.cases import Case as Case
 from .laboratory.cases import grid as grid
+from .laboratory.exact_beam import ExactBeam as ExactBeam
 from .laboratory.full_model import FullModel as FullModel
 from .laboratory.full_transient import FrameAcceleration as FrameAcceleration
 from .laboratory.full_transient import FullTransient as FullTransient

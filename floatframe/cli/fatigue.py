@@ -54,9 +54,7 @@ def fatigue_command(
         ]
     for path in paths:
         if path.suffix.lower().removeprefix(".") not in KINDS:
-            raise FatigueError(
-                f"--output {path}: expected a name that ends in {', '.join('.' + k for k in KINDS)}"
-            )
+            raise FatigueError(f"--output {path}: expected a name that ends in {', '.join('.' + k for k in KINDS)}")
     with stages(remaining=True) as clock, clock("damage on the surface") as advance:
         made = assess(given, progress=advance)
     record = fatigue_record(made)

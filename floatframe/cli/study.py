@@ -54,7 +54,8 @@ def study_command(
     contents: dict[Path, bytes] = {}
     for path in paths:
         if path.suffix.lower() == ".json":
-            record = {"name": result.name, "reference": result.reference, "cases": result.table()}
+            record = {"name": result.name, "reference": result.reference, "settled": result.settled,
+                      "cases": result.table()}  # fmt: skip
             contents[path] = json_module.dumps(record, indent=2).encode()
         elif path.suffix.lower() == ".csv":
             contents[path] = csv_text(result).encode()
@@ -96,8 +97,9 @@ def print_result(result: "LaboratoryResult") -> None:
         note = "" if not r.notes else r.notes[0] + (f" ({len(r.notes)} notes)" if len(r.notes) > 1 else "")
         told = (str(r.n_q), f"{100 * r.error:.3g}", r.worst, r.fails_first, f"{r.seconds:.3g}", note)
         rows.append((r.case.words, str(r.case.n_modes), *told))
+    settled = "" if result.settled is None else f", itself settled to {100 * result.settled:.2g} %"
     print_table(
-        f"{result.name}, against {result.reference}",
+        f"{result.name}, against {result.reference}{settled}",
         ("description", "modes>", "coordinates>", "error %>", "of", "fails first", "time [s]>", "note"),
         rows,
     )

@@ -1,7 +1,8 @@
 """Other descriptions of flexible parts than one floating frame, each a handful of bodies, joints and forces."""
 
+from floatframe.flexible_parts.exact_beams import exact_beams
 from floatframe.flexible_parts.finite_segments import finite_segments
 from floatframe.flexible_parts.flexible_part import FlexiblePart, PartMaker
 from floatframe.flexible_parts.superelement import corotational
 
-__all__ = ["FlexiblePart", "PartMaker", "corotational", "finite_segments"]
+__all__ = ["FlexiblePart", "PartMaker", "corotational", "exact_beams", "finite_segments"]

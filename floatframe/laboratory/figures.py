@@ -44,6 +44,8 @@ def convergence_figure(result: LaboratoryResult) -> "Figure":
     left.set(xlabel="modal coordinates", ylabel="largest error / range of the reference", yscale="log")
     right.set(xlabel="processor time of the run [s]", xlim=(0, None))
     for axes in (left, right):
+        if result.settled is not None:  # below it the reference itself is not known
+            axes.axhline(max(result.settled, FLOOR), color="#666666", linewidth=0.8, linestyle=":")
         axes.grid(color="#e3e7eb", which="both", linewidth=0.6)
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)

@@ -12,7 +12,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from floatframe.errors import ModelError
 from floatframe.integrators.carry import Integrator
 from floatframe.laboratory.bodies import BodyShelf
 from floatframe.laboratory.cases import Case
+from floatframe.laboratory.exact_beam import ExactBeam, with_exact_beams
 from floatframe.laboratory.full_model import FullModel
 from floatframe.laboratory.substitution import with_body
 from floatframe.motion.integration import integrate
@@ -101,6 +102,7 @@ class LaboratoryResult:
     reference: str  #: in words
     columns: tuple[str, ...]  #: that were compared
     cases: tuple[CaseResult, ...]
+    settled: float | None = None  #: how far the reference itself is from its limit, as an error; None: not known
 
     def table(self) -> list[dict[str, Any]]:
         """Return one row a case, tidy: ready for a data frame, CSV or JSON."""
@@ -136,7 +138,7 @@ def study(
     integrator: Integrator,
     t_end: float,
     h: float,
-    reference: Case | FullModel | Reference,
+    reference: Case | FullModel | ExactBeam | Reference,
     sensors: Sequence[str] | None = None,
     cut: str = "rigid",
     stages: Stages | None = None,
@@ -153,7 +155,8 @@ def study(
     job
         Job file it is reduced by; mode set, number of modes and frame come from the cases.
     reference
-        A case that is finer than the others, the whole finite element model, or columns from elsewhere.
+        A case that is finer than the others, the whole finite element model, geometrically exact beams (a body of
+        lines), or columns from elsewhere.
     sensors
         Names of the sensors that are compared; None: all.
     cut
@@ -179,6 +182,7 @@ def study(
     if not cases:
         raise ModelError("study: expected at least one case")
     found: dict[Case, Run] = {}
+    settled: dict[str, float] = {}
     every = [*cases, reference] if isinstance(reference, Case) else cases
 
     with BodyShelf(job, cut, cases=every) as shelf, quiet():
@@ -210,6 +214,16 @@ def study(
                 told = moved(with_body(system, body, [whole], stiffening=whole.geometric is not None)).reference(
                     f"{reference.words}, {whole.n_q} shapes"
                 )
+        elif isinstance(reference, ExactBeam):
+            coarse, fine = (with_exact_beams(system, body, shelf.model(), k * reference.elements) for k in (1, 2))
+            with stages("exact beams"):
+                before, after = moved(coarse), moved(fine)
+            told = after.reference(f"{reference.words}, twice {reference.elements} elements")
+            settled = {name: distance(before.columns[name], values, float(np.ptp(values)) or 1.0) / 3
+                       for name, values in told.columns.items()}  # fmt: skip
+            lost = [name for name in wanted if name not in {sensor.name for sensor in fine.sensors}]
+            if lost:
+                told = replace(told, words=f"{told.words} (without {', '.join(lost)}, which they do not know)")
         else:
             told = reference
         failures: dict[Case, str] = {}
@@ -244,7 +258,8 @@ def study(
                 here.notes,
             )
         )
-    return LaboratoryResult(system.name, told.words, tuple(compared), tuple(results))
+    limit = max((settled[name] for name in compared), default=0.0) if settled else None
+    return LaboratoryResult(system.name, told.words, tuple(compared), tuple(results), limit)
 
 
 @contextmanager

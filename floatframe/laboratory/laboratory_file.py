@@ -11,6 +11,7 @@ from fe_models.foundation.stages import Stages
 from fe_models.foundation.toml_file import Table, read_toml, validated
 from floatframe.errors import ModelError
 from floatframe.laboratory.cases import Case, grid
+from floatframe.laboratory.exact_beam import ExactBeam
 from floatframe.laboratory.full_model import MOST_DOFS, FullModel
 from floatframe.laboratory.laboratory import CaseResult, LaboratoryResult, Reference, study
 from floatframe.signals.read_signals import read_signals
@@ -55,10 +56,13 @@ class VaryTable(Table):
 
 
 class ReferenceTable(Table):
-    """[reference]: the full model, a finer case, or a table of columns from elsewhere."""
+    """[reference]: the full model, exact beams, a finer case, or a table of columns from elsewhere."""
 
-    kind: Literal["case", "full-model", "file"] | None = Field(None, description='"case", "full-model" or "file"')
+    kind: Literal["case", "full-model", "exact-beam", "file"] | None = Field(
+        None, description='"case", "full-model", "exact-beam" or "file"'
+    )
     most_dofs: int = Field(MOST_DOFS, ge=1, description="a whole number from 1, of a full model")
+    elements: int = Field(32, ge=1, description="a whole number from 1, of exact beams")
     file: Path | None = Field(None, description="the path of a table of time and sensor columns (.csv, .mat)")
     mode_set: str = Field("craig-bampton", description="the name of a mode set")
     n_modes: int = Field(10, ge=0, description="a whole number from 0")
@@ -75,19 +79,21 @@ class ReferenceTable(Table):
     def _one(self) -> "ReferenceTable":
         given = self.model_fields_set - {"kind"}
         kind = self.kind or ("file" if self.file is not None else "case")
-        own = {"file": {"file"}, "full-model": {"most_dofs"}}.get(kind)
+        own = {"file": {"file"}, "full-model": {"most_dofs"}, "exact-beam": {"elements"}}.get(kind)
         if kind == "file" and self.file is None:
             raise ValueError('kind = "file": expected file = the path of a table')
-        others = given - own if own is not None else given & {"file", "most_dofs"}
+        others = given - own if own is not None else given & {"file", "most_dofs", "elements"}
         if others:
             raise ValueError(f'of a reference of kind "{kind}" expected no {", ".join(sorted(others))}')
         return self
 
     @property
-    def asked(self) -> Case | FullModel | None:
+    def asked(self) -> Case | FullModel | ExactBeam | None:
         """The reference that is computed; None: it is read from a file."""
         if self.kind == "full-model":
             return FullModel(self.most_dofs)
+        if self.kind == "exact-beam":
+            return ExactBeam(self.elements)
         if self.file is not None:
             return None
         return Case(self.mode_set, self.n_modes, self.frame, self.stiffening, self.parts)
@@ -131,7 +137,7 @@ def run_laboratory(
     system, given = read_system(asked.system)
     run = required_run(given, asked.system)
     table = asked.reference
-    reference: Case | FullModel | Reference | None = table.asked
+    reference: Case | FullModel | ExactBeam | Reference | None = table.asked
     if reference is None:
         assert table.file is not None
         signals = read_signals(table.file, uneven=True)

@@ -1,20 +1,29 @@
 """A system with another description of one of its flexible bodies: the same body anew, or parts in its place."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from cms.errors import CmsError
 from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.markers import Marker, body_name
 from floatframe.errors import ModelError
+from floatframe.flexible_parts.flexible_part import FlexiblePart
 from floatframe.joints import FixedJoint
+from floatframe.results.sensors.loads import EnergySensor
+from floatframe.results.sensors.places import DisplacementSensor
+from floatframe.rotations import rotation_matrix
 from floatframe.system import System
 
-__all__ = ["with_body"]
+__all__ = ["with_body", "with_part"]
+
+NOT_OF_BODIES = (DisplacementSensor, EnergySensor)  #: sensors that mean another thing of a part of several bodies
 
 CUT = "cut_"  #: beginning of the names of interfaces at cuts
 
@@ -52,20 +61,77 @@ def with_body(system: System, name: str, reduced: Sequence[ReducedBody], *, stif
         FixedJoint(f"{name}_{CUT}{k + 1}", Marker(names[k], f"{CUT}{k + 1}"), Marker(names[k + 1], f"{CUT}{k + 1}"))
         for k in range(len(parts) - 1)
     )
+    to = partial(marker_on_part, parts=parts)
     changed: dict[str, Any] = {
-        kind: tuple(moved(each, name, parts) for each in getattr(system, kind))
+        kind: tuple(moved(each, name, to, len(parts)) for each in getattr(system, kind))
         for kind in ("joints", "forces", "couplers", "sensors", "inputs", "outputs", "events")
     }
     changed["joints"] = (*changed["joints"], *cuts)
     return replace(system, bodies=tuple(bodies), source="", **changed)
 
 
-def moved(part: Any, name: str, parts: Sequence[FlexibleBody]) -> Any:
-    """Return a joint, force or sensor with every marker on the body moved to the part that has its place."""
+def with_part(system: System, name: str, part: FlexiblePart) -> System:
+    """Return the system with a flexible body as a part of several bodies; sensors that it does not know are left out.
+
+    Raises
+    ------
+    ModelError
+        If a joint or force names a place that the part has not, or the body as a whole.
+    """
+    body = system.body(name)
+    assert isinstance(body, FlexibleBody)
+    bodies = [each for old in system.bodies for each in (part.bodies if old.name == name else (old,))]
+    places = {each.name: each.position for each in part.bodies}
+    R = rotation_matrix(body.orientation)
+
+    def on_part(marker: Marker) -> Marker:
+        there = marker_of_part(marker, part, places, body.position, R)
+        triad = there.triad if marker.triad is None else np.asarray(there.triad) @ marker.triad
+        return replace(there, triad=triad)
+
+    changed: dict[str, Any] = {
+        kind: tuple(moved(each, name, on_part, 2) for each in getattr(system, kind))
+        for kind in ("joints", "forces", "couplers", "inputs", "outputs", "events")
+    }
+    changed["forces"] = (*changed["forces"], *part.forces)
+    sensors = []
+    for sensor in system.sensors:
+        if isinstance(sensor, NOT_OF_BODIES):
+            continue
+        with suppress(ModelError):
+            sensors.append(moved(sensor, name, on_part, 2))
+    return replace(system, bodies=tuple(bodies), source="", sensors=tuple(sensors), **changed)
+
+
+def marker_of_part(
+    marker: Marker, part: FlexiblePart, places: Mapping[str, Array], position: Array, R: Array
+) -> Marker:
+    """Return the place of a marker on a part: an interface, a node of the mesh by number or by its position."""
+    if marker.interface is not None:
+        found = part.marker(marker.interface)
+    elif marker.node is not None:
+        found = part.marker(f"node {marker.node}")
+    elif marker.position is not None:
+        wanted = position + R @ marker.position
+        away = {body: float(np.linalg.norm(place - wanted)) for body, place in places.items()}
+        nearest = min(away, key=lambda body: away[body])
+        size = float(np.linalg.norm(np.ptp(list(places.values()), axis=0)))
+        if away[nearest] > marker.tolerance * size:
+            raise ModelError(f"no node of {part.name!r} is at {marker.position.tolist()}, {nearest!r} is nearest")
+        found = Marker(nearest)
+    else:
+        raise ModelError(
+            f"a marker on {part.name!r} without a place, or on an element or set: name an interface or node"
+        )
+    return replace(found, triad=np.eye(3) if found.triad is None else found.triad)
+
+
+def moved(part: Any, name: str, to: Callable[[Marker], Marker], n_parts: int) -> Any:
+    """Return a joint, force or sensor with every marker on the body where it is on its parts."""
     if isinstance(part, Marker):
-        return marker_on_part(part, parts) if body_name(part.body) == name else part
+        return to(part) if body_name(part.body) == name else part
     if isinstance(part, tuple | list):
-        return type(part)(moved(each, name, parts) for each in part)
+        return type(part)(moved(each, name, to, n_parts) for each in part)
     if not is_dataclass(part) or isinstance(part, type):
         return part
     changes = {}
@@ -76,9 +142,13 @@ def moved(part: Any, name: str, parts: Sequence[FlexibleBody]) -> Any:
         if value == name if isinstance(value, str) and each.name != "name" else isinstance(value, FlexibleBody):
             raise ModelError(
                 f"{getattr(part, 'name', type(part).__name__)!r}: {each.name}: names the body {name!r} as a whole, "
-                f"which has {len(parts)} parts here; name a place on it, or leave the case out"
+                f"which has {n_parts} or more parts here; name a place on it, or leave the case out"
             )
-        new = moved(value, name, parts) if isinstance(value, Marker | tuple | list) or is_dataclass(value) else value
+        new = (
+            moved(value, name, to, n_parts)
+            if isinstance(value, Marker | tuple | list) or is_dataclass(value)
+            else value
+        )
         if new is not value:
             changes[each.name] = new
     return replace(part, **changes) if changes else part

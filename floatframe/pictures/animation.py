@@ -186,7 +186,8 @@ def motion_scene(
     return Scene(
         surfaces=tuple(surfaces),
         lines=(
-            *(() if has_ground else (ground,)), *drawn,
+            *(() if has_ground else (ground,)),
+            *drawn,
             *(line for line in lines if np.ptp(line.points.reshape(-1, 3), axis=0).max() > 1e-3 * size),
         ),
         triads=tuple(triads),

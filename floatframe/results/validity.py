@@ -50,7 +50,7 @@ class ValidityNote:
         if self.kind == "inertia":
             return "import it with its full mass matrix, nodal masses, or mesh and density beside (cms import)"
         if self.kind == "rotation" and 0 <= self.in_mean_axes < self.largest:
-            frame = "take mean axes (cms frame --to tisserand, [body] frame = \"tisserand\")"
+            frame = 'take mean axes (cms frame --to tisserand, [body] frame = "tisserand")'
             if self.in_mean_axes <= self.limit:
                 return f"{frame}: there it turns by {self.in_mean_axes:.3g} rad, within the limit"
             return f"{frame}: there it turns by {self.in_mean_axes:.3g} rad; then {self.next_action}"

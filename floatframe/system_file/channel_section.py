@@ -86,7 +86,7 @@ class InputSection(ChannelSection):
     def _fits(self) -> "InputSection":
         if self.type is None:
             if self.measure is not None:
-                raise ValueError("measure: a force has none; expected type = \"base\" or \"drive\" beside it")
+                raise ValueError('measure: a force has none; expected type = "base" or "drive" beside it')
             self.way()
             return self
         keys = INPUT_TYPES[self.type]
