@@ -74,6 +74,7 @@ def full_transient(
     rho_inf: float = 0.8,
     rows: sp.sparray | Array | None = None,
     is_preloaded: bool = False,
+    every: int = 1,
 ) -> FullTransient:
     """Integrate the equations of a finite element model over time, from rest.
 
@@ -101,6 +102,8 @@ def full_transient(
     is_preloaded
         Start in equilibrium with the loads and motions of the first time, instead of undeformed; the given motions must
         hold the body.
+    every
+        Results at every so many of the times, from the first on.
 
     Raises
     ------
@@ -117,14 +120,17 @@ def full_transient(
         raise ModelError(f"{where}: t: expected two or more times, ascending and evenly spaced")
     if not 0 <= rho_inf <= 1:
         raise ModelError(f"{where}: rho_inf: expected 0 to 1, got {rho_inf:g}")
+    if every < 1:
+        raise ModelError(f"{where}: every: expected a whole number from 1, got {every}")
     n_t, h = len(t), float(step.mean())
+    n_out = (n_t - 1) // every + 1
     P = sp.eye_array(body.n_dof, format="csr") if rows is None else sp.csr_array(rows)
     if P.shape[1] != body.n_dof:
         raise ModelError(f"{where}: rows: expected {body.n_dof} columns, got {P.shape[1]}")
-    if 3.0 * n_t * P.shape[0] > MOST_NUMBERS:
+    if 3.0 * n_out * P.shape[0] > MOST_NUMBERS:
         raise ModelError(
-            f"{where}: {P.shape[0]} rows at {n_t} times are {24e-9 * n_t * P.shape[0]:.1f} GB; give rows = a matrix of "
-            "what is wanted"
+            f"{where}: {P.shape[0]} rows at {n_out} times are {24e-9 * n_out * P.shape[0]:.1f} GB; give rows = a "
+            "matrix of what is wanted, or every = 10, say"
         )
     moved = {name: history(where, body, name, given, t) for name, given in (motions or {}).items()}
     held = np.concatenate([boundary_dofs(body, name) for name in moved] or [np.zeros(0, np.int64)])
@@ -140,8 +146,8 @@ def full_transient(
     A = scheme.c_m * M + scheme.c_d * D + scheme.c_k * K
     M_h, D_h, K_h = M[:, held], D[:, held], K[:, held]
     M_i, D_i, K_i = M[i][:, i], D[i][:, i], K[i][:, i]
-    results = [np.empty((n_t, P.shape[0])) for _ in range(3)]
-    reaction = np.zeros((n_t, len(held)))
+    results = [np.empty((n_out, P.shape[0])) for _ in range(3)]
+    reaction = np.zeros((n_out, len(held)))
     rows_h = [sp.csr_array(X[held]) for X in (K, D, M)]
 
     def known(k: int) -> Array:
@@ -161,16 +167,18 @@ def full_transient(
                 new = factor.solve(known(k)[i] - K_i @ u_p - D_i @ v_p - M_i @ w)  # (2)
                 u, v = u_p + scheme.c_k * new, v_p + scheme.c_d * new
                 acceleration, algorithmic = scheme.c_m * new + w, new
+            if k % every:
+                continue
             whole = [np.zeros(body.n_dof) for _ in range(3)]
             for x, at_i, at_h in zip(whole, (u, v, acceleration), (u_h[k], v_h[k], a_h[k]), strict=True):
                 x[i], x[held] = at_i, at_h
             for result, x in zip(results, whole, strict=True):
-                result[k] = P @ x
+                result[k // every] = P @ x
             if len(held):  # (3)
-                reaction[k] = sum(X @ x for X, x in zip(rows_h, whole, strict=True)) - (F @ p[k])[held]
+                reaction[k // every] = sum(X @ x for X, x in zip(rows_h, whole, strict=True)) - (F @ p[k])[held]
     ends = np.cumsum([0, *(len(boundary_dofs(body, name)) for name in moved)])
     forces = {name: reaction[:, a:b] for name, a, b in zip(moved, ends[:-1], ends[1:], strict=True)}
-    return FullTransient(t, results[0], results[1], results[2], forces, len(i))
+    return FullTransient(t[::every], results[0], results[1], results[2], forces, len(i))
 
 
 @dataclass(frozen=True)

@@ -133,3 +133,14 @@ def test_what_is_refused(body):
         full_transient(body, t, wrenches={"left": still}, is_preloaded=True)
     with pytest.raises(ModelError, match="GB; give rows"):
         full_transient(body, np.linspace(0, 1, 1_000_000))
+
+
+def test_every_other_time_is_what_it_is_with_all(body):
+    t = np.linspace(0, 0.005, 12)
+    force = np.zeros((12, 6))
+    force[:, 1] = 50 * pulse(t, 0.004)
+    given = {"motions": {"left": np.zeros((12, 6))}, "wrenches": {"right": force}}
+    whole, some = full_transient(body, t, **given), full_transient(body, t, **given, every=3)
+    assert_allclose(some.t, t[::3])
+    assert_allclose(some.u, whole.u[::3])
+    assert_allclose(some.forces["left"], whole.forces["left"][::3])
