@@ -111,6 +111,7 @@ from .joints import SlidingJoint as SlidingJoint
 from .joints import SphericalJoint as SphericalJoint
 from .joints import UniversalJoint as UniversalJoint
 from .joints.coordinate_coupler import CoordinateCoupler as CoordinateCoupler
+from .joints.coordinate_coupler import Limits as Limits
 from .laboratory.cases import Case as Case
 from .laboratory.cases import grid as grid
 from .laboratory.exact_beam import ExactBeam as ExactBeam

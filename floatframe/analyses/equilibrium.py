@@ -25,6 +25,7 @@ from floatframe.errors import ConvergenceError, ModelError
 from floatframe.joints.rows import is_held_velocity
 from floatframe.kernels.model import STIFFNESS
 from floatframe.kernels.work import Work, new_work
+from floatframe.motion.stop_events import require_off_stops
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.validity import ValidityNote
 from floatframe.rotations import rotation_matrix
@@ -150,6 +151,7 @@ def steady_rotation(
         is_told = bool((np.abs(gaps) <= told)[~holds].all())
         if error <= tolerance and is_closed and is_told:
             _require_rotation(compiled, work, omega)
+            require_off_stops(system, w)
             notes = notes_at(system, work, state, u_dot, w)
             return Equilibrium(*motion_of_file(compiled, state, u_dot), w, omega, error, iteration, notes)
         if iteration == max_iterations:

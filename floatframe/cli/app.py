@@ -156,6 +156,7 @@ def print_run(trajectory: "Trajectory") -> None:
     for event in summary.get("events", ()):
         done = ["run stopped"] * event["stop"] + [f"{name} on" for name in event["switch_on"]]
         done += [f"{name} off" for name in event["switch_off"]]
+        done += [f"impulse {value:.6g} at {name}" for name, value in event.get("impulse", {}).items()]
         rows.append(("event", f"{event['name']} at {event['t']:.9g} {second}: {', '.join(done) or 'recorded'}"))
     if "wall_time" in summary:
         rows.append(("wall time", f"{summary['wall_time']:.2f} s"))

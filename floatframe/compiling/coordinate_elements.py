@@ -18,7 +18,18 @@ from floatframe.forces import UserForce
 from floatframe.functions.expressions import Tape, compile_expression
 from floatframe.joints.axis_frame import axis_in_b, turning_frame
 from floatframe.joints.coordinate_coupler import CoordinateCoupler
-from floatframe.joints.rows import COUPLE, NO_MOMENT, PART, PUSH, SPAN, TWIST, RelativePlace, Row, RowCoordinate
+from floatframe.joints.rows import (
+    COUPLE,
+    NO_MOMENT,
+    PART,
+    PUSH,
+    RELEASED,
+    SPAN,
+    TWIST,
+    RelativePlace,
+    Row,
+    RowCoordinate,
+)
 from floatframe.kernels import model
 from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.records import filled, of_items
@@ -98,7 +109,10 @@ def add_coupler(system: System, made: Connections, elements: CoordinateElements,
     factors = [factor for _, factor in coupler.terms]
     as_placed = sum(f * placed_value(x, made) for f, x in zip(factors, coordinates, strict=True))
     scale = 1 / max(abs(factor) for factor in factors)
-    held = Row(COUPLE, np.array([scale, 0.0, 0.0]), c=as_placed, motion=coupler.constant)  # type: ignore[arg-type]
+    along = np.array([scale, 0.0, 0.0])
+    held = Row(COUPLE, along, c=as_placed, motion=coupler.constant)  # type: ignore[arg-type]
+    if not coupler.acts:
+        held = Row(RELEASED, along)
     add_coordinates(made, elements, coupler.name, COUPLER, coordinates, factors, [True] * len(coordinates), [held])
 
 

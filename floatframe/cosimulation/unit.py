@@ -130,6 +130,12 @@ class Unit:
                 f"system {self.system.name!r}: its table [events] cannot be a part of a co-simulation; leave it out "
                 "and let the master switch"
             )
+        stops = [coupler.name for coupler in self.system.couplers if coupler.limits is not None]
+        if stops:
+            raise ModelError(
+                f"system {self.system.name!r}: coupler {stops[0]!r} has limits, which cannot be a part of a "
+                "co-simulation; take a force with a table for the stop"
+            )
         self.system, self.held = with_held_inputs(self.system, self.names)
         compiled = compiled_system(self.system)
         self.numbers = {each.name: function_numbers(self.system, compiled, each) for each in self.held}

@@ -194,6 +194,9 @@ def require_smooth_run(family: Family, t_start: float, h: float, n_steps: int) -
             f"sensitivities: event {acting[0].name!r}: motions over events are not differentiated; take the "
             "events out, or end the run before them"
         )
+    stops = [coupler.name for coupler in system.couplers if coupler.limits is not None]
+    if stops:
+        raise ModelError(f"sensitivities: coupler {stops[0]!r} has limits: motions over impacts are not differentiated")
     if system.fmus:
         raise ModelError(f"sensitivities: unit {system.fmus[0].name!r} of another program is not differentiated")
     for each in (system, *(around.system for p in family.parameters for around in p.around)):

@@ -12,30 +12,45 @@ from floatframe.compiling.file_frames import rows_of_file, state_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator
-from floatframe.kernels.memory import Rows
+from floatframe.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Rows
 from floatframe.kernels.work import Work, new_work
-from floatframe.motion.events import Event, events_of, off_at_start, require_events, with_forces_off
+from floatframe.motion.events import Event, events_of, off_at_start, require_events, switched
+from floatframe.motion.stop_events import (
+    INWARD,
+    StopEvent,
+    coupled_sum,
+    just_inside,
+    require_within_limits,
+    stop_events,
+    stop_values,
+    sum_rows,
+)
 from floatframe.results.head import Head
 from floatframe.results.results_file import MemorySource
 from floatframe.results.sensors import sensor_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.results.writer import arrays_of
+from floatframe.start.impact import impact
+from floatframe.state import State
 from floatframe.system import System
 
 __all__ = ["EventWatch"]
 
-SPRINGS, WORK = 3, 10  #: columns of `Rows.diagnostics`
+SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
 MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
 
 
 @dataclass
 class EventWatch:
-    """The events of a run: what is watched, which forces are off, and what has happened."""
+    """The events of a run: what is watched, what is switched off, what stops hold, and what has happened."""
 
     full: System  #: with all forces
     head: Head
     system: System = field(init=False)  #: with some off
-    off: frozenset[str] = field(init=False)
+    events: tuple[Event, ...] = field(init=False)  #: those of the system, then those of its stops
+    off: frozenset[str] = field(init=False)  #: forces at zero and couplers not engaged
+    caught: dict[str, float] = field(default_factory=dict)  #: what couplers that have been engaged hold
+    resting: dict[str, str] = field(default_factory=dict)  #: side of the limits at which couplers hold
     values: Array = field(init=False)  #: of the events at the last time, angles without jumps, (n_events,)
     row: Rows | None = field(init=False, default=None)  #: results at the last time
     happened: list[dict[str, Any]] = field(default_factory=list)
@@ -44,13 +59,18 @@ class EventWatch:
 
     def __post_init__(self) -> None:
         require_events(self.full)
-        self.switch(off_at_start(events_of(self.full)))
-        self.values = np.zeros(len(events_of(self.full)))
+        self.events = (*events_of(self.full), *stop_events(self.full))
+        released = {coupler.name for coupler in self.full.couplers if not coupler.engaged}
+        self.switch(off_at_start(events_of(self.full)) | released)
+        self.values = np.zeros(len(self.events))
 
     def switch(self, off: frozenset[str]) -> None:
-        """Take these forces off, all others on."""
+        """Take these forces and couplers off, all others on, with what couplers have caught and stops hold."""
         self.off = off
-        self.system = with_forces_off(self.full, off)
+        self.caught = {name: value for name, value in self.caught.items() if name not in off}
+        limits = {coupler.name: coupler.limits for coupler in self.full.couplers}
+        stops = {name: float(getattr(limits[name], side)) for name, side in self.resting.items()}
+        self.system = switched(self.full, off, self.caught | stops)
 
     def begin(self, row: Rows) -> None:
         """Take the results at the time from which steps go on."""
@@ -58,6 +78,8 @@ class EventWatch:
         self.row = row
         if is_first and not self.happened:
             self.values = self.measured(row, row)[0]
+            require_within_limits(compiled_system(self.full), self.events, self.values)
+            self.take_inside()
 
     def measured(self, before: Rows, after: Rows) -> Array:
         """Return what each event watches at two times, (2, n_events)."""
@@ -66,7 +88,10 @@ class EventWatch:
         arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
         motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
         columns = []
-        for event in events_of(self.full):
+        for event in self.events:
+            if isinstance(event, StopEvent):
+                columns.append(np.array(stop_values(compiled, event, self.resting, (before, after))))
+                continue
             if event.at is not None:
                 columns.append(motion.t)
                 continue
@@ -96,7 +121,7 @@ class EventWatch:
             if failure is not None:
                 return begin, row, work, failure
             values = self.values_after(row)
-            events = events_of(self.full)
+            events = self.events
             passed = [j for j, e in enumerate(events) if e.happens(float(self.values[j]), float(values[j]))]
             trial = new_work(compiled_system(self.system).model) if passed else work  # leaves the factors of the run
             found = sorted(
@@ -129,31 +154,110 @@ class EventWatch:
                 if (reached[i] - level) * (self.values[i] - level) > 0.0:
                     reached[i] = level
             self.values, self.row = reached, row
-            self.add(event, t)
-            if event.record and not event.stop:
-                self.recorded.append(row)
-            if event.stop:
-                self.has_stopped = True
-                return carry, row, work, None
-            self.switch((self.off | set(event.switch_off)) - set(event.switch_on))
-            told = state_of_file(compiled_system(self.full), carry.state)
-            fresh = integrator.start(self.system, t, told, before=carry)
-            stored, work_done = float(row.diagnostics[-1, SPRINGS]), carry.work
-            carry = replace(
-                fresh, work=work_done, n_iterations=carry.n_iterations, n_steps=carry.n_steps,
-                n_rejected=carry.n_rejected, h_next=0.0,
-            )  # fmt: skip
-            work = new_work(compiled_system(self.system).model)
-            carry, row = integrator.observe(self.system, t, carry, work)
-            gained = float(row.diagnostics[-1, SPRINGS]) - stored  # energy that springs bring or take with them
-            carry = replace(carry, work=work_done + np.array([gained, 0.0]))
-            row.diagnostics[-1, WORK] += gained
+            if isinstance(event, StopEvent):
+                state = self.strike(integrator, carry, event, t, h)
+            else:
+                self.add(event, t)
+                if event.record and not event.stop:
+                    self.recorded.append(row)
+                if event.stop:
+                    self.has_stopped = True
+                    return carry, row, work, None
+                state = self.engage(event, carry, t)
+            carry, row, work = self.begun_anew(integrator, carry, state, row, t)
             self.row = row
+            self.take_inside()
             where, size, number = t, t_end - t, 0
             if size <= 1e-12 * h:
                 return carry, row._replace(t=np.array([t_end])), work, None
         words = f"{MOST_IN_A_STEP} events happened in one step: {', '.join(e['name'] for e in self.happened[-3:])}, ..."
         return carry, row, work, Failure(words, np.inf)
+
+    def begun_anew(
+        self, integrator: Integrator, carry: Carry, state: State, row: Rows, t: float
+    ) -> tuple[Carry, Rows, Work]:
+        """Return memory, results and working arrays of the motion that begins at t from a state of the engine.
+
+        The energy that springs bring or take with them is work given; what an impact takes is work taken.
+        """
+        is_struck = state is not carry.state
+        told = state_of_file(compiled_system(self.full), state)
+        fresh = integrator.start(self.system, t, told, before=carry)
+        before, work_done = row.diagnostics[-1], carry.work
+        carry = replace(
+            fresh, work=work_done, n_iterations=carry.n_iterations, n_steps=carry.n_steps,
+            n_rejected=carry.n_rejected, h_next=0.0,
+        )  # fmt: skip
+        work = new_work(compiled_system(self.system).model)
+        carry, row = integrator.observe(self.system, t, carry, work)
+        after = row.diagnostics[-1]
+        taken = float(before[KINETIC] - after[KINETIC]) if is_struck else 0.0
+        change = np.array([float(after[SPRINGS] - before[SPRINGS]), taken])
+        after[WORK_GIVEN] += change[0]
+        after[WORK_TAKEN] += change[1]
+        return replace(carry, work=work_done + change), row, work
+
+    def engage(self, event: Event, carry: Carry, t: float) -> State:
+        """Switch by an event; return the state of the engine with the velocities after it."""
+        compiled = compiled_system(self.full)
+        couplers = {coupler.name: coupler for coupler in self.full.couplers}
+        engaged = [name for name in event.switch_on if name in couplers and name in self.off]
+        for name in engaged:
+            caught, constant = coupled_sum(compiled, name, carry.w), couplers[name].constant
+            if constant is None:
+                self.caught[name] = caught
+                continue
+            wanted = float(constant(t))  # type: ignore[operator]
+            if abs(caught - wanted) > SHUT * max(1.0, compiled.length):
+                raise ModelError(
+                    f"event {event.name!r} at t = {t:g}: coupler {name!r} is to hold {wanted:.6g}, but finds "
+                    f"{caught:.6g}; leave its constant out, so that it holds what it catches, or let the event watch it"
+                )
+        self.switch((self.off | set(event.switch_off)) - set(event.switch_on))
+        if not engaged:
+            return carry.state
+        hit = impact(compiled_system(self.system), carry.state, t=t, known=carry.w, restitution={})
+        cores = [sum_rows(compiled, name)[2] for name in engaged]
+        self.happened[-1]["impulse"] = {name: float(hit.impulse[k]) for name, k in zip(engaged, cores, strict=True)}
+        return hit.state
+
+    def strike(self, integrator: Integrator, carry: Carry, event: StopEvent, t: float, h: float) -> State:
+        """Meet a limit, or leave it; return the state of the engine with the velocities after it."""
+        self.add(event, t)
+        happened = self.happened[-1]
+        if event.side == "release":
+            del self.resting[event.coupler]
+            self.switch(self.off)
+            return carry.state
+        limits = next(each.limits for each in self.full.couplers if each.name == event.coupler)
+        assert limits is not None  # it has events
+        _, factors, core = sum_rows(compiled_system(self.full), event.coupler)
+        self.resting[event.coupler] = event.side
+        self.switch(self.off)
+        holding = compiled_system(self.system)
+        hit = impact(holding, carry.state, t=t, known=carry.w, restitution={})
+        speed = float(hit.rate[core]) * float(np.abs(factors).max())  # rows of couplers have a largest coefficient of 1
+        told = state_of_file(compiled_system(self.full), hit.state)
+        pressed = INWARD[event.side] * float(integrator.start(self.system, t, told, before=carry).w[core])
+        thrown = 2 * limits.restitution * abs(float(hit.impulse[core]))  # pressed by this for the time of the flight
+        happened["speed before"], happened["speed after"] = speed, 0.0
+        if pressed > 0.0 and thrown <= pressed * h:
+            happened["impulse"] = {event.coupler: float(hit.impulse[core])}
+            return hit.state
+        if limits.restitution > 0.0:
+            restitution = {core: limits.restitution}
+            hit = impact(holding, carry.state, t=t, known=carry.w, restitution=restitution)
+            happened["speed after"] = -limits.restitution * speed
+        happened["impulse"] = {event.coupler: float(hit.impulse[core])}
+        del self.resting[event.coupler]
+        self.switch(self.off)
+        return hit.state
+
+    def take_inside(self) -> None:
+        """Let limits that are reached, and on which nothing rests, be reached anew by whatever goes beyond them."""
+        for j, event in enumerate(self.events):
+            if isinstance(event, StopEvent) and event.side in INWARD and event.coupler not in self.resting:
+                self.values[j] = just_inside(event, float(self.values[j]))
 
     def add(self, event: Event, t: float) -> None:
         """Take an event into what has happened."""
@@ -164,7 +268,7 @@ class EventWatch:
         self, integrator: Integrator, begin: Carry, trial: Work, t: float, size: float, part: float, j: int
     ) -> Failure | None:
         """Record the results at an event that does not change the motion, by a step to it that leads no further."""
-        event = events_of(self.full)[j]
+        event = self.events[j]
         _, row, _, failure = integrator.advance(
             self.system, begin, trial, t0=t, h=part * size, first=0, n_steps=1, every=1
         )
@@ -182,7 +286,7 @@ class EventWatch:
         self, integrator: Integrator, begin: Carry, work: Work, t: float, size: float, j: int, last: float
     ) -> float:
         """Return the part of a step after which event j has just happened."""
-        event = events_of(self.full)[j]
+        event = self.events[j]
         if event.at is not None:
             return (event.at - t) / size
         sign = np.sign(last - event.level) or -np.sign(self.values[j] - event.level)
@@ -210,12 +314,15 @@ class EventWatch:
 
     def record(self) -> dict[str, Array]:
         """Return what a run needs to go on."""
-        words = json.dumps({"off": sorted(self.off), "happened": self.happened})
+        words = json.dumps(
+            {"off": sorted(self.off), "happened": self.happened, "caught": self.caught, "resting": self.resting}
+        )
         return {"event_values": self.values, "events": np.frombuffer(words.encode(), dtype=np.uint8)}
 
     def restore(self, record: Mapping[str, Array]) -> None:
         """Go on from a record."""
         data = json.loads(np.asarray(record["events"], dtype=np.uint8).tobytes().decode())
+        self.caught, self.resting = data.get("caught", {}), data.get("resting", {})
         self.switch(frozenset(data["off"]))
         self.happened = data["happened"]
         self.values = np.array(record["event_values"], dtype=float)

@@ -6,7 +6,7 @@ Event("brake", at=1.5, switch_on=("brake",))
 Event("crossing", "place", column="x", record=True)
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -17,6 +17,7 @@ from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad, Bushing, Force, JointForce, PointForce, SpringDamper
 from floatframe.functions.time_functions import constant
+from floatframe.joints.coordinate_coupler import CoordinateCoupler
 from floatframe.results.sensors import sensor_of
 from floatframe.system import System
 
@@ -24,10 +25,11 @@ __all__ = [
     "DIRECTIONS",
     "Event",
     "events_of",
+    "has_events",
     "off_at_start",
     "require_events",
     "require_times_of_events",
-    "with_forces_off",
+    "switched",
 ]
 
 DIRECTIONS = {"rising": 1, "falling": -1, "both": 0}
@@ -61,8 +63,8 @@ class Event:
     """What happens when a measured value passes a level, or at a time.
 
     The time where a value passes its level is found to `tolerance` by steps of other sizes. A force is off at the
-    start if the first event that names it switches it on. An event that only records does not change the motion, bit
-    for bit.
+    start if the first event that names it switches it on; a coupler (a latch, a clutch) if it is not `engaged`. An
+    event that only records does not change the motion, bit for bit.
     """
 
     name: str
@@ -71,7 +73,7 @@ class Event:
     direction: str = "both"  #: "rising", "falling" or "both"
     column: str = ""  #: of the sensor, such as "x" or "rate"; "": its first
     stop: bool = False  #: end the run there
-    switch_on: tuple[str, ...] = ()  #: names of forces
+    switch_on: tuple[str, ...] = ()  #: names of forces and couplers
     switch_off: tuple[str, ...] = ()
     tolerance: float = 1e-9  #: of the time, in parts of the step
     at: float | None = None  #: instead of `watch`: the time of the event, after the start of the run [s]
@@ -124,6 +126,8 @@ class Event:
 def require_events(system: System) -> None:
     """Raise `ModelError` if an event watches or switches what does not exist, or cannot be switched."""
     forces = {getattr(force, "name", ""): force for force in system.forces}
+    couplers = {coupler.name: coupler for coupler in system.couplers}
+    first_on = off_at_start(events_of(system))
     for event in events_of(system):
         where = f"event {event.name!r}"
         if event.watch:
@@ -132,16 +136,37 @@ def require_events(system: System) -> None:
             except ModelError as error:
                 raise ModelError(f"{where}: watch: {error}") from error
         for name in (*event.switch_on, *event.switch_off):
+            if name in couplers:
+                require_switched(where, couplers[name], is_first_on=name in first_on)
+                continue
             if name not in forces or not name:
-                choices = [key for key in forces if key]
-                raise ModelError(f"{where}: no force {quoted(name)}{nearest(name, choices)}")
+                choices = [key for key in (*forces, *couplers) if key]
+                raise ModelError(f"{where}: no force or coupler {quoted(name)}{nearest(name, choices)}")
             if type(forces[name]) not in SILENT:
                 raise ModelError(f"{where}: a force of the kind {type(forces[name]).__name__} cannot be switched")
+
+
+def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: bool) -> None:
+    """Raise `ModelError` if a coupler cannot be switched by events, or waits for one without saying so."""
+    if coupler.limits is not None:
+        raise ModelError(
+            f"{where}: coupler {coupler.name!r} has limits and is switched by them alone; take another coupler for the "
+            "event"
+        )
+    if is_first_on and coupler.engaged:
+        raise ModelError(
+            f"{where}: coupler {coupler.name!r} is switched on, but it is engaged at the start; say engaged = false"
+        )
 
 
 def events_of(system: System) -> tuple[Event, ...]:
     """Return the events that a system carries: it knows their names only."""
     return cast(tuple[Event, ...], system.events)
+
+
+def has_events(system: System) -> bool:
+    """Whether something may be switched during a motion: events, or stops that are struck."""
+    return bool(system.events) or any(coupler.limits is not None for coupler in system.couplers)
 
 
 def require_times_of_events(system: System, t_start: float) -> None:
@@ -153,7 +178,7 @@ def require_times_of_events(system: System, t_start: float) -> None:
 
 
 def off_at_start(events: Sequence[Event]) -> frozenset[str]:
-    """Return the forces that the first event which names them switches on."""
+    """Return the forces and couplers that the first event which names them switches on."""
     first: dict[str, bool] = {}
     for event in events:
         for name in event.switch_on:
@@ -163,12 +188,22 @@ def off_at_start(events: Sequence[Event]) -> frozenset[str]:
     return frozenset(name for name, is_off in first.items() if is_off)
 
 
-def with_forces_off(system: System, off: frozenset[str]) -> System:
-    """Return the system with these forces at zero; its results have the same columns."""
-    if not off:
+def switched(system: System, off: frozenset[str], held: Mapping[str, float]) -> System:
+    """Return the system with these forces at zero and these couplers not engaged; its results have the same columns.
+
+    held: what couplers that have been switched on hold, by name.
+    """
+    if not off and not held:
         return system
     forces: list[Force] = []
     for force in system.forces:
         is_off = getattr(force, "name", "") in off
         forces.append(replace(force, **SILENT[type(force)]) if is_off else force)
-    return replace(system, forces=forces)
+    couplers = []
+    for coupler in system.couplers:
+        if coupler.name in off:
+            coupler = replace(coupler, engaged=False)
+        elif coupler.name in held:
+            coupler = replace(coupler, engaged=True, limits=None, constant=held[coupler.name])
+        couplers.append(coupler)
+    return replace(system, forces=forces, couplers=couplers)

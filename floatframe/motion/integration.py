@@ -24,7 +24,7 @@ from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import new_work
 from floatframe.motion.event_steps import EventWatch
-from floatframe.motion.events import require_times_of_events
+from floatframe.motion.events import has_events, require_times_of_events
 from floatframe.motion.jumps import jumps_of_steps, over_jumps
 from floatframe.motion.knots import knot_words
 from floatframe.motion.restart import RESTART_STEPS, carry_of_record, restart_record, system_digest
@@ -137,7 +137,7 @@ def integrate(
         log.warning("system %r: %s", system.name, words)
     head = head_of(system, integrator, t_start, t_end, step, output_every)
     head = replace(head, angles=compiled_system(system).angles)
-    watch = EventWatch(system, head) if system.events else None
+    watch = EventWatch(system, head) if has_events(system) else None
     require_times_of_events(system, t_start)
     begun = system if watch is None else watch.system
     with ExitStack() as held:  # the place of the results, from before the work until its end
@@ -224,7 +224,7 @@ def resume(
         if record is None:
             raise ResultsError(f"{output}: the interrupted run has no restart record; run it anew")
         carry, n_done = carry_of_record(record, system)
-        watch = EventWatch(system, head) if system.events else None
+        watch = EventWatch(system, head) if has_events(system) else None
         if watch is not None:
             watch.restore(record)
         writer = ResultsWriter(place, head, goes_on=True)

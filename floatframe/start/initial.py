@@ -49,7 +49,9 @@ __all__ = [
     "consistent_state",
     "mobility",
     "solve_accelerations",
+    "start_unknowns",
     "velocity_correction",
+    "work_from",
 ]
 
 ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size

@@ -21,8 +21,8 @@ class EventSection(Table):
         "both", description=f"one of {', '.join(DIRECTIONS)}"
     )
     stop: bool = Field(False, description="true: the run ends there")
-    switch_on: list[str] = Field([], description="names of forces")
-    switch_off: list[str] = Field([], description="names of forces")
+    switch_on: list[str] = Field([], description="names of forces and couplers")
+    switch_off: list[str] = Field([], description="names of forces and couplers")
     record: bool = Field(False, description="true: the results at this time are kept")
     tolerance: Annotated[float, Field(gt=0)] = Field(
         1e-9, description="a number above 0, of the time in parts of the step"

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -11,7 +11,7 @@ from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
 from fe_models.foundation.words import nearest
 from floatframe.bodies.markers import Place
 from floatframe.joints import JOINTS, Joint
-from floatframe.joints.coordinate_coupler import CoordinateCoupler
+from floatframe.joints.coordinate_coupler import CoordinateCoupler, Limits
 from floatframe.system_file.coordinate_section import CoordinateSection, marker_of
 from floatframe.system_file.keys import Name, Positive
 from floatframe.system_file.motion_section import MotionSection, require_quantity
@@ -90,13 +90,27 @@ class TermSection(CoordinateSection):
     factor: float = Field(description="a number other than 0, the coefficient of the coordinate")
 
 
+class LimitsSection(Table):
+    """[couplers.NAME.limits]: stops of a sum of coordinates."""
+
+    lower: float | None = Field(None, description="a number in the unit of the sum")
+    upper: float | None = Field(None, description="a number in the unit of the sum")
+    restitution: Annotated[float, Field(ge=0, le=1)] = Field(0.0, description="a number from 0 to 1, Newton's")
+
+    def found(self) -> Limits:
+        """Return the limits."""
+        return Limits(self.lower, self.upper, self.restitution)
+
+
 class CouplerSection(Table):
     """[couplers.NAME]: a linear relation between coordinates."""
 
     terms: list[TermSection] = Field(description="tables [[couplers.NAME.terms]], coordinates with factors")
     constant: float | MotionSection | None = Field(
-        None, description="a number, or a function of time; default: as placed"
+        None, description="a number, or a function of time; default: as placed, or as caught by an event"
     )
+    engaged: bool = Field(True, description="false: no force until an event switches it on (latch, clutch, brake)")
+    limits: LimitsSection | None = Field(None, description="stops: it acts only while the sum is at one of them")
 
 
 def joint_of(name: str, section: JointSection, signals: Mapping[str, SignalFunction] | None = None) -> Joint:
@@ -127,5 +141,9 @@ def coupler_of(
     constant = section.constant
     terms = [(term.found(), term.factor) for term in section.terms]
     return CoordinateCoupler(
-        name, terms, constant.function(signals) if isinstance(constant, MotionSection) else constant
+        name,
+        terms,
+        constant.function(signals) if isinstance(constant, MotionSection) else constant,
+        section.engaged,
+        None if section.limits is None else section.limits.found(),
     )

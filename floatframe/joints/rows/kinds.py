@@ -30,8 +30,8 @@ Rows of a line that deforms, LINE, LINE_TURN (held) and LINE_FREE (wrench), are 
 
 rho leads from the centre of a disc (axis y in B, radius c) to the point of its rim nearest to the plane, see
 kernels/joints/rolling.py. Force elements have rows of their own, PART; the held row of a coordinate coupler is
-COUPLE; SPAN is the distance of two points as a coordinate; LAW_LENGTH, LAW_ANGLE and LAW_RATE are what public elements
-hold.
+COUPLE, and RELEASED while the coupler is not engaged; SPAN is the distance of two points as a coordinate; LAW_LENGTH,
+LAW_ANGLE and LAW_RATE are what public elements hold.
 
 Joints whose points coincide need one moment (N = M), the others take the force at the point of B and have ARM rows.
 
@@ -70,6 +70,7 @@ __all__ = [
     "POINT",
     "POSITION",
     "PUSH",
+    "RELEASED",
     "RIM",
     "RIM_HEIGHT",
     "ROD",
@@ -96,7 +97,7 @@ __all__ = [
 #: codes of the kinds in the kernels; SPRING rows belong to spring-dampers
 POINT, DOT, GAUGE, SPRING, TURN, SLIDE, DISTANCE, SCREW, GAUGE_B, THREAD, ARM, ROD, PUSH, TWIST = range(14)
 RIM_HEIGHT, ROLL, RIM, COUPLE, PART, SPAN, TURN_B, TWIST_B, LINE, LINE_TURN, LINE_FREE = range(14, 25)
-EQUAL_TURN, BISECTOR, LAW_LENGTH, LAW_ANGLE, LAW_RATE = range(25, 30)
+EQUAL_TURN, BISECTOR, LAW_LENGTH, LAW_ANGLE, LAW_RATE, RELEASED = range(25, 31)
 NOTHING, POSITION, VELOCITY = range(3)  #: what a row holds
 FORCE, MOMENT, MOMENT_B = 0, 3, 6  #: where the parts F, M, N begin in the unknown wrench
 NO_MOMENT = -1  #: in place of a part: nothing acts there
@@ -148,6 +149,7 @@ ROW_KINDS = (
     RowKind(LAW_LENGTH, "an element holds a length", POSITION, is_length=True),
     RowKind(LAW_ANGLE, "an element holds an angle or a number", POSITION),
     RowKind(LAW_RATE, "an element holds a velocity", VELOCITY, is_length=True),
+    RowKind(RELEASED, "no force of a coupler that is not engaged"),
 )
 
 HOLDS = np.array([kind.holds for kind in ROW_KINDS])

@@ -1,9 +1,11 @@
 """Coordinate couplers (gears): Σ a_p x_p - c(t) = 0 over the coordinates of a connection.
 
 The multiplier lam is the last unknown; the force along coordinate p is Q_p = a_p lam. The held row is divided by its
-largest coefficient (`row_x`), so that all rows have numbers of one size.
+largest coefficient (`row_x`), so that all rows have numbers of one size. While a coupler is not
+engaged its row is lam = 0.
 """
 
+from floatframe.joints.rows.kinds import RELEASED
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.coordinate import (
     coordinate_derivatives,
@@ -24,14 +26,16 @@ def coupler_rows(model, work, c, c_k):
     i = model.connections.item[c]
     k = model.elements.core[i]
     lam = work.state.w[k]
-    held, _, _ = prescribed(model, work, k)
-    total = -held
+    total = 0.0
+    if model.rows.kind[k] != RELEASED:
+        held, _, _ = prescribed(model, work, k)
+        total = -held
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
         factor = model.coordinates.factor[p]
         coordinate_rows(model, work, p, factor * lam, c_k)
         x, _ = coordinate_motion(model, work, p)
         total += factor * x
-    work.connections.g[k] = model.rows.x[k, 0] * total
+    work.connections.g[k] = c_k * lam if model.rows.kind[k] == RELEASED else model.rows.x[k, 0] * total
 
 
 @inner
@@ -50,7 +54,10 @@ def coupler_derivatives(model, work, c, c_k):
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
         factor = model.coordinates.factor[p]
         coordinate_derivatives(model, work, c, p, factor * work.state.w[k], k, factor, c_k)
-        coordinate_gradient(model, work, p, k - model.connections.w0[c], factor * model.rows.x[k, 0], 0.0)
+        if model.rows.kind[k] != RELEASED:
+            coordinate_gradient(model, work, p, k - model.connections.w0[c], factor * model.rows.x[k, 0], 0.0)
+    if model.rows.kind[k] == RELEASED:
+        V[k - model.connections.w0[c], k - model.connections.w0[c]] = 1.0
 
 
 @inner
@@ -58,6 +65,9 @@ def coupler_rates(model, work, c, rate, bias):
     """Write the rate of the held row of coupler c, and its second rate at zero u_dot."""
     i = model.connections.item[c]
     k = model.elements.core[i]
+    rate[k], bias[k] = 0.0, 0.0
+    if model.rows.kind[k] == RELEASED:
+        return
     _, first, second = prescribed(model, work, k)
     first, second = -first, -second
     for p in range(model.elements.coordinate0[i], model.elements.coordinate0[i + 1]):
@@ -73,5 +83,7 @@ def coupler_rates(model, work, c, rate, bias):
 def coupler_power(model, work, c):
     """Return the power that enters where the constant of the coupler changes with time: lam dc/dt."""
     k = model.elements.core[model.connections.item[c]]
+    if model.rows.kind[k] == RELEASED:
+        return 0.0
     _, first, _ = prescribed(model, work, k)
     return work.state.w[k] * first

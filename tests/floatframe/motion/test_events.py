@@ -160,7 +160,7 @@ def test_a_run_with_events_that_do_not_happen_is_the_one_without():
     ("event", "words"),
     [
         (lambda: Event("e", "guide.distanse", stop=True), "no sensor or joint coordinate 'guide.distanse'"),
-        (lambda: Event("e", "guide.distance", switch_off=("gravty",)), "no force 'gravty'"),
+        (lambda: Event("e", "guide.distance", switch_off=("gravty",)), "no force or coupler 'gravty'"),
         (lambda: Event("e", "guide.distance"), "an event without consequence"),
         (lambda: Event("e", "guide.distance", direction="up", stop=True), "expected one of rising, falling, both"),
         (lambda: Event("e", "place", column="w", stop=True), "column: expected one of x, y, z"),
