@@ -13,7 +13,8 @@ from cms.families.families import Families
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.families.sharing import body_of
 from cms.mode_set import ModeSet
-from cms.recovery.matrices import recovery_of_model
+from cms.recovery.load_columns import nodes_of_loads
+from cms.recovery.matrices import recovery_of_model, unique
 from cms.recovery.request import RecoveryRequest
 from cms.reduced_basis.damping import Damping, modal_damping
 from cms.reduced_basis.finishing import FinishedBasis, finish
@@ -108,7 +109,10 @@ def reduce(
     elif geometric or quadratic:
         states = states_of(source, condition)
     finished = finish(body, modes, condition)
-    kept = kept_nodes(keeping := keep_nodes(body, keep))
+    keeping = keep_nodes(body, keep)
+    if len(loaded := nodes_of_loads(body, unique(recovery))):
+        keeping = replace(keeping, kept=np.concatenate([keeping.kept, loaded]))
+    kept = kept_nodes(keeping)
     axes, origin = condition.frame.axes, condition.frame.origin
     moments = reduced_moments(body, finished.Phi, condition.frame)
     reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)

@@ -15,7 +15,7 @@ import numpy as np
 from cms.errors import ExportError, RecoveryError
 from cms.exporters.interface_model import InterfaceModel, interface_model
 from cms.recovery.interface_rows import node_words
-from cms.recovery.load_columns import WRENCH, loads_of_body
+from cms.recovery.load_columns import WRENCH, forces_of_loads
 from cms.reduced_body.recovery_table import N_RIGID, RecoveryTable
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.body.rigid_motion import rigid_motion_of_points
@@ -85,7 +85,8 @@ class CraigBampton:
         Raises
         ------
         RecoveryError
-            If the table is of another body, or an interface takes no wrench of one node (kind "nodes" of several).
+            If the table is of another body, a load acts at a node that is not kept, or an interface takes no
+            wrench of one node (kind "nodes" of several).
         """
         if isinstance(table, str):
             if table not in self.body.recovery:
@@ -111,18 +112,12 @@ class CraigBampton:
 
         A wrench at an interface is that of its one node, in axes of B.
         """
-        known, forces = loads_of_body(self.body)
         A = self.body.frame.axes
         turn = np.kron(np.eye(2), A.T)
         L = np.zeros((table.n_rows, self.n_b))
         names = [f"{interface.name} {word}" for interface in self.body.interfaces for word in WRENCH]
         other = [k for k, name in enumerate(table.loads) if name not in names]
-        unknown = [table.loads[k] for k in other if table.loads[k] not in known.names]
-        if unknown:
-            raise RecoveryError(
-                f"recovery {table.name!r}: load {unknown[0]!r} acts at a node whose work on the modes is not on "
-                "record; make the table without loads_at"
-            )
+        forces = forces_of_loads(self.body, [table.loads[k] for k in other])
         for interface in self.body.interfaces:
             if f"{interface.name} fx" not in table.loads:
                 continue
@@ -136,7 +131,7 @@ class CraigBampton:
                     f"recovery {table.name!r}: interface {interface.name!r} has {len(rows)} dofs of several nodes, and "
                     "the static part knows the wrench of all together"
                 )
-        return L, other, T.T @ forces[:, [known.column(table.loads[k]) for k in other]]
+        return L, other, T.T @ forces
 
 
 def craig_bampton_matrices(body: ReducedBody, *, about: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> CraigBampton:

@@ -4,11 +4,13 @@ In axes of B, wrenches at the reference points of the interfaces. What they do t
 Gᵀ F over the rigid motions and modes; of a reduced body it follows from the moments.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
+from cms.errors import RecoveryError
 from cms.exporters.interface_model import free_matrices
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.frame_conversion import rigid_mass, six_motions
@@ -23,9 +25,11 @@ from cms.second_order.unit_loads import unit_mass_loads
 from cms.second_order.unit_states import has_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 from fe_models.body.mass_loads import MassLoads
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["LoadColumns", "loads_of_body", "loads_of_model", "on_coordinates"]
+__all__ = [
+    "LoadColumns", "forces_of_loads", "loads_of_body", "loads_of_model", "nodes_of_loads", "on_coordinates",
+]  # fmt: skip
 
 GRAVITY = ("gravity x", "gravity y", "gravity z")
 SPIN = tuple(f"spin {'xyz'[a]}{'xyz'[b]}" for a, b in SPIN_PAIRS)
@@ -90,6 +94,47 @@ def loads_of_body(body: ReducedBody) -> tuple[LoadColumns, Array]:
     return columns.done(), np.hstack([np.zeros((N_RIGID + n_q, 0)), *forces])
 
 
+def forces_of_loads(body: ReducedBody, names: Sequence[str]) -> Array:
+    """Return the forces of loads on z by their names, (6 + n_q, n): those the body knows, and at nodes it keeps.
+
+    Raises
+    ------
+    RecoveryError
+        If a load acts at a node that the body does not keep, or a moment where its rotation is not known.
+    """
+    known, forces = loads_of_body(body)
+    columns = [np.zeros((len(forces), 0))]
+    for name in names:
+        if name in known.names:
+            columns.append(forces[:, [known.column(name)]])
+        else:
+            columns.append(on_q_alone(node_force(body, name)[:, None], held=body.is_held))
+    return np.hstack(columns)
+
+
+def node_force(body: ReducedBody, name: str) -> Array:
+    """Return the force on z of a load "node 17 fx" at a kept node, in axes of B, (6 + n_q,)."""
+    place, _, word = name.rpartition(" ")
+    node = place.removeprefix("node ")
+    flags = body.numbering.on_skin
+    rows = [row for row in range(len(body.nodes)) if not (flags.size and flags[row]) and body.node_name(row) == node]
+    turning = [] if body.kept is None else [row for row in rows if body.kept.of_node(row) is not None]
+    if not rows or word not in WRENCH or not place.startswith("node "):
+        raise RecoveryError(
+            f"body {body.name!r}: load {name!r}: its work on the modes is not known, since the body does not keep that "
+            "node; reduce it again with the table (nodes of loads_at are kept), or make the table without loads_at"
+        )
+    row = (turning or rows)[0]
+    motion = np.hstack([six_motions(body.nodes[row]), np.zeros((6, body.n_q))])
+    motion[:3, N_RIGID:] = body.Phi[row]
+    if word in WRENCH[3:]:
+        rotation = None if body.kept is None else body.kept.of_node(row)
+        if rotation is None:
+            raise RecoveryError(f"body {body.name!r}: load {name!r}: the rotation of that node is not known")
+        motion[3:, N_RIGID:] = rotation
+    return np.asarray(motion[WRENCH.index(word)])
+
+
 def spin_forces(body: ReducedBody) -> Array:
     """Return the forces of the loads A c of `unit_mass_loads` on z, of amplitude one, (6 + n_q, 6)."""
     moments = body.moments
@@ -137,6 +182,13 @@ def loads_of_model(body: FEBody, frame: BodyFrame, request: RecoveryRequest) -> 
                     columns.add(tuple(f"node {places.word(node)} {word}" for word in words), (dimensions,) * 3)
                     forces.append(np.asarray(sp.csr_array(matrix[own]).T @ frame.axes))
     return columns.done(), np.hstack([np.zeros((body.n_dof, 0)), *forces])
+
+
+def nodes_of_loads(body: FEBody, requests: Iterable[RecoveryRequest]) -> IntArray:
+    """Return the nodes at which forces of `loads_at` act, which the reduced body keeps for their work, (n,)."""
+    places = Places(body)
+    found = [places.nodes(at) for request in requests for at in request.loads_at]
+    return np.concatenate([np.zeros(0, np.int64), *found])
 
 
 def on_coordinates(body: ReducedBody) -> tuple[Array, Array, Array]:

@@ -16,7 +16,7 @@ from fe_models.foundation.components import MOTION_COMPONENTS, STRESS_COMPONENTS
 from fe_models.foundation.units import Dimensions
 from fe_models.foundation.words import nearest, quoted
 from fe_models.recovery.element_forces import ElementGroup, element_groups
-from fe_models.recovery.strain import node_compliances
+from fe_models.recovery.strain import nodal_strain
 
 __all__ = ["chosen_components", "model_block", "node_rows"]
 
@@ -138,13 +138,26 @@ def stress_block(body: FEBody, rows: Rows) -> Block:
         word = places.point_names[point]
         names += [RowName(rows.quantity, "point", -1, word, c, dimensions) for c in STRESS_COMPONENTS]
     rows_of_nodes = np.array(nodes, dtype=np.int64)
-    compliance = node_compliances(body, rows_of_nodes) if is_strain else None
-    return Block(tuple(names), 0, stress_values(body, rows_of_nodes, points, compliance))
+    values = strain_values(body, rows_of_nodes) if is_strain else stress_values(body, rows_of_nodes, points)
+    if is_strain:
+        values(np.zeros((body.n_dof, 1)))  # whether it is known at all of them
+    return Block(tuple(names), 0, values)
 
 
-def stress_values(
-    body: FEBody, nodes: IntArray, points: list[int], compliance: Array | None
-) -> Callable[[Array], Array]:
+def strain_values(body: FEBody, nodes: IntArray) -> Callable[[Array], Array]:
+    """Return the function of displacement columns, (6 n_nodes, k)."""
+
+    def values(u: Array) -> Array:
+        parts = []
+        for begin in range(0, u.shape[1], COLUMNS_AT_ONCE):
+            mesh = body.mesh_displacement(u[:, begin : begin + COLUMNS_AT_ONCE])
+            parts.append(nodal_strain(body, mesh, nodes).reshape(-1, mesh.shape[1]))
+        return np.concatenate(parts, axis=1)
+
+    return values
+
+
+def stress_values(body: FEBody, nodes: IntArray, points: list[int]) -> Callable[[Array], Array]:
     """Return the function of displacement columns, (6 (n_nodes + n_points), k)."""
     wanted = np.unique(nodes)
 
@@ -156,8 +169,6 @@ def stress_values(
             if len(nodes):
                 assert body.element_model is not None
                 stress = body.element_model.nodal_stress(mesh, nodes=wanted)[nodes]
-            if compliance is not None:
-                stress = compliance @ stress
             if points:
                 assert body.stress_points is not None
                 stress = np.concatenate([stress, body.stress_points.stress(mesh)[points]])
@@ -193,13 +204,13 @@ def shown(body: FEBody, places: Places, at: str | int, nodes: IntArray) -> IntAr
 
 
 def element_block(body: FEBody, rows: Rows) -> Block:
-    """Return the forces in beams, shells or springs; a name among the places is that of a part or a kind of cells."""
+    """Return forces, strains or stress of elements; a name among the places is that of a part or a kind of cells."""
     groups = [group for group in element_groups(body) if group.quantity == rows.quantity]
     if not groups:
         known = tuple(dict.fromkeys(group.quantity for group in element_groups(body)))
         raise RecoveryError(
             f"body {body.name!r}: recovery of {rows.quantity}: it has no such elements"
-            + (f"; it has {', '.join(known)}" if known else ": solids and bare matrices have stress or nothing")
+            + (f"; it has {', '.join(known)}" if known else ": of bare matrices no elements are known")
         )
     chosen = [(group, elements) for group, elements in elements_of(body, rows, groups) if len(elements)]
     names = [

@@ -10,7 +10,9 @@ __all__ = ["OF_ELEMENTS", "OF_NODES", "QUANTITIES", "RecoveryRequest", "Rows", "
 
 OF_MOTION = ("displacement", "velocity", "acceleration")  #: in the order of the derivatives of z
 OF_NODES = (*OF_MOTION, "stress", "strain")
-OF_ELEMENTS = ("beam force", "shell resultant", "spring force")
+OF_ELEMENTS = (
+    "beam force", "shell resultant", "spring force", "beam strain", "shell strain", "element stress", "element strain",
+)  # fmt: skip
 OF_INTERFACES = ("interface force", "net force")
 QUANTITIES = (*OF_NODES, *OF_ELEMENTS, *OF_INTERFACES)
 

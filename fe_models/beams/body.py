@@ -103,7 +103,16 @@ def beam_body(
         units=units,
         surface=n_nodes + skin.triangles,
         element_model=BeamModel(
-            mesh.nodes, tuple(pieces), geometry, elements.K_local, dofs_of_line, of_line, sections, skin, springs
+            mesh.nodes,
+            tuple(pieces),
+            geometry,
+            elements.K_local,
+            dofs_of_line,
+            of_line,
+            sections,
+            skin,
+            springs,
+            tuple((item.material.E, item.material.mu) for item in used),
         ),
         recovery=Recovery(
             sp.vstack([sp.eye_array(6 * n_nodes), skin_rows(mesh.nodes, skin.points, skin.mover)], format="csr"),

@@ -39,6 +39,7 @@ class BeamModel:
     sections: tuple[SectionProperties, ...]
     skin: Skin
     springs: tuple[Spring, ...] = ()
+    moduli: tuple[tuple[float, float], ...] = ()  #: E and G of the material of each section [Pa]
 
     @property
     def n_nodes(self) -> int:

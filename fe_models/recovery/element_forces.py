@@ -1,4 +1,4 @@
-"""Forces in elements from a displacement field: sections of beams, resultants of shells, springs.
+"""Forces and strains in elements from a displacement field: sections of beams, shells, springs, centres of solids.
 
 Each group of elements of one kind says which numbers it has and how they are named; groups of a body of several parts
 stand side by side, in the order of the parts.
@@ -14,10 +14,13 @@ from fe_models.beams.model import BeamModel
 from fe_models.body.fe_body import FEBody
 from fe_models.body.numbering import NONE
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.units import Dimensions
+from fe_models.recovery.element_strains import beam_strains, centre_strains, centre_stress, shell_strains
 from fe_models.shells.elements import ShellCells
 from fe_models.shells.model import ShellModel
 from fe_models.shells.stiffeners import StiffenedModel
+from fe_models.solids.body import SolidModel
 from fe_models.weld import WeldedModel, mesh_rows
 
 __all__ = ["ElementGroup", "element_groups"]
@@ -27,6 +30,9 @@ PER_LENGTH, BENDING = Dimensions(1, 0, -2), Dimensions(1, 1, -2)
 SECTION = ("N", "Vy", "Vz", "Mx", "My", "Mz")
 BEAM = tuple(f"end {end} {name}" for end in "AB" for name in SECTION)
 SHELL = ("Nx", "Ny", "Nxy", "Mx", "My", "Mxy", "Qx", "Qy")
+BEAM_STRAIN = tuple(f"end {end} {name}" for end in "AB" for name in ("eps", "gy", "gz", "kx", "ky", "kz"))
+SHELL_STRAIN = ("ex", "ey", "gxy", "kx", "ky", "kxy", "gxz", "gyz")
+NUMBER, PER_METRE, STRESS = Dimensions(), Dimensions(0, -1, 0), Dimensions(1, -1, -2)
 SPRING = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
@@ -37,7 +43,8 @@ class ElementGroup:
     "beam force": on the face whose normal is the local +x, about the centroid, local axes, at both ends
     (`BeamModel.section_forces`). "shell resultant": in local axes, the mean of the points of its stiffness
     (`ShellCells.resultants`). "spring force": stiffness times the motion of the second side against the first, in the
-    axes of the spring: a tension is positive.
+    axes of the spring: a tension is positive. "beam strain", "shell strain": what these forces do in the material
+    (`element_strains`). "element stress", "element strain": of solids, at the centre, mesh axes.
     """
 
     quantity: str
@@ -48,7 +55,7 @@ class ElementGroup:
     components: tuple[str, ...]
     dimensions: tuple[Dimensions, ...]  #: of each component
     forces: Callable[[Array, IntArray], Array]  #: of columns over the mesh dofs and elements, (n, n_components, k)
-    source: "ShellCells | BeamModel"  #: whose elements they are
+    source: "ShellCells | BeamModel | SolidModel"  #: whose elements they are
     rows: slice  #: of the mesh dofs of the body: those of the model behind them
     first_node: int  #: of the body: where the nodes of that model begin
 
@@ -115,16 +122,49 @@ def _groups(body: FEBody, model: object, at: _Place) -> Iterator[ElementGroup]:
             yield ElementGroup(
                 "shell resultant", part, *named, SHELL, dimensions, forces, group, at.rows, at.first_node
             )
+            dimensions_of_strains = (NUMBER,) * 3 + (PER_METRE,) * 3 + (NUMBER,) * 2
+            strains = shell_strains(group, at.rows)
+            yield ElementGroup(
+                "shell strain", part, *named, SHELL_STRAIN, dimensions_of_strains, strains, group, at.rows,
+                at.first_node,
+            )  # fmt: skip
     elif isinstance(model, BeamModel):
         six = (FORCE,) * 3 + (MOMENT,) * 3
         if len(model.dofs):
             named = _named(body, at.part, _triangles(body, at, model.skin.line_of, len(model.dofs)))
             forces = _section_forces(model, at.rows)
             yield ElementGroup("beam force", at.part, *named, BEAM, six * 2, forces, model, at.rows, at.first_node)
+            of_strains = ((NUMBER,) * 3 + (PER_METRE,) * 3) * 2
+            strains = beam_strains(model, at.rows)
+            yield ElementGroup(
+                "beam strain", at.part, *named, BEAM_STRAIN, of_strains, strains, model, at.rows, at.first_node
+            )
         if model.springs:
             named = _named(body, at.part, np.full(len(model.springs), NONE))
             forces = _spring_forces(model, at.rows)
             yield ElementGroup("spring force", at.part, *named, SPRING, six, forces, model, at.rows, at.first_node)
+
+
+    elif isinstance(model, SolidModel):
+        for kind in model.mesh.cells:
+            part = " ".join(word for word in (at.part, kind) if word)
+            named = _named_cells(part, model, kind)
+            for quantity, dimension, values in (
+                ("element stress", STRESS, centre_stress(model, kind, at.rows)),
+                ("element strain", NUMBER, centre_strains(model, kind, at.rows)),
+            ):
+                yield ElementGroup(
+                    quantity, part, *named, STRESS_COMPONENTS, (dimension,) * 6, values, model, at.rows, at.first_node
+                )
+
+
+def _named_cells(part: str, model: SolidModel, kind: str) -> tuple[tuple[str, ...], IntArray, Mapping[str, IntArray]]:
+    """Return names, numbers and sets of the solid cells of a type, inside the body too."""
+    n = len(model.mesh.cells[kind])
+    numbers = np.asarray(model.mesh.cell_numbers.get(kind, np.full(n, NONE)))
+    names = tuple(f"{part} {k}" if number == NONE else str(number) for k, number in enumerate(numbers.tolist()))
+    sets = {name: rows[kind] for name, rows in model.mesh.cell_sets.items() if len(rows.get(kind, ()))}
+    return names, numbers, sets
 
 
 def _triangles(body: FEBody, at: _Place, element_of: IntArray, count: int) -> IntArray:

@@ -115,7 +115,7 @@ def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
         If the body has no such elements, a name or number is unknown, or the section of a beam is given by its numbers
         without an outline: its outer fibres are not known.
     """
-    groups = [group for group in element_groups(body) if group.quantity != "spring force"]
+    groups = [group for group in element_groups(body) if group.quantity in ("beam force", "shell resultant")]
     where = f"body {body.name!r}: stress points"
     if not groups:
         raise BodyError(f"{where}: it has no beams and no shells; the stress of solids is that of their nodes")
@@ -142,6 +142,7 @@ def element_points(body: FEBody, at: Iterable[int | str] = (ALL,)) -> FEBody:
         if isinstance(group.source, ShellCells):
             parts.append(shell_corners(body, group, group.source, rows))
             continue
+        assert isinstance(group.source, BeamModel)
         parts.append(beam_ends(where, group, group.source, rows))
         words = "at beams warping stresses are left out"
         if not all(group.source.sections[k].shows_shear for k in set(group.source.of_line[rows].tolist())):

@@ -1,38 +1,113 @@
-"""Strain at the nodes of solids, from their stress."""
+"""Strain at nodes: of solids, and at the outer faces of shells and the outer fibres of beams.
+
+Each element's own strain is S sigma with the compliance S of its material, so that what a mean over elements shows is
+the mean of their strains: of stress in the plane of a shell, and of one fibre of a beam, lateral contraction included.
+"""
 
 import numpy as np
 
+from fe_models.beams.model import BeamModel
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
+from fe_models.material import Material
+from fe_models.shells.elements import ShellCells
+from fe_models.shells.model import ShellModel
+from fe_models.shells.stiffeners import StiffenedModel
 from fe_models.solids.body import SolidModel
-from fe_models.weld import WeldedModel
+from fe_models.weld import WeldedModel, mesh_rows
 
-__all__ = ["node_compliances"]
+__all__ = ["isotropic_compliance", "nodal_strain"]
 
 
-def node_compliances(body: FEBody, nodes: IntArray) -> Array:
-    """Return strain by stress at nodes, (n, 6, 6) [1/Pa], xx yy zz yz xz xy, shear strains doubled.
+def nodal_strain(body: FEBody, u: Array, nodes: IntArray) -> Array:
+    """Return the strain at nodes, (n, 6, k), xx yy zz yz xz xy in mesh axes, shear strains doubled.
 
-    The stress of a node is the mean over elements of one material, so that its strain is the mean of their strains.
+    Parameters
+    ----------
+    u
+        Displacement columns over the dofs of the mesh, (n_mesh_dof, k).
+    nodes
+        Of the solids, of the skins of beams and shells, of the middle surface of shells.
 
     Raises
     ------
     BodyError
-        If a node is of no solid: the strain of beams and shells is not known at nodes.
+        If a node is of none of them, or of a layup whose faces are not isotropic.
     """
-    return np.array([_compliance(body, int(node)) for node in nodes]).reshape(-1, 6, 6)
+    found = np.zeros((len(nodes), 6, np.shape(u)[1]))
+    put(found, np.arange(len(nodes)), body.element_model, np.asarray(u), np.asarray(nodes), f"body {body.name!r}")
+    return found
 
 
-def _compliance(body: FEBody, node: int) -> Array:
-    model, row = body.element_model, node
+def put(found: Array, rows: IntArray, model: object, u: Array, nodes: IntArray, where: str) -> None:
+    """Write the strain of nodes of a model into some rows."""
+    if not len(nodes):
+        return
     if isinstance(model, WeldedModel):
         first = np.cumsum([0, *model.n_nodes])
-        part = int(np.searchsorted(first, node, side="right")) - 1
-        model, row = (model.parts[part], node - int(first[part])) if part < len(model.parts) else (None, 0)
-    if not isinstance(model, SolidModel) or row >= len(model.mesh.nodes):
+        part_of = np.searchsorted(first, nodes, side="right") - 1
+        require(bool((part_of < len(model.parts)).all()), where, nodes)
+        for k, (part, own_u) in enumerate(zip(model.parts, mesh_rows(model.n_mesh_dof), strict=True)):
+            own = part_of == k
+            put(found, rows[own], part, u[own_u], nodes[own] - int(first[k]), where)
+    elif isinstance(model, StiffenedModel):
+        n, dofs = model.shell.n_nodes + len(model.shell.skin.points), model.shell.n_mesh_dof
+        on_shell = nodes < n
+        put(found, rows[on_shell], model.shell, u[:dofs], nodes[on_shell], where)
+        put(found, rows[~on_shell], model.frame, u[dofs:], nodes[~on_shell] - n, where)
+    elif isinstance(model, SolidModel):
+        require(bool((nodes < len(model.mesh.nodes)).all()), where, nodes)
+        compliances = np.array([np.linalg.inv(material.stiffness) for material in model.materials])
+        found[rows] = compliances[model.of_node[nodes]] @ model.nodal_stress(u, nodes=np.unique(nodes))[nodes]
+    elif isinstance(model, BeamModel):
+        on_skin = nodes - model.n_nodes
+        require(bool((on_skin >= 0).all()), where, nodes)
+        compliances = np.array([isotropic_compliance(E, G) for E, G in model.moduli])
+        found[rows] = compliances[section_of_skin(model)[on_skin]] @ model.nodal_stress(u)[nodes]
+    elif isinstance(model, ShellModel):
+        require(bool((nodes < model.n_nodes + len(model.skin.points)).all()), where, nodes)
+        found[rows] = model.means_of_corners(u, lambda *at: shell_strain(where, *at))[nodes]
+    else:
+        require(ok=False, where=where, nodes=nodes)
+
+
+def require(ok: bool, where: str, nodes: IntArray) -> None:
+    """Raise `BodyError` unless the nodes are of elements whose strain is known."""
+    if not ok:
         raise BodyError(
-            f"body {body.name!r}: strain: node {node} is of no solid elements; ask for its stress, or for the forces "
-            "in beams and shells"
+            f"{where}: strain: node {int(nodes[0])} is of no solid, shell or skin of a beam; ask for its stress, or "
+            'for "beam strain" and "shell strain" of elements'
         )
-    return np.asarray(np.linalg.inv(model.materials[model.of_node[row]].stiffness), np.float64)
+
+
+def section_of_skin(model: BeamModel) -> IntArray:
+    """Return the section of each point of the skin, (n_skin,): a ring joins lines of one section only."""
+    found = np.zeros(len(model.skin.points), np.int64)
+    for line, number in enumerate(np.asarray(model.of_line).tolist()):
+        for start in model.skin.ring_start[line].tolist():
+            found[start : start + len(model.sections[number].points)] = number
+    return found
+
+
+def shell_strain(where: str, group: ShellCells, resultants: Array, rows: slice, height: float) -> Array:
+    """Return the strain of cells at a height, as `ShellCells.stress` does, (n, p, 6, k)."""
+    stress = group.stress(resultants, rows, height)
+    of_law = np.zeros((len(group.laws), 6, 6))
+    for number in np.unique(group.law[rows]):
+        law = group.laws[number]
+        material = law.layers[law.layer_at(height * law.thickness)].material
+        if not isinstance(material, Material):
+            raise BodyError(
+                f"{where}: strain at nodes of a layup of {type(material).__name__} is not known; ask for "
+                '"shell strain" of its elements: strains of the middle surface and curvatures'
+            )
+        of_law[number] = isotropic_compliance(material.E, material.mu)
+    return np.asarray(of_law[group.law[rows]][:, None] @ stress)
+
+
+def isotropic_compliance(E: float, G: float) -> Array:
+    """Return strain by stress, (6, 6) [1/Pa]; nu = E/(2 G) - 1."""
+    S = np.diag([1 / E] * 3 + [1 / G] * 3)
+    S[:3, :3] -= (E / (2 * G) - 1) / E * (1 - np.eye(3))
+    return S

@@ -1,5 +1,6 @@
 """The elements behind a shell body: integrals over mass, stress at the faces, geometric stiffness."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -64,18 +65,28 @@ class ShellModel:
         Array
             (n_nodes + n_skin, 6, k) [Pa], components xx, yy, zz, yz, xz, xy.
         """
+        return self.means_of_corners(u, ShellCells.stress)
+
+    def means_of_corners(self, u: Array, values: Callable[[ShellCells, Array, slice, float], Array]) -> Array:
+        """Return the means of six values of the cells at the nodes, as `nodal_stress` has them, (n, 6, k).
+
+        Parameters
+        ----------
+        values
+            Of cells, resultants at their corners, rows and a height in the thickness, as `ShellCells.stress`.
+        """
         self._require_rows("nodal_stress", u)
         u = np.asarray(u)
         n_skin, k = len(self.skin.points), u.shape[1]
-        stress = np.zeros((self.n_nodes + n_skin, 6 * k))
+        total = np.zeros((self.n_nodes + n_skin, 6 * k))
         for group, patch, means in zip(self.groups, self.skin.patch, self._means, strict=True):
             for rows in group.chunks():
                 resultants = group.corner_resultants(u, rows)
                 of_chunk = slice(rows.start * patch.shape[1], rows.stop * patch.shape[1])
                 for height, mean in zip((MIDDLE, TOP, BOTTOM), means, strict=True):
-                    corners = group.stress(resultants, rows, height).reshape(-1, 6 * k)
-                    stress += mean[:, of_chunk] @ corners
-        return stress.reshape(-1, 6, k)
+                    corners = values(group, resultants, rows, height).reshape(-1, 6 * k)
+                    total += mean[:, of_chunk] @ corners
+        return total.reshape(-1, 6, k)
 
     def nodal_rotation(self, u: Array, nodes: IntArray) -> Array:
         """Return NaN, (n, 3, k): rotations of shells are dofs."""

@@ -19,7 +19,9 @@ from fe_models.meshes.cell_shapes import CELL_SHAPES, collapsed_cube, shape_valu
 from fe_models.meshes.mesh import SOLID_TYPES
 from fe_models.meshes.skfem_cells import SKFEM_ELEMENTS, skfem_node_order
 
-__all__ = ["INTEGRATIONS", "MASSES", "ReferenceElement", "ShapeTable", "reference_element", "shape_table"]
+__all__ = [
+    "INTEGRATIONS", "MASSES", "ReferenceElement", "ShapeTable", "reference_centre", "reference_element", "shape_table",
+]  # fmt: skip
 
 Degree = int | tuple[int, int]  #: wedges: of triangle and line; pyramids: numbers of points across and up
 
@@ -168,6 +170,14 @@ def shape_table(kind: str, points: Array, weights: Array) -> ShapeTable:
     N = np.stack([np.broadcast_to(value, len(points)) for value, _ in values], axis=1)
     dN = np.stack([np.broadcast_to(gradient, (3, len(points))).T for _, gradient in values], axis=1)
     return ShapeTable(frozen(points), frozen(weights), frozen(N), frozen(dN))
+
+
+@cache
+def reference_centre(kind: str) -> Array:
+    """Return the gradients of the shape functions at the centroid of a reference cell, (n_corners, 3)."""
+    points, weights = quadrature(*RULES[kind][:2])
+    centroid = weights @ points / weights.sum()
+    return frozen(shape_table(kind, centroid[None], np.ones(1)).gradients[0])
 
 
 @cache

@@ -1,5 +1,6 @@
 """OP4 files beside pyNastran, which wants an older numpy: FLOATFRAME_PYNASTRAN names the Python that has it."""
 
+import json
 import os
 import subprocess
 
@@ -8,6 +9,7 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
+from cms.importers.element_rows import FORCE_ITEMS
 from fe_models.importers.nastran_matrices.op4 import read_op4
 from fe_models.importers.nastran_matrices.write_op4 import write_op4
 
@@ -78,3 +80,41 @@ def test_pynastran_reads_exported_superelements(tmp_path):
         for name, matrix in {"KAAX": model.K, "MAAX": model.M, "BAAX": model.D}.items():
             at = [rows.index(tuple(row)) for row in theirs[f"{name}_rows"].tolist()]
             assert_allclose(theirs[name], matrix[np.ix_(at, at)], rtol=1e-9, atol=1e-30)
+
+
+READ_HEADERS = """
+import json
+from pyNastran.op2.tables.oef_forces import oef_force_objects as objects
+names = {1: "Rod", 3: "Rod", 4: "CShear", 10: "Rod", 24: "Visc", 33: "Plate", 34: "CBar", 38: "CGap", 69: "Bend",
+         74: "Plate", 102: "CBush"}
+found = {}
+for code, name in names.items():
+    kind = getattr(objects, f"Real{name}ForceArray")
+    found[code] = kind.get_headers(kind.__new__(kind))
+print(json.dumps(found))
+"""
+#: pyNastran's word for an item -> ours
+WORDS = {
+    "axial": "N", "torsion": "T", "torque": "T", "shear1": "V1", "shear2": "V2",
+    **{f"bending_moment_{end}{plane}": f"end {end.upper()} M{plane}" for end in "ab" for plane in (1, 2)},
+    "mx": "Nx", "my": "Ny", "mxy": "Nxy", "bmx": "Mx", "bmy": "My", "bmxy": "Mxy", "tx": "Qx", "ty": "Qy",
+    **{f"force{a}{b}": f"F{a}{b}" for a in range(1, 5) for b in range(1, 5)},
+    **{f"kick_force{k}": f"kick {k}" for k in range(1, 5)},
+    **{f"shear{a}{b}": f"q{a}{b}" for a, b in ((1, 2), (2, 3), (3, 4), (4, 1))},
+    "sfy": "fy", "sfz": "fz",
+    **{f"{theirs}_{plane}{end}": f"end {end.upper()} {ours}{plane}"
+       for end in "ab" for theirs, ours in (("bending_moment", "M"), ("shear", "V")) for plane in (1, 2)},
+    **{f"{theirs}_{end}": f"end {end.upper()} {ours}"
+       for end in "ab" for theirs, ours in (("axial", "N"), ("torque", "T"))},
+}  # fmt: skip
+
+
+@pytest.mark.skipif(not PYTHON, reason="FLOATFRAME_PYNASTRAN is not set")
+def test_items_of_element_forces_stand_in_the_order_of_pynastran():
+    """Every type whose MEF1 rows come in; words that both have (fx, mx of a bushing) mean the same there."""
+    said = subprocess.run([PYTHON, "-c", READ_HEADERS], check=True, timeout=100, capture_output=True, text=True).stdout
+    theirs = {int(code): words for code, words in json.loads(said.splitlines()[-1]).items()}
+    assert set(theirs) == set(FORCE_ITEMS)
+    for code, items in FORCE_ITEMS.items():
+        same = code == 102  # a bushing: mx is a moment, of a plate it is a membrane force
+        assert [name for name, _ in items] == [w if same else WORDS.get(w, w) for w in theirs[code]], code

@@ -13,6 +13,7 @@ import cms
 from cms.cli.app import app
 from cms.errors import RecoveryError
 from cms.recovery.files import write_recovery
+from cms.recovery.load_columns import forces_of_loads
 from tests.cms.recovery.test_matrices import reduced
 
 JOB = """
@@ -64,13 +65,6 @@ def folder(tmp_path_factory):
     return folder
 
 
-def without_points(body):
-    """Return the body without the loads at a node, which it cannot carry to its interfaces."""
-    table = body.recovery["all"]
-    kept = {"loads": table.loads[:-3], "static": table.static[:, :-3], "load_dimensions": table.load_dimensions[:-3]}
-    return cms.ReducedBody(**{**body.__dict__, "recovery": {"all": cms.RecoveryTable(**{**table.__dict__, **kept})}})
-
-
 def run(*words, code=0):
     result = CliRunner().invoke(app, [str(word) for word in words])
     assert result.exit_code == code, result.output
@@ -119,7 +113,7 @@ def test_section_forces_of_a_beam_are_those_of_statics(file):
 
 @pytest.mark.parametrize("over", ["modes", "interfaces"])
 def test_all_formats_hold_the_same_matrices(tmp_path, over):
-    body = without_points(reduced("craig-bampton", "turned"))
+    body = reduced("craig-bampton", "turned")
     for suffix in ("npz", "mat", "op4", "csv"):
         write_recovery(body, tmp_path / f"all.{suffix}", over=over)
     npz = np.load(tmp_path / "all.npz")
@@ -150,14 +144,23 @@ def test_rows_over_interfaces_say_the_same_of_a_free_motion():
     """(u_b, eta) and the loads, against z and the loads with the forces at the interfaces that the motion needs."""
     body = reduced("craig-bampton", "turned")
     table = body.recovery["all"]
-    with pytest.raises(RecoveryError, match="make the table without loads_at"):
-        cms.craig_bampton_matrices(body).recover("all")
-    table = without_points(body).recovery["all"]
+    assert table.loads[-3:] == ("node index 20 fx", "node index 20 fy", "node index 20 fz")
     matrices = cms.craig_bampton_matrices(body)
     rows = matrices.recover(table)
     rng = np.random.default_rng(8)
-    y, y_dot, y_ddot = (rng.standard_normal(len(matrices.M)) * 1e-3 for _ in range(3))
+    motion = [rng.standard_normal(len(matrices.M)) * 1e-3 for _ in range(3)]
     p = rng.standard_normal(len(rows.loads))
+    check_rows(body, matrices, rows, motion, p)
+    at_node = np.array([name.startswith("node index 20 ") for name in rows.loads])
+    assert at_node.sum() == 3
+    still = [np.zeros(len(matrices.M))] * 3
+    check_rows(body, matrices, rows, still, np.where(at_node, p, 0.0))  # the loads at a node alone
+
+
+def check_rows(body, matrices, rows, motion, p):
+    """Rows over (u_b, eta) and loads against rows over z, the loads and the interface forces of that motion."""
+    table = rows.table
+    y, y_dot, y_ddot = motion
     z, z_dot, z_ddot = (matrices.T @ each for each in (y, y_dot, y_ddot))
     at = {name: value for name, value in zip(rows.loads, p, strict=True)}
     whole = np.array([at.get(name, 0.0) for name in table.loads])
@@ -168,8 +171,27 @@ def test_rows_over_interfaces_say_the_same_of_a_free_motion():
         own = force[6 * k : 6 * k + 6]
         whole[first : first + 6] = np.concatenate([A.T @ own[:3], A.T @ own[3:]])
     expected = table.values(z, z_dot, z_ddot, whole)
-    scale = np.array([np.abs(rows.values(y, y_dot, y_ddot)[table.rows(q)]).max() for q in table.quantities])
-    assert_allclose(rows.values(y, y_dot, y_ddot, p) / scale, expected / scale, rtol=0, atol=1e-8)
+    found = rows.values(y, y_dot, y_ddot, p)
+    scale = np.array([np.abs(found[table.rows(q)]).max() or 1.0 for q in table.quantities])
+    assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-8)
+
+
+def test_the_work_of_a_load_at_a_node_is_that_of_the_full_model():
+    """Interface forces at rest, -Zᵀ G: their static rows are of the full model, G here of the nodes that are kept."""
+    body = reduced("craig-bampton", "turned")
+    table, matrices = body.recovery["all"], cms.craig_bampton_matrices(body)
+    names = table.loads[-3:]
+    G = forces_of_loads(body, names)
+    held = table.static[table.rows("interface force")][:, [table.loads.index(name) for name in names]]
+    assert_allclose(-(matrices.T.T @ G)[: matrices.n_b], held, rtol=0, atol=1e-10)
+
+
+def test_loads_at_nodes_that_are_not_kept_are_refused():
+    body = reduced("craig-bampton", "turned")
+    table = body.recovery["all"]
+    lost = cms.RecoveryTable(**{**table.__dict__, "loads": (*table.loads[:-1], "node index 9999 fz")})
+    with pytest.raises(RecoveryError, match="load 'node index 9999 fz': its work on the modes is not known"):
+        cms.craig_bampton_matrices(body).recover(lost)
 
 
 def test_the_rigid_part_is_what_pyyeti_finds():
@@ -231,8 +253,7 @@ def test_the_check_sees_rows_of_another_place_and_of_another_body(file, tmp_path
 BAD = {
     '"beem force", at = [1]': ('"beam force", at = [12]', "beam force"),
     '"beam force", at = [77]': ('"beam force", at = [12]', "no element, set or part '77'"),
-    '"shell resultant"': ('"beam force", at = [12]', "it has no such elements; it has beam force"),
-    '"strain", at = [3]': ('"beam force", at = [12]', "of no solid elements|shows no stress"),
+    '"shell resultant"': ('"beam force", at = [12]', "it has no such elements; it has beam force, beam strain"),
     'at = [33, "tip"]': ('at = [3, "tip"]', "no node 33"),
     'at = ["tipp"]': ('at = [3, "tip"]', "did you mean 'tip'"),
     'components = "xz "': ('components = "xx"', "no component"),
@@ -275,7 +296,7 @@ def test_bad_tables_and_files_are_refused(tmp_path):
 def test_forces_of_a_driven_base_are_those_of_pyyeti():
     """Its frequency response of Craig-Bampton matrices on a moving boundary, beside our rows of the same motion."""
     cb = pytest.importorskip("pyyeti.cb")
-    body = without_points(reduced("craig-bampton", "turned"))
+    body = reduced("craig-bampton", "turned")
     matrices = cms.craig_bampton_matrices(body)
     rows = matrices.recover("all")
     n_b, frequencies = matrices.n_b, np.array([5.0, 60.0, 190.0, 400.0, 1500.0])

@@ -138,6 +138,24 @@ def test_forces_of_unknown_elements_are_left_out_and_told():
     assert "1 rows of CBAR" in notes[1]
 
 
+def test_rods_shear_panels_and_shells_have_their_items_and_scalar_springs_say_why_not():
+    """The order is that of pyNastran (tests/external/test_pynastran.py); units are those of the words."""
+    sizes = {10: 2, 3: 2, 24: 2, 4: 16, 33: 8, 74: 8, 38: 8, 69: 12, 102: 6, 11: 1, 21: 1}
+    elements = np.array([[kind, kind, k + 1] for kind, n in sizes.items() for k in range(n)])
+    rows, notes = force_rows(elements, np.ones((len(elements), 3)))
+    names = {}
+    for name in rows.names:
+        names.setdefault(name.number, []).append((name.component, name.dimensions.length))
+    assert names[10] == names[3] == names[24] == [("N", 1), ("T", 2)]
+    assert names[33] == names[74]
+    assert names[33][:4] == [("Nx", 0), ("Ny", 0), ("Nxy", 0), ("Mx", 1)]
+    assert [length for _, length in names[4]] == [1] * 8 + [1, 0] * 4
+    assert [length for _, length in names[69]] == [2, 2, 1, 1, 1, 2] * 2
+    assert [length for _, length in names[38]] == [1] * 8
+    assert [(11 in names, 21 in names), len(notes)] == [(False, False), 2]
+    assert all("each is a force or a moment, and the file does not say which" in note for note in notes)
+
+
 def test_rows_of_a_body_that_was_imported_go_through_its_file(tmp_path):
     cms.write(imported(), tmp_path / "outboard.h5")
     back = cms.read(tmp_path / "outboard.h5")

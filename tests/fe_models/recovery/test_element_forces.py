@@ -34,7 +34,7 @@ def test_resultants_of_a_stretched_and_bent_plate():
     mesh[:, 0, 0] = eps * x[:9]
     mesh[:, 2, 1], mesh[:, 4, 1] = -kappa * x[:9] ** 2 / 2, kappa * x[:9]
     u[:54] = mesh.reshape(54, 2)
-    (group,) = element_groups(body)
+    group, _ = element_groups(body)
     assert (group.quantity, group.count, group.part) == ("shell resultant", 4, "quad")
     mesh_u = np.zeros((body.element_model.n_mesh_dof, 2))
     mesh_u[:54] = u[:54]
@@ -55,7 +55,7 @@ def test_a_spring_shows_its_stiffness_times_its_elongation():
     body = fm.beam_body(
         mesh, fm.BeamProperty(fm.Circle(0.01), STEEL), name="two", units=unit_system("m-kg-s"), springs=[spring]
     )
-    beams, springs = element_groups(body)
+    beams, _, springs = element_groups(body)
     assert (beams.quantity, springs.quantity, springs.names) == ("beam force", "spring force", ("0",))
     u = np.zeros((body.element_model.n_mesh_dof, 1))
     u[6 * 2 + 1], u[6 * 2] = 1e-3, 4e-3  # node 2 away along y, and along x
@@ -74,7 +74,7 @@ def test_elements_are_called_as_the_user_does():
         line_sets={"braces": np.array([2, 0])},
     )  # fmt: skip
     body = fm.beam_body(mesh, fm.BeamProperty(fm.Circle(0.01), STEEL), name="frame", units=unit_system("m-kg-s"))
-    (group,) = element_groups(body)
+    group, _ = element_groups(body)
     assert group.names == ("40", "20", "30")
     assert group.numbers.tolist() == [40, 20, 30]
     assert group.groups["braces"].tolist() == [0, 2]
