@@ -3,6 +3,7 @@ from .analyses import BaseMotion as BaseMotion
 from .analyses import Column as Column
 from .analyses import DriveMotion as DriveMotion
 from .analyses import Equilibrium as Equilibrium
+from .analyses import ForceInput as ForceInput
 from .analyses import FrequencyResponse as FrequencyResponse
 from .analyses import InverseDynamics as InverseDynamics
 from .analyses import LinearSystem as LinearSystem

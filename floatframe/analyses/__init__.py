@@ -5,6 +5,7 @@ from floatframe.analyses.driven.inverse_dynamics import InverseDynamics, drive_f
 from floatframe.analyses.driven.kinematics import kinematics
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium, steady_rotation
 from floatframe.analyses.linear.channels import Column
+from floatframe.analyses.linear.force_inputs import ForceInput
 from floatframe.analyses.linear.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
@@ -19,6 +20,7 @@ __all__ = [
     "Column",
     "DriveMotion",
     "Equilibrium",
+    "ForceInput",
     "FrequencyResponse",
     "InverseDynamics",
     "LinearSystem",

@@ -9,7 +9,7 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages, vector_words
 
 if TYPE_CHECKING:
-    from floatframe.analyses import Equilibrium, LinearSystem, SystemModes
+    from floatframe.analyses import Equilibrium, LinearSystem, Locus, SystemModes
     from floatframe.analyses.linear.channels import AnyInput, AnyOutput
     from floatframe.pictures.body_colors import BodyColor
     from floatframe.system import System
@@ -174,18 +174,28 @@ def campbell_command(
     axis: Axis = "z",
     center: Center = "0,0,0",
     n_modes: Modes = 12,
+    outputs: Annotated[
+        list[str], typer.Option("--out", "-m", help="A name of [outputs] or [sensors], sensor.column; repeatable.")
+    ] = [],  # noqa: B006
 ) -> None:
-    """Campbell diagram: frequencies of a steadily turning system over its speed.
+    """Campbell diagram: frequencies of a steadily turning system over its speed, and what its outputs show there.
+
+    Outputs are those of the table [outputs] of the system, unless named: their steady values at the speeds, such as
+    bearing forces, are printed, are columns of a .csv and panels below the diagram.
 
     Example: floatframe campbell rotor.toml --speeds 0:200:21 --axis z -o rotor.png
+
+    Example: floatframe campbell rotor.toml --speeds 0:200:21 --out bearing --out "tip.x" -o rotor.csv
     """
+    import csv
     import io
 
     import numpy as np
 
     from fe_models.foundation.paths import replace_file
     from floatframe.analyses import campbell
-    from floatframe.analyses.linear.plots import plot_campbell
+    from floatframe.analyses.linear.plots import campbell_figure
+    from floatframe.cli.channel_names import chosen
     from floatframe.errors import ModelError
 
     model = read(system)
@@ -197,21 +207,41 @@ def campbell_command(
     with stages() as clock, clock("modes over the speed") as advance:
         locus = campbell(
             model, values, axis=vector(axis, "--axis"), center=vector(center, "--center"), n_modes=n_modes,
-            progress=lambda done, all_: advance(done / all_),
+            outputs=chosen(model, outputs, model.outputs), progress=lambda done, all_: advance(done / all_),
         )  # fmt: skip
     if kind == "csv":
-        table = np.column_stack([locus.values, locus.frequencies / model.units.time, locus.damping_ratios])
+        table = np.column_stack(
+            [locus.values, locus.frequencies / model.units.time, locus.damping_ratios, locus.steady]
+        )
         n = locus.eigenvalues.shape[1]
-        head = ",".join(["speed", *(f"Hz {k + 1}" for k in range(n)), *(f"damping {k + 1}" for k in range(n))])
-        lines = [head, *(",".join(f"{value:.10g}" for value in row) for row in table)]
-        replace_file(path, ("\n".join(lines) + "\n").encode())
+        head = ["speed", *(f"Hz {k + 1}" for k in range(n)), *(f"damping {k + 1}" for k in range(n))]
+        head += [f"{name} [{unit}]" for name, unit in zip(locus.outputs, locus.output_units, strict=True)]
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(head)
+        writer.writerows([f"{value:.10g}" for value in row] for row in table)
+        replace_file(path, text.getvalue().encode())
     else:
         picture = io.BytesIO()
-        figure = plot_campbell(locus, time_unit=model.units.time).get_figure(root=True)
-        assert figure is not None
-        figure.savefig(picture, format=kind, dpi=130)
+        campbell_figure(locus, time_unit=model.units.time).savefig(picture, format=kind, dpi=130)
         replace_file(path, picture.getvalue())
+    if locus.outputs:
+        print_steady(locus, model.units.time_symbol)
     say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def print_steady(locus: "Locus", time: str) -> None:
+    """Print the steady values of outputs: at the first and the last speed, and the largest in size with its speed."""
+    rows = []
+    for name, unit, values in zip(locus.outputs, locus.output_units, locus.steady.T, strict=True):
+        k = int(abs(values).argmax())
+        rows.append((name, unit, *(f"{values[j]:.5g}" for j in (0, -1, k)), f"{locus.values[k]:.5g}"))
+    first, last = f"{locus.values[0]:g}", f"{locus.values[-1]:g}"
+    print_table(
+        f"Outputs over the speed [rad/{time}]",
+        ("output", "unit", f"at {first}>", f"at {last}>", "largest>", "at>"),
+        rows,
+    )
 
 
 def draw_mode_film(

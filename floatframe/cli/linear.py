@@ -2,27 +2,25 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cms.cli.console import guarded, output_path, print_table, say
 from floatframe.cli.analyses import Axis, Center, Speed, SystemArgument, linearized, read
+from floatframe.cli.channel_names import chosen
 
 if TYPE_CHECKING:
     from floatframe.analyses import LinearSystem
-    from floatframe.analyses.linear.channels import AnyInput, AnyOutput
     from floatframe.analyses.linear.frequency_response import FrequencyResponse
-    from floatframe.system import System
 
 __all__ = ["register"]
 
 MOST_LEFT_OUT = 6  #: columns that are told one by one
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 Inputs = Annotated[
     list[str],
-    typer.Option("--input", "-i", help="A name of [inputs]; a force: joint.coordinate, body/interface:x."),
+    typer.Option("--input", "-i", help="A name of [inputs], forces.NAME.amplitude, joint.angle, body/interface:x."),
 ]
 Outputs = Annotated[
     list[str],
@@ -141,47 +139,6 @@ def print_left_out(linear: "LinearSystem") -> None:
         say(f"left out: {name}, not linear here: {why}")
     if len(linear.left_out) > MOST_LEFT_OUT:
         say(f"and {len(linear.left_out) - MOST_LEFT_OUT} more columns that are not linear here")
-
-
-def chosen(system: "System", texts: list[str], default: Any) -> Any:
-    """Return the channels named on the command line, or those of the system."""
-    return tuple(channel_of(system, text) for text in texts) if texts else tuple(default)
-
-
-def channel_of(system: "System", text: str) -> "AnyInput | AnyOutput":
-    """Return a channel by the name of an input or output, "joint.coordinate" or "body/interface:component"."""
-    import numpy as np
-
-    from fe_models.foundation.words import nearest
-    from floatframe.analyses.linear.channels import AnyInput, AnyOutput, Column, inputs_of, outputs_of
-    from floatframe.bodies.markers import Marker
-    from floatframe.errors import ModelError
-    from floatframe.results.sensors import sensors_of
-    from floatframe.results.sensors.channels import Channel, CoordinateChannel
-
-    named: dict[str, AnyInput | AnyOutput] = {}
-    for each in (*sensors_of(system), *outputs_of(system.outputs), *inputs_of(system.inputs)):
-        named[each.name] = each
-    if text in named:
-        return named[text]
-    owner, _, column = text.rpartition(".")
-    if owner in named:
-        return Column(named[owner], column)  # type: ignore[arg-type]
-    joint, _, coordinate = text.rpartition(".")
-    coordinates = [f"{each.name}.{name}" for each in system.joints for name in each.coordinates]
-    if text in coordinates:
-        return CoordinateChannel(text, joint, coordinate)
-    place, _, component = text.rpartition(":")
-    body, _, interface = place.partition("/")
-    if not body or component not in DIRECTIONS:
-        hint = nearest(text, [*named, *coordinates]) if "/" not in text and ":" not in text else ""
-        raise ModelError(
-            f"channel {text!r}: expected a name of [inputs], [outputs] or [sensors], joint.coordinate, or "
-            f"body/interface:component (interfaces only of flexible bodies) with one of {', '.join(DIRECTIONS)}{hint}"
-        )
-    index = DIRECTIONS.index(component)
-    kind = "translation" if index < 3 else "rotation"
-    return Channel(text, Marker(body, interface or None), np.eye(3)[index % 3], kind)
 
 
 def band_of(text: str, linear: "LinearSystem", seconds: float) -> tuple[float, float]:

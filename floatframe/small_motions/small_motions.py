@@ -49,11 +49,12 @@ class BaseColumn:
 
 @dataclass(frozen=True, eq=False)
 class InputForce:
-    """Force and moment of an input of size one at an interface of a flexible body."""
+    """Force and moment of an input of size one at an interface of a flexible body, or a load case of it."""
 
     body: str
-    interface: str
+    interface: str  #: "": a load case
     wrench: Array  #: ground axes, (6,)
+    load_case: str = ""
 
 
 @dataclass(frozen=True, eq=False)

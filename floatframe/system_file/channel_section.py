@@ -10,6 +10,7 @@ from fe_models.foundation.components import STRESS_COMPONENTS
 from fe_models.foundation.toml_file import Table, Vector3, choice
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.linear.channels import AnyInput, AnyOutput, Column
+from floatframe.analyses.linear.force_inputs import ForceInput
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
 from floatframe.results.sensors import Sensor
@@ -28,6 +29,8 @@ INPUT_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up t
     "base": ("|", "direction", "quantity", "about", "joints", "measure"),
     "drive": ("joint", "coordinate", "|", "measure"),
     "parameter": ("force", "parameter", "|"),
+    "amplitude": ("force", "|"),
+    "motor": ("force", "|"),
 }
 
 
@@ -69,7 +72,7 @@ class ChannelSection(Table):
 
 
 class InputSection(ChannelSection):
-    """[inputs.NAME]: a force or torque; with type a motion of the base, of a drive, or a parameter of a user force."""
+    """[inputs.NAME]: a force or torque; with type a motion of a base or drive, a parameter, an amplitude."""
 
     type: choice("type of input", lambda: tuple(INPUT_TYPES)) | None = Field(  # type: ignore[valid-type]
         None, description=f"one of {', '.join(INPUT_TYPES)}; without: a force or torque"
@@ -79,7 +82,7 @@ class InputSection(ChannelSection):
     )
     about: Vector3 | None = Field(None, description="a point of the axis about which a base turns, [x, y, z]")
     joints: list[str] | None = Field(None, description="joints and forces whose ground side moves; default: all")
-    force: str | None = Field(None, description="the name of a user force")
+    force: str | None = Field(None, description="the name of a force")
     parameter: str | None = Field(None, description="a parameter of its expressions")
 
     @model_validator(mode="after")
@@ -106,6 +109,8 @@ class InputSection(ChannelSection):
             return DriveMotion(name, str(self.joint), str(self.coordinate), rate)
         if self.type == "parameter":
             return ParameterInput(name, str(self.force), str(self.parameter))
+        if self.type in ("amplitude", "motor"):
+            return ForceInput(name, str(self.force))
         if self.type == "base":
             about, direction = np.array(self.about or (0.0, 0.0, 0.0)), np.array(self.direction or (1.0, 0.0, 0.0))
             return BaseMotion(name, direction, self.quantity or QUANTITIES[0], about, self.joints, rate)

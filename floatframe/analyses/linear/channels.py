@@ -8,6 +8,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
+from floatframe.analyses.linear.force_inputs import ForceInput, force_input_unit
 from floatframe.analyses.linear.inputs import BaseMotion, DriveMotion, ParameterInput
 from floatframe.errors import ModelError
 from floatframe.results.sensors.channels import VALUE, Channel, CoordinateChannel, StressChannel
@@ -44,7 +45,7 @@ class AnyOutput(Protocol):
         """Return the same columns by small motions, as far as they are linear."""
 
 
-AnyInput = Channel | CoordinateChannel | DriveMotion | BaseMotion | ParameterInput
+AnyInput = Channel | CoordinateChannel | DriveMotion | BaseMotion | ParameterInput | ForceInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +138,12 @@ def require_input(channel: Any) -> None:
     if not isinstance(channel, AnyInput):
         raise ModelError(
             f"linearize: {getattr(channel, 'name', channel)!r} is no input: expected a Channel or CoordinateChannel (a "
-            "force along it), DriveMotion, BaseMotion or ParameterInput"
+            "force along it), ForceInput, DriveMotion, BaseMotion or ParameterInput"
         )
 
 
 def channel_unit(system: System, channel: AnyInput) -> str:
     """Return the unit of an input."""
+    if isinstance(channel, ForceInput):
+        return force_input_unit(system, channel)
     return channel.force_units(system.units)

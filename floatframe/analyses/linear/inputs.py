@@ -6,6 +6,7 @@ Each enters the equations of `system_matrices` in its own way, s its value:
     drive, g(x, f(t)) = 0         E = ∂g/∂f, the rate of the row for f = t while nothing moves
     base, a rigid motion s of markers on the ground: E, E' = the rows by their places and by their velocities
     parameter p of Q = f(x, v, p)   E = -∂f/∂p
+    amplitude of a force, motor     F, E by what one more of it changes (`force_inputs`)
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
+from floatframe.analyses.linear.force_inputs import ForceInput, force_column, forces_of_amplitude
 from floatframe.analyses.system_matrices import Inputs
 from floatframe.bodies.coordinates import JointCoordinate
 from floatframe.bodies.markers import body_name
@@ -29,6 +31,7 @@ from floatframe.functions.time_functions import TimeFunction, constant, polynomi
 from floatframe.joints.rows import kind_of
 from floatframe.kernels.work import new_work
 from floatframe.results.sensors.channels import QUANTITIES, RATES, Channel, CoordinateChannel, rate_unit
+from floatframe.results.trajectory import Trajectory
 from floatframe.small_motions.small_motions import BaseColumn, InputForce, SmallMotions
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.state import State
@@ -124,10 +127,13 @@ def base_columns(system: System, inputs: Sequence[Any]) -> tuple[BaseColumn, ...
     return tuple(base_column(system, each) if isinstance(each, BaseMotion) else BaseColumn() for each in inputs)
 
 
-def interface_forces(inputs: Sequence[Any]) -> tuple[tuple[InputForce, ...], ...]:
-    """Return what each input does at interfaces of flexible bodies."""
+def interface_forces(system: System, now: Trajectory, inputs: Sequence[Any]) -> tuple[tuple[InputForce, ...], ...]:
+    """Return what each input does at interfaces of flexible bodies, in a steady motion."""
     found = []
     for channel in inputs:
+        if isinstance(channel, ForceInput):
+            found.append(forces_of_amplitude(system, now, channel))
+            continue
         forces = []
         for sign, marker in channel.markers if isinstance(channel, Channel) else ():
             if marker.interface is not None:
@@ -181,6 +187,8 @@ def column_of(small: SmallMotions, k: int, channel: Any) -> tuple[Array, Array, 
         E, E_rate = base_rows(small, small.bases[k], channel)
     elif isinstance(channel, ParameterInput):
         E = parameter_rows(small, channel)
+    elif isinstance(channel, ForceInput):
+        F, E = force_column(small, channel)
     elif isinstance(channel, CoordinateChannel) and (row := free_row(small, channel)) is not None:
         E[row] = 1.0
     else:

@@ -338,16 +338,11 @@ def linearize(
     set_iterate(work, state, u_dot, about.w)
     shown = small_motions_of_file(compiled, state.q)
     parts = tangents(model, work)
+    now = snapshot(system, about)
     small = SmallMotions(
-        system,
-        compiled,
-        work,
-        state,
-        about.omega,
-        snapshot(system, about),
-        base_columns(system, inputs),
-        interface_forces(inputs),
-    )
+        system, compiled, work, state, about.omega, now, base_columns(system, inputs),
+        interface_forces(system, now, inputs),
+    )  # fmt: skip
     by_inputs = input_columns(small, inputs)
     Omega, Omega_t = turning_matrices(model, work)
     N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.bodies.u0[:-1]])

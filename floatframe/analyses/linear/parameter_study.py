@@ -8,9 +8,10 @@ from scipy.optimize import linear_sum_assignment
 
 from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
-from floatframe.analyses.linear.channels import AnyOutput
+from floatframe.analyses.linear.channels import AnyOutput, outputs_of
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import system_modes
+from floatframe.analyses.snapshot import snapshot
 from floatframe.checked_values import array_of_shape, unit_vector
 from floatframe.errors import ModelError
 from floatframe.system import System
@@ -120,17 +121,36 @@ def campbell(
     axis = unit_vector("campbell: axis", axis)
     center = array_of_shape("campbell: center", center, (3,))
     last: list[Equilibrium] = []
-    seen: list[LinearSystem] = []
+    seen: list[dict[str, tuple[float, str]]] = []
+    observed = outputs_of(system.outputs) if outputs is None else tuple(outputs)
 
     def at(speed: float) -> LinearSystem:
         state = last[0].state if last else None
         last[:] = [steady_rotation(system, speed * axis, center=center, state=state)]
-        seen.append(linearize(system, last[0], inputs=(), outputs=outputs))
-        return seen[-1]
+        seen.append(steady_values(system, last[0], observed))
+        return linearize(system, last[0], inputs=(), outputs=())
 
     locus = root_locus(at, speeds, parameter="speed [rad/s]", n_modes=n_modes, progress=progress)
-    names = [name for name in seen[0].outputs if all(name in each.outputs for each in seen)]
-    columns = [seen[0].outputs.index(name) for name in names]
-    steady = [[float(each.output_values[each.outputs.index(name)]) for name in names] for each in seen]
-    units = tuple(seen[0].output_units[k] for k in columns)
-    return replace(locus, outputs=tuple(names), output_units=units, steady=np.array(steady))
+    names = [name for name in seen[0] if all(name in each for each in seen)]
+    steady = np.array([[each[name][0] for name in names] for each in seen])
+    return replace(locus, outputs=tuple(names), output_units=tuple(seen[0][name][1] for name in names), steady=steady)
+
+
+def steady_values(system: System, about: Equilibrium, outputs: Sequence[AnyOutput]) -> dict[str, tuple[float, str]]:
+    """Return value and unit of every column of outputs in a steady motion; one of one column goes by its own name.
+
+    Raises
+    ------
+    ModelError
+        If two columns have one name.
+    """
+    now = snapshot(system, about)
+    found: dict[str, tuple[float, str]] = {}
+    for output in outputs:
+        measured = output.measure(system, now)
+        for column, values in measured.columns.items():
+            name = output.name if len(measured.columns) == 1 else f"{output.name}.{column}"
+            if name in found:
+                raise ModelError(f"campbell: two outputs are called {name!r}; give each its own name")
+            found[name] = (float(values[0]), measured.units[column])
+    return found

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["plot_campbell", "plot_frequency_response", "plot_root_locus"]
+__all__ = ["campbell_figure", "plot_campbell", "plot_frequency_response", "plot_root_locus"]
 
 
 NOTHING = 1e-12  #: of the largest amplitude of a unit, below which a response is rounding
@@ -48,6 +48,40 @@ def plot_campbell(locus: Locus, ax: "Axes | None" = None, *, time_unit: float = 
     ax.set_ylabel("frequency in the turning system [Hz]")
     ax.grid(alpha=0.3)
     return ax
+
+
+def campbell_figure(locus: Locus, *, time_unit: float = 1.0) -> "Figure":
+    """Return the diagram with the steady values of its outputs below, a panel for each unit.
+
+    Outputs that stay zero at all speeds, beside the largest of their unit, are named and not drawn.
+    """
+    from matplotlib.figure import Figure
+
+    size = {unit: 0.0 for unit in locus.output_units}
+    for unit, values in zip(locus.output_units, locus.steady.T, strict=True):
+        size[unit] = max(size[unit], float(np.abs(values).max(initial=0.0)))
+    units = [unit for unit in size if size[unit] > 0]
+    rows = 1 + len(units)
+    figure = Figure(figsize=(7, 4.5 + 2.4 * len(units)), layout="constrained")
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=[2.0] + [1.0] * len(units)).ravel()
+    plot_campbell(locus, axes[0], time_unit=time_unit)
+    still = []
+    for k, (name, unit) in enumerate(zip(locus.outputs, locus.output_units, strict=True)):
+        values = locus.steady[:, k]
+        if float(np.abs(values).max(initial=0.0)) <= NOTHING * size[unit]:
+            still.append(name)
+            continue
+        axes[1 + units.index(unit)].plot(locus.values, values, color=f"C{k % 10}", linewidth=1.4, label=name)
+    for unit, ax in zip(units, axes[1:], strict=True):
+        ax.set_ylabel(f"[{unit}]")
+        ax.legend(fontsize="small")
+        ax.grid(alpha=0.3)
+    if units:
+        axes[0].set_xlabel("")
+        axes[-1].set_xlabel(locus.parameter)
+    if still:
+        figure.suptitle(f"zero: {', '.join(still)}", fontsize="small", color="0.4")
+    return figure
 
 
 def plot_root_locus(locus: Locus, ax: "Axes | None" = None) -> "Axes":

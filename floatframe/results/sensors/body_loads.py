@@ -245,6 +245,13 @@ class RecoverySensor:
                 value = R @ now[k, first : first + 3]
                 part = on_interfaces[k][first : first + 3] + turning.turned(tilde(value))
                 y = y + part.turned(R.T)[j % 3].turned(factor)
+            elif load.startswith("load case "):
+                x = np.zeros((1, small.n_x))
+                for k, forces in enumerate(small.forces):
+                    x[0, small.n_u + k] = sum(
+                        push.body == body.name and load == f"load case {push.load_case}" for push in forces
+                    )
+                y = y + small.by_motion(x).turned(factor)
         return LinearColumns({table.labels[row]: y[k] for k, row in enumerate(rows)}, units, {})
 
     def found(self, system: System) -> tuple[FlexibleBody, RecoveryTable, IntArray]:

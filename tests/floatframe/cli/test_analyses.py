@@ -134,3 +134,103 @@ def test_a_system_without_a_run_can_be_analysed_but_not_run(pendulum):
     invoke("campbell", pendulum, "--speeds", "0:0:1", "-o", pendulum.with_suffix(".csv"))
     for command in ("run", "kinematics"):
         assert "expected a table [run] with t_end and h" in " ".join(invoke(command, pendulum, code=2).split())
+
+
+def test_campbell_prints_draws_and_writes_the_outputs(tmp_path):
+    """A ball in a cage that turns: it pulls with m omega² r, r as the bushing gives way: k r = k r_0 + m omega² r."""
+    path = tmp_path / "rotor.toml"
+    path.write_text(ROTOR)
+    table = tmp_path / "rotor.csv"
+    told = invoke("campbell", path, "--speeds", "0:10:3", "-o", table)
+    assert "pull" in told
+    lines = [line.split(",") for line in table.read_text().splitlines()]
+    head, rows = lines[0], np.array(lines[1:], float)
+    column = rows[:, head.index("pull [N]")]
+    k, m, r = 4000.0, 2.0, 0.5
+    stretched = k * r / (k - m * rows[:, 0] ** 2)
+    assert_allclose(np.abs(column), m * rows[:, 0] ** 2 * stretched, rtol=1e-6, atol=1e-6)
+    invoke("campbell", path, "--speeds", "0:10:3", "--out", "cage.force size", "--out", "place", "-o", table)
+    names = table.read_text().splitlines()[0]
+    assert "place.x [m]" in names
+    assert "pull" not in names
+    picture = tmp_path / "rotor.svg"
+    invoke("campbell", path, "--speeds", "0:10:3", "-o", picture)
+    assert picture.read_text().count("[N]") or picture.stat().st_size > 10_000
+    assert "did you mean 'cage'" in invoke("campbell", path, "--speeds", "0:10:3", "--out", "cag", code=2)
+
+
+def test_amplitudes_motors_and_drives_are_inputs_by_name(pendulum, tmp_path):
+    """The names that a table [fmu] uses too; the transfer of a motor is that of the textbook."""
+    text = PENDULUM.replace("[run]", MOTOR + "\n[run]")
+    pendulum.write_text(text)
+    path = tmp_path / "lin.npz"
+    for name in ("forces.drive.motor", "twist"):
+        invoke("linearize", pendulum, "--input", name, "--out", "rod:rz", "-o", path)
+        s = 2j
+        with np.load(path) as data:
+            transfer = data["C"] @ np.linalg.solve(s * np.eye(2) - data["A"], data["B"]) + data["D"]
+        assert_allclose(transfer[0, 0], 1 / (2.0 / 3 * s**2 + 9.81), rtol=1e-8)
+    invoke("response", pendulum, "--input", "forces.push.amplitude", "--out", "rod:rz", "-o", tmp_path / "r.csv")
+    assert "did you mean" in invoke("linearize", pendulum, "--input", "forces.pusch.amplitude", code=2)
+
+
+ROTOR = """
+[system]
+units = "m-kg-s"
+
+[bodies.hub]
+mass = 1.0
+inertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+
+[bodies.ball]
+mass = 2.0
+inertia = [[0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01]]
+position = [0.5, 0, 0]
+
+[joints.axle]
+type = "revolute"
+body_a = "ground"
+body_b = "hub"
+marker_b = [0, 0, 0]
+axis = [0, 0, 1]
+
+[forces.cage]
+type = "bushing"
+body_a = "hub"
+marker_a = [0.5, 0, 0]
+body_b = "ball"
+stiffness = [4000, 4000, 4000, 100, 100, 100]
+
+[sensors.cage]
+type = "reaction"
+of = "cage"
+
+[sensors.place]
+type = "position"
+body = "ball"
+marker = [0, 0, 0]
+
+[outputs.pull]
+sensor = "cage"
+column = "force x"
+"""
+MOTOR = """
+[forces.drive]
+type = "joint-force"
+joint = "hinge"
+coordinate = "angle"
+preload = 0.0
+[forces.drive.motor]
+type = "constant"
+value = 0.0
+
+[forces.push]
+type = "point-force"
+body = "rod"
+marker = [0, 0, 0]
+force = [1, 0, 0]
+
+[inputs.twist]
+type = "motor"
+force = "drive"
+"""

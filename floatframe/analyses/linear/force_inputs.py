@@ -1,0 +1,115 @@
+"""Amplitudes of point forces and load cases, and motors of joints, as inputs of a linearised system.
+
+Equations are linear in such an amplitude, so that its column is the difference of what they leave with it one larger:
+
+    residual(a + 1) - residual(a) = -F,   rows(a + 1) - rows(a) = E
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import Units
+from fe_models.foundation.words import nearest, quoted
+from floatframe.bodies.markers import body_name
+from floatframe.compiling.interface_loads import amplitudes, loads_on_interfaces
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import ModelError
+from floatframe.forces import BodyLoad, JointForce, PointForce
+from floatframe.functions.time_functions import TimeFunction, constant
+from floatframe.kernels.work import new_work
+from floatframe.results.trajectory import Trajectory
+from floatframe.rotations import rotation_matrix
+from floatframe.small_motions.small_motions import InputForce, SmallMotions
+from floatframe.start.newton_equations import linearized, set_iterate
+from floatframe.system import System
+
+__all__ = ["ForceInput", "force_column", "force_input_unit", "forces_of_amplitude", "forces_with_amplitude"]
+
+WITH_AMPLITUDE = {PointForce: "amplitude", BodyLoad: "amplitude", JointForce: "motor"}  #: kind of force -> its function
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class ForceInput:
+    """A force of the system as an input: the change of its amplitude, or of the motor of a joint force.
+
+    Of a point force or load case the input is a factor; of a joint force it is the force or torque itself.
+    """
+
+    name: str
+    force: str  #: name of a point force, a load case (`BodyLoad`) or a `JointForce`
+
+    def force_units(self, units: Units) -> str:
+        """Return its unit, as far as it is known without the system."""
+        return "1"
+
+
+def forces_with_amplitude(system: System) -> dict[str, Any]:
+    """Return name -> force of those whose amplitude or motor can be an input."""
+    return {force.name: force for force in system.forces if isinstance(force, PointForce | BodyLoad | JointForce)}
+
+
+def force_of(system: System, channel: ForceInput) -> Any:
+    """Return the force that is meant; `ModelError` with the nearest name if there is none."""
+    known = forces_with_amplitude(system)
+    if channel.force not in known:
+        names = [force.name for force in system.forces if hasattr(force, "name")]
+        what = "has no amplitude or motor" if channel.force in names else "is not there"
+        raise ModelError(
+            f"input {channel.name!r}: force {quoted(channel.force)} {what}; expected a point force, a load case or a "
+            f"joint force{nearest(channel.force, list(known))}"
+        )
+    return known[channel.force]
+
+
+def force_input_unit(system: System, channel: ForceInput) -> str:
+    """Return the unit of the input."""
+    force = force_of(system, channel)
+    if not isinstance(force, JointForce):
+        return "1"
+    units = system.units
+    is_angle = force.coordinate.startswith("angle")
+    return f"{units.force_symbol} {units.length_symbol}" if is_angle else units.force_symbol
+
+
+def force_column(small: SmallMotions, channel: ForceInput) -> tuple[Array, Array]:
+    """Return forces on the bodies, (n_u,), and the part in the rows, (n_w,), of the input."""
+    force = force_of(small.system, channel)
+    key = WITH_AMPLITUDE[type(force)]
+    given = getattr(force, key)
+    now = given(0.0) if isinstance(given, TimeFunction) else float(key == "amplitude")
+    found = []
+    for value in (now, now + 1.0):
+        changed = replace(force, **{key: constant(value)})
+        forces = [changed if each is force else each for each in small.system.forces]
+        model = compiled_system(replace(small.system, forces=forces, inputs=(), outputs=())).model
+        work = new_work(model)
+        set_iterate(work, small.state, w=small.work.state.w)
+        linearized(model, work, 0.0, 0.0, 1.0)
+        found.append((work.bodies.residual.copy(), work.connections.g.copy()))
+    (residual, rows), (residual_1, rows_1) = found
+    return residual - residual_1, rows_1 - rows
+
+
+def forces_of_amplitude(system: System, now: Trajectory, channel: ForceInput) -> tuple[InputForce, ...]:
+    """Return what the input does at an interface of a flexible body, or that it is a load case of one."""
+    force = force_of(system, channel)
+    if isinstance(force, BodyLoad):
+        return (InputForce(body_name(force.body), "", np.zeros(6), force.load_case),)
+    if not isinstance(force, PointForce) or force.marker.interface is None:
+        return ()
+    name = body_name(force.marker.body)
+    i = [body.name for body in system.bodies].index(name)
+    R = rotation_matrix(now.body(name).p)
+    found = []
+    for load in loads_on_interfaces(system, i)[1]:
+        if load.force is force:
+            one = replace(load, force=replace(force, amplitude=None))
+            six = amplitudes(one, np.zeros(1), R)[0]
+            interface = system.bodies[i].reduced.interfaces[load.interface].name  # type: ignore[union-attr]
+            found.append(InputForce(name, interface, np.concatenate([R[0] @ six[:3], R[0] @ six[3:]])))
+    return tuple(found)
