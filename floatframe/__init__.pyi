@@ -195,3 +195,5 @@ from .studies.study import run_study as run_study
 from .studies.study_file import read_study as read_study
 from .system import System as System
 from .system_file.read_system import read_system as read_system
+from .viewer.modes_view import view_modes as view_modes
+from .viewer.motion_view import view as view

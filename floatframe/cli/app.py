@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli import analyses, cosimulation, driven, fatigue, gradient, linear, shake, spectra, study, sweep
+from floatframe.cli import analyses, cosimulation, driven, fatigue, gradient, linear, shake, spectra, study, sweep, view
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -488,3 +488,4 @@ shake.register(app)
 gradient.register(app)
 fatigue.register(app)
 cosimulation.register(app)
+view.register(app)

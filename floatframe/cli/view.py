@@ -1,0 +1,97 @@
+"""The command that writes pages: view."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cms.cli.console import guarded, output_path, say, stages
+from floatframe.cli.analyses import Axis, Center, Speed, linearized
+from floatframe.cli.analyses import read as read_model
+
+__all__ = ["register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command("view")(view_command)
+
+
+@guarded
+def view_command(
+    file: Annotated[
+        Path, typer.Argument(help="A results file (.h5): its motion. A system file (.toml): its modes, or with --rest.")
+    ],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
+    sensors: Annotated[
+        list[str],
+        typer.Option("--sensor", "-s", help="Plot this sensor, sensor.column or joint.coordinate; * and ? are wild."),
+    ] = [],  # noqa: B006
+    color: Annotated[str, typer.Option(help="Colour at first: displacement or von-mises.")] = "displacement",
+    magnification: Annotated[
+        float | None, typer.Option(help="How many times larger deformation is drawn at first; default: to be seen.")
+    ] = None,
+    largest: Annotated[float, typer.Option("--largest", help="MB of the page, at most.")] = 10.0,
+    rest: Annotated[bool, typer.Option("--rest", help="Of a system file: its equilibrium alone.")] = False,
+    n_modes: Annotated[int, typer.Option("--modes", "-n", min=1, help="How many modes, by frequency.")] = 20,
+    speed: Speed = 0.0,
+    axis: Axis = "z",
+    center: Center = "0,0,0",
+) -> None:
+    """Write a motion, or the modes or equilibrium of a system, as one page, turned while it plays; needs no network.
+
+    The page opens in every browser, on a phone too: the machine in 3D with slider, speed, colours by displacement or
+    stress and named views, its plots beside it. Without -o it stands beside the file: swing.h5 gives swing.html.
+
+    Example: floatframe view swing.h5 -o motion.html
+
+    Example: floatframe view swing.h5 --sensor "wheel*" --color von-mises
+
+    Example: floatframe view crane.toml -o modes.html
+    """
+    from floatframe.errors import ModelError, ResultsError
+    from floatframe.results.trajectory import read_results
+    from floatframe.viewer.modes_view import view_modes
+    from floatframe.viewer.motion_view import require_color, view
+
+    require_color(color)
+    if file.suffix.lower() in (".npz", ".mat"):
+        raise ResultsError(f"{file}: a state space does not know its bodies; give the system file, which it came from")
+    is_system = file.suffix.lower() == ".toml"
+    if rest and not is_system:
+        raise ResultsError(f"--rest: {file} is a motion; the equilibrium is that of a system file (.toml)")
+    if is_system:
+        from floatframe.analyses import system_modes
+
+        if sensors:
+            raise ResultsError(f"--sensor: plots are those of a motion; expected results (.h5), got {file}")
+        model = read_model(file)
+        path = page_path(output, file, (file, *model.files))
+        with stages(remaining=True) as clock, clock("page"):
+            linear = linearized(model, speed, axis, center)
+            if rest:
+                page = view(linear.equilibrium, path, system=model, color=color, largest=largest,
+                            magnification=magnification)  # fmt: skip
+            else:
+                if magnification is not None:
+                    raise ModelError("--magnification: a mode has no size of its own; choose how large in the page")
+                page = view_modes(model, linear.equilibrium, system_modes(linear), path, n_modes=n_modes, color=color,
+                                  largest=largest)  # fmt: skip
+    else:
+        trajectory = read_results(file)
+        path = page_path(output, file, (file, *trajectory.files))
+        with stages(remaining=True) as clock, clock("page"):
+            page = view(trajectory, path, sensors=sensors, color=color, magnification=magnification, largest=largest)
+    for note in page.notes:
+        say(note)
+    say(f"wrote {page.path} ({page.size / 1e6:.2f} MB)")
+
+
+def page_path(output: Path | None, file: Path, inputs: tuple[Path | str, ...]) -> Path:
+    """Return where the page is written."""
+    from floatframe.errors import ResultsError
+
+    path: Path = output_path(output, file.with_suffix(".html"), ResultsError, overwrite_of=inputs)
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise ResultsError(f"--output {path}: expected a file name that ends in .html")
+    return path
