@@ -144,6 +144,7 @@ from .results.place_motion import largest_von_mises as largest_von_mises
 from .results.place_motion import nodal_stress as nodal_stress
 from .results.place_motion import point_motion as point_motion
 from .results.sensors import AngleSensor as AngleSensor
+from .results.sensors import BushingSensor as BushingSensor
 from .results.sensors import Channel as Channel
 from .results.sensors import ControlSensor as ControlSensor
 from .results.sensors import CoordinateChannel as CoordinateChannel

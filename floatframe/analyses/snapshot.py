@@ -1,5 +1,6 @@
 """One state as a motion of one time, so that sensors, tables and pictures of motions serve for it too."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.analyses.observed_state import observed_state
 from floatframe.compiling.file_frames import motion_of_engine, rows_of_file
 from floatframe.compiling.system import compiled_system
+from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import new_work
 from floatframe.motion.integration import head_of, joint_rows
 from floatframe.results.results_file import MemorySource
@@ -16,7 +18,7 @@ from floatframe.results.trajectory import Trajectory
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["snapshot"]
+__all__ = ["snapshot", "states_as_motion"]
 
 
 @dataclass(frozen=True)
@@ -57,5 +59,22 @@ def snapshot(
     w = np.zeros(int(model.connections.w0[-1])) if w is None else w
     rows, _ = observed_state(compiled, new_work(model), *motion_of_engine(compiled, state, u_dot), w, t)
     rows = rows_of_file(compiled, rows)
-    head = head_of(system, Snapshot(), t, t, 1.0, 1)  # type: ignore[arg-type]
-    return Trajectory(head, MemorySource(joint_rows(system, [rows])), is_complete=True)
+    return as_motion(system, [rows], t, t)
+
+
+def states_as_motion(system: System, states: Sequence[State]) -> Trajectory:
+    """Return states one after the other, without forces, as a trajectory at the times 0, 1, 2, ..., for pictures."""
+    compiled = compiled_system(system)
+    model, work = compiled.model, new_work(compiled.model)
+    still, w = np.zeros(int(model.bodies.u0[-1])), np.zeros(int(model.connections.w0[-1]))
+    found = []
+    for k, state in enumerate(states):
+        rows, _ = observed_state(compiled, work, *motion_of_engine(compiled, state, still), w, float(k))
+        found.append(rows_of_file(compiled, rows))
+    return as_motion(system, found, 0.0, float(max(len(states) - 1, 0)))
+
+
+def as_motion(system: System, rows: list[Rows], t: float, t_end: float) -> Trajectory:
+    """Return rows of results as a trajectory in memory."""
+    head = head_of(system, Snapshot(), t, t_end, 1.0, 1)  # type: ignore[arg-type]
+    return Trajectory(head, MemorySource(joint_rows(system, rows)), is_complete=True)

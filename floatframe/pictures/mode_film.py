@@ -10,10 +10,12 @@ from cms.rendering.drawing import OnFrame
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.analyses.linear.system_modes import SystemModes
+from floatframe.analyses.snapshot import states_as_motion
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.pictures.body_colors import DISPLACEMENT, BodyColor
+from floatframe.pictures.glyphs import glyphs
 from floatframe.pictures.stage import box_of, ground_grid, view_axes
 from floatframe.rotations import rotation_matrix
 from floatframe.start.newton_equations import displaced, in_ground_axes
@@ -130,7 +132,9 @@ def mode_scene(
     up = -model.gravity if np.any(model.gravity) else upright(points)
     direction, up = view_axes(points, up)
     ground, step = ground_grid(points, up)
-    lines: tuple[Lines, ...] = (ground,)
+    motion = states_as_motion(system, states)
+    drawn = glyphs(system, motion, np.arange(len(states)), size, 1.0, up)
+    lines: tuple[Lines, ...] = (ground, *drawn)
     units = system.units
     return Scene(
         surfaces=tuple(surfaces),

@@ -11,6 +11,7 @@ from fe_models.foundation.words import nearest
 from floatframe.bodies.markers import Marker
 from floatframe.results.sensors import (
     AngleSensor,
+    BushingSensor,
     ControlSensor,
     CoordinateSensor,
     CouplerSensor,
@@ -50,6 +51,7 @@ AT = ("marker", *MESH, "tolerance")  #: keys of a place
 SENSOR_TYPES: dict[str, tuple[str, ...]] = {  # type -> keys; the first ones up to "|" are needed
     **dict.fromkeys(PLACE_QUANTITIES, ("body", "|", *AT, "relative_to", "relative_marker")),
     "angle": ("body_a", "body_b", "|", "marker_a", "marker_b", "axis"),
+    "bushing": ("of", "|"),
     "control": ("of", "|"),
     "coordinate": ("joint", "coordinate", "|"),
     "coupler": ("of", "|"),
@@ -90,7 +92,7 @@ class SensorSection(Table):
     axis: Vector3 | None = Field(None, description="an axis in the axes of marker_a, [x, y, z]; default: z")
     joint: str | None = Field(None, description="the name of a joint")
     coordinate: str | None = Field(None, description="a coordinate of the joint")
-    of: str | None = Field(None, description="the name of a joint or spring-damper; of a coupler, user force, element")
+    of: str | None = Field(None, description="the name of a joint, spring, bushing, coupler, user force or element")
     output: str | None = Field(None, description="the name of an output, state or multiplier of the element")
     interface: str | None = Field(None, description="the name of an interface of the body")
     table: str | None = Field(None, description="the name of a recovery table of the modal file")
@@ -158,6 +160,7 @@ class SensorSection(Table):
 
 
 BY_KEYS: dict[str, Any] = {  # sensors whose fields are the keys of their table
+    "bushing": BushingSensor,
     "control": ControlSensor,
     "coordinate": CoordinateSensor,
     "coupler": CouplerSensor,

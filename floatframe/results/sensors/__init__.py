@@ -6,6 +6,7 @@ from typing import cast
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.results.sensors.body_loads import InterfaceForceSensor, RecoverySensor, SpringSensor
+from floatframe.results.sensors.bushings import BushingSensor
 from floatframe.results.sensors.channels import Channel, CoordinateChannel, StressChannel
 from floatframe.results.sensors.coordinate_elements import ControlSensor, CouplerSensor
 from floatframe.results.sensors.elements import ElementSensor
@@ -19,6 +20,7 @@ from floatframe.system import System
 __all__ = [
     "SENSORS",
     "AngleSensor",
+    "BushingSensor",
     "Channel",
     "ControlSensor",
     "CoordinateChannel",
@@ -49,6 +51,7 @@ __all__ = [
 
 Sensor = (
     AngleSensor
+    | BushingSensor
     | Channel
     | ControlSensor
     | CoordinateChannel
@@ -73,6 +76,7 @@ Sensor = (
 
 SENSORS = {
     "angle": AngleSensor,
+    "bushing": BushingSensor,
     "control": ControlSensor,
     "coordinate": CoordinateSensor,
     "coupler": CouplerSensor,

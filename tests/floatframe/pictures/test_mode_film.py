@@ -7,20 +7,24 @@ from typer.testing import CliRunner
 
 from floatframe import (
     GROUND,
+    Bushing,
     FlexibleBody,
     Gravity,
     Marker,
     ModelError,
+    PrismaticJoint,
     ResultsError,
     RevoluteJoint,
     RigidBody,
     SphericalJoint,
+    SpringDamper,
     System,
     linearize,
     system_modes,
 )
 from floatframe.cli.app import app
 from floatframe.pictures.body_colors import VON_MISES
+from floatframe.pictures.glyphs import BUSHING_COLOR, JOINT_COLOR, SPRING_COLOR
 from floatframe.pictures.mode_film import mode_scene
 from tests.floatframe.cli.test_analyses import PENDULUM
 from tests.synthetic import synthetic_reduced_body
@@ -87,3 +91,25 @@ def test_eig_draws_modes_into_films_and_pictures(tmp_path, monkeypatch):
     assert "expected 1 to 1, the modes" in eig("-a", 4, code=2)
     assert "expected --animate with the number of one mode" in eig("-o", tmp_path / "x.gif", code=2)
     assert "did you mean 'von-mises'" in eig("-a", 1, "--color", "von-mise", code=2)
+
+
+def test_joints_springs_and_bushings_are_drawn_and_move_with_the_mode():
+    """A disc on a bushing beside one on a spring: what is drawn ends at their markers in every frame."""
+    one = RigidBody("one", 1.0, np.eye(3), position=(1.0, 0, 0))
+    two = RigidBody("two", 1.5, np.eye(3), position=(2.0, 0, 0))
+    mount = Bushing("mount", GROUND, Marker("one"), [900.0, 500, 400, 50, 60, 70])
+    coil = SpringDamper("coil", Marker("one"), Marker("two"), 300.0, 0.0)
+    guide = PrismaticJoint("guide", GROUND, Marker("two"), axis=(1, 0, 0))
+    system = System([one, two], [guide], [mount, coil])
+    linear = linearize(system)
+    modes = system_modes(linear)
+    moving = 0
+    for number in range(1, len(modes.eigenvalues) + 1):
+        scene = mode_scene(system, linear.equilibrium, modes, number, QUARTERS)
+        assert {JOINT_COLOR, SPRING_COLOR, BUSHING_COLOR} <= {line.color for line in scene.lines}
+        (spring,) = (line for line in scene.lines if line.color == SPRING_COLOR)
+        for frame in range(4):
+            ends, bodies = spring.points[frame][[0, -1]], scene.surfaces[::2]
+            assert_allclose(ends, [body.nodes[frame].mean(axis=0) for body in bodies], rtol=0, atol=1e-6)
+        moving += np.ptp(spring.points, axis=0).max() > 0.01
+    assert moving >= 3  # along the line, and the block across it in both directions

@@ -1,0 +1,101 @@
+"""The sensor of a bushing: its six deformations and their rates, in the axes half way between its markers.
+
+The formulas are those of the force (`floatframe/kernels/connections/bushing.py`): with A, B the axes of the markers, d
+the distance of their points, theta the rotation vector of A^T B, C half way between them and t = |theta|,
+
+    e = C^T d,  e' = C^T d' + e × gamma,  theta' = S u,   u = C^T (omega_B - omega_A)
+    gamma = C^T (omega_A + omega_B) / 2 - tau theta × u,  tau = tan(t/4) / (2 t),
+    S = alpha 1 + beta theta theta^T,  alpha = (t/2) / sin(t/2),  beta = (1 - alpha) / t²
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
+from floatframe.compiling.markers import MarkerData
+from floatframe.compiling.pair_forces import bushing_markers
+from floatframe.compiling.system import compiled_system
+from floatframe.errors import ModelError
+from floatframe.forces import Bushing
+from floatframe.forces.bushing import DEFORMATIONS
+from floatframe.results.joint_coordinates import end_motion
+from floatframe.results.sensors.linear_columns import scalar_columns
+from floatframe.results.sensors.measurement import Measurement, unit_words
+from floatframe.results.trajectory import Trajectory
+from floatframe.rotations import tilde
+from floatframe.small_motions.rows import LinearColumns
+from floatframe.small_motions.small_motions import SmallMotions
+from floatframe.system import System
+
+__all__ = ["BushingSensor"]
+
+SERIES_BELOW = 1e-2  #: t² below which alpha, beta, tau are series
+NAMES = (*DEFORMATIONS, *(f"{name} rate" for name in DEFORMATIONS))
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class BushingSensor:
+    """Deformations x, y, z, rx, ry, rz of a bushing and their rates, as its stiffness and damping see them."""
+
+    name: str
+    of: str  #: name of the bushing
+
+    def measure(self, system: System, trajectory: Trajectory) -> Measurement:
+        """Return deformations and rates over time."""
+        a, b = (end_motion(system, trajectory, end) for end in self.ends(system))
+        theta = Rotation.from_matrix(np.swapaxes(a.axes, -1, -2) @ b.axes).as_rotvec()
+        C = a.axes @ Rotation.from_rotvec(theta / 2).as_matrix()
+        e = np.einsum("tba,tb->ta", C, b.position - a.position)
+        u = np.einsum("tba,tb->ta", C, b.omega - a.omega)
+        mean = np.einsum("tba,tb->ta", C, (a.omega + b.omega) / 2)
+        alpha, beta, tau = (x[:, None] for x in scalars(np.einsum("ta,ta->t", theta, theta)))
+        gamma = mean - tau * np.cross(theta, u)
+        e_rate = np.einsum("tba,tb->ta", C, b.velocity - a.velocity) + np.cross(e, gamma)
+        turning = alpha * u + beta * np.einsum("ta,ta->t", theta, u)[:, None] * theta
+        columns = np.hstack([e, theta, e_rate, turning]).T
+        return Measurement(self.name, trajectory.t, dict(zip(NAMES, columns, strict=True)), self.units(system))
+
+    def linear(self, small: SmallMotions) -> LinearColumns:
+        """Return de = Cᵀ dd + e × dc and dtheta = S u, rates as theirs."""
+        a, b = (small.place(end, self.of) for end in self.ends(small.system))
+        theta = Rotation.from_matrix(a.axes.T @ b.axes).as_rotvec()
+        C = a.axes @ Rotation.from_rotvec(theta / 2).as_matrix()
+        e = C.T @ (b.position - a.position)
+        alpha, beta, tau = (float(x[0]) for x in scalars(np.array([theta @ theta])))
+        u = (b.turned - a.turned).turned(C.T)
+        dc = (a.turned + b.turned).turned(C.T / 2) - u.turned(tau * tilde(theta))
+        de = (b.moved - a.moved).turned(C.T) + dc.turned(tilde(e))
+        turning = u.turned(alpha * np.eye(3) + beta * np.outer(theta, theta))
+        rows = [*(de[k] for k in range(3)), *(turning[k] for k in range(3))]
+        rows += [row.rate for row in rows]
+        return scalar_columns(dict(zip(NAMES, rows, strict=True)), self.units(small.system))
+
+    def ends(self, system: System) -> tuple[MarkerData, MarkerData]:
+        """Return both markers; `ModelError` with the nearest name if there is no such bushing."""
+        bushings = {force.name: force for force in system.forces if isinstance(force, Bushing)}
+        if self.of not in bushings:
+            raise ModelError(f"sensor {self.name!r}: no bushing {quoted(self.of)}{nearest(self.of, list(bushings))}")
+        a, b = bushing_markers(system, bushings[self.of], compiled_system(system).placed)
+        return a, b
+
+    def units(self, system: System) -> dict[str, str]:
+        """Return the units of the columns."""
+        kinds = ("length", "angle", "speed", "angular speed")
+        return {name: unit_words(system.units, kinds[k // 3]) for k, name in enumerate(NAMES)}
+
+
+def scalars(t2: Array) -> tuple[Array, Array, Array]:
+    """Return alpha, beta, tau of t², (n,) each; series for small ones, to t⁶."""
+    near = t2 < SERIES_BELOW
+    t = np.sqrt(np.where(near, 1.0, t2))
+    alpha = (t / 2) / np.sin(t / 2)
+    beta, tau = (1 - alpha) / t**2, np.tan(t / 4) / (2 * t)
+    low = -(1 / 24 + t2 * (7 / 5760 + t2 * (31 / 967680 + t2 * 127 / 154828800)))
+    y = t2 / 16
+    low_tau = (1 + y * (1 / 3 + y * (2 / 15 + y * 17 / 315))) / 8
+    return np.where(near, 1 - t2 * low, alpha), np.where(near, low, beta), np.where(near, low_tau, tau)

@@ -1,0 +1,75 @@
+"""Deformations of bushings: the law of the force from them, their rates as slopes, and small motions."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from floatframe import (
+    GROUND,
+    Bushing,
+    BushingSensor,
+    GeneralizedAlpha,
+    Marker,
+    ModelError,
+    RigidBody,
+    System,
+    integrate,
+    linearize,
+    measured,
+    static_equilibrium,
+    steady_rotation,
+)
+from tests.floatframe.analyses.test_linear_sensors import compare, machine, rotor
+
+K = np.diag([40.0, 50, 60, 3, 4, 5]) + 0.3
+D = np.diag([0.4, 0.5, 0.6, 0.03, 0.04, 0.05])
+TURN = Rotation.from_rotvec([0.5, -0.8, 0.3]).as_matrix()
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """A body that swings in a soft bushing by more than a right angle."""
+    body = RigidBody("body", 1.0, np.diag([0.05, 0.06, 0.07]), velocity=(2.0, -1.0, 1.0), omega_B=(9.0, -12.0, 10.0))
+    mount = Bushing("mount", Marker(GROUND, position=(0.1, 0, 0), triad=TURN), Marker("body"), K, D)
+    system = System([body], [], [mount])
+    return system, integrate(system, GeneralizedAlpha(0.9), 0.5, 5e-4)
+
+
+def test_the_law_of_the_force_follows_from_them(motion):
+    system, run = motion
+    columns = np.array(list(measured(system, run, [BushingSensor("s", "mount")])["s"].columns.values()))
+    assert np.linalg.norm(columns[3:6], axis=0).max() > np.pi / 2
+    law = K @ columns[:6] + D @ columns[6:]
+    A = TURN @ Rotation.from_rotvec(columns[3:6].T / 2).as_matrix()
+    force = np.einsum("tab,bt->ta", A, law[:3])
+    found = run.reaction("mount").force
+    assert_allclose(force, found, rtol=0, atol=1e-9 * np.abs(found).max())
+
+
+def test_rates_are_slopes(motion):
+    system, run = motion
+    columns = np.array(list(measured(system, run, [BushingSensor("s", "mount")])["s"].columns.values()))
+    slopes = (columns[:6, 2:] - columns[:6, :-2]) / (run.t[2:] - run.t[:-2])
+    for slope, rate in zip(slopes, columns[6:, 1:-1], strict=True):
+        assert_allclose(slope, rate, rtol=0, atol=3e-4 * np.abs(rate).max())
+
+
+@pytest.mark.parametrize("is_turning", [False, True])
+def test_small_motions(is_turning):
+    sensor = [BushingSensor("s", "cage" if is_turning else "mount")]
+    if is_turning:
+        system = rotor()
+        about = steady_rotation(system, (0, 0, 2.0), tolerance=1e-12)
+    else:
+        system = machine()
+        about = static_equilibrium(system, tolerance=1e-12)
+    linear = linearize(system, about, outputs=sensor)
+    assert len(linear.outputs) == 12
+    compare(system, about, linear, sensor, tolerance=2e-6)
+
+
+def test_a_bushing_that_is_not_there(motion):
+    system, run = motion
+    with pytest.raises(ModelError, match="no bushing 'mout'; did you mean 'mount'"):
+        measured(system, run, [BushingSensor("s", "mout")])
