@@ -47,7 +47,8 @@ def further_modules(package: str) -> list[str]:
     return [name for name in FURTHER if name.split(".")[0] == package]
 
 
-FURTHER = ("fe_models.parts", "floatframe.mechanisms")  #: reached by module path, with an `__all__` of their own
+#: reached by module path, with an `__all__` of their own
+FURTHER = ("fe_models.parts", "floatframe.drives", "floatframe.hydraulics", "floatframe.mechanisms")
 
 
 def write_pages(app: Sphinx) -> None:

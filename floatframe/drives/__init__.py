@@ -1,0 +1,21 @@
+"""Electric motors, controllers and maps with states of their own, as public elements on a shaft.
+
+`pid` is the controller of them all, `shaft` and `turns` what they share; each other module is one drive with its law.
+"""
+
+from floatframe.drives.dc_motor import DcMotor
+from floatframe.drives.induction_motor import InductionMotor
+from floatframe.drives.pid import Pid
+from floatframe.drives.pid_drive import PidDrive
+from floatframe.drives.speed_control import SpeedControl
+from floatframe.drives.torque_map import TorqueMap
+
+ELEMENTS = {
+    "dc-motor": "floatframe.drives.dc_motor:DcMotor",
+    "induction-motor": "floatframe.drives.induction_motor:InductionMotor",
+    "pid": "floatframe.drives.pid_drive:PidDrive",
+    "speed-control": "floatframe.drives.speed_control:SpeedControl",
+    "torque-map": "floatframe.drives.torque_map:TorqueMap",
+}
+
+__all__ = ["ELEMENTS", "DcMotor", "InductionMotor", "Pid", "PidDrive", "SpeedControl", "TorqueMap"]

@@ -1,0 +1,125 @@
+"""A direct current motor on a shaft: armature current as a state, supply by a function of time or a controller."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.bodies.markers import Marker
+from floatframe.drives.pid import Pid, pid_law
+from floatframe.drives.shaft import Z_AXIS, check_controller, check_shaft, required, shaft_numbers, time_functions
+from floatframe.drives.turns import turned_angle
+from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.elements.curves import function_at, function_numbers
+from floatframe.elements.pairs import add_torque, direction_of, turning_speed
+from floatframe.elements.unit_names import in_units
+from floatframe.errors import ModelError
+from floatframe.functions.time_functions import TimeFunction
+
+__all__ = ["DcMotor"]
+
+CONTROLLED = ("speed", "angle", "current")
+BY_FUNCTION, SPEED, ANGLE, CURRENT = range(4)
+OUTPUTS = (
+    ("current", "A"), ("voltage", "V"), ("torque", "N m"), ("speed", "rad/s"), ("angle", "rad"), ("power in", "W"),
+    ("power lost", "W"), ("power out", "W"), ("energy", "J"),
+)  # fmt: skip
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class DcMotor(Element):
+    """Torque k i on marker b (rotor) against marker a (stator) about an axis, with L di/dt = u - R i - k ratio omega.
+
+    omega is the angular velocity of b against a about `axis`; a gear makes the motor turn `ratio` times as fast, and
+    its torque on b, friction subtracted, `ratio` times as large. The voltage u is a function of time, or the output
+    of a controller of `controlled`: the speed omega, the angle (zero as placed, with all its turns), or the current.
+
+    Raises
+    ------
+    ModelError
+        For a missing supply, or both a voltage and a controller.
+    """
+
+    name: str
+    marker_a: Marker
+    marker_b: Marker
+    resistance: float  #: R [ohm]
+    inductance: float  #: L [H]
+    constant: float  #: k, torque over current and voltage over speed [N m/A = V s/rad]
+    voltage: TimeFunction | float | None = None  #: u over time [V]
+    controller: Pid | None = None  #: of u, instead
+    controlled: str = "speed"  #: what the controller sees: "speed", "angle" or "current"
+    axis: Array = Z_AXIS  #: in the axes of marker a, (3,)
+    ratio: float = 1.0  #: of the gear: speed of the motor over omega
+    friction: float = 0.0  #: dry friction of the motor [N m]
+    friction_speed: float = 1.0  #: w in friction ω/√(ω² + w²), ω of the motor [rad/s]
+    damping: float = 0.0  #: of the motor, torque over speed [N m s]
+    current: float = 0.0  #: at the start [A]
+
+    def __post_init__(self) -> None:
+        check_shaft(self)
+        required(
+            self, above=("resistance", "inductance", "constant", "friction_speed"), at_least=("friction", "damping"),
+            real=("ratio", "current"),
+        )  # fmt: skip
+        if self.ratio == 0:
+            raise ModelError(f"element {self.name!r}: ratio: expected a number other than 0")
+        time_functions(self, "voltage")
+        check_controller(self, CONTROLLED)
+        if (self.voltage is None) == (self.controller is None):
+            given = "neither: missing supply" if self.voltage is None else "both"
+            raise ModelError(f"element {self.name!r}: expected a voltage or a controller, got {given}")
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return the law of the motor."""
+        numbers = [self.resistance, self.inductance, self.constant, self.ratio, self.friction, self.friction_speed]
+        numbers += [self.damping, BY_FUNCTION if self.controller is None else 1 + CONTROLLED.index(self.controlled)]
+        states = [("current", "A", self.current)]
+        if self.controller is None:
+            assert isinstance(self.voltage, TimeFunction)  # by __post_init__
+            supply = function_numbers(self.voltage)
+        else:
+            supply = self.controller.numbers
+            if self.controlled == "angle":
+                states.append(("counted angle", "rad", 0.0))
+            starts = self.controller.start(self.current if self.controlled == "current" else 0.0)
+            states += [(name, "1", start) for name, start in zip(self.controller.states, starts, strict=True)]
+        return ElementLaw(
+            function=dc_motor_law,
+            data=[*numbers, *shaft_numbers(self.axis, placed), *supply],
+            states=[name for name, _, _ in states],
+            start=[start for _, _, start in states],
+            state_units=in_units(placed.units, [unit for _, unit, _ in states]),
+            outputs=[name for name, _ in OUTPUTS],
+            output_units=in_units(placed.units, [unit for _, unit in OUTPUTS]),
+            tangent="complex",
+            acts=("moment", "moment"),
+            energy="energy",
+            power_in="power in",
+            power_lost="power lost",
+        )
+
+
+@njit
+def dc_motor_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Write the torque of a motor, the rates of its current and its controller, and its outputs."""
+    R, L, k, ratio, mode = data[0], data[1], data[2], data[3], int(data[7])
+    e = direction_of(x, 0, data, 8)
+    speed = turning_speed(x, 0, 1, e)
+    omega, i, angle = ratio * speed, z[0], 0.0 * speed
+    if mode == BY_FUNCTION:
+        u = function_at(data, 17, t) + 0.0 * i
+    elif mode == ANGLE:
+        angle = turned_angle(x, data, 8, speed, z, z_dot, 1)
+        u = pid_law(t, angle, data, 17, z, z_dot, 2)
+    else:
+        u = pid_law(t, speed if mode == SPEED else i, data, 17, z, z_dot, 1)
+    z_dot[0] = (u - R * i - k * omega) / L
+    friction = data[4] * omega / np.sqrt(omega * omega + data[5] * data[5]) + data[6] * omega
+    torque = ratio * (k * i - friction)
+    add_torque(wrench, 0, 1, torque, e)
+    seen[0], seen[1], seen[2], seen[3], seen[4] = i, u, torque, speed, angle
+    seen[5], seen[6], seen[7], seen[8] = u * i, R * i * i + friction * omega, torque * speed, 0.5 * L * i * i

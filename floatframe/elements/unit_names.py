@@ -1,0 +1,45 @@
+"""Units of what an element shows, in the units of the system, from their names in SI units."""
+
+from collections.abc import Sequence
+
+from fe_models.foundation.units import Dimensions, Units, unit_words
+
+__all__ = ["in_units"]
+
+DIMENSIONS = {
+    "m": Dimensions(0, 1, 0),
+    "m/s": Dimensions(0, 1, -1),
+    "m^2": Dimensions(0, 2, 0),
+    "m^3": Dimensions(0, 3, 0),
+    "m^3/s": Dimensions(0, 3, -1),
+    "N": Dimensions(1, 1, -2),
+    "N m": Dimensions(1, 2, -2),
+    "J": Dimensions(1, 2, -2),
+    "Pa": Dimensions(1, -1, -2),
+    "W": Dimensions(1, 2, -3),
+    "rad/s": Dimensions(0, 0, -1),
+    "Hz": Dimensions(0, 0, -1),
+}
+SI = "m-kg-s"
+
+
+def in_units(units: Units, names: Sequence[str]) -> list[str]:
+    """Return the names of units in SI as those of a system; names that are none of mechanics stay.
+
+    >>> from fe_models.foundation.units import unit_system
+    >>> in_units(unit_system("mm-t-s"), ["Pa", "m^3/s", "N m", "rad/s", "A"])
+    ['MPa', 'mm^3 s^-1', 'N mm', 'rad/s', 'A']
+    """
+    if units.name == SI:
+        return list(names)
+    return [in_unit(units, name) for name in names]
+
+
+def in_unit(units: Units, name: str) -> str:
+    """Return one name."""
+    if name not in DIMENSIONS:
+        return name
+    if name in ("rad/s", "Hz"):
+        time = units.time_symbol
+        return name if time == "s" else f"rad/{time}" if name == "rad/s" else f"1/{time}"
+    return unit_words(units, DIMENSIONS[name])

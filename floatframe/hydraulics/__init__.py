@@ -1,0 +1,49 @@
+"""Hydraulic circuits and shock absorbers with states of their own, as public elements.
+
+`fluid` and `gas` say what volumes and energies are at a pressure; `components` describes circuits, `nodes` checks them,
+`circuit_data` writes their numbers, and `circuit_law` is the compiled law; `oleo_strut` is a shock absorber.
+"""
+
+from floatframe.hydraulics.circuit import Circuit
+from floatframe.hydraulics.components import (
+    Accumulator,
+    CheckValve,
+    Cylinder,
+    DirectionalValve,
+    FlowSource,
+    Node,
+    Orifice,
+    Pipe,
+    Pump,
+    ReliefValve,
+    Resistance,
+    Supply,
+    Tank,
+)
+from floatframe.hydraulics.fluid import Fluid
+from floatframe.hydraulics.oleo_strut import OleoStrut
+
+ELEMENTS = {
+    "circuit": "floatframe.hydraulics.circuit:Circuit",
+    "oleo-strut": "floatframe.hydraulics.oleo_strut:OleoStrut",
+}
+
+__all__ = [
+    "ELEMENTS",
+    "Accumulator",
+    "CheckValve",
+    "Circuit",
+    "Cylinder",
+    "DirectionalValve",
+    "FlowSource",
+    "Fluid",
+    "Node",
+    "OleoStrut",
+    "Orifice",
+    "Pipe",
+    "Pump",
+    "ReliefValve",
+    "Resistance",
+    "Supply",
+    "Tank",
+]

@@ -1,0 +1,108 @@
+"""A hydraulic circuit as one element: components between nodes, pressures as states, attached to markers."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.words import nearest, quoted
+from floatframe.bodies.markers import Marker
+from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.errors import ModelError
+from floatframe.hydraulics.circuit_data import circuit_law_of
+from floatframe.hydraulics.components import (
+    COMPONENTS,
+    Component,
+    Cylinder,
+    Node,
+    Pump,
+)
+from floatframe.hydraulics.fluid import Fluid
+from floatframe.hydraulics.nodes import check_nodes
+
+__all__ = ["Circuit"]
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Circuit(Element):
+    """Components between named nodes; cylinders and pumps attach it to markers.
+
+    Nodes are made by naming them. A node that no supply or tank holds has its absolute pressure as a state, and needs
+    volume: that of chambers and pipes at it, or its own, `nodes={"gallery": Node(volume=2e-5)}`.
+
+    Raises
+    ------
+    ModelError
+        For an unknown node, one with nothing or one component at it, one without volume, pressures that two components
+        prescribe, a circuit in which nothing sets the pressure, and cylinders placed outside their stroke.
+    """
+
+    name: str
+    fluid: Fluid
+    components: Sequence[Component]
+    nodes: Mapping[str, Node] = field(default_factory=dict)  #: what nodes have beside components, by name
+
+    def __post_init__(self) -> None:
+        where = f"element {self.name!r}"
+        if not isinstance(self.fluid, Fluid):
+            raise ModelError(f"{where}: fluid: expected a Fluid, got {self.fluid!r}")
+        object.__setattr__(self, "components", tuple(self.components))
+        for k, component in enumerate(self.components):
+            if not isinstance(component, tuple(COMPONENTS.values())):
+                raise ModelError(
+                    f"{where}: components: expected components of floatframe.hydraulics, got {component!r}"
+                )
+            if component.name in [each.name for each in self.components[:k]]:
+                raise ModelError(f"{where}: components: the name {component.name!r} is used twice")
+        for key, node in self.nodes.items():
+            if not isinstance(node, Node):
+                raise ModelError(f"{where}: nodes: {key}: expected a Node, got {node!r}")
+        try:
+            check_nodes(self.fluid, self.components, self.nodes)
+            if not self.markers:
+                raise ModelError("expected a cylinder or a pump, which attach it to bodies, got none")
+        except ModelError as error:
+            raise ModelError(f"{where}: {error}") from None
+
+    @classmethod
+    def from_table(cls, name: str, table: Mapping[str, Any], read: Any) -> "Circuit":
+        """Return the circuit of a table [elements.NAME]; `read` is the reader of such tables.
+
+        Raises
+        ------
+        ModelError
+            With the key path, if a component has an unknown type or wrong keys.
+        """
+        made = dict(table)
+        rows = made.get("components", [])
+        if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
+            raise ModelError(f"{read.where}.components: expected a list of tables [[elements.{name}.components]]")
+        components = []
+        for k, row in enumerate(rows, start=1):
+            where = f"{read.where}.components.{k}"
+            kind, own = row.get("type"), {key: value for key, value in row.items() if key != "type"}
+            if kind not in COMPONENTS:
+                raise ModelError(
+                    f"{where}.type: expected one of {', '.join(COMPONENTS)}, got {quoted(kind)}"
+                    f"{nearest(str(kind), tuple(COMPONENTS))}"
+                )
+            components.append(replace(read, where=where).fields_of(COMPONENTS[kind], own))
+        made.pop("components", None)
+        circuit = read.fields_of(cls, made, name=name, components=tuple(components))
+        assert isinstance(circuit, cls)
+        return circuit
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """The markers of its cylinders and pumps, two of each."""
+        return tuple(
+            marker
+            for each in self.components
+            if isinstance(each, Cylinder | Pump)
+            for marker in (each.marker_a, each.marker_b)
+        )
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return the law of the circuit, its cylinders as placed and its pressures at their start."""
+        return circuit_law_of(self.fluid, self.components, self.nodes, placed)
