@@ -5,31 +5,34 @@ A flow that ends in the equilibrium, made implicit with growing steps (pseudo-tr
     (1) at a state x:  residual f(x) of the bodies, gaps g(x) of the joints, at the velocities of the steady motion
     (2) (W/tau + K) dx - Jᵀ dw = -f,   G dx = -g          W: mass with modal stiffness, K: whole tangent
     (3) tau grows as f falls: small tau follows the flow downhill, large tau is Newton's method
+    (4) states z of elements follow their rates by implicit steps of sqrt(tau), z_new = z + sqrt(tau) g(z_new)
 
 Motions that cost nothing (a wheel on its hinge) stay where they are, since W/tau holds them.
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.analyses.observed_state import observed_state
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
 from floatframe.checked_values import array_of_shape
+from floatframe.compiling.callbacks import raise_errors_of
 from floatframe.compiling.file_frames import motion_of_file
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ConvergenceError, ModelError
 from floatframe.joints.rows import is_held_velocity
-from floatframe.kernels.model import STIFFNESS
+from floatframe.kernels.model import STIFFNESS, Model
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.stop_events import require_off_stops
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.validity import ValidityNote
 from floatframe.rotations import rotation_matrix
-from floatframe.start.initial import assembled, checked, require_independent_constraints
+from floatframe.start.initial import assembled, checked, require_independent_constraints, start_unknowns
 from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.start.newton_equations import (
     Linearized,
@@ -53,6 +56,8 @@ LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
 FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: of tau in one step, while the residual falls or stands
 STANDING = 0.9  #: last residual by this one, below which it rises: tau shrinks with it
 ROUNDING = 32 * np.finfo(float).eps  #: of a position or rotation, as springs see it
+LONG_STEP = 1e4  #: step of states by the first one at which states that stand are at rest
+LONGEST_STEP = 1e10  #: of them, in units of time
 CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
 
 
@@ -67,6 +72,63 @@ class Equilibrium:
     residual: float  #: largest force out of balance, relative to the forces at work
     n_iterations: int
     validity: tuple[ValidityNote, ...] = ()  #: bodies that are out of the range of their frame, as for a motion
+
+
+@dataclass(eq=False)
+class StatesAtRest:
+    """States of elements on their way to rest (4), and the unknowns of their equations; those of user forces stay."""
+
+    solved: IntArray  #: numbers of the states of elements among all states
+    rows: IntArray  #: of their values
+    equations: IntArray  #: rows of multipliers that hold nothing
+    sizes: Array  #: typical, of states and these multipliers
+    own: NDArray[np.bool_]  #: which rows belong to them, (n_w,)
+    names: tuple[str, ...]  #: of states and these multipliers, with their elements
+    change: Array = field(default_factory=lambda: np.full(1, np.inf))  #: last one of each, relative to its size
+    first_step: float = 0.0
+    last_step: float = 0.0
+
+    @classmethod
+    def of(cls, compiled: CompiledSystem) -> "StatesAtRest":
+        """Return those of a system."""
+        model = compiled.model
+        solved = np.arange(int(model.laws.state0[0]), len(model.states.row))
+        rows, equations = model.states.row[solved], model.laws.equation
+        own = np.zeros(int(model.connections.w0[-1]), dtype=bool)
+        for row in (rows, rows + 1, rows + 2, equations):
+            own[row] = True
+        sizes = np.concatenate([model.states.size[solved], model.laws.equation_size])
+        states = [f"{each.element.name}.{name}" for each in compiled.laws for name in each.law.states]
+        equations_of = dict(zip((row for each in compiled.laws for row in each.multipliers),
+                                (f"{each.element.name}.{name}" for each in compiled.laws for name in each.law.multipliers),
+                                strict=True))  # fmt: skip
+        names = (*states, *(equations_of[int(row)] for row in equations))
+        return cls(solved, rows, equations, sizes, own, names)
+
+    def prepare(self, work: Work, w: Array, tau: float) -> None:
+        """Begin a step at the unknowns w."""
+        step = min(float(np.sqrt(tau)), LONGEST_STEP)
+        work.states.base[self.solved] = w[self.rows]
+        work.states.kappa[self.solved] = step
+        self.first_step, self.last_step = self.first_step or step, step
+
+    def follow(self, w: Array, dw: Array) -> None:
+        """Take note of a step."""
+        at = np.concatenate([self.rows, self.equations])
+        self.change = np.abs(dw[at]) / np.maximum(self.sizes, np.abs(w[at]))
+
+    def are_at_rest(self, tolerance: float) -> bool:
+        """Whether a long step has changed nothing."""
+        if not len(self.sizes):
+            return True
+        is_long = self.last_step >= min(LONG_STEP * self.first_step, LONGEST_STEP) > 0
+        return is_long and float(self.change.max()) <= tolerance
+
+    def words(self, tolerance: float) -> str:
+        """Return which state does not come to rest, in words, empty if all do."""
+        if not len(self.sizes) or self.change.max() <= tolerance:
+            return ""
+        return f"; state {self.names[int(self.change.argmax())]!r} of an element does not come to rest"
 
 
 def static_equilibrium(
@@ -127,18 +189,22 @@ def steady_rotation(
             f"joint {rolling[0]!r} rolls without slip: equilibria and linearisations do not know held velocities; "
             "hold the body by other joints, or integrate the motion"
         )
+    resting = compiled.resting_model
+    states = StatesAtRest.of(compiled)
     work = new_work(model)
     given = compiled.placed if state is None else checked(compiled, state)
     state = assembled(compiled, work, given)
     require_placed_near(compiled, given, state)
     require_independent_constraints(compiled, work, state)
     holds = held_rows(model)
-    w, tau, last = np.zeros(len(work.state.w)), 0.0, np.inf
+    w, tau, last = start_unknowns(model), 0.0, np.inf
     for iteration in range(max_iterations + 1):
         state, u_dot = turning(compiled, state, omega, center)
         set_iterate(work, state, u_dot, w)
-        parts, K = _tangent(compiled, work)
-        W = with_modal_weight(model, linearized(model, work, 1.0, 0.0, 0.0).H)
+        states.prepare(work, w, tau)
+        parts, K = _tangent(resting, work)
+        raise_errors_of(compiled.callbacks)
+        W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
         forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
         size = _size(W, forces)
         scale_of_forces = _forces_at_work(compiled, work, parts, W)
@@ -147,13 +213,14 @@ def steady_rotation(
             break
         error = size / scale_of_forces if scale_of_forces > 0 else 0.0
         is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
-        told = tolerance * np.abs(w).max(initial=0.0) + _rounding(compiled, parts, state)
-        is_told = bool((np.abs(gaps) <= told)[~holds].all())
-        if error <= tolerance and is_closed and is_told:
+        told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + _rounding(compiled, parts, state)
+        is_told = bool((np.abs(gaps) <= told)[~holds & ~states.own].all())
+        if error <= tolerance and is_closed and is_told and states.are_at_rest(tolerance):
             _require_rotation(compiled, work, omega)
             require_off_stops(system, w)
             notes = notes_at(system, work, state, u_dot, w)
-            return Equilibrium(*motion_of_file(compiled, state, u_dot), w, omega, error, iteration, notes)
+            told_state, told_u_dot = motion_of_file(compiled, state, u_dot)
+            return Equilibrium(replace(told_state, w=w), told_u_dot, w, omega, error, iteration, notes)
         if iteration == max_iterations:
             break
         if tau == 0.0:
@@ -168,13 +235,14 @@ def steady_rotation(
         part = min(1.0, LARGEST_TURN / max(_largest_motion(compiled, y), 1e-300))
         state = displaced(model, state, part * in_ground_axes(model, state, y))
         w = w + part * dw
+        states.follow(w, dw)
     lost = indefinite_masses(system, state)
     raise ConvergenceError(
         f"no equilibrium found in {iteration} steps: loads at or above buckling bend it too far, or it lies far away; "
         f"{indefinite_mass_words(lost)}"
         if lost
         else f"no equilibrium found in {iteration} steps: forces are out of balance by {error:.2g} of those at work, "
-        f"most at body {_worst_body(compiled, W, forces)!r}; hold what can fall or drift, start nearer, or add damping "
+        f"most at body {_worst_body(compiled, W, forces)!r}{states.words(tolerance)}; hold what can fall or drift, start nearer, or add damping "
         "and integrate until it rests",
         t=0.0,
         h=0.0,
@@ -202,9 +270,8 @@ def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array)
     return State(state.r, state.p, state.q, u), u_dot
 
 
-def _tangent(compiled: CompiledSystem, work: Work) -> tuple[Linearized, tuple[Array, ...]]:
+def _tangent(model: Model, work: Work) -> tuple[Linearized, tuple[Array, ...]]:
     """Return rows and wrenches, and of each body the derivative of the residual along the steady rotations."""
-    model = compiled.model
     parts = linearized(model, work, 0.0, 0.0, 1.0)
     if not work.state.u.any():
         return parts, parts.H

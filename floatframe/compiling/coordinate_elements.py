@@ -35,7 +35,10 @@ from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.records import filled, of_items
 from floatframe.system import System
 
-__all__ = ["CoordinateElements", "PlacedCoordinate", "add_coordinate_elements", "find_coordinate", "placed_value"]
+__all__ = ["LEAST_SIZE", "CoordinateElements", "PlacedCoordinate", "add_coordinate_elements", "find_coordinate", "placed_value"]
+
+
+LEAST_SIZE = 1e-3  #: of a state, where nothing else is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +132,7 @@ def add_user_force(
     for record, name in zip(elements.coordinates[-len(coordinates) :], names, strict=True):
         record["core"] = first + acting.index(name) if name in acting else first
     starts = enumerate(force.states.values())
-    elements.states += [{"row": first + len(acting) + 3 * k, "start": start} for k, start in starts]
+    elements.states += [{"row": first + len(acting) + 3 * k, "start": start, "size": LEAST_SIZE} for k, start in starts]
     elements.state0.append(len(elements.states))
     address = 0
     if force.function is not None:

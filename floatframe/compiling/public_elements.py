@@ -9,6 +9,7 @@ from floatframe.compiling.bodies import integers, offsets
 from floatframe.compiling.callbacks import Callback
 from floatframe.compiling.callbacks.law_functions import law_callbacks
 from floatframe.compiling.connections import Connections, End
+from floatframe.compiling.coordinate_elements import LEAST_SIZE
 from floatframe.compiling.markers import MarkerData, find_marker, marker_pose
 from floatframe.elements.element import ACTS, Element, ElementLaw, Placed, markers_of
 from floatframe.errors import ModelError
@@ -36,6 +37,7 @@ class PlacedLaw:
     head: tuple[int, ...]  #: its sizes, see `compiling.callbacks.law_templates`
     value: Callback  #: its function
     slopes: Callback  #: of derivatives
+    rest: tuple[Callback, Callback]  #: the same of what holds in equilibrium
 
     @property
     def n_out(self) -> int:
@@ -64,6 +66,12 @@ class PublicElements:
         """Return the laws as the kernels see them, in a system of a size."""
         laws = [each.law for each in self.placed]
         sources = [each for group in self.sources for each in group]
+        equations = [
+            (row, size or LEAST_SIZE)
+            for each in self.placed
+            for row, size, holds in zip(each.multipliers, each.law.multiplier_sizes, each.law.holds, strict=True)
+            if holds == NOTHING
+        ]
 
         def number_of(output: str | None, law: ElementLaw) -> int:
             return -1 if output is None else law.outputs.index(output)
@@ -79,6 +87,8 @@ class PublicElements:
             source=[source for source, _ in sources],
             factor=[factor for _, factor in sources],
             state0=self.state0,
+            equation=[row for row, _ in equations],
+            equation_size=[size for _, size in equations],
             length=[law.length or length for law in laws],
             energy=[number_of(law.energy, law) for law in laws],
             given=[number_of(law.power_in, law) for law in laws],
@@ -108,16 +118,22 @@ def add_element(system: System, made: Connections, elements: PublicElements, ele
     states = [w0 + len(sources) + 3 * k for k in range(len(law.states))]
     first = w0 + len(sources) + 3 * len(law.states)
     elements.sources.append(sources)
-    elements.states += [{"row": row, "start": start} for row, start in zip(states, law.start, strict=True)]
+    for row, start, size in zip(states, law.start, law.state_sizes, strict=True):
+        elements.states.append({"row": row, "start": start, "size": size or max(abs(start), LEAST_SIZE)})
     elements.state0.append(elements.state0[-1] + len(states))
     moving = sum(1 << k for k, is_on_ground in enumerate(on_ground) if not is_on_ground)
     sizes = (len(law.states), len(law.multipliers), len(law.outputs), len(law.data))
     elements.heads.append((len(markers), WIDTH, *sizes, moving, 0))
     head = elements.heads[-1]
     value, slopes = law_callbacks(where, law, head)
+    rest = (value, slopes)
+    if law.rest is not None:
+        tangent = "differences" if callable(law.tangent) else law.tangent
+        rest = law_callbacks(where, replace(law, function=law.rest, tangent=tangent), head)
+        elements.callbacks += rest
     multipliers = tuple(range(first, first + len(law.multipliers)))
     elements.placed.append(
-        PlacedLaw(element, law, len(made.sizes) - 1, tuple(states), multipliers, tuple(markers), head, value, slopes)
+        PlacedLaw(element, law, len(made.sizes) - 1, tuple(states), multipliers, tuple(markers), head, value, slopes, rest)
     )
     elements.callbacks += [value, slopes]
     elements.addresses.append((value.address, slopes.address))

@@ -66,6 +66,17 @@ class CompiledSystem:
     angle_motions: tuple[TimeFunction | None, ...]  #: that prescribe them
 
     @property
+    def resting_model(self) -> Model:
+        """The model with what elements say of equilibrium in the place of their laws."""
+        rest = [each.rest for each in self.laws]
+        return self.model._replace(
+            laws=self.model.laws._replace(
+                address=np.array([value.address for value, _ in rest], dtype=np.int64),
+                tangent=np.array([slopes.address for _, slopes in rest], dtype=np.int64),
+            )
+        )
+
+    @property
     def connection_names(self) -> tuple[str, ...]:
         """Names of joints, springs, couplers and user forces: the order of connections in the model."""
         return self.joint_names + self.spring_names + self.element_names

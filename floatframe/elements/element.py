@@ -62,6 +62,7 @@ class ElementLaw:
     state_sizes: Sequence[float] = ()  #: typical sizes, by which convergence is measured; default: from the values
     multipliers: Sequence[str] = ()  #: unknowns lam with the equations 0 = g
     multiplier_units: Sequence[str] = ()
+    multiplier_sizes: Sequence[float] = ()  #: typical sizes of those that hold nothing, as `state_sizes`
     holds: Sequence[int] = ()  #: of each: POSITION, VELOCITY or NOTHING
     held_units: Sequence[str] = ()  #: of g; default "m", or "m/s" of a velocity; "rad" and "1" are measured as angles
     outputs: Sequence[str] = ()  #: what sensors and reports may ask for
@@ -102,10 +103,10 @@ class ElementLaw:
         start = tuple(self.start) or (0.0,) * len(self.states)
         require_length("start", start, "states", self.states)
         object.__setattr__(self, "start", tuple(number("law: start", each) for each in start))
-        sizes = tuple(self.state_sizes) or (0.0,) * len(self.states)
-        require_length("state_sizes", sizes, "states", self.states)
-        sizes = tuple(number("law: state_sizes", each, at_least=0.0) for each in sizes)
-        object.__setattr__(self, "state_sizes", sizes)
+        for key, names in (("state_sizes", "states"), ("multiplier_sizes", "multipliers")):
+            sizes = tuple(getattr(self, key)) or (0.0,) * len(getattr(self, names))
+            require_length(key, sizes, names, getattr(self, names))
+            object.__setattr__(self, key, tuple(number(f"law: {key}", each, at_least=0.0) for each in sizes))
         self._held()
         if isinstance(self.tangent, str) and self.tangent not in TANGENTS:
             raise ModelError(f"law: tangent: expected a function or one of {', '.join(TANGENTS)}, got {self.tangent!r}")

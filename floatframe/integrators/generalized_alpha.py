@@ -230,6 +230,14 @@ class GeneralizedAlpha:
                 f"h_min = {least:.3g}; allow a larger error or a shorter step, or look for a jump in the motion"
             )
             return Failure(words, excess)
+        no_number = int(work.counted.no_number)
+        if no_number:
+            name = compiled.connection_names[no_number - 1]
+            words = (
+                f"element {name!r} gives what is no number (NaN or infinity) for a motion that is one; see its law, or "
+                "choose a smaller h if it is only known near the motion"
+            )
+            return Failure(words, excess)
         words = f"Newton's method did not converge in {self.max_iterations} iterations"
         if np.isfinite(excess):
             words += f" (last correction {excess:.2g} times the allowed one)"

@@ -132,6 +132,29 @@ def update(model, work, memory, by_rate, by_acceleration, c_k):
 
 
 @inner
+def correction_of_states(model, work, c_k):
+    """Return the largest correction of a state or of an unknown of an equation, relative to its size.
+
+    The size is the typical one, the present one, or for a state that of its change in a step.
+    """
+    largest = 0.0
+    for s in range(model.states.row.shape[0]):
+        k = model.states.row[s]
+        size = max(model.states.size[s], abs(work.state.w[k]), abs(work.states.kappa[s] * work.state.w[k + 1]))
+        change = abs(work.solver.mu[k] / c_k) / size
+        if not math.isfinite(change):
+            return math.inf
+        largest = max(largest, change)
+    for j in range(model.laws.equation.shape[0]):
+        k = model.laws.equation[j]
+        change = abs(work.solver.mu[k] / c_k) / max(model.laws.equation_size[j], abs(work.state.w[k]))
+        if not math.isfinite(change):
+            return math.inf
+        largest = max(largest, change)
+    return largest
+
+
+@inner
 def roundoff_floor(model, work, length):
     """Return the squared norm of rounding errors of the positions."""
     total = 0.0
@@ -186,11 +209,13 @@ def one_step(model, work, memory, order, h):
     solver = work.solver
     if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
         work.solver.is_due = 1
-    last = math.inf
+    work.counted.no_number = 0
+    last, last_of_states = math.inf, math.inf
     excess = math.inf
+    is_new = True
+    has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     for iteration in range(order.max_iterations):
         evaluate(model, work, c_k)
-        is_new = iteration == 0
         if work.solver.is_due == 1:
             body = factorize_bodies(model, work, c_m, c_d, c_k)
             if body >= 0:
@@ -208,11 +233,20 @@ def one_step(model, work, memory, order, h):
             work.solver.is_due = 1
             return DIVERGED, -1, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
-        has_states = model.states.row.shape[0] > 0  # they follow the bodies by one iteration
-        if iteration == 0 and has_states:
-            last = norm
-            continue
-        if norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2):
+        is_new = False
+        of_states = 0.0
+        if has_states:  # they follow the bodies by one iteration
+            of_states = correction_of_states(model, work, c_k) / order.tolerance
+            if not math.isfinite(of_states):
+                work.solver.is_due = 1
+                return DIVERGED, -1, math.inf, -1.0
+            if iteration == 0:
+                last, last_of_states = norm, of_states
+                is_new = of_states > 1.0
+                continue
+            is_new = of_states > max(1.0, SLOW * last_of_states)
+        is_small = norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
+        if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             if iteration >= MANY:
                 work.solver.is_due = 1
             error = -1.0
@@ -222,9 +256,10 @@ def one_step(model, work, memory, order, h):
                     return INACCURATE, -1, excess, error
             accept(model, work, memory, h, alpha_m, alpha_f)
             return DONE, -1, excess, error
-        if norm > SLOW * last or iteration >= MANY:
+        if (norm > SLOW * last and not is_small) or iteration >= MANY:
             work.solver.is_due = 1
-        last = norm
+        last, last_of_states = norm, of_states
+        excess = max(excess, of_states)
     work.solver.is_due = 1
     return DIVERGED, -1, excess, -1.0
 

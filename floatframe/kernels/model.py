@@ -257,6 +257,8 @@ class Laws(NamedTuple):
     source: IntArray = integer(Size("wrench rows of laws"))  #: number of the wrench as the function writes it
     factor: Array = real(Size("wrench rows of laws"))  #: by which it becomes the unknown of the row, 1 or -1
     state0: IntArray = integer(n_laws + 1)  #: first of its states among all
+    equation: IntArray = integer(Size("equations of laws"))  #: rows of multipliers that hold nothing
+    equation_size: Array = real(Size("equations of laws"), unit="that of the multiplier")  #: typical
     length: Array = real(n_laws, unit="m")  #: over which the law changes
     energy: IntArray = integer(n_laws)  #: outputs that are stored energy, power given and power lost, -1 for none
     given: IntArray = integer(n_laws)
@@ -268,6 +270,7 @@ class States(NamedTuple):
 
     row: IntArray = integer(n_states)  #: of its value; those of its rate and algorithmic rate follow
     start: Array = real(n_states, unit="that of the state")  #: value at the start
+    size: Array = real(n_states, unit="that of the state")  #: typical, by which convergence is measured
 
 
 class Tapes(NamedTuple):

@@ -187,7 +187,7 @@ class StateWork(NamedTuple):
 
     base: Array = real(n_states)  #: known part of the value after the step
     rate_base: Array = real(n_states, unit="1/s")  #: known part of its algorithmic rate
-    kappa: Array = real(unit="s")
+    kappa: Array = real(n_states, unit="s")  #: by which it follows its rate
     rho: Array = real()
 
 
@@ -227,6 +227,7 @@ class Counted(NamedTuple):
     evaluations: IntArray = integer()
     factorisations: IntArray = integer()
     iterations: IntArray = integer()
+    no_number: IntArray = integer()  #: 1 + the first element of a step whose law gave what is no number, 0 for none
     rows: IntArray = integer()  #: written into the results of the present call
 
 

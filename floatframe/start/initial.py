@@ -105,6 +105,8 @@ def consistent_motion(
     """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files."""
     compiled = compiled_system(system)
     given = compiled.placed if state is None else checked(compiled, state)
+    if known is None and state is not None and state.w is not None:
+        known = array_of_shape("state: w", state.w, (int(compiled.model.connections.w0[-1]),))
     work = work_from(compiled.model, known)
     work.state.time[...] = t
     state = assembled(compiled, work, given, known)

@@ -15,6 +15,8 @@ of wrenches. Two ends whose forces are opposite share one unknown, with the fact
 The derivatives come from one call, d(wrench, g, h)/d(dr, dphi, dv, domega of each marker, z, lam), row by row.
 """
 
+import math
+
 from floatframe.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.compiler.user_call import call_law
@@ -79,18 +81,34 @@ def law_rows(model, work, c, c_k):
             if place >= 0:
                 put_sum(work.markers.wrench[m], part, scaled(model.markers.sign[m], vector(w[k + place :])))
     law_values(model, work, c)
+    note_what_is_no_number(model, work, c)
     for j in range(laws.row0[i], laws.row0[i + 1]):
         g[k] = c_k * (w[k] - laws.factor[j] * out[laws.source[j]])
         k += 1
     o, s = 6 * laws.head[i, 0], laws.state0[i]
     for _ in range(laws.head[i, 2]):
-        g[k] = c_k * (w[k] - work.states.base[s] - work.states.kappa * w[k + 1])
+        g[k] = c_k * (w[k] - work.states.base[s] - work.states.kappa[s] * w[k + 1])
         g[k + 1] = c_k * (w[k + 1] - out[o])
         g[k + 2] = c_k * (w[k + 2] - work.states.rate_base[s] - work.states.rho * w[k + 1])
         o, s, k = o + 1, s + 1, k + 3
     for _ in range(laws.head[i, 3]):
         g[k] = out[o] * (c_k if model.rows.holds[k] == NOTHING else 1.0)
         o, k = o + 1, k + 1
+
+
+@inner
+def note_what_is_no_number(model, work, c):
+    """Write down the first element of a step whose law gives what is no number for a motion that is one."""
+    head = model.laws.head[model.connections.item[c]]
+    total = 0.0
+    for k in range(6 * head[0] + head[2] + head[3]):
+        total += work.laws.outputs[k]
+    if math.isfinite(total) or work.counted.no_number > 0:
+        return
+    for k in range(1 + head[0] * head[1] + head[2] + head[3]):
+        if not math.isfinite(work.laws.inputs[k]):
+            return
+    work.counted.no_number = c + 1
 
 
 @inner
@@ -121,9 +139,9 @@ def law_derivatives(model, work, c, c_k):
         add_slopes(work, V, a, n, n_z, n_lam, states, r, -c_k * laws.factor[j], -laws.factor[j], own)
         r += 1
     o = 6 * n
-    for _ in range(n_z):
+    for s in range(laws.state0[i], laws.state0[i] + n_z):
         own = slopes[o * n_columns : (o + 1) * n_columns]
-        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa
+        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[s]
         V[r + 1, r + 1] = 1.0
         V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
         add_slopes(work, V, a, n, n_z, n_lam, states, r + 1, -c_k, -1.0, own)

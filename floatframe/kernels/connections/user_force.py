@@ -100,7 +100,7 @@ def user_force_rows(model, work, c, c_k):
     for s in range(model.users.n_states[u]):
         i = model.users.state0[u] + s
         rate = work.state.w[k + 1]
-        work.connections.g[k] = c_k * (work.state.w[k] - work.states.base[i] - work.states.kappa * rate)
+        work.connections.g[k] = c_k * (work.state.w[k] - work.states.base[i] - work.states.kappa[i] * rate)
         work.connections.g[k + 1] = c_k * (rate - work.users.outputs[model.users.n_forces[u] + s])
         work.connections.g[k + 2] = c_k * (work.state.w[k + 2] - work.states.rate_base[i] - work.states.rho * rate)
         k += 3
@@ -135,7 +135,7 @@ def user_force_derivatives(model, work, c, c_k):
             V[r, core + n_forces + 3 * s] -= slopes[1 + 2 * n + s]
     for s in range(n_states):
         r = core + n_forces + 3 * s
-        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa
+        V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[model.users.state0[u] + s]
         V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
 
 
@@ -153,7 +153,7 @@ def user_force_power(model, work, c):
 
 @inner
 def begin_states(rows, states, memory, h, alpha_f):
-    """Write b, b', kappa and rho of a step of size h, with rho_inf = alpha_f/(1 - alpha_f).
+    """Write b, b', kappa (one for all) and rho of a step of size h, with rho_inf = alpha_f/(1 - alpha_f).
 
     The value of each state stands at its row of w, then its rate and algorithmic rate.
 
@@ -164,11 +164,11 @@ def begin_states(rows, states, memory, h, alpha_f):
     d_m, d_f = (3.0 * rho_inf - 1.0) / (2.0 * (rho_inf + 1.0)), alpha_f
     th = 0.5 + d_f - d_m
     states.rho = (1.0 - d_f) / (1.0 - d_m)
-    states.kappa = h * th * states.rho
     for s in range(rows.shape[0]):
         k = rows[s]
         z, g, a = memory.w[k], memory.w[k + 1], memory.w[k + 2]
         base = (d_f * g - d_m * a) / (1.0 - d_m)
+        states.kappa[s] = h * th * states.rho
         states.base[s] = z + h * ((1.0 - th) * a + th * base)
         states.rate_base[s] = base
 
