@@ -32,7 +32,13 @@ from floatframe.motion.stop_events import require_off_stops
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.results.validity import ValidityNote
 from floatframe.rotations import rotation_matrix
-from floatframe.start.initial import assembled, checked, require_independent_constraints, start_unknowns
+from floatframe.start.initial import (
+    assembled,
+    checked,
+    known_of,
+    require_independent_constraints,
+    start_unknowns,
+)
 from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
 from floatframe.start.newton_equations import (
     Linearized,
@@ -99,10 +105,12 @@ class StatesAtRest:
             own[row] = True
         sizes = np.concatenate([model.states.size[solved], model.laws.equation_size])
         states = [f"{each.element.name}.{name}" for each in compiled.laws for name in each.law.states]
-        equations_of = dict(zip((row for each in compiled.laws for row in each.multipliers),
-                                (f"{each.element.name}.{name}" for each in compiled.laws for name in each.law.multipliers),
-                                strict=True))  # fmt: skip
-        names = (*states, *(equations_of[int(row)] for row in equations))
+        of_rows = {
+            row: f"{each.element.name}.{name}"
+            for each in compiled.laws
+            for row, name in zip(each.multipliers, each.law.multipliers, strict=True)
+        }
+        names = (*states, *(of_rows[int(row)] for row in equations))
         return cls(solved, rows, equations, sizes, own, names)
 
     def prepare(self, work: Work, w: Array, tau: float) -> None:
@@ -192,12 +200,13 @@ def steady_rotation(
     resting = compiled.resting_model
     states = StatesAtRest.of(compiled)
     work = new_work(model)
+    w = start_unknowns(model, known_of(compiled, state))
     given = compiled.placed if state is None else checked(compiled, state)
     state = assembled(compiled, work, given)
     require_placed_near(compiled, given, state)
     require_independent_constraints(compiled, work, state)
     holds = held_rows(model)
-    w, tau, last = start_unknowns(model), 0.0, np.inf
+    tau, last = 0.0, np.inf
     for iteration in range(max_iterations + 1):
         state, u_dot = turning(compiled, state, omega, center)
         set_iterate(work, state, u_dot, w)
@@ -242,8 +251,8 @@ def steady_rotation(
         f"{indefinite_mass_words(lost)}"
         if lost
         else f"no equilibrium found in {iteration} steps: forces are out of balance by {error:.2g} of those at work, "
-        f"most at body {_worst_body(compiled, W, forces)!r}{states.words(tolerance)}; hold what can fall or drift, start nearer, or add damping "
-        "and integrate until it rests",
+        f"most at body {_worst_body(compiled, W, forces)!r}{states.words(tolerance)}; hold what can fall or drift, "
+        "start nearer, or add damping and integrate until it rests",
         t=0.0,
         h=0.0,
         residual=error,

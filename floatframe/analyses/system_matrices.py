@@ -18,6 +18,10 @@ V_f Z = 0, and r the left side of the bodies without Jᵀ Z lam,
     dw = -V_f⁺ (G_f xi + G_vf nu + E_f s + E'_f s') + Z lam,   Jᵀ Z lam = r,
 
 so that r follows from motions alone, and wrenches are linear in xi, nu, eta and s.
+
+States z of elements and user forces stand among the unknowns w, each with its rate. They enter like inputs, as their
+columns of V in the place of E; their rates z' = -(G_x xi + G_v nu + V dw), of the rows that say what these are, are
+read off like outputs.
 """
 
 from dataclasses import dataclass
@@ -26,7 +30,7 @@ import numpy as np
 import scipy.linalg as la
 from numpy.typing import NDArray
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.errors import ModelError
 from floatframe.joints.rows import is_held
 from floatframe.kernels.model import Model
@@ -48,6 +52,10 @@ class Inputs:
     E: Array  #: in the rows, (n_w, n_s)
     E_rate: Array  #: their rates in the rows, (n_w, n_s)
 
+    def beside(self, others: "Inputs") -> "Inputs":
+        """Return these inputs and others after them."""
+        return Inputs(*(np.hstack([getattr(each, name) for each in (self, others)]) for name in ("F", "E", "E_rate")))
+
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
@@ -62,13 +70,15 @@ class Tangents:
     G_v: Array  #: by velocities, (n_w, n_u)
     V: Array  #: by wrenches, (n_w, n_w)
     holds: NDArray[np.bool_]  #: which rows hold something, (n_w,) bool
+    free: NDArray[np.bool_]  #: which say what a wrench is, (n_w,) bool
+    states: IntArray  #: rows of the values of states, those of their rates follow, (n_states,)
     soft: Array  #: compliance of held rows that share their reactions, zero for all others, (n_w,)
     by_rows: Array  #: V_f⁺, (n_w, n_free)
 
     def body_forces(self, inputs: Inputs) -> tuple[Array, Array]:
         """Return the forces of inputs and of their rates on the bodies, rows eliminated, (n_u, n_s) each."""
         to_bodies = self.J.T @ self.by_rows
-        free = ~self.holds
+        free = self.free
         return inputs.F - to_bodies @ inputs.E[free], -to_bodies @ inputs.E_rate[free]
 
     def open_wrenches(self) -> tuple[Array, Array]:
@@ -79,9 +89,12 @@ class Tangents:
         ModelError
             If reactions cannot be told apart, and the system does not say how they share.
         """
-        V = self.V[~self.holds]
+        unknown = ~self.of_states
+        V = self.V[np.ix_(self.free, unknown)]
         scale = np.maximum(np.abs(V).max(axis=0, initial=0.0), 1.0)
-        Z = la.null_space(V / scale, rcond=RANK) / scale[:, None] if len(V) else np.eye(len(self.V))
+        own = la.null_space(V / scale, rcond=RANK) / scale[:, None] if len(V) else np.eye(int(unknown.sum()))
+        Z = np.zeros((len(self.V), own.shape[1]))
+        Z[unknown] = own
         if not Z.shape[1]:
             return Z, np.zeros((0, self.J.shape[1]))
         Z /= np.linalg.norm(Z, axis=0)
@@ -107,19 +120,40 @@ class Tangents:
 
     def wrenches(self, inputs: Inputs, Omega: Array, Omega_t: Array) -> "Wrenches":
         """Return dw as linear in xi, xi', xi'' and s, s'."""
-        free, D = ~self.holds, self.full(Omega, Omega_t)
+        free, D = self.free, self.full(Omega, Omega_t)
         force, force_rate = self.body_forces(inputs)
         Z, back = self.open_wrenches()
         Q = Z @ back
         G_x, G_v = self.G_x[free], self.G_v[free]
         E, E_rate = inputs.E[free], inputs.E_rate[free]
+        of_states = np.zeros((len(self.V), E.shape[1]))
+        if len(self.states):  # the last inputs
+            of_states[self.states, E.shape[1] - len(self.states) + np.arange(len(self.states))] = 1.0
         return Wrenches(
             x=sum_of_products((Q, D[0]), (-self.by_rows, G_x), (-self.by_rows, G_v @ Omega)),
             v=sum_of_products((Q, D[1]), (-self.by_rows, G_v)),
             a=sum_of_products((Q, D[2])),
-            s=sum_of_products((-Q, force), (-self.by_rows, E)),
+            s=of_states + sum_of_products((-Q, force), (-self.by_rows, E)),
             s_rate=sum_of_products((-Q, force_rate), (-self.by_rows, E_rate)),
         )
+
+    @property
+    def of_states(self) -> NDArray[np.bool_]:
+        """Which rows are values, rates and algorithmic rates of states, (n_w,)."""
+        return rows_of_states(self.states, len(self.V))
+
+    @property
+    def by_states(self) -> Inputs:
+        """How states enter the equations."""
+        zero = np.zeros((len(self.V), len(self.states)))
+        return Inputs(np.zeros((self.J.shape[1], len(self.states))), self.V[:, self.states], zero)
+
+    def rates_of_states(self, Omega: Array) -> tuple[Array, Array, Array]:
+        """Return the rates of states by xi and xi', (n_states, n_u), and by wrenches and states, (n_states, n_w)."""
+        rows = self.states + 1
+        by_wrench = -self.V[rows]
+        by_wrench[:, rows] = 0.0
+        return -(self.G_x + self.G_v @ Omega)[rows], -self.G_v[rows], by_wrench
 
     def full(self, Omega: Array, Omega_t: Array) -> tuple[Array, Array, Array]:
         """Return the matrices of xi, xi' and xi'' in the equations of the bodies."""
@@ -164,13 +198,25 @@ def tangents(model: Model, work: Work) -> Tangents:
     G, G_v = by_position.G.toarray(), by_both.G.toarray() - by_position.G.toarray()
     J, V = by_position.J.toarray(), by_position.V.toarray()
     holds = held_rows(model)
-    by_rows = np.linalg.pinv(V[~holds]) if (~holds).any() else np.zeros((len(V), 0))
-    if (~holds).any():
+    states = np.asarray(model.states.row)
+    of_states = rows_of_states(states, len(V))
+    free = ~holds & ~of_states
+    by_rows = np.zeros((len(V), int(free.sum())))
+    if free.any():
+        by_rows[~of_states] = np.linalg.pinv(V[np.ix_(free, ~of_states)])
         # dw = -V⁺ (G_x xi + G_v nu): reactions along what joints hold do no work in motions they allow
         to_bodies = J.T @ by_rows
-        K += to_bodies @ G[~holds]
-        C += to_bodies @ G_v[~holds]
-    return Tangents(M, C, K, G[holds], J, G, G_v, V, holds, np.asarray(model.rows.soft), by_rows)
+        K += to_bodies @ G[free]
+        C += to_bodies @ G_v[free]
+    return Tangents(M, C, K, G[holds], J, G, G_v, V, holds, free, states, np.asarray(model.rows.soft), by_rows)
+
+
+def rows_of_states(states: IntArray, n_w: int) -> NDArray[np.bool_]:
+    """Return which rows are values, rates and algorithmic rates of states, (n_w,)."""
+    found = np.zeros(n_w, dtype=bool)
+    for k in range(3):
+        found[states + k] = True
+    return found
 
 
 def turning_matrices(model: Model, work: Work) -> tuple[Array, Array]:

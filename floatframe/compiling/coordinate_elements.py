@@ -35,7 +35,14 @@ from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.records import filled, of_items
 from floatframe.system import System
 
-__all__ = ["LEAST_SIZE", "CoordinateElements", "PlacedCoordinate", "add_coordinate_elements", "find_coordinate", "placed_value"]
+__all__ = [
+    "LEAST_SIZE",
+    "CoordinateElements",
+    "PlacedCoordinate",
+    "add_coordinate_elements",
+    "find_coordinate",
+    "placed_value",
+]
 
 
 LEAST_SIZE = 1e-3  #: of a state, where nothing else is known

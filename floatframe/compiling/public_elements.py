@@ -133,7 +133,9 @@ def add_element(system: System, made: Connections, elements: PublicElements, ele
         elements.callbacks += rest
     multipliers = tuple(range(first, first + len(law.multipliers)))
     elements.placed.append(
-        PlacedLaw(element, law, len(made.sizes) - 1, tuple(states), multipliers, tuple(markers), head, value, slopes, rest)
+        PlacedLaw(
+            element, law, len(made.sizes) - 1, tuple(states), multipliers, tuple(markers), head, value, slopes, rest
+        )
     )
     elements.callbacks += [value, slopes]
     elements.addresses.append((value.address, slopes.address))

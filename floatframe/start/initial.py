@@ -47,6 +47,7 @@ __all__ = [
     "acceleration_rates",
     "consistent_motion",
     "consistent_state",
+    "known_of",
     "mobility",
     "solve_accelerations",
     "start_unknowns",
@@ -105,8 +106,7 @@ def consistent_motion(
     """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files."""
     compiled = compiled_system(system)
     given = compiled.placed if state is None else checked(compiled, state)
-    if known is None and state is not None and state.w is not None:
-        known = array_of_shape("state: w", state.w, (int(compiled.model.connections.w0[-1]),))
+    known = known_of(compiled, state) if known is None else known
     work = work_from(compiled.model, known)
     work.state.time[...] = t
     state = assembled(compiled, work, given, known)
@@ -114,6 +114,25 @@ def consistent_motion(
     require_independent_constraints(compiled, work, state)
     state = with_compatible_velocities(compiled, work, state, known)
     return ConsistentState(state, *solve_accelerations(compiled, work, state, known))
+
+
+def known_of(compiled: CompiledSystem, state: State | None) -> Array | None:
+    """Return the unknowns that a state carries, where the system has states that go on; else None.
+
+    Raises
+    ------
+    ModelError
+        If they are those of another system.
+    """
+    if state is None or state.w is None or not len(compiled.model.states.row):
+        return None
+    n_w = int(compiled.model.connections.w0[-1])
+    if state.w.shape != (n_w,):
+        raise ModelError(
+            f"state: w: expected the {n_w} unknowns of this system's joints, forces and elements, got {len(state.w)} "
+            "of another; let their states begin at their start: dataclasses.replace(state, w=None)"
+        )
+    return state.w
 
 
 def checked(compiled: CompiledSystem, state: State) -> State:

@@ -11,7 +11,8 @@ G Y + E = 0, and xi = N z + Y s with the Y that needs no force besides, the quas
     M_z z'' + C_z z' + K_z z = B s + B_rate s' + B_acceleration s''
     y = L z + L_rate z' + L_acceleration z'' + D s + D_rate s' + D_acceleration s''
 
-Outputs see wrenches too, which follow from both (`system_matrices`).
+Outputs see wrenches too, which follow from both (`system_matrices`). States of elements and user forces come after the
+motions in z, with first-order equations: ones in C, none in M.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,13 +46,14 @@ from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.system_matrices import Inputs, Tangents, settled, tangents, turning_matrices
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
-from floatframe.compiling.system import compiled_system
+from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
-from floatframe.kernels.work import new_work
+from floatframe.kernels.work import Work, new_work
 from floatframe.results.sensors.measurement import unit_words
 from floatframe.small_motions.joint_rates import coordinate_rows
-from floatframe.small_motions.small_motions import SmallMotions
+from floatframe.small_motions.rows import Rows, joined
+from floatframe.small_motions.small_motions import BaseColumn, SmallMotions
 from floatframe.start.newton_equations import linearized, set_iterate
 from floatframe.system import System
 
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
 __all__ = ["LinearSystem", "NamedMotions", "linearize"]
 
 RANK = 1e-10  #: singular value of the scaled rows below which one repeats others
+STEADY = 1e-6  #: of its size, that a state which stands is from its rest, or moves in a unit of time
 TINY = float(np.finfo(float).tiny)
 MASSLESS = 1e-12  #: eigenvalue of the scaled mass matrix below which a motion has no mass
 
@@ -114,6 +117,9 @@ class LinearSystem:
     output_values: Array = field(default_factory=empty)  #: outputs in the steady motion, (n_outputs,)
     left_out: Mapping[str, str] = field(default_factory=dict)  #: columns of outputs that are not linear here, and why
     motions: NamedMotions | None = None  #: of which states can be made, see `state_space`
+    #: states of elements and user forces, the last of z: their rows of C are those of a unit matrix, of M by z'' alone
+    states: tuple[str, ...] = ()
+    state_units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n_z, n_s, n_y = self.M.shape[0], len(self.inputs), len(self.outputs)
@@ -129,8 +135,8 @@ class LinearSystem:
 
     @property
     def n_z(self) -> int:
-        """Number of independent motions (the mobility, with the modes of flexible bodies)."""
-        return int(self.M.shape[0])
+        """Number of independent motions (the mobility, with the modes of flexible bodies), without states."""
+        return int(self.M.shape[0]) - len(self.states)
 
     def bodies(self) -> Iterator[tuple[slice, Array]]:
         """Yield for each body its rows of N and its mass matrix."""
@@ -147,7 +153,7 @@ class LinearSystem:
         """
         dynamic, static = self.motions_with_and_without_mass()
         if not static.shape[1]:
-            return self, np.eye(self.n_z)
+            return self, np.eye(len(self.M))
         K_s = static.T @ self.K @ static
         T = dynamic - static @ la.solve(K_s, static.T @ self.K @ dynamic)
         parts = {name: T.T @ getattr(self, name) @ T for name in ("M", "C", "K")}
@@ -163,14 +169,17 @@ class LinearSystem:
         return replace(self, **parts, Y=self.Y + self.N @ by_input[0], motions=motions), T
 
     def motions_with_and_without_mass(self) -> tuple[Array, Array]:
-        """Return bases of z: motions with mass (orthonormal by it), and those without, (n_z, n) each."""
-        scale = 1 / np.sqrt(np.maximum(np.diag(self.M), np.finfo(float).tiny))
-        values, vectors = la.eigh(scale[:, None] * self.M * scale)
+        """Return bases of z: motions with mass (orthonormal by it) and states, and motions without mass."""
+        n, n_states = self.n_z, len(self.states)
+        M = self.M[:n, :n]
+        scale = 1 / np.sqrt(np.maximum(np.diag(M), np.finfo(float).tiny))
+        values, vectors = la.eigh(scale[:, None] * M * scale)
         is_massive = values > MASSLESS
         static = scale[:, None] * vectors[:, ~is_massive]
         # scaled so that a massless motion of tiny diagonal mass does not spoil the others
         static /= np.linalg.norm(static, axis=0)
-        return scale[:, None] * vectors[:, is_massive], static
+        dynamic = la.block_diag(scale[:, None] * vectors[:, is_massive], np.eye(n_states))
+        return dynamic, np.pad(static, ((0, n_states), (0, 0)))
 
     def feedthrough(self) -> Array:
         """Return the part of outputs that follows inputs at once, D of the state space, (n_outputs, n_inputs).
@@ -190,7 +199,7 @@ class LinearSystem:
         return any(part[:, k].any() for pair in parts[: most + 1] for part in pair)
 
     def state_space(self) -> "StateSpace":
-        """Return A, B, C, D over the state (z, z_dot) of the motions with mass, as `scipy.signal.StateSpace`.
+        """Return A, B, C, D over (z, z_dot) of the motions with mass, then the states, as `scipy.signal.StateSpace`.
 
         An input that is a velocity or acceleration adds what is below it as states (see `kept_inputs`), where anything
         depends on that.
@@ -204,28 +213,35 @@ class LinearSystem:
 
         system, _ = self.with_mass()
         system.require_states()
-        n, n_s, kept = system.n_z, len(system.inputs), system.kept_inputs()
-        factor = la.cho_factor(system.M)
-        n_x = 2 * n + len(kept)
+        n, n_s, kept, m = system.n_z, len(system.inputs), system.kept_inputs(), len(system.states)
+        factor = la.cho_factor(system.M[:n, :n])
+        n_x = 2 * n + m + len(kept)
         # s, s', s'' over the state x and the inputs u
         by_x, by_u = np.zeros((3, n_s, n_x)), np.zeros((3, n_s, n_s))
         for k, rate in enumerate(system.input_rates):
             by_u[rate, k, k] = 1.0
         for j, (k, r) in enumerate(kept):
-            by_x[r, k, 2 * n + j] = 1.0
-        of_s = [la.cho_solve(factor, B) for B in (system.B, system.B_rate, system.B_acceleration)]
+            by_x[r, k, 2 * n + m + j] = 1.0
+        of_all = (system.B, system.B_rate, system.B_acceleration)
+        of_s = [la.cho_solve(factor, B[:n]) for B in of_all]
         A, B = np.zeros((n_x, n_x)), np.zeros((n_x, n_s))
-        A[:n, n : 2 * n] = np.eye(n)
-        A[n : 2 * n, :n] = -la.cho_solve(factor, system.K)
-        A[n : 2 * n, n : 2 * n] = -la.cho_solve(factor, system.C)
-        A[n : 2 * n] += sum(b @ x for b, x in zip(of_s, by_x, strict=True))
-        B[n : 2 * n] = sum(b @ u for b, u in zip(of_s, by_u, strict=True))
+        moved, last = slice(n, 2 * n), slice(2 * n, 2 * n + m)
+        A[:n, moved] = np.eye(n)
+        A[moved, :n] = -la.cho_solve(factor, system.K[:n, :n])
+        A[moved, moved] = -la.cho_solve(factor, system.C[:n, :n])
+        A[moved, last] = -la.cho_solve(factor, system.K[:n, n:])
+        A[moved] += sum(b @ x for b, x in zip(of_s, by_x, strict=True))
+        B[moved] = sum(b @ u for b, u in zip(of_s, by_u, strict=True))
+        A[last, :n], A[last, moved], A[last, last] = -system.K[n:, :n], -system.C[n:, :n], -system.K[n:, n:]
+        A[last] += sum(b[n:] @ x for b, x in zip(of_all, by_x, strict=True)) - system.M[n:, :n] @ A[moved]
+        B[last] = sum(b[n:] @ u for b, u in zip(of_all, by_u, strict=True)) - system.M[n:, :n] @ B[moved]
         for j, (k, r) in enumerate(kept):
             above = r + 1
-            A[2 * n + j], B[2 * n + j] = by_x[above, k], by_u[above, k]
-        C = np.hstack([system.L, system.L_rate, np.zeros((len(system.outputs), len(kept)))])
-        C += system.L_acceleration @ A[n : 2 * n]
-        D = system.L_acceleration @ B[n : 2 * n]
+            A[2 * n + m + j], B[2 * n + m + j] = by_x[above, k], by_u[above, k]
+        none = np.zeros((len(system.outputs), len(kept)))
+        C = np.hstack([system.L[:, :n], system.L_rate[:, :n], system.L[:, n:], none])
+        C += system.L_acceleration[:, :n] @ A[moved]
+        D = system.L_acceleration[:, :n] @ B[moved]
         for part, x, u in zip((system.D, system.D_rate, system.D_acceleration), by_x, by_u, strict=True):
             C, D = C + part @ x, D + part @ u
         return StateSpace(A, B, C, D)
@@ -325,12 +341,6 @@ def linearize(
     outputs = outputs_of(system.outputs) if outputs is None else tuple(outputs)
     for channel in inputs:
         require_input(channel)
-    with_states = [force.name for force in system.forces if isinstance(force, UserForce) and force.states]
-    if with_states:
-        raise ModelError(
-            f"system {system.name!r}: force {with_states[0]!r} has states of its own, which a linearisation to M, C, K "
-            "does not hold; take it out, or give its forces without states"
-        )
     about = static_equilibrium(system) if about is None else about
     compiled = compiled_system(system)
     model, work = compiled.model, new_work(compiled.model)
@@ -338,12 +348,13 @@ def linearize(
     set_iterate(work, state, u_dot, about.w)
     shown = small_motions_of_file(compiled, state.q)
     parts = tangents(model, work)
+    states = states_of(system, compiled, work, parts)
+    n_states = len(states.names)
     now = snapshot(system, about)
-    small = SmallMotions(
-        system, compiled, work, state, about.omega, now, base_columns(system, inputs),
-        interface_forces(system, now, inputs),
-    )  # fmt: skip
-    by_inputs = input_columns(small, inputs)
+    bases = (*base_columns(system, inputs), *(BaseColumn() for _ in states.names))
+    forces = (*interface_forces(system, now, inputs), *(() for _ in states.names))
+    small = SmallMotions(system, compiled, work, state, about.omega, now, bases, forces)
+    by_inputs = input_columns(small, inputs).beside(parts.by_states)
     Omega, Omega_t = turning_matrices(model, work)
     N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.bodies.u0[:-1]])
     if N.shape[1] == 0:
@@ -351,11 +362,11 @@ def linearize(
     D_0, D_1, D_2 = parts.full(Omega, Omega_t)
     K_z = N.T @ D_0 @ N
     force, force_rate = parts.body_forces(by_inputs)
-    moves = np.array([isinstance(channel, DriveMotion | BaseMotion) for channel in inputs], dtype=bool)
+    moves = np.array([*(isinstance(channel, DriveMotion | BaseMotion) for channel in inputs), *[False] * n_states])
     Y, size = motions_of_inputs(small, parts, by_inputs, N, K_z, D_0, moves)
     seen = observed(small, outputs)
-    w = parts.wrenches(by_inputs, Omega, Omega_t) if seen.rows.w.any() else None
-    rows = seen.rows
+    rows = joined([seen.rows, rates_of_states(small, parts, Omega)])
+    w = parts.wrenches(by_inputs, Omega, Omega_t) if rows.w.any() else None
     of_motions = [rows.x[:, : small.n_u], rows.v[:, : small.n_u], rows.a[:, : small.n_u]]
     of_inputs = [rows.x[:, small.n_u :], rows.v[:, small.n_u :], rows.a[:, small.n_u :]]
     if w is not None:
@@ -374,14 +385,11 @@ def linearize(
         "D_rate": settled(of_inputs[1] + of_motions[1] @ Y, (of_motions[1], size), (one, of_inputs[1])),
         "D_acceleration": settled(of_inputs[2] + of_motions[2] @ Y, (of_motions[2], size), (one, of_inputs[2])),
     }
+    matrices = {"M": N.T @ D_2 @ N, "C": N.T @ D_1 @ N, "K": K_z, **coefficients, "N": by_bodies}
     return LinearSystem(
         about,
-        M=N.T @ D_2 @ N,
-        C=N.T @ D_1 @ N,
-        K=K_z,
-        **coefficients,
-        N=by_bodies,
-        Y=la.block_diag(*shown) @ Y,
+        **with_states(matrices, n_states),
+        Y=(la.block_diag(*shown) @ Y)[:, : len(inputs)],
         inputs=tuple(channel.name for channel in inputs),
         outputs=seen.names,
         body_names=compiled.body_names,
@@ -393,8 +401,67 @@ def linearize(
         output_units=seen.units,
         output_values=seen.values,
         left_out=seen.left_out,
-        motions=named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N),
+        motions=named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N, n_states),
+        states=states.names,
+        state_units=states.units,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class NamedStates:
+    """States of elements and user forces in their order."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+def states_of(system: System, compiled: CompiledSystem, work: Work, parts: Tangents) -> NamedStates:
+    """Return the states of user forces and elements; `ModelError` if one of them is not at rest."""
+    found = [
+        (f"{force.name}.{name}", "") for force in system.forces if isinstance(force, UserForce) for name in force.states
+    ]
+    for each in compiled.laws:
+        units = zip(each.law.states, each.law.state_units, strict=True)
+        found += [(f"{each.element.name}.{name}", unit) for name, unit in units]
+    rows, size = compiled.model.states.row, compiled.model.states.size
+    for (name, _), row, least in zip(found, rows, size, strict=True):
+        value, rate = work.state.w[row], -work.connections.g[row + 1] + work.state.w[row + 1]
+        if abs(rate) > STEADY * max(abs(value), least) * (1 + abs(parts.V[row + 1, row])):
+            raise ModelError(
+                f"linearize: state {name!r} is not at rest: its rate is {rate:.3g} at {value:.6g}; linearise about a "
+                "motion in which it stands (of a user force: let it start there)"
+            )
+    return NamedStates(tuple(name for name, _ in found), tuple(unit for _, unit in found))
+
+
+def rates_of_states(small: SmallMotions, parts: Tangents, Omega: Array) -> Rows:
+    """Return the rates of states by small motions."""
+    by_place, by_rate, by_wrench = parts.rates_of_states(Omega)
+    rows = small.by_motion(by_place)
+    return Rows(rows.x, small.by_motion(by_rate).x, rows.a, by_wrench)
+
+
+def with_states(parts: dict[str, Array], n_states: int) -> dict[str, Array]:
+    """Return the matrices over motions and states, from those that have states as last inputs, rates as last outputs.
+
+    Their rates are L z + L_rate z' + L_acceleration z'' + D s.
+    """
+    if not n_states:
+        return parts
+    n, n_y, n_s = parts["M"].shape[0], len(parts["L"]) - n_states, parts["B"].shape[1] - n_states
+    zero, none = np.zeros((n, n_states)), np.zeros((n_states, n_states))
+    found: dict[str, Array] = {}
+    for name, rows, own in (("M", "L_acceleration", none), ("C", "L_rate", np.eye(n_states)),
+                            ("K", "L", -parts["D"][n_y:, n_s:])):  # fmt: skip
+        by_states = -parts["B"][:, n_s:] if name == "K" else zero
+        found[name] = np.block([[parts[name], by_states], [-parts[rows][n_y:], own]])
+    for suffix in ("", "_rate", "_acceleration"):
+        B, L, D = parts[f"B{suffix}"], parts[f"L{suffix}"], parts[f"D{suffix}"]
+        found[f"B{suffix}"] = np.vstack([B[:, :n_s], D[n_y:, :n_s]])
+        found[f"L{suffix}"] = np.hstack([L[:n_y], D[:n_y, n_s:]])
+        found[f"D{suffix}"] = D[:n_y, :n_s]
+    found["N"] = np.hstack([parts["N"], np.zeros((len(parts["N"]), n_states))])
+    return found
 
 
 def motions_of_inputs(
@@ -431,7 +498,9 @@ def without_rounding(N: Array, force: Array, D: Array, Y: Array, size: Array) ->
     return settled(N.T @ (force - D @ Y), (N.T, force), (N.T, np.abs(D) @ size))
 
 
-def named_motions(system: System, by_bodies: Array, of_joints: dict[str, Array], N: Array) -> NamedMotions:
+def named_motions(
+    system: System, by_bodies: Array, of_joints: dict[str, Array], N: Array, n_states: int
+) -> NamedMotions:
     """Return the joint coordinates that move, the modal coordinates and the motions of body frames, over z."""
     length, found = system.units.length_symbol, []
     for name, row in of_joints.items():
@@ -447,7 +516,8 @@ def named_motions(system: System, by_bodies: Array, of_joints: dict[str, Array],
         found += [(f"{body.name} {name}", symbol, row, 2) for name, symbol, row in frame]
         first += 6 + n_q
     names, units, over_z, ranks = zip(*found, strict=True)
-    return NamedMotions(names, units, np.array(over_z), ranks, system.units.time_symbol)
+    rows = np.pad(np.array(over_z), ((0, 0), (0, n_states)))
+    return NamedMotions(names, units, rows, ranks, system.units.time_symbol)
 
 
 def seen_from(T: Array, mass: Array) -> Array:

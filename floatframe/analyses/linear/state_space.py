@@ -76,7 +76,8 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
     (1) motions without mass are taken out, which follow the others
     (2) joint coordinates are chosen, then modal coordinates, then motions of body frames, each time the one of which
         most is new to those chosen before, by the mass matrix, until there are as many as independent motions
-    (3) they and their rates are the states, and after them what is below inputs that are velocities or accelerations.
+    (3) they and their rates are the states, after them those of elements and user forces, and then what is below inputs
+        that are velocities or accelerations.
 
     Raises
     ------
@@ -89,12 +90,12 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
         )
     system, T_mass = linear.with_mass()
     motions = linear.motions
-    rows = motions.rows @ T_mass  # (1)
-    chosen = independent_rows(rows, system.M, motions)  # (2)
+    rows = (motions.rows @ T_mass)[:, : system.n_z]  # (1)
+    chosen = independent_rows(rows, system.M[: system.n_z, : system.n_z], motions)  # (2)
     R = rows[chosen]
     space, n = linear.state_space(), len(chosen)
     kept = system.kept_inputs()
-    T = la.block_diag(R, R, np.eye(len(kept)))  # (3)
+    T = la.block_diag(R, R, np.eye(len(system.states) + len(kept)))  # (3)
     backward = np.linalg.inv(T)  # well conditioned by (2)
     A = T @ space.A @ backward
     A[:n] = np.eye(n, len(A), k=n)  # as it is but for rounding
@@ -106,8 +107,13 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
         B=T @ space.B,
         C=space.C @ backward,
         D=space.D,
-        states=(*names, *(f"{name} rate" for name in names), *(name for name, _ in of_inputs)),
-        state_units=(*units, *(f"{unit}/{motions.time_unit}" for unit in units), *(unit for _, unit in of_inputs)),
+        states=(*names, *(f"{name} rate" for name in names), *linear.states, *(name for name, _ in of_inputs)),
+        state_units=(
+            *units,
+            *(f"{unit}/{motions.time_unit}" for unit in units),
+            *linear.state_units,
+            *(unit for _, unit in of_inputs),
+        ),
         inputs=linear.inputs,
         input_units=linear.input_units,
         outputs=linear.outputs,

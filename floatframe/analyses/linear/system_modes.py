@@ -1,6 +1,6 @@
 """Vibration modes of a whole system: complex eigenvalues with frequency and damping, and what moves in each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg as la
@@ -11,6 +11,7 @@ from floatframe.analyses.linear.linearization import LinearSystem
 __all__ = ["SystemModes", "system_modes"]
 
 ZERO = 1e-7  #: |lambda| by the highest one below which a mode is a motion that costs nothing
+STILL = 1e-9  #: motion of bodies by that of states below which a mode is one of states alone
 UNSTABLE = 1e-6  #: growth rate by the highest |lambda| that rounding explains: a double eigenvalue moves by its root
 
 
@@ -22,6 +23,8 @@ class SystemModes:
     shapes: Array  #: motions of the bodies (body axes), the largest entry 1, (n_u, n_modes) complex
     energy_shares: Array  #: share of each body in the kinetic energy of the mode, (n_modes, n_bodies)
     bodies: tuple[str, ...]  #: their names
+    states: tuple[str, ...] = ()  #: of elements and user forces
+    state_shapes: Array = field(default_factory=lambda: np.zeros((0, 0)))  #: by the same factor, (n_states, n_modes)
 
     @property
     def frequencies(self) -> Array:
@@ -52,11 +55,12 @@ def system_modes(linear: LinearSystem) -> SystemModes:
     real; otherwise the first-order pencil of (z, z_dot).
     """
     system, _ = linear.with_mass()
-    M, C, K = (np.asarray(a) for a in (system.M, system.C, system.K))
+    n = system.n_z
+    M, C, K = (np.asarray(a)[:n, :n] for a in (system.M, system.C, system.K))
     omega2, Z = la.eigh((K + K.T) / 2, (M + M.T) / 2)
     highest = np.sqrt(np.abs(omega2).max())
     modal_C = Z.T @ C @ Z
-    is_conservative = (
+    is_conservative = not system.states and (
         np.abs(modal_C).max() <= 1e-12 * highest and np.abs(Z.T @ (K - K.T) @ Z).max() <= 1e-10 * highest**2
     )
     if is_conservative:
@@ -68,19 +72,31 @@ def system_modes(linear: LinearSystem) -> SystemModes:
             shapes = np.column_stack([shapes, shapes[:, k]])
     else:
         # in the coordinates of the undamped modes, scaled by their frequencies: a well-scaled state matrix
-        n = len(omega2)
-        modal_K = Z.T @ K @ Z
-        A = np.zeros((2 * n, 2 * n))
-        A[:n, n:] = highest * np.eye(n)
-        A[n:, :n] = -modal_K / highest
-        A[n:, n:] = -modal_C
+        rates, states = slice(n, 2 * n), slice(2 * n, 2 * n + len(system.states))
+        A = np.zeros((states.stop, states.stop))
+        A[:n, rates] = highest * np.eye(n)
+        A[rates, :n] = -Z.T @ K @ Z / highest
+        A[rates, rates] = -modal_C
+        A[rates, states] = -Z.T @ system.K[:n, n:] / highest
+        A[states, :n] = -system.K[n:, :n] @ Z
+        A[states, rates] = -system.C[n:, :n] @ Z * highest
+        A[states, states] = -system.K[n:, n:]
+        A[states] -= system.M[n:, :n] @ Z @ A[rates] * highest
+        of_z = np.r_[:n, states]
         eigenvalues, vectors = la.eig(A)
         keep = eigenvalues.imag >= 0
-        eigenvalues, shapes = eigenvalues[keep], Z @ vectors[:n, keep]
+        eigenvalues, shapes = eigenvalues[keep], la.block_diag(Z, np.eye(len(system.states))) @ vectors[of_z][:, keep]
     eigenvalues = np.where(np.abs(eigenvalues) <= ZERO * highest, 0.0, eigenvalues)
     order = np.lexsort((eigenvalues.imag, np.abs(eigenvalues)))
-    shapes = (system.N @ shapes)[:, order]
+    of_states = np.pad(shapes, ((0, len(system.M) - len(shapes)), (0, 0)))[n:, order]
+    shapes = (system.N[:, : len(shapes)] @ shapes)[:, order]
     largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
+    if system.states:  # a state that moves no body has a mode of its own
+        own = of_states[np.abs(of_states).argmax(axis=0), np.arange(shapes.shape[1])]
+        largest = np.where(np.abs(largest) > STILL * np.abs(own), largest, own)
     energies = np.array([np.einsum("uk,uv,vk->k", shapes[u].conj(), m, shapes[u]).real for u, m in linear.bodies()])
-    shares = (energies / energies.sum(axis=0)).T
-    return SystemModes(eigenvalues[order], shapes / largest, shares, linear.body_names)
+    total = energies.sum(axis=0)
+    shares = np.divide(energies, total, out=np.zeros_like(energies), where=total > 0).T
+    return SystemModes(
+        eigenvalues[order], shapes / largest, shares, linear.body_names, system.states, of_states / largest
+    )

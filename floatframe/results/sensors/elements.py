@@ -9,6 +9,7 @@ from floatframe.compiling.public_elements import PlacedLaw
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.results.element_motion import element_motion
+from floatframe.results.sensors.element_slopes import output_rows
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
 from floatframe.small_motions.rows import LinearColumns
@@ -21,7 +22,10 @@ __all__ = ["ElementSensor"]
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class ElementSensor:
-    """A public element: its outputs, states and multipliers by their names, or one of them."""
+    """A public element: its outputs, states and multipliers by their names, or one of them.
+
+    A name that is both an output and a state is the state.
+    """
 
     name: str
     of: str  #: name of the element
@@ -35,16 +39,16 @@ class ElementSensor:
         return Measurement(self.name, trajectory.t, {name: columns[name] for name in units}, units)
 
     def linear(self, small: SmallMotions) -> LinearColumns:
-        """Return multipliers, which are unknowns beside the wrenches."""
+        """Return all columns: outputs by the derivatives of the law, states and multipliers as unknowns."""
         placed = self.placed(small.system)
         units = self.units_of(placed)
-        rows = dict(zip(placed.law.multipliers, placed.multipliers, strict=True))
-        columns = {name: small.by_wrench([rows[name]]) for name in units if name in rows}
-        return LinearColumns(
-            columns,
-            {name: units[name] for name in columns},
-            {name: "it is an output of an element" for name in units if name not in rows},
-        )
+        law = placed.law
+        names = dict(zip((*law.states, *law.multipliers), (*placed.states, *placed.multipliers), strict=True))
+        columns = {name: small.by_wrench([names[name]]) for name in units if name in names}
+        if any(name in law.outputs for name in units):
+            rows = output_rows(placed, small)
+            columns |= {name: rows[law.outputs.index(name)] for name in units if name in law.outputs}
+        return LinearColumns({name: columns[name] for name in units}, units, {})
 
     def placed(self, system: System) -> PlacedLaw:
         """Return the element; `ModelError` with the nearest name if it is not there."""

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from floatframe import Marker
-from floatframe.elements import POSITION, Element, ElementLaw
+from floatframe.elements import NOTHING, POSITION, VELOCITY, Element, ElementLaw
 
 
 @njit
@@ -116,4 +116,117 @@ class Ball(Element):
             holds=(POSITION,) * 3,
             acts=("force", "force"),
             is_opposite=True,
+        )
+
+
+@njit
+def jack_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Lift with a pressure: p' = B (c (p_s - p) - A v), force A p along z."""
+    area, leak, supply, stiffness = data
+    wrench[0, 2] = area * z[0]
+    z_dot[0] = stiffness * (leak * (supply - z[0]) - area * x[0, 14])
+    seen[0] = area * z[0]
+    seen[1] = supply * leak * (supply - z[0])  # the power of the supply less its throttle's
+    seen[2] = 0.5 * z[0] * z[0] / stiffness
+    seen[3] = leak * (supply - z[0]) * (supply - z[0])
+
+
+@njit
+def closed_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Hold another pressure at rest."""
+    z_dot[0] = 2 * data[2] - z[0]
+    wrench[0, 2] = data[0] * z[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Jack(Element):
+    name: str
+    marker: Marker
+    area: float = 1e-3
+    leak: float = 1e-9
+    supply: float = 1e6
+    stiffness: float = 1e12
+    is_closed: bool = False
+    start: float = 3e5
+
+    def law(self, placed):
+        return ElementLaw(
+            function=jack_law,
+            rest=closed_law if self.is_closed else None,
+            data=[self.area, self.leak, self.supply, self.stiffness],
+            states=("p",),
+            start=(self.start,),
+            state_units=("Pa",),
+            state_sizes=(1e5,),
+            outputs=("force", "given", "energy", "lost"),
+            output_units=("N", "W", "J", "W"),
+            acts=("force",),
+            tangent="complex",
+            energy="energy",
+            power_in="given",
+            power_lost="lost",
+        )
+
+
+@njit
+def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Follow b stiffly by the cube root a, with a flow lam that splits: lam + lam³ = b."""
+    z_dot[0] = -data[0] * (z[0] * z[0] * z[0] - z[1])
+    z_dot[1] = np.cos(t) - z[1]
+    g[0] = lam[0] + lam[0] * lam[0] * lam[0] - z[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Circuit(Element):
+    name: str
+    marker: Marker
+    stiffness: float = 1e6
+    tangent: str = "complex"
+
+    def law(self, placed):
+        return ElementLaw(
+            function=circuit_law,
+            data=[self.stiffness],
+            states=("a", "b"),
+            start=(1.0, 1.0),
+            multipliers=("flow",),
+            holds=(NOTHING,),
+            acts=("none",),
+            tangent=self.tangent,
+        )
+
+
+@njit
+def disc_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Roll a disc, whose axis is y of its marker, on the plane z = 0.
+
+    Its lowest point is rho = R (n (n · z) - z)/|...| from the centre, n the axis; the point touches the plane, and
+    moves neither along x nor along y.
+    """
+    n0, n1, n2 = x[0, 4], x[0, 7], x[0, 10]
+    s = np.sqrt(n0 * n0 + n1 * n1)
+    r0, r1, r2 = data[0] * n0 * n2 / s, data[0] * n1 * n2 / s, -data[0] * s
+    w0, w1, w2 = x[0, 15], x[0, 16], x[0, 17]
+    g[0] = x[0, 2] + r2
+    g[1] = x[0, 12] + w1 * r2 - w2 * r1
+    g[2] = x[0, 13] + w2 * r0 - w0 * r2
+    f0, f1, f2 = lam[1], lam[2], lam[0]
+    wrench[0, 0], wrench[0, 1], wrench[0, 2] = f0, f1, f2
+    wrench[0, 3], wrench[0, 4], wrench[0, 5] = r1 * f2 - r2 * f1, r2 * f0 - r0 * f2, r0 * f1 - r1 * f0
+
+
+@dataclass(frozen=True, eq=False)
+class Disc(Element):
+    name: str
+    marker: Marker
+    radius: float
+
+    def law(self, placed):
+        return ElementLaw(
+            function=disc_law,
+            data=[self.radius],
+            multipliers=("N", "Fx", "Fy"),
+            multiplier_units=("N", "N", "N"),
+            holds=(POSITION, VELOCITY, VELOCITY),
+            tangent="complex",
         )

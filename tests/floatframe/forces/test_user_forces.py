@@ -25,7 +25,9 @@ from floatframe import (
     UserForce,
     integrate,
     linearize,
+    named_state_space,
     resume,
+    system_modes,
     user_force_motion,
 )
 from floatframe.compiling.system import compiled_system
@@ -274,9 +276,21 @@ def test_a_jitted_function_that_does_not_fit_is_refused():
         _ = compiled_system(wheel(UserForce("u", HUB, ("phi",), function=wrong)))
 
 
-def test_control_with_states_is_not_linearised():
-    with pytest.raises(ModelError, match="'pid' has states of its own"):
-        linearize(wheel(pid()))
+def test_control_with_states_is_linearised_with_its_states():
+    linear = linearize(wheel(pid()))
+    A = np.array([[0, 1, 0], [-40 / J, -4 / J, -30 / J], [1, 0, 0]])
+    assert linear.states == ("pid.e",)
+    assert_allclose(named_state_space(linear).A, A, rtol=0, atol=1e-12 * np.abs(A).max())
+    exact = np.linalg.eigvals(A)
+    exact = exact[exact.imag >= 0]
+    found = system_modes(linear).eigenvalues
+    assert_allclose(found, exact[np.argsort(np.abs(exact))], rtol=1e-10)
+
+
+def test_a_state_that_does_not_stand_is_not_linearised():
+    system = wheel([pid(), JointForce("load", "hub", "angle", preload=-6.0)])
+    with pytest.raises(ModelError, match=r"state 'pid\.e' is not at rest: its rate is -0\.15"):
+        linearize(system)  # with e = 0 at the start the wheel stands where -40 phi = 6
 
 
 @pytest.mark.parametrize(
