@@ -148,7 +148,7 @@ def nodal_condition(reduced: ReducedBody, frame: NodalFrame) -> tuple[Array, Arr
     """Return rigid motions and shapes at the six held dofs, (6, 6) and (6, n_q), and the dofs (node, component)."""
     where = f"reduced body {reduced.name!r}: nodal frame"
     if frame.dofs is not None:
-        held = checked_dofs(frame, where)
+        held = checked_dofs(frame, where, reduced.numbering, reduced.node_ids)
         kept = {int(node): row for row, node in enumerate(reduced.node_ids)}
         for node, component in held:
             if component > 2 or int(node) not in kept:

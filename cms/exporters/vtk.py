@@ -40,9 +40,7 @@ def make_vtk(request: Request) -> Made:
         hertz = body.frequencies[k] / body.units.time
         whole = {"q": np.array([q]), "frequency": np.array([hertz])}
         name = path.with_name(f"{path.stem}_{k + 1}.vtu")
-        files[name] = unstructured_grid(
-            points, body.surface, fields, whole, request.header(), numbers_of_cells(body)
-        )
+        files[name] = unstructured_grid(points, body.surface, fields, whole, request.header(), numbers_of_cells(body))
         entries.append(f'<DataSet timestep="{k + 1}" file={quoteattr(name.name)}/>')
     collection = ['<VTKFile type="Collection" version="0.1">', "<Collection>", *entries, "</Collection>", "</VTKFile>"]
     files[path] = ("\n".join(['<?xml version="1.0"?>', *comment(request.header()), *collection]) + "\n").encode("utf-8")

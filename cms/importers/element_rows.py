@@ -38,8 +38,11 @@ FORCE_ITEMS: Mapping[int, tuple[tuple[str, Dimensions], ...]] = {
     3: ROD,
     4: (
         *((f"F{a}{b}", FORCE) for a, b in ((4, 1), (2, 1), (1, 2), (3, 2), (2, 3), (4, 3), (3, 4), (1, 4))),
-        *((name, unit) for k, flow in enumerate(("q12", "q23", "q34", "q41"), start=1)
-          for name, unit in ((f"kick {k}", FORCE), (flow, PER_LENGTH))),
+        *(
+            (name, unit)
+            for k, flow in enumerate(("q12", "q23", "q34", "q41"), start=1)
+            for name, unit in ((f"kick {k}", FORCE), (flow, PER_LENGTH))
+        ),
     ),
     10: ROD,
     24: ROD,

@@ -164,16 +164,24 @@ class NeighbourSection(Table):
         return value
 
 
-def held_dofs(value: Any) -> tuple[tuple[int, int], ...]:
+def held_dofs(value: Any) -> tuple[tuple[int | str, int | str], ...]:
     """Return six pairs of node and component."""
     pairs = value if isinstance(value, list | tuple) else ()
-    good = [isinstance(p, list | tuple) and len(p) == 2 and all(type(x) is int and x >= 0 for x in p) for p in pairs]
-    if len(pairs) != 6 or not all(good) or any(component > 5 for _, component in pairs):
-        raise ValueError("expected six pairs [node, component 0-5], nodes counted from 0")
+    if len(pairs) != 6 or not all(isinstance(p, list | tuple) and len(p) == 2 and is_dof(*p) for p in pairs):
+        raise ValueError(
+            "expected six pairs [node, component 0-5], nodes counted from 0, or [number of a node, ux to rz]"
+        )
     return tuple((node, component) for node, component in pairs)
 
 
-HeldDofs = Annotated[tuple[tuple[int, int], ...], BeforeValidator(held_dofs)]
+def is_dof(node: Any, component: Any) -> bool:
+    """Whether this is a node counted from 0 with a component 0 to 5, or a number with the name of a component."""
+    if component in MOTION_COMPONENTS:
+        return (type(node) is int and node >= 0) or isinstance(node, str)
+    return type(node) is int and type(component) is int and node >= 0 and 0 <= component <= 5
+
+
+HeldDofs = Annotated[tuple[tuple[int | str, int | str], ...], BeforeValidator(held_dofs)]
 
 
 class ReductionSection(Table):
@@ -238,7 +246,7 @@ class ReductionSection(Table):
         "tisserand", description=f"one of {', '.join(FRAMES)}"
     )
     at: Name | None = Field(None, description="the name of an interface, which carries a nodal frame")
-    dofs: HeldDofs | None = Field(None, description="six pairs [node, component 0-5], which a nodal frame holds")
+    dofs: HeldDofs | None = Field(None, description="six pairs [node, component], which a nodal frame holds")
     origin: Vector3 | None = Field(None, description="the origin of the body frame in mesh coordinates, [x, y, z]")
     axes: Matrix3 | None = Field(None, description="the axes of the body frame, [x axis, y axis, z axis]")
     stress: bool | None = Field(None, description="true or false: whether to keep the stress of the modes")

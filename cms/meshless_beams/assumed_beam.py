@@ -35,6 +35,7 @@ from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterfa
 from cms.reduced_body.source_columns import source_columns
 from cms.solvers.orientation import orientation
 from fe_models.body.beam_line import BeamLine
+from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.units import Units
 from fe_models.foundation.words import nearest, quoted
@@ -263,7 +264,7 @@ def held_dofs(where: str, frame: NodalFrame, x_station: Array, names: list[str])
     """Return six (station, component) that a nodal frame holds, (6, 2)."""
     points = np.column_stack([x_station, np.zeros((len(x_station), 2))])
     if frame.dofs is not None:
-        held = checked_dofs(frame, f"{where}: nodal frame")
+        held = checked_dofs(frame, f"{where}: nodal frame", Numbering())
         if held[:, 0].min() < 0 or held[:, 0].max() >= len(names):
             raise BodyError(f"{where}: nodal frame: dofs: expected stations 0..{len(names) - 1}, got {frame.dofs}")
         determinate_rows(points[held[:, 0]], held[:, 1], f"{where}: nodal frame")

@@ -16,7 +16,10 @@ from cms.families.rigid_modes import geometric_rigid_modes
 from cms.reduced_basis.node_weights import node_weights, weighted_rigid_modes
 from cms.reduced_body.reduced_body import BodyFrame
 from fe_models.body.fe_body import FEBody
+from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.words import nearest, quoted
 
 __all__ = [
     "FRAMES", "BuckensFrame", "Frame", "FrameCondition", "HeldFrame", "NodalFrame", "TisserandFrame",
@@ -38,7 +41,9 @@ class NodalFrame:
     at: str | None = None  #: name of the interface; None: given dofs, or six of all boundary dofs
     origin: tuple[float, float, float] | None = None  #: in mesh coordinates [m], instead of the default
     axes: Axes | None = None  #: x, y and z axis of the frame in mesh axes, orthonormal; None: the mesh axes
-    dofs: tuple[tuple[int, int], ...] | None = None  #: six of (node, component 0-5) that are statically determinate
+    #: six that are statically determinate, each (node, component): a node counted from 0 and a component 0 to 5, or its
+    #: number in the user's mesh (or "INSTANCE.number") and a component by name, "ux" to "rz"
+    dofs: tuple[tuple[int | str, int | str], ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -180,7 +185,7 @@ def nodal_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]
 def given_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]:
     """Return the dofs that the user gave, after checking that there are six and that they hold the body."""
     where = f"body {body.name!r}: nodal frame"
-    held = checked_dofs(frame, where)
+    held = checked_dofs(frame, where, body.numbering)
     rows = []
     for node, component in held:
         own = np.flatnonzero((body.dofs == (node, component)).all(axis=1))
@@ -197,11 +202,31 @@ def given_rows(body: FEBody, frame: NodalFrame) -> tuple[IntArray, sp.csr_array]
     return held, sp.csr_array(sp.vstack(rows))
 
 
-def checked_dofs(frame: NodalFrame, where: str) -> IntArray:
-    """Return the given dofs of a nodal frame, (6, 2), after checking their form."""
+def checked_dofs(frame: NodalFrame, where: str, numbering: Numbering, index: IntArray | None = None) -> IntArray:
+    """Return the given dofs of a nodal frame, (6, 2) of (node counted from 0, component), after checking their form.
+
+    Parameters
+    ----------
+    numbering
+        Says what the user's numbers are.
+    index
+        Node counted from 0 of each row of the numbering; None: the row itself.
+    """
     if frame.at is not None:
         raise BodyError(f"{where}: expected either at (an interface) or dofs, got both")
-    held = np.asarray(frame.dofs)
+    pairs: list[tuple[int | str, int | str]] = []
+    if any(len(pair) != 2 for pair in frame.dofs or ()):
+        raise BodyError(f"{where}: dofs: expected six pairs (node, component), got {frame.dofs}")
+    for node, component in frame.dofs or ():
+        if isinstance(component, str):
+            if component not in MOTION_COMPONENTS:
+                hint = nearest(component, MOTION_COMPONENTS)
+                raise BodyError(f"{where}: dofs: no component {quoted(component)}{hint}")
+            row = int(numbering.rows_of_node(f"{where}: dofs", node)[0])
+            pairs.append((row if index is None else int(index[row]), MOTION_COMPONENTS.index(component)))
+        else:
+            pairs.append((node, component))
+    held = np.asarray(pairs)
     if held.shape != (6, 2) or held.dtype.kind not in "iu" or held.min() < 0 or held[:, 1].max() > 5:
         raise BodyError(f"{where}: dofs: expected six pairs (node, component 0-5), got {frame.dofs}")
     return held.astype(np.int64)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cms.errors import BodyError
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
@@ -31,6 +32,7 @@ __all__ = [
 ]
 
 GROUND_INDEX = -1
+SAME_PLACE = 1e-9  #: distance of a node from a reference point, of the size of the body, that is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +79,13 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
         position = np.zeros(3) if marker.position is None else marker.position
         return MarkerData(index, MarkerShape(position, triad))
     choices = [interface.name for interface in body.reduced.interfaces]
+    if marker.node is not None:
+        marker = replace(marker, node=None, interface=interface_at_node(body, where, marker.node))
     if marker.interface is None:
         place = "position" if marker.address is None else marker.address.kind
         raise ModelError(
             f"{where}: a marker on the flexible body {body.name!r} needs an interface and no {place} (sensors and "
-            f"channels alone take kept nodes); choices: {', '.join(choices)}"
+            f"channels alone take these); choices: {', '.join(choices)}"
         )
     if marker.interface not in choices:
         raise ModelError(
@@ -90,6 +94,36 @@ def find_marker(system: System, where: str, marker: Marker) -> MarkerData:
         )
     shape = interface_shape(body.moved, marker.interface, is_stiffened=body.is_stiffened)
     return MarkerData(index, replace(shape, triad=shape.triad @ triad))
+
+
+def interface_at_node(body: FlexibleBody, where: str, node: int | str) -> str:
+    """Return the interface that is a node of the user's mesh: its only member, or a member at its reference point.
+
+    Raises
+    ------
+    ModelError
+        If there is no such node, or no interface is there: joints and forces need its modes and unit loads.
+    """
+    reduced = body.reduced
+    try:
+        row = int(reduced.numbering.rows_of_node(f"{where}: body {body.name!r}", node)[0])
+    except BodyError as error:
+        raise ModelError(str(error)) from error
+    tolerance = SAME_PLACE * float(np.linalg.norm(np.ptp(reduced.nodes, axis=0)))
+    alone = [each.name for each in reduced.interfaces if each.members.tolist() == [row]]
+    near = [
+        each.name
+        for each in reduced.interfaces
+        if row in each.members and np.linalg.norm(each.position - reduced.nodes[row]) <= tolerance
+    ]
+    found = alone or near
+    if not found:
+        names = ", ".join(each.name for each in reduced.interfaces) or "it has none"
+        raise ModelError(
+            f"{where}: node {node} of body {body.name!r} is no interface, and joints and forces need its static modes: "
+            f'make it one in the job ([interfaces.NAME] kind = "rigid", nodes = [{node}]), or take one of: {names}'
+        )
+    return found[0]
 
 
 def joint_markers(system: System, joint: Joint, placed: State) -> tuple[MarkerData, MarkerData]:

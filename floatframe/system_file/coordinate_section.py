@@ -5,6 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, StringConstraints, model_validator
 
+from cms.reduced_body.address import Address
 from fe_models.foundation.toml_file import Matrix3, Table, Vector3, choice
 from floatframe.bodies.coordinates import AxialAngle, AxialDistance, Coordinate, JointCoordinate, PointDistance
 from floatframe.bodies.markers import Marker
@@ -16,9 +17,11 @@ Name = Annotated[str, StringConstraints(min_length=1)]
 COORDINATES = {"axial-distance": AxialDistance, "axial-angle": AxialAngle, "point-distance": PointDistance}
 
 
-def marker_of(body: str, place: str | tuple[float, float, float] | None, triad: Any = None) -> Marker:
-    """Return a marker by interface or position; rows of the triad in the file are its axes."""
+def marker_of(body: str, place: str | Address | tuple[float, float, float] | None, triad: Any = None) -> Marker:
+    """Return a marker by interface, node or position; rows of the triad in the file are its axes."""
     axes = None if triad is None else np.array(triad).T
+    if isinstance(place, Address):
+        return Marker(body, node=place.node, triad=axes)
     if isinstance(place, str):
         return Marker(body, place, triad=axes)
     return Marker(body, position=None if place is None else np.array(place), triad=axes)

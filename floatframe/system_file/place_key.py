@@ -26,13 +26,18 @@ def mesh_number(value: Any) -> Any:
 
 
 def place_on_body(value: Any) -> Any:
-    """Return the name of an interface, or a position as three numbers."""
+    """Return the name of an interface, a position as three numbers, or the address of {node = 12}."""
     if isinstance(value, str) and value:
         return value
+    if isinstance(value, dict) and list(value) == ["node"]:
+        return address_of_table(value)
     try:
         return numbers(value)
     except ValueError:
-        raise ValueError('expected the name of an interface ("big_end") or a position [x, y, z] in the body') from None
+        raise ValueError(
+            'expected the name of an interface ("big_end") or a position [x, y, z] in the body, or '
+            "{node = 12}, a node that is an interface"
+        ) from None
 
 
 def measured_place(value: Any) -> Any:
@@ -75,7 +80,7 @@ def address_of_table(table: dict[str, Any]) -> Address:
 
 
 MeshNumber = Annotated[int | str, BeforeValidator(mesh_number)]
-PlaceOnBody = Annotated[str | Position, BeforeValidator(place_on_body)]  #: of joints and forces
+PlaceOnBody = Annotated[Any, BeforeValidator(place_on_body)]  #: of joints and forces: str, Position, or node
 MeasuredPlace = Annotated[Any, BeforeValidator(measured_place)]  #: of sensors: str, Position or Address
 NodeOrPosition = Annotated[Any, BeforeValidator(node_or_position)]  #: Position or Address
 
