@@ -7,7 +7,7 @@ import numpy as np
 
 from cms.reduced_body.reduced_body import ReducedBody
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.pictures.sensor_plots import NOTHING, panels_of
+from floatframe.pictures.sensor_plots import panels_of
 from floatframe.results.recovery import elastic_displacements
 from floatframe.results.sensors.measurement import Measurement
 from floatframe.results.trajectory import Trajectory
@@ -15,6 +15,7 @@ from floatframe.results.trajectory import Trajectory
 __all__ = ["Panel", "motion_panels", "sensor_panels"]
 
 MOST_CURVES, MOST_PANELS = 6, 14  #: in a panel, and of sensors
+SEEN = 1e-4  #: of the largest curve of a panel, below which another would lie on zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +35,9 @@ def sensor_panels(measurements: Sequence[Measurement], rows: IntArray) -> list[P
         for unit, columns in panels_of(measurement):
             curves = {name: np.asarray(measurement.columns[name], dtype=float)[rows] for name in columns}
             size = {name: largest(values) for name, values in curves.items()}
-            moving = {name: v for name, v in curves.items() if size[name] > NOTHING * max(size.values())}
+            moving = {name: v for name, v in curves.items() if size[name] > SEEN * max(size.values())}
             names = moving or {columns[-1]: curves[columns[-1]]}
-            found.append(Panel(measurement.sensor, unit, limited(names), len(names)))
+            found.append(Panel(measurement.sensor, unit, limited(names), len(curves)))
     return found[:MOST_PANELS]
 
 
@@ -49,8 +50,8 @@ def motion_panels(trajectory: Trajectory, bodies: Mapping[str, ReducedBody], row
         for k, axis in enumerate("xyz")
     }
     reach = max((float(np.ptp(values)) for values in paths.values()), default=0.0)
-    moving = {name: values for name, values in paths.items() if np.ptp(values) > 1e-6 * reach}
-    found.append(Panel("position of body frames", units.length_symbol, limited(moving), len(moving)))
+    moving = {name: values for name, values in paths.items() if np.ptp(values) > SEEN * reach}
+    found.append(Panel("position of body frames", units.length_symbol, limited(moving), len(paths)))
     elastic = {}
     for name, body in bodies.items():
         for interface in body.interfaces:
