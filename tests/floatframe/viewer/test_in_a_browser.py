@@ -12,7 +12,7 @@ from tests.floatframe.viewer.test_motion_view import SIZE, swinging
 PLACES = """(t) => {
   View.pause(); View.seek(t);
   const s = View.surfaces[0], p = new THREE.Vector3(), found = [];
-  for (let k = 0; k < s.count; k++) { p.fromArray(s.moved, 3 * k).applyMatrix4(s.body.matrix); found.push(p.toArray()); }
+  for (let k = 0; k < s.count; k++) found.push(p.fromArray(s.moved, 3 * k).applyMatrix4(s.body.matrix).toArray());
   return found;
 }"""
 SEEN = """() => {
