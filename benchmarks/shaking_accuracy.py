@@ -4,7 +4,7 @@ import numpy as np
 from pyyeti import ode, srs
 
 from floatframe.shaking.loads.levels import Level
-from floatframe.shaking.loads.pulses import pulse, synthesised
+from floatframe.shaking.loads.pulses import damped_sines, pulse, synthesised
 from floatframe.shaking.loads.random_vibration import RandomTest, random_runs
 from floatframe.shaking.loads.sine import SineTest, sweep_envelope
 from floatframe.shaking.responses.response_spectrum import octave_frequencies, shock_response_spectrum
@@ -50,6 +50,8 @@ def main() -> None:
         print(f"peak of a sweep at {rate:g} octaves a minute: {off:.1e} from ten times finer steps")
     made = synthesised(Level.of([(100, 50), (1000, 1000), (4000, 1000)]))
     print(f"history for a spectrum: {made.decibels.min():+.2f} to {made.decibels.max():+.2f} dB from its target")
+    made = damped_sines(Level.of([(100, 50), (1000, 1000), (4000, 1000)]))
+    print(f"the same of damped sines: {made.decibels.min():+.2f} to {made.decibels.max():+.2f} dB from its target")
 
 
 if __name__ == "__main__":

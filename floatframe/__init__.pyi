@@ -172,6 +172,7 @@ from .results.validity import ValidityNote as ValidityNote
 from .shaking.loads.levels import Level as Level
 from .shaking.loads.notching import ForceLimit as ForceLimit
 from .shaking.loads.notching import ResponseLimit as ResponseLimit
+from .shaking.loads.pulses import damped_sines as damped_sines
 from .shaking.loads.pulses import pulse as pulse
 from .shaking.loads.pulses import synthesised as synthesised
 from .shaking.loads.random_vibration import CrossSpectrum as CrossSpectrum
@@ -179,6 +180,7 @@ from .shaking.loads.random_vibration import RandomTest as RandomTest
 from .shaking.loads.shock import SpectrumRequest as SpectrumRequest
 from .shaking.loads.shock import TimeTest as TimeTest
 from .shaking.loads.sine import SineTest as SineTest
+from .shaking.loads.slopes import level_of_bands as level_of_bands
 from .shaking.loads.uncertainty import Uncertainty as Uncertainty
 from .shaking.responses.response_spectrum import shock_response_spectrum as shock_response_spectrum
 from .shaking.shake import NotchRequest as NotchRequest

@@ -61,6 +61,7 @@ def shake_command(
     """
     from fe_models.foundation.paths import replace_file
     from floatframe.errors import ModelError
+    from floatframe.shaking.light_record import light_record
     from floatframe.shaking.page import shake_html
     from floatframe.shaking.record import shake_csv, shake_record
     from floatframe.shaking.shake import shake
@@ -87,7 +88,10 @@ def shake_command(
     with stages() as clock, clock(f"{job.structure.name}: shaken"):
         result = shake(job)
     if json:
-        typer.echo(json_module.dumps(shake_record(result), indent=1))
+        light, _ = light_record(shake_record(result), "")
+        if "curves" in light:
+            light["curves"] = "left out here; -o NAME.json writes them into NAME.npz"
+        typer.echo(json_module.dumps(light, indent=1))
     else:
         print_result(result)
     for path in paths:
@@ -95,12 +99,30 @@ def shake_command(
         if kind == ".html":
             content = shake_html(result)
         elif kind == ".json":
-            content = json_module.dumps(shake_record(result), separators=(",", ":")) + "\n"
+            beside = path.with_suffix(".npz")
+            light, curves = light_record(shake_record(result), beside.name)
+            content = json_module.dumps(light, separators=(",", ":")) + "\n"
+            if curves:
+                beside = output_path(beside, None, ModelError, overwrite_of=inputs)
+                replace_file(beside, npz_of(curves))
+                if not json:
+                    say(f"wrote {beside} ({beside.stat().st_size / 1e6:.2f} MB): the curves of {path.name}")
         else:
             content = shake_csv(result)
         replace_file(path, content.encode())
         if not json:
             say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def npz_of(arrays: dict[str, Any]) -> bytes:
+    """Return arrays as the bytes of an .npz file."""
+    import io
+
+    import numpy as np
+
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **arrays)
+    return stream.getvalue()
 
 
 def job_of_options(

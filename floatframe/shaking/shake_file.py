@@ -17,10 +17,11 @@ from fe_models.foundation.toml_file import Table, Vector3, choice, read_toml, va
 from floatframe.errors import ModelError, SignalError, SystemFileError
 from floatframe.shaking.loads.levels import ACCELERATIONS, OF_OUTPUT, Level, read_level
 from floatframe.shaking.loads.notching import DEEPEST, ForceLimit, Limit, ResponseLimit
-from floatframe.shaking.loads.pulses import EDGE, PULSES, pulse, synthesised
+from floatframe.shaking.loads.pulses import DECAY, EDGE, PULSES, SHAPES, damped_sines, pulse, synthesised
 from floatframe.shaking.loads.random_vibration import CrossSpectrum, RandomTest
 from floatframe.shaking.loads.shock import SpectrumRequest, TimeTest
 from floatframe.shaking.loads.sine import SineTest
+from floatframe.shaking.loads.slopes import level_of_bands
 from floatframe.shaking.loads.uncertainty import Uncertainty
 from floatframe.shaking.responses.response_spectrum import KINDS
 from floatframe.shaking.shake import NotchRequest, ShakeJob
@@ -52,8 +53,17 @@ def file_beside(value: Any, info: ValidationInfo) -> Any:
 
 
 def rows_or_file(value: Any, info: ValidationInfo) -> Any:
-    """Return rows as tuples, or the path of a file."""
-    return file_beside(value, info) if isinstance(value, str) else rows_of(2)(value)
+    """Return rows as tuples, bands with levels and slopes as they are, or the path of a file."""
+    if isinstance(value, str):
+        return file_beside(value, info)
+    if isinstance(value, list) and value and all(isinstance(row, list) and len(row) == 3 for row in value):
+        for number, (first, last, level) in enumerate(value, start=1):
+            if not (is_number(first) and is_number(last) and (is_number(level) or isinstance(level, str))):
+                raise ValueError(
+                    f'band {number}: expected [from Hz, to Hz, level or "slope dB/oct"], got {[first, last, level]!r}'
+                )
+        return tuple(tuple(row) for row in value)
+    return rows_of(2)(value)
 
 
 def rows_of(length: int) -> Callable[[Any], tuple[tuple[float, ...], ...]]:
@@ -77,9 +87,9 @@ def is_number(value: Any) -> bool:
 
 Number = float
 Row2 = tuple[Number, Number]
-Rows = Annotated[tuple[Row2, ...] | Path, BeforeValidator(rows_or_file)]
+Rows = Annotated[Any, BeforeValidator(rows_or_file)]  # rows of two numbers, bands of three entries, or a path
 Names = Annotated[tuple[str, ...], BeforeValidator(as_tuple)]
-ROWS = "rows [Hz, level], or the path of a file with two columns"
+ROWS = 'rows [Hz, level], bands [from Hz, to Hz, level or "slope dB/oct"], or the path of a file with two columns'
 
 
 class BaseSection(Table):
@@ -195,6 +205,10 @@ class ShockSection(Table):
         None, description="rows [Hz, acceleration] of a shock response spectrum to be met, or a file"
     )
     Q: float = Field(10.0, description="a number above 0.5, of that spectrum")
+    shapes: choice("shapes", lambda: tuple(SHAPES)) = Field(  # type: ignore[valid-type]
+        "wavelets", description=f"what the history of a spectrum is made of, one of {', '.join(SHAPES)}"
+    )
+    decay: float | None = Field(None, description="a ratio from 0.005 to 0.5, of damped sines")
     file: Annotated[Path, BeforeValidator(file_beside)] | None = Field(None, description="a file with a time history")
     column: str | None = Field(None, description="the name of the acceleration in the file")
     unit: str = Field("g", description="the unit of the acceleration")
@@ -206,6 +220,8 @@ class ShockSection(Table):
         ways = [key for key in ("pulse", "srs", "file") if getattr(self, key) is not None]
         if len(ways) != 1:
             raise ValueError(f"expected one of pulse, srs, file, got {', '.join(ways) or 'none'}")
+        if self.decay is not None and (self.srs is None or self.shapes != "damped-sines"):
+            raise ValueError('decay belongs to an srs with shapes = "damped-sines"')
         if self.pulse is not None and (self.amplitude is None or self.duration is None):
             raise ValueError("a pulse needs amplitude and duration")
         return self
@@ -385,8 +401,11 @@ def damping_of(section: DampingSection) -> Damping:
 
 
 def level_of(rows: Any, unit: str, where: str) -> Level:
-    """Return a level of rows or of a file."""
-    return read_level(rows, unit, where) if isinstance(rows, Path) else Level.of(rows, unit, where)
+    """Return a level of rows, of bands or of a file."""
+    if isinstance(rows, Path):
+        return read_level(rows, unit, where)
+    is_bands = bool(rows) and len(rows[0]) == 3
+    return level_of_bands(rows, unit, where) if is_bands else Level.of(rows, unit, where)
 
 
 def random_of(name: str, section: RandomSection) -> RandomTest:
@@ -417,9 +436,18 @@ def shock_of(name: str, section: ShockSection, spectra: SpectrumRequest) -> Time
         t, a = pulse(section.pulse, section.amplitude, section.duration, edge=section.edge)
         words = f"{section.pulse} of {section.amplitude:g} {section.unit}, {1e3 * section.duration:g} ms"
     elif section.srs is not None:
-        synthesis = synthesised(level_of(section.srs, section.unit, f"{where}: srs"), section.Q, section.duration)
+        target = level_of(section.srs, section.unit, f"{where}: srs")
+        if section.shapes == "damped-sines":
+            decay = DECAY if section.decay is None else section.decay
+            synthesis = damped_sines(target, section.Q, section.duration, decay=decay)
+        else:
+            synthesis = synthesised(target, section.Q, section.duration)
         t, a = synthesis.time, synthesis.acceleration
-        words = f"wavelets made for a spectrum of Q = {section.Q:g}"
+        least, most = float(synthesis.decibels.min()), float(synthesis.decibels.max())
+        words = (
+            f"{section.shapes.replace('-', ' ')} made for a spectrum of Q = {section.Q:g}, met within {least:+.2f} to "
+            f"{most:+.2f} dB"
+        )
     else:
         assert section.file is not None
         signals = read_signals(section.file)

@@ -17,7 +17,7 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.shaking.structure.model import STANDARD_GRAVITY, gravity_in
 
-__all__ = ["ACCELERATIONS", "DENSITIES", "STROKES", "Level", "in_model", "level_rms", "read_level"]
+__all__ = ["ACCELERATIONS", "DENSITIES", "STROKES", "Level", "in_model", "known_unit", "level_rms", "read_level"]
 
 ACCELERATIONS = {  # unit -> m/s² or rad/s²
     "g": STANDARD_GRAVITY,

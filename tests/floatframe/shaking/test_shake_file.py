@@ -13,6 +13,7 @@ import cms
 import floatframe as ff
 from floatframe.cli.app import app
 from floatframe.errors import SystemFileError
+from floatframe.shaking.light_record import light_record, size_of_curves
 from floatframe.shaking.page import shake_html
 from floatframe.shaking.record import shake_csv, shake_record
 from tests.bodies import bar
@@ -122,6 +123,56 @@ def test_record_and_table_tell_the_runs_in_their_units(result):
     assert record["modes"][-1]["cumulative"][2] <= 1.0
     assert json.loads(json.dumps(record, allow_nan=False)) == record
     assert len(shake_csv(result).splitlines()) == len(record["table"]) + 1
+
+
+def back_in(light, arrays):
+    """The record with its curves put back."""
+    if isinstance(light, dict) and set(light) == {"array", "shape"}:
+        assert list(arrays[light["array"]].shape) == light["shape"]
+        return arrays[light["array"]].tolist()
+    if isinstance(light, dict):
+        return {key: back_in(value, arrays) for key, value in light.items() if key != "curves"}
+    return [back_in(each, arrays) for each in light] if isinstance(light, list) else light
+
+
+def test_a_long_record_has_its_curves_in_a_file_of_arrays(folder, result, monkeypatch):
+    record = shake_record(result)
+    n = size_of_curves(record)
+    monkeypatch.setattr("floatframe.shaking.light_record.MOST_NUMBERS", n)
+    assert light_record(record, "a.npz") == (record, {})  # few numbers stay
+    monkeypatch.setattr("floatframe.shaking.light_record.MOST_NUMBERS", 1000)
+    found = CliRunner().invoke(app, ["shake", str(folder / "bar.toml"), "-o", str(folder / "long.json")])
+    assert found.exit_code == 0, found.output
+    assert "long.npz" in found.output
+    light = json.loads((folder / "long.json").read_text())
+    assert light["curves"] == {"file": "long.npz", "key": "array", "missing": "NaN"}
+    assert light["random"][0]["densities"]["array"] == "random/0/densities"
+    assert light["table"] == record["table"]
+    with np.load(folder / "long.npz") as arrays:
+        assert back_in(light, arrays) == record
+    assert (folder / "long.json").stat().st_size < 0.2 * len(json.dumps(record))
+
+
+def test_a_file_takes_bands_with_slopes_and_damped_sines(folder):
+    text = (folder / "bar.toml").read_text()
+    text = text.replace('"level.csv"', '[[20, 80, "+3 dB/oct"], [80, 350, 0.04], [350, 2000, "-3 dB/oct"]]')
+    old = 'pulse = "half-sine"\namplitude = 20.0\nduration = 0.011'
+    new = 'srs = [[100, 300, "+6 dB/oct"], [300, 1000, 50]]\nshapes = "damped-sines"\ndecay = 0.04'
+    assert old in text
+    path = folder / "slopes.toml"
+    path.write_text(text.replace(old, new))
+    job = ff.read_shake(path)
+    assert_allclose(job.random[0].level.at(np.array([20.0, 100, 2000])), [0.01, 0.04, 0.007], rtol=0.01)
+    shock = next(test for test in job.shock if test.name == "pulse")
+    assert_allclose(shock.synthesis.target[0], 50 / 3 ** (6 / 20 / np.log10(2)), rtol=1e-12)
+    assert np.abs(shock.synthesis.decibels).max() < 1.0
+    assert shock.words.startswith("damped sines made for a spectrum of Q = 10, met within -")
+    for bad, words in ((('"damped-sines"\ndecay', '"wavelets"\ndecay'), "decay belongs to an srs"),
+                       (('"+6 dB/oct"', '"+6 dB"'), "expected a slope"),
+                       (('[300, 1000, 50]', '[300, 1000, true]'), "band 2: expected")):  # fmt: skip
+        path.write_text(text.replace(old, new).replace(*bad))
+        with pytest.raises((SystemFileError, ff.ModelError), match=words):
+            ff.read_shake(path)
 
 
 def test_a_transient_takes_accelerations_and_forces_of_a_file(result):

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from floatframe.errors import ModelError
 from floatframe.shaking.loads.levels import Level
-from floatframe.shaking.loads.pulses import pulse, synthesised
+from floatframe.shaking.loads.pulses import damped_sines, pulse, synthesised
 from floatframe.shaking.loads.shock import SpectrumRequest, TimeTest, time_runs
 from floatframe.shaking.loads.uncertainty import Uncertainty
 from floatframe.shaking.responses.response_spectrum import shock_response_spectrum
@@ -85,6 +85,42 @@ def test_a_history_for_a_spectrum_meets_it_and_leaves_nothing():
     assert abs(run.velocity_left[0]) < 1e-3 * largest
     again = shock_response_spectrum(made.acceleration, made.time[1], made.frequencies, 10.0)
     assert_allclose(again, made.reached, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("rows", "decay"), [([(100, 50), (1000, 1000), (4000, 1000)], 0.05), ([(20, 5), (200, 100), (500, 100)], 0.03)]
+)
+def test_damped_sines_meet_a_spectrum_and_leave_neither_velocity_nor_displacement(rows, decay):
+    from pyyeti import srs
+
+    target = Level.of(rows)
+    made = damped_sines(target, 10.0, decay=decay)
+    assert np.abs(made.decibels).max() < 0.75
+    t, a = made.time, made.acceleration
+    fine = np.linspace(0, t[-1], 4 * (len(t) - 1) + 1)  # straight between the samples, for a second program
+    f = np.geomspace(target.first, target.last, 25)
+    other = srs.srs(np.interp(fine, t, a), 1 / fine[1], f, 10.0, rolloff="none", time="total", parallel="no")
+    assert np.abs(20 * np.log10(other / target.at(f))).max() < 1.0
+    h = t[1]
+    v = np.concatenate([[0], np.cumsum(h * (a[1:] + a[:-1]) / 2)])
+    x = np.concatenate([[0], np.cumsum(h * v[:-1] + h**2 * (a[:-1] / 3 + a[1:] / 6))])
+    assert abs(v[-1]) < 1e-10 * np.abs(v).max()
+    assert abs(x[-1]) < 1e-9 * np.abs(x).max()
+    assert abs(a[-1]) < 1e-12 * np.abs(a).max()
+    rise = np.abs(a).argmax()
+    assert rise < 0.2 * len(a)  # it rings down
+    run = time_runs(masses([300.0], 0.05), TimeTest("p", t, a * G, ("z",), kind="shock"))[0]
+    assert abs(run.displacement_left[0]) < 1e-6 * np.abs(x).max() * G
+
+
+def test_damped_sines_of_no_use_are_refused():
+    target = Level.of([(10, 1.0), (100, 10.0)])
+    with pytest.raises(ModelError, match=r"less than three cycles of the first frequency, 10 Hz; expected 0\.3 s"):
+        damped_sines(target, 10.0, 0.1)
+    with pytest.raises(ModelError, match=r"decay: expected a ratio from 0\.005 to 0\.5, got 2"):
+        damped_sines(target, 10.0, decay=2.0)
+    with pytest.raises(ModelError, match="too many; take a shorter duration"):
+        damped_sines(Level.of([(0.001, 1.0), (10000, 10.0)]))
 
 
 def test_a_time_too_short_for_a_spectrum_is_refused():
