@@ -1,0 +1,153 @@
+"""From wheels, track and laws to the numbers that the compiled law reads."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.checked_values import number
+from floatframe.errors import ModelError
+from floatframe.rails.contact_search import Pair, quasi_elastic
+from floatframe.rails.contact_table import Steel, TableGrid, contact_table, numbers_of_table
+from floatframe.rails.creep_names import CREEP_LAWS, NORMAL_LAWS
+from floatframe.rails.splines import coefficients
+from floatframe.rails.track import Track
+
+__all__ = ["ContactLaws", "Wheel", "law_numbers", "output_names", "shift_off_the_rail"]
+
+PARTS = ("tread", "flange")
+
+
+@dataclass(frozen=True)
+class ContactLaws:
+    """How wheel and rail press and rub.
+
+    Raises
+    ------
+    ModelError
+        If a law is unknown or a number impossible.
+    """
+
+    normal: str = "hertz"  #: by the depth of penetration, or "constraint": the treads are held on the rails
+    creep: str = "fastsim"  #: kalker, kalker-saturated, polach or fastsim
+    friction: float = 0.3  #: mu
+    shear_modulus: float = 8.2e10  #: G of wheel and rail [Pa]
+    poisson: float = 0.28
+    smoothing: float = 2e-5  #: eps of the quasi-elastic contact [m]
+    damping: float = 0.0  #: N = K d^(3/2) (1 + damping d_dot) [s/m]
+    low_speed: float = 0.05  #: v_0: creepages are over sqrt(v² + v_0²) [m/s]
+    strips: int = 12  #: FASTSIM: cells along and strips across
+    polach: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 0.0)  #: k_A, k_S, A and B [s/m] of its friction
+
+    def __post_init__(self) -> None:
+        where = "contact of wheel and rail"
+        for name, choices in (("normal", NORMAL_LAWS), ("creep", tuple(CREEP_LAWS))):
+            if getattr(self, name) not in choices:
+                raise ModelError(f"{where}: {name}: expected one of {', '.join(choices)}, got {getattr(self, name)!r}")
+        for name in ("friction", "shear_modulus", "smoothing", "low_speed"):
+            number(f"{where}: {name}", getattr(self, name), above=0.0)
+        number(f"{where}: damping", self.damping, at_least=0.0)
+        if not 0 <= number(f"{where}: poisson", self.poisson) <= 0.5:
+            raise ModelError(f"{where}: poisson: expected 0 to 0.5, got {self.poisson:g}")
+        if self.shear_modulus < 1e9:
+            raise ModelError(f"{where}: shear_modulus: {self.shear_modulus:g} Pa: expected about 8e10 for steel, in pascal")
+        if not (isinstance(self.strips, int) and 4 <= self.strips <= 200):
+            raise ModelError(f"{where}: strips: expected an integer between 4 and 200, got {self.strips!r}")
+        if len(self.polach) != 4 or not all(np.isfinite(self.polach)):
+            raise ModelError(f"{where}: polach: expected four numbers k_A, k_S, A and B, got {self.polach!r}")
+        object.__setattr__(self, "polach", tuple(float(each) for each in self.polach))
+
+
+class Wheel(NamedTuple):
+    """One wheel: its side of the track, and where it is on the axle."""
+
+    side: int  #: +1 on the left rail, -1 on the right one
+    arm: float  #: from the marker to its running circle along the axle, to the left [m]
+    pair: Pair
+
+
+@lru_cache(maxsize=32)
+def shift_off_the_rail(pair: Pair) -> float:
+    """Return the outward shift at which a wheel counts as off the track [m].
+
+    With a flange: where it has climbed to within 8 mm of its height; without: where its middle leaves the head.
+    """
+    if not pair.has_flange:
+        return float(pair.head.y[-1] - pair.offset)
+    u = np.linspace(0.0, 0.05, 251)
+    q = quasi_elastic(pair, u).q
+    climbed = np.flatnonzero(q > float(pair.wheel.z.max()) - 0.008)
+    return float(u[climbed[0]]) if len(climbed) else float(u[-1])
+
+
+def grid_of(pair: Pair) -> TableGrid:
+    """Return the grid of the table of a pair: to where the wheel is off the rail."""
+    most = shift_off_the_rail(pair) + 0.002
+    least = -max(0.03, most)
+    return TableGrid(v=(least, most, int(np.ceil((most - least) / 2e-4)) + 1))
+
+
+def law_numbers(wheels: Sequence[Wheel], track: Track, laws: ContactLaws) -> Array:
+    """Return the numbers of the law `wheels_on_rails`: head, wheels, cells of the track, irregularities, tables."""
+    cells = track.cells
+    n_head, n_wheel = 20, 6
+    cells_at = n_head + n_wheel * len(wheels)
+    irregular_at = cells_at + cells.size
+    deviations = track.irregularities
+    if deviations is None:
+        signals, first, step, n = np.zeros(0), 0.0, 1.0, 0
+    else:
+        seen = deviations.seen_by_wheels(min(each.pair.radius for each in wheels))
+        signals = np.column_stack([coefficients(v) for v in (seen.left_y, seen.left_z, seen.right_y, seen.right_z)]).ravel()
+        first, step, n = float(seen.s[0]), float(seen.s[1] - seen.s[0]), len(seen.s)
+    tables_at = irregular_at + len(signals)
+    tables: list[Array] = []
+    places: dict[int, int] = {}
+    rows = []
+    for each in wheels:
+        if id(each.pair) not in places:
+            places[id(each.pair)] = tables_at + sum(len(one) for one in tables)
+            steel = Steel(laws.shear_modulus, laws.poisson)
+            tables.append(
+                numbers_of_table(
+                    contact_table(each.pair, parts=PARTS if each.pair.has_flange else ("all",),
+                                  smoothing=laws.smoothing, steel=steel, grid=grid_of(each.pair))
+                )  # fmt: skip
+            )
+        rows.append([
+            each.side, each.arm, 0.5 * each.pair.running_circles, each.pair.radius, places[id(each.pair)],
+            shift_off_the_rail(each.pair),
+        ])  # fmt: skip
+    options = {"polach": [*laws.polach, 0.0], "fastsim": [laws.strips, laws.strips, 0, 0, 0]}.get(laws.creep, [0.0] * 5)
+    head = [
+        len(wheels), n_parts_of(wheels), CREEP_LAWS[laws.creep], *options, laws.shear_modulus, laws.friction, laws.low_speed,
+        laws.damping, laws.normal == "constraint", track.start[2], cells_at, len(cells), irregular_at, first, step, n,
+    ]  # fmt: skip
+    return np.concatenate([np.array(head, dtype=float), np.ravel(rows), cells.ravel(), signals, *tables])
+
+
+def n_parts_of(wheels: Sequence[Wheel]) -> int:
+    """Return how many parts the wheels have; all the same."""
+    found = {len(PARTS) if each.pair.has_flange else 1 for each in wheels}
+    if len(found) > 1:
+        raise ModelError("wheels of an axle: expected both with a flange or both without one")
+    return found.pop()
+
+
+def output_names(wheels: Sequence[Wheel], wheel_outputs: Sequence, contact_outputs: Sequence) -> tuple[list[str], list[str]]:
+    """Return names and units of all outputs, in the order in which the law writes them."""
+    names, units = [], []
+    parts = PARTS[: n_parts_of(wheels)]
+    for each in wheels:
+        prefix = "" if len(wheels) == 1 else ("left_" if each.side > 0 else "right_")
+        for name, unit in wheel_outputs:
+            names.append(prefix + name)
+            units.append(unit)
+        for part in parts:
+            for name, unit in contact_outputs:
+                names.append(f"{prefix}{part}_{name}")
+                units.append(unit)
+    return [*names, "off_track", "energy", "power_lost"], [*units, "m", "J", "W"]

@@ -1,0 +1,111 @@
+"""Contact over shift, roll and yaw as a table: what a wheel needs in every step, found once per pair of profiles.
+
+Each part of the wheel (tread, flange) has for every v, phi and sin² psi the quasi-elastic contact, Hertz's ellipse and
+Kalker's coefficients; v = u + r_0 sin(phi) is the shift of the wheel where it meets the rail, so that a roll only tilts the
+profile. Over v and phi they are cubic B-splines, over sin² psi a parabola: twice differentiable in all.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.checked_values import number
+from floatframe.errors import ModelError
+from floatframe.rails.contact_search import Pair, QuasiElastic, quasi_elastic
+from floatframe.rails.hertz import ellipse
+from floatframe.rails.kalker import kalker_coefficients
+from floatframe.rails.splines import coefficients
+
+__all__ = ["FIELDS", "ContactTable", "Steel", "TableGrid", "contact_table", "numbers_of_table"]
+
+#: of each part: depth at h = 0, dq/du, lever x over sin psi, levers y and z, rolling radius, Hertz's stiffness, a and b of
+#: one newton, Kalker's coefficients
+FIELDS = ("q", "slope", "x", "y", "z", "radius", "stiffness", "a_1", "b_1", "c11", "c22", "c23", "c33")
+
+FAR = 0.003  #: height of a part above the rail from which on the table goes on unchanged [m]
+
+
+class Steel(NamedTuple):
+    """Of wheel and rail alike."""
+
+    shear_modulus: float = 8.2e10  #: G [Pa]
+    poisson: float = 0.28
+
+
+@dataclass(frozen=True)
+class TableGrid:
+    """Where the table is known; beyond, the values at its edge hold."""
+
+    v: tuple[float, float, int] = (-0.03, 0.015, 226)  #: least, largest [m], number of points
+    roll: tuple[float, float, int] = (-0.016, 0.016, 9)  #: [rad]
+    yaw: float = 0.04  #: largest [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTable:
+    """Values at the points of the grid, (n_parts, n_v, n_roll, 3, fields)."""
+
+    grid: TableGrid
+    values: Array
+
+
+def contact_table(
+    pair: Pair, *, parts: tuple[str, ...] = ("tread", "flange"), smoothing: float = 2e-5, steel: Steel | None = None,
+    grid: TableGrid | None = None,
+) -> ContactTable:  # fmt: skip
+    """Return the table of a wheel on its rail; of equal arguments the one made before.
+
+    Raises
+    ------
+    ModelError
+        If the smoothing is no height of micrometres.
+    """
+    smoothing = number("contact_table: smoothing", smoothing, above=0.0)
+    if not 1e-7 <= smoothing <= 1e-3:
+        raise ModelError(f"contact_table: smoothing: expected a height between 1e-7 and 1e-3 m, got {smoothing:g} m")
+    return made_once(pair, parts, smoothing, steel or Steel(), grid or TableGrid())
+
+
+@lru_cache(maxsize=32)
+def made_once(pair: Pair, parts: tuple[str, ...], smoothing: float, steel: Steel, grid: TableGrid) -> ContactTable:
+    """Return the table, made when it is first asked for."""
+    v, roll = np.linspace(*grid.v), np.linspace(*grid.roll)
+    sines = np.sqrt(np.array([0.0, 0.5, 1.0])) * np.sin(grid.yaw)
+    values = np.empty((len(parts), len(v), len(roll), 3, len(FIELDS)))
+    modulus = steel.shear_modulus / (1 - steel.poisson)
+    for k, part in enumerate(parts):
+        for i, phi in enumerate(roll):
+            for j, sine in enumerate(sines):
+                yaw = float(np.arcsin(sine)) if sine else 1e-6  # x over sin psi has a limit at zero
+                u = v - pair.radius * np.sin(phi)
+                found = near_the_rail(quasi_elastic(pair, u, roll=float(phi), yaw=yaw, smoothing=smoothing, part=part))
+                cos = 1 / np.sqrt(1 + found.slope**2)
+                shape = ellipse(0.5 * cos / found.radius, 0.5 * np.maximum(found.bend, 0.05), modulus)
+                values[k, :, i, j, :9] = np.column_stack([
+                    found.q, found.slope, found.x / np.sin(yaw), found.y, found.z, found.radius,
+                    shape.stiffness, shape.a_1, shape.b_1,
+                ])  # fmt: skip
+                values[k, :, i, j, 9:] = kalker_coefficients(shape.ratio, steel.poisson).T
+    return ContactTable(grid, values)
+
+
+def near_the_rail(found: QuasiElastic) -> QuasiElastic:
+    """Return a contact that goes on unchanged where the part is more than `FAR` above the rail, or beside it."""
+    near = np.flatnonzero(found.q > -FAR)
+    if not len(near):
+        raise ModelError("contact_table: a part of the wheel comes nowhere near the rail: does the profile fit the gauge?")
+    rows = near[np.clip(np.searchsorted(near, np.arange(len(found.q))), 0, len(near) - 1)]
+    return QuasiElastic(*(values[rows] for values in found))
+
+
+def numbers_of_table(table: ContactTable) -> Array:
+    """Return the table as the law reads it: sizes, then coefficients (n_v + 2, n_roll + 2, 3, parts x fields)."""
+    (v_0, v_1, n_v), (r_0, r_1, n_r) = table.grid.v, table.grid.roll
+    c = coefficients(coefficients(table.values, 1), 2)
+    c = np.moveaxis(c, 0, 3)  # parts beside fields
+    c = c.reshape(*c.shape[:3], -1)
+    head = [n_v, v_0, (v_1 - v_0) / (n_v - 1), n_r, r_0, (r_1 - r_0) / (n_r - 1), np.sin(table.grid.yaw) ** 2, c.shape[3]]
+    return np.concatenate([head, c.ravel()])

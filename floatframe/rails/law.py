@@ -1,0 +1,279 @@
+"""The law of wheels on rails: from the motion of a marker and the numbers of the element to its wrench, compiled.
+
+For each wheel, with side = +1 on the left and -1 on the right, outward = side · left:
+
+(1)  W = r + side c A_y, the centre of the wheel on its axle; place s on the track, axes t, n, b there
+(2)  u = side (W - o)·n - half the distance of the running circles - side δy(s),  h = (W - o)·b - r_0 - δz(s),
+     sin(roll) = a·b and sin(yaw) = -a·t of the outward axle a; v = u + r_0 sin(roll), the shift at the rail
+(3)  contact of each part from the table; depth d = (q - h) cos(angle)
+(4)  N = K d^(3/2) (1 + damping d_dot) where d > 0, or from the multiplier of 0 = h - q
+(5)  at P = W + x t + side y n + z b: creepages of v + omega x (P - r), creep forces by the law chosen
+(6)  force N (b cos - outward sin) + F_x t + F_y e_y, moment about the marker of the force at P and M about the normal
+"""
+
+import numba
+import numpy as np
+
+from floatframe.rails.creep_laws import creep_force
+from floatframe.rails.splines import basis, basis_slopes, cell
+
+__all__ = ["CONTACT_OUTPUTS", "HEAD", "WHEEL_HEAD", "WHEEL_OUTPUTS", "wheels_on_rails"]
+
+#: numbers at the beginning of the data
+HEAD = (
+    "n_wheels", "n_parts", "creep", "option_0", "option_1", "option_2", "option_3", "option_4", "shear_modulus", "friction",
+    "low_speed", "damping", "is_constraint", "height", "cells_at", "n_cells", "irregular_at", "irregular_from",
+    "irregular_step", "irregular_n",
+)  # fmt: skip
+#: then for each wheel
+WHEEL_HEAD = ("side", "arm", "half", "radius", "table_at", "u_off")
+N_HEAD, N_WHEEL, N_FIELDS, N_CELL = len(HEAD), len(WHEEL_HEAD), 13, 8
+
+#: outputs of each wheel: name, unit
+WHEEL_OUTPUTS = (
+    ("shift", "m"), ("N", "N"), ("Q", "N"), ("Y", "N"), ("Y_over_Q", "1"), ("wear", "N"), ("s", "m"), ("off", "m"),
+)  # fmt: skip
+#: outputs of each part of a wheel in contact
+CONTACT_OUTPUTS = (
+    ("N", "N"), ("angle", "rad"), ("radius", "m"), ("a", "m"), ("b", "m"), ("xi", "1"), ("eta", "1"), ("spin", "1/m"),
+    ("Fx", "N"), ("Fy", "N"), ("M", "N m"), ("depth", "m"),
+)  # fmt: skip
+GAUSS_X = np.polynomial.legendre.leggauss(4)[0]
+GAUSS_W = np.polynomial.legendre.leggauss(4)[1]
+
+
+@numba.njit(cache=True)
+def along_cell(data, at, x, y):
+    """Return how far a point is ahead of the beginning of a cell, along its tangent there."""
+    return (x - data[at + 1]) * np.cos(data[at + 3]) + (y - data[at + 2]) * np.sin(data[at + 3])
+
+
+@numba.njit(cache=True)
+def place_on_track(data, x, y):
+    """Return s, origin (x, y), heading, cant angle and its slope, curvature of the track beside a point."""
+    cells, n = int(data[14]), int(data[15])
+    best, near = 1e300, 0
+    for i in range(n):
+        dx, dy = x.real - data[cells + N_CELL * i + 1], y.real - data[cells + N_CELL * i + 2]
+        if dx * dx + dy * dy < best:
+            best, near = dx * dx + dy * dy, i
+    while near > 0 and along_cell(data, cells + N_CELL * near, x, y).real < 0:
+        near -= 1
+    while near < n - 1 and along_cell(data, cells + N_CELL * (near + 1), x, y).real >= 0:
+        near += 1
+    at = cells + N_CELL * near
+    k_0, slope, psi_0 = data[at + 4], data[at + 5], data[at + 3]
+    d = along_cell(data, at, x, y)
+    ox = 0 * d
+    oy = 0 * d
+    psi = 0 * d + psi_0
+    for _ in range(4):  # (point - origin)·t = 0 by Newton; quadratic, from an error of curvature times offset
+        ox = 0 * d + data[at + 1]
+        oy = 0 * d + data[at + 2]
+        for i in range(4):
+            sigma = 0.5 * d * (GAUSS_X[i] + 1)
+            angle = psi_0 + k_0 * sigma + 0.5 * slope * sigma * sigma
+            ox = ox + 0.5 * d * GAUSS_W[i] * np.cos(angle)
+            oy = oy + 0.5 * d * GAUSS_W[i] * np.sin(angle)
+        psi = psi_0 + k_0 * d + 0.5 * slope * d * d
+        c, s = np.cos(psi), np.sin(psi)
+        ahead = (x - ox) * c + (y - oy) * s
+        if k_0 == 0.0 and slope == 0.0:
+            d = d + ahead
+            ox, oy = ox + ahead * c, oy + ahead * s
+            break
+        beside = (y - oy) * c - (x - ox) * s
+        k = k_0 + slope * d
+        step = ahead / (1 - k * beside)
+        d = d + step
+        # the origin of the next round, so that the last step is in it
+        ox, oy = ox + step * c, oy + step * s
+    psi = psi_0 + k_0 * d + 0.5 * slope * d * d
+    return data[at] + d, ox, oy, psi, data[at + 6] + data[at + 7] * d, k_0 + slope * d
+
+
+@numba.njit(cache=True)
+def deviation(data, signal, s):
+    """Return a deviation of the rails at s and its slope: signals left y, left z, right y, right z."""
+    at, n = int(data[16]), int(data[19])
+    if n == 0:
+        return 0 * s, 0 * s
+    i, t = cell(s, data[17], data[18], n)
+    w0, w1, w2, w3 = basis(t)
+    v0, v1, v2, v3 = basis_slopes(t)
+    at = at + 4 * i + signal
+    value = w0 * data[at] + w1 * data[at + 4] + w2 * data[at + 8] + w3 * data[at + 12]
+    slope = (v0 * data[at] + v1 * data[at + 4] + v2 * data[at + 8] + v3 * data[at + 12]) / data[18]
+    if (i == 0 and t.real == 0.0) or (i == n - 2 and t.real == 1.0):
+        slope = 0 * slope
+    return value, slope
+
+
+@numba.njit(cache=True)
+def contact_fields(data, table, part, v, roll, sine2, field):
+    """Write the fields of one part at a shift v = u + r_0 roll, roll and squared sine of yaw."""
+    n_v, n_r, n_f = int(data[table]), int(data[table + 3]), int(data[table + 7])
+    i, t = cell(v, data[table + 1], data[table + 2], n_v)
+    j, q = cell(roll, data[table + 4], data[table + 5], n_r)
+    wu = basis(t)
+    wr = basis(q)
+    e = sine2 / data[table + 6]
+    if e.real > 1:
+        e = 0 * e + 1
+    y0, y1, y2 = (1 - e) * (1 - 2 * e), 4 * e * (1 - e), e * (2 * e - 1)
+    for f in range(N_FIELDS):
+        field[f] = 0 * v
+    start = table + 8 + part * N_FIELDS
+    for a in range(4):
+        for b in range(4):
+            w = wu[a] * wr[b]
+            at = start + ((i + a) * (n_r + 2) + j + b) * 3 * n_f
+            w0, w1, w2 = w * y0, w * y1, w * y2
+            for f in range(N_FIELDS):
+                field[f] += w0 * data[at + f] + w1 * data[at + n_f + f] + w2 * data[at + 2 * n_f + f]
+
+
+@numba.njit(cache=True)
+def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Write the wrench of all wheels of the element on its marker, see the module docstring."""
+    n_parts = int(data[1])
+    law, options = int(data[2]), data[3:8]
+    G, mu, low_speed, damping = data[8], data[9], data[10], data[11]
+    is_constraint = data[12] == 1.0
+    n_w_out, n_c_out = 8, 12
+    rx, ry, rz = x[0, 0], x[0, 1], x[0, 2]
+    ax, ay, az = x[0, 4], x[0, 7], x[0, 10]  # the axle, to the left
+    vx, vy, vz = x[0, 12], x[0, 13], x[0, 14]
+    ox_, oy_, oz_ = x[0, 15], x[0, 16], x[0, 17]
+    zero = 0 * (rx + vx + (lam[0] if is_constraint else 0.0))
+    field = np.empty(N_FIELDS, dtype=x.dtype)
+    energy = zero
+    lost = zero
+    worst = zero - 1.0
+    for wheel in range(int(data[0])):
+        at = N_HEAD + wheel * N_WHEEL
+        side, arm, half, radius, table, u_off = data[at], data[at + 1], data[at + 2], data[at + 3], int(data[at + 4]), data[at + 5]
+        wx, wy, wz = rx + arm * ax, ry + arm * ay, rz + arm * az
+        s, cx, cy, psi, cant, k = place_on_track(data, wx, wy)
+        c, sn = np.cos(psi), np.sin(psi)
+        cc, cs = np.cos(cant), np.sin(cant)
+        # t = (c, sn, 0), n = (-sn cc, c cc, -cs), b = (-sn cs, c cs, cc)
+        nx, ny, nz = -sn * cc, c * cc, -cs
+        bx, by, bz = -sn * cs, c * cs, cc
+        dx, dy, dz = wx - cx, wy - cy, wz - data[13]
+        beside = dx * nx + dy * ny + dz * nz
+        signal = 0 if side > 0 else 2
+        off_y, slope_y = deviation(data, signal, s)
+        off_z, slope_z = deviation(data, signal + 1, s)
+        stretch = 1 / (1 - k * beside)  # ds by way along the rail
+        slope_y, slope_z = slope_y * stretch, slope_z * stretch
+        u = side * (beside - off_y) - half
+        h = dx * bx + dy * by + dz * bz - radius - off_z
+        roll = side * (ax * bx + ay * by + az * bz)
+        sine = -side * (ax * c + ay * sn)
+        v = u + radius * roll  # the shift at the height of the rail
+        speed = vx * c + vy * sn
+        ahead = 1.0 if speed.real >= 0 else -1.0
+        V = np.sqrt(speed * speed + low_speed * low_speed)
+        first = wheel * (n_w_out + n_parts * n_c_out)
+        N_all = zero
+        Q = zero
+        Y = zero
+        wear = zero
+        for part in range(n_parts):
+            contact_fields(data, table, part, v, roll, sine * sine, field)
+            slope = field[1]
+            cos = 1 / np.sqrt(1 + slope * slope)
+            sin = slope * cos
+            depth = (field[0] - h) * cos
+            # the point of contact, from the marker
+            x_c, y_c, z_c = field[2] * sine, side * field[3], field[4]
+            px = arm * ax + x_c * c + y_c * nx + z_c * bx
+            py = arm * ay + x_c * sn + y_c * ny + z_c * by
+            pz = arm * az + y_c * nz + z_c * bz
+            ux = vx + oy_ * pz - oz_ * py
+            uy = vy + oz_ * px - ox_ * pz
+            uz = vz + ox_ * py - oy_ * px
+            # normal of the contact (into the wheel) and the direction across
+            mx, my, mz = bx * cos - side * nx * sin, by * cos - side * ny * sin, bz * cos - side * nz * sin
+            ex, ey, ez = nx * cos + side * bx * sin, ny * cos + side * by * sin, nz * cos + side * bz * sin
+            N = zero
+            if is_constraint and part == 0:
+                g[wheel] = h - field[0]
+                N = lam[wheel] / cos
+            elif depth.real > 0:
+                N = field[6] * depth * np.sqrt(depth)
+                energy += 0.4 * N * depth
+                if damping > 0:
+                    factor = 1 - damping * (ux * mx + uy * my + uz * mz)
+                    if factor.real < 0:
+                        factor = 0 * factor
+                    N = N * factor
+            out = first + n_w_out + part * n_c_out
+            seen[out + 1] = np.arctan(slope)
+            seen[out + 2] = field[5]
+            seen[out + 11] = depth
+            if N.real <= 0:
+                if is_constraint and part == 0:  # a wheel held on its rail is pulled too: no creep forces then
+                    wrench[0, 0] += N * mx
+                    wrench[0, 1] += N * my
+                    wrench[0, 2] += N * mz
+                    wrench[0, 3] += N * (py * mz - pz * my)
+                    wrench[0, 4] += N * (pz * mx - px * mz)
+                    wrench[0, 5] += N * (px * my - py * mx)
+                    seen[out] = N
+                    N_all += N
+                    Q += N * cos
+                    Y += N * sin
+                continue
+            cube = np.exp(np.log(N) / 3)
+            a, b = field[7] * cube, field[8] * cube
+            xi = (ux * c + uy * sn) / V
+            eta = (ux * ex + uy * ey + uz * ez) / V
+            spin = (ox_ * mx + oy_ * my + oz_ * mz) / V
+            fx, fy, moment = creep_force(
+                law, ahead * xi, ahead * eta, spin, N, a, b, field[9], field[10], field[11], field[12], G, mu, options
+            )
+            fx, fy = ahead * fx, ahead * fy
+            # normal force along the rail where the rail itself is not straight
+            up = N * cos
+            ft = fx + up * (side * slope * slope_y - slope_z)
+            force_x = N * mx + ft * c + fy * ex
+            force_y = N * my + ft * sn + fy * ey
+            force_z = N * mz + fy * ez
+            wrench[0, 0] += force_x
+            wrench[0, 1] += force_y
+            wrench[0, 2] += force_z
+            wrench[0, 3] += py * force_z - pz * force_y + moment * mx
+            wrench[0, 4] += pz * force_x - px * force_z + moment * my
+            wrench[0, 5] += px * force_y - py * force_x + moment * mz
+            tread = -(fx * xi + fy * eta + moment * spin)
+            seen[out] = N
+            seen[out + 3] = a
+            seen[out + 4] = b
+            seen[out + 5] = xi
+            seen[out + 6] = eta
+            seen[out + 7] = spin
+            seen[out + 8] = fx
+            seen[out + 9] = fy
+            seen[out + 10] = moment
+            N_all += N
+            Q += force_x * bx + force_y * by + force_z * bz
+            Y -= side * (force_x * nx + force_y * ny + force_z * nz)
+            wear += tread
+            lost += tread * V
+        seen[first] = v
+        seen[first + 1] = N_all
+        seen[first + 2] = Q
+        seen[first + 3] = Y
+        if Q.real > 1.0 or Q.real < -1.0:
+            seen[first + 4] = Y / Q
+        seen[first + 5] = wear
+        seen[first + 6] = s
+        seen[first + 7] = v - u_off
+        if v.real - u_off > worst.real:
+            worst = v - u_off
+    last = int(data[0]) * (n_w_out + n_parts * n_c_out)
+    seen[last] = worst
+    seen[last + 1] = energy
+    seen[last + 2] = lost
