@@ -21,7 +21,7 @@ from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.rails.profile import Profile
-from floatframe.rails.standard_profiles import GAUGE_DEPTH, cone, inclined, rail_60e1, wheel_s1002
+from floatframe.rails.standard_profiles import GAUGE_DEPTH, cone, inclined, rail_60e1, turned, wheel_s1002
 
 __all__ = ["ContactPoint", "Pair", "QuasiElastic", "quasi_elastic", "rigid_contacts", "wheel_curve"]
 
@@ -75,15 +75,16 @@ class Pair:
 
     @cached_property
     def gauge_point(self) -> float:
-        """Place of the gauge face on the head, 14 mm below its top, y < 0 [m]."""
-        inner = self.head.y < self.head.y[np.argmax(self.head.z)]
-        y, z = self.head.y[inner], self.head.z[inner]
-        if z.min() > -GAUGE_DEPTH:
+        """Place of the gauge face on the head, the innermost within 14 mm below its top, y < 0 [m]."""
+        y, z, _ = turned(self.rail, self.inclination)
+        inner = slice(0, int(np.argmax(z)) + 1)
+        y, z = y[inner], z[inner]
+        if z[0] > -GAUGE_DEPTH:
             raise ModelError(
-                f"profile {self.rail.name!r}: ends {-z.min() * 1e3:.3g} mm below the top on its inner side, above the "
+                f"profile {self.rail.name!r}: ends {-z[0] * 1e3:.3g} mm below the top on its inner side, above the "
                 f"{GAUGE_DEPTH * 1e3:g} mm where the gauge is measured: give more of the profile"
             )
-        return float(np.interp(-GAUGE_DEPTH, z, y))
+        return float(min(y[z >= -GAUGE_DEPTH].min(), np.interp(-GAUGE_DEPTH, z, y)))
 
     @cached_property
     def offset(self) -> float:

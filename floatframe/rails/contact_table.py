@@ -1,6 +1,6 @@
 """Contact over shift, roll and yaw as a table: what a wheel needs in every step, found once per pair of profiles.
 
-Each part of the wheel (tread, flange) has for every v, phi and sin² psi the quasi-elastic contact, Hertz's ellipse and
+Each part of the wheel (tread, flange) has for every v, phi and sin(psi) the quasi-elastic contact, Hertz's ellipse and
 Kalker's coefficients; v = u + r_0 sin(phi) is the shift of the wheel where it meets the rail, so that a roll only tilts the
 profile. Over v and phi they are cubic B-splines, over sin² psi a parabola: twice differentiable in all.
 """
@@ -17,14 +17,15 @@ from floatframe.errors import ModelError
 from floatframe.rails.contact_search import Pair, QuasiElastic, quasi_elastic
 from floatframe.rails.hertz import ellipse
 from floatframe.rails.kalker import kalker_coefficients
-from floatframe.rails.splines import coefficients
+from floatframe.rails.splines import coefficients, even_coefficients
 
-__all__ = ["FIELDS", "ContactTable", "Steel", "TableGrid", "contact_table", "numbers_of_table"]
+__all__ = ["FIELDS", "LEAST_BEND", "ContactTable", "Steel", "TableGrid", "contact_table", "numbers_of_table"]
 
 #: of each part: depth at h = 0, dq/du, lever x over sin psi, levers y and z, rolling radius, Hertz's stiffness, a and b of
 #: one newton, Kalker's coefficients
 FIELDS = ("q", "slope", "x", "y", "z", "radius", "stiffness", "a_1", "b_1", "c11", "c22", "c23", "c33")
 
+LEAST_BEND = 0.05  #: curvature below which a contact is not taken to be flatter [1/m]
 FAR = 0.003  #: height of a part above the rail from which on the table goes on unchanged [m]
 
 
@@ -40,13 +41,13 @@ class TableGrid:
     """Where the table is known; beyond, the values at its edge hold."""
 
     v: tuple[float, float, int] = (-0.03, 0.015, 226)  #: least, largest [m], number of points
-    roll: tuple[float, float, int] = (-0.016, 0.016, 9)  #: [rad]
-    yaw: float = 0.04  #: largest [rad]
+    roll: tuple[float, float, int] = (-0.012, 0.012, 7)  #: [rad]
+    yaw: tuple[float, int] = (0.04, 6)  #: largest [rad], number of points from zero on
 
 
 @dataclass(frozen=True, eq=False)
 class ContactTable:
-    """Values at the points of the grid, (n_parts, n_v, n_roll, 3, fields)."""
+    """Values at the points of the grid, (n_parts, n_v, n_roll, n_yaw, fields)."""
 
     grid: TableGrid
     values: Array
@@ -73,8 +74,8 @@ def contact_table(
 def made_once(pair: Pair, parts: tuple[str, ...], smoothing: float, steel: Steel, grid: TableGrid) -> ContactTable:
     """Return the table, made when it is first asked for."""
     v, roll = np.linspace(*grid.v), np.linspace(*grid.roll)
-    sines = np.sqrt(np.array([0.0, 0.5, 1.0])) * np.sin(grid.yaw)
-    values = np.empty((len(parts), len(v), len(roll), 3, len(FIELDS)))
+    sines = np.linspace(0.0, np.sin(grid.yaw[0]), grid.yaw[1])
+    values = np.empty((len(parts), len(v), len(roll), grid.yaw[1], len(FIELDS)))
     modulus = steel.shear_modulus / (1 - steel.poisson)
     for k, part in enumerate(parts):
         for i, phi in enumerate(roll):
@@ -83,7 +84,7 @@ def made_once(pair: Pair, parts: tuple[str, ...], smoothing: float, steel: Steel
                 u = v - pair.radius * np.sin(phi)
                 found = near_the_rail(quasi_elastic(pair, u, roll=float(phi), yaw=yaw, smoothing=smoothing, part=part))
                 cos = 1 / np.sqrt(1 + found.slope**2)
-                shape = ellipse(0.5 * cos / found.radius, 0.5 * np.maximum(found.bend, 0.05), modulus)
+                shape = ellipse(0.5 * cos / found.radius, 0.5 * np.maximum(found.bend, LEAST_BEND), modulus)
                 values[k, :, i, j, :9] = np.column_stack([
                     found.q, found.slope, found.x / np.sin(yaw), found.y, found.z, found.radius,
                     shape.stiffness, shape.a_1, shape.b_1,
@@ -102,10 +103,11 @@ def near_the_rail(found: QuasiElastic) -> QuasiElastic:
 
 
 def numbers_of_table(table: ContactTable) -> Array:
-    """Return the table as the law reads it: sizes, then coefficients (n_v + 2, n_roll + 2, 3, parts x fields)."""
+    """Return the table as the law reads it: sizes, then coefficients (n_v + 2, n_roll + 2, n_yaw + 2, parts x fields)."""
     (v_0, v_1, n_v), (r_0, r_1, n_r) = table.grid.v, table.grid.roll
-    c = coefficients(coefficients(table.values, 1), 2)
+    c = even_coefficients(coefficients(coefficients(table.values, 1), 2), 3)
     c = np.moveaxis(c, 0, 3)  # parts beside fields
     c = c.reshape(*c.shape[:3], -1)
-    head = [n_v, v_0, (v_1 - v_0) / (n_v - 1), n_r, r_0, (r_1 - r_0) / (n_r - 1), np.sin(table.grid.yaw) ** 2, c.shape[3]]
+    head = [n_v, v_0, (v_1 - v_0) / (n_v - 1), n_r, r_0, (r_1 - r_0) / (n_r - 1), table.grid.yaw[1],
+            np.sin(table.grid.yaw[0]) / (table.grid.yaw[1] - 1), c.shape[3]]  # fmt: skip
     return np.concatenate([head, c.ravel()])

@@ -110,27 +110,27 @@ def deviation(data, signal, s):
 
 
 @numba.njit(cache=True)
-def contact_fields(data, table, part, v, roll, sine2, field):
-    """Write the fields of one part at a shift v = u + r_0 roll, roll and squared sine of yaw."""
-    n_v, n_r, n_f = int(data[table]), int(data[table + 3]), int(data[table + 7])
+def contact_fields(data, table, part, v, roll, sine, field):
+    """Write the fields of one part at a shift v = u + r_0 roll, sine of the roll, sine of the yaw."""
+    n_v, n_r, n_y, n_f = int(data[table]), int(data[table + 3]), int(data[table + 6]), int(data[table + 8])
+    if sine.real < 0:
+        sine = -sine
     i, t = cell(v, data[table + 1], data[table + 2], n_v)
     j, q = cell(roll, data[table + 4], data[table + 5], n_r)
-    wu = basis(t)
-    wr = basis(q)
-    e = sine2 / data[table + 6]
-    if e.real > 1:
-        e = 0 * e + 1
-    y0, y1, y2 = (1 - e) * (1 - 2 * e), 4 * e * (1 - e), e * (2 * e - 1)
+    k, e = cell(sine, 0.0, data[table + 7], n_y)
+    w_v, w_r, w_y = basis(t), basis(q), basis(e)
     for f in range(N_FIELDS):
         field[f] = 0 * v
-    start = table + 8 + part * N_FIELDS
+    start = table + 9 + part * N_FIELDS
     for a in range(4):
         for b in range(4):
-            w = wu[a] * wr[b]
-            at = start + ((i + a) * (n_r + 2) + j + b) * 3 * n_f
-            w0, w1, w2 = w * y0, w * y1, w * y2
-            for f in range(N_FIELDS):
-                field[f] += w0 * data[at + f] + w1 * data[at + n_f + f] + w2 * data[at + 2 * n_f + f]
+            w_vr = w_v[a] * w_r[b]
+            at = start + (((i + a) * (n_r + 2) + j + b) * (n_y + 2) + k) * n_f
+            for c in range(4):
+                w = w_vr * w_y[c]
+                for f in range(N_FIELDS):
+                    field[f] += w * data[at + f]
+                at += n_f
 
 
 @numba.njit(cache=True)
@@ -181,7 +181,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
         Y = zero
         wear = zero
         for part in range(n_parts):
-            contact_fields(data, table, part, v, roll, sine * sine, field)
+            contact_fields(data, table, part, v, roll, sine, field)
             slope = field[1]
             cos = 1 / np.sqrt(1 + slope * slope)
             sin = slope * cos

@@ -6,7 +6,14 @@ from scipy.linalg import solve_banded
 
 from fe_models.foundation.arrays import Array
 
-__all__ = ["basis", "basis_slopes", "cell", "coefficients"]
+__all__ = ["basis", "basis_slopes", "cell", "coefficients", "even_coefficients"]
+
+
+def even_coefficients(values: Array, axis: int = 0) -> Array:
+    """Return the coefficients through values at 0, h, 2 h, ... of a function that is even: c_(-1) = c_1 at the beginning."""
+    y = np.moveaxis(np.asarray(values, dtype=float), axis, 0)
+    both = coefficients(np.concatenate([y[:0:-1], y]))
+    return np.moveaxis(both[len(y) - 1 :], 0, axis)
 
 
 def coefficients(values: Array, axis: int = 0) -> Array:

@@ -9,10 +9,11 @@ from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.rails.profile import Profile
 
-__all__ = ["GAUGE_DEPTH", "PROFILES", "cone", "inclined", "rail_60e1", "s1002", "wheel_s1002"]
+__all__ = ["GAUGE_DEPTH", "PROFILES", "cone", "inclined", "rail_60e1", "s1002", "turned", "wheel_s1002"]
 
 GAUGE_DEPTH = 0.014  #: below the top of the rails, where the gauge is measured [m]
 SPACING = 1e-4  #: of the points that stand for a curve [m]
+STEEPEST = 15.0  #: slope up to which the side of a rail is part of the head that wheels are searched on
 
 #: S1002, y from the running circle outward and F downward, in mm: bounds between sections H to A, then the sections
 S1002_BOUNDS = (-70.0, -62.764705882, -49.662510381, -39.764473993, -38.426669071, -35.0, -26.0, 32.15796, 60.0)
@@ -146,23 +147,28 @@ def inclined(rail: Profile, inclination: float) -> Profile:
     """Return a rail turned inward by an angle whose tangent is `inclination` (1/40, 1/20), its highest point at z = 0.
 
     A rail turned so is higher on its outer side than before: heights there become z + inclination y. What has become
-    undercut is cut away.
+    undercut, or steeper than STEEPEST, is cut away.
     """
-    angle = np.arctan(number("inclination of the rail", inclination))
+    y, z, angle = turned(rail, inclination)
+    top = int(np.argmax(z))
+    flat = np.diff(y) * STEEPEST > np.abs(np.diff(z))
+    last = top + int(np.argmin(np.append(flat[top:], False)))
+    first = top - int(np.argmin(np.append(flat[:top][::-1], False)))
+    return replace(rail, y=y[first : last + 1], z=z[first : last + 1], inclination=rail.inclination + angle)
+
+
+def turned(rail: Profile, inclination: float) -> tuple[Array, Array, float]:
+    """Return the points of a rail turned inward, with the top at z = 0, sides and all, and the angle [rad]."""
+    angle = float(np.arctan(number("inclination of the rail", inclination)))
     if abs(angle) > 0.2:
         raise ModelError(f"inclination of the rail: expected a tangent such as 0.025 (1/40), got {inclination:g}")
     c, s = np.cos(angle), np.sin(angle)
     y, z = c * rail.y - s * rail.z, s * rail.y + c * rail.z
-    top = int(np.argmax(z))
-    keep_right = np.minimum.accumulate(np.append(np.diff(y[top:]) > 0, True))
-    keep_left = np.minimum.accumulate(np.append(np.diff(-y[top::-1]) > 0, True))
-    last = top + int(np.argmin(keep_right)) if not keep_right.all() else len(y) - 1
-    first = top - int(np.argmin(keep_left)) if not keep_left.all() else 0
-    y, z = y[first : last + 1], z[first : last + 1]
-    spline = Profile("rail", y, z, rail.name).spline
-    stationary = spline.derivative().roots(extrapolate=False)
-    height = max(float(spline(stationary).max()), float(z.max())) if len(stationary) else float(z.max())
-    return replace(rail, y=y, z=z - height, inclination=rail.inclination + angle)
+    # the top between the points: where the upright profile falls outward as steeply as the rail was turned
+    top = int(np.clip(np.argmax(z), 1, len(z) - 2))
+    bend = z[top - 1] - 2 * z[top] + z[top + 1]
+    rise = -((z[top + 1] - z[top - 1]) ** 2) / (8 * bend) if bend < 0 else 0.0
+    return y, z - (z[top] + max(rise, 0.0)), angle
 
 
 #: names of the system file

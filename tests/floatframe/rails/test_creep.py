@@ -59,7 +59,8 @@ def test_small_creepages_give_linear_forces(law):
 
 @pytest.mark.parametrize("law", [fastsim, saturated_creep, polach])
 def test_large_creepages_give_coulombs_friction_against_them(law):
-    slope = 1.0 if law is not saturated_creep else STEEL[0] / STEEL[1]
+    # simplified theory and bent linear forces keep the ratio of the coefficients, Polach takes the direction of slip
+    slope = 1.0 if law is polach else STEEL[0] / STEEL[1]
     xi, eta = 0.3, 0.4
     F = forces(law, xi, eta, 0.0)
     assert_allclose(np.hypot(F[0], F[1]), MU * N, rtol=1e-2)

@@ -55,7 +55,7 @@ def test_an_inclined_rail_is_that_of_the_manchester_benchmark():
         [-8.6518464, 0.12495522], [2.2616861, 0.0084805629], [10.231937, 0.41437678], [18.093602, 1.6039611],
         [22.405651, 3.1735515], [27.215326, 8.0403505],
     ]).T  # fmt: skip
-    for rail, most in ((rail_60e1(), 0.026), (head_of_circles(21.03, 52.053, "as there"), 0.014)):
+    for rail, most in ((rail_60e1(), 0.026), (head_of_circles(21.03, 52.053, "as there"), 0.018)):
         head = inclined(rail, 1 / 40)
         shifts = np.linspace(7.3, 7.7, 81)
         defects = [head.height((y + shift) * 1e-3) * 1e3 + z for shift in shifts]
@@ -65,7 +65,8 @@ def test_an_inclined_rail_is_that_of_the_manchester_benchmark():
 
 def test_an_inclined_rail_has_its_top_at_zero_and_is_higher_outside():
     head = inclined(rail_60e1(), 1 / 20)
-    assert_allclose(head.z.max(), 0.0, atol=1e-9)
+    around = np.linspace(-0.03, 0.03, 600001)
+    assert_allclose(head.height(around).max(), 0.0, atol=1e-10)
     assert_allclose(head.slope(np.array([0.0])), 1 / 20, rtol=1e-2)
     assert np.all(np.diff(head.y) > 0)
 
@@ -87,7 +88,7 @@ def test_noise_of_a_measurement_is_smoothed_to_its_size():
     rough = Profile("wheel", y, z)
     for noise in (1e-5, None):
         wheel = profile_of_points("wheel", y, z, noise=noise)
-        assert np.sqrt(np.mean((wheel.height(y) - s1002(y * 1e3) * 1e-3) ** 2)) < 5e-6
+        assert np.sqrt(np.mean((wheel.height(y) - s1002(y * 1e3) * 1e-3) ** 2)) < 6e-6
         inner = (wheel.y > -0.02) & (wheel.y < 0.04)
         true = np.gradient(s1002(wheel.y[inner] * 1e3) * 1e-3, wheel.y[inner])
         assert np.abs(wheel.slope(wheel.y[inner]) - true).max() < 0.02 < np.abs(rough.slope(wheel.y[inner]) - true).max()
