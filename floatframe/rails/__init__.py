@@ -13,12 +13,18 @@ from floatframe.rails.conicity import (
     wheelset_at,
 )
 from floatframe.rails.contact_search import Pair, quasi_elastic, rigid_contacts
-from floatframe.rails.irregularities import SPECTRA, Irregularities, TrackSpectrum, random_irregularities, wheel_envelope
+from floatframe.rails.irregularities import (
+    SPECTRA,
+    Irregularities,
+    TrackSpectrum,
+    random_irregularities,
+    wheel_envelope,
+)
 from floatframe.rails.kalker import kalker_coefficients
 from floatframe.rails.profile import Profile, profile_of_points
 from floatframe.rails.standard_profiles import cone, rail_60e1, wheel_s1002
 from floatframe.rails.track import Segment, Track, curve
-from floatframe.rails.wheelset import Wheelset, WheelOnRail, height_on_rails, track_shape
+from floatframe.rails.wheelset import WheelOnRail, Wheelset, height_on_rails, track_shape
 
 __all__ = [
     "SPECTRA",

@@ -19,6 +19,7 @@ from floatframe.rails.track import Track
 __all__ = ["ContactLaws", "Wheel", "law_numbers", "output_names", "shift_off_the_rail"]
 
 PARTS = ("tread", "flange")
+N_OPTIONS = 5  #: of a law of creep
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,9 @@ class ContactLaws:
         if not 0 <= number(f"{where}: poisson", self.poisson) <= 0.5:
             raise ModelError(f"{where}: poisson: expected 0 to 0.5, got {self.poisson:g}")
         if self.shear_modulus < 1e9:
-            raise ModelError(f"{where}: shear_modulus: {self.shear_modulus:g} Pa: expected about 8e10 for steel, in pascal")
+            raise ModelError(
+                f"{where}: shear_modulus: {self.shear_modulus:g} Pa: expected about 8e10 for steel, in pascal"
+            )
         if not (isinstance(self.strips, int) and 4 <= self.strips <= 200):
             raise ModelError(f"{where}: strips: expected an integer between 4 and 200, got {self.strips!r}")
         if len(self.polach) != 4 or not all(np.isfinite(self.polach)):
@@ -101,30 +104,42 @@ def law_numbers(wheels: Sequence[Wheel], track: Track, laws: ContactLaws) -> Arr
         signals, first, step, n = np.zeros(0), 0.0, 1.0, 0
     else:
         seen = deviations.seen_by_wheels(min(each.pair.radius for each in wheels))
-        signals = np.column_stack([coefficients(v) for v in (seen.left_y, seen.left_z, seen.right_y, seen.right_z)]).ravel()
+        signals = np.column_stack(
+            [coefficients(v) for v in (seen.left_y, seen.left_z, seen.right_y, seen.right_z)]
+        ).ravel()
         first, step, n = float(seen.s[0]), float(seen.s[1] - seen.s[0]), len(seen.s)
     tables_at = irregular_at + len(signals)
     tables: list[Array] = []
-    places: dict[int, int] = {}
+    places: dict[Pair, int] = {}
     rows = []
     for each in wheels:
-        if id(each.pair) not in places:
-            places[id(each.pair)] = tables_at + sum(len(one) for one in tables)
+        if each.pair not in places:
+            places[each.pair] = tables_at + sum(len(one) for one in tables)
             steel = Steel(laws.shear_modulus, laws.poisson)
             tables.append(
                 numbers_of_table(
-                    contact_table(each.pair, parts=PARTS if each.pair.has_flange else ("all",),
-                                  smoothing=laws.smoothing, steel=steel, grid=grid_of(each.pair))
-                )  # fmt: skip
+                    contact_table(
+                        each.pair,
+                        parts=PARTS if each.pair.has_flange else ("all",),
+                        smoothing=laws.smoothing,
+                        steel=steel,
+                        grid=grid_of(each.pair),
+                    )
+                )
             )
         rows.append([
-            each.side, each.arm, 0.5 * each.pair.running_circles, each.pair.radius, places[id(each.pair)],
+            each.side, each.arm, 0.5 * each.pair.running_circles, each.pair.radius, places[each.pair],
             shift_off_the_rail(each.pair),
         ])  # fmt: skip
-    options = {"polach": [*laws.polach, 0.0], "fastsim": [laws.strips, laws.strips, 0, 0, 0]}.get(laws.creep, [0.0] * 5)
+    options = [0.0] * N_OPTIONS
+    if laws.creep == "polach":
+        options = [*laws.polach, 0.0]
+    if laws.creep == "fastsim":
+        options[:2] = [float(laws.strips)] * 2
     head = [
-        len(wheels), n_parts_of(wheels), CREEP_LAWS[laws.creep], *options, laws.shear_modulus, laws.friction, laws.low_speed,
-        laws.damping, laws.normal == "constraint", track.start[2], cells_at, len(cells), irregular_at, first, step, n,
+        len(wheels), n_parts_of(wheels), CREEP_LAWS[laws.creep], *options,
+        laws.shear_modulus, laws.friction, laws.low_speed, laws.damping, laws.normal == "constraint",
+        track.start[2], cells_at, len(cells), irregular_at, first, step, n,
     ]  # fmt: skip
     return np.concatenate([np.array(head, dtype=float), np.ravel(rows), cells.ravel(), signals, *tables])
 
@@ -137,7 +152,9 @@ def n_parts_of(wheels: Sequence[Wheel]) -> int:
     return found.pop()
 
 
-def output_names(wheels: Sequence[Wheel], wheel_outputs: Sequence, contact_outputs: Sequence) -> tuple[list[str], list[str]]:
+def output_names(
+    wheels: Sequence[Wheel], wheel_outputs: Sequence, contact_outputs: Sequence
+) -> tuple[list[str], list[str]]:
     """Return names and units of all outputs, in the order in which the law writes them."""
     names, units = [], []
     parts = PARTS[: n_parts_of(wheels)]

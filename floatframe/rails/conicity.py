@@ -1,8 +1,9 @@
 """Rolling radius difference, equivalent conicity, Klingel's wavelength: the kinematics of a free wheelset.
 
-A wheelset that rolls slowly without slip has y'' + delta_r(y)/(r_0 e_0) = 0, where e_0 is the distance of the contact points and
-primes are derivatives along the track. A conical one, delta_r = 2 lam y, has waves of length 2 pi sqrt(r_0 e_0/(2 lam)).
-The equivalent conicity of an amplitude is that of the cone whose wave is as long (the definition of UIC 519 and EN 15302).
+A wheelset that rolls slowly without slip has y'' + delta_r(y)/(r_0 e_0) = 0, where e_0 is the distance of the contact
+points and primes are derivatives along the track. A conical one, delta_r = 2 lam y, has waves of length 2 pi sqrt(r_0
+e_0/(2 lam)). The equivalent conicity of an amplitude is that of the cone whose wave is as long (the definition of UIC
+519 and EN 15302).
 """
 
 import numpy as np
@@ -28,8 +29,8 @@ def klingel_wavelength(conicity: float, radius: float, running_circles: float) -
 def wheelset_at(pair: Pair, y: Array, *, smoothing: float | None = None) -> tuple[Array, Array, Array]:
     """Return rolling radii on the left and right and the roll of a wheelset shifted by y to the left, each (n,).
 
-    Both wheels touch: the roll phi (left side up) is the one at which h_left = h_right + e_0 phi. With `smoothing` the contact is
-    quasi-elastic, without it that of rigid bodies.
+    Both wheels touch: the roll phi (left side up) is the one at which h_left = h_right + e_0 phi. With `smoothing` the
+    contact is quasi-elastic, without it that of rigid bodies.
     """
     y = np.atleast_1d(np.asarray(y, dtype=float))
     left, right, rolls = np.empty_like(y), np.empty_like(y), np.empty_like(y)
@@ -71,8 +72,8 @@ def equivalent_conicity(
 ) -> float:
     """Return the conicity of the cone whose wave is as long, from the non-linear wave of this amplitude.
 
-    Energy of y'' = -f(y), f = delta_r/(r_0 e_0): y'²/2 + U(y) = U(a); wavelength = 2 int dy/sqrt(2 (U(a) - U(y))) between the
-    turning points; lam = (2 pi/wavelength)² r_0 e_0/2.
+    Energy of y'' = -f(y), f = delta_r/(r_0 e_0): y'²/2 + U(y) = U(a); wavelength = 2 int dy/sqrt(2 (U(a) - U(y)))
+    between the turning points; lam = (2 pi/wavelength)² r_0 e_0/2.
 
     Parameters
     ----------
@@ -111,10 +112,13 @@ def equivalent_conicity(
         return float(U(low) - U(low + 2 * amplitude))
 
     try:
-        left = float(brentq(turning, max(fine[0], centre - 2 * amplitude), min(centre, fine[-1] - 2 * amplitude), xtol=1e-12))
+        left = float(
+            brentq(turning, max(fine[0], centre - 2 * amplitude), min(centre, fine[-1] - 2 * amplitude), xtol=1e-12)
+        )
     except ValueError:
         raise ModelError(
-            f"equivalent_conicity: no wave of amplitude {amplitude:g} m within the shifts from {fine[0]:g} to {fine[-1]:g} m"
+            f"equivalent_conicity: no wave of amplitude {amplitude:g} m within the shifts "
+            f"from {fine[0]:g} to {fine[-1]:g} m"
         ) from None
     top = float(U(left))
     middle = left + amplitude

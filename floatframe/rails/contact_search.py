@@ -1,17 +1,20 @@
-"""Where a wheel touches a rail: points of rigid bodies, and the quasi-elastic contact that is smooth in every displacement.
+"""Where a wheel touches a rail: points of rigid bodies, and the quasi-elastic contact, which is smooth.
 
-The place of a wheel against its rail is u, the outward shift of the wheel, the roll phi (outer side up), the yaw psi, and the
-height h of its centre over the nominal radius. A rail does not change along the track, so that of the circle of the wheel at s
-only the point matters whose normal is square to the rail (Wang's line of contact, see docs/rails.md): the wheel becomes a curve
-(x, y, z)(s) against the profile Z(y) of the rail, and its depth in it is p(s) = Z(y(s) + u + offset) - z(s) - h.
+The place of a wheel against its rail is u, the outward shift of the wheel, the roll phi (outer side up), the yaw psi,
+and the height h of its centre over the nominal radius. A rail does not change along the track, so that of the circle
+of the wheel at s only the point matters whose normal is square to the rail (Wang's line of contact, see
+docs/rails.md): the wheel becomes a curve (x, y, z)(s) against the profile Z(y) of the rail, and its depth in it is
+p(s) = Z(y(s) + u + offset) - z(s) - h.
 
 - rigid: the local maxima of p that reach the highest one within a tolerance;
-- quasi-elastic: q = eps log( int w exp(p/eps) dy / L ), the maximum rounded off over heights of eps. Its gradient is the mean of
-  slopes and levers under the weights exp(p/eps), so that forces along it have a potential, and no contact ever jumps.
+- quasi-elastic: q = eps log( int w exp(p/eps) dy / L ), the maximum rounded off over heights of eps. Its gradient is
+  the mean of slopes and levers under the weights exp(p/eps), so that forces along it have a potential, and no contact
+  ever jumps.
 """
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import sha256
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +72,19 @@ class Pair:
             )
 
     @cached_property
+    def content(self) -> tuple[bytes | float, ...]:
+        """What makes a pair the same as another one, whose tables serve for both."""
+        shapes = (self.wheel.y, self.wheel.z, self.rail.y, self.rail.z)
+        numbers = (self.radius, self.running_circles, self.gauge, self.inclination)
+        return (*(sha256(values.tobytes()).digest() for values in shapes), *numbers)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Pair) and self.content == other.content
+
+    def __hash__(self) -> int:
+        return hash(self.content)
+
+    @cached_property
     def head(self) -> Profile:
         """The rail as it stands in the track, turned inward."""
         return inclined(self.rail, self.inclination)
@@ -123,9 +139,9 @@ class Curve(NamedTuple):
 def wheel_curve(pair: Pair, roll: float = 0.0, yaw: float = 0.0, s: Array | None = None) -> Curve:
     """Return the points of a wheel whose normal is square to the direction of the rail, s increasing.
 
-    With the axle a = (-sin psi cos phi, cos psi cos phi, sin phi), f = (cos psi, sin psi, 0), d = a's upward normal in the
-    plane of both, and R(s) = r_0 + F(s), the surface is s a + R (sin t f - cos t d), its normal sin t f - cos t d - R' a.
-    It has no x component where f_x sin t - d_x cos t = R' a_x.
+    With the axle a = (-sin psi cos phi, cos psi cos phi, sin phi), f = (cos psi, sin psi, 0), d = a's upward normal in
+    the plane of both, and R(s) = r_0 + F(s), the surface is s a + R (sin t f - cos t d), its normal sin t f - cos t d
+    - R' a. It has no x component where f_x sin t - d_x cos t = R' a_x.
     """
     s = np.arange(pair.wheel.y[0], pair.wheel.y[-1], STEP) if s is None else s
     R, R_s = pair.radius + pair.wheel.spline(s), pair.wheel.spline(s, 1)
@@ -188,7 +204,11 @@ def rigid_contacts(
         place = float(at.y[0] + u + pair.offset)
         height = float(pair.head.height(at.y + u + pair.offset)[0] - at.z[0] - pair.radius)
         angle = float(np.arctan(pair.head.slope(np.array(place))))
-        found.append(ContactPoint(float(s[0]), place, float(at.x[0]), float(pair.radius + pair.wheel.spline(s[0])), angle, height))
+        found.append(
+            ContactPoint(
+                float(s[0]), place, float(at.x[0]), float(pair.radius + pair.wheel.spline(s[0])), angle, height
+            )
+        )
     found.sort(key=lambda point: -point.height)
     return [point for point in found if point.height >= found[0].height - tolerance]
 
@@ -221,7 +241,8 @@ def quasi_elastic(
     smoothing
         eps [m].
     part
-        "all" of the wheel, its "tread" or its "flange": shares of one, which go over smoothly where the slope of the profile
+        "all" of the wheel, its "tread" or its "flange": shares of one, which go over smoothly where the slope of the
+        profile
         is between 0.35 and 0.7.
     """
     curve = wheel_curve(pair, roll, yaw)

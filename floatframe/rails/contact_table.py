@@ -1,8 +1,8 @@
 """Contact over shift, roll and yaw as a table: what a wheel needs in every step, found once per pair of profiles.
 
 Each part of the wheel (tread, flange) has for every v, phi and sin(psi) the quasi-elastic contact, Hertz's ellipse and
-Kalker's coefficients; v = u + r_0 sin(phi) is the shift of the wheel where it meets the rail, so that a roll only tilts the
-profile. Over v and phi they are cubic B-splines, over sin² psi a parabola: twice differentiable in all.
+Kalker's coefficients; v = u + r_0 sin(phi) is the shift of the wheel where it meets the rail, so that a roll only
+tilts the profile. Over v and phi they are cubic B-splines, over sin² psi a parabola: twice differentiable in all.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,8 @@ from floatframe.rails.splines import coefficients, even_coefficients
 
 __all__ = ["FIELDS", "LEAST_BEND", "ContactTable", "Steel", "TableGrid", "contact_table", "numbers_of_table"]
 
-#: of each part: depth at h = 0, dq/du, lever x over sin psi, levers y and z, rolling radius, Hertz's stiffness, a and b of
+#: of each part: depth at h = 0, dq/du, lever x over sin psi, levers y and z, rolling radius, Hertz's stiffness, a and
+#: b of
 #: one newton, Kalker's coefficients
 FIELDS = ("q", "slope", "x", "y", "z", "radius", "stiffness", "a_1", "b_1", "c11", "c22", "c23", "c33")
 
@@ -97,13 +98,15 @@ def near_the_rail(found: QuasiElastic) -> QuasiElastic:
     """Return a contact that goes on unchanged where the part is more than `FAR` above the rail, or beside it."""
     near = np.flatnonzero(found.q > -FAR)
     if not len(near):
-        raise ModelError("contact_table: a part of the wheel comes nowhere near the rail: does the profile fit the gauge?")
+        raise ModelError(
+            "contact_table: a part of the wheel comes nowhere near the rail: does the profile fit the gauge?"
+        )
     rows = near[np.clip(np.searchsorted(near, np.arange(len(found.q))), 0, len(near) - 1)]
     return QuasiElastic(*(values[rows] for values in found))
 
 
 def numbers_of_table(table: ContactTable) -> Array:
-    """Return the table as the law reads it: sizes, then coefficients (n_v + 2, n_roll + 2, n_yaw + 2, parts x fields)."""
+    """Return the table as the law reads it: sizes, then coefficients, (n_v + 2, n_roll + 2, n_yaw + 2, all fields)."""
     (v_0, v_1, n_v), (r_0, r_1, n_r) = table.grid.v, table.grid.roll
     c = even_coefficients(coefficients(coefficients(table.values, 1), 2), 3)
     c = np.moveaxis(c, 0, 3)  # parts beside fields

@@ -1,10 +1,11 @@
 """Creep forces of an elliptic contact: linear, linear with saturation, Polach, FASTSIM.
 
 Each is a function law(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options) -> (F_x, F_y, M) on the wheel:
-xi, eta longitudinal and lateral creepage, the velocity of the wheel's surface against the rail over the speed of rolling;
-phi the spin [rad/m]; N the normal force [N]; a (rolling direction), b the semi-axes [m]; Kalker's coefficients; G [Pa]; mu
-the coefficient of friction; `options` what a law has besides. x points in the direction of rolling, z away from the rail.
-Numbers may be float64 or complex128 (a step along the imaginary axis gives derivatives): comparisons look at real parts.
+xi, eta longitudinal and lateral creepage, the velocity of the wheel's surface against the rail over the speed of
+rolling; phi the spin [rad/m]; N the normal force [N]; a (rolling direction), b the semi-axes [m]; Kalker's
+coefficients; G [Pa]; mu the coefficient of friction; `options` what a law has besides. x points in the direction of
+rolling, z away from the rail. Numbers may be float64 or complex128 (a step along the imaginary axis gives
+derivatives): comparisons look at real parts.
 """
 
 import numba
@@ -40,8 +41,8 @@ def saturated_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
 
 
 @numba.njit(cache=True)
-def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
-    """Return Polach's forces (1999, 2005); options = (k_A, k_S, A, B, V).
+def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
+    """Return Polach's forces (1999, 2005); options = (k_A, k_S, A, B), V the speed of rolling.
 
     (1)  friction falls with the slip speed w = V |creepage|: mu (A + (1 - A) exp(-B w))
     (2)  eta_c = eta + phi a where that is larger than eta, else eta;  nu_c = |(xi, eta_c)|
@@ -51,7 +52,7 @@ def polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
          K = |e_M| (d³/3 - d²/2 + 1/6) - (1 - d²)^(3/2)/3 < 0,  d = (e_M² - 1)/(e_M² + 1),
          e_M = (8/3) G b sqrt(a b) C23 eta_c/((1 + 6.3 (1 - exp(-a/b))) mu N)
     """
-    k_a, k_s, low, fall, V = options[0], options[1], options[2], options[3], options[4]
+    k_a, k_s, low, fall = options[0], options[1], options[2], options[3]
     eta_c = eta
     turned = eta + phi * a
     if abs(turned.real) > abs(eta.real):
@@ -129,7 +130,8 @@ def fastsim_of_flexibilities(xi, eta, phi, N, a, b, L1, L2, L3, mu, m_x, m_y):
 def fastsim(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
     """Return FASTSIM's forces, flexibilities from the linear coefficients; options = (cells along, strips).
 
-    L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23): forces at vanishing creepage are the linear ones.
+    L1 = 8 a/(3 G C11), L2 = 8 a/(3 G C22), L3 = pi a sqrt(a/b)/(4 G C23): forces at vanishing creepage are the linear
+    ones.
     """
     L1 = 8 * a / (3 * G * c11)
     L2 = 8 * a / (3 * G * c22)
@@ -138,12 +140,12 @@ def fastsim(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
 
 
 @numba.njit(cache=True)
-def creep_force(law, xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options):
-    """Return (F_x, F_y, M) by the law of a number of `creep_names.CREEP_LAWS`."""
+def creep_force(law, xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V):
+    """Return (F_x, F_y, M) at a speed V of rolling, by the law of a number of `creep_names.CREEP_LAWS`."""
     if law == 0:
         return linear_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
     if law == 1:
         return saturated_creep(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
     if law == 2:
-        return polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)
+        return polach(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options, V)
     return fastsim(xi, eta, phi, N, a, b, c11, c22, c23, c33, G, mu, options)

@@ -1,8 +1,8 @@
 """Hertz's contact of two smooth bodies: semi-axes of the ellipse, stiffness, pressure.
 
-The distance of the unloaded surfaces is A x² + B y², with A in the direction of rolling. With E* = G/(1 - nu) of two equal
-bodies and the complete elliptic integrals K and E of the eccentricity e of the ellipse, k = short/long semi-axis (theory in
-docs/rails.md):
+The distance of the unloaded surfaces is A x² + B y², with A in the direction of rolling. With E* = G/(1 - nu) of two
+equal bodies and the complete elliptic integrals K and E of the eccentricity e of the ellipse, k = short/long semi-axis
+(theory in docs/rails.md):
 
 (1)  long axis L, short axis S:   C_L = p_0 k² /(E* S) (K - E)/e² k^-1 ...
      in the form used here: C_L / C_S = (K - E) / (E/k² - K)
@@ -22,7 +22,7 @@ __all__ = ["Ellipse", "ellipse"]
 
 
 class Ellipse(NamedTuple):
-    """What does not depend on the load: semi-axes are a_1 N^(1/3) and b_1 N^(1/3), the load is stiffness approach^(3/2)."""
+    """What does not depend on the load N: semi-axes are a_1 N^(1/3) and b_1 N^(1/3), N = stiffness approach^(3/2)."""
 
     a_1: Array  #: of the semi-axis in the direction of rolling [m/N^(1/3)]
     b_1: Array  #: of the lateral one [m/N^(1/3)]
@@ -64,9 +64,9 @@ def ellipse(A: Array, B: Array, modulus: float) -> Ellipse:
     x = np.interp(wanted, log_ratio, log_k)
     for _ in range(3):  # Newton on the exact curve, with the slope of the table
         step = 1e-4
-        slope = (np.log(curvature_ratio(np.exp(np.minimum(x + step, 0)))) - np.log(curvature_ratio(np.exp(x - step)))) / (
-            np.minimum(x + step, 0) - (x - step)
-        )
+        slope = (
+            np.log(curvature_ratio(np.exp(np.minimum(x + step, 0)))) - np.log(curvature_ratio(np.exp(x - step)))
+        ) / (np.minimum(x + step, 0) - (x - step))
         x = np.minimum(x - (np.log(curvature_ratio(np.exp(x))) - wanted) / slope, 0.0)
     k = np.exp(x)
     m = 1 - k**2

@@ -1,7 +1,7 @@
 """What rails deviate from their track: tables over the arc length, random ones of a spectrum, a short defect.
 
-Four signals, each over the arc length: lateral (to the left) and vertical (upward) of the left and of the right rail. Spectra
-are one-sided over the angular wavenumber Omega [rad/m]: the variance is the integral over Omega > 0.
+Four signals, each over the arc length: lateral (to the left) and vertical (upward) of the left and of the right rail.
+Spectra are one-sided over the angular wavenumber Omega [rad/m]: the variance is the integral over Omega > 0.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ MOST = 0.2  #: largest deviation of a rail [m]
 
 @dataclass(frozen=True)
 class TrackSpectrum:
-    """Spectra of alignment (lateral), profile (vertical) and cross level (roll), of the rational form both families have.
+    """Spectra of alignment (lateral), profile (vertical) and cross level (roll), rational in W².
 
     S_lateral = A_l W_c² / D(W), S_vertical = A_v W_c² / D(W), D = (W² + W_r²)(W² + W_c²), [m²/(rad/m)];
     S_roll = roll_factor A_v W_c² W²/(D (W² + W_s²)) with W_r in D, [rad²/(rad/m)].
@@ -48,8 +48,8 @@ class TrackSpectrum:
 def fra(vertical: float, lateral: float, w_s: float) -> TrackSpectrum:
     """Return the spectrum of a class of the FRA: numbers in cm² rad/m; S = 0.25 A W_c²/(W² (W² + W_c²)).
 
-    Cross level, 4 · 0.25 A_v W_c²/((W² + W_c²)(W² + W_s²)) cm²/(rad/m) as the difference of height of the two rails over
-    1.5 m, is a roll of that over (1.5 m)².
+    Cross level, 4 · 0.25 A_v W_c²/((W² + W_c²)(W² + W_s²)) cm²/(rad/m) as the difference of height of the two rails
+    over 1.5 m, is a roll of that over (1.5 m)².
     """
     return TrackSpectrum(0.25e-4 * lateral, 0.25e-4 * vertical, 0.8245, 0.0, w_s, 4 / (2 * HALF_BASE) ** 2)
 
@@ -93,18 +93,21 @@ class Irregularities:
                 raise ModelError(f"irregularities: {name}: expected numbers") from None
             if values[name].ndim != 1 or values[name].shape != values["s"].shape or len(values["s"]) < 4:
                 raise ModelError(
-                    f"irregularities: {name}: expected as many numbers as s has, 4 or more, got shape {values[name].shape}"
+                    f"irregularities: {name}: expected as many numbers as s has, 4 or more, "
+                    f"got shape {values[name].shape}"
                 )
             if not np.isfinite(values[name]).all():
                 raise ModelError(f"irregularities: {name}: expected finite numbers")
         steps = np.diff(values["s"])
         if steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.mean():
-            raise ModelError("irregularities: s: expected equally spaced places that increase; resample the measurement")
+            raise ModelError(
+                "irregularities: s: expected equally spaced places that increase; resample the measurement"
+            )
         for name, array in values.items():
             if name != "s" and np.abs(array).max() > MOST:
                 raise ModelError(
-                    f"irregularities: {name}: deviations up to {np.abs(array).max():g} m: these look like millimetres; give "
-                    "metres (times 0.001)"
+                    f"irregularities: {name}: deviations up to {np.abs(array).max():g} m: these look like millimetres; "
+                    "give metres (times 0.001)"
                 )
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -124,8 +127,12 @@ class Irregularities:
         """Return the deviations with vertical ones as a wheel follows them, see `wheel_envelope`."""
         step = float(self.s[1] - self.s[0])
         return Irregularities(
-            self.s, self.left_y, wheel_envelope(self.left_z, step, radius), self.right_y, wheel_envelope(self.right_z, step, radius)
-        )  # fmt: skip
+            self.s,
+            self.left_y,
+            wheel_envelope(self.left_z, step, radius),
+            self.right_y,
+            wheel_envelope(self.right_z, step, radius),
+        )
 
     @classmethod
     def from_table(cls, table: Any, where: str = "irregularities") -> "Irregularities":
@@ -156,7 +163,8 @@ def random_irregularities(
 ) -> Irregularities:  # fmt: skip
     """Return a random track of a spectrum: waves of equally spaced wavenumbers with random phases.
 
-    z(s) = sum_k sqrt(2 S(W_k) dW) cos(W_k s + phase_k), for alignment, profile and cross level with phases of their own.
+    z(s) = sum_k sqrt(2 S(W_k) dW) cos(W_k s + phase_k), for alignment, profile and cross level with phases of their
+    own, summed by an inverse Fourier transform over twice the length.
 
     Parameters
     ----------
@@ -181,32 +189,43 @@ def random_irregularities(
         spectrum = SPECTRA[spectrum]
     length = number("irregularities: length", length, above=0.0)
     longest, shortest = (number("irregularities: wavelengths", value, above=0.0) for value in (longest, shortest))
-    spacing, fade = number("irregularities: spacing", spacing, above=0.0), number("irregularities: fade", fade, at_least=0.0)
+    spacing, fade = (
+        number("irregularities: spacing", spacing, above=0.0),
+        number("irregularities: fade", fade, at_least=0.0),
+    )
     if shortest >= longest:
         raise ModelError(f"irregularities: shortest wave {shortest:g} m is not shorter than the longest, {longest:g} m")
     if spacing > shortest / 4:
-        raise ModelError(f"irregularities: spacing {spacing:g} m is more than a quarter of the shortest wave, {shortest:g} m")
+        raise ModelError(
+            f"irregularities: spacing {spacing:g} m is more than a quarter of the shortest wave, {shortest:g} m"
+        )
     if length / spacing > 2e6:
-        raise ModelError(f"irregularities: {length / spacing:.3g} places are too many; a longer spacing or a shorter track")
-    low, high = 2 * np.pi / longest, 2 * np.pi / shortest
-    n = max(50, int(np.ceil((high - low) * length / np.pi)))  # twice as fine as the track is long: it does not repeat
-    dW = (high - low) / n
-    W = low + dW * (np.arange(n) + 0.5)
-    s = np.arange(0.0, length + 0.5 * spacing, spacing)
-    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (3, n))
-    signals = np.zeros((3, len(s)))
-    for i, density in enumerate(spectrum.densities(W)):
-        amplitudes = np.sqrt(2 * density * dW)
-        for begin in range(0, n, 256):  # in blocks: the whole table of cosines can be large
-            part = slice(begin, begin + 256)
-            signals[i] += amplitudes[part] @ np.cos(np.outer(W[part], s) + phases[i, part, None])
+        raise ModelError(
+            f"irregularities: {length / spacing:.3g} places are too many; a longer spacing or a shorter track"
+        )
+    n = int(np.ceil(length / spacing)) + 1
+    period = 2 * n  # in points: twice the track, so that it does not repeat
+    dW = 2 * np.pi / (period * spacing)
+    k = np.arange(int(np.ceil(2 * np.pi / longest / dW)), int(2 * np.pi / shortest / dW) + 1)
+    if len(k) < 2:
+        raise ModelError(
+            f"irregularities: length {length:g} m is too short for waves of {shortest:g} m to {longest:g} m"
+        )
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (3, len(k)))
+    s = np.asarray(spacing * np.arange(n), dtype=np.float64)
+    lines = np.zeros((3, period // 2 + 1), dtype=complex)
+    lines[:, k] = (
+        np.sqrt(2 * np.array(spectrum.densities(np.asarray(dW * k, dtype=np.float64))) * dW)
+        * np.exp(1j * phases)
+        * period
+        / 2
+    )
+    signals = np.fft.irfft(lines, period)[:, :n]
     if fade > 0:
         rise = np.clip(np.minimum(s, s[-1] - s) / fade, 0, 1)
         signals *= rise * rise * (3 - 2 * rise)
     lateral, vertical, roll = signals
-    return Irregularities(
-        start + s, lateral, vertical + HALF_BASE * roll, lateral, vertical - HALF_BASE * roll
-    )
+    return Irregularities(start + s, lateral, vertical + HALF_BASE * roll, lateral, vertical - HALF_BASE * roll)
 
 
 def wheel_envelope(z: Array, spacing: float, radius: float) -> Array:

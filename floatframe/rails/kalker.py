@@ -1,8 +1,8 @@
 """Kalker's coefficients of linear creep, interpolated in his table over a/b and Poisson's ratio.
 
-Between rows the coefficients are interpolated linearly in g = min(a/b, b/a), between Poisson's ratios their reciprocals by a
-parabola (they are nearly linear in nu); beyond the table, g < 0.1, his asymptotes are used, scaled so that they join the
-table at g = 0.1. C32 = -C23 (Kalker 1990, Table E3).
+Between rows the coefficients are interpolated linearly in g = min(a/b, b/a), between Poisson's ratios their
+reciprocals by a parabola (they are nearly linear in nu); beyond the table, g < 0.1, his asymptotes are used, scaled so
+that they join the table at g = 0.1. C32 = -C23 (Kalker 1990, Table E3).
 """
 
 import numpy as np

@@ -21,7 +21,8 @@ __all__ = ["CONTACT_OUTPUTS", "HEAD", "WHEEL_HEAD", "WHEEL_OUTPUTS", "wheels_on_
 
 #: numbers at the beginning of the data
 HEAD = (
-    "n_wheels", "n_parts", "creep", "option_0", "option_1", "option_2", "option_3", "option_4", "shear_modulus", "friction",
+    "n_wheels", "n_parts", "creep", "option_0", "option_1", "option_2", "option_3", "option_4", "shear_modulus",
+    "friction",
     "low_speed", "damping", "is_constraint", "height", "cells_at", "n_cells", "irregular_at", "irregular_from",
     "irregular_step", "irregular_n",
 )  # fmt: skip
@@ -152,7 +153,14 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
     worst = zero - 1.0
     for wheel in range(int(data[0])):
         at = N_HEAD + wheel * N_WHEEL
-        side, arm, half, radius, table, u_off = data[at], data[at + 1], data[at + 2], data[at + 3], int(data[at + 4]), data[at + 5]
+        side, arm, half, radius, table, u_off = (
+            data[at],
+            data[at + 1],
+            data[at + 2],
+            data[at + 3],
+            int(data[at + 4]),
+            data[at + 5],
+        )
         wx, wy, wz = rx + arm * ax, ry + arm * ay, rz + arm * az
         s, cx, cy, psi, cant, k = place_on_track(data, wx, wy)
         c, sn = np.cos(psi), np.sin(psi)
@@ -232,7 +240,21 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
             eta = (ux * ex + uy * ey + uz * ez) / V
             spin = (ox_ * mx + oy_ * my + oz_ * mz) / V
             fx, fy, moment = creep_force(
-                law, ahead * xi, ahead * eta, spin, N, a, b, field[9], field[10], field[11], field[12], G, mu, options
+                law,
+                ahead * xi,
+                ahead * eta,
+                spin,
+                N,
+                a,
+                b,
+                field[9],
+                field[10],
+                field[11],
+                field[12],
+                G,
+                mu,
+                options,
+                V,
             )
             fx, fy = ahead * fx, ahead * fy
             # normal force along the rail where the rail itself is not straight

@@ -1,8 +1,9 @@
 """A profile of a wheel or of a rail: a height over the lateral coordinate, checked, with slope and curvature.
 
-Coordinates are the same for both sides of the track: y outward, towards the field, away from the centre of the track. The
-profile of a wheel is what its radius adds to the nominal one (positive towards the rail, so that a flange is at y < 0 with
-values near +28 mm), over the distance from the running circle. That of a rail is the height over its top, positive upward.
+Coordinates are the same for both sides of the track: y outward, towards the field, away from the centre of the track.
+The profile of a wheel is what its radius adds to the nominal one (positive towards the rail, so that a flange is at y
+< 0 with values near +28 mm), over the distance from the running circle. That of a rail is the height over its top,
+positive upward.
 """
 
 from dataclasses import dataclass, field
@@ -54,7 +55,7 @@ class Profile:
         return CubicSpline(self.y, self.z, bc_type="natural")
 
     def height(self, y: Array) -> Array:
-        """z at y [m]; beyond the ends the profile stops: -infinity."""
+        """Z at y [m]; beyond the ends the profile stops: -infinity."""
         y = np.asarray(y, dtype=float)
         inside = (y >= self.y[0]) & (y <= self.y[-1])
         return np.where(inside, self.spline(np.clip(y, self.y[0], self.y[-1])), -np.inf)
@@ -64,7 +65,7 @@ class Profile:
         return self.spline(np.asarray(y, dtype=float), 1)
 
     def curvature(self, y: Array) -> Array:
-        """z'' (1 + z'²)^(-3/2) at y [1/m]."""
+        """Z'' (1 + z'²)^(-3/2) at y [1/m]."""
         y = np.asarray(y, dtype=float)
         return self.spline(y, 2) * (1 + self.spline(y, 1) ** 2) ** -1.5
 
@@ -76,7 +77,9 @@ def checked_points(where: str, kind: str, y: Any, z: Any) -> tuple[Array, Array]
     except (TypeError, ValueError):
         raise ModelError(f"{where}: expected numbers for y and z [m]") from None
     if y.ndim != 1 or y.shape != z.shape or len(y) < 5:
-        raise ModelError(f"{where}: expected two equal lists of at least 5 numbers, y and z, got {y.shape} and {z.shape}")
+        raise ModelError(
+            f"{where}: expected two equal lists of at least 5 numbers, y and z, got {y.shape} and {z.shape}"
+        )
     if not (np.isfinite(y).all() and np.isfinite(z).all()):
         raise ModelError(f"{where}: expected finite numbers")
     if y[0] > y[-1]:

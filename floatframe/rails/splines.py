@@ -1,4 +1,4 @@
-"""Uniform cubic B-splines: coefficients in NumPy, values in compiled code that takes float64 and complex128 arguments."""
+"""Uniform cubic B-splines: coefficients in NumPy, values in compiled code, for float64 and complex128 arguments."""
 
 import numba
 import numpy as np
@@ -10,7 +10,7 @@ __all__ = ["basis", "basis_slopes", "cell", "coefficients", "even_coefficients"]
 
 
 def even_coefficients(values: Array, axis: int = 0) -> Array:
-    """Return the coefficients through values at 0, h, 2 h, ... of a function that is even: c_(-1) = c_1 at the beginning."""
+    """Return the coefficients through values at 0, h, 2 h, ... of an even function: c_(-1) = c_1 at the beginning."""
     y = np.moveaxis(np.asarray(values, dtype=float), axis, 0)
     both = coefficients(np.concatenate([y[:0:-1], y]))
     return np.moveaxis(both[len(y) - 1 :], 0, axis)

@@ -75,7 +75,7 @@ def s1002(y: Array) -> Array:
 
 
 def wheel_s1002() -> Profile:
-    """Return S1002 as a profile, without the last 1.2 mm of the back of the flange, which is steeper than 60 degrees."""
+    """Return S1002 as a profile, without the last, steepest 1.2 mm of the back of the flange."""
     y = np.linspace(-68.8, 60.0, 1 + round(128.8e-3 / SPACING))
     return Profile("wheel", y * 1e-3, s1002(y) * 1e-3, "S1002")
 

@@ -1,8 +1,9 @@
 """A track fixed in the ground: its centre line over the arc length, cant, irregularities of each rail.
 
-Straights, circles and clothoids (curvature linear in the arc length) follow each other; a curve to the left is positive. The
-axes of the track at s are t forward, n to the left, b upward, turned about t by the cant: in a curve to the left the left
-rail is lower. The centre line stays at one height. Before its beginning and beyond its end the track is straight.
+Straights, circles and clothoids (curvature linear in the arc length) follow each other; a curve to the left is
+positive. The axes of the track at s are t forward, n to the left, b upward, turned about t by the cant: in a curve to
+the left the left rail is lower. The centre line stays at one height. Before its beginning and beyond its end the track
+is straight.
 """
 
 from collections.abc import Sequence
@@ -35,9 +36,15 @@ class Segment:
 
 
 def curve(
-    radius: float, length: float, *, transition: float = 50.0, cant: float = 0.0, before: float = 20.0, after: float = 50.0
+    radius: float,
+    length: float,
+    *,
+    transition: float = 50.0,
+    cant: float = 0.0,
+    before: float = 20.0,
+    after: float = 50.0,
 ) -> tuple[Segment, ...]:
-    """Return straight, clothoid, circle, clothoid and straight: a curve to the left, or with a negative radius to the right.
+    """Return straight, clothoid, circle, clothoid and straight: a curve to the left, or, R < 0, to the right.
 
     Parameters
     ----------
@@ -80,7 +87,9 @@ class Track:
 
     segments: Sequence[Segment] = ()  #: none: straight for ever
     irregularities: Irregularities | None = None
-    start: Array = field(default_factory=lambda: np.zeros(3))  #: of the centre line, height of the tops of the rails [m]
+    start: Array = field(
+        default_factory=lambda: np.zeros(3)
+    )  #: of the centre line, height of the tops of the rails [m]
     heading: float = 0.0  #: from the x axis of the ground to the left [rad]
 
     def __post_init__(self) -> None:
@@ -100,8 +109,8 @@ class Track:
         for i, (one, other) in enumerate(joints):
             if abs(one.cant[1] - other.cant[0]) > 1e-9:
                 raise ModelError(
-                    f"track: cant jumps from {one.cant[1]:g} m to {other.cant[0]:g} m between segments {i} and {i + 1}: "
-                    "rails cannot; put a transition between them"
+                    f"track: cant jumps from {one.cant[1]:g} m to {other.cant[0]:g} m between segments {i} and "
+                    f"{i + 1}: rails cannot; put a transition between them"
                 )
 
     @property
@@ -111,9 +120,11 @@ class Track:
 
     @cached_property
     def cells(self) -> Array:
-        """Pieces of constant change of curvature and cant, (n, 8): s, x, y, heading, k, dk/ds, cant angle and its ds."""
+        """Pieces of constant change of curvature and cant, (n, 8): s, x, y, heading, k, k', cant angle, its slope."""
         s, x, y, heading = 0.0, float(self.start[0]), float(self.start[1]), self.heading
-        rows = [[-MOST_LENGTH, x - MOST_LENGTH * np.cos(heading), y - MOST_LENGTH * np.sin(heading), heading, 0, 0, 0, 0]]
+        rows = [
+            [-MOST_LENGTH, x - MOST_LENGTH * np.cos(heading), y - MOST_LENGTH * np.sin(heading), heading, 0, 0, 0, 0]
+        ]
         if self.segments:
             first = np.arcsin(self.segments[0].cant[0] / 1.5)
             rows[0][6] = first
@@ -174,15 +185,13 @@ class Track:
                 segments = curve(**table["curve"])
             else:
                 segments = tuple(
-                    Segment(each["length"], *(tuple(pair(each[key])) for key in ("curvature", "cant") if key in each))
-                    if "curvature" in each or "cant" not in each
-                    else Segment(each["length"], cant=pair(each["cant"]))
+                    Segment(each["length"], pair(each.get("curvature", 0.0)), pair(each.get("cant", 0.0)))
                     for each in table.get("segments", ())
                 )
         except (TypeError, KeyError) as error:
             raise ModelError(
-                f"{where}: a segment has length, curvature and cant (a number or [begin, end]); a curve has radius, length, "
-                f"transition, cant, before, after: {error}"
+                f"{where}: a segment has length, curvature and cant (a number or [begin, end]); a curve has radius, "
+                f"length, transition, cant, before, after: {error}"
             ) from None
         irregular = table.get("irregularities")
         return cls(

@@ -38,9 +38,9 @@ LAW_KEYS = (
 class Wheelset(Element):
     """Two wheels that turn with one axle, on the rails of a track that is fixed in the ground.
 
-    The marker is at the middle of the axle, on the body that turns; its y axis is the axle and points to the left, so that
-    the wheelset rolls forward with a positive angular velocity about it. The tops of the rails are at the height of
-    `track.start`.
+    The marker is at the middle of the axle, on the body that turns; its y axis is the axle and points to the left, so
+    that the wheelset rolls forward with a positive angular velocity about it. The tops of the rails are at the height
+    of `track.start`.
     """
 
     name: str
@@ -70,8 +70,8 @@ class Wheelset(Element):
 class WheelOnRail(Element):
     """One wheel on its rail: an independently rotating wheel, or one side of a wheelset with different profiles.
 
-    The marker is at the middle of the running circle, on the body that turns; its y axis is the axle and points to the left of
-    the track, on both sides.
+    The marker is at the middle of the running circle, on the body that turns; its y axis is the axle and points to the
+    left of the track, on both sides.
     """
 
     name: str
@@ -106,8 +106,8 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
     Raises
     ------
     ModelError
-        If the marker is on the ground, its axle does not lie across the track, a wheel is placed off its rail, or the system
-        is not in metres, kilograms and seconds.
+        If the marker is on the ground, its axle does not lie across the track, a wheel is placed off its rail, or the
+        system is not in metres, kilograms and seconds.
     """
     from floatframe.rails.law import CONTACT_OUTPUTS, WHEEL_OUTPUTS, wheels_on_rails  # numba: slow to import
 
@@ -146,8 +146,8 @@ def require_on_track(
         _, n, b = frame.axes.T
         if axle @ n < 0.9:
             raise ModelError(
-                f"{where}: marker: its y axis, the axle, points {np.round(axle, 3).tolist()}; expected across the track to "
-                f"its left, {np.round(n, 3).tolist()}: give the marker a triad"
+                f"{where}: marker: its y axis, the axle, points {np.round(axle, 3).tolist()}; expected across the "
+                f"track to its left, {np.round(n, 3).tolist()}: give the marker a triad"
             )
         d = W - frame.origin
         shift = each.side * float(d @ n) - 0.5 * each.pair.running_circles
@@ -155,8 +155,8 @@ def require_on_track(
         side = "left" if each.side > 0 else "right"
         if abs(shift) > 0.05 or abs(height) > 0.05:
             raise ModelError(
-                f"{where}: its {side} wheel is placed off the track: {shift * 1e3:.4g} mm outward of the middle of its rail "
-                f"and {height * 1e3:.4g} mm above it; expected both within 50 mm: its centre belongs at "
+                f"{where}: its {side} wheel is placed off the track: {shift * 1e3:.4g} mm outward of the middle of "
+                f"its rail and {height * 1e3:.4g} mm above it; expected both within 50 mm: its centre belongs at "
                 f"{np.round(W - each.side * shift * n - height * b, 4).tolist()} m"
             )
 
@@ -178,10 +178,12 @@ def nearest_frame(track: Track, point: Any) -> Any:
 def wheel_shape(pair: Pair, side: int, arm: float) -> Drawn:
     """Return a wheel as it looks, in the axes of the marker: the flange is on its inner side."""
     shape = RailWheel(pair.radius, flange_side=-side if pair.has_flange else 0)
-    return Drawn(Shape(shape, position=(0.0, arm, 0.0)), 0)
+    return Drawn(Shape(shape, position=np.array([0.0, arm, 0.0])), 0)
 
 
-def track_shape(track: Track, length: float, *, start: float = 0.0, gauge: float = 1.5, spacing: float = 1.0) -> DrawnTrack:
+def track_shape(
+    track: Track, length: float, *, start: float = 0.0, gauge: float = 1.5, spacing: float = 1.0
+) -> DrawnTrack:
     """Return how a track looks from `start` over `length` [m], for the scene of a system."""
     s = np.linspace(start, start + length, max(2, int(np.ceil(length / spacing)) + 1))
     frames = [track.frame(float(each)) for each in s]
@@ -215,7 +217,7 @@ def common_fields(name: str, table: Mapping[str, Any], read: Any, own: tuple[str
 
 
 def profile_of_table(where: str, kind: str, value: Any, read: Any) -> Profile:
-    """Return a profile: a name, {cone = 0.05}, {y = [...], z = [...]} or {file = "points.txt"}, points smoothed by `noise`."""
+    """Return a profile: a name, {cone = 0.05}, {y = [...], z = [...]} or {file = "points.txt"}, smoothed by `noise`."""
     if isinstance(value, str):
         if value not in PROFILES or PROFILES[value]().kind != kind:
             raise ModelError(

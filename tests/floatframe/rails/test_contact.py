@@ -1,4 +1,4 @@
-"""Where wheels touch rails: another program's places, closed forms of circles, gradients of the quasi-elastic depth, tables."""
+"""Where wheels touch rails: another program's places, closed forms of circles, gradients, tables, conicity."""
 
 from dataclasses import replace
 
@@ -41,9 +41,10 @@ MANCHESTER = Pair(rail=head_of_circles(21.03, 52.053, "UIC60 of the Manchester b
 def test_contacts_of_the_manchester_benchmark(y, roll, yaw, s, angle, x):
     """Cases of the benchmark A2.2 as CONTACT 23.1 prints them: place on the wheel [mm], angle, place ahead [mm].
 
-    Roll and yaw in flange contact move the place by millimetres: a search in the plane of the axle alone misses x by all of it.
-    The rail is drawn with circles here, within 0.014 mm of the points there; on the tread, where wheel and rail are almost
-    conformal, that moves a contact by half a millimetre, on the flank by 0.2 mm. CONTACT searches under 10 kN, this one rigid.
+    Roll and yaw in flange contact move the place by millimetres: a search in the plane of the axle alone misses x by
+    all of it. The rail is drawn with circles here, within 0.014 mm of the points there; on the tread, where wheel and
+    rail are almost conformal, that moves a contact by half a millimetre, on the flank by 0.2 mm. CONTACT searches
+    under 10 kN, this one rigid.
     """
     found = rigid_contacts(MANCHESTER, y, roll=roll, yaw=yaw)[0]
     assert_allclose(found.s * 1e3, s, rtol=0, atol=0.8 if angle == 0.4176 else 0.6 if x is None else 0.2)
@@ -53,7 +54,7 @@ def test_contacts_of_the_manchester_benchmark(y, roll, yaw, s, angle, x):
 
 
 def test_two_points_touch_at_once_where_the_contact_jumps_to_the_flange():
-    """The jump of a cone between shifts of 5 and 7 mm: both points have the same height there, tread and flank of the flange."""
+    """The jump of a cone between shifts of 5 and 7 mm: tread and flank of the flange have the same height there."""
     low, high = 0.004, 0.007
     for _ in range(45):
         middle = 0.5 * (low + high)
@@ -83,11 +84,15 @@ def test_the_wheel_curve_is_the_envelope_of_the_wheel(u, roll, yaw):
 
 @pytest.mark.parametrize("part", ["all", "tread", "flange"])
 def test_means_of_the_quasi_elastic_contact_are_the_gradient_of_its_depth(part):
-    """Forces along the gradient have a potential: slope = dq/du, and the lever about the track's direction is dq/dphi."""
+    """Forces along the gradient have a potential: slope = dq/du, lever about the track's direction = -dq/dphi."""
     u, roll, step = np.array([-6e-3, 0.3e-3, 4e-3, 6.5e-3]), 1e-3, 1e-6
     at = quasi_elastic(NEW, u, roll=roll, part=part)
-    by_u = (quasi_elastic(NEW, u + step, roll=roll, part=part).q - quasi_elastic(NEW, u - step, roll=roll, part=part).q) / (2 * step)
-    by_roll = (quasi_elastic(NEW, u, roll=roll + step, part=part).q - quasi_elastic(NEW, u, roll=roll - step, part=part).q) / (2 * step)
+    by_u = (
+        quasi_elastic(NEW, u + step, roll=roll, part=part).q - quasi_elastic(NEW, u - step, roll=roll, part=part).q
+    ) / (2 * step)
+    by_roll = (
+        quasi_elastic(NEW, u, roll=roll + step, part=part).q - quasi_elastic(NEW, u, roll=roll - step, part=part).q
+    ) / (2 * step)
     use = at.q > -5e-3
     assert_allclose(at.slope[use], by_u[use], rtol=2e-3)
     assert_allclose((-(at.y + at.slope * at.z))[use], by_roll[use], rtol=0, atol=2e-3 * 0.46)
@@ -127,14 +132,19 @@ def test_a_table_answers_as_the_search_it_was_made_of():
             if exact.q[0] < -2e-3:
                 continue
             contact_fields(data, 0, part, u + NEW.radius * np.sin(roll), np.sin(roll), np.sin(yaw), field)
-            defects = [field[0] - exact.q[0], field[1] - exact.slope[0], field[3] - exact.y[0], field[5] - exact.radius[0]]
+            defects = [
+                field[0] - exact.q[0],
+                field[1] - exact.slope[0],
+                field[3] - exact.y[0],
+                field[5] - exact.radius[0],
+            ]
             worst[part] = np.maximum(worst[part], np.abs(defects))
     # flank to root is a change within 20 micrometres of shift: slopes cannot be as near as depths there
     assert np.all(worst < [[1e-6, 4e-3, 3e-4, 5e-5], [9e-5, 1.3, 5e-3, 5e-3]]), worst
 
 
 def test_klingels_wavelength_and_the_conicity_of_a_cone_on_a_circle():
-    """delta_r/(2 y) of a cone gamma on rails of radius R: gamma (b + R gamma)/(b - r gamma) near the centre (Wickens 1965)."""
+    """delta_r/(2 y) of a cone gamma on rails of radius R: gamma (b + R gamma)/(b - r gamma) (Wickens 1965)."""
     assert_allclose(klingel_wavelength(0.05, 0.46, 1.5), 2 * np.pi * np.sqrt(0.46 * 0.75 / 0.05), rtol=1e-14)
     gamma, b, R, r = 0.05, 0.75, 0.3, 0.46
     expected = gamma * (b + R * gamma) / (b - r * gamma)
@@ -157,7 +167,7 @@ def test_the_conicity_of_a_cubic_difference_is_that_of_its_wave():
 
 
 def test_s1002_on_60e1_has_the_conicity_that_is_known_of_it():
-    """About 0.18 at 3 mm for new profiles, rails 1 : 40 and 1435 mm: the value everyone quotes; harmonics agree with waves."""
+    """About 0.18 at 3 mm for new profiles, rails 1 : 40 and 1435 mm, as is quoted; harmonics agree with waves."""
     y = np.linspace(-3.75e-3, 3.75e-3, 61)
     difference = (y, rolling_radius_difference(NEW, y))
     wave = equivalent_conicity(NEW, 3e-3, difference=difference)

@@ -59,7 +59,7 @@ def test_a_ball_on_a_plane_is_the_closed_form():
 
 
 def test_the_ellipse_of_contact_is_that_of_another_program():
-    """CONTACT's example of FASTSIM: curvatures 0.8464 and 2.406 1/m, G = 82 GPa, nu = 0.28, 82 kN: 8 mm, 4 mm, 0.09267 mm."""
+    """CONTACT's example of FASTSIM: A, B = 0.8464, 2.406 1/m, G = 82 GPa, nu = 0.28, 82 kN: 8, 4, 0.09267 mm."""
     found = ellipse(np.array(0.8464), np.array(2.406), 82e9 / 0.72)
     cube = 82e3 ** (1 / 3)
     assert_allclose([found.a_1 * cube, found.b_1 * cube], [8e-3, 4e-3], rtol=2e-4)
@@ -67,6 +67,9 @@ def test_the_ellipse_of_contact_is_that_of_another_program():
 
 
 def test_exchanged_curvatures_exchange_the_axes():
-    one, other = ellipse(np.array([0.3, 0.8]), np.array([0.8, 0.3]), 1.0), ellipse(np.array([0.8, 0.3]), np.array([0.3, 0.8]), 1.0)
+    one, other = (
+        ellipse(np.array([0.3, 0.8]), np.array([0.8, 0.3]), 1.0),
+        ellipse(np.array([0.8, 0.3]), np.array([0.3, 0.8]), 1.0),
+    )
     assert_allclose(one.a_1, other.b_1, rtol=1e-14)
     assert_allclose(one.stiffness, other.stiffness, rtol=1e-14)

@@ -6,13 +6,23 @@ from numpy.testing import assert_allclose
 
 from floatframe import ModelError
 from floatframe.rails.profile import Profile, profile_of_points
-from floatframe.rails.standard_profiles import S1002_BOUNDS, cone, head_of_circles, inclined, rail_60e1, s1002, wheel_s1002
+from floatframe.rails.standard_profiles import (
+    S1002_BOUNDS,
+    cone,
+    head_of_circles,
+    inclined,
+    rail_60e1,
+    s1002,
+    wheel_s1002,
+)
 
 
 def test_the_eight_sections_of_s1002_meet_with_equal_slopes():
     for bound in S1002_BOUNDS[1:-1]:
         below, at, above = s1002(np.array([bound - 1e-7, bound, bound + 1e-7]))
-        assert_allclose([below, above], at, rtol=0, atol=1.5e-4)  # mm; the standard's polynomials are printed to ten digits
+        assert_allclose(
+            [below, above], at, rtol=0, atol=1.5e-4
+        )  # mm; the standard's polynomials are printed to ten digits
         left = np.diff(s1002(bound + np.array([-2e-5, -1e-5])))[0] / 1e-5
         right = np.diff(s1002(bound + np.array([1e-5, 2e-5])))[0] / 1e-5
         assert_allclose(left, right, rtol=0, atol=1e-4)
@@ -31,9 +41,12 @@ def test_s1002_has_the_flange_of_its_standard():
 
 
 def test_s1002_on_its_tread_is_where_another_program_has_it():
-    """Places and heights of the wheel of the Manchester benchmark as CONTACT 23.1 prints them, less the approach it prints."""
+    """Places and heights of the wheel of the Manchester benchmark as CONTACT 23.1 prints them, less its approach."""
     s = np.array([1.8726, 4.7204, 6.2694, 7.5089, 8.5660])
-    height, approach = np.array([0.0729, 0.1451, 0.1754, 0.1960, 0.2114]), np.array([1.596, 1.859, 1.946, 2.007, 2.054]) * 1e-2
+    height, approach = (
+        np.array([0.0729, 0.1451, 0.1754, 0.1960, 0.2114]),
+        np.array([1.596, 1.859, 1.946, 2.007, 2.054]) * 1e-2,
+    )
     assert_allclose(-s1002(s), height - approach, rtol=0, atol=7e-4)
 
 
@@ -49,7 +62,7 @@ def test_the_head_of_60e1_closes_at_its_published_width():
 
 
 def test_an_inclined_rail_is_that_of_the_manchester_benchmark():
-    """UIC60 at 1 : 40 as tabulated there (sampled, mm; y inward negative, z downward), whose heads are drawn to 0.02 mm."""
+    """UIC60 at 1 : 40 as tabulated there (sampled, mm; y inward negative, z downward)."""
     y, z = np.array([
         [-36.310303, 4.1373100], [-30.211027, 2.2283480], [-18.800542, 0.59313022], [-12.236779, 0.24991168],
         [-8.6518464, 0.12495522], [2.2616861, 0.0084805629], [10.231937, 0.41437678], [18.093602, 1.6039611],
@@ -91,7 +104,9 @@ def test_noise_of_a_measurement_is_smoothed_to_its_size():
         assert np.sqrt(np.mean((wheel.height(y) - s1002(y * 1e3) * 1e-3) ** 2)) < 6e-6
         inner = (wheel.y > -0.02) & (wheel.y < 0.04)
         true = np.gradient(s1002(wheel.y[inner] * 1e3) * 1e-3, wheel.y[inner])
-        assert np.abs(wheel.slope(wheel.y[inner]) - true).max() < 0.02 < np.abs(rough.slope(wheel.y[inner]) - true).max()
+        assert (
+            np.abs(wheel.slope(wheel.y[inner]) - true).max() < 0.02 < np.abs(rough.slope(wheel.y[inner]) - true).max()
+        )
 
 
 def test_points_from_outside_inward_are_the_same_profile():
