@@ -93,10 +93,11 @@ def accept_body(
     if band is not None and not (np.isfinite(band) and band > 0):
         raise QualityError(f"acceptance: band: expected a frequency above 0 [Hz], got {band:g}")
     compared, left_out, job = "", None, None
-    records: tuple[QualityRecord, ...] = ()
+    own = check_body(reduced)
+    records = own
     if full.job is not None:
         job = read_job(Path(full.job))
-        records, compared = against_job(job, Path(full.job), reduced, band, stages)
+        records, compared = against_job(job, Path(full.job), reduced, own, band, stages)
         if job.body.deck is not None:
             left_out = cards_left_out(read_deck(job.body.deck))
     elif full.deck is not None:
@@ -106,12 +107,10 @@ def accept_body(
             job = job_of_deck(deck, full, reduced, Path(folder))
             with stages("full model"):
                 body = uncoupled_body(job, stages)
-            records = with_own_checks(reduced, compare_with_model(body, reduced, band=band or band_of(reduced)))
+            records = (*own, *compare_with_model(body, reduced, band=band or band_of(reduced)))
             compared = f"the deck {full.deck}, {body.n_dof} dofs, its supports removed"
-    else:
-        records = check_body(reduced)
-        if (deck_path := reduced.provenance.get("deck")) and Path(deck_path).is_file():
-            left_out = cards_left_out(read_deck(Path(deck_path)))
+    elif (deck_path := reduced.provenance.get("deck")) and Path(deck_path).is_file():
+        left_out = cards_left_out(read_deck(Path(deck_path)))
     if left_out is not None:
         records = (*records, left_out_record(left_out))
     error = mesh_error(job, most_dofs, stages)
@@ -121,7 +120,7 @@ def accept_body(
         reduced,
         records,
         range_of_use(reduced, records),
-        effective_masses(reduced),
+        () if has_failed(own) else effective_masses(reduced),
         compared,
         error,
         left_out,
@@ -133,7 +132,7 @@ def accept_body(
 
 
 def against_job(
-    job: Job, path: Path, reduced: ReducedBody, band: float | None, stages: Stages
+    job: Job, path: Path, reduced: ReducedBody, own: tuple[QualityRecord, ...], band: float | None, stages: Stages
 ) -> tuple[tuple[QualityRecord, ...], str]:
     """Compare with the full model of a job: with its mode set too where the body was made with it."""
     uncoupled = uncoupled_body(job, stages)
@@ -147,20 +146,15 @@ def against_job(
                 modes = job_mode_set(families, reduction_of(job, body))
             top = usable_band(modes, reduced) if band is None else band
             with stages("compare"), FullReference(families, band=top) as reference:
-                records = check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled)
+                records = check_reduction(body, modes, reduced, reference=reference, uncoupled=uncoupled, own=own)
         return records, f"{name}, and its mode set"
     records = compare_with_model(body, reduced, band=band or band_of(reduced))
-    return with_own_checks(reduced, records), f"{name}; the body was made otherwise"
+    return (*own, *records), f"{name}; the body was made otherwise"
 
 
 def is_of_one_model(body: "FEBody", reduced: ReducedBody) -> bool:
     """Whether a reduced body says that it was made of a model of this size."""
     return reduced.provenance.get("full dofs") == str(body.n_dof)
-
-
-def with_own_checks(reduced: ReducedBody, records: tuple[QualityRecord, ...]) -> tuple[QualityRecord, ...]:
-    """Return the checks of a body by itself, then others."""
-    return (*check_body(reduced), *records)
 
 
 def band_of(reduced: ReducedBody) -> float:
@@ -204,7 +198,7 @@ def left_out_record(left_out: tuple[LeftOut, ...]) -> QualityRecord:
 
 def effective_masses(reduced: ReducedBody) -> tuple[EffectiveMass, ...]:
     """Return the effective masses with one interface held, for each that can be."""
-    if not reduced.n_q or has_failed(check_body(reduced)):
+    if not reduced.n_q:
         return ()
     found = []
     for interface in reduced.interfaces:

@@ -17,7 +17,7 @@ from cms.correlation.model_modes import modes_of_body, modes_of_file
 from cms.correlation.points import TOLERANCE, Placement
 from cms.correlation.universal_file import read_universal
 from cms.correlation.update import MODES_BEYOND, Parameter, Update, update_model
-from cms.jobs.body_of_job import job_body
+from cms.jobs.body_of_job import checked_mesh, is_of_mesh, job_body
 from cms.jobs.job import Job
 from cms.modal_file.file import read
 from fe_models.body.fe_body import FEBody
@@ -25,10 +25,12 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.stages import Stages
 from fe_models.foundation.toml_file import Table, Vector3, changed, read_toml, validated
 from fe_models.foundation.units import unit_system
+from fe_models.meshes.mesh import Mesh
 
 __all__ = ["CorrelationFile", "CorrelationResult", "read_correlation", "run_correlation"]
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
+OF_MESH = ("body", "mesh_size")  #: tables of a job whose numbers change its mesh
 UNIVERSAL, TABLES = (".unv", ".uff", ".unv55", ".ufb"), (".csv", ".txt")
 Axis = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
@@ -196,8 +198,13 @@ def run_correlation(asked: CorrelationFile, stages: Stages | None = None) -> Cor
 
 
 def body_maker(content: dict[str, Any], path: Path, parameters: tuple[Parameter, ...]) -> Callable[[Array], FEBody]:
-    """Return the function from values of the parameters to the coupled body of the job; the last bodies are kept."""
+    """Return the function from values of the parameters to the coupled body of the job; the last bodies are kept.
+
+    A solid mesh is read and judged once, unless a parameter belongs to the mesh.
+    """
     made: dict[bytes, FEBody] = {}
+    meshes: list[Mesh] = []
+    is_of_body = any(p.path.split(".")[0] in OF_MESH for p in parameters)
 
     def body_at(values: Array) -> FEBody:
         key = np.asarray(values, float).tobytes()
@@ -206,7 +213,10 @@ def body_maker(content: dict[str, Any], path: Path, parameters: tuple[Parameter,
                 made.pop(next(iter(made)))
             given = {p.path: float(v) for p, v in zip(parameters, values, strict=True)}
             document = changed(content, given, str(path), CorrelationError)
-            made[key] = job_body(named(validated(Job, document, path, CorrelationError, context=path.parent), path))
+            job = named(validated(Job, document, path, CorrelationError, context=path.parent), path)
+            if is_of_mesh(job) and not is_of_body and not meshes:
+                meshes.append(checked_mesh(job, Stages(), None)[0])
+            made[key] = job_body(job, mesh=meshes[0] if meshes else None)
         return made[key]
 
     return body_at

@@ -11,17 +11,31 @@ from fe_models.foundation.stages import Stages
 from fe_models.foundation.units import unit_system
 
 if TYPE_CHECKING:
-    pass
+    from fe_models.meshes.mesh import Mesh
+    from fe_models.reports.first_order import FirstOrderError
 from cms.jobs.mesh_of_job import is_cad, solid_mesh_of
 from cms.jobs.parts_of_job import interfaces_of, load_cases_of, materials_of, part_of_mesh
 
-__all__ = ["coupled_body", "job_body", "uncoupled_body"]
+__all__ = ["checked_mesh", "coupled_body", "is_of_mesh", "job_body", "uncoupled_body"]
 
 
-def job_body(job: Job, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
-    """Run a job up to the coupled body: read, check, assemble, couple the interfaces."""
+def job_body(
+    job: Job,
+    stages: Stages | None = None,
+    *,
+    on_report: Callable[[Any], None] | None = None,
+    mesh: "Mesh | None" = None,
+) -> FEBody:
+    """Run a job up to the coupled body: read, check, assemble, couple the interfaces.
+
+    Parameters
+    ----------
+    mesh
+        The solid mesh of the job as `checked_mesh` made it for the same job with other numbers: it is neither read nor
+        judged again.
+    """
     stages = stages or Stages()
-    body = uncoupled_body(job, stages, on_report=on_report)
+    body = uncoupled_body(job, stages, on_report=on_report, mesh=mesh)
     with stages("couple interfaces"):
         return coupled_body(job, body)
 
@@ -41,7 +55,9 @@ def coupled_body(job: Job, body: FEBody) -> FEBody:
     return planar(couple(body), normal=PLANES[job.body.plane])
 
 
-def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None) -> FEBody:
+def uncoupled_body(
+    job: Job, stages: Stages, *, on_report: Callable[[Any], None] | None = None, mesh: "Mesh | None" = None
+) -> FEBody:
     """Run a job up to the body whose interfaces are still to be coupled, with the nodes and points it asks for."""
     from fe_models.body.kept_nodes import keep_nodes
 
@@ -55,7 +71,7 @@ def uncoupled_body(job: Job, stages: Stages, *, on_report: Callable[[Any], None]
     return element_points(body, job.body.stress_points)
 
 
-def made_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
+def made_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None, mesh: "Mesh | None" = None) -> FEBody:
     """Make the body of a job from what it names: a deck, a mesh, tables or matrices."""
     if job.body.deck is not None:
         from cms.jobs.deck_body import body_of_deck
@@ -70,7 +86,7 @@ def made_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None)
 
         return body_of_frame(job, stages, on_report)
     if job.body.mesh is not None:
-        return body_of_mesh(job, stages, on_report)
+        return body_of_mesh(job, stages, on_report, mesh)
     if job.body.matrices is not None:
         from cms.jobs.matrices_of_job import body_of_matrices
 
@@ -78,19 +94,24 @@ def made_body(job: Job, stages: Stages, on_report: Callable[[Any], None] | None)
     raise JobError("job: expected either mesh or matrices, got neither")
 
 
-def body_of_mesh(job: Job, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
-    """Read and check the mesh, and assemble it with the materials and interfaces of the job."""
+def is_of_mesh(job: Job) -> bool:
+    """Whether the body of a job is made of a solid mesh, perhaps with beams tied to it."""
+    others = job.body.deck is not None or job.shells or (job.sections and not job.ties)
+    return job.body.mesh is not None and not others
+
+
+def checked_mesh(
+    job: Job, stages: Stages, on_report: Callable[[Any], None] | None
+) -> "tuple[Mesh, FirstOrderError | None]":
+    """Read and judge the solid mesh of a job; return it without unused nodes, and what its first order costs."""
     from fe_models.meshes.unused_nodes import drop_unused_nodes
     from fe_models.reports.mesh_report import report_mesh
-    from fe_models.solids.body import solid_body
 
-    units = unit_system(job.body.units)
-    materials = materials_of(job)
     with stages("mesh" if is_cad(job) else "read mesh"):
         mesh = part_of_mesh(job, solid_mesh_of(job))
     with stages("check mesh"):
         bricks = job.body.incompatible_modes
-        report = report_mesh(mesh, materials, units=units, incompatible_modes=bricks)
+        report = report_mesh(mesh, materials_of(job), units=unit_system(job.body.units), incompatible_modes=bricks)
         if on_report is not None:
             on_report(report)
         report.raise_for_errors(accept=job.body.accept)
@@ -100,7 +121,20 @@ def body_of_mesh(job: Job, stages: Stages, on_report: Callable[[Any], None] | No
             raise JobError(
                 f"body.incompatible_modes: the mesh has no bricks of eight nodes, but {kinds}; remove the key"
             )
-        interfaces = () if job.ties else interfaces_of(job, mesh)
+    return mesh, report.first_order
+
+
+def body_of_mesh(
+    job: Job, stages: Stages, on_report: Callable[[Any], None] | None, mesh: "Mesh | None" = None
+) -> FEBody:
+    """Read and check the mesh, unless that was done, and assemble it with the materials and interfaces of the job."""
+    from fe_models.solids.body import solid_body
+
+    units, first_order = unit_system(job.body.units), None
+    if mesh is None:
+        mesh, first_order = checked_mesh(job, stages, on_report)
+    materials, bricks = materials_of(job), job.body.incompatible_modes
+    interfaces = () if job.ties else interfaces_of(job, mesh)
     name = str(job.body.name)
     with stages("assemble") as advance:
         body = solid_body(
@@ -112,8 +146,8 @@ def body_of_mesh(job: Job, stages: Stages, on_report: Callable[[Any], None] | No
             incompatible_modes=bricks,
             progress=advance,
         )
-        if report.first_order is not None:
-            body = replace(body, provenance={**body.provenance, **report.first_order.provenance()})
+        if first_order is not None:
+            body = replace(body, provenance={**body.provenance, **first_order.provenance()})
     if job.ties:
         from cms.jobs.mixed_body import body_of_mixed
 

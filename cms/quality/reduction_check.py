@@ -32,6 +32,7 @@ def check_reduction(
     reference: FullReference | None = None,
     uncoupled: FEBody | None = None,
     snapshots: Snapshots | None = None,
+    own: tuple[QualityRecord, ...] | None = None,
 ) -> tuple[QualityRecord, ...]:
     """Check a reduced body by itself and against its full model.
 
@@ -46,6 +47,8 @@ def check_reduction(
         The body before `couple`: adds the comparison of rigid with distributing interfaces (two more factorisations).
     snapshots
         A reference motion: adds the deformation error.
+    own
+        What `check_body` has found of the reduced body, so that it is not asked again; None: it is asked here.
 
     Returns
     -------
@@ -64,11 +67,14 @@ def check_reduction(
         )
     require_same_units(body, reduced)
     if reference is None:
-        with FullReference(body, band=usable_band(modes, reduced)) as own:
-            return check_reduction(body, modes, reduced, reference=own, uncoupled=uncoupled, snapshots=snapshots)
+        with FullReference(body, band=usable_band(modes, reduced)) as made:
+            return check_reduction(
+                body, modes, reduced, reference=made, uncoupled=uncoupled, snapshots=snapshots, own=own
+            )
     if reference.body is not body:
         raise QualityError(f"check: the reference is of another body than {body.name!r}")
-    records = [record for record in check_body(reduced) if record.name != "dropped-columns"]
+    found = check_body(reduced) if own is None else own
+    records = [record for record in found if record.name != "dropped-columns"]
     grounding = check_grounding(body)
     records += [grounding, check_mass_properties(body, reduced)]
     if grounding.verdict == "fail":

@@ -6,7 +6,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
-from floatframe.bodies.markers import Place
+from floatframe.bodies.markers import Marker, Place, body_name
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.joints.axis_frame import checked_axes, normals_of
@@ -26,8 +26,8 @@ class RollingDisc:
     """
 
     name: str
-    marker_a: Place
-    marker_b: Place
+    marker_a: Place  #: a Marker: a point of the plane
+    marker_b: Place  #: a Marker: the centre of the disc
     radius: float = 1.0  #: of the disc [m]
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))  #: normal of the plane, axes of marker A
     axis_b: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: of the disc, in the axes of marker B
@@ -38,6 +38,13 @@ class RollingDisc:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", number(f"joint {self.name!r}: radius", self.radius, above=0.0))
+        for key, what in (("marker_a", "a point of the plane"), ("marker_b", "the centre of the disc")):
+            given = getattr(self, key)
+            if not isinstance(given, Marker):  # a body is met where the other marker is: the centre on the plane
+                raise ModelError(
+                    f"joint {self.name!r}: {key}: expected a Marker, {what}, as Marker({body_name(given)!r}, "
+                    f"position=(0, 0, 0)), in a system file {key} = [0, 0, 0]; got the body {body_name(given)!r} alone"
+                )
         checked_axes(self)
 
     def rows(self, A_a: Array, A_b: Array, d: Array) -> tuple[Row, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cms.acceptance import accept
 from cms.acceptance.accept import FullModel, accept_body
 from cms.acceptance.against_model import compare_with_model
 from cms.acceptance.document import Table, document_of
@@ -24,6 +25,8 @@ from cms.acceptance.write import write_acceptance
 from cms.cli import main
 from cms.jobs.reduce_job import reduce_job
 from cms.modal_file.file import read, write
+from cms.quality import reduction_check
+from cms.quality.body_check import check_body
 from cms.quality.errors import QualityError
 from cms.reduced_body.linear_range import LINEAR, STIFFENED
 from fe_models.body.numbering import Numbering
@@ -57,6 +60,19 @@ def test_own_body_against_its_job(accepted, folder):
     assert [(Path(each.path).name, each.state) for each in accepted.sources] == [("bar.inp", "unchanged")]
     (mesh,) = (record for record in accepted.records if record.name == "mesh-error")
     assert 0 < mesh.value == accepted.mesh_error.largest
+
+
+def test_the_body_is_checked_once(folder, monkeypatch):
+    """By itself, and beside the full model of its job."""
+    asked = []
+    for module in (accept, reduction_check):
+        monkeypatch.setattr(module, "check_body", lambda reduced, of=check_body: asked.append(reduced) or of(reduced))
+    for full in (FullModel(), FullModel(job=folder / "bar.toml")):
+        asked.clear()
+        records = accept_body(folder / "bar.h5", full).records
+        assert len(asked) == 1
+        names = [record.name for record in records]
+        assert len(set(names)) == len(names)
 
 
 def test_a_file_by_itself_is_accepted_with_a_band_of_custom_only(folder):

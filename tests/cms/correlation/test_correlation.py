@@ -29,6 +29,7 @@ from cms.correlation import (
 from cms.correlation.criteria import pair_modes
 from cms.correlation.measured import phase_collinearity
 from cms.correlation.report import correlation_page
+from cms.jobs import body_of_job
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
@@ -327,7 +328,10 @@ def test_file_command_page_and_updated_job(folder, specimen, rows, tmp_path, cap
     write(tmp_path / "modes.unv", text)
     file = write(tmp_path / "t.toml", FILE)
     updated = tmp_path / "updated.toml"
+    reads, read_mesh = [], body_of_job.solid_mesh_of
+    monkeypatch.setattr(body_of_job, "solid_mesh_of", lambda job: reads.append(job) or read_mesh(job))
     assert run(monkeypatch, ["correlate", str(file), "--updated-job", str(updated)]) == 0
+    assert len(reads) == 1  # whatever the number of values
     assert "materials.steel.young" in capsys.readouterr().out
     assert "# weighed" in updated.read_text()
     job = read_job(updated)

@@ -264,4 +264,4 @@ def test_gears_pass_the_motion_of_a_drive_on():
 def test_rolling_is_refused():
     disc = RigidBody("disc", 1.0, np.eye(3), position=(0, 0, 1.0))
     with pytest.raises(ModelError, match="joint 'roll' rolls: it holds velocities"):
-        kinematics(System([disc], [RollingDisc("roll", GROUND, Marker("disc"), radius=1.0)]), [0.0, 1.0])
+        kinematics(System([disc], [RollingDisc("roll", Marker(GROUND), Marker("disc"), radius=1.0)]), [0.0, 1.0])

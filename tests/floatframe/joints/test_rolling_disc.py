@@ -124,3 +124,19 @@ def test_a_rolling_disc_is_not_linearised():
 def test_a_disc_that_lies_flat_is_refused():
     with pytest.raises(ModelError, match="lies flat on the plane"):
         _ = compiled_system(disc(np.pi / 2, (0, 0, 0), (0, 0, 0), (0, 0, 0)))
+
+
+@pytest.mark.parametrize(
+    ("ends", "words"),
+    [
+        ((GROUND, Marker("disc")), r"marker_a: expected a Marker, a point of the plane, as Marker\('ground'"),
+        (
+            (Marker(GROUND), "disc"),
+            r"marker_b: expected a Marker, the centre of the disc, .* got the body 'disc' alone",
+        ),
+    ],
+)
+def test_a_body_without_a_place_is_refused(ends, words):
+    """Met where the other end is placed, the centre of the disc would lie on its plane."""
+    with pytest.raises(ModelError, match=words):
+        RollingDisc("roll", *ends, radius=1.0)
