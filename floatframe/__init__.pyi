@@ -2,6 +2,7 @@ from . import shapes as shapes
 from .analyses import BaseMotion as BaseMotion
 from .analyses import Column as Column
 from .analyses import DriveMotion as DriveMotion
+from .analyses import ElementCheck as ElementCheck
 from .analyses import Equilibrium as Equilibrium
 from .analyses import ForceInput as ForceInput
 from .analyses import FrequencyResponse as FrequencyResponse
@@ -12,6 +13,7 @@ from .analyses import NamedStateSpace as NamedStateSpace
 from .analyses import ParameterInput as ParameterInput
 from .analyses import SystemModes as SystemModes
 from .analyses import campbell as campbell
+from .analyses import check_element as check_element
 from .analyses import drive_forces as drive_forces
 from .analyses import frequency_response as frequency_response
 from .analyses import frozen_bodies as frozen_bodies

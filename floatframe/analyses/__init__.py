@@ -3,6 +3,7 @@
 from floatframe.analyses.driven.driven_motion import frozen_bodies, quasi_static_bodies
 from floatframe.analyses.driven.inverse_dynamics import InverseDynamics, drive_forces, inverse_dynamics, with_motors
 from floatframe.analyses.driven.kinematics import kinematics
+from floatframe.analyses.element_check import ElementCheck, check_element
 from floatframe.analyses.equilibrium import Equilibrium, static_equilibrium, steady_rotation
 from floatframe.analyses.linear.channels import Column
 from floatframe.analyses.linear.force_inputs import ForceInput
@@ -19,6 +20,7 @@ __all__ = [
     "BaseMotion",
     "Column",
     "DriveMotion",
+    "ElementCheck",
     "Equilibrium",
     "ForceInput",
     "FrequencyResponse",
@@ -29,6 +31,7 @@ __all__ = [
     "ParameterInput",
     "SystemModes",
     "campbell",
+    "check_element",
     "drive_forces",
     "frequency_response",
     "frozen_bodies",

@@ -37,6 +37,7 @@ from floatframe.start.initial import (
     checked,
     known_of,
     require_independent_constraints,
+    require_numbers,
     start_unknowns,
 )
 from floatframe.start.mass_positivity import indefinite_mass_words, indefinite_masses
@@ -213,6 +214,7 @@ def steady_rotation(
         states.prepare(work, w, tau)
         parts, K = _tangent(resting, work)
         raise_errors_of(compiled.callbacks)
+        require_numbers(compiled, work)
         W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
         forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
         size = _size(W, forces)

@@ -1,6 +1,6 @@
 """Public elements as the kernels see them: the ends and rows of their connections, their functions and numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from floatframe.compiling.bodies import integers, offsets
 from floatframe.compiling.callbacks import Callback
 from floatframe.compiling.callbacks.law_functions import law_callbacks
+from floatframe.compiling.callbacks.law_source import digest_of
 from floatframe.compiling.connections import Connections, End
 from floatframe.compiling.coordinate_elements import LEAST_SIZE
 from floatframe.compiling.markers import MarkerData, find_marker, marker_pose
@@ -40,9 +41,20 @@ class PlacedLaw:
     rest: tuple[Callback, Callback]  #: the same of what holds in equilibrium
 
     @property
+    def digest(self) -> tuple[int | str | None, ...]:
+        """What its functions are, whatever their addresses."""
+        functions = (self.law.function, self.law.tangent, self.law.rest)
+        return tuple(digest_of(each) or words_of(each) if callable(each) else each for each in functions)
+
+    @property
     def n_out(self) -> int:
         """Number of wrench components, rates of states and held equations."""
         return 6 * len(self.markers) + len(self.law.states) + len(self.law.multipliers)
+
+
+def words_of(function: Callable[..., None]) -> str:
+    """Return the name of a function that has no digest."""
+    return f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', '')}"
 
 
 @dataclass
@@ -93,6 +105,8 @@ class PublicElements:
             energy=[number_of(law.energy, law) for law in laws],
             given=[number_of(law.power_in, law) for law in laws],
             lost=[number_of(law.power_lost, law) for law in laws],
+            stop0=offsets(integers([len(law.stops) for law in laws])),
+            stop=[law.outputs.index(output) for law in laws for output in law.stops],
         )
 
 

@@ -77,6 +77,11 @@ class CompiledSystem:
         )
 
     @property
+    def stop_words(self) -> tuple[str, ...]:
+        """What outputs of elements say that end a run, in the order of the model."""
+        return tuple(f"element {each.element.name!r}: {text}" for each in self.laws for text in each.law.stops.values())
+
+    @property
     def connection_names(self) -> tuple[str, ...]:
         """Names of joints, springs, couplers and user forces: the order of connections in the model."""
         return self.joint_names + self.spring_names + self.element_names

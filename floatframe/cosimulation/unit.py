@@ -16,6 +16,7 @@ from floatframe.errors import ConvergenceError, ModelError, ResultsError
 from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import Work, new_work
+from floatframe.motion.events import events_of
 from floatframe.motion.integration import head_of, number_of_steps
 from floatframe.motion.jumps import begun_anew, jumps_of_steps, over_jumps
 from floatframe.motion.restart import carry_of_record, restart_record
@@ -125,7 +126,7 @@ class Unit:
                 f"system {self.system.name!r}: units of other programs act beside it (fmus), which cannot be a part of "
                 "a unit; take them out and let the master connect them"
             )
-        if self.system.events:
+        if events_of(self.system):
             raise ModelError(
                 f"system {self.system.name!r}: its table [events] cannot be a part of a co-simulation; leave it out "
                 "and let the master switch"

@@ -13,8 +13,8 @@ Made by `numba.njit` it runs at the speed of the kernels, a plain Python functio
 arguments alone: it is called several times a step, also for motions that are not reached in the end.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -80,6 +80,8 @@ class ElementLaw:
     energy: str | None = None  #: output that is the energy it stores
     power_in: str | None = None  #: output that is the power it gives to the system from outside
     power_lost: str | None = None  #: output that is the power it takes from the system
+    #: outputs that end a run where they are above zero after a step, with what is then said
+    stops: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not callable(self.function):
@@ -115,6 +117,9 @@ class ElementLaw:
         for key in ("energy", "power_in", "power_lost"):
             if getattr(self, key) is not None and getattr(self, key) not in self.outputs:
                 raise ModelError(f"law: {key}: expected one of its outputs, got {getattr(self, key)!r}")
+        for key in self.stops:
+            if key not in self.outputs:
+                raise ModelError(f"law: stops: expected names of its outputs, got {key!r}")
         if self.length is not None:
             object.__setattr__(self, "length", number("law: length", self.length, above=0.0))
 
@@ -162,6 +167,13 @@ class Element:
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the element between its markers as they are placed."""
         raise ModelError(f"{type(self).__name__}: expected a method law(placed) that returns an ElementLaw")
+
+    def events(self) -> Sequence[Any]:
+        """Return the events that the element brings with it, `floatframe.Event` on "NAME.OUTPUT"; none by default.
+
+        A run that watches for events calls Python after every step; `ElementLaw.stops` costs nothing.
+        """
+        return ()
 
 
 def markers_of(element: Element) -> tuple[Marker, ...]:

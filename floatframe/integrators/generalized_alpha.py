@@ -213,10 +213,18 @@ class GeneralizedAlpha:
 
     def explain(self, system: System, work: Work, outcome: tuple, least: float) -> Failure:
         """Say why a step failed."""
-        from floatframe.kernels.generalized_alpha import INACCURATE, SINGULAR_BODY, SINGULAR_CONNECTION
+        from floatframe.kernels.generalized_alpha import INACCURATE, SINGULAR_BODY, SINGULAR_CONNECTION, STOPPED
 
         compiled = compiled_system(system)
         status, _, _, index, excess = outcome
+        no_number = int(work.counted.no_number)
+        if no_number:
+            name = compiled.connection_names[no_number - 1]
+            words = (
+                f"element {name!r} gives what is no number (NaN or infinity) for a motion that is one; see its law, or "
+                "choose a smaller h if it is only known near the motion"
+            )
+            return Failure(words, excess)
         if status == SINGULAR_BODY:
             name = compiled.body_names[index]
             words = f"the Newton matrix of body {name!r} is singular; check its mass, inertia and stiffness"
@@ -224,18 +232,12 @@ class GeneralizedAlpha:
         if status == SINGULAR_CONNECTION:
             name = compiled.connection_names[index]
             return Failure(f"the constraints of joint {name!r} depend on others here (a singular position)", excess)
+        if status == STOPPED:
+            return Failure(compiled.stop_words[index], excess)
         if status == INACCURATE:
             words = (
                 f"its error stays above error_tolerance = {self.error_tolerance} down to the least step, "
                 f"h_min = {least:.3g}; allow a larger error or a shorter step, or look for a jump in the motion"
-            )
-            return Failure(words, excess)
-        no_number = int(work.counted.no_number)
-        if no_number:
-            name = compiled.connection_names[no_number - 1]
-            words = (
-                f"element {name!r} gives what is no number (NaN or infinity) for a motion that is one; see its law, or "
-                "choose a smaller h if it is only known near the motion"
             )
             return Failure(words, excess)
         words = f"Newton's method did not converge in {self.max_iterations} iterations"

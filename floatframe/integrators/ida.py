@@ -53,6 +53,12 @@ class Ida:
         for c, name in enumerate(compiled.connection_names):
             if compiled.model.connections.law[c] in (COUPLER, USER_FORCE):
                 raise ModelError(f"Ida: {name!r} has a memory of its own, which this scheme does not know; use another")
+        for each in compiled.laws:
+            if each.law.states or each.law.multipliers:
+                raise ModelError(
+                    f"Ida: element {each.element.name!r} has states or multipliers of its own, which this scheme does "
+                    "not know; use GeneralizedAlpha"
+                )
         made = consistent_motion(system, state, t=t)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)

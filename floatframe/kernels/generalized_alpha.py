@@ -20,12 +20,13 @@ __all__ = [
     "INACCURATE",
     "SINGULAR_BODY",
     "SINGULAR_CONNECTION",
+    "STOPPED",
     "advance",
     "load_state",
     "write_row",
 ]
 
-DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE = 0, 1, 2, 3, 4
+DONE, DIVERGED, SINGULAR_BODY, SINGULAR_CONNECTION, INACCURATE, STOPPED = 0, 1, 2, 3, 4, 5
 SLOW = 0.2  # ratio of corrections above which the factors are made anew
 MANY = 4  # iterations of a step after which the next one starts with new factors
 ROUNDOFF = 2e-15  # of a position
@@ -210,6 +211,7 @@ def one_step(model, work, memory, order, h):
     if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
         work.solver.is_due = 1
     work.counted.no_number = 0
+    work.counted.stopped = 0
     last, last_of_states = math.inf, math.inf
     excess = math.inf
     is_new = True
@@ -358,6 +360,8 @@ def advance(model, work, memory, rows, order):
             status, index, excess, error = one_step(model, work, memory, order, memory.h)
             if status == DONE:
                 memory.n_accepted += 1
+                if work.counted.stopped > 0:
+                    return STOPPED, k, work.counted.rows, work.counted.stopped - 1, excess
                 left = left - part if n_parts > 1.0 else 0.0
                 if h_min > 0.0:
                     memory.h_wanted = min(step_after(part, error, most_error, has_failed), h)

@@ -263,6 +263,8 @@ class Laws(NamedTuple):
     energy: IntArray = integer(n_laws)  #: outputs that are stored energy, power given and power lost, -1 for none
     given: IntArray = integer(n_laws)
     lost: IntArray = integer(n_laws)
+    stop0: IntArray = integer(n_laws + 1)  #: first of the outputs that end a run where they are above zero
+    stop: IntArray = integer(Size("stops of laws"))  #: their numbers
 
 
 class States(NamedTuple):

@@ -228,6 +228,7 @@ class Counted(NamedTuple):
     factorisations: IntArray = integer()
     iterations: IntArray = integer()
     no_number: IntArray = integer()  #: 1 + the first element of a step whose law gave what is no number, 0 for none
+    stopped: IntArray = integer()  #: 1 + the first output of a step that ends the run, 0 for none
     rows: IntArray = integer()  #: written into the results of the present call
 
 

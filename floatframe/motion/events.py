@@ -160,13 +160,13 @@ def require_switched(where: str, coupler: CoordinateCoupler, *, is_first_on: boo
 
 
 def events_of(system: System) -> tuple[Event, ...]:
-    """Return the events that a system carries: it knows their names only."""
-    return cast(tuple[Event, ...], system.events)
+    """Return the events that a system carries, whose names alone it knows, and those that its elements bring."""
+    return cast(tuple[Event, ...], (*system.events, *(event for each in system.elements for event in each.events())))
 
 
 def has_events(system: System) -> bool:
     """Whether something may be switched during a motion: events, or stops that are struck."""
-    return bool(system.events) or any(coupler.limits is not None for coupler in system.couplers)
+    return bool(events_of(system)) or any(coupler.limits is not None for coupler in system.couplers)
 
 
 def require_times_of_events(system: System, t_start: float) -> None:

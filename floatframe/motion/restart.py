@@ -16,6 +16,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.records import leaves
+from floatframe.motion.events import events_of
 from floatframe.state import State
 from floatframe.system import System
 
@@ -65,11 +66,14 @@ def carry_of_record(record: Mapping[str, Array], system: System) -> tuple[Carry,
 def system_digest(system: System, integrator: Integrator) -> str:
     """Return the sha256 of everything the motion follows from: compiled system, its start, method and parameters."""
     digest = hashlib.sha256(repr((type(integrator).__name__, asdict(integrator))).encode())  # type: ignore[call-overload]
-    if system.events:
-        digest.update(repr(system.events).encode())
+    if events_of(system):
+        digest.update(repr(events_of(system)).encode())
     compiled = compiled_system(system)
+    for each in compiled.laws:
+        digest.update(repr(each.digest).encode())
     arrays = dict(leaves(compiled.model)) | {name: getattr(compiled.placed, name) for name in STATE}
-    del arrays["users.address"]  # addresses change from process to process
+    for name in ("users.address", "laws.address", "laws.tangent"):  # addresses change from process to process
+        del arrays[name]
     for part in arrays.values():
         array = np.ascontiguousarray(part)
         digest.update(repr((array.shape, array.dtype.str)).encode() + array.tobytes())

@@ -49,6 +49,7 @@ __all__ = [
     "consistent_state",
     "known_of",
     "mobility",
+    "require_numbers",
     "solve_accelerations",
     "start_unknowns",
     "velocity_correction",
@@ -179,6 +180,7 @@ def closed(compiled: CompiledSystem, model: Model, work: Work, state: State, w: 
         set_iterate(work, state, w=w)
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         raise_errors_of(compiled.callbacks)
+        require_numbers(compiled, work)
         error = np.where(holds, work.connections.g, 0.0)
         if np.abs(error / scale).max() <= ASSEMBLED:
             return state, np.zeros_like(error)
@@ -295,6 +297,7 @@ def solve_accelerations(
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         _, bias = rates_of_constraints(model, work)
         raise_errors_of(compiled.callbacks)
+        require_numbers(compiled, work)
         rows = -np.where(is_held(model.rows.kind), bias, work.connections.g)
         y, change = solve(with_mass_for_all(model, parts.H), parts, -work.bodies.residual, rows)
         w = w + change
@@ -311,6 +314,16 @@ def work_from(model: Model, known: Array | None) -> Work:
     work = new_work(model)
     work.states.base[:] = start_unknowns(model, known)[model.states.row]
     return work
+
+
+def require_numbers(compiled: CompiledSystem, work: Work) -> None:
+    """Raise `ModelError` naming the element whose law gives what is no number at the iterate."""
+    no_number = int(work.counted.no_number)
+    if no_number:
+        raise ModelError(
+            f"element {compiled.connection_names[no_number - 1]!r} gives what is no number (NaN or infinity) where it "
+            "is placed; see its law, or place its bodies where it is known"
+        )
 
 
 def start_unknowns(model: Model, known: Array | None = None) -> Array:

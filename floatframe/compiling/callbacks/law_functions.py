@@ -86,7 +86,7 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
                 whole = cfunc(signature, cache=digest is not None, error_model="numpy")(made)
             except RuntimeError:  # nowhere to keep the cache
                 whole = cfunc(signature, error_model="numpy")(made)
-        except NumbaError as error:
+        except (NumbaError, NotImplementedError) as error:
             name = "tangent" if kind == "given" else "function"
             what = "with complex numbers, " if kind == "complex" else ""
             reason = str(error).strip().splitlines()

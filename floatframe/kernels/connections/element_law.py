@@ -244,6 +244,8 @@ def law_rates(model, work, c, rate, bias):
 def law_power(model, work, c):
     """Return the energy that element c holds, the power it gives to the system, and what it takes; at the iterate.
 
+    An output that ends the run is noted.
+
     Power on the bodies P_b = given - lost - d(energy)/dt. An element that names no energy holds none; what it then
     does not name follows from P_b.
     """
@@ -251,6 +253,9 @@ def law_power(model, work, c):
     laws = model.laws
     law_values(model, work, c)
     seen = 6 * laws.head[i, 0] + laws.head[i, 2] + laws.head[i, 3]
+    for k in range(laws.stop0[i], laws.stop0[i + 1]):
+        if work.laws.outputs[seen + laws.stop[k]] > 0.0 and work.counted.stopped == 0:
+            work.counted.stopped = k + 1
     energy, given, lost = laws.energy[i], laws.given[i], laws.lost[i]
     P_given = work.laws.outputs[seen + given] if given >= 0 else 0.0
     P_lost = work.laws.outputs[seen + lost] if lost >= 0 else 0.0

@@ -1,0 +1,268 @@
+"""Whether the law of an element is what the engine takes it for: shapes, numbers, derivatives, balance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.callbacks import raise_errors_of
+from floatframe.compiling.callbacks.law_functions import called_law
+from floatframe.compiling.callbacks.law_slopes import difference_slopes
+from floatframe.compiling.markers import marker_pose
+from floatframe.compiling.public_elements import PlacedLaw
+from floatframe.compiling.system import compiled_system
+from floatframe.elements.element import ACTS
+from floatframe.errors import ModelError
+from floatframe.joints.rows import POSITION
+from floatframe.kernels.work import new_work
+from floatframe.results.element_motion import placed_law
+from floatframe.rotations import rotation_exp
+from floatframe.start.initial import consistent_motion
+from floatframe.start.newton_equations import linearized, set_iterate
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["ElementCheck", "check_element"]
+
+N_SAMPLES = 3  #: motions at which it is tried, the first as placed
+NEAR = 1e-3  #: of the size of the system, or rad: how far from it the others are
+MOVING = 0.1  #: of the size of the system in a unit of time, or rad: their velocities
+DERIVATIVE = 1e-5  #: of the largest in its row: difference of derivatives that is told
+ROUNDING = 1e-9  #: of values
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class ElementCheck:
+    """What was found on an element."""
+
+    name: str
+    findings: tuple[str, ...]  #: what is wrong, a sentence each
+    derivative_error: float  #: largest difference from differences, relative to the largest of its row
+
+    @property
+    def is_good(self) -> bool:
+        """Whether nothing was found."""
+        return not self.findings
+
+
+def check_element(system: System, name: str, state: State | None = None) -> ElementCheck:
+    """Try the law of an element at a state (default: as placed) and two motions near it.
+
+    (1) in Python, in arrays of the very sizes, the function stays within them and raises nothing
+    (2) all it writes are numbers, the same each time, and the same as compiled
+    (3) it writes no part of a wrench that `acts` leaves out, and opposite forces where it says so
+    (4) the derivatives that the engine takes are those of its values
+    (5) what holds a position depends on places and the time alone, what holds a velocity not on multipliers
+
+    Raises
+    ------
+    ResultsError
+        If there is no such element.
+    """
+    placed = placed_law(system, name, "check_element")
+    findings = told_in_python(placed, placed_inputs(system, placed), "as placed")
+    if findings:  # compiled, it might write into what is not its own
+        return ElementCheck(name, tuple(findings), np.inf)
+    try:
+        samples = sample_inputs(system, placed, state)
+    except ModelError as error:
+        return ElementCheck(name, (str(error),), np.inf)
+    worst = 0.0
+    for sample, inputs in enumerate(samples):
+        where = "as placed" if sample == 0 else "near its place, in motion"
+        findings += told_in_python(placed, inputs, where)
+        values = values_of(placed, inputs)
+        if not np.isfinite(values).all():
+            at = [row_name(placed, int(k)) for k in np.flatnonzero(~np.isfinite(values))]
+            findings.append(f"{where}: {', '.join(at[:3])}: no number (NaN or infinity)")
+            continue
+        findings += balance(placed, values, where)
+        own, other = own_slopes(placed, inputs), differences(placed, inputs)
+        worst = max(worst, relative_error(own, other).max(initial=0.0))
+        findings += wrong_slopes(placed, own, other, where)
+        findings += wrong_dependence(placed, other, where)
+    return ElementCheck(name, tuple(dict.fromkeys(findings)), worst)
+
+
+def values_of(placed: PlacedLaw, inputs: Array) -> Array:
+    """Return all that the law writes, as the engine calls it."""
+    n_all = placed.n_out + len(placed.law.outputs)
+    values = called_law(placed.value.address, placed.head, np.asarray(placed.law.data), inputs[None], n_all)[0]
+    raise_errors_of([placed.value])
+    return values
+
+
+def placed_inputs(system: System, placed: PlacedLaw) -> Array:
+    """Return the inputs of the law with its markers as placed, at rest, (n,)."""
+    compiled = compiled_system(system)
+    n_q = np.asarray(compiled.model.bodies.n_q)
+    parts = [np.zeros(1)]
+    for marker in placed.markers:
+        r, A = marker_pose(marker, compiled.placed, n_q)
+        parts += [r, A.ravel(), np.zeros(6)]
+    return np.concatenate([*parts, placed.law.start, np.zeros(len(placed.multipliers))])
+
+
+def sample_inputs(system: System, placed: PlacedLaw, state: State | None) -> list[Array]:
+    """Return the inputs of the law at the samples, (n,) each."""
+    compiled = compiled_system(system)
+    made = consistent_motion(system, state)
+    work = new_work(compiled.model)
+    set_iterate(work, made.state, made.u_dot, made.w)
+    linearized(compiled.model, work, 1.0, 0.0, 0.0)
+    first, n = int(compiled.model.connections.a[placed.connection]), len(placed.markers)
+    own = [*placed.states, *placed.multipliers]
+    rng, length = np.random.default_rng(7), compiled.length
+    samples = []
+    for k in range(N_SAMPLES):
+        near, moving = (NEAR, MOVING) if k else (0.0, 0.0)
+        parts = [np.zeros(1)]
+        for m, marker in zip(range(first, first + n), placed.markers, strict=True):
+            moves = float(marker.body >= 0)
+            r, A, v, omega = (getattr(work.markers, name)[m] for name in ("r", "A", "v", "omega"))
+            turn = rotation_exp(moves * near * rng.normal(size=3))
+            parts += [
+                r + moves * near * length * rng.normal(size=3), (turn @ A).ravel(),
+                v + moves * moving * length * rng.normal(size=3), omega + moves * moving * rng.normal(size=3),
+            ]  # fmt: skip
+        parts.append(made.w[own] * (1 + near * rng.normal(size=len(own))))
+        samples.append(np.concatenate(parts))
+    return samples
+
+
+def told_in_python(placed: PlacedLaw, inputs: Array, where: str) -> list[str]:
+    """(1), (2): return what the function does in Python that it should not."""
+    law, n = placed.law, len(placed.markers)
+    function = getattr(law.function, "py_func", law.function)
+    results = []
+    for _ in range(2):
+        wrench, z_dot, g = np.zeros((n, 6)), np.zeros(len(law.states)), np.zeros(len(law.multipliers))
+        seen, x = np.zeros(len(law.outputs)), inputs[1 : 1 + 18 * n].reshape(n, 18).copy()
+        z, lam = np.split(inputs[1 + 18 * n :].copy(), [len(law.states)])
+        given = (x, z, lam, np.array(law.data))
+        before = [each.copy() for each in given]
+        try:
+            with np.errstate(all="ignore"):
+                function(float(inputs[0]), *given, wrench, z_dot, g, seen)
+        except Exception as error:
+            sizes = f"wrench {wrench.shape}, z_dot {z_dot.shape}, g {g.shape}, seen {seen.shape}"
+            return [
+                f"{where}: its function raised {type(error).__name__}: {error} (with {sizes}, data {given[3].shape})"
+            ]
+        for name, old, new in zip(("x", "z", "lam", "data"), before, given, strict=True):
+            if not np.array_equal(old, new):
+                return [f"{where}: its function changes {name}, which is an input"]
+        results.append(np.concatenate([wrench.ravel(), z_dot, g, seen]))
+    if not np.array_equal(results[0], results[1], equal_nan=True):
+        return [f"{where}: two calls with the same numbers give different results; it must depend on them alone"]
+    values = values_of(placed, inputs)
+    scale = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    far = ~np.isclose(values, results[0], rtol=ROUNDING, atol=ROUNDING * scale, equal_nan=True)
+    if far.any():
+        k = int(np.flatnonzero(far)[0])
+        return [f"{where}: {row_name(placed, k)}: {values[k]:.6g} compiled, but {results[0][k]:.6g} in Python"]
+    return []
+
+
+def balance(placed: PlacedLaw, values: Array, where: str) -> list[str]:
+    """(3): return what is wrong with the wrenches."""
+    law, n = placed.law, len(placed.markers)
+    wrench = values[: 6 * n].reshape(n, 6)
+    found = []
+    assert law.acts is not None  # since the element was compiled
+    for m, (marker, acts) in enumerate(zip(placed.markers, law.acts, strict=True)):
+        lost = [k for k in range(6) if k not in ACTS[acts] and wrench[m, k] != 0.0]
+        if lost and marker.body >= 0:
+            names = ", ".join(row_name(placed, 6 * m + k) for k in lost)
+            found.append(f"{where}: {names}: written, but acts = {acts!r} leaves it out, so that it does nothing")
+    if law.is_opposite and not np.allclose(wrench[0, :3], -wrench[1, :3], rtol=ROUNDING, atol=0.0):
+        forces = " and ".join(str(np.round(each, 6).tolist()) for each in wrench[:, :3])
+        found.append(f"{where}: is_opposite says the forces on both markers are opposite, got {forces}")
+    return found
+
+
+def own_slopes(placed: PlacedLaw, inputs: Array) -> Array:
+    """Return the derivatives that the engine takes, (n_out, n_columns)."""
+    n_columns = 12 * len(placed.markers) + len(placed.states) + len(placed.multipliers)
+    address = placed.slopes.address
+    slopes = called_law(address, placed.head, np.asarray(placed.law.data), inputs[None], placed.n_out * n_columns)
+    raise_errors_of([placed.slopes])
+    return without_ground(placed, slopes.reshape(placed.n_out, n_columns))
+
+
+def differences(placed: PlacedLaw, inputs: Array) -> Array:
+    """Return the same by differences; markers on the ground do not move."""
+    slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs)[: placed.n_out]
+    return without_ground(placed, slopes)
+
+
+def without_ground(placed: PlacedLaw, slopes: Array) -> Array:
+    """Return derivatives without those by markers on the ground, for which nobody asks."""
+    for m, marker in enumerate(placed.markers):
+        if marker.body < 0:
+            slopes[:, 12 * m : 12 * m + 12] = 0.0
+    return slopes
+
+
+def relative_error(own: Array, other: Array) -> Array:
+    """Return the differences of derivatives, relative to the largest of their row."""
+    scale = np.maximum(np.abs(own), np.abs(other)).max(axis=1, initial=0.0, keepdims=True)
+    error = np.where(np.isfinite(own), np.abs(own - other), np.inf)
+    return np.divide(error, scale, out=np.zeros_like(error), where=(error > 0) & np.isfinite(scale))
+
+
+def wrong_slopes(placed: PlacedLaw, own: Array, other: Array, where: str) -> list[str]:
+    """(4): return the worst derivative, if it is wrong."""
+    error = relative_error(own, other)
+    error = np.where(np.isfinite(own), error, np.inf)
+    if error.max(initial=0.0) <= DERIVATIVE:
+        return []
+    row, column = (int(k) for k in np.unravel_index(error.argmax(), error.shape))
+    kind = "its tangent" if callable(placed.law.tangent) else f"tangent = {placed.law.tangent!r}"
+    hint = "; where the law has a kink both may be right"
+    if placed.law.tangent == "complex":
+        hint += ", and compiled powers of complex numbers, v**2, lose the step: write v*v"
+    return [
+        f"{where}: derivative of {row_name(placed, row)} by {column_name(placed, column)}: {kind} gives "
+        f"{own[row, column]:.6g}, differences {other[row, column]:.6g}{hint}"
+    ]
+
+
+def wrong_dependence(placed: PlacedLaw, slopes: Array, where: str) -> list[str]:
+    """(5): return what is held but depends on what it may not."""
+    found = []
+    n, n_z = len(placed.markers), len(placed.states)
+    for j, holds in enumerate(placed.law.holds):
+        row = slopes[6 * n + n_z + j]
+        allowed = np.zeros(len(row), dtype=bool)
+        for m in range(n):
+            allowed[12 * m : 12 * m + (6 if holds == POSITION else 12)] = True
+        if holds != POSITION:
+            allowed[12 * n : 12 * n + n_z] = True
+        if not holds or not (np.abs(row[~allowed]) > DERIVATIVE * np.abs(row).max()).any():
+            continue
+        column = int(np.abs(np.where(allowed, 0.0, row)).argmax())
+        what = "a position: places and the time alone" if holds == POSITION else "a velocity: not multipliers"
+        found.append(
+            f"{where}: {row_name(placed, 6 * n + n_z + j)} depends on {column_name(placed, column)}, but holds {what}"
+        )
+    return found
+
+
+def row_name(placed: PlacedLaw, k: int) -> str:
+    """Return what the law writes at a place, in words."""
+    n, law = len(placed.markers), placed.law
+    if k < 6 * n:
+        return f"{'force' if k % 6 < 3 else 'moment'} {AXES[k % 3]} on marker {k // 6 + 1}"
+    names = [*(f"rate of {name}" for name in law.states), *(f"g of {name}" for name in law.multipliers)]
+    return [*names, *(f"output {name}" for name in law.outputs)][k - 6 * n]
+
+
+def column_name(placed: PlacedLaw, k: int) -> str:
+    """Return a variation in words."""
+    n, law = len(placed.markers), placed.law
+    if k < 12 * n:
+        kind = ("position", "rotation", "velocity", "angular velocity")[k % 12 // 3]
+        return f"{kind} {AXES[k % 3]} of marker {k // 12 + 1}"
+    return [*law.states, *law.multipliers][k - 12 * n]

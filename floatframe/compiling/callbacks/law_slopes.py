@@ -1,0 +1,57 @@
+"""Derivatives of the law of an element by differences of fourth order: of its outputs, and to check its own."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.callbacks.law_functions import called_law
+from floatframe.rotations import rotation_exp
+
+__all__ = ["difference_slopes"]
+
+STEP = 1e-4  #: of differences, relative
+LEAST = 1e-3  #: size of a state or multiplier near zero
+STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))  #: of fourth order
+
+
+def varied(inputs: Array, n: int, k: int, step: float) -> Array:
+    """Return the inputs of a law with variation k (dr, dphi, dv, domega of each marker, states, multipliers)."""
+    y = inputs.copy()
+    if k >= 12 * n:
+        y[1 + 18 * n + k - 12 * n] += step
+        return y
+    first, j = 1 + 18 * (k // 12), k % 12
+    if j < 3:
+        y[first + j] += step
+    elif j < 6:
+        A = y[first + 3 : first + 12].reshape(3, 3)
+        y[first + 3 : first + 12] = (rotation_exp(step * np.eye(3)[j - 3]) @ A).ravel()
+    else:
+        y[first + 6 + j] += step
+    return y
+
+
+def size_of(inputs: Array, n: int, k: int) -> float:
+    """Return the size by which variation k is measured."""
+    if k >= 12 * n:
+        return max(abs(float(inputs[1 + 18 * n + k - 12 * n])), LEAST)
+    j = k % 12
+    if 3 <= j < 6:
+        return 1.0
+    return max(1.0, abs(float(inputs[1 + 18 * (k // 12) + j + (6 if j >= 6 else 0)])))
+
+
+def difference_slopes(
+    address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, step: float = STEP
+) -> Array:
+    """Return d(wrenches, rates, held, outputs) by all variations at inputs, (6 n + n_z + n_lam + n_seen, n_columns)."""
+    n, _, n_z, n_lam, n_seen = head[:5]
+    n_out, n_columns = 6 * n + n_z + n_lam + n_seen, 12 * n + n_z + n_lam
+    slopes = np.zeros((n_out, n_columns))
+    for k in range(n_columns):
+        h = step * size_of(inputs, n, k)
+        rows = np.array([varied(inputs, n, k, steps * h) for steps, _ in STENCIL])
+        values = called_law(address, head, np.asarray(data), rows, n_out)
+        slopes[:, k] = np.array([factor for _, factor in STENCIL]) @ values / h
+    return slopes
