@@ -63,6 +63,7 @@ LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
 FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: of tau in one step, while the residual falls or stands
 STANDING = 0.9  #: last residual by this one, below which it rises: tau shrinks with it
 ROUNDING = 32 * np.finfo(float).eps  #: of a position or rotation, as springs see it
+STANDSTILL = 1e-200  #: of the first residual, below which it is as good as zero
 LONG_STEP = 1e4  #: step of states by the first one at which states that stand are at rest
 LONGEST_STEP = 1e10  #: of them, in units of time
 CLOSED = 1e-10  #: largest gap of a joint, relative to the size of the system
@@ -235,9 +236,9 @@ def steady_rotation(
         if iteration == max_iterations:
             break
         if tau == 0.0:
-            tau = 0.1 * compiled.length / max(size / np.sqrt(_total_mass(W)), np.finfo(float).tiny)
+            tau = 0.1 * compiled.length / max(size / np.sqrt(_total_mass(W)), STANDSTILL)
         else:
-            fall = last / max(size, np.finfo(float).tiny)
+            fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
             tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
         last = size
         y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)

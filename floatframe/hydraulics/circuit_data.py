@@ -99,6 +99,7 @@ class Record:
     markers: tuple[int, int] = (-1, -1)
     start: float | None = None  #: of its state
     functions: dict[int, TimeFunction] = field(default_factory=dict)  #: by the place among its numbers
+    is_servo: bool = False  #: whether its opening follows what it is asked for
     spool: tuple[int, int] | None = None  #: place among its numbers, and component whose first output is read
 
 
@@ -276,7 +277,11 @@ def add_directional_valve(made: Builder, each: DirectionalValve, cylinders: dict
     for begin, end, how in paths:
         numbers = [k, each.transition or made.transition, how, 0, each.overlap, each.leakage]
         a, b = made.number(getattr(each, begin)), made.number(getattr(each, end))
-        made.between(Record(f"{each.name} {begin}-{end}", ORIFICE, a, b, numbers, spool=(3, spool)))
+        made.between(
+            Record(
+                f"{each.name} {begin}-{end}", ORIFICE, a, b, numbers, is_servo=each.follow is not None, spool=(3, spool)
+            )
+        )
 
 
 def written(made: Builder, placed: Placed, acts: list[str]) -> ElementLaw:
@@ -314,7 +319,7 @@ def written(made: Builder, placed: Placed, acts: list[str]) -> ElementLaw:
     first = 0
     for node in nodes:
         at = 0 if node.pressure is None else function_number(node.pressure)
-        data += [node.volume, node.compliance, at, first, len(node.attached)]
+        data += [node.volume, node.compliance, at, first, len(node.attached), laminar_flow(made, node)]
         first += len(node.attached)
     for k, record in enumerate(made.records):
         state = -1
@@ -358,6 +363,12 @@ def written(made: Builder, placed: Placed, acts: list[str]) -> ElementLaw:
         power_in="power in",
         power_lost="power lost",
     )
+
+
+def laminar_flow(made: Builder, node: PlacedNode) -> float:
+    """Return the flow at which the orifices and valves of a node become laminar, 0 if it has none."""
+    at_node = [made.records[component] for how, component, _ in node.attached if how in (INTO, OUT_OF)]
+    return sum(each.numbers[0] * sqrt(each.numbers[1]) for each in at_node if each.kind in (ORIFICE, VALVE))
 
 
 def evaluated(data: np.ndarray, start: np.ndarray, placed: Placed, n_outputs: int) -> np.ndarray:
@@ -405,7 +416,7 @@ def passes(record: Record, i: int, j: int, values: np.ndarray) -> bool:
             part = record.functions[3](0.0)
         elif n[2] != ALWAYS:
             part = values[int(n[3])] * (1 if n[2] == BY_SPOOL else -1) - n[4]
-        return part > 0 or n[5] > 0
+        return part > 0 or n[5] > 0 or record.is_servo
     if record.kind == VALVE:
         return values[i] - values[j] > n[2] or n[4] > 0
     if record.kind == CYLINDER:

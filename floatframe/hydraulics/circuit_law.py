@@ -32,8 +32,8 @@ __all__ = ["circuit_law", "circuit_rest"]
 N_NODES, N_FREE, N_COMPONENTS, NODES, COMPONENTS, ATTACHED, N_ISLANDS, ISLANDS, FLUID = range(9)
 HEAD = FLUID + 6
 AMBIENT = FLUID + 3
-NODE_WIDTH = 5
-VOLUME, COMPLIANCE, FUNCTION, FIRST, COUNT = range(NODE_WIDTH)
+NODE_WIDTH = 6
+VOLUME, COMPLIANCE, FUNCTION, FIRST, COUNT, LAMINAR = range(NODE_WIDTH)
 COMPONENT_WIDTH = 22
 KIND, A, B, SEEN, STATE, MARKER_A, MARKER_B, FIRST_NUMBER = range(8)
 ORIFICE, VALVE, RESISTANCE, INERTIA, CYLINDER, ACCUMULATOR, FLOW, PUMP, SPOOL = range(1, 10)  # kinds of components
@@ -215,11 +215,21 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 
 @njit
 def circuit_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Write what `circuit_law` does, but the rate of one node of each closed part as what its content is off.
+    """Write what `circuit_law` does, but rates of pressures that have the same zeros and are easier to solve.
 
-    Nothing flows into or out of a closed part: its pressures at rest follow from the content it has been filled with.
+    The flow Q into a node goes with roots of pressure differences, from which Newton's method steps across the zero and
+    back. Q sqrt(Q² + Q_0²)/Q_0, with the flow Q_0 at which its orifices become laminar, goes with the differences.
+
+    The rate of one node of each closed part is what its content is off: nothing flows into or out of such a part, and
+    its pressures at rest follow from what it has been filled with.
     """
     circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen)
+    for i in range(int(data[N_FREE])):
+        scale = data[int(data[NODES]) + NODE_WIDTH * i + LAMINAR]
+        if scale > 0.0:
+            v, dv, _ = compression(z[i], data, FLUID)
+            V, _, slope, _, Q = node_volume(data, i, z[i], seen)
+            z_dot[i] = v * v * Q * np.sqrt(Q * Q + scale * scale) / scale / (v * slope - V * dv)
     at = int(data[ISLANDS])
     for _ in range(int(data[N_ISLANDS])):  # number of nodes, content, pressure for a relative defect of one, nodes
         n, content, scale = int(data[at]), data[at + 1], data[at + 2]

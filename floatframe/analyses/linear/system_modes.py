@@ -58,7 +58,7 @@ def system_modes(linear: LinearSystem) -> SystemModes:
     n = system.n_z
     M, C, K = (np.asarray(a)[:n, :n] for a in (system.M, system.C, system.K))
     omega2, Z = la.eigh((K + K.T) / 2, (M + M.T) / 2)
-    highest = np.sqrt(np.abs(omega2).max())
+    highest = float(np.sqrt(np.abs(omega2).max())) or 1.0  # 1: nothing is sprung but by states
     modal_C = Z.T @ C @ Z
     is_conservative = not system.states and (
         np.abs(modal_C).max() <= 1e-12 * highest and np.abs(Z.T @ (K - K.T) @ Z).max() <= 1e-10 * highest**2

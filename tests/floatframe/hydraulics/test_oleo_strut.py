@@ -36,7 +36,8 @@ def strut(a, b, axis, **options):
     numbers = {
         "gas_volume": GAS, "charge": CHARGE, "gas_area": A_GAS, "oil_area": A_OIL, "area": AREA, "stroke": STROKE,
         "extended_length": LENGTH, "stop_stiffness": STOP, "recoil_area": RECOIL, "exponent": N, "discharge": DISCHARGE,
-        "friction": SEAL, "friction_area": SEAL_AREA, "friction_speed": SLOW, "stop_damping": STOP_DAMPING, "axis": axis,
+        "friction": SEAL, "friction_area": SEAL_AREA, "friction_speed": SLOW, "stop_damping": STOP_DAMPING,
+        "axis": axis,
     }  # fmt: skip
     return OleoStrut("strut", a, b, OIL, **(numbers | options))
 
@@ -47,10 +48,11 @@ def drop(**options):
         for name, mass, z in (("upper", UPPER, HEIGHT + LENGTH), ("lower", LOWER, HEIGHT))
     ]
     at = {body.name: Marker(body.name, position=(0, 0, 0)) for body in bodies}
+    base = Marker(GROUND, position=(0, 0, 0))
     guides = [
         PrismaticJoint(f"guide {name}", Marker(GROUND, position=(0, 0, 0)), at[name], axis=(0, 0, 1)) for name in at
     ]
-    tyre = SpringDamper("tyre", Marker(GROUND, position=(0, 0, 0)), at["lower"], TYRE, TYRE_DAMPING, free_length=HEIGHT)
+    tyre = SpringDamper("tyre", base, at["lower"], TYRE, TYRE_DAMPING, free_length=HEIGHT)
     shock = strut(at["upper"], at["lower"], (0, 0, -1), **options)
     return System(bodies, guides, [Gravity((0, 0, -FALL)), tyre], elements=[shock])
 
@@ -153,7 +155,7 @@ def test_the_tangent_of_a_strut_is_exact(oil_volume):
     [
         (
             {"gas_volume": 1e-3},
-            "gas_volume: expected more than gas_area times stroke = 0.00128, got 0.001: nothing would",
+            "gas_volume: expected more than gas_area times stroke = 0.00128, got 0.001",
         ),
         ({"area": monotone_table([0.0, 0.3], [1e-4, -1e-5])}, "area: expected areas above 0 over the stroke, got -"),
         ({"charge": -6e5}, "element 'strut': charge: expected a number > 0, got -600000"),
@@ -170,7 +172,7 @@ def test_a_strut_that_is_placed_elsewhere_is_refused():
         (-0.7, "marker_b lies -0.7 along the axis from marker_a as placed; expected one above 0: does the axis point"),
         (
             0.1,
-            "its markers are 0.1 apart along the axis as placed, stroke 0.7; expected 0 to 0.32: check extended_length",
+            "its markers are 0.1 apart along the axis as placed, stroke 0.7; expected 0 to 0.32",
         ),
     ):
         x = np.array([marker_motion([0, 0, 0]), marker_motion([0, 0, distance])])
