@@ -1,0 +1,13 @@
+"""Wheels on roads: tyres (linear, brush, Magic Formula), their property files, flat, measured and random roads."""
+
+import lazy_loader
+
+# the public names stand in __init__.pyi; each module is imported when its name is first used
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+#: type of an element in a system file, behind "wheels.": module and class
+ELEMENTS = {
+    "linear-tyre": "floatframe.wheels.linear_tyre:LinearTyre",
+    "brush-tyre": "floatframe.wheels.brush_tyre:BrushTyre",
+    "magic-formula-tyre": "floatframe.wheels.magic_formula_tyre:MagicFormulaTyre",
+}

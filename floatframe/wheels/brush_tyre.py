@@ -1,0 +1,65 @@
+"""A tyre of bristles with parabolic pressure and friction."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.bodies.markers import Marker
+from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.wheels.brush_law import brush_law, brush_law_at_rest
+from floatframe.wheels.numbers import SHOWN, acts_of, states_of, tyre_numbers
+from floatframe.wheels.roads.road import FlatRoad, Road
+from floatframe.wheels.tyre_fields import check_common, common_numbers
+
+__all__ = ["BrushTyre"]
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class BrushTyre(Element):
+    """Bristles that stick and slide: slip stiffness, contact length, friction; combined slip without more numbers.
+
+    The contact length grows with the square root of the load, so that slip stiffness grows with the load and sliding
+    sets in at the same slip. Outputs kappa and alpha are the theoretical slips, over the speed of rolling.
+    """
+
+    name: str
+    marker_a: Marker  #: of the road: z up, x along it
+    marker_b: Marker  #: the centre of the wheel, on the spinning body
+    radius: float  #: R_0, unloaded [m]
+    stiffness: float  #: k, vertical [N/m]
+    nominal_load: float  #: F_0 at which the numbers below hold [N]
+    slip_stiffness: float  #: C_0 = 2 c_p a_0², of small slip along and across [N]
+    contact_length: float  #: 2 a_0 [m]
+    friction: float = 1.0  #: mu
+    damping: float = 0.0  #: c, vertical [N s/m]
+    relaxation_x: float = 0.0  #: relaxation length along x [m]; 0: none, and then the wheel creeps at a standstill
+    relaxation_y: float = 0.0  #: relaxation length along y [m]
+    rolling_resistance: float = 0.0  #: f_r: M_y = -f_r R_0 F_z
+    flattening: float = 1 / 3  #: q: effective rolling radius R_0 - q d
+    low_speed: float = 1.0  #: below it the wheel counts as coming to a standstill [m/s]
+    settling_time: float = 0.02  #: tau, damping of the tread at a standstill [s]
+    damping_depth: float = 0.0  #: deflection over which the vertical damping sets in [m]
+    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
+    road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
+
+    def __post_init__(self) -> None:
+        positive = ("nominal_load", "slip_stiffness", "contact_length", "friction")
+        check_common(self, positive, ("rolling_resistance", "flattening"))
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return the law between the markers as placed."""
+        own = [self.slip_stiffness, 0.5 * self.contact_length, self.nominal_load, self.friction]
+        own += [self.flattening, self.rolling_resistance]
+        data = tyre_numbers(f"element {self.name!r}", placed, common_numbers(self), self.axis, own, self.road)
+        return ElementLaw(
+            function=brush_law,
+            rest=brush_law_at_rest,
+            data=data,
+            tangent="complex",
+            acts=acts_of(placed),
+            **states_of(self.relaxation_x, self.relaxation_y, 1e-3 * self.radius),
+            **SHOWN,
+        )

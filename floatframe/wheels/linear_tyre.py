@@ -1,0 +1,66 @@
+"""A tyre whose forces are in proportion to slip."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from floatframe.bodies.markers import Marker
+from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.wheels.linear_law import linear_law, linear_law_at_rest
+from floatframe.wheels.numbers import SHOWN, acts_of, states_of, tyre_numbers
+from floatframe.wheels.roads.road import FlatRoad, Road
+from floatframe.wheels.tyre_fields import check_common, common_numbers
+
+__all__ = ["LinearTyre"]
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class LinearTyre(Element):
+    """Forces in proportion to slip up to the limit of friction; the tyre of linear vehicle dynamics.
+
+    Marker A lies on the road, its z up; marker B is the centre of the wheel on the body that spins. All lengths, forces
+    and speeds are in units of the system. Axes, slips and outputs: docs/wheels.md.
+    """
+
+    name: str
+    marker_a: Marker  #: of the road: z up, x along it
+    marker_b: Marker  #: the centre of the wheel, on the spinning body
+    radius: float  #: R_0, unloaded [m]
+    stiffness: float  #: k, vertical [N/m]
+    slip_stiffness: float  #: C_x = dF_x/dkappa [N]
+    cornering_stiffness: float  #: C_y = -dF_y/dalpha [N/rad]
+    damping: float = 0.0  #: c, vertical [N s/m]
+    camber_stiffness: float = 0.0  #: C_gamma = -dF_y/dsin(gamma) [N]
+    trail: float = 0.0  #: pneumatic trail t: M_z = t C_y tan(alpha) [m]
+    friction: float = 1.0  #: mu, |(F_x, F_y)| <= mu F_z
+    relaxation_x: float = 0.0  #: relaxation length along x [m]; 0: none, and then the wheel creeps at a standstill
+    relaxation_y: float = 0.0  #: relaxation length along y [m]
+    rolling_resistance: float = 0.0  #: f_r: M_y = -f_r R_0 F_z
+    flattening: float = 1 / 3  #: q: effective rolling radius R_0 - q d
+    low_speed: float = 1.0  #: below it the wheel counts as coming to a standstill [m/s]
+    settling_time: float = 0.02  #: tau, damping of the tread at a standstill [s]
+    damping_depth: float = 0.0  #: deflection over which the vertical damping sets in [m]
+    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
+    road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
+
+    def __post_init__(self) -> None:
+        positive = ("slip_stiffness", "cornering_stiffness", "friction")
+        check_common(self, positive, ("trail", "rolling_resistance", "flattening"), ("camber_stiffness",))
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return the law between the markers as placed."""
+        own = [self.slip_stiffness, self.cornering_stiffness, self.camber_stiffness, self.trail, self.friction]
+        own += [self.flattening, self.rolling_resistance]
+        data = tyre_numbers(f"element {self.name!r}", placed, common_numbers(self), self.axis, own, self.road)
+        return ElementLaw(
+            function=linear_law,
+            rest=linear_law_at_rest,
+            data=data,
+            tangent="complex",
+            acts=acts_of(placed),
+            **states_of(self.relaxation_x, self.relaxation_y, 1e-3 * self.radius),
+            **SHOWN,
+        )

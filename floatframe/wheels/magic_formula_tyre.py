@@ -1,0 +1,171 @@
+"""A tyre with the Magic Formula, from a tyre property file."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.copies import frozen_copies
+from fe_models.foundation.units import UNIT_SYSTEMS, Dimensions, Units
+from floatframe.bodies.markers import Marker
+from floatframe.checked_values import number, unit_vector
+from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.errors import ModelError
+from floatframe.wheels.coefficients import COEFFICIENTS, NEEDED_COMBINED
+from floatframe.wheels.magic_formula_law import magic_formula_law, magic_formula_law_at_rest
+from floatframe.wheels.numbers import SHOWN, acts_of, states_of, tyre_numbers
+from floatframe.wheels.roads.road import FlatRoad, Road
+from floatframe.wheels.tyre_fields import check_road
+from floatframe.wheels.tyre_file import TyreProperties
+
+__all__ = ["MagicFormulaTyre"]
+
+CONVENTIONS = {"iso": 1.0, "adapted-sae": -1.0}
+SIDES = ("left", "right")
+WIDEST = {"kappa": (-1.5, 1.5), "alpha": (-1.5, 1.5), "gamma": (-1.0, 1.0)}  #: where the file gives no range
+LOADS = 1e-3, 1e3  #: the same of the load, of the nominal one
+SI = UNIT_SYSTEMS["m-kg-s"]
+LENGTH, FORCE, SPEED = Dimensions(length=1), Dimensions(mass=1, length=1, time=-2), Dimensions(length=1, time=-1)
+STIFFNESS, DAMPING = Dimensions(mass=1, time=-2), Dimensions(mass=1, time=-1)
+PRESSURE = Dimensions(mass=1, length=-1, time=-2)
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class MagicFormulaTyre(Element):
+    """The Magic Formula of version 5.2 or 6.1, combined slip, relaxation and standstill; turn slip is left out.
+
+    Marker A lies on the road, its z up; marker B is the centre of the wheel on the body that spins. The file is converted
+    into units of the system; numbers here are in units of the system. Axes, signs and formulas: docs/wheels.md.
+    """
+
+    name: str
+    marker_a: Marker  #: of the road: z up, x along it
+    marker_b: Marker  #: the centre of the wheel, on the spinning body
+    tyre: TyreProperties  #: of `read_tyre_file`
+    convention: str = "iso"  #: signs of the file: "iso" (W axes of ISO 8855, as TYDEX) or "adapted-sae"
+    side: str | None = None  #: on which it is mounted: "left" or "right"; the other one than the file's mirrors it
+    pressure: float | None = None  #: of the tyre; None: as the file has it
+    is_combined: bool | None = None  #: forces of combined slip; None: as USE_MODE of the file says
+    relaxation_x: float | None = None  #: relaxation lengths; None: from the file; 0: none, then it creeps when standing
+    relaxation_y: float | None = None
+    low_speed: float | None = None  #: below it the wheel counts as coming to a standstill; None: VXLOW of the file, or 1 m/s
+    settling_time: float = 0.02  #: tau, damping of the tread at a standstill [s]
+    damping_depth: float = 0.0  #: deflection over which the vertical damping sets in
+    axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
+    road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
+
+    def __post_init__(self) -> None:
+        where = f"element {self.name!r}"
+        if not isinstance(self.tyre, TyreProperties):
+            raise ModelError(f"{where}: tyre: expected what read_tyre_file returns, got {self.tyre!r}")
+        if self.convention not in CONVENTIONS:
+            raise ModelError(f"{where}: convention: expected one of {', '.join(CONVENTIONS)}, got {self.convention!r}")
+        if self.side is not None and self.side not in SIDES:
+            raise ModelError(f"{where}: side: expected one of {', '.join(SIDES)}, got {self.side!r}")
+        if self.tyre.cornering_stiffness * CONVENTIONS[self.convention] > 0:
+            other = next(name for name in CONVENTIONS if name != self.convention)
+            raise ModelError(
+                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, a side force along "
+                f"positive slip angles that {self.convention!r} forbids; is it a file of {other!r}?"
+            )
+        if (self.relaxation_x is None) != (self.relaxation_y is None):
+            raise ModelError(f"{where}: expected relaxation_x and relaxation_y, or neither (then the file's)")
+        for key in ("settling_time", "damping_depth", "relaxation_x", "relaxation_y"):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, number(f"{where}: {key}", getattr(self, key), at_least=0.0))
+        for key in ("pressure", "low_speed"):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, number(f"{where}: {key}", getattr(self, key), above=0.0))
+        object.__setattr__(self, "axis", unit_vector(f"{where}: axis", self.axis))
+        self._combined(where)
+
+    def _combined(self, where: str) -> bool:
+        """Return whether slip is combined; `ModelError` if the file does not say so, or lacks what that needs."""
+        is_combined = self.tyre.is_combined if self.is_combined is None else self.is_combined
+        lacking = [key for key in NEEDED_COMBINED if self.tyre.coefficients[key] == 0.0]
+        if is_combined is None:
+            raise ModelError(
+                f"{where}: is_combined: {self.tyre.source} has no USE_MODE of 3 (pure slip) or 4 (combined slip); say which"
+            )
+        if is_combined and lacking:
+            raise ModelError(
+                f"{where}: combined slip needs {', '.join(lacking)}, missing in {self.tyre.source}; "
+                "choose is_combined=False for forces of pure slip"
+            )
+        return is_combined
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return the law between the markers as placed, in units of the system."""
+        where = f"element {self.name!r}"
+        if placed.units is None:
+            raise ModelError(f"{where}: units: the system names none; {self.tyre.source} has units and must be converted")
+        units, tyre, p = placed.units, self.tyre, self.tyre.coefficients
+        radius = tyre.radius * LENGTH.factor(SI, units)
+        check_road(where, self.road, radius)
+        load, stiffness = tyre.load * FORCE.factor(SI, units), tyre.stiffness * STIFFNESS.factor(SI, units)
+        low_speed = self.low_speed or (tyre.low_speed or 1.0) * SPEED.factor(SI, units)
+        is_from_file = self.relaxation_x is None or self.relaxation_y is None
+        sigma = (radius, radius) if is_from_file else (self.relaxation_x or 0.0, self.relaxation_y or 0.0)
+        common = [radius, stiffness, tyre.damping * DAMPING.factor(SI, units), self.damping_depth]
+        common += [low_speed, self.settling_time, *sigma]
+        quarter = (stiffness * radius / load) ** 2 - 4 * p["QFZ2"]
+        if quarter < 0:
+            raise ModelError(f"{where}: QFZ2 = {p['QFZ2']:g} of {tyre.source} does not fit its vertical stiffness")
+        formula = dict(p) | {"QFZ1": p["QFZ1"] or float(np.sqrt(quarter))}
+        relative = self._relative_pressure(where, units)
+        own = [float(tyre.version == 61), float(self._combined(where)), relative - 1.0, relative, load]
+        own += [tyre.speed * SPEED.factor(SI, units), CONVENTIONS[self.convention], self._side()]
+        for name, widest in WIDEST.items():
+            own += tyre.ranges.get(name, widest)
+        loads = tyre.ranges.get("load", (LOADS[0] * tyre.load, LOADS[1] * tyre.load))
+        own += [max(loads[0], LOADS[0] * tyre.load) * FORCE.factor(SI, units), loads[1] * FORCE.factor(SI, units)]
+        own += [stiffness * (1 + p["PFZ1"] * (relative - 1.0)), float(is_from_file), *self._carcass(where, units, is_from_file)]
+        own += [formula[key] for key in COEFFICIENTS]
+        data = tyre_numbers(where, placed, common, self.axis, own, self.road)
+        return ElementLaw(
+            function=magic_formula_law,
+            rest=magic_formula_law_at_rest,
+            data=data,
+            tangent="complex",
+            acts=acts_of(placed),
+            **states_of(*sigma, 1e-3 * radius),
+            **SHOWN,
+        )
+
+    def _side(self) -> float:
+        """Return -1 for a tyre on the other side than the file's."""
+        return -1.0 if self.side is not None and self.tyre.side in SIDES and self.side != self.tyre.side else 1.0
+
+    def _carcass(self, where: str, units: Units, is_from_file: bool) -> list[float]:
+        """Return stiffnesses of the carcass for the relaxation lengths; `ModelError` if those are not in the file."""
+        found = []
+        for key, name, stiffness in (
+            ("PTX1", "LONGITUDINAL_STIFFNESS", self.tyre.carcass[0]),
+            ("PTY1", "LATERAL_STIFFNESS", self.tyre.carcass[1]),
+        ):
+            if is_from_file and self.tyre.coefficients[key] == 0.0 and not stiffness:
+                raise ModelError(
+                    f"{where}: relaxation lengths: {self.tyre.source} has neither {key} nor {name}; "
+                    "give relaxation_x and relaxation_y (0 for none)"
+                )
+            found.append((stiffness or 1.0) * STIFFNESS.factor(SI, units))
+        return found
+
+    def _relative_pressure(self, where: str, units: Units) -> float:
+        """Return pressure over nominal pressure; `ModelError` if it is out of the range of the file."""
+        tyre = self.tyre
+        if self.pressure is not None:
+            pressure = self.pressure * PRESSURE.factor(units, SI)
+        else:
+            pressure = tyre.pressure or tyre.nominal_pressure or 1.0
+        if tyre.nominal_pressure is None:
+            if self.pressure is not None:
+                raise ModelError(f"{where}: pressure: {tyre.source} has no NOMPRES, its forces do not know the pressure")
+            return 1.0
+        low, high = tyre.ranges.get("pressure", (0.0, np.inf))
+        if not low <= pressure <= high:
+            raise ModelError(
+                f"{where}: pressure: expected {low:g} to {high:g} Pa, the range of {tyre.source}, got {pressure:g} Pa"
+            )
+        return pressure / tyre.nominal_pressure

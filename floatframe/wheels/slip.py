@@ -1,0 +1,122 @@
+"""Slip of a rolling tyre, with relaxation and at a standstill.
+
+The tread is a string that the ground takes along at the slip velocity V_s and that rolling lets go over the relaxation
+length sigma, at the transport speed V = |V_x|:
+
+    u_dot = -V_sx - (V/sigma_x + L) u        kappa'     = (u + tau u_dot) / sigma_x      steady: kappa = -V_sx/V
+    v_dot =  V_sy - (V/sigma_y + L) v        tan alpha' = (v + tau v_dot) / sigma_y      steady: tan alpha = V_sy/V
+
+At a standstill V = 0: the tread is a spring, which holds without creep. What is added there fades out towards the low
+speed: a settling time tau, the damping of that spring, and the loss L, without which a tyre that slides at V = 0 would
+be stretched without end. L begins at the slip at which the tyre slides, s = 1, and holds s <= 2:
+L = w(s - 1) s_dot / 2 with s = |(u/(sigma_x kappa_s), v/(sigma_y alpha_s))| and s_dot the same of the slip velocity.
+"""
+
+import numpy as np
+from numba.extending import register_jitable
+
+from floatframe.wheels.contact import LOW_SPEED, RADIUS, SETTLING, SIGMA_X, SIGMA_Y, moved
+
+__all__ = ["direction", "hold_tread", "magnitude", "tread_slip"]
+
+LEAST_SLIP = 1e-4  #: at which a tyre may slide; keeps the loss of a tyre that is hardly loaded finite
+AIR = 20.0  #: a lifted tread relaxes at the rate AIR V_low/sigma
+
+
+@register_jitable(error_model="numpy")
+def magnitude(a):
+    """Return |a| of a real number, and with its sign for the imaginary part of a complex step."""
+    return a if a.real >= 0.0 else -a
+
+
+@register_jitable(error_model="numpy")
+def direction(V, low):
+    """Return the direction of a speed: -1 or 1 beyond the low speed, q (3 - q²)/2 with q = V/low within."""
+    q = V / low
+    if q.real >= 1.0:
+        return 1.0 + 0.0 * q
+    if q.real <= -1.0:
+        return -1.0 + 0.0 * q
+    return 0.5 * q * (3.0 - q * q)
+
+
+@register_jitable(error_model="numpy")
+def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, is_down):
+    """Return kappa' and tan alpha' of the tread, and write the rates of its states.
+
+    Parameters
+    ----------
+    data
+        Numbers of the tyre: low speed and settling time are used, and whether it has relaxation lengths.
+    sigma
+        Relaxation lengths along x and y at this load [m].
+    scale
+        Slips kappa_s and alpha_s at which the tyre slides.
+    z, z_dot
+        u and v [m], of the directions that relax, and their rates.
+    transport
+        V [m/s], of either sign.
+    V_sx, V_sy
+        Slip velocity over the road [m/s].
+    is_down
+        Whether the wheel touches the road.
+
+    Returns
+    -------
+    kappa, tan_alpha
+    """
+    V_low, tau = data[LOW_SPEED], data[SETTLING]
+    V = magnitude(transport)
+    if V.real >= V_low:
+        fade = 0.0 * V
+        rolling = V
+    else:
+        q = V / V_low
+        fade = (1.0 - q * q) * (1.0 - q * q)
+        rolling = 0.5 * (V * q + V_low)  # of directions without relaxation: V without its corner at zero
+    has_x, has_y = data[SIGMA_X] > 0.0, data[SIGMA_Y] > 0.0
+    kappa, tan_alpha = -V_sx / rolling, V_sy / rolling
+    k = 0
+    u = z[0] if has_x else 0.0 * V
+    if has_x:
+        k = 1
+    v = z[k] if has_y else 0.0 * V
+    loss = 0.0 * V
+    if fade.real > 0.0:
+        p_x = 1.0 / (sigma[0] * (scale[0] if scale[0].real > LEAST_SLIP else LEAST_SLIP + 0.0 * V)) if has_x else 0.0 * V
+        p_y = 1.0 / (sigma[1] * (scale[1] if scale[1].real > LEAST_SLIP else LEAST_SLIP + 0.0 * V)) if has_y else 0.0 * V
+        s_2 = (p_x * u) ** 2 + (p_y * v) ** 2
+        if s_2.real > 1.0:
+            s = np.sqrt(s_2)
+            w = s - 1.0 if s.real < 2.0 else 1.0 + 0.0 * s
+            w = w * w * (3.0 - 2.0 * w)
+            s_dot = np.sqrt((p_x * V_sx) ** 2 + (p_y * V_sy) ** 2 + 1e-18)
+            loss = 0.5 * fade * w * s_dot
+    if has_x:
+        if is_down:
+            z_dot[0] = -V_sx - (V / sigma[0] + loss) * u
+        else:
+            z_dot[0] = -(V / data[SIGMA_X] + AIR * V_low / data[SIGMA_X]) * u
+        kappa = (u + tau * fade * z_dot[0]) / sigma[0]
+    if has_y:
+        if is_down:
+            z_dot[k] = V_sy - (V / sigma[1] + loss) * v
+        else:
+            z_dot[k] = -(V / data[SIGMA_Y] + AIR * V_low / data[SIGMA_Y]) * v
+        tan_alpha = (v + tau * fade * z_dot[k]) / sigma[1]
+    return kappa, tan_alpha
+
+
+@register_jitable(error_model="numpy")
+def hold_tread(x, data, z, z_dot):
+    """Write the rates that vanish where the tread is stretched by what a standing wheel has moved since it was placed.
+
+    Without rolling u_dot = -V_sx and v_dot = V_sy, so that u = -(s_x - R_0 phi) and v = s_y: what statics asks for.
+    """
+    s_x, s_y, turn = moved(x, data)
+    k = 0
+    if data[SIGMA_X] > 0.0:
+        z_dot[0] = -(s_x - data[RADIUS] * turn) - z[0]
+        k = 1
+    if data[SIGMA_Y] > 0.0:
+        z_dot[k] = s_y - z[k]

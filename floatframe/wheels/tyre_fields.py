@@ -1,0 +1,70 @@
+"""Checks of the fields that tyres have in common."""
+
+from typing import Any
+
+from floatframe.checked_values import number, unit_vector
+from floatframe.errors import ModelError
+from floatframe.wheels.roads.road import FlatRoad, GridRoad
+
+__all__ = ["check_common", "check_road", "common_numbers"]
+
+STEEPEST = 1.0  #: slope over which a wheel follows the ground itself; steeper ground needs the wheel's envelope
+FIT = 1e-6  #: relative difference of radius and radius of an envelope that is taken for rounding
+
+
+def check_common(tyre: Any, positive: tuple[str, ...], at_least_zero: tuple[str, ...], free: tuple[str, ...] = ()) -> None:
+    """Check the numbers of a tyre and its road, and set them as floats.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of its range, the road is none, or an envelope is that of another wheel.
+    """
+    where = f"element {tyre.name!r}"
+    for key in ("radius", "stiffness", "low_speed", *positive):
+        object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key), above=0.0))
+    zero = ("damping", "relaxation_x", "relaxation_y", "settling_time", "damping_depth", *at_least_zero)
+    for key in zero:
+        object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key), at_least=0.0))
+    for key in free:
+        object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key)))
+    object.__setattr__(tyre, "axis", unit_vector(f"{where}: axis", tyre.axis))
+    check_road(where, tyre.road, tyre.radius)
+
+
+def check_road(where: str, road: Any, radius: float) -> None:
+    """Raise `ModelError` unless it is a road, and its envelope that of a wheel of this radius."""
+    if not isinstance(road, FlatRoad | GridRoad):
+        raise ModelError(
+            f"{where}: road: expected FlatRoad, GridRoad or what makes one (profile_road, iso_8608_road, Polyline.enveloped), "
+            f"got {road!r}"
+        )
+    if isinstance(road, FlatRoad):
+        return
+    if road.envelope_radius is None:
+        slope, at = road.steepest
+        if slope > STEEPEST:
+            raise ModelError(
+                f"{where}: road: beyond x = {at:g} it rises with a slope of {slope:.3g}; a wheel cannot follow ground that is "
+                f"steeper than {STEEPEST:g}: give what it feels of it, road.enveloped({radius:g})"
+            )
+    else:
+        if abs(road.envelope_radius - radius) > FIT * radius:
+            raise ModelError(
+                f"{where}: road: it is the envelope of a disc of radius {road.envelope_radius:g}, the wheel's is {radius:g}; "
+                "make it with the wheel's radius"
+            )
+
+
+def common_numbers(tyre: Any) -> list[float]:
+    """Return the first numbers of the data, in the order of `contact`."""
+    return [
+        tyre.radius,
+        tyre.stiffness,
+        tyre.damping,
+        tyre.damping_depth,
+        tyre.low_speed,
+        tyre.settling_time,
+        tyre.relaxation_x,
+        tyre.relaxation_y,
+    ]
