@@ -13,6 +13,7 @@ from floatframe.wheels.contact import (
     contact,
     normal_force,
     put_wrenches,
+    touching,
 )
 from floatframe.wheels.outputs import show, show_energy
 from floatframe.wheels.slip import direction, hold_tread, tread_slip
@@ -40,24 +41,23 @@ def brush_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     """
     x_W, y_W, n, _, point, d, rho, sine, cosine, V_x, V_y, Omega, rate, left = contact(x, data)
     is_down = d.real > 0.0
+    landed = touching(data, d)
     zero = 0.0 * d
-    F_z = normal_force(data, d, rate, cosine, data[STIFFNESS] * d)
+    F_z = normal_force(data, d, landed, rate, cosine, data[STIFFNESS] * d)
     R_e = data[RADIUS] - data[FLATTENING] * d if is_down else data[RADIUS] + zero
     V_r = R_e * Omega
     V_sx = V_x - V_r
     limit = data[FRICTION] * F_z
     sliding = 3.0 * data[FRICTION] * data[LOAD] / data[SLIP_STIFFNESS]  # sigma_s, the same at all loads
     length = data[SIGMA_X] + zero, data[SIGMA_Y] + zero
-    sigma_x, sigma_y = tread_slip(
-        data, length, (sliding + zero, sliding + zero), z, z_dot, V_r, V_sx, V_y, is_down
-    )
+    sigma_x, sigma_y = tread_slip(data, length, (sliding + zero, sliding + zero), z, z_dot, V_r, V_sx, V_y, landed)
     F_x, F_y, M_z = zero, zero, zero
     if is_down:
         a = data[HALF_LENGTH] * np.sqrt(F_z / data[LOAD] + 1e-12)
         r = np.sqrt(sigma_x * sigma_x + sigma_y * sigma_y + 1e-24) / sliding
         if r.real < 1.0:  # (1)
             over = limit * (3.0 - 3.0 * r + r * r) / sliding
-            trail = a / 3.0 * (1.0 - r) ** 3 / (1.0 - r + r * r / 3.0)  # (2)
+            trail = a / 3.0 * (1.0 - r) * (1.0 - r) * (1.0 - r) / (1.0 - r + r * r / 3.0)  # (2)
         else:
             over = limit / (r * sliding)
             trail = zero

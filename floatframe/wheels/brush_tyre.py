@@ -1,6 +1,8 @@
 """A tyre of bristles with parabolic pressure and friction."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +11,8 @@ from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.elements import Element, ElementLaw, Placed
 from floatframe.wheels.brush_law import brush_law, brush_law_at_rest
-from floatframe.wheels.numbers import SHOWN, acts_of, states_of, tyre_numbers
+from floatframe.wheels.numbers import tyre_law, tyre_numbers
+from floatframe.wheels.reading import Read, tyre_of_table
 from floatframe.wheels.roads.road import FlatRoad, Road
 from floatframe.wheels.tyre_fields import check_common, common_numbers
 
@@ -41,7 +44,7 @@ class BrushTyre(Element):
     flattening: float = 1 / 3  #: q: effective rolling radius R_0 - q d
     low_speed: float = 1.0  #: below it the wheel counts as coming to a standstill [m/s]
     settling_time: float = 0.02  #: tau, damping of the tread at a standstill [s]
-    damping_depth: float = 0.0  #: deflection over which the vertical damping sets in [m]
+    landing_depth: float | None = None  #: deflection over which damping and tread set in [m]; None: radius/500
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
     road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
 
@@ -49,17 +52,14 @@ class BrushTyre(Element):
         positive = ("nominal_load", "slip_stiffness", "contact_length", "friction")
         check_common(self, positive, ("rolling_resistance", "flattening"))
 
+    @classmethod
+    def from_table(cls, name: str, table: Mapping[str, Any], read: Read) -> "BrushTyre":
+        """Return the tyre of [elements.NAME]."""
+        return tyre_of_table(name, table, read, cls)
+
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law between the markers as placed."""
         own = [self.slip_stiffness, 0.5 * self.contact_length, self.nominal_load, self.friction]
         own += [self.flattening, self.rolling_resistance]
         data = tyre_numbers(f"element {self.name!r}", placed, common_numbers(self), self.axis, own, self.road)
-        return ElementLaw(
-            function=brush_law,
-            rest=brush_law_at_rest,
-            data=data,
-            tangent="complex",
-            acts=acts_of(placed),
-            **states_of(self.relaxation_x, self.relaxation_y, 1e-3 * self.radius),
-            **SHOWN,
-        )
+        return tyre_law(brush_law, brush_law_at_rest, data, placed, (self.relaxation_x, self.relaxation_y))

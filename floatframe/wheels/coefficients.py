@@ -1,4 +1,4 @@
-"""The coefficients of the Magic Formula that are read: name, what stands for one that is missing, section of the file."""
+"""The coefficients of the Magic Formula that are read, and what stands for one that is missing."""
 
 __all__ = ["COEFFICIENTS", "LEFT_OUT", "NEEDED", "NEEDED_COMBINED", "ONLY_52", "ONLY_61", "SCALES"]
 

@@ -11,10 +11,10 @@ from numba.extending import register_jitable
 from floatframe.wheels.roads.surface import CENTRE, road_height
 
 __all__ = ["AXIS", "CENTRE_AT", "COMMON", "DAMPING", "LOW_SPEED", "RADIUS", "ROAD", "SETTLING", "SIGMA_X", "SIGMA_Y"]
-__all__ += ["STIFFNESS", "TURN_AT", "contact", "cross", "dot", "moved", "normal_force", "put_wrenches"]
+__all__ += ["STIFFNESS", "TURN_AT", "contact", "cross", "dot", "moved", "normal_force", "put_wrenches", "touching"]
 
 # places of the numbers that all tyres have in their data; those of their own begin at COMMON
-RADIUS, STIFFNESS, DAMPING, DAMPING_DEPTH, LOW_SPEED, SETTLING, SIGMA_X, SIGMA_Y = range(8)
+RADIUS, STIFFNESS, DAMPING, LANDING, LOW_SPEED, SETTLING, SIGMA_X, SIGMA_Y = range(8)
 AXIS = 8  #: of the wheel in axes of its marker (3)
 CENTRE_AT, TURN_AT = 11, 14  #: of the wheel as placed: its centre (3) and axes (9) in axes of the road
 ROAD, COMMON = 23, 24  #: where the numbers of the road begin; where those of a law do
@@ -148,16 +148,28 @@ def moved(x, data):
 
 
 @register_jitable(error_model="numpy")
-def normal_force(data, deflection, rate, cosine, stiffness_force):
-    """Return F_z, which never pulls: (f(d) + c s d_dot) / cos gamma for d > 0, s from 0 to 1 over the damping depth.
+def touching(data, deflection):
+    """Return how far a wheel has landed: s² (3 - 2 s) of s = d over the landing depth, 0 in the air, 1 beyond it.
+
+    With it damping and tread set in without a jump, so that a step in which a wheel lands has a solution.
+    """
+    s = deflection / data[LANDING]
+    if s.real <= 0.0:
+        return 0.0 * s
+    if s.real >= 1.0:
+        return 1.0 + 0.0 * s
+    return s * s * (3.0 - 2.0 * s)
+
+
+@register_jitable(error_model="numpy")
+def normal_force(data, deflection, landed, rate, cosine, spring):
+    """Return F_z, which never pulls: (f(d) + c s d_dot) / cos gamma for d > 0, s how far the wheel has landed.
 
     The spring acts in the plane of the wheel: divided by cos gamma the force along the normal does its work.
     """
     if deflection.real <= 0.0:
         return 0.0 * deflection
-    s = deflection / data[DAMPING_DEPTH] if data[DAMPING_DEPTH] > 0.0 else 1.0 + 0.0 * deflection
-    s = s * s * (3.0 - 2.0 * s) if s.real < 1.0 else 1.0 + 0.0 * s
-    force = (stiffness_force + data[DAMPING] * s * rate) / cosine
+    force = (spring + data[DAMPING] * landed * rate) / cosine
     return force if force.real > 0.0 else 0.0 * force
 
 

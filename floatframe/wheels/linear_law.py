@@ -13,6 +13,7 @@ from floatframe.wheels.contact import (
     contact,
     normal_force,
     put_wrenches,
+    touching,
 )
 from floatframe.wheels.outputs import show, show_energy
 from floatframe.wheels.slip import direction, hold_tread, tread_slip
@@ -34,14 +35,15 @@ def linear_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     """
     x_W, y_W, n, _, point, d, rho, sine, cosine, V_x, V_y, Omega, rate, left = contact(x, data)  # (1)
     is_down = d.real > 0.0
+    landed = touching(data, d)
     zero = 0.0 * d
-    F_z = normal_force(data, d, rate, cosine, data[STIFFNESS] * d)
+    F_z = normal_force(data, d, landed, rate, cosine, data[STIFFNESS] * d)
     R_e = data[RADIUS] - data[FLATTENING] * d if is_down else data[RADIUS] + zero
     V_sx = V_x - R_e * Omega
     limit = data[FRICTION] * F_z
     sigma = data[SIGMA_X] + zero, data[SIGMA_Y] + zero  # (2)
     scale = limit / data[C_X], limit / data[C_Y]
-    kappa, tangent = tread_slip(data, sigma, scale, z, z_dot, V_x, V_sx, V_y, is_down)
+    kappa, tangent = tread_slip(data, sigma, scale, z, z_dot, V_x, V_sx, V_y, landed)
     F_x, F_y, arm = zero, zero, zero  # (3)
     if is_down:
         F_x, F_y = data[C_X] * kappa, -data[C_Y] * tangent - data[C_GAMMA] * sine

@@ -8,14 +8,16 @@ import numpy as np
 from numba.extending import register_jitable
 
 from floatframe.wheels.contact import COMMON
-from floatframe.wheels.slip import magnitude
+from floatframe.wheels.slip import magnitude, square
 
 __all__ = ["COEFFICIENTS_AT", "IS_61", "PRESSURE", "forces_and_moments", "peaks_and_stiffnesses"]
 
-# what stands before the coefficients: version 6.1 or 5.2, combined or pure slip; dp = (p - p_0)/p_0 and p/p_0; load F_0,
-# speed V_0; signs of the file against ISO, and of the side the tyre is mounted on against that of the file; ranges
+# what stands before the coefficients: version 6.1 or 5.2, combined or pure slip; dp = (p - p_0)/p_0 and p/p_0; load
+# F_0, speed V_0; signs of the file against ISO, and of the side the tyre is mounted on against that of the file; ranges
 IS_61, IS_COMBINED, DP, PRESSURE, LOAD, SPEED, SIGN, SIDE = range(COMMON, COMMON + 8)
-KAPPA_LOW, KAPPA_HIGH, ALPHA_LOW, ALPHA_HIGH, GAMMA_LOW, GAMMA_HIGH, LOAD_LOW, LOAD_HIGH = range(COMMON + 8, COMMON + 16)
+KAPPA_LOW, KAPPA_HIGH, ALPHA_LOW, ALPHA_HIGH, GAMMA_LOW, GAMMA_HIGH, LOAD_LOW, LOAD_HIGH = range(
+    COMMON + 8, COMMON + 16
+)
 C_VERTICAL, SIGMA_FROM_FILE, C_LONG, C_LAT = range(COMMON + 16, COMMON + 20)
 COEFFICIENTS_AT = COMMON + 20
 
@@ -167,8 +169,8 @@ def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling):
             a_t = np.sqrt(a_t * a_t + q * q + 1e-30) * sign_of(a_t)
             a_r = np.sqrt(a_r * a_r + q * q + 1e-30) * sign_of(a_r)
         else:
-            a_t = np.arctan(np.sqrt(np.tan(a_t) ** 2 + q * q + 1e-30)) * sign_of(a_t)
-            a_r = np.arctan(np.sqrt(np.tan(a_r) ** 2 + q * q + 1e-30)) * sign_of(a_r)
+            a_t = np.arctan(np.sqrt(square(np.tan(a_t)) + q * q + 1e-30)) * sign_of(a_t)
+            a_r = np.arctan(np.sqrt(square(np.tan(a_r)) + q * q + 1e-30)) * sign_of(a_r)
     B_t = (p[QBZ1] + p[QBZ2] * df + p[QBZ3] * df * df) * (1.0 + p[QBZ4] * c_z + p[QBZ5] * size) * p[LKY] / p[LMUY]
     D_t = F_z * R_0 / F_0 * (p[QDZ1] + p[QDZ2] * df) * (1.0 - p[PPZ1] * p[DP]) * p[LTR]
     D_t = D_t * (1.0 + p[QDZ3] * (size if is_61 else c_z) + p[QDZ4] * c_z * c_z)
@@ -185,13 +187,13 @@ def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling):
     f = F_z / p[LOAD]
     y = F_y / p[LOAD]
     tilt = p[QSX1] * p[LVMX] - p[QSX2] * gamma * (1.0 + p[PPMX1] * p[DP]) + p[QSX3] * y
-    tilt = tilt + p[QSX4] * np.cos(p[QSX5] * np.arctan(p[QSX6] * f) ** 2) * np.sin(
+    tilt = tilt + p[QSX4] * np.cos(p[QSX5] * square(np.arctan(p[QSX6] * f))) * np.sin(
         p[QSX7] * gamma + p[QSX8] * np.arctan(p[QSX9] * y)
     )
     tilt = tilt + p[QSX10] * np.arctan(p[QSX11] * f) * gamma
     M_x = R_0 * F_z * tilt * p[LMX]
     v = V_x / p[SPEED]
-    resistance = p[QSY1] + p[QSY2] * F_x / p[LOAD] + p[QSY3] * magnitude(v) + p[QSY4] * v**4
+    resistance = p[QSY1] + p[QSY2] * F_x / p[LOAD] + p[QSY3] * magnitude(v) + p[QSY4] * square(square(v))
     resistance = resistance + (p[QSY5] + p[QSY6] * f) * gamma * gamma
     loaded = f
     if is_61:

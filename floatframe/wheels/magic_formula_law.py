@@ -12,6 +12,7 @@ from floatframe.wheels.contact import (
     contact,
     normal_force,
     put_wrenches,
+    touching,
 )
 from floatframe.wheels.magic_formula import (
     ALPHA_HIGH,
@@ -120,10 +121,11 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     R_free = R_0 * (data[QRE0] + data[QV1] * spin * spin)
     d = d + R_free - R_0
     is_down = d.real > 0.0
+    landed = touching(data, d)
     stiffening = 1.0 + data[QV2] * magnitude(spin)
     q = d / R_0
     spring = (1.0 + data[PFZ1] * data[DP]) * (data[QFZ1] * q + data[QFZ2] * q * q) * F_0  # (2)
-    F_z = normal_force(data, d, rate, cosine, stiffening * spring)
+    F_z = normal_force(data, d, landed, rate, cosine, stiffening * spring)
     f = F_z / F_0
     R_e = R_free - F_0 / data[C_VERTICAL] * (data[DREFF] * np.arctan(data[BREFF] * f) + data[FREFF] * f)  # (3)
     V_sx = V_x - R_e * Omega
@@ -137,7 +139,7 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     df, mu_x, K_x, mu_y, K_y = peaks_and_stiffnesses(data, load, side * c)
     sigma = relaxation(data, df, load, K_x, K_y, gamma)
     scale = 3.0 * mu_x * load / magnitude(K_x), 3.0 * mu_y * load / magnitude(K_y)
-    kappa, tangent = tread_slip(data, sigma, scale, z, z_dot, V_x, V_sx, V_y, is_down)
+    kappa, tangent = tread_slip(data, sigma, scale, z, z_dot, V_x, V_sx, V_y, landed)
     kappa_held, over = held(kappa, data[KAPPA_LOW], data[KAPPA_HIGH])
     clamped += over
     alpha_held, over = held(np.arctan(tangent), data[ALPHA_LOW], data[ALPHA_HIGH])

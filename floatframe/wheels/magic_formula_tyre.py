@@ -1,6 +1,8 @@
 """A tyre with the Magic Formula, from a tyre property file."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +15,10 @@ from floatframe.elements import Element, ElementLaw, Placed
 from floatframe.errors import ModelError
 from floatframe.wheels.coefficients import COEFFICIENTS, NEEDED_COMBINED
 from floatframe.wheels.magic_formula_law import magic_formula_law, magic_formula_law_at_rest
-from floatframe.wheels.numbers import SHOWN, acts_of, states_of, tyre_numbers
+from floatframe.wheels.numbers import tyre_law, tyre_numbers
+from floatframe.wheels.reading import Read, properties_of_table, tyre_of_table
 from floatframe.wheels.roads.road import FlatRoad, Road
-from floatframe.wheels.tyre_fields import check_road
+from floatframe.wheels.tyre_fields import check_road, landing_depth
 from floatframe.wheels.tyre_file import TyreProperties
 
 __all__ = ["MagicFormulaTyre"]
@@ -35,8 +38,9 @@ PRESSURE = Dimensions(mass=1, length=-1, time=-2)
 class MagicFormulaTyre(Element):
     """The Magic Formula of version 5.2 or 6.1, combined slip, relaxation and standstill; turn slip is left out.
 
-    Marker A lies on the road, its z up; marker B is the centre of the wheel on the body that spins. The file is converted
-    into units of the system; numbers here are in units of the system. Axes, signs and formulas: docs/wheels.md.
+    Marker A lies on the road, its z up; marker B is the centre of the wheel on the body that spins. The file is
+    converted into units of the system; numbers here are in units of the system. Axes, signs and formulas:
+    docs/wheels.md.
     """
 
     name: str
@@ -49,9 +53,11 @@ class MagicFormulaTyre(Element):
     is_combined: bool | None = None  #: forces of combined slip; None: as USE_MODE of the file says
     relaxation_x: float | None = None  #: relaxation lengths; None: from the file; 0: none, then it creeps when standing
     relaxation_y: float | None = None
-    low_speed: float | None = None  #: below it the wheel counts as coming to a standstill; None: VXLOW of the file, or 1 m/s
+    low_speed: float | None = (
+        None  #: below it the wheel counts as coming to a standstill; None: VXLOW of the file, or 1 m/s
+    )
     settling_time: float = 0.02  #: tau, damping of the tread at a standstill [s]
-    damping_depth: float = 0.0  #: deflection over which the vertical damping sets in
+    landing_depth: float | None = None  #: deflection over which damping and tread set in; None: radius/500
     axis: Array = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  #: spin axis to the left, axes of marker B
     road: Road = field(default_factory=FlatRoad)  #: in axes of marker A
 
@@ -66,15 +72,15 @@ class MagicFormulaTyre(Element):
         if self.tyre.cornering_stiffness * CONVENTIONS[self.convention] > 0:
             other = next(name for name in CONVENTIONS if name != self.convention)
             raise ModelError(
-                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, a side force along "
-                f"positive slip angles that {self.convention!r} forbids; is it a file of {other!r}?"
+                f"{where}: convention: {self.tyre.source} has PKY1 = {self.tyre.coefficients['PKY1']:g}, a side force "
+                f"along positive slip angles that {self.convention!r} forbids; is it a file of {other!r}?"
             )
         if (self.relaxation_x is None) != (self.relaxation_y is None):
             raise ModelError(f"{where}: expected relaxation_x and relaxation_y, or neither (then the file's)")
-        for key in ("settling_time", "damping_depth", "relaxation_x", "relaxation_y"):
+        for key in ("settling_time", "relaxation_x", "relaxation_y"):
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, number(f"{where}: {key}", getattr(self, key), at_least=0.0))
-        for key in ("pressure", "low_speed"):
+        for key in ("pressure", "low_speed", "landing_depth"):
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, number(f"{where}: {key}", getattr(self, key), above=0.0))
         object.__setattr__(self, "axis", unit_vector(f"{where}: axis", self.axis))
@@ -86,7 +92,8 @@ class MagicFormulaTyre(Element):
         lacking = [key for key in NEEDED_COMBINED if self.tyre.coefficients[key] == 0.0]
         if is_combined is None:
             raise ModelError(
-                f"{where}: is_combined: {self.tyre.source} has no USE_MODE of 3 (pure slip) or 4 (combined slip); say which"
+                f"{where}: is_combined: {self.tyre.source} has no USE_MODE of 3 (pure slip) or 4 (combined "
+                "slip); say which"
             )
         if is_combined and lacking:
             raise ModelError(
@@ -95,11 +102,15 @@ class MagicFormulaTyre(Element):
             )
         return is_combined
 
+    @classmethod
+    def from_table(cls, name: str, table: Mapping[str, Any], read: Read) -> "MagicFormulaTyre":
+        """Return the tyre of [elements.NAME]: its file is `file` or `shipped`, with `version` if it does not say it."""
+        values = dict(table)
+        return tyre_of_table(name, values, read, cls, tyre=properties_of_table(values, read))
+
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law between the markers as placed, in units of the system."""
         where = f"element {self.name!r}"
-        if placed.units is None:
-            raise ModelError(f"{where}: units: the system names none; {self.tyre.source} has units and must be converted")
         units, tyre, p = placed.units, self.tyre, self.tyre.coefficients
         radius = tyre.radius * LENGTH.factor(SI, units)
         check_road(where, self.road, radius)
@@ -107,7 +118,8 @@ class MagicFormulaTyre(Element):
         low_speed = self.low_speed or (tyre.low_speed or 1.0) * SPEED.factor(SI, units)
         is_from_file = self.relaxation_x is None or self.relaxation_y is None
         sigma = (radius, radius) if is_from_file else (self.relaxation_x or 0.0, self.relaxation_y or 0.0)
-        common = [radius, stiffness, tyre.damping * DAMPING.factor(SI, units), self.damping_depth]
+        common = [radius, stiffness, tyre.damping * DAMPING.factor(SI, units)]
+        common += [landing_depth(self.landing_depth, radius)]
         common += [low_speed, self.settling_time, *sigma]
         quarter = (stiffness * radius / load) ** 2 - 4 * p["QFZ2"]
         if quarter < 0:
@@ -120,18 +132,14 @@ class MagicFormulaTyre(Element):
             own += tyre.ranges.get(name, widest)
         loads = tyre.ranges.get("load", (LOADS[0] * tyre.load, LOADS[1] * tyre.load))
         own += [max(loads[0], LOADS[0] * tyre.load) * FORCE.factor(SI, units), loads[1] * FORCE.factor(SI, units)]
-        own += [stiffness * (1 + p["PFZ1"] * (relative - 1.0)), float(is_from_file), *self._carcass(where, units, is_from_file)]
+        own += [
+            stiffness * (1 + p["PFZ1"] * (relative - 1.0)),
+            float(is_from_file),
+            *self._carcass(where, units, is_from_file),
+        ]
         own += [formula[key] for key in COEFFICIENTS]
         data = tyre_numbers(where, placed, common, self.axis, own, self.road)
-        return ElementLaw(
-            function=magic_formula_law,
-            rest=magic_formula_law_at_rest,
-            data=data,
-            tangent="complex",
-            acts=acts_of(placed),
-            **states_of(*sigma, 1e-3 * radius),
-            **SHOWN,
-        )
+        return tyre_law(magic_formula_law, magic_formula_law_at_rest, data, placed, sigma)
 
     def _side(self) -> float:
         """Return -1 for a tyre on the other side than the file's."""
@@ -161,7 +169,9 @@ class MagicFormulaTyre(Element):
             pressure = tyre.pressure or tyre.nominal_pressure or 1.0
         if tyre.nominal_pressure is None:
             if self.pressure is not None:
-                raise ModelError(f"{where}: pressure: {tyre.source} has no NOMPRES, its forces do not know the pressure")
+                raise ModelError(
+                    f"{where}: pressure: {tyre.source} has no NOMPRES, its forces do not know the pressure"
+                )
             return 1.0
         low, high = tyre.ranges.get("pressure", (0.0, np.inf))
         if not low <= pressure <= high:

@@ -1,18 +1,19 @@
 """What all tyres have in their data: the numbers before those of their law, and the road behind them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.elements import Placed
+from floatframe.elements import ElementLaw, Placed
 from floatframe.errors import ModelError
-from floatframe.wheels.contact import COMMON, ROAD
-from floatframe.wheels.outputs import OUTPUT_UNITS, OUTPUTS
+from floatframe.wheels.contact import COMMON, RADIUS, ROAD
+from floatframe.wheels.outputs import OUTPUTS
 from floatframe.wheels.roads.road import Road
 
-__all__ = ["acts_of", "states_of", "tyre_numbers"]
+__all__ = ["tyre_law", "tyre_numbers"]
 
+TREAD = 1e-3  #: typical deflection of the tread, of the radius
 UPRIGHT = 0.2  #: cosine of the inclination below which a wheel is not one that rolls on this road
 
 
@@ -31,31 +32,49 @@ def tyre_numbers(
     e = A @ axis
     if abs(e[2]) > np.sqrt(1 - UPRIGHT**2):
         raise ModelError(
-            f"{where}: its spin axis is {e.round(3).tolist()} in axes of marker_a, along the road's normal z; a wheel stands: "
-            "give `axis` (in axes of marker_b; default y), or turn a marker"
+            f"{where}: its spin axis is {e.round(3).tolist()} in axes of marker_a, along the road's normal z; a "
+            "wheel stands: give `axis` (in axes of marker_b; default y), or turn a marker"
         )
     ground = road.height(c[0], c[1])
     if c[2] <= ground:
         raise ModelError(
-            f"{where}: its centre lies at z = {c[2]:g}, below the road at {ground:g} (axes of marker_a); expected it a radius, "
-            f"{common[0]:g}, above: is the z axis of marker_a up, and is marker_b the wheel's centre?"
+            f"{where}: its centre lies at z = {c[2]:g}, below the road at {ground:g} (axes of marker_a); expected it a "
+            f"radius, {common[0]:g}, above: is the z axis of marker_a up, and is marker_b the wheel's centre?"
         )
     head = [*common, *axis, *c, *A.ravel()]
     assert len(head) == ROAD
     return np.concatenate([head, [COMMON + len(law)], law, road.numbers()])
 
 
-def states_of(sigma_x: float, sigma_y: float, low: float) -> dict[str, tuple]:
-    """Return the states of the tread that relax: names, starts, units, sizes."""
-    names = tuple(name for name, sigma in (("u", sigma_x), ("v", sigma_y)) if sigma > 0)
-    n = len(names)
-    return {"states": names, "start": (0.0,) * n, "state_units": ("m",) * n, "state_sizes": (low,) * n}
+def tyre_law(
+    function: Callable[..., None], rest: Callable[..., None], data: Array, placed: Placed, sigma: tuple[float, float]
+) -> ElementLaw:
+    """Return the law of a tyre: states of the tread where it relaxes, wrenches on what can move, outputs.
 
-
-def acts_of(placed: Placed) -> tuple[str, str]:
-    """Return on which markers the wrench acts: a road that is the ground needs none."""
-    return ("none" if placed.on_ground[0] else "wrench", "wrench")
-
-
-#: what every tyre shows
-SHOWN = {"outputs": tuple(OUTPUTS), "output_units": OUTPUT_UNITS, "energy": "energy", "power_lost": "power_lost"}
+    Parameters
+    ----------
+    function, rest
+        In motion and for statics.
+    data
+        Of `tyre_numbers`.
+    placed
+        The markers as placed: a road that is the ground needs no wrench.
+    sigma
+        Relaxation lengths along x and y [m]; 0: no state.
+    """
+    states = tuple(name for name, length in zip(("u", "v"), sigma, strict=True) if length > 0)
+    return ElementLaw(
+        function=function,
+        rest=rest,
+        data=data,
+        tangent="complex",
+        acts=("none" if placed.on_ground[0] else "wrench", "wrench"),
+        states=states,
+        start=(0.0,) * len(states),
+        state_units=("m",) * len(states),
+        state_sizes=(TREAD * float(data[RADIUS]),) * len(states),
+        outputs=tuple(OUTPUTS),
+        output_units=tuple(OUTPUTS.values()),
+        energy="energy",
+        power_lost="power_lost",
+    )

@@ -3,7 +3,7 @@
 import numpy as np
 from numba.extending import register_jitable
 
-__all__ = ["OUTPUTS", "OUTPUT_UNITS", "show", "show_energy"]
+__all__ = ["OUTPUTS", "show", "show_energy"]
 
 #: of the contact, in its axes, on the wheel; slips as the law has used them (with relaxation)
 OUTPUTS = {
@@ -12,7 +12,6 @@ OUTPUTS = {
     "Vx": "m/s", "Vsx": "m/s", "Vsy": "m/s", "px": "m", "py": "m", "pz": "m",
     "energy": "J", "power_lost": "W", "road_left": "m", "clamped": "1",
 }  # fmt: skip
-OUTPUT_UNITS = tuple(OUTPUTS.values())
 
 
 @register_jitable(error_model="numpy")

@@ -17,16 +17,22 @@ from numba.extending import register_jitable
 
 from floatframe.wheels.contact import LOW_SPEED, RADIUS, SETTLING, SIGMA_X, SIGMA_Y, moved
 
-__all__ = ["direction", "hold_tread", "magnitude", "tread_slip"]
+__all__ = ["direction", "hold_tread", "magnitude", "square", "tread_slip"]
 
 LEAST_SLIP = 1e-4  #: at which a tyre may slide; keeps the loss of a tyre that is hardly loaded finite
-AIR = 20.0  #: a lifted tread relaxes at the rate AIR V_low/sigma
+AIR = 20.0  #: a lifted tread relaxes at the rate (V + AIR V_low)/sigma
 
 
 @register_jitable(error_model="numpy")
 def magnitude(a):
     """Return |a| of a real number, and with its sign for the imaginary part of a complex step."""
     return a if a.real >= 0.0 else -a
+
+
+@register_jitable(error_model="numpy")
+def square(a):
+    """Return a²: a power of a complex number, compiled, loses a small imaginary part where the base is negative."""
+    return a * a
 
 
 @register_jitable(error_model="numpy")
@@ -41,7 +47,7 @@ def direction(V, low):
 
 
 @register_jitable(error_model="numpy")
-def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, is_down):
+def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, landed):
     """Return kappa' and tan alpha' of the tread, and write the rates of its states.
 
     Parameters
@@ -58,8 +64,8 @@ def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, is_down):
         V [m/s], of either sign.
     V_sx, V_sy
         Slip velocity over the road [m/s].
-    is_down
-        Whether the wheel touches the road.
+    landed
+        From 0 in the air to 1 on the road.
 
     Returns
     -------
@@ -83,27 +89,28 @@ def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, is_down):
     v = z[k] if has_y else 0.0 * V
     loss = 0.0 * V
     if fade.real > 0.0:
-        p_x = 1.0 / (sigma[0] * (scale[0] if scale[0].real > LEAST_SLIP else LEAST_SLIP + 0.0 * V)) if has_x else 0.0 * V
-        p_y = 1.0 / (sigma[1] * (scale[1] if scale[1].real > LEAST_SLIP else LEAST_SLIP + 0.0 * V)) if has_y else 0.0 * V
-        s_2 = (p_x * u) ** 2 + (p_y * v) ** 2
+        p_x = (
+            1.0 / (sigma[0] * (scale[0] if scale[0].real > LEAST_SLIP else LEAST_SLIP + 0.0 * V)) if has_x else 0.0 * V
+        )
+        p_y = (
+            1.0 / (sigma[1] * (scale[1] if scale[1].real > LEAST_SLIP else LEAST_SLIP + 0.0 * V)) if has_y else 0.0 * V
+        )
+        s_2 = square(p_x * u) + square(p_y * v)
         if s_2.real > 1.0:
             s = np.sqrt(s_2)
             w = s - 1.0 if s.real < 2.0 else 1.0 + 0.0 * s
             w = w * w * (3.0 - 2.0 * w)
-            s_dot = np.sqrt((p_x * V_sx) ** 2 + (p_y * V_sy) ** 2 + 1e-18)
+            s_dot = np.sqrt(square(p_x * V_sx) + square(p_y * V_sy) + 1e-18)
             loss = 0.5 * fade * w * s_dot
+    air = (1.0 - landed) * AIR * V_low
     if has_x:
-        if is_down:
-            z_dot[0] = -V_sx - (V / sigma[0] + loss) * u
-        else:
-            z_dot[0] = -(V / data[SIGMA_X] + AIR * V_low / data[SIGMA_X]) * u
-        kappa = (u + tau * fade * z_dot[0]) / sigma[0]
+        rate = -landed * V_sx - (V / sigma[0] + loss) * u
+        kappa = (u + tau * fade * rate) / sigma[0]
+        z_dot[0] = rate - air / sigma[0] * u
     if has_y:
-        if is_down:
-            z_dot[k] = V_sy - (V / sigma[1] + loss) * v
-        else:
-            z_dot[k] = -(V / data[SIGMA_Y] + AIR * V_low / data[SIGMA_Y]) * v
-        tan_alpha = (v + tau * fade * z_dot[k]) / sigma[1]
+        rate = landed * V_sy - (V / sigma[1] + loss) * v
+        tan_alpha = (v + tau * fade * rate) / sigma[1]
+        z_dot[k] = rate - air / sigma[1] * v
     return kappa, tan_alpha
 
 

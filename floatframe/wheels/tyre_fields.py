@@ -6,13 +6,16 @@ from floatframe.checked_values import number, unit_vector
 from floatframe.errors import ModelError
 from floatframe.wheels.roads.road import FlatRoad, GridRoad
 
-__all__ = ["check_common", "check_road", "common_numbers"]
+__all__ = ["check_common", "check_road", "common_numbers", "landing_depth"]
 
 STEEPEST = 1.0  #: slope over which a wheel follows the ground itself; steeper ground needs the wheel's envelope
+LANDINGS = 500  #: landing depths in a radius
 FIT = 1e-6  #: relative difference of radius and radius of an envelope that is taken for rounding
 
 
-def check_common(tyre: Any, positive: tuple[str, ...], at_least_zero: tuple[str, ...], free: tuple[str, ...] = ()) -> None:
+def check_common(
+    tyre: Any, positive: tuple[str, ...], at_least_zero: tuple[str, ...], free: tuple[str, ...] = ()
+) -> None:
     """Check the numbers of a tyre and its road, and set them as floats.
 
     Raises
@@ -23,9 +26,12 @@ def check_common(tyre: Any, positive: tuple[str, ...], at_least_zero: tuple[str,
     where = f"element {tyre.name!r}"
     for key in ("radius", "stiffness", "low_speed", *positive):
         object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key), above=0.0))
-    zero = ("damping", "relaxation_x", "relaxation_y", "settling_time", "damping_depth", *at_least_zero)
+    zero = ("damping", "relaxation_x", "relaxation_y", "settling_time", *at_least_zero)
     for key in zero:
         object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key), at_least=0.0))
+    if tyre.landing_depth is not None:
+        depth = number(f"{where}: landing_depth", tyre.landing_depth, above=0.0)
+        object.__setattr__(tyre, "landing_depth", depth)
     for key in free:
         object.__setattr__(tyre, key, number(f"{where}: {key}", getattr(tyre, key)))
     object.__setattr__(tyre, "axis", unit_vector(f"{where}: axis", tyre.axis))
@@ -36,8 +42,8 @@ def check_road(where: str, road: Any, radius: float) -> None:
     """Raise `ModelError` unless it is a road, and its envelope that of a wheel of this radius."""
     if not isinstance(road, FlatRoad | GridRoad):
         raise ModelError(
-            f"{where}: road: expected FlatRoad, GridRoad or what makes one (profile_road, iso_8608_road, Polyline.enveloped), "
-            f"got {road!r}"
+            f"{where}: road: expected FlatRoad, GridRoad or what makes one (profile_road, iso_8608_road, "
+            f"Polyline.enveloped), got {road!r}"
         )
     if isinstance(road, FlatRoad):
         return
@@ -45,15 +51,20 @@ def check_road(where: str, road: Any, radius: float) -> None:
         slope, at = road.steepest
         if slope > STEEPEST:
             raise ModelError(
-                f"{where}: road: beyond x = {at:g} it rises with a slope of {slope:.3g}; a wheel cannot follow ground that is "
-                f"steeper than {STEEPEST:g}: give what it feels of it, road.enveloped({radius:g})"
+                f"{where}: road: beyond x = {at:g} it rises with a slope of {slope:.3g}; a wheel cannot follow ground "
+                f"that is steeper than {STEEPEST:g}: give what it feels of it, road.enveloped({radius:g})"
             )
     else:
         if abs(road.envelope_radius - radius) > FIT * radius:
             raise ModelError(
-                f"{where}: road: it is the envelope of a disc of radius {road.envelope_radius:g}, the wheel's is {radius:g}; "
-                "make it with the wheel's radius"
+                f"{where}: road: it is the envelope of a disc of radius {road.envelope_radius:g}, the wheel's is "
+                f"{radius:g}; make it with the wheel's radius"
             )
+
+
+def landing_depth(given: float | None, radius: float) -> float:
+    """Return the deflection over which damping and tread set in."""
+    return radius / LANDINGS if given is None else given
 
 
 def common_numbers(tyre: Any) -> list[float]:
@@ -62,7 +73,7 @@ def common_numbers(tyre: Any) -> list[float]:
         tyre.radius,
         tyre.stiffness,
         tyre.damping,
-        tyre.damping_depth,
+        landing_depth(tyre.landing_depth, tyre.radius),
         tyre.low_speed,
         tyre.settling_time,
         tyre.relaxation_x,

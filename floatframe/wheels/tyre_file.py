@@ -75,12 +75,16 @@ def read_tyre_file(path: str | Path, *, version: str | None = None) -> TyrePrope
     path = Path(path)
     try:
         if path.stat().st_size > LARGEST:
-            raise ModelError(f"tyre file {path}: it has {path.stat().st_size} bytes; a property file has some ten thousand")
+            raise ModelError(
+                f"tyre file {path}: it has {path.stat().st_size} bytes; a property file has some ten thousand"
+            )
         content = path.read_bytes()
     except OSError as error:
         raise ModelError(f"tyre file {path}: cannot be read: {error.strerror or error}") from None
     if b"\0" in content:
-        raise ModelError(f"tyre file {path}: it holds binary data; expected the text of a property file, [SECTION] and KEY = value")
+        raise ModelError(
+            f"tyre file {path}: it holds binary data; expected the text of a property file, [SECTION] and KEY = value"
+        )
     return tyre_from_text(content.decode("utf-8", errors="replace"), f"tyre file {path}", version=version)
 
 
@@ -174,10 +178,14 @@ def entries(text: str, where: str) -> dict[str, tuple[int, str]]:
         if match is None:
             if section == "SHAPE" or (section.startswith("DEFLECTION") and numeric(line.split()[0]) is not None):
                 continue
-            raise ModelError(f"{where}, line {k}: expected KEY = value, [SECTION] or a comment ($ or !), got {line[:60]!r}")
+            raise ModelError(
+                f"{where}, line {k}: expected KEY = value, [SECTION] or a comment ($ or !), got {line[:60]!r}"
+            )
         key, value = match[1].upper(), match[2].strip().strip("'\"").strip()
         if key in found and found[key][1] != value:
-            raise ModelError(f"{where}, line {k}: {key} = {value} stands against {found[key][1]} in line {found[key][0]}")
+            raise ModelError(
+                f"{where}, line {k}: {key} = {value} stands against {found[key][1]} in line {found[key][0]}"
+            )
         found[key] = k, value
     return found
 
@@ -199,17 +207,21 @@ def factors(words: dict[str, tuple[int, str]], where: str) -> tuple[float, float
             raise ModelError(f"{where}: [UNITS]: missing {key}; expected one of {', '.join(sorted(known)).lower()}")
         if (unit := words[key][1].upper()) not in known:
             raise ModelError(
-                f"{where}, line {words[key][0]}: {key}: expected one of {', '.join(sorted(known)).lower()}, got {unit.lower()!r}"
+                f"{where}, line {words[key][0]}: {key}: expected one of "
+                f"{', '.join(sorted(known)).lower()}, got {unit.lower()!r}"
             )
         found.append(known[unit])
     angle = words.get("ANGLE", (0, "missing"))
     if angle[1].upper() not in ANGLES:
         raise ModelError(
-            f"{where}: [UNITS]: ANGLE: expected 'radians', got {angle[1]!r}: slopes and ranges of the formula are per radian"
+            f"{where}: [UNITS]: ANGLE: expected 'radians', got {angle[1]!r}: slopes and ranges of the formula "
+            "are per radian"
         )
     if "PRESSURE" in words:
         if (unit := words["PRESSURE"][1].upper()) not in PRESSURES:
-            raise ModelError(f"{where}: [UNITS]: PRESSURE: expected one of {', '.join(PRESSURES).lower()}, got {unit.lower()!r}")
+            raise ModelError(
+                f"{where}: [UNITS]: PRESSURE: expected one of {', '.join(PRESSURES).lower()}, got {unit.lower()!r}"
+            )
         pressure = PRESSURES[unit]
     elif found[:2] == [1.0, 1.0]:
         pressure = 1.0
@@ -237,8 +249,8 @@ def formula_version(words: dict[str, tuple[int, str]], where: str, version: str 
         return FORMATS[file_format]
     said = f"FITTYP = {fit}" if fit else f"PROPERTY_FILE_FORMAT = {file_format or 'missing'}"
     raise ModelError(
-        f"{where}: version of the formula: {said} is none that is known (FITTYP {', '.join(FIT_TYPES)}; PROPERTY_FILE_FORMAT "
-        f"{', '.join(FORMATS)}); if it is 5.2 or 6.1, say version = \"5.2\" or \"6.1\""
+        f"{where}: version of the formula: {said} is none that is known (FITTYP {', '.join(FIT_TYPES)}; "
+        f'PROPERTY_FILE_FORMAT {", ".join(FORMATS)}); if it is 5.2 or 6.1, say version = "5.2" or "6.1"'
     )
 
 
@@ -258,7 +270,9 @@ def notes_of(words: dict[str, tuple[int, str]], numbers: dict[str, float], kind:
     absent = [key for key in COEFFICIENTS if key not in numbers and key not in others]
     if absent:
         notes.append(f"not in the file, taken as 0 (factors as 1): {', '.join(absent)}")
-    unused = sorted(key for key in numbers if numbers[key] and key in COEFFICIENTS and chosen(numbers, kind)[key] != numbers[key])
+    unused = sorted(
+        key for key in numbers if numbers[key] and key in COEFFICIENTS and chosen(numbers, kind)[key] != numbers[key]
+    )
     if unused:
         notes.append(f"not of version {kind / 10:g}, unused: {', '.join(unused)}")
     reasons: dict[str, list[str]] = {}

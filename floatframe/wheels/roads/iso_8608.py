@@ -1,9 +1,9 @@
 """Random roads of ISO 8608: one-sided density of the height G_d(n) = G_d(n_0) (n/n_0)^-w, n_0 = 0.1 cycles/m.
 
-A profile is the sum of cosines sqrt(2 G_d dn) cos(2 pi n x + phi) at equally spaced n with phases at random, so that its
-density is that of the class, not only its expectation. Tracks at distance b of a surface that is alike in all
-directions have the normalised cross density (the two-dimensional density falls with |n|^-(w + 1), its section at lag b is
-Basset's integral)
+A profile is the sum of cosines sqrt(2 G_d dn) cos(2 pi n x + phi) at equally spaced n with phases at random, so that
+its density is that of the class, not only its expectation. Tracks at distance b of a surface that is alike in all
+directions have the normalised cross density (the two-dimensional density falls with |n|^-(w + 1), its section at lag
+b is Basset's integral)
 
     g(n, b) = 2/Gamma(w/2) (pi n b)^(w/2) K_(w/2)(2 pi n b),    1 for long waves, 0 for short ones,
 
@@ -11,6 +11,7 @@ and tracks are made from independent ones by the Cholesky factor of g between al
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -115,10 +116,10 @@ def iso_8608_road(
     z = z[:, : len(x)]
     if run_in > 0:
         z = z * 0.5 * (1 - np.cos(np.pi * np.clip(x / run_in, 0, 1)))
-    return GridRoad(metre * x, metre * z.T, y=metre * y)
+    return GridRoad(np.asarray(metre * x), np.asarray(metre * z.T, dtype=np.float64), y=metre * y)
 
 
-def mixed(waves: Array, n: Array, y: Array, waviness: float, coherence: float | None) -> Array:
+def mixed(waves: Any, n: Any, y: Array, waviness: float, coherence: float | None) -> Any:
     """Return independent waves, (n_tracks, n_n), mixed to the correlation of the tracks at each n."""
     apart = np.abs(y[:, None] - y[None, :])
     g = np.empty((len(n), len(y), len(y)))

@@ -39,8 +39,8 @@ class GridRoad:
 
     One y: a profile, the same at all y. Two and more: tracks, or a surface. Between the knots runs a monotone cubic
     (no overshoot, slopes without jumps) or, with `is_linear`, a straight line. What a wheel feels is the height and the
-    slope where it stands, found on the ground itself: waves should be longer than the wheel, R |z''| < 1. Shorter ones are
-    for `enveloped`.
+    slope where it stands, found on the ground itself: waves should be longer than the wheel, R |z''| < 1. Shorter ones
+    are for `enveloped`.
     """
 
     x: Array  #: knots along the road, (n_x,) [m], increasing
@@ -113,7 +113,7 @@ def at_row(y: Array, rows: Array, place: float) -> Array:
 @frozen_copies
 @dataclass(frozen=True, eq=False)
 class Polyline:
-    """A profile of straight pieces, which may have upright steps: x may stay where it is from one corner to the next."""
+    """A profile of straight pieces, which may have upright steps: two corners at one x."""
 
     x: Array  #: of the corners, (n,) [m], never falling
     z: Array  #: of the corners, (n,) [m]
@@ -129,7 +129,9 @@ class Polyline:
         """Return the profile as it stands, for wheels that are small against it."""
         return GridRoad(self.x, self.z, is_linear=True)
 
-    def enveloped(self, radius: float, *, step: float | None = None, between: Sequence[float] | None = None) -> GridRoad:
+    def enveloped(
+        self, radius: float, *, step: float | None = None, between: Sequence[float] | None = None
+    ) -> GridRoad:
         """Return what a rigid disc of that radius [m] feels.
 
         Parameters
@@ -139,8 +141,8 @@ class Polyline:
         step
             Of the result [m]; a twentieth of the radius by default.
         between
-            The obstacle lies between these two y [m], seen with the width of the wheel; beside them the road is level at
-            the height of its first corner. None: at all y.
+            The obstacle lies between these two y [m], edges included; beside them the road is level at the height of
+            its first corner. None: at all y.
         """
         R = number("envelope: radius", radius, above=0.0)
         x = even_knots(self.x[0] - R, self.x[-1] + R, step or R / ENVELOPE_STEPS)
@@ -175,7 +177,9 @@ def knots(where: str, values: Any, least: int = 2) -> Array:
         raise ModelError(f"{where}: expected {least} knots or more, got {len(array)}")
     if np.any(np.diff(array) <= 0):
         k = int(np.argmax(np.diff(array) <= 0))
-        raise ModelError(f"{where}: expected increasing numbers, got {array[k]:g}, then {array[k + 1]:g} at place {k + 1}")
+        raise ModelError(
+            f"{where}: expected increasing numbers, got {array[k]:g}, then {array[k + 1]:g} at place {k + 1}"
+        )
     return array
 
 

@@ -31,8 +31,16 @@ def version_61(T, p, p0, Fz, kappa, alpha, gamma, Vx, V0, R0, Fz0, *, combined=T
     dfz, dpi = (Fz - Fz0_) / Fz0_, (p - p0) / p0
     lmux_, lmuy_ = (10 * c[k] / (1 + 9 * c[k]) for k in ("LMUX", "LMUY"))
     # Fx0
-    mux = (c["PDX1"] + c["PDX2"] * dfz) * (1 + c["PPX3"] * dpi + c["PPX4"] * dpi**2) * (1 - c["PDX3"] * g**2) * c["LMUX"]
-    Kx = Fz * (c["PKX1"] + c["PKX2"] * dfz) * exp(c["PKX3"] * dfz) * (1 + c["PPX1"] * dpi + c["PPX2"] * dpi**2) * c["LKX"]
+    mux = (
+        (c["PDX1"] + c["PDX2"] * dfz) * (1 + c["PPX3"] * dpi + c["PPX4"] * dpi**2) * (1 - c["PDX3"] * g**2) * c["LMUX"]
+    )
+    Kx = (
+        Fz
+        * (c["PKX1"] + c["PKX2"] * dfz)
+        * exp(c["PKX3"] * dfz)
+        * (1 + c["PPX1"] * dpi + c["PPX2"] * dpi**2)
+        * c["LKX"]
+    )
     SHx = (c["PHX1"] + c["PHX2"] * dfz) * c["LHX"]
     SVx = Fz * (c["PVX1"] + c["PVX2"] * dfz) * c["LVX"] * lmux_
     Cx = c["PCX1"] * c["LCX"]
@@ -77,7 +85,12 @@ def version_61(T, p, p0, Fz, kappa, alpha, gamma, Vx, V0, R0, Fz0, *, combined=T
     if combined:
         at = sqrt(at**2 + (Kx / Ky) ** 2 * kappa**2) * sign(at)
         ar = sqrt(ar**2 + (Kx / Ky) ** 2 * kappa**2) * sign(ar)
-    Bt = (c["QBZ1"] + c["QBZ2"] * dfz + c["QBZ3"] * dfz**2) * (1 + c["QBZ4"] * g + c["QBZ5"] * abs(g)) * c["LKY"] / c["LMUY"]
+    Bt = (
+        (c["QBZ1"] + c["QBZ2"] * dfz + c["QBZ3"] * dfz**2)
+        * (1 + c["QBZ4"] * g + c["QBZ5"] * abs(g))
+        * c["LKY"]
+        / c["LMUY"]
+    )
     Ct = c["QCZ1"]
     Dt = Fz * (R0 / Fz0_) * (c["QDZ1"] + c["QDZ2"] * dfz) * (1 - c["PPZ1"] * dpi) * c["LTR"]
     Dt *= 1 + c["QDZ3"] * abs(g) + c["QDZ4"] * g**2

@@ -23,7 +23,9 @@ def turn(axis, angle):
 
 def placed(height=0.3, A=None, units=SI):
     A = np.eye(3) if A is None else A
-    return Placed(r=np.array([[0, 0, 0], [0, 0, height]]), A=np.array([np.eye(3), A]), on_ground=(True, False), units=units)
+    return Placed(
+        r=np.array([[0, 0, 0], [0, 0, height]]), A=np.array([np.eye(3), A]), on_ground=(True, False), units=units
+    )
 
 
 def motion(height=0.3, v=(0, 0, 0), omega=(0, 0, 0), A=None, at=(0, 0), road=None):

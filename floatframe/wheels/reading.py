@@ -1,0 +1,151 @@
+"""Tyres and roads from tables of a system file."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ModelError
+from floatframe.wheels.roads.iso_8608 import iso_8608_road
+from floatframe.wheels.roads.obstacles import bump, cosine_bump, ramp, step
+from floatframe.wheels.roads.road import FlatRoad, GridRoad, Polyline, Road
+from floatframe.wheels.tyre_file import TyreProperties, read_tyre_file, shipped_tyre
+
+__all__ = ["Read", "properties_of_table", "road_of_table", "tyre_of_table"]
+
+
+class Read(Protocol):
+    """Reads values of a table and names their keys in its messages."""
+
+    where: str
+
+    def value(self, kind: Any, value: Any, key: str) -> Any:
+        """Return a value as a kind says."""
+
+    def path(self, value: Any, key: str = "file") -> Path:
+        """Return the path of a file that exists."""
+
+    def fields_of(self, kind: Any, table: Mapping[str, Any], **given: Any) -> Any:
+        """Return a dataclass whose fields are the keys of a table."""
+
+
+#: obstacle: what makes its profile, and its numbers beside `length`
+OBSTACLES: dict[str, tuple[Callable[..., Polyline], tuple[str, ...]]] = {
+    "step": (step, ("at", "height")),
+    "ramp": (ramp, ("at", "height", "run")),
+    "bump": (bump, ("at", "height", "width")),
+    "cosine-bump": (cosine_bump, ("at", "height", "width")),
+}
+#: key of a random road: argument and kind
+RANDOM = {
+    "class": ("road_class", str), "length": ("length", float), "seed": ("seed", int), "tracks": ("tracks", np.ndarray),
+    "spacing": ("spacing", float), "band": ("band", np.ndarray), "waviness": ("waviness", float),
+    "run_in": ("run_in", float), "coherence": ("coherence", float), "metre": ("metre", float),
+}  # fmt: skip
+TYPES = ("flat", "profile", "grid", "iso-8608", *OBSTACLES)
+
+
+def road_of_table(table: Any, read: Read) -> Road:
+    """Return the road of {type = "profile", x = [...], z = [...], envelope = 0.3}.
+
+    Keys by type: flat; profile, grid: x, z, y, linear, or `file` (a text table, x in its first column, heights at `y`
+    in the others); iso-8608: those of `iso_8608_road`; step, ramp, bump, cosine-bump: at, height, run or width, length,
+    between. `envelope`, the radius of the wheel, and `envelope_width` give what a disc feels of it.
+    """
+    where = f"{read.where}.road"
+    if not isinstance(table, dict) or not isinstance(table.get("type"), str):
+        raise ModelError(f'{where}: expected a table such as {{type = "flat"}}, got {quoted(table)}')
+    kind, values = table["type"], {key: value for key, value in table.items() if key != "type"}
+    if kind not in TYPES:
+        raise ModelError(f"{where}.type: expected one of {', '.join(TYPES)}, got {quoted(kind)}{nearest(kind, TYPES)}")
+
+    def number(key: str, default: float | None = None) -> Any:
+        if key not in values and default is not None:
+            return default
+        if key not in values:
+            raise ModelError(f"{where}.{key}: missing; a road of type {kind!r} needs it")
+        return read.value(float, values.pop(key), f"road.{key}")
+
+    envelope = read.value(float, values.pop("envelope"), "road.envelope") if "envelope" in values else None
+    if kind == "flat":
+        road: Road = FlatRoad()
+    elif kind in OBSTACLES:
+        make, keys = OBSTACLES[kind]
+        profile = make(*(number(key) for key in keys), length=number("length"))
+        between = read.value(np.ndarray, values.pop("between"), "road.between") if "between" in values else None
+        refuse_others(where, kind, values)
+        if envelope is not None:
+            return profile.enveloped(envelope, between=between)
+        if between is not None:
+            raise ModelError(f"{where}.between: needs envelope, the radius of the wheel")
+        return profile.road()
+    elif kind == "iso-8608":
+        given = {RANDOM[k][0]: read.value(RANDOM[k][1], values.pop(k), f"road.{k}") for k in RANDOM if k in values}
+        for key in ("class", "length", "seed"):
+            if RANDOM[key][0] not in given:
+                raise ModelError(f"{where}.{key}: missing; a random road needs it")
+        road = iso_8608_road(**given)
+    else:
+        road = grid_of_table(where, values, read)
+    width = number("envelope_width", 0.0)
+    refuse_others(where, kind, values)
+    if envelope is None or isinstance(road, FlatRoad):
+        return road
+    return road.enveloped(envelope, width=width)
+
+
+def grid_of_table(where: str, values: dict[str, Any], read: Read) -> GridRoad:
+    """Return the road of knots and heights in the file itself, or in a text table beside it."""
+    given: dict[str, Any] = {}
+    if "file" in values:
+        path = read.path(values.pop("file"), "road.file")
+        try:
+            text = path.read_text(encoding="utf-8").replace(",", " ").replace(";", " ")
+            rows = np.array([line.split() for line in text.splitlines() if line.split("#")[0].strip()], dtype=float)
+        except (OSError, UnicodeDecodeError, ValueError) as error:
+            raise ModelError(
+                f"{where}.file: {path}: expected rows of numbers of one length, x and heights, # before comments: "
+                f"{error}"
+            ) from None
+        if rows.ndim != 2 or rows.shape[1] < 2:
+            raise ModelError(f"{where}.file: {path}: expected two columns or more, x and heights, got {rows.shape}")
+        given = {"x": rows[:, 0], "z": rows[:, 1:]}
+    for key, name in (("x", "x"), ("y", "y"), ("z", "z")):
+        if key in values:
+            if name in given:
+                raise ModelError(f"{where}.{key}: stands in the file already")
+            given[name] = read.value(np.ndarray, values.pop(key), f"road.{key}")
+    for key in ("x", "z"):
+        if key not in given:
+            raise ModelError(f"{where}.{key}: missing; give x and z, or file")
+    if "linear" in values:
+        given["is_linear"] = read.value(bool, values.pop("linear"), "road.linear")
+    return GridRoad(**given)
+
+
+def refuse_others(where: str, kind: str, values: Mapping[str, Any]) -> None:
+    """Raise `ModelError` if keys are left that this type of road does not have."""
+    if values:
+        raise ModelError(f"{where}: a road of type {kind!r} has no key {quoted(next(iter(values)))}")
+
+
+def tyre_of_table(name: str, table: Mapping[str, Any], read: Read, kind: type, **given: Any) -> Any:
+    """Return a tyre of a class whose fields are the keys of its table, but for the road."""
+    values = dict(table)
+    if "road" in values:
+        given["road"] = road_of_table(values.pop("road"), read)
+    return read.fields_of(kind, values, name=name, **given)
+
+
+def properties_of_table(values: dict[str, Any], read: Read) -> TyreProperties:
+    """Return the tyre of `file` (with `version` where the file does not say it) or `shipped`, taken out of a table."""
+    version = read.value(str, values.pop("version"), "version") if "version" in values else None
+    if ("file" in values) == ("shipped" in values):
+        raise ModelError(
+            f"{read.where}: expected file, a tyre property file, or shipped, the name of one of this package"
+        )
+    if "file" in values:
+        return read_tyre_file(read.path(values.pop("file"), "file"), version=version)
+    return read_tyre_file(shipped_tyre(read.value(str, values.pop("shipped"), "shipped")))
