@@ -61,7 +61,7 @@ def uncoupled_body(
     """Run a job up to the body whose interfaces are still to be coupled, with the nodes and points it asks for."""
     from fe_models.body.kept_nodes import keep_nodes
 
-    body = keep_nodes(made_body(job, stages, on_report), job.body.keep)
+    body = keep_nodes(made_body(job, stages, on_report, mesh), job.body.keep)
     if not job.body.stress_points:
         return body
     from fe_models.recovery.element_points import element_points
