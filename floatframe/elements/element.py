@@ -26,6 +26,7 @@ from floatframe.bodies.markers import Marker
 from floatframe.checked_values import array_of_shape, number
 from floatframe.errors import ModelError
 from floatframe.joints.rows import NOTHING, POSITION, VELOCITY
+from floatframe.shapes.drawn import Arrow, Drawn, Stretched
 
 __all__ = ["ACTS", "NOTHING", "POSITION", "TANGENTS", "VELOCITY", "Element", "ElementLaw", "Placed", "markers_of"]
 
@@ -173,6 +174,10 @@ class Element:
 
         A run that watches for events calls Python after every step; `ElementLaw.stops` costs nothing.
         """
+        return ()
+
+    def drawn(self) -> Sequence[Drawn | Stretched | Arrow]:
+        """Return what is seen of it in films and pages, fixed to its markers; nothing, unless it says so."""
         return ()
 
 

@@ -15,6 +15,7 @@ from floatframe.bodies.rigid_body import RigidBody
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.pictures.body_colors import DISPLACEMENT, BodyColor
+from floatframe.pictures.element_looks import element_pieces
 from floatframe.pictures.film_times import FilmTimes, film_times, round_below, speed_words, time_words
 from floatframe.pictures.glyphs import glyphs
 from floatframe.pictures.looks import looks_of, places_over
@@ -165,17 +166,25 @@ def motion_scene(
             surfaces.append(Surface(triangles, moved, color=RIGID_COLOR, opacity=opacity, name=name))
             triads.append(Triad(r, R, 0.06 * size, name))
             lines.append(trail(motions[name].r, rows))
+    around = [] if system is None else element_pieces(system, trajectory, rows)
+    for piece, at in around:
+        if not piece.is_ground:
+            drawn_surfaces, drawn_lines = drawn_piece(piece, at, "")
+            surfaces += drawn_surfaces
+            lines += drawn_lines
     seen = [surface.nodes.reshape(-1, 3)[::7] for surface in surfaces]
     points = np.concatenate([*seen, *(line.points.reshape(-1, 3)[::7] for line in lines)])
     up_axis = up_of(trajectory, points) if up is None else np.asarray(up, dtype=float)
     direction, up_axis = view_axes(points, up_axis)
     ground, step = ground_grid(points, up_axis)
-    around = () if system is None else tuple(piece for shape in system.scene for piece in shape.pieces())
-    for piece in around:
-        drawn_surfaces, drawn_lines = drawn_piece(piece, piece.nodes, "")
+    ground_pieces = [(piece, at) for piece, at in around if piece.is_ground]
+    if system is not None:
+        ground_pieces += [(piece, piece.nodes) for shape in system.scene for piece in shape.pieces()]
+    for piece, at in ground_pieces:
+        drawn_surfaces, drawn_lines = drawn_piece(piece, at, "")
         surfaces += drawn_surfaces
         lines += drawn_lines
-    has_ground = any(piece.is_ground for piece in around)
+    has_ground = any(piece.is_ground for piece, _ in ground_pieces)
     reach = max(size, 0.5 * float(np.linalg.norm(np.ptp(points, axis=0))))
     drawn = () if system is None else glyphs(system, trajectory, rows, reach, magnification, up_axis)
     words = [speed_words(times.speed)]

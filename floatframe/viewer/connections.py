@@ -27,7 +27,7 @@ from floatframe.shapes.piece import shifted
 from floatframe.shapes.rounds import axes_about
 from floatframe.viewer.cast import Between, Cast, Force, Placed
 
-__all__ = ["connections_cast", "joint_pieces"]
+__all__ = ["connections_cast", "distance", "joint_pieces"]
 
 SIZE = 0.012  #: of a joint, by the size of the scene
 GROUND_COLOR = "#7b8790"

@@ -21,6 +21,7 @@ from floatframe.system import System
 from floatframe.viewer.carriers import Carriers
 from floatframe.viewer.cast import Cast, bodies_cast, scene_cast
 from floatframe.viewer.connections import connections_cast
+from floatframe.viewer.element_cast import elements_cast
 from floatframe.viewer.flexible import FlexibleSurface
 from floatframe.viewer.packing import Block, Packed
 from floatframe.viewer.surface import broken_at_edges
@@ -93,6 +94,7 @@ def stage_record(shown: Shown, surfaces: list[FlexibleSurface], block: Block) ->
     trajectory, rows = shown.trajectory, shown.rows
     cast = Cast(Carriers(trajectory, rows, shown.system))
     bodies_cast(cast, shown.bodies, scale_of(shown))
+    elements_cast(cast)
     stage = stage_of(shown, cast)
     scene_cast(cast)
     connections_cast(cast, stage.size, stage.up)

@@ -1,7 +1,7 @@
 """Pages of motions: the numbers in them against the motion, what they say, what they refuse."""
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -25,10 +25,16 @@ from floatframe import (
     view,
 )
 from floatframe.errors import ModelError
+from floatframe.pictures.animation import motion_scene
+from floatframe.pictures.film_times import film_times
+from floatframe.results.element_motion import element_motion
 from floatframe.results.place_motion import largest_von_mises, nodal_stress
 from floatframe.results.recovery import nodal_displacements, nodal_positions
-from floatframe.shapes import Road, Wheel
+from floatframe.rotations import rotation_matrix
+from floatframe.shapes import Arrow, Box, Drawn, Road, Shape, Stretched, Wheel
+from floatframe.shapes.drawn import SPRING
 from tests.cms.second_order.test_geometric_reduction import bar_of_beams
+from tests.floatframe.elements.laws import Spring
 from tests.floatframe.viewer.pages import ReadPage
 from tests.synthetic import synthetic_reduced_body
 
@@ -235,3 +241,66 @@ def test_stress_is_refused_where_no_body_has_it(moved, tmp_path):
         view(motion, tmp_path / "no.html", system=other)
     with pytest.raises(ResultsError, match="give system="):
         view(static_equilibrium(other), tmp_path / "no.html")
+
+
+@dataclass(frozen=True, eq=False)
+class ShownSpring(Spring):
+    """A spring that shows itself, with the road under it and its force."""
+
+    wrong: str = ""
+
+    def drawn(self):
+        if self.wrong:
+            return {"marker": (Drawn(Shape(Box((1, 1, 1))), marker=2),), "output": (Arrow(("Fx", "lost", "lost")),),
+                    "kind": (Box((1, 1, 1)),)}[self.wrong]  # fmt: skip
+        wheel, road = Shape(Wheel(0.3, 0.1)), Shape(Road([(-1, 0, 0), (1, 0, 0)], 1.0))
+        arrow = Arrow(("tension", "lost", "lost"), marker=1, is_in_marker_axes=True)
+        return Drawn(wheel, marker=1), Drawn(road, marker=None), Stretched("coil"), arrow
+
+
+def sprung(wrong=""):
+    turned = (np.cos(0.3), 0, np.sin(0.3), 0)
+    block = RigidBody("block", 2.0, np.eye(3), position=(0, 0, -1.0), orientation=turned)
+    spring = ShownSpring("spring", Marker(GROUND), Marker("block", position=(0.1, 0, 0)), 50.0, 0.5, 0.8, wrong=wrong)
+    return System([block], [], [Gravity((0, 0, -9.81))], elements=[spring])
+
+
+def test_elements_show_themselves_at_their_markers_with_their_forces(tmp_path):
+    system = sprung()
+    motion = integrate(system, GeneralizedAlpha(0.8), 0.2, 1e-2)
+    view(motion, tmp_path / "spring.html", system=system)
+    read = ReadPage(tmp_path / "spring.html")
+    tyre = next(each for each in read.record["pieces"] if each["color"] == Wheel(0.3, 0.1).pieces()[0].color)
+    carrier = read.record["carriers"][tyre["carrier"]]
+    assert (carrier["body"], carrier["position"]) == (0, [0.1, 0, 0])
+    assert any(each["carrier"] == 0 and each["is_ground"] for each in read.record["pieces"])
+    coil = next(each for each in read.record["between"] if each["kind"] == "force")
+    assert (read.record["carriers"][coil["first"]]["body"], coil["second"]) == (-1, tyre["carrier"])
+    arrow = next(each for each in read.record["forces"] if each["is_of_element"])
+    found = element_motion(system, motion, "spring").outputs
+    local = np.stack([found["tension"], found["lost"], found["lost"]], axis=1)
+    expected = np.einsum("tab,tb->ta", rotation_matrix(motion.body("block").p), local)
+    assert_allclose(read.array(arrow["values"]), expected, rtol=0, atol=1e-4 * np.abs(expected).max())
+    # a film has shapes and coil too: the coil ends at both markers
+    times = film_times(motion.t, fps=25.0, speed=1.0, n_nodes=100)
+    scene = motion_scene(motion, {"block": system.bodies[0]}, times, system=system)
+    wound = next(surface for surface in scene.surfaces if surface.color == SPRING)
+    end = motion.body("block").r + rotation_matrix(motion.body("block").p) @ np.array([0.1, 0, 0])
+    near = [np.linalg.norm(wound.nodes[k] - end[row], axis=1).min() for k, row in enumerate(times.rows)]
+    assert max(near) < 0.02
+    assert np.linalg.norm(wound.nodes, axis=2).min(axis=1).max() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ("marker", "marker 2: expected 0 to 1"),
+        ("output", "no output 'Fx'"),
+        ("kind", "expected Drawn, Stretched or Arrow"),
+    ],
+)
+def test_elements_that_show_what_they_have_not_are_refused(tmp_path, wrong, words):
+    system = sprung(wrong)
+    motion = integrate(system, GeneralizedAlpha(0.8), 0.02, 1e-2)
+    with pytest.raises(ModelError, match=words):
+        view(motion, tmp_path / "no.html", system=system)
