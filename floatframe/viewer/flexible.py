@@ -22,6 +22,7 @@ __all__ = ["FlexibleSurface", "flexible_surface", "nodes_within"]
 
 MOVES, STRESSES = 1e-5, 1e-3  #: shares of the largest displacement and stress below which a mode is left out
 FEWEST, MOST = 300, 20_000  #: nodes shown of a body
+AT_ONCE = 2_000_000  #: numbers of displacement held at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,7 @@ def flexible_surface(
         shapes, amplitudes = np.concatenate([shapes, second]), np.concatenate([amplitudes, more], axis=1)
         if stress is not None:
             stress = np.concatenate([stress, np.zeros((len(second), *stress.shape[1:]))])
-    displacement = np.linalg.norm(moved(shapes, amplitudes), axis=-1).max(initial=0.0)
+    displacement = largest_displacement(shapes, amplitudes)
     largest_stress = 0.0
     if stress is not None:
         largest_stress = max(
@@ -88,14 +89,19 @@ def flexible_surface(
         kept |= reach * np.abs(stress).max(axis=(1, 2), initial=0.0) > STRESSES * largest_stress
     return FlexibleSurface(
         number, surface, np.asarray(body.nodes)[surface.rows], shapes[kept], None if stress is None else stress[kept],
-        amplitudes[:, kept], float(displacement), largest_stress, body.n_q,
+        amplitudes[:, kept], displacement, largest_stress, body.n_q,
     )  # fmt: skip
 
 
-def moved(shapes: Array, amplitudes: Array) -> Array:
-    """Return displacements, (n_rows, n, 3)."""
-    n = shapes.shape[1]
-    return np.asarray(amplitudes @ shapes.reshape(len(shapes), 3 * n)).reshape(-1, n, 3)
+def largest_displacement(shapes: Array, amplitudes: Array) -> float:
+    """Return the largest displacement of a node in any row [m]."""
+    n_a, n = shapes.shape[:2]
+    flat, largest = shapes.reshape(n_a, 3 * n), 0.0
+    at_once = max(1, AT_ONCE // max(3 * n, 1))
+    for first in range(0, len(amplitudes), at_once):
+        d = (amplitudes[first : first + at_once] @ flat).reshape(-1, n, 3)
+        largest = max(largest, float(np.einsum("tna,tna->tn", d, d).max(initial=0.0)))
+    return float(np.sqrt(largest))
 
 
 def second_order(body: ReducedBody, surface: ShownSurface, q: Array) -> tuple[Array, Array]:

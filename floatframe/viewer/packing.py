@@ -18,7 +18,7 @@ from fe_models.foundation.arrays import Array, IntArray
 __all__ = ["Block", "Packed"]
 
 TOP = 32767  #: of whole numbers of 16 bit
-LEVEL = 9  #: of the compression
+LEVEL = 6  #: of the compression: 9 takes five times as long for 1 %
 
 Packed = dict[str, Any]  #: at, type, shape, and of quantised numbers scale, offset, each: where it lies, what it means
 

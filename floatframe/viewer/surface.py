@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from cms.rendering.shape import surface_edges
@@ -41,11 +42,16 @@ def shown_surface(nodes: Array, triangles: IntArray, most: int) -> ShownSurface:
     rows, local = np.unique(triangles, return_inverse=True)
     local = local.reshape(-1, 3)
     n_nodes, n_triangles = len(rows), len(triangles)
+    at_edge = np.ones(n_nodes, bool)
     if n_nodes > most:
+        ends, _, is_sharp = surface_edges(nodes[rows], local)
+        at_edge[:] = False
+        at_edge[ends[is_sharp]] = True
         kept, local = thinned(nodes[rows], local, most)
-        rows = rows[kept]
-    corner, split = broken_at_edges(nodes[rows], local)
+        rows, at_edge = rows[kept], at_edge[kept]
+    corner, split = broken_at_edges(nodes[rows], local, at_edge)
     ends, _, is_sharp = surface_edges(nodes[rows], local)
+    is_sharp &= at_edge[ends].all(axis=1)
     return ShownSurface(rows, corner, split, ends[is_sharp], n_nodes, n_triangles)
 
 
@@ -78,13 +84,22 @@ def thinned(nodes: Array, triangles: IntArray, most: int) -> tuple[IntArray, Int
     return kept[used], local.reshape(-1, 3)
 
 
-def broken_at_edges(nodes: Array, triangles: IntArray) -> tuple[IntArray, IntArray]:
+def broken_at_edges(
+    nodes: Array, triangles: IntArray, at_edge: NDArray[np.bool_] | None = None
+) -> tuple[IntArray, IntArray]:
     """Return the node of each corner point, and triangles of corner points: smooth neighbours share them.
 
     Corners of triangles at a node are one point where a chain of edges that are not sharp joins the triangles.
+
+    Parameters
+    ----------
+    at_edge
+        Nodes between which an edge may be sharp, (n_nodes,): thinning makes a smooth surface coarse; None: all.
     """
     n = len(triangles)
     ends, beside, is_sharp = surface_edges(nodes, triangles)
+    if at_edge is not None:
+        is_sharp = is_sharp & at_edge[ends].all(axis=1)
     smooth = ~is_sharp & (beside[:, 0] != beside[:, 1])
     first, second, ends = beside[smooth, 0], beside[smooth, 1], ends[smooth]
     pairs = []
