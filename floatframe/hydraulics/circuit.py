@@ -84,8 +84,7 @@ class Circuit(Element):
             kind, own = row.get("type"), {key: value for key, value in row.items() if key != "type"}
             if kind not in COMPONENTS:
                 raise ModelError(
-                    f"{where}.type: expected one of {', '.join(COMPONENTS)}, got {quoted(kind)}"
-                    f"{nearest(str(kind), tuple(COMPONENTS))}"
+                    f"{where}.type: expected a component, got {quoted(kind)}{nearest(str(kind), tuple(COMPONENTS))}"
                 )
             components.append(replace(read, where=where).fields_of(COMPONENTS[kind], own))
         made.pop("components", None)

@@ -69,7 +69,7 @@ def check_nodes(fluid: Fluid, components: Sequence[Component], nodes: Mapping[st
             if name not in given and name not in has_volume:
                 raise ModelError(
                     f"component {each.name!r}: node {name!r} has no volume and no supply or tank: give it one, as in "
-                    f"nodes = {{ {name} = {{ volume = ... }} }}, or is another node meant"
+                    f"nodes = {{ {name} = {{ volume = ... }} }}"
                     f"{nearest(name, sorted(set(counts) - {name}))}"
                 )
             if counts[name] == 1 and not isinstance(each, Cylinder) and name not in nodes:

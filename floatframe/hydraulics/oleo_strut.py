@@ -1,4 +1,7 @@
-"""An oleo-pneumatic shock absorber between two markers: gas spring, metered orifice, seals and stops."""
+"""An oleo-pneumatic shock absorber between two markers: gas spring, metered orifice, seals and stops.
+
+The forces are those of Milwitzky & Cook (1953), with compressible oil if asked for.
+"""
 
 from dataclasses import dataclass
 from typing import Any
