@@ -113,6 +113,8 @@ def accept_body(
         left_out = cards_left_out(read_deck(Path(deck_path)))
     if left_out is not None:
         records = (*records, left_out_record(left_out))
+    if band is not None:
+        records = (*records, band_record(reduced, records, band))
     error = mesh_error(job, most_dofs, stages)
     if error.estimate is not None:
         records = (*records, judge("mesh-error", error.largest, error.words, {"error": error.estimate.error}))
@@ -155,6 +157,15 @@ def against_job(
 def is_of_one_model(body: "FEBody", reduced: ReducedBody) -> bool:
     """Whether a reduced body says that it was made of a model of this size."""
     return reduced.provenance.get("full dofs") == str(body.n_dof)
+
+
+def band_record(reduced: ReducedBody, records: tuple[QualityRecord, ...], band: float) -> QualityRecord:
+    """Return whether the body is good up to the frequency that was asked for [Hz]."""
+    usable = range_of_use(reduced, records).band
+    said = f"asked for {band:.6g} Hz; good for up to {usable.highest:.6g} Hz ({usable.words})"
+    data = {"asked_hz": band, "usable_hz": usable.highest}
+    share = band / usable.highest if usable.highest > 0 else np.inf  # NaN: no vibration modes
+    return judge("band-asked", float(share), said, data)
 
 
 def band_of(reduced: ReducedBody) -> float:

@@ -160,6 +160,10 @@ LIMITS: dict[str, Limit] = {
         "mass, centre and inertia: full model against the body", 1e-3, 1e-2,
         "look for masses that one of both has and the other not: what the deck lists as left out, units, densities",
     ),
+    "band-asked": Limit(
+        "highest frequency of interest over that which the body is good for", 1.000001, 1.000001,
+        "reduce with more modes, or ask for a lower band",
+    ),
     "mesh-error": Limit(
         "lowest frequencies too high by the mesh, estimated", 0.02, None,
         "mesh finer, or with cells of second order",

@@ -73,7 +73,13 @@ def check_seal(path: Path, kind: Kind) -> bool:
     if not head.startswith(magic):
         if head and magic.startswith(head):
             raise truncated(path, kind, f"at least {SEAL_SIZE} bytes", n_bytes)
-        return False  # of another kind, repacked, or with a damaged seal: the HDF5 part tells
+        other = re.match(rb"floatframe ([a-z-]{3,30}) \d{1,9}\nbytes ", head)
+        if other and other[1].decode() != kind.format:
+            raise kind.error(
+                f"{path}: expected a {kind.format}, got a {other[1].decode()}; a {kind.format} is written by "
+                f"{kind.writer}"
+            )
+        return False  # repacked, or with a damaged seal: the HDF5 part tells
     stated = re.match(rb"(\d{1,9})\nbytes (\d{1,18})\n", head[len(magic) :])
     if stated and int(stated[1]) > kind.version:
         raise newer(path, kind, int(stated[1]))

@@ -105,7 +105,7 @@ def material_of(key: str, section: MaterialSection, given: FatigueFile, body: Re
 def curve_of(material: MaterialSection, given: FatigueFile, body: ReducedBody) -> SNCurve:
     """Return an S-N curve in stress units of the body, with survival and the factors of all materials."""
     section, unit = material.sn, stress_factor(material, body)
-    table = section.amplitudes or section.ranges
+    table = section.amplitudes if section.amplitudes is not None else section.ranges
     if table is not None:
         half = 1.0 if section.amplitudes is not None else 0.5
         assert isinstance(section.cycles, tuple)

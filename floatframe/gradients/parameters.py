@@ -25,6 +25,8 @@ __all__ = ["Family", "Neighbour", "Parameter", "Source", "family_of"]
 
 Source = System | str | os.PathLike[str] | Callable[[dict[str, float]], System]
 
+#: tables of a system file that do not change its motion
+OUTSIDE = ("run", "inputs", "outputs", "fmu", "fmus", "cosimulation", "scene")
 STEP = 1e-3  #: of differences by a parameter, relative to its size
 SHORTER: tuple[float, ...] = (1.0, 1e-1, 1e-2, 1e-3)  #: of the step, tried where a system does not exist
 SAME_ROW = 0.1  #: by which a direction of a row may differ within a step
@@ -139,6 +141,12 @@ def numbers_of_file(path_of_file: str, paths: Mapping[str, str]) -> dict[str, fl
     from fe_models.foundation.toml_file import read_toml, value_of
     from floatframe.errors import SystemFileError
 
+    for path in paths.values():
+        if (table := path.partition(".")[0]) in OUTSIDE:
+            raise SystemFileError(
+                f"{path_of_file}: the key path {path!r}: the table [{table}] says how the system is run or looked at, "
+                "and is no part of it; derivatives are by numbers of bodies, joints, forces, sensors, signals"
+            )
     content = read_toml(Path(path_of_file), SystemFileError)
     found = {}
     for name, path in paths.items():

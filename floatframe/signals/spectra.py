@@ -11,6 +11,7 @@ averaged over segments that overlap (Welch (1967)).
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -116,6 +117,19 @@ def checked_samples(values: Array, rate: float, detrend: str, where: str) -> Arr
     return values
 
 
+def squared(values: Array, rate: float, where: str, **options: Any) -> tuple[Array, Array]:
+    """Return frequencies and lines of Welch's method; `SignalError` where squares of the samples overflow."""
+    from scipy.signal import welch
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        f, lines = welch(values, rate, **options)
+    if not np.isfinite(lines).all():
+        raise SignalError(
+            f"{where}: samples of up to {np.abs(values).max():.3g} are too large to be squared; look at their unit"
+        )
+    return f, lines
+
+
 def psd(
     values: Array,
     rate: float,
@@ -160,14 +174,12 @@ def psd(
     ----------
     Welch (1967).
     """
-    from scipy.signal import welch
-
     where = f"psd of {name!r}"
     values = checked_samples(values, rate, detrend, where)
     n = segment_length(len(values), n_segment, overlap, AVERAGES, where)
-    f, G = welch(
-        values, rate, window_samples(window, n), n, int(overlap * n), detrend=False if detrend == "none" else detrend,
-        scaling="density",
+    f, G = squared(
+        values, rate, where, window=window_samples(window, n), nperseg=n, noverlap=int(overlap * n),
+        detrend=False if detrend == "none" else detrend, scaling="density",
     )  # fmt: skip
     n_averages = number_of_segments(len(values), n, overlap)
     return Spectrum(
@@ -194,14 +206,12 @@ def amplitude_spectrum(
     Several segments are averaged in power. Broad-band noise has no amplitude: its lines depend on the resolution, take
     `psd`.
     """
-    from scipy.signal import welch
-
     where = f"amplitude spectrum of {name!r}"
     values = checked_samples(values, rate, detrend, where)
     n = segment_length(len(values), n_segment, overlap, 1, where)
-    f, P = welch(
-        values, rate, window_samples(window, n), n, int(overlap * n), detrend=False if detrend == "none" else detrend,
-        scaling="spectrum",
+    f, P = squared(
+        values, rate, where, window=window_samples(window, n), nperseg=n, noverlap=int(overlap * n),
+        detrend=False if detrend == "none" else detrend, scaling="spectrum",
     )  # fmt: skip
     rms = np.sqrt(P)
     is_paired = np.ones(len(f), dtype=bool)  # with its line of negative frequency

@@ -32,6 +32,7 @@ from floatframe.shaking.structure.model import Output, ShakenModel
 
 __all__ = ["ForceLimit", "Notch", "NotchedRun", "ResponseLimit", "notched_random", "notched_sine"]
 
+LOWEST = -60.0  #: logarithm of a clipped density over its largest value, 260 dB
 DEEPEST = 40.0  #: dB, unless the test says less
 JOINED = 0.01  #: dB below the level from which a notch is told
 
@@ -249,7 +250,9 @@ def clipped_at(run: RandomRun, density: Array, rms: float) -> float:
     def over(x: float) -> float:
         return float(np.sqrt(run.band.integral(np.minimum(density, top * math.exp(x))))) - rms
 
-    return top * math.exp(float(brentq(over, -60.0, 0.0, xtol=1e-12)))
+    if over(LOWEST) > 0:
+        return top * math.exp(LOWEST)  # what is deeper is refused anyway
+    return top * math.exp(float(brentq(over, LOWEST, 0.0, xtol=1e-12)))
 
 
 def lowered(level: Array, allowed: Array) -> tuple[Array, Array]:

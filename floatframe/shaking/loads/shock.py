@@ -35,6 +35,16 @@ class SpectrumRequest:
     last: float | None = None  #: [Hz]; None: twice the highest mode, 10000 Hz at most
     per_octave: int = 12
 
+    def __post_init__(self) -> None:
+        where = "shake: spectra"
+        if not len(self.Q) or not all(math.isfinite(Q) and Q > 0.5 for Q in self.Q):
+            raise ModelError(f"{where}: Q: expected numbers above 0.5, got {list(self.Q)}")
+        for name, value in (("first", self.first), ("last", self.last)):
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise ModelError(f"{where}: {name}: expected a frequency above 0 [Hz], got {value:g}")
+        if self.first is not None and self.last is not None and not self.first < self.last:
+            raise ModelError(f"{where}: first, last: expected rising frequencies, got {self.first:g} and {self.last:g}")
+
 
 @dataclass(frozen=True, eq=False)
 class TimeTest:
@@ -171,6 +181,8 @@ def time_run(
     request = test.spectra
     low = min(10.0, float(f[0]) / 10) if request.first is None else request.first
     high = min(1e4, 2 * float(f[-1])) if request.last is None else request.last
+    if not low < high:
+        raise ModelError(f"{where}: spectra: first, last: from {low:g} to {high:g} Hz nothing lies; give both")
     frequencies = octave_frequencies(low, high, request.per_octave)
     signals = {model.inputs[k]: values[j] for j, k in enumerate(columns) if model.rates[k] == 2}
     signals |= {o.name: out[i] for i, o in enumerate(outputs) if o.kind == "acceleration"}

@@ -220,6 +220,16 @@ def test_command_writes_judges_and_refuses(folder, tmp_path, capsys, monkeypatch
     assert "reservations" in capsys.readouterr().out or json.loads(target.read_text())["verdict"] == "fail"
 
 
+@pytest.mark.parametrize(("share", "verdict"), [(0.99, "pass"), (1.01, "fail"), (1e9, "fail")])
+def test_a_band_beyond_that_of_custom_is_not_accepted(folder, share, verdict):
+    usable = accept_body(folder / "bar.h5").range.band.highest
+    found = accept_body(folder / "bar.h5", band=share * usable)
+    (record,) = (record for record in found.records if record.name == "band-asked")
+    assert (record.verdict, found.verdict) == (verdict, verdict)
+    assert record.value == pytest.approx(share)
+    assert "by custom" in record.reason
+
+
 def test_bad_requests(folder):
     with pytest.raises(QualityError, match="got both"):
         FullModel(job=folder / "bar.toml", deck=folder / "bar.inp")

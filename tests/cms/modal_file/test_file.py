@@ -261,6 +261,13 @@ def test_a_change_through_hdf5_is_detected_without_the_seal(path, damage, words)
         read(copy)
 
 
+def test_a_sealed_file_of_another_kind_is_called_what_it_is(path):
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(b"floatframe modal-file ", b"floatframe results-file ", 1))
+    with pytest.raises(ModalFileError, match="expected a modal-file, got a results-file; a modal-file is written by"):
+        read(path)
+
+
 def test_a_change_through_hdf5_breaks_the_seal(path):
     with h5py.File(path, "r+") as file:
         file["modes/K"][0, 0] += 1.0

@@ -210,6 +210,8 @@ def test_a_measured_event_is_so_many_passes():
         ("repeats = 40", "times = [5.0, 6.0]", "expected two output times or more in it"),
         ("repeats = 40", "scale = 0.0", "scale: expected a number other than 0"),
         ("repeats = 40", 'body_name = "x"', "unknown key"),
+        ("cycles = 1e6\nslope = 5.0\nleast_cycles = 1.0", "cycles = []\namplitudes = []", "expected a table (cycles"),
+        ('results = "spin.h5"', 'results = "part.h5"', "expected a results-file, got a modal-file"),
         ("least_cycles = 1.0", "least_cycles = 1e6", "lie beyond the S-N curve, which is known up to"),
     ],
 )  # fmt: skip

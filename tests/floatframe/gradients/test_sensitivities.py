@@ -308,6 +308,14 @@ def test_bad_input_is_told():
     refused("one of many", of=["frequency 1"], analysis="eig", made=free)
 
 
+@pytest.mark.parametrize("path", ["run.h", "run.t_end", "outputs.tip.position.0", "scene.0.color"])
+def test_numbers_that_are_no_part_of_the_system_are_refused(tmp_path, path):
+    """The end of a run moved the value, and its derivative came out as rounding about zero."""
+    (tmp_path / "a.toml").write_text("[run]\nh = 1e-3\n")
+    with pytest.raises(ff.SystemFileError, match="and is no part of it"):
+        ff.sensitivities(tmp_path / "a.toml", ["tip x"], [path])
+
+
 def test_a_parameter_that_changes_what_a_system_is_made_of_is_refused():
     def made(p):
         forces = [ff.Gravity((0, -9.81, 0))]

@@ -210,6 +210,14 @@ def test_names_are_escaped_on_the_page(result):
         ('"left:z" = "a"', '"left:z" = "b"', "b"),
         ('body = "bar.h5"', "", "either body, a modal file, or system"),
         ("duration = 0.011", "", "needs amplitude and duration"),
+        (
+            "[notch.load]",
+            '[notch.rms]\nof = "random"\noutput = "tip acceleration z"\nrms = 1e-12\n[notch.load]',
+            "a notch of",
+        ),
+        ("[notch.tip]", "[spectra]\nQ = [0.1]\n[notch.tip]", "Q: expected numbers above 0.5"),
+        ("[notch.tip]", "[spectra]\nQ = []\n[notch.tip]", "Q: expected numbers above 0.5"),
+        ("[notch.tip]", "[spectra]\nfirst = 100.0\nlast = 10.0\n[notch.tip]", "expected rising frequencies"),
     ],
 )
 def test_bad_files_are_refused_in_words(folder, old, new, words):

@@ -150,6 +150,13 @@ def test_a_filter_is_found_from_its_input_and_output():
     assert abs(np.mean(noisy_out.coherence[5:-5] / expected[5:-5]) - 1) < 0.01
 
 
+def test_samples_too_large_to_be_squared_are_refused():
+    values = 1e300 * np.sin(np.arange(300.0))
+    for spectrum in (psd, amplitude_spectrum):
+        with pytest.raises(SignalError, match="of up to 1e\\+300 are too large to be squared"):
+            spectrum(values, 100.0)
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
