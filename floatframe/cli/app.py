@@ -7,7 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cms.cli.console import INTERRUPTED, commands, guarded, output_path, print_error, print_table, say, stages
-from floatframe.cli import analyses, cosimulation, driven, fatigue, gradient, linear, shake, spectra, study, sweep, view
+from floatframe.cli import (
+    analyses,
+    cosimulation,
+    driven,
+    fatigue,
+    gradient,
+    linear,
+    machine,
+    shake,
+    spectra,
+    study,
+    sweep,
+    view,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -488,4 +501,5 @@ shake.register(app)
 gradient.register(app)
 fatigue.register(app)
 cosimulation.register(app)
+machine.register(app)
 view.register(app)

@@ -1,0 +1,76 @@
+"""The antenna with pins in the place of hinges and massless rigid struts: positions and forces in closed form.
+
+One petal in its plane, r outward and z along the mast. The petal turns about its hinge (r_h, 0) by theta from the mast,
+its elbow, at c along it, is held by a strut of length l from the slider (r_s, s):
+
+    (r_h + c sin theta - r_s)² + (c cos theta - s)² = l²,       s = c cos theta + sqrt(l² - x²),  x = r_h + c sin theta - r_s
+    ds/dtheta = -c sin theta - x c cos theta / sqrt(l² - x²)
+
+Virtual work of n petals and the slider, M_theta the moment on one petal about its hinge that acts to open it,
+F the force on the slider along +z:  F ds + n M_theta dtheta + F_slider ds = 0. The strut force follows from the slider:
+n S (s - c cos theta)/l = -(F + F_slider), compression positive as it pushes the slider up.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+
+__all__ = ["AntennaGeometry", "Mechanism", "mechanism"]
+
+
+@dataclass(frozen=True)
+class AntennaGeometry:
+    """Lengths of one petal and its strut [m]."""
+
+    hinge_radius: float = 0.6  #: of the petal hinges from the mast
+    slider_radius: float = 0.15  #: of the feet of the struts
+    elbow: float = 1.2  #: from the hinge along the petal to the strut
+    strut: float = 1.75  #: length
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """What the mechanism does at some angles of the petals, each (n,)."""
+
+    theta: Array  #: of the petals from the mast [rad]
+    slider: Array  #: height s of the slider [m]
+    rate: Array  #: ds/dtheta [m/rad]
+    drive: Array  #: force F that the drive has to give to the slider along +z [N]
+    strut: Array  #: compression of one strut [N]
+    strut_angle: Array  #: of a strut from the mast, seen from its foot downward [rad]
+
+
+def mechanism(
+    geometry: AntennaGeometry,
+    theta: Array | float,
+    *,
+    n_petals: int,
+    petal_moment: Array | float = 0.0,
+    slider_force: Array | float = 0.0,
+) -> Mechanism:
+    """Return positions and forces of the pin-jointed antenna.
+
+    Parameters
+    ----------
+    geometry
+        Lengths.
+    theta
+        Angles of the petals from the mast, (n,) [rad].
+    n_petals
+        How many petals the slider drives.
+    petal_moment
+        About the hinge of one petal, acting to open it, by its weight, hinges and inertia [N m].
+    slider_force
+        On the slider along +z beside the drive: its weight [N].
+    """
+    theta = np.atleast_1d(np.asarray(theta, dtype=float))
+    c = geometry.elbow
+    x = geometry.hinge_radius + c * np.sin(theta) - geometry.slider_radius
+    height = np.sqrt(geometry.strut**2 - x**2)
+    slider = c * np.cos(theta) + height
+    rate = -c * np.sin(theta) - x * c * np.cos(theta) / height
+    drive = -n_petals * np.asarray(petal_moment) / rate - np.asarray(slider_force)
+    strut = -(drive + np.asarray(slider_force)) * geometry.strut / (n_petals * height)
+    return Mechanism(theta, slider, rate, np.broadcast_to(drive, theta.shape), strut, np.arctan2(x, height))

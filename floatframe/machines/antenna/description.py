@@ -1,0 +1,234 @@
+"""The antenna as files: jobs of petal and strut, and systems of as many petals as wanted."""
+
+import json
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from floatframe.machines.antenna.closed_forms import AntennaGeometry, mechanism
+
+__all__ = ["Antenna", "antenna_files", "strut_files"]
+
+
+@dataclass(frozen=True)
+class Antenna:
+    """Numbers of the antenna [m, kg, s]; docs/machines/antenna.md says where they come from."""
+
+    n_petals: int = 12
+    geometry: AntennaGeometry = field(default_factory=AntennaGeometry)
+    petal_length: float = 4.0
+    petal_width: float = 0.3
+    n_along: int = 20  #: cells of a petal
+    n_across: int = 2
+    bus_mass: float = 900.0
+    bus_inertia: tuple[float, float, float] = (420.0, 420.0, 300.0)  #: about the hinges' centre
+    slider_mass: float = 6.0
+    slider_inertia: float = 0.1
+    stowed: float = np.deg2rad(3.0)  #: angle of the petals from the mast
+    deployed: float = np.deg2rad(75.0)
+    duration: float = 60.0  #: of the deployment [s]
+    hinge_stiffness: float = 1.5  #: harness over each petal hinge [N m/rad], relaxed when deployed
+    hinge_damping: float = 0.3  #: [N m s/rad]
+    hinge_friction: float = 0.5  #: [N m]
+    friction_speed: float = 1e-3  #: at which friction reaches 76 % [rad/s]
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        """Heights of the slider, stowed and deployed."""
+        found = mechanism(self.geometry, np.array([self.stowed, self.deployed]), n_petals=self.n_petals)
+        return float(found.slider[0]), float(found.slider[1])
+
+
+def petal_mesh(antenna: Antenna) -> str:
+    """Return the mesh of a petal (Abaqus): a strip of quads along x, width along y, with a rib on its middle line."""
+    n, m = antenna.n_along, antenna.n_across
+    x = np.linspace(0.0, antenna.petal_length, n + 1)
+    y = np.linspace(-0.5, 0.5, m + 1) * antenna.petal_width
+
+    def number(i: int, j: int) -> int:
+        return 1 + i * (m + 1) + j
+
+    lines = ["*NODE"]
+    lines += [f"{number(i, j)}, {x[i]:.6g}, {y[j]:.6g}, 0" for i in range(n + 1) for j in range(m + 1)]
+    lines.append("*ELEMENT, TYPE=S4, ELSET=SKIN")
+    for i in range(n):
+        for j in range(m):
+            corners = number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)
+            lines.append(", ".join(map(str, (1 + i * m + j, *corners))))
+    lines.append("*ELEMENT, TYPE=B31, ELSET=RIB")
+    lines += [f"{1001 + i}, {number(i, m // 2)}, {number(i + 1, m // 2)}" for i in range(n)]
+    elbow = round(antenna.geometry.elbow / antenna.petal_length * n)
+    lines += ["*NSET, NSET=ROOT", str(number(0, m // 2)), "*NSET, NSET=ELBOW", str(number(elbow, m // 2)),
+              "*NSET, NSET=TIP", str(number(n, m // 2))]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+PETAL = """\
+# A petal of the antenna: a skin of aluminium with a box rib on its middle line, from its hinge along x.
+[body]
+name = "petal"
+mesh = "petal.inp"
+units = "m-kg-s"
+keep = ["TIP"]
+
+[materials.aluminium]
+young = 70e9
+poisson = 0.33
+density = 2700.0
+cells = "all"
+
+[shells.skin]
+cells = "SKIN"
+thickness = 0.0015
+
+[sections.rib]
+lines = "RIB"
+shape = "box"
+width = 0.03
+height = 0.06
+web = 0.0015
+flange = 0.0015
+offset = [0.0, -0.03]
+orientation = [0, 1, 0]
+
+[interfaces.root]
+kind = "rigid"
+nodes = "ROOT"
+
+[interfaces.elbow]
+kind = "rigid"
+nodes = "ELBOW"
+
+[reduction]
+set = "craig-bampton"
+n_modes = 6
+frame = "nodal"
+at = "root"
+
+[damping]
+ratio = 0.005
+"""
+
+STRUT = """\
+# A strut of the antenna: an aluminium tube from its foot at the slider along x to the elbow of a petal.
+[body]
+name = "strut"
+nodes = "strut_nodes.csv"
+lines = "strut_lines.csv"
+units = "m-kg-s"
+
+[materials.aluminium]
+young = 70e9
+poisson = 0.33
+density = 2700.0
+
+[sections.tube]
+shape = "tube"
+radius = 0.015
+thickness = 0.0015
+orientation = [0, 1, 0]
+
+[interfaces.foot]
+kind = "rigid"
+nodes = "foot"
+
+[interfaces.head]
+kind = "rigid"
+nodes = "head"
+
+[reduction]
+set = "craig-bampton"
+n_modes = 2
+frame = "nodal"
+at = "foot"
+
+[damping]
+ratio = 0.005
+"""
+
+
+def strut_files(antenna: Antenna) -> dict[str, str]:
+    """Return the tables of the tube of a strut by file name."""
+    nodes = f"node, x, y, z, sets\n1, 0, 0, 0, foot\n2, {antenna.geometry.strut:.6g}, 0, 0, head\n"
+    return {"strut_nodes.csv": nodes, "strut_lines.csv": "node1, node2, elements\n1, 2, 8\n"}
+
+
+def numbers(*values: float) -> str:
+    """Return a list of numbers of TOML."""
+    return json.dumps([float(f"{value:.15g}") + 0.0 for value in np.ravel(values)])
+
+
+def about(axis: str, angle: float) -> np.ndarray:
+    """Return the rotation matrix about the axis y or z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]] if axis == "y" else [[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def rotation_vector(R: np.ndarray) -> np.ndarray:
+    """Return the rotation vector of a matrix."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(R).as_rotvec())
+
+
+def place_text(position: np.ndarray, R: np.ndarray) -> str:
+    """Return the keys of a body's place."""
+    return f"position = {numbers(*position)}\nrotation_vector = {numbers(*rotation_vector(R))}\n"
+
+
+def leaf(antenna: Antenna, k: int, theta: float) -> str:
+    """Return petal k and its strut, with their hinges."""
+    geometry, turn = antenna.geometry, about("z", 2 * np.pi * k / antenna.n_petals)
+    found = mechanism(geometry, theta, n_petals=antenna.n_petals)
+    hinge = turn @ [geometry.hinge_radius, 0, 0]
+    petal = turn @ about("y", theta - np.pi / 2)  # x along the petal, y about its hinge
+    foot = turn @ [geometry.slider_radius, 0, 0] + [0, 0, found.slider[0]]
+    strut = turn @ about("y", np.pi / 2 - found.strut_angle[0])
+    radial = turn @ [geometry.slider_radius, 0, 0]
+    axis = numbers(*(turn @ [0, 1, 0]))
+    return f"""
+[bodies.petal_{k}]
+file = "petal.h5"
+{place_text(hinge, petal)}
+[bodies.strut_{k}]
+file = "strut.h5"
+{place_text(foot, strut)}
+[joints.hinge_{k}]
+type = "revolute"
+body_a = "bus"
+marker_a = {numbers(*hinge)}
+body_b = "petal_{k}"
+marker_b = "root"
+axis = {axis}
+
+[joints.foot_{k}]
+type = "universal"
+body_a = "slider"
+marker_a = {numbers(*radial)}
+body_b = "strut_{k}"
+marker_b = "foot"
+axis = {axis}
+axis_b = {numbers(*strut_normal(found.strut_angle[0]))}
+
+[joints.elbow_{k}]
+type = "spherical"
+body_a = "petal_{k}"
+marker_a = "elbow"
+body_b = "strut_{k}"
+marker_b = "head"
+
+[forces.harness_{k}]
+type = "joint-force"
+joint = "hinge_{k}"
+coordinate = "angle"
+stiffness = {antenna.hinge_stiffness:.6g}
+free = {antenna.deployed - theta:.15g}
+damping = {antenna.hinge_damping:.6g}
+friction = {antenna.hinge_friction:.6g}
+friction_speed = {antenna.friction_speed:.6g}
+"""
+
+
+def strut_normal(angle: float) -> tuple[float, float, float]:
+    """Return the second axis of the universal joint in the axes of the strut: its z axis."""
+    return (0.0, 0.0, 1.0)

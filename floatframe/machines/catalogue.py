@@ -1,0 +1,62 @@
+"""Which machines there are, and their files in a folder of one's own.
+
+A machine is a folder `files` in a room here, with jobs of its flexible parts, system files, and a README.md that names
+the commands in their order. `MACHINES` has a line for each.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fe_models.foundation.paths import replace_files
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ModelError
+
+__all__ = ["MACHINES", "Machine", "copy_machine", "machine_files"]
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine ready to copy."""
+
+    title: str
+    room: str  #: folder in floatframe/machines
+    shows: str  #: what is in it, in a line
+
+
+#: every machine by the name with which `floatframe machine` copies it
+MACHINES: dict[str, Machine] = {}
+
+
+def machine_files(name: str) -> Sequence[Path]:
+    """Return the files of a machine as they are shipped.
+
+    Raises
+    ------
+    ModelError
+        If there is no such machine, with the nearest name.
+    """
+    if name not in MACHINES:
+        raise ModelError(f"no machine {quoted(name)}{nearest(name, list(MACHINES))}")
+    folder = Path(__file__).parent / MACHINES[name].room / "files"
+    return sorted(path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+
+
+def copy_machine(name: str, folder: str | Path) -> Sequence[Path]:
+    """Copy the files of a machine into a folder, which is made; return where they are.
+
+    Raises
+    ------
+    ModelError
+        If there is no such machine, or one of its files stands there already: nothing is written then.
+    """
+    sources, place = machine_files(name), Path(folder)
+    origin = Path(__file__).parent / MACHINES[name].room / "files"
+    targets = [place / source.relative_to(origin) for source in sources]
+    taken = [target for target in targets if target.exists()]
+    if taken:
+        raise ModelError(f"machine {name!r}: {taken[0]} exists; copy it into another folder, nothing was written")
+    for target in targets:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    replace_files({target: source.read_bytes() for source, target in zip(sources, targets, strict=True)})
+    return targets

@@ -1,0 +1,36 @@
+"""Machines in a folder of one's own: the files as shipped, and refusals."""
+
+import pytest
+from typer.testing import CliRunner
+
+from floatframe import ModelError
+from floatframe.cli.app import app
+from floatframe.machines import MACHINES, copy_machine, machine_files
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_machine_is_copied_as_it_is_shipped(name, tmp_path):
+    targets = copy_machine(name, tmp_path / "mine")
+    assert [path.read_bytes() for path in targets] == [path.read_bytes() for path in machine_files(name)]
+    assert "README.md" in [path.name for path in targets]
+    assert any(path.suffix == ".toml" for path in targets)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_what_stands_there_is_kept(name, tmp_path):
+    (tmp_path / "README.md").write_text("mine")
+    with pytest.raises(ModelError, match="exists; copy it into another folder, nothing was written"):
+        copy_machine(name, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["README.md"]
+
+
+def test_an_unknown_machine_is_refused_with_the_nearest():
+    name = next(iter(MACHINES))
+    with pytest.raises(ModelError, match=f"did you mean '{name}'"):
+        machine_files(name[:-1] + "_")
+
+
+def test_the_command_lists_them():
+    outcome = CliRunner().invoke(app, ["machine"])
+    assert outcome.exit_code == 0
+    assert all(name in outcome.output for name in MACHINES)
