@@ -232,3 +232,181 @@ friction_speed = {antenna.friction_speed:.6g}
 def strut_normal(angle: float) -> tuple[float, float, float]:
     """Return the second axis of the universal joint in the axes of the strut: its z axis."""
     return (0.0, 0.0, 1.0)
+
+
+def bus_and_slider(antenna: Antenna, theta: float, *, fixed: bool) -> str:
+    """Return the spacecraft, the slider on its mast, and the scene they are drawn in."""
+    slider = mechanism(antenna.geometry, theta, n_petals=antenna.n_petals).slider[0]
+    held = '\n[joints.stand]\ntype = "fixed"\nbody_a = "ground"\nmarker_a = [0, 0, 0]\nbody_b = "bus"\nmarker_b = [0, 0, 0]\n'
+    Ix, Iy, Iz = antenna.bus_inertia
+    return f"""
+[bodies.bus]
+mass = {antenna.bus_mass:.6g}
+inertia = [[{Ix:.6g}, 0, 0], [0, {Iy:.6g}, 0], [0, 0, {Iz:.6g}]]
+center_of_mass = [0, 0, -0.8]
+
+[[bodies.bus.shapes]]
+type = "cylinder"
+radius = {0.95 * antenna.geometry.hinge_radius:.6g}
+length = 1.6
+position = [0, 0, -0.8]
+color = "#c9a227"
+
+[[bodies.bus.shapes]]
+type = "cylinder"
+radius = 0.05
+length = {antenna.travel[0] + 0.1:.6g}
+position = [0, 0, {antenna.travel[0] / 2:.6g}]
+color = "#8a8f98"
+
+[bodies.slider]
+mass = {antenna.slider_mass:.6g}
+inertia = [[{antenna.slider_inertia:.6g}, 0, 0], [0, {antenna.slider_inertia:.6g}, 0], [0, 0, {antenna.slider_inertia:.6g}]]
+position = [0, 0, {slider:.15g}]
+
+[[bodies.slider.shapes]]
+type = "cylinder"
+radius = {antenna.geometry.slider_radius:.6g}
+length = 0.08
+color = "#3b6ea5"
+
+[joints.mast]
+type = "prismatic"
+body_a = "bus"
+marker_a = [0, 0, 0]
+body_b = "slider"
+marker_b = [0, 0, 0]
+axis = [0, 0, 1]
+{held if fixed else ""}"""
+
+
+def system_text(
+    antenna: Antenna, title: str, *, theta: float, fixed: bool, gravity: bool, offload: float, tail: str
+) -> str:
+    """Return a system file: bus, slider, petals and struts at an angle; offload is an upward force at every elbow."""
+    text = f'# {title}\n[system]\nunits = "m-kg-s"\n' + ("gravity = [0, 0, -9.81]\n" if gravity else "")
+    text += bus_and_slider(antenna, theta, fixed=fixed)
+    for k in range(1, antenna.n_petals + 1):
+        text += leaf(antenna, k, theta)
+        if offload:
+            text += f"""
+[forces.wire_{k}]
+type = "point-force"
+body = "petal_{k}"
+marker = "elbow"
+force = [0, 0, {offload:.15g}]
+"""
+    return text + tail
+
+
+def driven_tail(antenna: Antenna) -> str:
+    """Return the drive of the slider from stowed to deployed, and what is measured."""
+    first, last = antenna.travel
+    return f"""
+[joints.mast.motions.distance]
+type = "smooth-step"
+t_start = 0.0
+t_end = {antenna.duration:.6g}
+first = {first:.15g}
+last = {last:.15g}
+{sensors()}
+[run]
+t_end = {antenna.duration:.6g}
+h = {antenna.duration / 240:.6g}
+"""
+
+
+def sensors() -> str:
+    """Return the sensors that all systems of the antenna have."""
+    return """
+[sensors.drive]
+type = "joint"
+of = "mast"
+coordinate = "distance"
+
+[sensors.hinge]
+type = "joint"
+of = "hinge_1"
+coordinate = "angle"
+
+[sensors.strut]
+type = "reaction"
+of = "foot_1"
+
+[sensors.tip]
+type = "position"
+body = "petal_1"
+node = "TIP"
+"""
+
+
+def released_tail(antenna: Antenna, *, push: float, rate: float) -> str:
+    """Return the push of the drive spring with its rate limiter, and the latch at the end of the travel."""
+    return f"""
+[forces.drive]
+type = "joint-force"
+joint = "mast"
+coordinate = "distance"
+preload = {-push:.6g}
+damping = {rate:.6g}
+
+[couplers.latch]
+engaged = false
+terms = [{{ joint = "mast", coordinate = "distance", factor = 1.0 }}]
+
+[events.latched]
+watch = "mast.distance"
+level = {antenna.travel[1]:.15g}
+direction = "falling"
+switch_on = ["latch"]
+switch_off = ["drive"]
+record = true
+{sensors()}
+[sensors.bus]
+type = "acceleration"
+body = "bus"
+marker = [0, 0, 0]
+
+[run]
+t_end = 30.0
+h = 2e-3
+output_every = 5
+"""
+
+
+def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, str]:
+    """Return all files of the machine by name.
+
+    Parameters
+    ----------
+    antenna
+        Its numbers.
+    petal_moment
+        First moment of the mass of a petal about its hinge [kg m], for the wires of the rig, as `cms info petal.h5` tells it:
+        mass times the distance of the centre of mass.
+    """
+    wire = 9.81 * petal_moment / antenna.geometry.elbow
+    options = {"theta": antenna.stowed, "fixed": True}
+    tail = driven_tail(antenna)
+    return {
+        "petal.inp": petal_mesh(antenna),
+        "petal.toml": PETAL,
+        "strut.toml": STRUT,
+        **strut_files(antenna),
+        "space.toml": system_text(
+            antenna, "The antenna held, without gravity, driven open slowly: floatframe kinematics space.toml",
+            gravity=False, offload=0.0, tail=tail, **options,
+        ),
+        "rig.toml": system_text(
+            antenna, "The antenna on a rig under gravity, a wire with constant force at every elbow",
+            gravity=True, offload=wire, tail=tail, **options,
+        ),
+        "bare.toml": system_text(
+            antenna, "The antenna under gravity without compensation", gravity=True, offload=0.0, tail=tail, **options
+        ),
+        "latching.toml": system_text(
+            antenna, "The antenna on its free spacecraft, opened by a spring against a rate limiter, latched at the end",
+            theta=antenna.stowed, fixed=False, gravity=False, offload=0.0,
+            tail=released_tail(antenna, push=60.0, rate=400.0),
+        ),
+    }  # fmt: skip
