@@ -37,6 +37,7 @@ CLOSED = 1e-12  #: largest gap, relative to the size of the system
 ACCEPTED = 1e-9  #: the same where rounding allows no less
 MOST_ITERATIONS = 30
 SETTLED = 1e-11  #: last change of q relative to its size
+LEAST_SHAPE = 1e-14  #: of the size of the system: a deformation that is none, where all loads vanish
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +103,7 @@ def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: f
     if rigid.all():
         return now
     n, size = now.n_iterations, 0.0
+    none = LEAST_SHAPE * compiled.length * float(np.sqrt(model.body_types.mass[model.bodies.kind].sum()))
     for _ in range(MOST_ITERATIONS):
         set_iterate(work, now.state, now.u_dot, now.w)
         parts = linearized(model, work, 0.0, 0.0, 1.0)
@@ -111,7 +113,7 @@ def quasi_static_bodies(compiled: CompiledSystem, work: Work, state: State, t: f
         now = frozen_bodies(compiled, work, State(moved.r, moved.p, q, now.state.u), t)
         n += 1 + now.n_iterations
         change, size = float(np.linalg.norm(y[~rigid])), float(np.linalg.norm(q))
-        if change <= SETTLED * size or size == 0.0:
+        if change <= SETTLED * size or size <= none:
             return replace(now, n_iterations=n)
     raise ConvergenceError(
         f"the deformation at t = {t:g} did not settle in {MOST_ITERATIONS} iterations (last change {change:.2g} of "

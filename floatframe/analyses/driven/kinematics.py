@@ -151,6 +151,7 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
             f"kinematics: joint {compiled.owners[rolling[0]]!r} rolls: it holds velocities, and where that leads "
             "follows by integration only; integrate the motion"
         )
+    shapes = state.q  # those that bodies were placed in: closing joints with modes may bend them
     state = assembled(compiled, work, state)
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
@@ -172,7 +173,7 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
             f"kinematics: {counted.n_redundant_rigid} constraints repeat others ({told}), so that reactions are not "
             'unique; replace a joint by one that holds less, or share the load: redundant = "minimum-norm"'
         )
-    return elasticity(compiled, work, state, t)
+    return elasticity(compiled, work, replace(state, q=shapes), t)
 
 
 def moved_on(

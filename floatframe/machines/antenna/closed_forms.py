@@ -3,7 +3,7 @@
 One petal in its plane, r outward and z along the mast. The petal turns about its hinge (r_h, 0) by theta from the mast,
 its elbow, at c along it, is held by a strut of length l from the slider (r_s, s):
 
-    (r_h + c sin theta - r_s)² + (c cos theta - s)² = l²,       s = c cos theta + sqrt(l² - x²),  x = r_h + c sin theta - r_s
+    x² + (c cos theta - s)² = l²,    x = r_h + c sin theta - r_s,    s = c cos theta + sqrt(l² - x²)
     ds/dtheta = -c sin theta - x c cos theta / sqrt(l² - x²)
 
 Virtual work of n petals and the slider, M_theta the moment on one petal about its hinge that acts to open it,

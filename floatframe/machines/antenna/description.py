@@ -27,10 +27,10 @@ class Antenna:
     stowed: float = np.deg2rad(3.0)  #: angle of the petals from the mast
     deployed: float = np.deg2rad(75.0)
     duration: float = 60.0  #: of the deployment [s]
-    hinge_stiffness: float = 1.5  #: harness over each petal hinge [N m/rad], relaxed when deployed
+    hinge_stiffness: float = 1.5  #: harness over each petal hinge [N m/rad], relaxed when stowed
     hinge_damping: float = 0.3  #: [N m s/rad]
     hinge_friction: float = 0.5  #: [N m]
-    friction_speed: float = 1e-3  #: at which friction reaches 76 % [rad/s]
+    friction_speed: float = 0.02  #: at which friction reaches 76 % [rad/s]
 
     @property
     def travel(self) -> tuple[float, float]:
@@ -147,6 +147,16 @@ ratio = 0.005
 """
 
 
+STAND = """
+[joints.stand]
+type = "fixed"
+body_a = "ground"
+marker_a = [0, 0, 0]
+body_b = "bus"
+marker_b = [0, 0, 0]
+"""
+
+
 def strut_files(antenna: Antenna) -> dict[str, str]:
     """Return the tables of the tube of a strut by file name."""
     nodes = f"node, x, y, z, sets\n1, 0, 0, 0, foot\n2, {antenna.geometry.strut:.6g}, 0, 0, head\n"
@@ -208,7 +218,7 @@ marker_a = {numbers(*radial)}
 body_b = "strut_{k}"
 marker_b = "foot"
 axis = {axis}
-axis_b = {numbers(*strut_normal(found.strut_angle[0]))}
+axis_b = [0, 0, 1]
 
 [joints.elbow_{k}]
 type = "spherical"
@@ -222,23 +232,17 @@ type = "joint-force"
 joint = "hinge_{k}"
 coordinate = "angle"
 stiffness = {antenna.hinge_stiffness:.6g}
-free = {antenna.deployed - theta:.15g}
+free = {antenna.stowed - theta:.15g}
 damping = {antenna.hinge_damping:.6g}
 friction = {antenna.hinge_friction:.6g}
 friction_speed = {antenna.friction_speed:.6g}
 """
 
 
-def strut_normal(angle: float) -> tuple[float, float, float]:
-    """Return the second axis of the universal joint in the axes of the strut: its z axis."""
-    return (0.0, 0.0, 1.0)
-
-
 def bus_and_slider(antenna: Antenna, theta: float, *, fixed: bool) -> str:
     """Return the spacecraft, the slider on its mast, and the scene they are drawn in."""
     slider = mechanism(antenna.geometry, theta, n_petals=antenna.n_petals).slider[0]
-    held = '\n[joints.stand]\ntype = "fixed"\nbody_a = "ground"\nmarker_a = [0, 0, 0]\nbody_b = "bus"\nmarker_b = [0, 0, 0]\n'
-    Ix, Iy, Iz = antenna.bus_inertia
+    (Ix, Iy, Iz), J = antenna.bus_inertia, antenna.slider_inertia
     return f"""
 [bodies.bus]
 mass = {antenna.bus_mass:.6g}
@@ -261,7 +265,7 @@ color = "#8a8f98"
 
 [bodies.slider]
 mass = {antenna.slider_mass:.6g}
-inertia = [[{antenna.slider_inertia:.6g}, 0, 0], [0, {antenna.slider_inertia:.6g}, 0], [0, 0, {antenna.slider_inertia:.6g}]]
+inertia = [[{J:.6g}, 0, 0], [0, {J:.6g}, 0], [0, 0, {J:.6g}]]
 position = [0, 0, {slider:.15g}]
 
 [[bodies.slider.shapes]]
@@ -277,7 +281,7 @@ marker_a = [0, 0, 0]
 body_b = "slider"
 marker_b = [0, 0, 0]
 axis = [0, 0, 1]
-{held if fixed else ""}"""
+{STAND if fixed else ""}"""
 
 
 def system_text(
@@ -320,13 +324,13 @@ def sensors() -> str:
     """Return the sensors that all systems of the antenna have."""
     return """
 [sensors.drive]
-type = "joint"
-of = "mast"
+type = "coordinate"
+joint = "mast"
 coordinate = "distance"
 
 [sensors.hinge]
-type = "joint"
-of = "hinge_1"
+type = "coordinate"
+joint = "hinge_1"
 coordinate = "angle"
 
 [sensors.strut]
@@ -336,7 +340,7 @@ of = "foot_1"
 [sensors.tip]
 type = "position"
 body = "petal_1"
-node = "TIP"
+set = "TIP"
 """
 
 
@@ -347,8 +351,14 @@ def released_tail(antenna: Antenna, *, push: float, rate: float) -> str:
 type = "joint-force"
 joint = "mast"
 coordinate = "distance"
-preload = {-push:.6g}
 damping = {rate:.6g}
+
+[forces.drive.motor]
+type = "smooth-step"
+t_start = 0.0
+t_end = 2.0
+first = 0.0
+last = {-push:.6g}
 
 [couplers.latch]
 engaged = false
@@ -369,7 +379,7 @@ marker = [0, 0, 0]
 
 [run]
 t_end = 30.0
-h = 2e-3
+h = 4e-3
 output_every = 5
 """
 
@@ -382,8 +392,8 @@ def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, s
     antenna
         Its numbers.
     petal_moment
-        First moment of the mass of a petal about its hinge [kg m], for the wires of the rig, as `cms info petal.h5` tells it:
-        mass times the distance of the centre of mass.
+        First moment of the mass of a petal about its hinge, for the wires of the rig: mass times distance of the centre
+        of mass, as `cms info petal.h5` tells them [kg m].
     """
     wire = 9.81 * petal_moment / antenna.geometry.elbow
     options = {"theta": antenna.stowed, "fixed": True}
@@ -405,7 +415,7 @@ def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, s
             antenna, "The antenna under gravity without compensation", gravity=True, offload=0.0, tail=tail, **options
         ),
         "latching.toml": system_text(
-            antenna, "The antenna on its free spacecraft, opened by a spring against a rate limiter, latched at the end",
+            antenna, "The antenna on its free spacecraft, opened by a motor against a damper, then latched",
             theta=antenna.stowed, fixed=False, gravity=False, offload=0.0,
             tail=released_tail(antenna, push=60.0, rate=400.0),
         ),

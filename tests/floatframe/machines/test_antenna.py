@@ -1,0 +1,115 @@
+"""The deployable antenna against pins and virtual work; its latching against momentum; its files as shipped."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+import floatframe as ff
+from floatframe.machines import machine_files
+from floatframe.machines.antenna import Antenna, antenna_files, mechanism
+
+G = 9.81
+SLOW = Antenna(n_petals=3, duration=1e5)
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    """Return a folder with the reduced petal and strut, the masses in them, and a way to write systems there."""
+    folder = tmp_path_factory.mktemp("antenna")
+    for name, text in antenna_files(SLOW).items():
+        (folder / name).write_text(text)
+    petal, strut = (cms.reduce_job(folder / f"{name}.toml") for name in ("petal", "strut"))
+    cms.write(petal, folder / "petal.h5")
+    cms.write(strut, folder / "strut.h5")
+    return folder, petal.moments, strut.moments
+
+
+def written(parts, antenna):
+    folder, petal, _ = parts
+    moment = petal.gram[0, 0] * petal.center_of_mass[0]
+    for name, text in antenna_files(antenna, petal_moment=moment).items():
+        (folder / name).write_text(text)
+    return folder
+
+
+def test_closed_form_follows_from_its_geometry():
+    theta, geometry = np.linspace(0.05, 1.3, 7), SLOW.geometry
+    found, step = mechanism(geometry, theta, n_petals=3), 1e-6
+    foot = np.array([np.full(7, geometry.slider_radius), found.slider])
+    elbow = np.array([geometry.hinge_radius + geometry.elbow * np.sin(theta), geometry.elbow * np.cos(theta)])
+    assert_allclose(np.linalg.norm(foot - elbow, axis=0), geometry.strut, rtol=1e-14)
+    ahead, behind = (mechanism(geometry, theta + d, n_petals=3).slider for d in (step, -step))
+    assert_allclose(found.rate, (ahead - behind) / (2 * step), rtol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["space", "rig", "bare"])
+def test_drive_and_strut_forces_are_those_of_virtual_work(parts, name):
+    """Rigid parts moved so slowly that nothing has inertia: weights, harness, friction, wires; 1e-6."""
+    folder = written(parts, SLOW)
+    (_, petal, strut), antenna = parts, SLOW
+    system, _ = ff.read_system(folder / f"{name}.toml")
+    motion = ff.kinematics(system, np.linspace(0.1, 0.9, 5) * antenna.duration)
+    drive, hinge = (ff.joint_coordinate(system, motion, *of) for of in (("mast", "distance"), ("hinge_1", "angle")))
+    theta, x = antenna.stowed + hinge.value, petal.center_of_mass
+    mass, half = petal.gram[0, 0], strut.gram[0, 0] / 2
+    g, wire = (0.0 if name == "space" else G), (G * mass * x[0] / antenna.geometry.elbow if name == "rig" else 0.0)
+    moment = mass * g * (x[0] * np.sin(theta) - x[2] * np.cos(theta))
+    moment += (half * g - wire) * antenna.geometry.elbow * np.sin(theta)
+    moment -= antenna.hinge_stiffness * hinge.value + antenna.hinge_damping * hinge.rate
+    moment -= antenna.hinge_friction * np.tanh(hinge.rate / antenna.friction_speed)
+    weight = -(antenna.slider_mass + 3 * half) * g
+    found = mechanism(antenna.geometry, theta, n_petals=3, petal_moment=moment, slider_force=weight)
+    assert_allclose(found.slider, drive.value, rtol=0, atol=1e-9)
+    assert_allclose(drive.force, found.drive, rtol=0, atol=1e-6 * np.abs(found.drive).max())
+    # along strut 3, which stands over the x axis: its ends carry half of its weight less and more than its middle
+    axis = np.stack([np.sin(found.strut_angle), np.zeros(5), -np.cos(found.strut_angle)], axis=1)
+    foot, elbow = (np.einsum("ti,ti->t", motion.reaction(of).force, axis) for of in ("foot_3", "elbow_3"))
+    assert_allclose(0.5 * (elbow - foot), found.strut, rtol=0, atol=1e-6 * np.abs(found.strut).max())
+
+
+def test_quasi_static_shapes_change_forces_by_little_and_the_wires_take_the_weight(parts):
+    antenna = replace(SLOW, duration=1e4)
+    folder = written(parts, antenna)
+    force = {}
+    for name in ("space", "rig", "bare"):
+        system, _ = ff.read_system(folder / f"{name}.toml")
+        motion = ff.kinematics(system, [0.5e4, 0.7e4], elasticity=ff.quasi_static_bodies)
+        force[name] = ff.joint_coordinate(system, motion, "mast", "distance").force
+    gravity = {name: np.abs(force[name] - force["space"]) for name in ("rig", "bare")}
+    assert (gravity["rig"] < 0.35 * gravity["bare"]).all()
+
+
+def test_latching_keeps_momentum_and_moves_the_spacecraft_as_the_centre_of_mass_says(parts):
+    antenna = Antenna(n_petals=3, stowed=Antenna().deployed - 0.02)
+    folder = written(parts, antenna)
+    system, _ = ff.read_system(folder / "latching.toml")
+    motion = ff.integrate(system, ff.GeneralizedAlpha(), 6.0, 4e-3, output_every=5)
+    (event,) = motion.head.summary["events"]
+    after = motion.t > event["t"]
+    distance = ff.joint_coordinate(system, motion, "mast", "distance").value
+    assert_allclose(distance[after], antenna.travel[1], atol=1e-8)
+    assert abs(event["impulse"]["latch"]) > 1e-3
+    scale = np.abs(event["impulse"]["latch"])
+    assert_allclose(motion.linear_momentum, 0.0, atol=1e-6 * scale)
+    assert_allclose(motion.angular_momentum, 0.0, atol=1e-5 * scale)
+    (_, petal, strut), n = parts, 3
+    heights = []
+    for theta in (antenna.stowed, antenna.deployed):
+        slider, x = mechanism(antenna.geometry, theta, n_petals=n).slider[0], petal.center_of_mass
+        z = n * petal.gram[0, 0] * (x[0] * np.cos(theta) + x[2] * np.sin(theta)) + antenna.slider_mass * slider
+        heights.append(z + n * strut.gram[0, 0] / 2 * (slider + antenna.geometry.elbow * np.cos(theta)))
+    total = antenna.bus_mass + antenna.slider_mass + n * (petal.gram[0, 0] + strut.gram[0, 0])
+    moved = -(heights[1] - heights[0]) / total
+    bus = motion.body("bus").r[:, 2]
+    assert_allclose(bus[after].mean(), moved, rtol=0.05)  # petals go on swinging about it
+
+
+def test_shipped_files_are_those_of_the_description(parts):
+    _, petal, _ = parts
+    moment = petal.gram[0, 0] * petal.center_of_mass[0]
+    made = antenna_files(Antenna(), petal_moment=moment)
+    shipped = {path.name: path.read_text() for path in machine_files("antenna") if path.name != "README.md"}
+    assert shipped == made
