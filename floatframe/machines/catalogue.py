@@ -27,7 +27,7 @@ class Machine:
 #: every machine by the name with which `floatframe machine` copies it
 MACHINES: dict[str, Machine] = {
     "antenna": Machine(
-        "a deployable antenna", "antenna", "slow opening on a rig and in space by one drive, latching shock in free flight"
+        "a deployable antenna", "antenna", "slow opening on a rig and in space, latching shock in free flight"
     ),
 }
 
