@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -396,7 +397,7 @@ def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, s
         of mass, as `cms info petal.h5` tells them [kg m].
     """
     wire = 9.81 * petal_moment / antenna.geometry.elbow
-    options = {"theta": antenna.stowed, "fixed": True}
+    options: dict[str, Any] = {"theta": antenna.stowed, "fixed": True}
     tail = driven_tail(antenna)
     return {
         "petal.inp": petal_mesh(antenna),
