@@ -1,9 +1,9 @@
 """Rolling radius difference, equivalent conicity, Klingel's wavelength: the kinematics of a free wheelset.
 
-A wheelset that rolls slowly without slip has y'' + delta_r(y)/(r_0 e_0) = 0, where e_0 is the distance of the contact
-points and primes are derivatives along the track. A conical one, delta_r = 2 lam y, has waves of length 2 pi sqrt(r_0
-e_0/(2 lam)). The equivalent conicity of an amplitude is that of the cone whose wave is as long (the definition of UIC
-519 and EN 15302).
+A wheelset that rolls slowly without slip has y'' + delta_r(y)/(r_0 e_0) = 0, where y is the lateral shift at the height of
+the rails (the axle, which rolls as it shifts, moves by r_0 phi less), e_0 the distance of the contact points and primes are
+derivatives along the track. A conical one, delta_r = 2 lam y, has waves of length 2 pi sqrt(r_0 e_0/(2 lam)). The
+equivalent conicity of an amplitude is that of the cone whose wave is as long (the definition of UIC 519 and EN 15302).
 """
 
 import numpy as np
@@ -29,6 +29,7 @@ def klingel_wavelength(conicity: float, radius: float, running_circles: float) -
 def wheelset_at(pair: Pair, y: Array, *, smoothing: float | None = None) -> tuple[Array, Array, Array]:
     """Return rolling radii on the left and right and the roll of a wheelset shifted by y to the left, each (n,).
 
+    y is the shift at the height of the rails: that of the axle is y - r_0 phi.
     Both wheels touch: the roll phi (left side up) is the one at which h_left = h_right + e_0 phi. With `smoothing` the
     contact is quasi-elastic, without it that of rigid bodies.
     """
@@ -40,11 +41,12 @@ def wheelset_at(pair: Pair, y: Array, *, smoothing: float | None = None) -> tupl
             # a roll about the centre of the axle moves both wheels' centres: arm (1 - cos) sideways is left out
             found = []
             for side in (1.0, -1.0):
+                u = side * (shift - pair.radius * float(np.sin(phi)))
                 if smoothing is None:
-                    point = rigid_contacts(pair, side * shift, roll=side * phi)[0]
+                    point = rigid_contacts(pair, u, roll=side * phi)[0]
                     found.append((point.height, point.radius))
                 else:
-                    one = quasi_elastic(pair, np.array([side * shift]), roll=side * phi, smoothing=smoothing)
+                    one = quasi_elastic(pair, np.array([u]), roll=side * phi, smoothing=smoothing)
                     found.append((float(one.q[0]), float(one.radius[0])))
             return found[0][0], found[1][0], found[0][1], found[1][1]
 
@@ -62,7 +64,7 @@ def wheelset_at(pair: Pair, y: Array, *, smoothing: float | None = None) -> tupl
 
 
 def rolling_radius_difference(pair: Pair, y: Array, *, smoothing: float | None = None) -> Array:
-    """Return r_left - r_right [m] over the shift y to the left [m], (n,)."""
+    """Return r_left - r_right [m] over the shift y to the left at the height of the rails [m], (n,)."""
     left, right, _ = wheelset_at(pair, y, smoothing=smoothing)
     return left - right
 

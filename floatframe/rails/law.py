@@ -28,6 +28,7 @@ HEAD = (
 )  # fmt: skip
 #: then for each wheel
 WHEEL_HEAD = ("side", "arm", "half", "radius", "table_at", "u_off")
+LIFTED = 0.025  #: height of a tread above its rail at which the wheel counts as off the track [m]
 N_HEAD, N_WHEEL, N_FIELDS, N_CELL = len(HEAD), len(WHEEL_HEAD), 13, 8
 
 #: outputs of each wheel: name, unit
@@ -188,12 +189,15 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
         Q = zero
         Y = zero
         wear = zero
+        lift = zero
         for part in range(n_parts):
             contact_fields(data, table, part, v, roll, sine, field)
             slope = field[1]
             cos = 1 / np.sqrt(1 + slope * slope)
             sin = slope * cos
             depth = (field[0] - h) * cos
+            if part == 0:
+                lift = h - field[0]
             # the point of contact, from the marker
             x_c, y_c, z_c = field[2] * sine, side * field[3], field[4]
             px = arm * ax + x_c * c + y_c * nx + z_c * bx
@@ -292,9 +296,12 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
             seen[first + 4] = Y / Q
         seen[first + 5] = wear
         seen[first + 6] = s
-        seen[first + 7] = v - u_off
-        if v.real - u_off > worst.real:
-            worst = v - u_off
+        off = v - u_off
+        if (lift - LIFTED).real > off.real:
+            off = lift - LIFTED
+        seen[first + 7] = off
+        if off.real > worst.real:
+            worst = off
     last = int(data[0]) * (n_w_out + n_parts * n_c_out)
     seen[last] = worst
     seen[last + 1] = energy

@@ -144,12 +144,16 @@ def test_a_table_answers_as_the_search_it_was_made_of():
 
 
 def test_klingels_wavelength_and_the_conicity_of_a_cone_on_a_circle():
-    """delta_r/(2 y) of a cone gamma on rails of radius R: gamma (b + R gamma)/(b - r gamma) (Wickens 1965)."""
+    """Of a cone gamma on rails of radius R, contacts 2 b apart: gamma (1 + R gamma/b) by the shift at the rails.
+
+    By that of the axle it is gamma (b + R gamma)/(b - r gamma), since the roll is gamma/(b - r gamma) of it (Wickens 1965).
+    """
     assert_allclose(klingel_wavelength(0.05, 0.46, 1.5), 2 * np.pi * np.sqrt(0.46 * 0.75 / 0.05), rtol=1e-14)
     gamma, b, R, r = 0.05, 0.75, 0.3, 0.46
-    expected = gamma * (b + R * gamma) / (b - r * gamma)
     y = np.array([-2e-3, 1e-3, 3e-3])
-    assert_allclose(rolling_radius_difference(CONE, y) / (2 * y), expected, rtol=3e-3)
+    assert_allclose(rolling_radius_difference(CONE, y) / (2 * y), gamma * (1 + R * gamma / b), rtol=3e-3)
+    by_axle = rolling_radius_difference(CONE, y) / (2 * (y - r * wheelset_at(CONE, y)[2]))
+    assert_allclose(by_axle, gamma * (b + R * gamma) / (b - r * gamma), rtol=3e-3)
     curve = (np.linspace(-5e-3, 5e-3, 41), 2 * 0.05 * np.linspace(-5e-3, 5e-3, 41))
     assert_allclose(equivalent_conicity(CONE, 3e-3, difference=curve), 0.05, rtol=1e-4)
 
@@ -171,13 +175,14 @@ def test_s1002_on_60e1_has_the_conicity_that_is_known_of_it():
     y = np.linspace(-3.75e-3, 3.75e-3, 61)
     difference = (y, rolling_radius_difference(NEW, y))
     wave = equivalent_conicity(NEW, 3e-3, difference=difference)
-    assert_allclose(wave, 0.18, rtol=0, atol=0.005)
+    assert_allclose(wave, 0.18, rtol=0, atol=0.008)
     assert_allclose(harmonic_conicity(NEW, 3e-3, points=24), wave, rtol=0.06)
 
 
 def test_both_wheels_touch_at_the_roll_that_is_found():
     left, right, roll = wheelset_at(CONE, np.array([3e-3]))
-    h = [rigid_contacts(CONE, side * 3e-3, roll=side * roll[0])[0] for side in (1, -1)]
+    u = 3e-3 - 0.46 * np.sin(roll[0])
+    h = [rigid_contacts(CONE, side * u, roll=side * roll[0])[0] for side in (1, -1)]
     assert_allclose(h[0].height - h[1].height, 1.5 * roll[0], rtol=0, atol=1e-9)
     assert left[0] > right[0]
 
