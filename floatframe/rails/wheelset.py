@@ -27,6 +27,10 @@ from floatframe.shapes.wheels import RailWheel
 __all__ = ["WheelOnRail", "Wheelset", "height_on_rails", "track_shape"]
 
 SIDES = {"left": 1, "right": -1}
+OFF_TRACK = (
+    "a wheel has left the track: its flange has climbed the rail, or its tread is 25 mm above it; the outputs ..._off "
+    "say which one, and the results until here are kept"
+)
 PAIR_KEYS = ("radius", "running_circles", "gauge", "inclination")
 LAW_KEYS = (
     "normal", "creep", "friction", "shear_modulus", "poisson", "smoothing", "damping", "low_speed", "strips", "polach",
@@ -132,6 +136,7 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
         length=1e-3,  # shifts of a millimetre change the contact
         energy="energy",
         power_lost="power_lost",
+        stops={"off_track": OFF_TRACK},
     )
 
 

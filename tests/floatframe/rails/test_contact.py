@@ -146,7 +146,7 @@ def test_a_table_answers_as_the_search_it_was_made_of():
 def test_klingels_wavelength_and_the_conicity_of_a_cone_on_a_circle():
     """Of a cone gamma on rails of radius R, contacts 2 b apart: gamma (1 + R gamma/b) by the shift at the rails.
 
-    By that of the axle it is gamma (b + R gamma)/(b - r gamma), since the roll is gamma/(b - r gamma) of it (Wickens 1965).
+    By that of the axle it is gamma (b + R gamma)/(b - r gamma), its roll gamma/(b - r gamma) of it (Wickens 1965).
     """
     assert_allclose(klingel_wavelength(0.05, 0.46, 1.5), 2 * np.pi * np.sqrt(0.46 * 0.75 / 0.05), rtol=1e-14)
     gamma, b, R, r = 0.05, 0.75, 0.3, 0.46

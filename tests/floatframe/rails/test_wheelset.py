@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from floatframe import (
     GROUND,
     Bushing,
+    ConvergenceError,
     ElementSensor,
     Event,
     GeneralizedAlpha,
@@ -20,6 +21,7 @@ from floatframe import (
     RevoluteJoint,
     RigidBody,
     System,
+    check_element,
     element_motion,
     integrate,
     rails,
@@ -244,14 +246,44 @@ def test_two_wheels_that_turn_by_themselves_do_what_a_wheelset_does_at_equal_spe
     )
 
 
-def test_a_wheel_that_climbs_ends_the_run_and_keeps_its_results():
-    """A side force of 1.5 of the weight tips the axle over its flange: the event ends the run, what was before is kept."""
+def pushed_over():
+    """A side force of 1.5 of the weight, which tips the axle over its flange."""
     body = axle(10.0, 10.0 / 0.46, (0, 0, 0.4597))
-    wheels = rails.Wheelset("wheels", Marker("axle"), NEW)
-    pushed = PointForce("push", Marker("axle"), force=(0, 3 * LOAD, 0))
-    sensor = ElementSensor("rails", "wheels")
-    event = Event("derailed", "rails", column="off_track", direction="rising", stop=True)
-    system = System([body], [], [DOWN, pushed], elements=[wheels], sensors=[sensor], events=[event])
-    motion = integrate(system, METHOD, 2.0, 5e-4)
+    force = PointForce("push", Marker("axle"), force=(0, 3 * LOAD, 0))
+    return System([body], [], [DOWN, force], elements=[rails.Wheelset("wheels", Marker("axle"), NEW)])
+
+
+def test_a_wheel_off_the_track_ends_the_run_with_a_message_and_its_results():
+    with pytest.raises(
+        ConvergenceError, match=r"'wheels'.*a wheel has left the track.*results until here are kept"
+    ) as caught:
+        integrate(pushed_over(), METHOD, 2.0, 5e-4)
+    motion = caught.value.trajectory
+    found = element_motion(pushed_over(), motion, "wheels").outputs
     assert 0.03 < motion.t[-1] < 0.12
-    assert_allclose(element_motion(system, motion, "wheels").outputs["off_track"][-1], 0.0, atol=1e-4)
+    assert np.all(found["off_track"][:-1] <= 0)
+    assert found["right_off"][-1] > found["left_off"][-1]  # the wheel behind is the one in the air
+    assert found["left_flange_N"].max() > LOAD
+
+
+def test_an_event_may_end_the_run_before():
+    sensor, event = ElementSensor("rails", "wheels"), Event("near", "rails", level=-5e-3, column="off_track", stop=True)
+    system = replace(pushed_over(), sensors=[sensor], events=[event])
+    motion = integrate(system, METHOD, 2.0, 5e-4)
+    assert_allclose(element_motion(system, motion, "wheels").outputs["off_track"][-1], -5e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize("normal", ["hertz", "constraint"])
+def test_the_check_of_elements_finds_no_fault(normal):
+    laws = rails.ContactLaws(normal=normal)
+    body = axle(20.0, 20.0 / 0.46, (0, 2e-3, 0.4595))
+    check_element(
+        System([body], [], [DOWN], elements=[rails.Wheelset("wheels", Marker("axle"), NEW, laws=laws)]), "wheels"
+    )
+
+
+def test_wheels_and_track_are_drawn():
+    wheels = rails.Wheelset("wheels", Marker("axle"), NEW)
+    assert [each.shape.geometry.flange_side for each in wheels.drawn()] == [-1, 1]  # the flange is inside
+    track = rails.track_shape(rails.Track(rails.curve(300.0, 60.0, cant=0.1)), 150.0)
+    assert track.cant.min() < -0.09
