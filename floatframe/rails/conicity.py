@@ -2,7 +2,7 @@
 
 A wheelset that rolls slowly without slip has y'' + delta_r(y)/(r_0 e_0) = 0, where y is the lateral shift at the height
 of the rails (the axle, which rolls as it shifts, moves by r_0 phi less), e_0 the distance of the contact points and
-primes are derivatives along the track. A conical one, delta_r = 2 lam y, has waves of length 2 pi sqrt(r_0 e_0/(2 lam)). The
+primes are derivatives along the track. A conical one, delta_r = 2 lam y, has waves of 2 pi sqrt(r_0 e_0/(2 lam)). The
 equivalent conicity of an amplitude is that of the cone whose wave is as long (the definition of UIC 519 and EN 15302).
 """
 
