@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import pi, sqrt
 from typing import Any
 
 from fe_models.foundation.copies import frozen_copies
@@ -19,6 +20,7 @@ from floatframe.hydraulics.components import (
 )
 from floatframe.hydraulics.fluid import Fluid
 from floatframe.hydraulics.nodes import check_nodes
+from floatframe.shapes.drawn import Stretched
 
 __all__ = ["Circuit"]
 
@@ -100,6 +102,15 @@ class Circuit(Element):
             for each in self.components
             if isinstance(each, Cylinder | Pump)
             for marker in (each.marker_a, each.marker_b)
+        )
+
+    def drawn(self) -> tuple[Stretched, ...]:
+        """Return a rod in a cylinder for each cylinder, as wide as its head."""
+        attached = [each for each in self.components if isinstance(each, Cylinder | Pump)]
+        return tuple(
+            Stretched("strut", 2 * k, 2 * k + 1, radius=sqrt(each.head_area / pi))
+            for k, each in enumerate(attached)
+            if isinstance(each, Cylinder)
         )
 
     def law(self, placed: Placed) -> ElementLaw:

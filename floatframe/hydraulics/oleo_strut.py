@@ -4,6 +4,7 @@ The forces are those of Milwitzky & Cook (1953), with compressible oil if asked 
 """
 
 from dataclasses import dataclass
+from math import pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from floatframe.elements.unit_names import in_units
 from floatframe.errors import ModelError
 from floatframe.functions.time_functions import TimeFunction, constant
 from floatframe.hydraulics.fluid import Fluid
+from floatframe.shapes.drawn import Stretched
 
 __all__ = ["OleoStrut"]
 
@@ -112,6 +114,10 @@ class OleoStrut(Element):
             raise ModelError(
                 f"{where}: {key}: expected areas above 0 over the stroke, got {values[k]:.4g} at s = {s[k]:.4g}"
             )
+
+    def drawn(self) -> tuple[Stretched, ...]:
+        """Return a rod in a cylinder, as wide as the area that displaces gas."""
+        return (Stretched("strut", radius=sqrt(self.gas_area / pi)),)
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the strut; `ModelError` if it is placed outside its stroke."""

@@ -21,6 +21,7 @@ from floatframe.hydraulics import (
 )
 from floatframe.system_file.read_system import read_system
 from tests.floatframe.element_laws import marker_motion, placed
+from tests.root import ROOT
 
 OIL = Fluid(870.0, 1.4e9, 101325.0)
 BASE, TOP = Marker("ground"), Marker("rod")
@@ -193,3 +194,21 @@ def test_a_circuit_of_a_file_is_that_of_python(tmp_path):
 def test_a_file_with_a_wrong_circuit_is_refused_with_the_key(tmp_path, old, new, message):
     with pytest.raises(SystemFileError, match=message):
         read(tmp_path, FILE.replace(old, new))
+
+
+def test_the_tables_of_the_page_are_read(tmp_path):
+    page = (ROOT / "docs" / "hydraulics_and_drives.md").read_text()
+    tables = "\n".join(line[4:] for line in page.splitlines() if line.startswith("    "))
+    mechanism = (
+        FILE[: FILE.index("[elements.lift]")]
+        + """
+[bodies.rotor]
+mass = 1.0
+inertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+
+"""
+    )
+    lift, motor = read(tmp_path, mechanism + tables).elements
+    assert [each.name for each in lift.components] == ["jack", "hole", "ball"]
+    assert motor.controller.upper == 24.0
+    assert [piece.radius for piece in lift.drawn()] == [pytest.approx(np.sqrt(2e-3 / np.pi))]
