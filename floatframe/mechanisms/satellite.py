@@ -8,6 +8,7 @@ from floatframe.bodies.markers import Marker
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.joints import FixedJoint
 from floatframe.mechanisms.rods import Rod, turning
+from floatframe.shapes import Shape, Sphere
 from floatframe.system import System
 
 __all__ = ["satellite"]
@@ -43,7 +44,8 @@ def satellite(
     """
     if boom is not None:
         boom_length = float(np.linalg.norm(np.subtract(*(boom.interface(end).position for end in ends))))
-    bodies: list = [RigidBody("hub", hub_mass, 0.4 * hub_mass * hub_radius**2 * np.eye(3))]
+    ball = Shape(Sphere(hub_radius), color="gold")
+    bodies: list = [RigidBody("hub", hub_mass, 0.4 * hub_mass * hub_radius**2 * np.eye(3), shapes=[ball])]
     joints = []
     for name, sign in (("right", 1.0), ("left", -1.0)):
         root = np.array([sign * hub_radius, 0.0, 0.0])

@@ -168,12 +168,10 @@ def body_record(
 ) -> dict[str, Any]:
     """Return the motion of a body frame, and the amplitudes of its shapes."""
     motion = trajectory.body(name)
-    p = motion.p[rows]
-    flips = np.cumprod(np.where((p[1:] * p[:-1]).sum(axis=1) < 0, -1.0, 1.0)) if len(p) > 1 else np.zeros(0)
     return {
         "name": name,
         "r": block.real(motion.r[rows]),
-        "p": block.real(p * np.r_[1.0, flips][:, None]),
+        "p": block.real(motion.p[rows]),
         "a": None if amplitudes is None else block.quantised(amplitudes, each=-1, centred=True),
     }
 
