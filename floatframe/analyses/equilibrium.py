@@ -12,6 +12,7 @@ Motions that cost nothing (a wheel on its hinge) stay where they are, since W/ta
 
 import logging
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -223,9 +224,11 @@ def steady_rotation(
         if not np.isfinite(size + scale_of_forces):  # a stiffened body beyond the second order
             error = np.inf
             break
-        error = size / scale_of_forces if scale_of_forces > 0 else 0.0
+        noise = _rounding(compiled, parts, state)
+        is_nothing = scale_of_forces <= _size(W, abs(parts.J).T @ np.where(holds, 0.0, noise))  # springs relax to none
+        error = 0.0 if is_nothing else size / scale_of_forces
         is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
-        told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + _rounding(compiled, parts, state)
+        told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + noise
         is_told = bool((np.abs(gaps) <= told)[~holds & ~states.own].all())
         if error <= tolerance and is_closed and is_told and states.are_at_rest(tolerance):
             _require_rotation(compiled, work, omega)
@@ -236,7 +239,8 @@ def steady_rotation(
         if iteration == max_iterations:
             break
         if tau == 0.0:
-            tau = 0.1 * compiled.length / max(size / np.sqrt(_total_mass(W)), STANDSTILL)
+            pulled = forces - parts.J.T @ wrenches_by_law(model, parts, gaps, holds | states.own)
+            tau = 0.1 * compiled.length / max(_size(W, pulled) / np.sqrt(_total_mass(W)), STANDSTILL)
         else:
             fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
             tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
@@ -260,6 +264,22 @@ def steady_rotation(
         h=0.0,
         residual=error,
     )
+
+
+def wrenches_by_law(model: Model, parts: Linearized, gaps: Array, others: NDArray[np.bool_]) -> Array:
+    """Return the change of wrenches to the laws of springs, bushings and the like at this place, (n_w,).
+
+    Of connections that hold nothing and have no states alone; their rows V dw = -g have no other unknown.
+    """
+    change, w0 = np.zeros(len(gaps)), model.connections.w0
+    for first, last in pairwise(w0.tolist()):
+        rows = slice(first, last)
+        if first == last or others[rows].any() or not gaps[rows].any():
+            continue
+        block = parts.V[rows, rows].toarray()
+        if np.linalg.cond(block) < 1e12:
+            change[rows] = np.linalg.solve(block, -gaps[rows])
+    return change
 
 
 def notes_at(system: System, work: Work, state: State, u_dot: Array, w: Array) -> tuple[ValidityNote, ...]:

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 import cms
 from floatframe import (
     GROUND,
+    Bushing,
     ConvergenceError,
     FlexibleBody,
     GeneralizedAlpha,
@@ -39,7 +40,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.mechanisms import slider_crank
 from floatframe.mechanisms.rods import slender_inertia
 from floatframe.results.place_motion import interface_motion
-from floatframe.results.sensors import Channel
+from floatframe.results.sensors import Channel, ReactionSensor, measured
 from floatframe.rotations import euler_parameters_of_rotation_vector, rotation_exp, rotation_log, rotation_matrix
 from floatframe.start.newton_equations import displaced
 from floatframe.state import State
@@ -476,3 +477,37 @@ def test_a_free_body_that_spins_about_its_centre_of_mass_is_found(frame, offset)
     ends = [interface_motion(motion, "bar", reduced, name).position[0] for name in ("left", "right")]
     assert_allclose(np.linalg.norm(ends[1] - ends[0]) - length, rho * speed**2 * length**3 / (12 * young), rtol=0.05)
     assert_allclose(np.mean(ends, axis=0)[:2], 0.0, atol=1e-9)
+
+
+TURN = euler_parameters_of_rotation_vector(np.array([0.5, 0.4, -0.3]))
+
+
+def relaxing():
+    """Springs, turned and stretched as placed, that come to rest where no force is left."""
+    b = RigidBody("b", 1.0, 0.1 * np.eye(3), position=(0.3, 0.2, 0.1), orientation=TURN)
+    c = RigidBody("c", 2.0, 0.2 * np.eye(3), position=(1.3, 0.2, 0.1))
+    mount = Bushing("mount", Marker(GROUND, position=(0.1, 0.7, 0)), Marker("b", position=(0.03, 0.1, 0)),
+                    [100, 200, 300, 4, 5, 6.0])  # fmt: skip
+    ball = SphericalJoint("ball", GROUND, Marker("b", position=(0.1, 0.2, 0.3)))
+    coil = SpringDamper("coil", Marker(GROUND, position=(1, 0.3, 0.2)), Marker("b", position=(0.5, 0, 0)), 100.0, 0.0,
+                        free_length=0.4)  # fmt: skip
+    chain = SpringDamper("chain", Marker("b"), Marker("c", position=(0.1, 0.1, 0.1)), 100.0, 0.0, free_length=0.4)
+    return {
+        "a bushing": System([b], [], [mount]),
+        "a body on a ball": System([b], [ball], [coil]),
+        "two bodies": System([b, c], [], [mount, chain]),
+    }
+
+
+@pytest.mark.parametrize("name", ["a bushing", "a body on a ball", "two bodies"])
+def test_springs_relax_to_no_force_at_all(name):
+    """Nothing is left that forces could be measured by but the rounding of places."""
+    system = relaxing()[name]
+    rest = static_equilibrium(system)
+    assert rest.n_iterations < 30
+    assert np.abs(rest.w).max() < 1e-9
+    now = measured(system, snapshot(system, rest), [ReactionSensor(f.name, f.name) for f in system.forces])
+    assert all(np.abs(each.columns["force size"]).max() < 1e-9 for each in now.values())
+    if name == "a bushing":
+        assert_allclose(rest.state.r[0], [0.07, 0.6, 0], rtol=0, atol=1e-9)
+        assert_allclose(np.abs(rest.state.p[0]), [1, 0, 0, 0], rtol=0, atol=1e-9)
