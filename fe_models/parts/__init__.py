@@ -3,6 +3,7 @@
 from fe_models.errors import MeshingError
 from fe_models.parts.bracket import Bracket, mesh_bracket
 from fe_models.parts.connecting_rod import SLENDER_ROD, ConnectingRod, mesh_connecting_rod
+from fe_models.parts.engine_body import EngineBody, engine_body_mesh, write_engine_mesh
 from fe_models.parts.errors import PartError
 from fe_models.parts.gmsh_session import PartMesh
 from fe_models.parts.shipped import SHIPPED_MESHES, shipped_mesh
@@ -12,10 +13,13 @@ __all__ = [
     "SLENDER_ROD",
     "Bracket",
     "ConnectingRod",
+    "EngineBody",
     "MeshingError",
     "PartError",
     "PartMesh",
+    "engine_body_mesh",
     "mesh_bracket",
     "mesh_connecting_rod",
     "shipped_mesh",
+    "write_engine_mesh",
 ]

@@ -53,12 +53,12 @@ class TimeFunction:
     def jumps(self, order: int) -> tuple[Array, Array]:
         """Return the times where the value (order 0), rate or second rate jumps, and by how much: each (n,).
 
-        A jump is above 1e-9 of the sizes of the numbers it lies between.
+        A jump is above 1e-9 of the sizes of the numbers it lies between, unless these are next to nothing (denormal).
         """
         length = np.diff(self.begins)
         before, after = at_pieces(self.pieces[:-1], length, order), at_pieces(self.pieces[1:], 0.0, order)
         scale = np.maximum(piece_sizes(self.pieces[:-1], length, order), piece_sizes(self.pieces[1:], 0.0, order))
-        is_jump = np.abs(after - before) > 1e-9 * scale
+        is_jump = np.abs(after - before) > np.maximum(1e-9 * scale, np.finfo(float).tiny)
         return self.begins[1:][is_jump], (after - before)[is_jump]
 
     def __call__(self, t: float, order: int = 0) -> float:

@@ -1,0 +1,173 @@
+"""Paths that the rails lead a wheelset along: a short defect seen through the envelope of the wheel, an S-curve.
+
+A wheel of radius R over a rail z(s) has its centre at R + max over x of [z(s + x) - (R - sqrt(R² - x²))]: it cannot
+follow what is shorter than its chord. Across, the flange leans on the rail: it stands at an angle gamma, and a
+horizontal cut through it recedes by x² / (2 R tan gamma), a disc of radius R tan gamma.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.paths import replace_file
+from floatframe.checked_values import number
+from floatframe.errors import ModelError
+
+__all__ = ["Defect", "SCurve", "WheelPaths", "envelope", "write_paths"]
+
+CHANNELS = ("x", "y", "yaw", "roll")  #: of each wheelset, in the order of the columns
+N_CONTACT = 1001  #: places along the wheel that are tried
+FINE = 1e-3  #: distance of the places of a path before its kinks are rounded [m]
+
+
+def envelope(rail: Callable[[Array], Array], s: Array, reach: float, radius: float) -> Array:
+    """Return max over |x| <= reach of rail(s + x) - (R - sqrt(R² - x²)), (n_s,) [m].
+
+    Parameters
+    ----------
+    rail
+        Height of the rail over the way.
+    s
+        Places of the wheel, (n_s,) [m].
+    reach
+        How far before and behind the wheel the rail is looked at, less than the radius [m].
+    radius
+        R of the disc [m].
+    """
+    if not 0 < reach <= radius:
+        raise ModelError(f"envelope: expected a reach above 0 and at most the radius {radius:g}, got {reach:g}")
+    x = np.linspace(-reach, reach, N_CONTACT)
+    fall = radius - np.sqrt(radius**2 - x**2)
+    return np.array([(rail(place + x) - fall).max() for place in np.asarray(s, dtype=float)])
+
+
+@dataclass(frozen=True, eq=False)
+class WheelPaths:
+    """Where the track leads each wheelset."""
+
+    t: Array  #: (n_t,) [s]
+    places: Array  #: x, y of the middle of the track [m], yaw [rad], turn about the right rail [rad], (n_t, n_wheelsets, 4)
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A bump on the left rail of a straight track, over which all wheelsets run: both of its curves are cosines.
+
+    Raises
+    ------
+    ModelError
+        If a number is none, or length, speed or a radius is not above zero.
+    """
+
+    length: float = 0.1  #: of the defect along the rail [m]
+    vertical: float = 0.010  #: height of its crest; below zero it is a dip [m]
+    lateral: float = 0.004  #: by which the rail stands inwards there [m]
+    speed: float = 5.0  #: [m/s]
+    begin: float = 0.5  #: from the first wheelset to its middle at the start [m]
+    radius: float = 0.625  #: of the wheels [m]
+    gauge: float = 1.5  #: between the middles of the rails [m]
+    flange_angle: float = 1.2217  #: gamma, 70 degrees [rad]
+    patch: float = 0.015  #: half length of the contact, over which kinks of the path are rounded [m]
+    rest: float = 0.8  #: time after the last wheelset [s]
+
+    def __post_init__(self) -> None:
+        for name in ("length", "speed", "radius", "gauge", "flange_angle", "patch"):
+            number(f"defect: {name}", getattr(self, name), above=0.0)
+        for name in ("vertical", "lateral", "begin", "rest"):
+            number(f"defect: {name}", getattr(self, name))
+
+    def shape(self, s: Array) -> Array:
+        """Return 1 at its middle, 0 from its ends on, (n,)."""
+        return np.where(np.abs(s) < self.length / 2, 0.5 * (1 + np.cos(2 * np.pi * s / self.length)), 0.0)
+
+    def lift(self, s: Array) -> Array:
+        """Return the height of the centre of a wheel over its radius, s from the middle of the defect, (n,) [m]."""
+        reach = min(self.length / 2 + np.sqrt(2 * self.radius * abs(self.vertical)), self.radius)
+        return self.rounded(lambda x: envelope(lambda r: self.vertical * self.shape(r), x, reach, self.radius), s)
+
+    def push(self, s: Array) -> Array:
+        """Return the way by which the flange is pushed to the right, (n,) [m]."""
+        radius = self.radius * np.tan(self.flange_angle)
+        reach = min(self.length / 2 + np.sqrt(2 * radius * abs(self.lateral)), radius)
+        return self.rounded(lambda x: envelope(lambda r: self.lateral * self.shape(r), x, reach, radius), s)
+
+    def rounded(self, path: Callable[[Array], Array], s: Array) -> Array:
+        """Return the mean of a path about s, weighted by a cosine over the contact, (n,) [m]."""
+        at = np.arange(s.min() - 2 * self.patch, s.max() + 2 * self.patch, FINE)
+        x = np.arange(-self.patch, self.patch + FINE / 2, FINE)
+        weight = 1 + np.cos(np.pi * x / self.patch)
+        smooth = np.convolve(path(at), weight / weight.sum(), mode="same")
+        return np.interp(s, at, smooth)
+
+    def paths(self, wheelsets: Array, h: float) -> WheelPaths:
+        """Return the paths of wheelsets at these places x at the start, (n_wheelsets,), every h seconds."""
+        first, last = max(wheelsets), min(wheelsets)
+        duration = (first - last + self.begin) / self.speed + self.rest
+        t = h * np.arange(int(np.ceil(duration / h)) + 1)
+        places = np.zeros((len(t), len(wheelsets), 4))
+        for k, x in enumerate(wheelsets):
+            s = x - first - self.begin + self.speed * t
+            near = np.abs(s) < self.length / 2 + self.radius
+            places[:, k, 0] = x + self.speed * t
+            places[near, k, 1] = -self.push(s[near])
+            places[near, k, 3] = np.arcsin(self.lift(s[near]) / self.gauge)
+        return WheelPaths(t, places)
+
+
+@dataclass(frozen=True)
+class SCurve:
+    """From one straight track to another beside it: y = shift (x/L - sin(2 pi x/L)/(2 pi)), without cant.
+
+    Its curvature rises and falls as a sine, so that nothing jumps; the greatest is nearly 2 pi shift / L².
+    """
+
+    shift: float = 4.0  #: from the first track to the second [m]
+    length: float = 50.0  #: L, along the first track [m]
+    speed: float = 7.0  #: along the way [m/s]
+    begin: float = 3.0  #: from the first wheelset to the curve at the start [m]
+    rest: float = 3.0  #: time after the last wheelset [s]
+
+    def __post_init__(self) -> None:
+        for name in ("length", "speed"):
+            number(f"S-curve: {name}", getattr(self, name), above=0.0)
+        for name in ("shift", "begin", "rest"):
+            number(f"S-curve: {name}", getattr(self, name))
+
+    def y(self, x: Array) -> Array:
+        """Return the place across over the place along, from the beginning of the curve, (n,) [m]."""
+        u = np.clip(x / self.length, 0.0, 1.0)
+        return self.shift * (u - np.sin(2 * np.pi * u) / (2 * np.pi))
+
+    def slope(self, x: Array) -> Array:
+        """Return dy/dx, (n,)."""
+        u = np.clip(x / self.length, 0.0, 1.0)
+        return self.shift / self.length * (1 - np.cos(2 * np.pi * u))
+
+    def paths(self, wheelsets: Array, h: float) -> WheelPaths:
+        """Return the paths of wheelsets at these places x at the start, (n_wheelsets,), every h seconds."""
+        first, last = max(wheelsets), min(wheelsets)
+        x = np.linspace(0.0, self.length, 20001)  # the way s(x) = ∫ sqrt(1 + y'²) dx, by the trapezoidal rule
+        steps = np.sqrt(1 + self.slope(x) ** 2)
+        way = np.concatenate([[0.0], np.cumsum(0.5 * (steps[1:] + steps[:-1]) * np.diff(x))])
+        duration = (first - last + self.begin + way[-1]) / self.speed + self.rest
+        t = h * np.arange(int(np.ceil(duration / h)) + 1)
+        places = np.zeros((len(t), len(wheelsets), 4))
+        start = first + self.begin
+        for k, place in enumerate(wheelsets):
+            s = place - start + self.speed * t
+            along = np.where(s < 0, s, np.where(s > way[-1], s - way[-1] + self.length, np.interp(s, way, x)))
+            places[:, k, 0], places[:, k, 1] = start + along, self.y(along)
+            places[:, k, 2] = np.arctan(self.slope(along))
+        return WheelPaths(t, places)
+
+
+def write_paths(paths: WheelPaths, path: Path) -> None:
+    """Write a table: time, then x, y, yaw and roll of each wheelset, numbers from 1, in m and rad."""
+    n = paths.places.shape[1]
+    names = [f"{name} {k + 1} [{'m' if name in 'xy' else 'rad'}]" for k in range(n) for name in CHANNELS]
+    rows = np.column_stack([paths.t, paths.places.reshape(len(paths.t), -1)])
+    text = [", ".join(["time [s]", *names]), *(", ".join(f"{v:.12g}" for v in row) for row in rows.tolist())]
+    replace_file(path, ("\n".join(text) + "\n").encode())
