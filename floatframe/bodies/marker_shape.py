@@ -140,7 +140,7 @@ def rotation_of_nodes(reduced: ReducedBody, rows: IntArray) -> Array:
         return np.asarray(reduced.kept.of_node(int(rows[0])))
     points = np.asarray(reduced.nodes[rows])
     A = mean_motion(points, np.full(len(rows), 1.0 / len(rows)), points.mean(axis=0))
-    return np.asarray(A[3:] @ np.asarray(reduced.Phi)[rows].reshape(-1, reduced.n_q))
+    return np.asarray(A[3:] @ np.asarray(reduced.Phi)[rows].reshape(A.shape[1], reduced.n_q))
 
 
 def is_turning(reduced: ReducedBody, rows: IntArray) -> bool:
