@@ -3,7 +3,7 @@
 from fe_models.errors import MeshingError
 from fe_models.parts.bracket import Bracket, mesh_bracket
 from fe_models.parts.connecting_rod import SLENDER_ROD, ConnectingRod, mesh_connecting_rod
-from fe_models.parts.engine_body import EngineBody, engine_body_mesh, write_engine_mesh
+from fe_models.parts.engine_body import EngineBody, engine_body_mesh, mesh_deck
 from fe_models.parts.errors import PartError
 from fe_models.parts.gmsh_session import PartMesh
 from fe_models.parts.shipped import SHIPPED_MESHES, shipped_mesh
@@ -20,6 +20,6 @@ __all__ = [
     "engine_body_mesh",
     "mesh_bracket",
     "mesh_connecting_rod",
+    "mesh_deck",
     "shipped_mesh",
-    "write_engine_mesh",
 ]

@@ -7,16 +7,14 @@ are swept along stations of x, y and z that hold every edge, so that a finer mes
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.paths import replace_file
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.parts.lengths import require, require_lengths
 
-__all__ = ["EngineBody", "engine_body_mesh", "write_engine_mesh"]
+__all__ = ["EngineBody", "engine_body_mesh", "mesh_deck"]
 
 
 @dataclass(frozen=True)
@@ -222,9 +220,9 @@ class _Grid:
         )
 
 
-def write_engine_mesh(mesh: ShellMesh, path: str | Path) -> None:
-    """Write quads, lines and their groups as the mesh of an Abaqus deck (.inp), numbers from 1; lines after the quads."""
-    replace_file(Path(path), ("\n".join(_deck(mesh)) + "\n").encode())
+def mesh_deck(mesh: ShellMesh) -> str:
+    """Return quads, lines and their groups as text of the mesh of an Abaqus deck, numbers from 1; lines after quads."""
+    return "\n".join(_deck(mesh)) + "\n"
 
 
 def _deck(mesh: ShellMesh) -> Iterator[str]:

@@ -7,16 +7,14 @@ horizontal cut through it recedes by x² / (2 R tan gamma), a disc of radius R t
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.paths import replace_file
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 
-__all__ = ["Defect", "SCurve", "WheelPaths", "envelope", "write_paths"]
+__all__ = ["Defect", "SCurve", "WheelPaths", "envelope", "path_table"]
 
 CHANNELS = ("x", "y", "yaw", "roll")  #: of each wheelset, in the order of the columns
 N_CONTACT = 1001  #: places along the wheel that are tried
@@ -164,10 +162,10 @@ class SCurve:
         return WheelPaths(t, places)
 
 
-def write_paths(paths: WheelPaths, path: Path) -> None:
-    """Write a table: time, then x, y, yaw and roll of each wheelset, numbers from 1, in m and rad."""
+def path_table(paths: WheelPaths) -> str:
+    """Return a table as text: time, then x, y, yaw and roll of each wheelset, numbers from 1, in m and rad."""
     n = paths.places.shape[1]
     names = [f"{name} {k + 1} [{'m' if name in 'xy' else 'rad'}]" for k in range(n) for name in CHANNELS]
     rows = np.column_stack([paths.t, paths.places.reshape(len(paths.t), -1)])
-    text = [", ".join(["time [s]", *names]), *(", ".join(f"{v:.12g}" for v in row) for row in rows.tolist())]
-    replace_file(path, ("\n".join(text) + "\n").encode())
+    text = [", ".join(["time [s]", *names]), *(", ".join(f"{v:.10g}" for v in row) for row in rows.tolist())]
+    return "\n".join(text) + "\n"
