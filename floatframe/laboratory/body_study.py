@@ -22,12 +22,18 @@ from fe_models.body.fe_body import FEBody
 from fe_models.body.numbering import Numbering
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
+from fe_models.shells.shell_points import ShellPoints
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.markers import Marker, body_name
 from floatframe.errors import ModelError
+from floatframe.forces import Bushing
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
 from floatframe.laboratory.body_errors import BodyErrors, BodyReference, largest_difference
 from floatframe.laboratory.substitution import with_body
-from floatframe.laboratory.suspended_body import SuspendedMotion, suspended_motion, wrench_on_body
+from floatframe.laboratory.suspended_body import SuspendedMotion, suspended_motion
 from floatframe.motion.integration import integrate
+from floatframe.results.trajectory import Trajectory
+from floatframe.rotations import rotation_matrix
 from floatframe.system import System
 
 __all__ = ["Loading", "SetError", "body_study", "full_motions", "lean_body", "stress_rows"]
@@ -150,15 +156,12 @@ def body_study(
                     told(SetError(key, set_name, n_modes, reduced.n_q, failure=str(error)))
                     continue
                 q = motion.body(name).q[:: each.every].T
-                forces = {b: wrench_on_body(system, name, motion, b)[:: each.every] for b in full[key].forces}
+                forces = {b: bushing_force(system, name, motion, b)[:: each.every] for b in full[key].forces}
                 told(
                     SetError(
                         key, set_name, n_modes, reduced.n_q, references[key].errors(Phi, q),
                         {place: references[key].history_error(rows, Phi, q) for place, rows in (stress or {}).items()},
-                        largest_difference(
-                            {b: f[:, :3] for b, f in forces.items()},
-                            {b: f[:, :3] for b, f in full[key].forces.items()},
-                        ),
+                        largest_difference(forces, {b: f[:, :3] for b, f in full[key].forces.items()}),
                     )
                 )  # fmt: skip
     return tuple(results)
@@ -169,24 +172,36 @@ def lean_body(body: FEBody) -> FEBody:
     return replace(body, surface=np.zeros((0, 3), np.int64), kept=np.zeros(0, np.int64), numbering=Numbering())
 
 
-def stress_rows(body: FEBody, points: FEBody) -> sp.csr_array:
-    """Return the stress at the points of a body as rows over the dofs, (6 n_points, n_dof) [Pa/m].
+def stress_rows(body: FEBody) -> sp.csr_array:
+    """Return the stress at the stress points of a shell as rows over the dofs, (6 n_points, n_dof) [Pa/m].
 
     Parameters
     ----------
     body
-        Coupled.
-    points
-        The same with stress points that depend on few dofs (`fe_models.shell_points`), whose stress is wanted.
+        Coupled, with points of `fe_models.shell_points`: few, for their cells are asked dof by dof.
+
+    Raises
+    ------
+    ModelError
+        If it has none.
     """
-    chosen = points.stress_points
-    if chosen is None:
-        raise ModelError(f"stress rows: body {body.name!r} has no stress points")
-    near = np.linalg.norm(body.nodes[:, None] - np.asarray(chosen.positions)[None], axis=2).min(axis=1) <= REACH
-    dofs = np.flatnonzero(near[body.dofs[:, 0]])
-    unit = np.zeros((body.n_dof, len(dofs)))
-    unit[dofs, np.arange(len(dofs))] = 1.0
-    values = chosen.stress(body.mesh_displacement(unit)).reshape(-1, len(dofs))
-    columns = sp.csc_array(values)
-    return sp.csr_array((columns @ sp.csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)),
-                                                shape=(len(dofs), body.n_dof))))  # fmt: skip
+    points = body.stress_points
+    if not isinstance(points, ShellPoints) or body.recovery is None:
+        raise ModelError(f"stress rows: body {body.name!r}: expected stress points of fe_models.shell_points")
+    on_mesh = np.unique(np.concatenate([group.dofs[rows].ravel() for group, rows in points.parts]))
+    dofs = np.unique(sp.csr_array(body.recovery.matrix)[on_mesh].indices)
+    pick = sp.csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), shape=(len(dofs), body.n_dof))
+    values = points.stress(body.mesh_displacement(pick.T.toarray()))
+    return sp.csr_array(sp.csr_array(values.reshape(-1, len(dofs))) @ pick)
+
+
+def bushing_force(system: System, name: str, motion: Trajectory, bushing: str) -> Array:
+    """Return the force of a bushing on the body, mesh axes, (n_t, 3) [N]."""
+    force = next(each for each in system.forces if each.name == bushing)
+    assert isinstance(force, Bushing)
+    end = force.marker_b
+    sign = -1.0 if body_name(end.body if isinstance(end, Marker) else end) == name else 1.0
+    body = system.body(name)
+    assert isinstance(body, FlexibleBody)
+    R = rotation_matrix(motion.body(name).p) @ body.reduced.frame.axes.T
+    return sign * np.einsum("tab,ta->tb", R, motion.reaction(bushing).force)

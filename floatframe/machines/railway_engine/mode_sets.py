@@ -1,0 +1,143 @@
+"""Mode sets of the railway engine's body beside its full model: the study of docs/railway_engine.md."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+import cms
+from cms.families.families import Families
+from cms.jobs.body_of_job import job_body
+from cms.jobs.job import read_job
+from cms.jobs.shell_body import shell_mesh
+from cms.mode_set import ModeSet
+from cms.reduced_basis.damping import RayleighDamping
+from fe_models.body.fe_body import FEBody
+from fe_models.shells.shell_points import shell_points
+from floatframe.errors import ModelError
+from floatframe.forces import Bushing
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.laboratory.body_study import Loading, SetError, body_study, full_motions, lean_body, stress_rows
+from floatframe.laboratory.suspended_body import SuspendedMotion
+from floatframe.system import System
+from floatframe.system_file.read_system import read_system
+from floatframe.system_file.run_section import required_run
+
+__all__ = ["FREE", "MORE_SETS", "NAME", "PLACES", "SETS", "EngineStudy", "engine_loads", "engine_study"]
+
+NAME, FREE = "carbody", ("bogie_1", "bogie_2")
+
+#: where stress is looked at: place -> point next to the cell, mesh axes [m]
+PLACES = {
+    "side wall over the seat": (5.0, 1.45, 1.6),
+    "window corner": (7.2, 1.45, 2.0),
+    "roof in the middle": (0.3, 0.3, 3.9),
+    "floor beside the pivot": (5.0, 0.3, 1.2),
+}
+
+#: set -> what makes it of n vibration modes
+SETS: dict[str, Callable[[Families, int], ModeSet]] = {
+    "craig-bampton": lambda families, n: cms.craig_bampton(families, n_modes=n),
+    "craig-bampton-ir": lambda families, n: cms.craig_bampton_ir(families, n_modes=n),
+    "rubin": lambda families, n: cms.rubin(families, n_modes=n),
+    "attachment": lambda families, n: cms.attachment(families, n_modes=n),
+    "krylov": lambda families, n: cms.krylov(families, n_modes=n),
+    "balanced-truncation": lambda families, n: cms.balanced_truncation(families, n_modes=n),
+    "normal": lambda families, n: cms.normal_modes(families, n_modes=n),
+}
+
+#: sets that span the same as `rubin` with as many modes
+MORE_SETS: dict[str, Callable[[Families, int], ModeSet]] = {
+    "herting": lambda families, n: cms.herting(families, n_modes=n),
+    "macneal": lambda families, n: cms.macneal(families, n_modes=n),
+    "craig-chang": lambda families, n: cms.craig_chang(families, n_modes=n),
+    "dual-craig-bampton": lambda families, n: cms.dual_craig_bampton(families, n_modes=n),
+    "unrestrained-attachment": lambda families, n: cms.unrestrained_attachment(families, n_modes=n),
+}
+
+
+def engine_loads(system: System) -> list[cms.InterfaceLoad]:
+    """Return what the bushings of the body put on its interfaces, for `cms.benfield_hruda`: springs to the ground."""
+    loads = []
+    for force in system.forces:
+        if isinstance(force, Bushing) and not isinstance(force.marker_b, str) and force.marker_b.interface is not None:
+            K = np.diag(force.stiffness)
+            loads.append(cms.point_load(force.marker_b.interface, stiffness=K[:3], rotational_stiffness=K[3:]))
+    return loads
+
+
+@dataclass(frozen=True, eq=False)
+class EngineStudy:
+    """The full motions, and the error of every set."""
+
+    full: dict[str, SuspendedMotion]
+    results: tuple[SetError, ...]
+    n_dof: int
+
+
+def engine_study(
+    files: Sequence[str | Path],
+    n_modes: Sequence[int],
+    *,
+    sets: Sequence[str] = (*SETS, "benfield-hruda"),
+    also: Sequence[tuple[str, int]] = (),
+    every: int = 1,
+    on_case: Callable[[SetError], None] | None = None,
+) -> EngineStudy:
+    """Compare mode sets with the full model under the systems of these files, beside their carbody.toml and .h5.
+
+    Parameters
+    ----------
+    files
+        System files, as `write_railway_engine` writes them; results are named after them.
+    n_modes
+        Numbers of vibration modes.
+    sets
+        Names of `SETS` and `MORE_SETS`, and "benfield-hruda", loaded with the springs of its bogies.
+    also
+        Further sets with one number of modes each.
+    every
+        Errors are looked at every so many steps.
+
+    Raises
+    ------
+    ModelError
+        If a set is not one of these.
+    """
+    body, damping, stress = _body_of(Path(files[0]).with_name("carbody.toml"))
+    loadings = {}
+    for path in files:
+        system, given = read_system(path)
+        run = required_run(given, Path(path))
+        if not isinstance(run.integrator, GeneralizedAlpha):
+            raise ModelError(f"{path}: run: expected scheme = 'generalized-alpha', which the full model is run with")
+        loadings[Path(path).stem] = Loading(replace(system, sensors=()), run.integrator, run.t_end, run.h, every)
+    loads = engine_loads(next(iter(loadings.values())).system)
+    makers = SETS | MORE_SETS | {"benfield-hruda": lambda families, n: cms.benfield_hruda(families, n, loads=loads)}
+    wanted = [*((name, n) for name in sets for n in n_modes), *also]
+    unknown = [name for name, _ in wanted if name not in makers]
+    if unknown:
+        raise ModelError(f"engine study: no set {unknown[0]!r}; choices: {', '.join(makers)}")
+    full = full_motions(loadings, NAME, body, free=FREE, damping=damping)
+    cases = [(name, makers[name], n) for name, n in wanted]
+    results = body_study(loadings, NAME, body, full, cases, damping=damping, stress=stress, on_case=on_case)
+    return EngineStudy(full, results, body.n_dof)
+
+
+def _body_of(path: Path) -> tuple[FEBody, RayleighDamping, dict[str, sp.sparray]]:
+    """Return the coupled body of a job, its damping, and the rows of the stress at `PLACES`."""
+    job = read_job(path)
+    damping = job.damping.damping if job.damping is not None else None
+    if not isinstance(damping, RayleighDamping):
+        raise ModelError(f"{path}: damping: expected alpha and beta, which the full model can have too")
+    body = job_body(job)
+    mesh = shell_mesh(job)
+    centres = mesh.nodes[mesh.cells["quad"]].mean(axis=1)
+    stress = {}
+    for place, point in PLACES.items():
+        nearest = int(np.linalg.norm(centres - point, axis=1).argmin())
+        stress[place] = stress_rows(shell_points(body, {"quad": [nearest]}))
+    return lean_body(body), damping, stress
+
