@@ -1,12 +1,13 @@
 """Mode sets of the railway engine's body against its full finite element model: the study of docs/railway_engine.md.
 
-    python -m benchmarks.railway_engine                  # table and pictures in build/; a quarter of an hour of one core
-    python -m benchmarks.railway_engine --draw           # table and pictures again from build/railway_engine.json
+    python -m benchmarks.railway_engine                  # table and pictures in build/; a quarter of an hour of a core
+    python -m benchmarks.railway_engine --draw           # the same again from what was run before
     python -m benchmarks.railway_engine --size 0.75      # a coarser mesh: minutes
 
-Body of 10602 dofs (cells of 0.5 m), rail defect at 5 m/s with steps of 0.5 ms, S-curve at 7 m/s with steps of 5 ms. Sets
-with 0 to 80 vibration modes, three with 160; those that span the same as `rubin` with 20. Errors as shares of the greatest value of the
-full model, of displacement (epsilon_M), strain energy (epsilon_K), force of the bushings and stress at four places.
+Body of 10602 dofs (cells of 0.5 m), rail defect at 5 m/s with steps of 0.5 ms, S-curve at 7 m/s with steps of 5 ms.
+Sets with 0 to 80 vibration modes, three with 160; those that span the same as `rubin` with 20. Errors as shares of the
+greatest value of the full model: of displacement (epsilon_M), strain energy (epsilon_K), force of the bushings, and
+stress at four places, the worst.
 """
 
 import argparse

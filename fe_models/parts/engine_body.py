@@ -9,12 +9,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.meshes.shell_mesh import ShellMesh
 from fe_models.parts.lengths import require, require_lengths
 
 __all__ = ["EngineBody", "engine_body_mesh", "mesh_deck"]
+
+
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,9 @@ class EngineBody:
             ("floor < waist < window_top < cantrail", zs),
             ("seat < width/2", (self.seat, self.width / 2)),
         ):
-            require(self, bool((np.diff(row) > 0).all()), f"{what}, got {', '.join(f'{v:g}' for v in row)}", "change one")
+            require(
+                self, bool((np.diff(row) > 0).all()), f"{what}, got {', '.join(f'{v:g}' for v in row)}", "change one"
+            )
 
     def frames(self) -> Array:
         """Return places x >= 0 of the frames, ascending; every edge has one."""
@@ -67,7 +73,9 @@ class EngineBody:
 
 def divided(edges: tuple[float, ...], size: float) -> Array:
     """Return edges and equal parts between them that are no longer than `size`, ascending."""
-    parts = [np.linspace(a, b, max(int(np.ceil((b - a) / size - 1e-9)), 1) + 1)[:-1] for a, b in itertools.pairwise(edges)]
+    parts = [
+        np.linspace(a, b, max(int(np.ceil((b - a) / size - 1e-9)), 1) + 1)[:-1] for a, b in itertools.pairwise(edges)
+    ]
     return np.concatenate([*parts, [edges[-1]]])
 
 
@@ -75,10 +83,10 @@ def engine_body_mesh(part: EngineBody | None = None, *, size: float = 0.5) -> Sh
     """Return quads and lines of the body.
 
     Groups of cells: "floor", "side", "roof", "end", "bulkhead". Groups of lines: "solebar" and "cantrail" (along the
-    edges of floor and roof), "stringer" (along sides and roof), "post" (of end walls
-    and bulkheads), "bolster" (across the floor at the pivots), "crossbeam"
-    (across the floor at the other frames), "frame" (up the sides and over the roof). Node sets of one node: "seat_1_left", "seat_1_right", "seat_2_left",
-    "seat_2_right" (bogie 1 in front), "pivot_1", "pivot_2", mounts of the equipment, and places to look at.
+    edges of floor and roof), "stringer" (along sides and roof), "post" (of end walls and bulkheads), "bolster" (across
+    the floor at the pivots), "crossbeam" (across the floor at the other frames), "frame" (up the sides and over the
+    roof). Node sets of one node: "seat_1_left", "seat_1_right", "seat_2_left", "seat_2_right" (bogie 1 in front),
+    "pivot_1", "pivot_2", mounts of the equipment, and places to look at.
 
     Parameters
     ----------
@@ -96,7 +104,7 @@ def engine_body_mesh(part: EngineBody | None = None, *, size: float = 0.5) -> Sh
     require(part, 0 < size < np.inf, f"a size above zero, got {size:g}", "choose one of 0.2 to 1 m")
     x, y, z = part.stations(size)
     grid = _Grid(part)
-    n_x, n_y, n_z = len(x), len(y), len(z)
+    n_y, n_z = len(y), len(z)
     up = (z - z[0]) / (z[-1] - z[0])
 
     floor = grid.nodes(np.stack(np.broadcast_arrays(x[:, None], y[None, :], part.floor), axis=-1))
@@ -114,7 +122,8 @@ def engine_body_mesh(part: EngineBody | None = None, *, size: float = 0.5) -> Sh
     grid.quads("side", right, kept=is_wall)
     y_cells = np.abs(0.5 * (y[:-1] + y[1:]))
     is_screen = (y_cells < part.seat)[:, None] & is_window_z[None, :]
-    for at, kind in ((0, "end"), (-1, "end"), (_at(x, -part.bulkhead), "bulkhead"), (_at(x, part.bulkhead), "bulkhead")):
+    walls = [(0, "end"), (-1, "end"), *((_at(x, sign * part.bulkhead), "bulkhead") for sign in (-1, 1))]
+    for at, kind in walls:
         wall = np.empty((n_y, n_z, 3))
         wall[..., 0], wall[..., 1] = x[at], y[:, None]
         wall[..., 2] = part.floor + (part.roof(y) - part.floor)[:, None] * up[None, :]
@@ -189,7 +198,7 @@ class _Grid:
         found = [self.number.setdefault(key, len(self.number)) for key in keys]
         return np.array(found, dtype=np.int64).reshape(points.shape[:-1])
 
-    def quads(self, group: str, index: IntArray, *, kept: Array | None = None, outwards: bool = True) -> None:
+    def quads(self, group: str, index: IntArray, *, kept: BoolArray | None = None, outwards: bool = True) -> None:
         """Add the cells of a grid of nodes; `outwards` as its two directions turn by the right hand."""
         cells = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1)
         cells = cells[kept] if kept is not None else cells.reshape(-1, 4)
@@ -199,7 +208,7 @@ class _Grid:
 
     def line(self, group: str, nodes: IntArray) -> None:
         """Add the lines from each node to the next."""
-        ends = [(int(a), int(b)) for a, b in zip(nodes[:-1], nodes[1:], strict=True)]
+        ends = [(int(a), int(b)) for a, b in itertools.pairwise(nodes)]
         self.line_groups.setdefault(group, []).extend(range(len(self.lines), len(self.lines) + len(ends)))
         self.lines += ends
 

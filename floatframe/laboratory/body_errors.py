@@ -86,7 +86,7 @@ class BodyReference:
 
 
 def largest_difference(histories: Mapping[str, Array], full: Mapping[str, Array]) -> float:
-    """Return the greatest difference of vectors over time, (n_t, n) each, over the greatest vector of the full model."""
+    """Return the greatest difference of vectors over time, (n_t, n) each, over the greatest of the full model."""
     difference = max(float(la.norm(histories[name] - of, axis=1).max()) for name, of in full.items())
     return difference / max(float(la.norm(of, axis=1).max()) for of in full.values())
 

@@ -1,7 +1,7 @@
-"""A full finite element body on bushings, within a system: nothing is reduced, and the body may turn as far as it likes.
+"""A full finite element body on bushings, within a system: nothing is reduced, and the body may turn as it likes.
 
 (1) the system is run with the body rigid: motion of its frame B and of the other bodies, wrenches of the bushings
-(2) u, displacement of the body relative to B, and w_k, small motions of chosen rigid bodies relative to (1), in mesh axes:
+(2) u, displacement of the body relative to B, and w_k, small motions of chosen rigid bodies relative to (1):
 
         M u'' + D u' + K u + Σ B_uᵀ (D_b x' + K_b x) = -M Psi_R (a, alpha) - Σ omega_a omega_b f_ab + Σ B_uᵀ W_b(t)
         M_k w_k'' + Σ B_kᵀ (D_b x' + K_b x) = 0,        x = B_u u + Σ B_k w_k
@@ -199,9 +199,7 @@ def _end(place: object) -> tuple[str, Marker | None]:
     return (body_name(place.body), place) if isinstance(place, Marker) else (body_name(place), None)  # type: ignore[arg-type]
 
 
-def _point(
-    where: str, system: System, body: FEBody, owner: str, marker: Marker | None, name: str
-) -> Array | None:
+def _point(where: str, system: System, body: FEBody, owner: str, marker: Marker | None, name: str) -> Array | None:
     """Return where a marker is placed, ground axes, (3,); None where it is placed by the other one."""
     if marker is None:
         return None

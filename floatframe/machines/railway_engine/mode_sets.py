@@ -140,4 +140,3 @@ def _body_of(path: Path) -> tuple[FEBody, RayleighDamping, dict[str, sp.sparray]
         nearest = int(np.linalg.norm(centres - point, axis=1).argmin())
         stress[place] = stress_rows(shell_points(body, {"quad": [nearest]}))
     return lean_body(body), damping, stress
-

@@ -18,7 +18,7 @@ __all__ = ["Defect", "SCurve", "WheelPaths", "envelope", "path_table"]
 
 CHANNELS = ("x", "y", "yaw", "roll")  #: of each wheelset, in the order of the columns
 N_CONTACT = 1001  #: places along the wheel that are tried
-FINE = 1e-3  #: distance of the places of a path before its kinks are rounded [m]
+N_PATCH = 15  #: places in half a contact over which a path is rounded
 
 
 def envelope(rail: Callable[[Array], Array], s: Array, reach: float, radius: float) -> Array:
@@ -47,7 +47,7 @@ class WheelPaths:
     """Where the track leads each wheelset."""
 
     t: Array  #: (n_t,) [s]
-    places: Array  #: x, y of the middle of the track [m], yaw [rad], turn about the right rail [rad], (n_t, n_wheelsets, 4)
+    places: Array  #: x, y of the track [m], yaw [rad], turn about the right rail [rad], (n_t, n_wheelsets, 4)
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,9 @@ class Defect:
 
     def rounded(self, path: Callable[[Array], Array], s: Array) -> Array:
         """Return the mean of a path about s, weighted by a cosine over the contact, (n,) [m]."""
-        at = np.arange(s.min() - 2 * self.patch, s.max() + 2 * self.patch, FINE)
-        x = np.arange(-self.patch, self.patch + FINE / 2, FINE)
-        weight = 1 + np.cos(np.pi * x / self.patch)
+        step = self.patch / N_PATCH
+        at = np.arange(s.min() - 2 * self.patch, s.max() + 2 * self.patch, step)
+        weight = 1 + np.cos(np.pi * np.arange(-N_PATCH, N_PATCH + 1) / N_PATCH)
         smooth = np.convolve(path(at), weight / weight.sum(), mode="same")
         return np.interp(s, at, smooth)
 
@@ -104,7 +104,7 @@ class Defect:
         """Return the paths of wheelsets at these places x at the start, (n_wheelsets,), every h seconds."""
         first, last = max(wheelsets), min(wheelsets)
         duration = (first - last + self.begin) / self.speed + self.rest
-        t = h * np.arange(int(np.ceil(duration / h)) + 1)
+        t: Array = h * np.arange(int(np.ceil(duration / h)) + 1, dtype=np.float64)
         places = np.zeros((len(t), len(wheelsets), 4))
         for k, x in enumerate(wheelsets):
             s = x - first - self.begin + self.speed * t
@@ -151,7 +151,7 @@ class SCurve:
         steps = np.sqrt(1 + self.slope(x) ** 2)
         way = np.concatenate([[0.0], np.cumsum(0.5 * (steps[1:] + steps[:-1]) * np.diff(x))])
         duration = (first - last + self.begin + way[-1]) / self.speed + self.rest
-        t = h * np.arange(int(np.ceil(duration / h)) + 1)
+        t: Array = h * np.arange(int(np.ceil(duration / h)) + 1, dtype=np.float64)
         places = np.zeros((len(t), len(wheelsets), 4))
         start = first + self.begin
         for k, place in enumerate(wheelsets):

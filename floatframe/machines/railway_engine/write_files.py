@@ -14,7 +14,7 @@ from floatframe.machines.railway_engine.wheel_paths import Defect, SCurve, path_
 
 __all__ = ["CASES", "railway_engine_files", "write_railway_engine"]
 
-CASES = {"defect": Defect, "s_curve": SCurve}
+CASES: dict[str, type[Defect] | type[SCurve]] = {"defect": Defect, "s_curve": SCurve}
 SAMPLE = {"defect": 2e-3, "s_curve": 2e-2}  #: times between samples of the paths [s]
 SIZE = 0.75  #: largest edge of a cell of the mesh that is shipped [m]
 
