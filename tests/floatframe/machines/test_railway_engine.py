@@ -101,7 +101,7 @@ def test_what_does_not_fit_is_refused():
 def coarse(tmp_path_factory):
     """The vehicle with a coarse body, 4 m between two short passages: its system over the first bump and its body."""
     folder = tmp_path_factory.mktemp("engine")
-    track = Defect(begin=0.3, rest=0.0)
+    track = Defect(vertical=0.5e-3, lateral=0.2e-3, begin=0.3, rest=0.0)  # small: all is linear
     path = write_railway_engine(folder, "defect", track=track, part=EngineBody(pitch=3.0), size=3.0)
     body = job_body(read_job(folder / "carbody.toml"))
     with cms.Families(lean_body(body)) as families:
@@ -112,7 +112,7 @@ def coarse(tmp_path_factory):
     text = path.read_text()
     path.write_text(text[: text.index("[sensors.cab]")] + text[text.index("[run]") :])
     system, run = read_system(path)
-    return body, system, Loading(system, run.integrator, 0.30, 1e-3, 5)
+    return body, system, Loading(system, run.integrator, 0.30, 5e-4, 10)
 
 
 @pytest.fixture(scope="module")
@@ -165,11 +165,11 @@ def linear_vehicle(body, system):
 
 
 def test_the_full_body_moves_as_the_linear_vehicle_on_its_wheels(coarse, full):
-    """On a straight track all is linear: the whole vehicle at once, by the trapezoidal rule with half the step."""
+    """On a straight track and a small defect all is linear: the whole vehicle at once, by the trapezoidal rule."""
     body, system, loading = coarse
     lean = lean_body(body)
     M, D, K, K_w, D_w = linear_vehicle(lean, system)
-    h = 0.5 * loading.h
+    h = loading.h
     t = h * np.arange(round(loading.t_end / h) + 1)
     w, w_dot = np.zeros((24, len(t))), np.zeros((24, len(t)))
     for k in range(4):
@@ -189,11 +189,11 @@ def test_the_full_body_moves_as_the_linear_vehicle_on_its_wheels(coarse, full):
         a = factor.solve(f[:, k] - D @ v_p - K @ u_p)
         u, v = u_p + 0.25 * h**2 * a, v_p + 0.5 * h * a
         kept.append(u)
-    there = without_rigid(lean, np.array(kept)[:: 2 * loading.every, : lean.n_dof].T)
+    there = without_rigid(lean, np.array(kept)[:: loading.every, : lean.n_dof].T)
     reference = BodyReference(lean, full.t, full.u)
     error = la.norm(there - reference.elastic) / la.norm(there)
     assert la.norm(there[:, -1]) > 0.01 * la.norm(there, axis=0).max()  # it still rings
-    assert error < 0.02  # steps of 1 ms against 0.5 ms
+    assert error < 1e-3  # with the defect of 10 mm it is 0.9 %: products of angles, which the linear vehicle lacks
     assert full.imbalance < 1e-9
 
 
