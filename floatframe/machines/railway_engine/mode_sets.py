@@ -16,6 +16,7 @@ from cms.mode_set import ModeSet
 from cms.reduced_basis.damping import RayleighDamping
 from fe_models.body.fe_body import FEBody
 from fe_models.shells.shell_points import shell_points
+from floatframe.bodies.markers import Marker
 from floatframe.errors import ModelError
 from floatframe.forces import Bushing
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
@@ -62,8 +63,8 @@ def engine_loads(system: System) -> list[cms.InterfaceLoad]:
     """Return what the bushings of the body put on its interfaces, for `cms.benfield_hruda`: springs to the ground."""
     loads = []
     for force in system.forces:
-        if isinstance(force, Bushing) and not isinstance(force.marker_b, str) and force.marker_b.interface is not None:
-            K = np.diag(force.stiffness)
+        if isinstance(force, Bushing) and isinstance(force.marker_b, Marker) and force.marker_b.interface is not None:
+            K = np.diag(force.stiffness).tolist()
             loads.append(cms.point_load(force.marker_b.interface, stiffness=K[:3], rotational_stiffness=K[3:]))
     return loads
 
