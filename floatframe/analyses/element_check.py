@@ -79,7 +79,7 @@ def check_element(system: System, name: str, state: State | None = None) -> Elem
             continue
         findings += balance(placed, values, where)
         own, other = own_slopes(placed, inputs), differences(placed, inputs)
-        worst = max(worst, relative_error(own, other).max(initial=0.0))
+        worst = max(worst, relative_error(len(placed.markers), own, other).max(initial=0.0))
         findings += wrong_slopes(placed, own, other, where)
         findings += wrong_dependence(placed, other, where)
     return ElementCheck(name, tuple(dict.fromkeys(findings)), worst)
@@ -205,16 +205,18 @@ def without_ground(placed: PlacedLaw, slopes: Array) -> Array:
     return slopes
 
 
-def relative_error(own: Array, other: Array) -> Array:
-    """Return the differences of derivatives, relative to the largest of their row."""
+def relative_error(n: int, own: Array, other: Array) -> Array:
+    """Return the differences of derivatives, relative to the largest of their row, above rounding of all wrenches."""
     scale = np.maximum(np.abs(own), np.abs(other)).max(axis=1, initial=0.0, keepdims=True)
+    of_wrenches = scale[: 6 * n]
+    of_wrenches[:] = np.maximum(of_wrenches, ROUNDING / DERIVATIVE * of_wrenches.max(initial=0.0))
     error = np.where(np.isfinite(own), np.abs(own - other), np.inf)
     return np.divide(error, scale, out=np.zeros_like(error), where=(error > 0) & np.isfinite(scale))
 
 
 def wrong_slopes(placed: PlacedLaw, own: Array, other: Array, where: str) -> list[str]:
     """(4): return the worst derivative, if it is wrong."""
-    error = relative_error(own, other)
+    error = relative_error(len(placed.markers), own, other)
     error = np.where(np.isfinite(own), error, np.inf)
     if error.max(initial=0.0) <= DERIVATIVE:
         return []

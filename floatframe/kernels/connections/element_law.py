@@ -21,7 +21,7 @@ from floatframe.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.compiler.user_call import call_law
 from floatframe.kernels.rotation import exp_matrix
-from floatframe.kernels.vector import add, matrix, norm, product, put, put_sum, scaled, vector
+from floatframe.kernels.vector import add, dot, matrix, norm, product, put, put_sum, scaled, vector
 
 __all__ = ["law_derivatives", "law_power", "law_rates", "law_rows", "law_values"]
 
@@ -81,19 +81,24 @@ def law_rows(model, work, c, c_k):
             if place >= 0:
                 put_sum(work.markers.wrench[m], part, scaled(model.markers.sign[m], vector(w[k + place :])))
     law_values(model, work, c)
-    note_what_is_no_number(model, work, c)
+    total = 0.0
     for j in range(laws.row0[i], laws.row0[i + 1]):
         g[k] = c_k * (w[k] - laws.factor[j] * out[laws.source[j]])
+        total += g[k]
         k += 1
     o, s = 6 * laws.head[i, 0], laws.state0[i]
     for _ in range(laws.head[i, 2]):
         g[k] = c_k * (w[k] - work.states.base[s] - work.states.kappa[s] * w[k + 1])
         g[k + 1] = c_k * (w[k + 1] - out[o])
+        total += g[k + 1]
         g[k + 2] = c_k * (w[k + 2] - work.states.rate_base[s] - work.states.rho * w[k + 1])
         o, s, k = o + 1, s + 1, k + 3
     for _ in range(laws.head[i, 3]):
         g[k] = out[o] * (c_k if model.rows.holds[k] == NOTHING else 1.0)
+        total += g[k]
         o, k = o + 1, k + 1
+    if not math.isfinite(total):
+        note_what_is_no_number(model, work, c)
 
 
 @inner
@@ -125,9 +130,6 @@ def law_derivatives(model, work, c, c_k):
     for r in range(size):
         for j in range(size):
             V[r, j] = 0.0
-        for m in range(a, a + n):
-            for j in range(12):
-                work.connections.P[m, r, j] = 0.0
     law_inputs(model, work, c)
     data = laws.data[laws.data0[i] : laws.data0[i + 1]]
     call_law(laws.tangent[i], laws.head[i], work.laws.inputs, data, slopes)
@@ -145,6 +147,9 @@ def law_derivatives(model, work, c, c_k):
         V[r + 1, r + 1] = 1.0
         V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
         add_slopes(work, V, a, n, n_z, n_lam, states, r + 1, -c_k, -1.0, own)
+        for m in range(a, a + n):
+            for j in range(12):
+                work.connections.P[m, r, j], work.connections.P[m, r + 2, j] = 0.0, 0.0
         o, r = o + 1, r + 3
     for _ in range(n_lam):
         own = slopes[o * n_columns : (o + 1) * n_columns]
@@ -241,6 +246,21 @@ def law_rates(model, work, c, rate, bias):
 
 
 @inner
+def power_on_bodies(model, work, c):
+    """Return the power of the wrenches of element c."""
+    first, last = model.connections.a[c], model.connections.a[c] + model.laws.head[model.connections.item[c], 0]
+    w = work.state.w[model.connections.w0[c] :]
+    total = 0.0
+    for m in range(first, last):
+        force, moment, sign = model.markers.force[m], model.markers.moment[m], model.markers.sign[m]
+        if force >= 0:
+            total += sign * dot(w[force:], work.markers.v[m])
+        if moment >= 0:
+            total += sign * dot(w[moment:], work.markers.omega[m])
+    return total
+
+
+@inner
 def law_power(model, work, c):
     """Return the energy that element c holds, the power it gives to the system, and what it takes; at the iterate.
 
@@ -249,24 +269,20 @@ def law_power(model, work, c):
     Power on the bodies P_b = given - lost - d(energy)/dt. An element that names no energy holds none; what it then
     does not name follows from P_b.
     """
-    i, a = model.connections.item[c], model.connections.a[c]
-    laws = model.laws
+    i, laws = model.connections.item[c], model.laws
+    energy, given, lost = laws.energy[i], laws.given[i], laws.lost[i]
+    if energy < 0 and given < 0 and lost < 0 and laws.stop0[i] == laws.stop0[i + 1]:
+        return 0.0, power_on_bodies(model, work, c), 0.0
     law_values(model, work, c)
     seen = 6 * laws.head[i, 0] + laws.head[i, 2] + laws.head[i, 3]
     for k in range(laws.stop0[i], laws.stop0[i + 1]):
         if work.laws.outputs[seen + laws.stop[k]] > 0.0 and work.counted.stopped == 0:
             work.counted.stopped = k + 1
-    energy, given, lost = laws.energy[i], laws.given[i], laws.lost[i]
     P_given = work.laws.outputs[seen + given] if given >= 0 else 0.0
     P_lost = work.laws.outputs[seen + lost] if lost >= 0 else 0.0
     if energy >= 0:
         return work.laws.outputs[seen + energy], P_given, P_lost
-    on_bodies = 0.0
-    for m in range(a, a + laws.head[i, 0]):
-        o = 6 * (m - a)
-        for k in range(3):
-            on_bodies += work.laws.outputs[o + k] * work.markers.v[m, k]
-            on_bodies += work.laws.outputs[o + 3 + k] * work.markers.omega[m, k]
+    on_bodies = power_on_bodies(model, work, c)
     if given < 0:
         return 0.0, on_bodies + P_lost, P_lost
     if lost < 0:
