@@ -78,4 +78,4 @@ def brush_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 def brush_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
     """Write the same for a wheel that stands: its tread is stretched by what it has moved."""
     brush_law(t, x, z, lam, data, wrench, z_dot, g, seen)
-    hold_tread(x, data, z, z_dot)
+    hold_tread(x, data, seen[10], z, z_dot)

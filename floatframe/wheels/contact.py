@@ -129,9 +129,9 @@ def contact(x, data):
 
 @register_jitable(error_model="numpy")
 def moved(x, data):
-    """Return how far a standing wheel has moved since it was placed: along x, along y, and turned about its axis.
+    """Return how far a standing wheel has moved since it was placed: along x, along y, turned about its axis and x.
 
-    In axes of the road, for small motions: the turn is half the skew part of the relative rotation along the axis.
+    In axes of the road, for small motions: the turn is half the skew part of the relative rotation.
     """
     axis = data[AXIS], data[AXIS + 1], data[AXIS + 2]
     c = turned_back(x, 0, (x[1, 0] - x[0, 0], x[1, 1] - x[0, 1], x[1, 2] - x[0, 2]))
@@ -139,12 +139,14 @@ def moved(x, data):
     e = turned_back(x, 0, turned(x, 1, axis))
     length = np.sqrt(e[0] * e[0] + e[1] * e[1])
     ahead = e[1] / length, -e[0] / length
-    turn = 0.0 * gone[0]
+    turn, lean = 0.0 * gone[0], 0.0 * gone[0]
     for k in range(3):  # columns of the placed axes, and where they are now
         old = data[TURN_AT + k], data[TURN_AT + 3 + k], data[TURN_AT + 6 + k]
         new = turned_back(x, 0, (x[1, 3 + k], x[1, 6 + k], x[1, 9 + k]))
-        turn += 0.5 * dot(cross(old, new), e)
-    return gone[0] * ahead[0] + gone[1] * ahead[1], -gone[0] * ahead[1] + gone[1] * ahead[0], turn
+        half = cross(old, new)
+        turn += 0.5 * dot(half, e)
+        lean += 0.5 * (half[0] * ahead[0] + half[1] * ahead[1])
+    return gone[0] * ahead[0] + gone[1] * ahead[1], -gone[0] * ahead[1] + gone[1] * ahead[0], turn, lean
 
 
 @register_jitable(error_model="numpy")

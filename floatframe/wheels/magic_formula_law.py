@@ -167,4 +167,4 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 def magic_formula_law_at_rest(t, x, z, lam, data, wrench, z_dot, g, seen):
     """Write the same for a wheel that stands: its tread is stretched by what it has moved."""
     magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen)
-    hold_tread(x, data, z, z_dot)
+    hold_tread(x, data, seen[10], z, z_dot)

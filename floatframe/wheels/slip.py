@@ -115,15 +115,17 @@ def tread_slip(data, sigma, scale, z, z_dot, transport, V_sx, V_sy, landed):
 
 
 @register_jitable(error_model="numpy")
-def hold_tread(x, data, z, z_dot):
+def hold_tread(x, data, rho, z, z_dot):
     """Write the rates that vanish where the tread is stretched by what a standing wheel has moved since it was placed.
 
-    Without rolling u_dot = -V_sx and v_dot = V_sy, so that u = -(s_x - R_0 phi) and v = s_y: what statics asks for.
+    Without rolling u_dot = -V_sx and v_dot = V_sy, so that u = -(s_x - R_e phi) and v = s_y + rho times the lean, with
+    R_e of a flattening of a third: what statics asks for.
     """
-    s_x, s_y, turn = moved(x, data)
+    s_x, s_y, turn, lean = moved(x, data)
+    R_e = (2.0 * data[RADIUS] + rho) / 3.0
     k = 0
     if data[SIGMA_X] > 0.0:
-        z_dot[0] = -(s_x - data[RADIUS] * turn) - z[0]
+        z_dot[0] = -(s_x - R_e * turn) - z[0]
         k = 1
     if data[SIGMA_Y] > 0.0:
-        z_dot[k] = s_y - z[k]
+        z_dot[k] = s_y + rho * lean - z[k]
