@@ -10,6 +10,7 @@ from floatframe.errors import ModelError
 from floatframe.wheels.contact import COMMON, RADIUS, ROAD
 from floatframe.wheels.outputs import OUTPUTS
 from floatframe.wheels.roads.road import Road
+from floatframe.wheels.roads.surface import FLAT
 
 __all__ = ["tyre_law", "tyre_numbers"]
 
@@ -77,4 +78,5 @@ def tyre_law(
         output_units=tuple(OUTPUTS.values()),
         energy="energy",
         power_lost="power_lost",
+        stops={} if data[int(data[ROAD])] == FLAT else {"off_road": "the wheel is beyond the end of its road"},
     )

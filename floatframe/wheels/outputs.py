@@ -10,7 +10,7 @@ OUTPUTS = {
     "Fx": "N", "Fy": "N", "Fz": "N", "Mx": "N m", "My": "N m", "Mz": "N m",
     "kappa": "1", "alpha": "rad", "gamma": "rad", "deflection": "m", "loaded_radius": "m",
     "Vx": "m/s", "Vsx": "m/s", "Vsy": "m/s", "px": "m", "py": "m", "pz": "m",
-    "energy": "J", "power_lost": "W", "road_left": "m", "clamped": "1",
+    "energy": "J", "power_lost": "W", "road_left": "m", "clamped": "1", "off_road": "m",
 }  # fmt: skip
 
 
@@ -31,8 +31,9 @@ def show(seen, F, M, slips, shape, speeds, point):
 
 @register_jitable(error_model="numpy")
 def show_energy(seen, energy, lost, left, clamped):
-    """Write energy stored, power lost, what is left of the road, and how many inputs were held in their ranges."""
+    """Write energy stored, power lost, what is left of the road, how many inputs were held in their ranges."""
     seen[17] = energy
     seen[18] = lost
     seen[19] = left
     seen[20] = clamped
+    seen[21] = -left
