@@ -15,7 +15,7 @@ from floatframe.bodies.rigid_body import RigidBody
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
 from floatframe.pictures.body_colors import DISPLACEMENT, BodyColor
-from floatframe.pictures.element_looks import element_pieces
+from floatframe.pictures.element_looks import dressed_bodies, element_pieces
 from floatframe.pictures.film_times import FilmTimes, film_times, round_below, speed_words, time_words
 from floatframe.pictures.glyphs import glyphs
 from floatframe.pictures.looks import looks_of, places_over
@@ -132,6 +132,7 @@ def motion_scene(
     if magnification is None:
         magnification = chosen_magnification(flexible, displacements)
     surfaces, triads, lines = [], [], []
+    dressed = dressed_bodies(system)
     named: dict[str, Body] = {name: body for name, body in bodies.items() if isinstance(body, RigidBody)}
     named |= {} if system is None else {body.name: body for body in system.bodies}
     scalars = {name: color.values(body, motions[name].q[rows]) for name, body in flexible.items()}
@@ -154,7 +155,7 @@ def motion_scene(
                 path = interface_path(motions[name], interface, magnification)
                 triads.append(Triad(path[rows], R @ interface.triad, 0.06 * size, interface.name))
                 lines.append(trail(path, rows))
-        elif looks:
+        elif looks or name in dressed:
             lines.append(trail(motions[name].r, rows))
         else:
             rigid = bodies.get(name)

@@ -5,44 +5,110 @@ from dataclasses import replace
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
+from floatframe.bodies.markers import body_name
 from floatframe.compiling.markers import MarkerData, find_marker
 from floatframe.elements.element import Element, markers_of
+from floatframe.errors import ModelError
 from floatframe.results.joint_coordinates import end_motion
 from floatframe.results.trajectory import Trajectory
-from floatframe.shapes import Drawn, Piece, Stretched
+from floatframe.shapes import Arrow, Drawn, Piece, Stretched
 from floatframe.shapes.drawn import SECOND, STRETCH, StretchedPiece
 from floatframe.system import System
 
-__all__ = ["element_pieces"]
+__all__ = ["drawn_pieces", "dressed_bodies", "element_pieces", "shown_of"]
 
 Placed = tuple[Piece, Array]  #: a piece, and its nodes in ground axes, (n, 3) or (n_frames, n, 3)
 COLOR = "#2a7f62"
 
 
+def shown_of(system: System, element: Element) -> tuple[Drawn | Stretched | Arrow, ...]:
+    """Return what an element shows of itself, without what gives way to shapes that its bodies have of their own.
+
+    Raises
+    ------
+    ModelError
+        If it shows something else, or at a marker that it does not have.
+    """
+    where, markers, found = f"element {element.name!r}", markers_of(element), []
+    shapely = {body.name for body in system.bodies if body.shapes}
+    for each in element.drawn():
+        require_markers(where, each, len(markers))
+        if isinstance(each, Drawn) and each.is_default and each.marker is not None:
+            if body_name(markers[each.marker].body) in shapely:
+                continue
+        found.append(each)
+    return tuple(found)
+
+
+def require_markers(where: str, shown: Drawn | Stretched | Arrow, n: int) -> None:
+    """Raise `ModelError` unless an element shows itself at markers it has."""
+    if not isinstance(shown, Drawn | Stretched | Arrow):
+        raise ModelError(f"{where}: drawn: expected Drawn, Stretched or Arrow, got {shown!r}")
+    numbers = (shown.first, shown.second) if isinstance(shown, Stretched) else (shown.marker,)
+    wrong = [number for number in numbers if number is not None and not 0 <= number < n]
+    if wrong:
+        raise ModelError(f"{where}: drawn: marker {wrong[0]}: expected 0 to {n - 1}, the numbers of its markers")
+
+
+def dressed_bodies(system: System | None) -> set[str]:
+    """Return the names of the bodies on which elements draw shapes, such as the wheels of tyres."""
+    found = set()
+    for element in () if system is None else system.elements:
+        for each in shown_of(system, element):  # type: ignore[arg-type]
+            if isinstance(each, Drawn) and each.marker is not None:
+                found.add(body_name(markers_of(element)[each.marker].body))
+    return found
+
+
+def drawn_pieces(drawn: Drawn, metres: float) -> list[Piece]:
+    """Return the pieces of a shape in units of a system whose unit of length has so many metres."""
+    scale = 1 / metres if drawn.is_in_metres else 1.0
+    return [replace(p, nodes=scale * p.nodes, color=p.color or COLOR) for p in drawn.shape.pieces()]
+
+
 def element_pieces(system: System, trajectory: Trajectory, rows: IntArray) -> list[Placed]:
-    """Return the pieces of all elements with their nodes over the frames; arrows of loads are left to pages."""
-    return [each for element in system.elements for each in pieces_of(system, trajectory, rows, element)]
+    """Return the pieces of all elements with their nodes over the frames; arrows of loads are left to pages.
+
+    What stands on the ground is there once, though several elements show it.
+    """
+    found: list[Placed] = []
+    seen = set()
+    for element in system.elements:
+        for piece, at in pieces_of(system, trajectory, rows, element):
+            key = (piece.color, at.tobytes()) if at.ndim == 2 else None
+            if key is None or key not in seen:
+                seen.add(key)
+                found.append((piece, at))
+    return found
 
 
 def pieces_of(system: System, trajectory: Trajectory, rows: IntArray, element: Element) -> list[Placed]:
     """Return the pieces of an element."""
-    shown = tuple(element.drawn())
+    shown = shown_of(system, element)
     if not shown:
         return []
     ends = [find_marker(system, f"element {element.name!r}", marker) for marker in markers_of(element)]
     found: list[Placed] = []
     for each in shown:
         if isinstance(each, Drawn):
-            for piece in each.shape.pieces():
-                coloured = piece if piece.color else replace(piece, color=COLOR)
-                found.append((coloured, piece.nodes if each.marker is None else
-                              at_marker(system, trajectory, rows, ends[each.marker], piece.nodes)))  # fmt: skip
+            end = None if each.marker is None else ends[each.marker]
+            for piece in drawn_pieces(each, system.units.length):
+                found.append((piece, placed_nodes(system, trajectory, rows, end, piece.nodes)))
         elif isinstance(each, Stretched):
             a, b = (end_motion(system, trajectory, ends[k]).position[rows] for k in (each.first, each.second))
             length = float(np.linalg.norm(b[0] - a[0]))
             if length > 0:
                 found += [(part.piece, stretched(part, a, b)) for part in each.pieces(length)]
     return found
+
+
+def placed_nodes(system: System, trajectory: Trajectory, rows: IntArray, end: MarkerData | None, nodes: Array) -> Array:
+    """Return nodes in the axes of a marker, ground axes: (n, 3) on the ground, else (n_frames, n, 3)."""
+    if end is None:
+        return nodes
+    if end.body < 0:
+        return np.asarray(end.shape.position + nodes @ end.shape.triad.T)
+    return at_marker(system, trajectory, rows, end, nodes)
 
 
 def at_marker(system: System, trajectory: Trajectory, rows: IntArray, end: MarkerData, nodes: Array) -> Array:

@@ -29,6 +29,8 @@ class Drawn:
 
     shape: Shape
     marker: int | None = 0  #: number in `Element.markers`; None: the ground, such as for its road or track
+    is_default: bool = False  #: whether it gives way to shapes that the body of its marker has of its own
+    is_in_metres: bool = False  #: whether its numbers are metres, whatever the units of the system
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,8 @@ class Stretched:
 class Arrow:
     """An arrow at a marker, along three outputs of the element, as long as they are large."""
 
-    outputs: tuple[str, str, str]  #: names of the components, as in `ElementLaw.outputs`
+    #: names of the components, as in `ElementLaw.outputs`; None: the force of the element on the body of the marker
+    outputs: tuple[str, str, str] | None = None
     marker: int = 0  #: number of the marker it starts at
     is_in_marker_axes: bool = False  #: whether the components are along the axes of the marker, else of the ground
     at: tuple[str, str, str] | None = None  #: outputs that are the place of its start, ground axes; None: the marker

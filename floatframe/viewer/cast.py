@@ -8,6 +8,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.pictures.animation import GLASS, LARGEST, RIGID_COLOR, connections, hides_flexible, rotations
+from floatframe.pictures.element_looks import dressed_bodies
 from floatframe.pictures.looks import looks_of
 from floatframe.pictures.stage import box_of
 from floatframe.shapes import Piece, Plane
@@ -58,7 +59,14 @@ class Cast:
     placed: list[Placed] = field(default_factory=list)
     between: list[Between] = field(default_factory=list)
     forces: list[Force] = field(default_factory=list)
-    planes: list[Plane] = field(default_factory=list)  #: flat grounds without an end
+    #: flat grounds without an end: upwards, height along it, distance of grid lines (None: any)
+    planes: list[tuple[Array, float, float | None]] = field(default_factory=list)
+    on_ground: set[object] = field(default_factory=set)  #: what elements have drawn there already
+
+    def add_plane(self, plane: Plane, position: Array, axes: Array) -> None:
+        """Add a flat ground."""
+        normal = axes @ plane.normal
+        self.planes.append((normal, float(position @ normal), plane.step))
 
     @property
     def has_ground(self) -> bool:
@@ -81,12 +89,13 @@ def bodies_cast(cast: Cast, bodies: dict[str, RigidBody | FlexibleBody | None], 
     motions = {name: trajectory.body(name) for name in bodies}
     frames = {name: (motion.r[rows[:1]], rotations(motion.p[rows[:1]])) for name, motion in motions.items()}
     flexible = {name: body.reduced for name, body in bodies.items() if isinstance(body, FlexibleBody)}
+    dressed = dressed_bodies(carriers.system)
     for i, (name, body) in enumerate(bodies.items()):
         looks = () if body is None else looks_of(body)
         for look in looks:
             piece = look.piece if look.piece.color else replace(look.piece, color=RIGID_COLOR)
             cast.placed.append(Placed(piece, carriers.of_shape(i, look.carrier)))
-        if looks or (isinstance(body, FlexibleBody) and len(body.reduced.surface)):
+        if looks or name in dressed or (isinstance(body, FlexibleBody) and len(body.reduced.surface)):
             continue
         if isinstance(body, FlexibleBody):
             corners, triangles = box_around(body.reduced.nodes, CUBE * size)
@@ -104,7 +113,7 @@ def scene_cast(cast: Cast) -> None:
     for shape in () if system is None else system.scene:
         geometry = getattr(shape, "geometry", shape)
         if isinstance(geometry, Plane):
-            cast.planes.append(geometry)
+            cast.add_plane(geometry, getattr(shape, "position", np.zeros(3)), np.eye(3))
         for piece in shape.pieces():
             coloured = piece if piece.color else replace(piece, color=RIGID_COLOR)
             cast.placed.append(Placed(coloured, GROUND_CARRIER, "scene"))

@@ -1,17 +1,15 @@
 """What public elements show of themselves in a page: `Element.drawn()` on their markers, arrows of their outputs."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.compiling.markers import find_marker
 from floatframe.elements.element import Element, markers_of
 from floatframe.errors import ModelError
-from floatframe.pictures.glyphs import SPRING_COLOR
+from floatframe.pictures.element_looks import drawn_pieces, shown_of
 from floatframe.results.element_motion import ElementMotion, element_motion
 from floatframe.rotations import rotation_exp, rotation_matrix
-from floatframe.shapes import Arrow, Drawn, Stretched
+from floatframe.shapes import Arrow, Drawn, Plane, Stretched
 from floatframe.viewer.carriers import GROUND_CARRIER
 from floatframe.viewer.cast import Between, Cast, Force, Placed
 from floatframe.viewer.connections import distance
@@ -29,19 +27,16 @@ def elements_cast(cast: Cast) -> None:
 def element_cast(cast: Cast, element: Element) -> None:
     """Add what an element shows of itself."""
     carriers, where = cast.carriers, f"element {element.name!r}"
-    system, shown = carriers.system, tuple(element.drawn())
+    system = carriers.system
+    shown = () if system is None else shown_of(system, element)
     if system is None or not shown:
         return
-    markers = markers_of(element)
-    ends = [carriers.of_marker(marker, find_marker(system, where, marker)) for marker in markers]
+    ends = [carriers.of_marker(marker, find_marker(system, where, marker)) for marker in markers_of(element)]
     motion = None
     for each in shown:
-        require_markers(where, each, len(ends))
         if isinstance(each, Drawn):
             carrier = GROUND_CARRIER if each.marker is None else ends[each.marker]
-            pieces = [piece if piece.color else replace(piece, color=SPRING_COLOR) for piece in each.shape.pieces()]
-            kind = "scene" if each.marker is None else "body"
-            cast.placed += [Placed(piece, carrier, kind) for piece in pieces]
+            drawn_cast(cast, each, carrier, system.units.length)
         elif isinstance(each, Stretched):
             a, b = ends[each.first], ends[each.second]
             length = distance(cast, a, b)
@@ -52,25 +47,33 @@ def element_cast(cast: Cast, element: Element) -> None:
             cast.forces.append(element_force(cast, element.name, each, ends[each.marker], motion))
 
 
-def require_markers(where: str, shown: Drawn | Stretched | Arrow, n: int) -> None:
-    """Raise `ModelError` unless an element shows itself at markers it has."""
-    if not isinstance(shown, Drawn | Stretched | Arrow):
-        raise ModelError(f"{where}: drawn: expected Drawn, Stretched or Arrow, got {shown!r}")
-    numbers = (shown.first, shown.second) if isinstance(shown, Stretched) else (shown.marker,)
-    wrong = [number for number in numbers if number is not None and not 0 <= number < n]
-    if wrong:
-        raise ModelError(f"{where}: drawn: marker {wrong[0]}: expected 0 to {n - 1}, the numbers of its markers")
+def drawn_cast(cast: Cast, drawn: Drawn, carrier: int, metres: float) -> None:
+    """Add a shape on a carrier; one that stands on the ground once, though several elements show it."""
+    found = cast.carriers.found[carrier]
+    if found.body < 0 and isinstance(drawn.shape.geometry, Plane):
+        cast.add_plane(drawn.shape.geometry, found.position + found.axes @ drawn.shape.position, found.axes)
+    for piece in drawn_pieces(drawn, metres):
+        if found.body < 0:
+            key = (carrier, piece.color, piece.nodes.tobytes())
+            if key not in cast.on_ground:
+                cast.on_ground.add(key)
+                cast.placed.append(Placed(piece, carrier, "scene"))
+        else:
+            cast.placed.append(Placed(piece, carrier, "body"))
 
 
 def element_force(cast: Cast, name: str, arrow: Arrow, carrier: int, motion: ElementMotion) -> Force:
     """Return an arrow of three outputs of an element."""
     rows, trajectory = cast.carriers.rows, cast.carriers.trajectory
-    missing = [each for each in (*arrow.outputs, *(arrow.at or ())) if each not in motion.outputs]
+    missing = [each for each in (*(arrow.outputs or ()), *(arrow.at or ())) if each not in motion.outputs]
     if missing:
         hint = nearest(missing[0], list(motion.outputs))
         raise ModelError(f"element {name!r}: drawn: there is no output {quoted(missing[0])}{hint}")
-    values = np.stack([motion.outputs[each][rows] for each in arrow.outputs], axis=1)
-    if arrow.is_in_marker_axes:
+    if arrow.outputs is None:
+        values = motion.wrench[rows, arrow.marker, :3]
+    else:
+        values = np.stack([motion.outputs[each][rows] for each in arrow.outputs], axis=1)
+    if arrow.is_in_marker_axes and arrow.outputs is not None:
         found = cast.carriers.found[carrier]
         axes = np.broadcast_to(found.axes, (len(rows), 3, 3))
         if found.motion is not None:

@@ -227,12 +227,8 @@ def ground_record(cast: Cast, stage: Stage) -> dict[str, Any] | None:
     """Return the flat ground: as the scene has it, or below all that moves where there is none; None: uneven ground."""
     up = stage.up / np.linalg.norm(stage.up)
     step = round_below(stage.size / 2)
-    system = cast.carriers.system
-    for shape in () if system is None else system.scene:
-        plane = getattr(shape, "geometry", shape)
-        if plane in cast.planes:
-            at = np.asarray(getattr(shape, "position", np.zeros(3)))
-            return {"normal": plane.normal.tolist(), "level": float(at @ plane.normal), "step": plane.step or step}
+    for normal, level, own in cast.planes[:1]:
+        return {"normal": normal.tolist(), "level": level, "step": own or step}
     if cast.has_ground:
         return None
     corners = np.array([stage.low, stage.high])

@@ -10,7 +10,9 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
 from floatframe.bodies.markers import Marker
 from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.shapes import Arrow, Drawn
 from floatframe.wheels.linear_law import linear_law, linear_law_at_rest
+from floatframe.wheels.looks import tyre_looks
 from floatframe.wheels.numbers import tyre_law, tyre_numbers
 from floatframe.wheels.reading import Read, tyre_of_table
 from floatframe.wheels.roads.road import FlatRoad, Road
@@ -57,6 +59,10 @@ class LinearTyre(Element):
     def from_table(cls, name: str, table: Mapping[str, Any], read: Read) -> "LinearTyre":
         """Return the tyre of [elements.NAME]."""
         return tyre_of_table(name, table, read, cls)
+
+    def drawn(self) -> tuple[Drawn | Arrow, ...]:
+        """Show wheel, road and force."""
+        return tyre_looks(self.radius, self.axis, self.road)
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law between the markers as placed."""

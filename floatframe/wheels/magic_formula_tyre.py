@@ -13,7 +13,9 @@ from floatframe.bodies.markers import Marker
 from floatframe.checked_values import number, unit_vector
 from floatframe.elements import Element, ElementLaw, Placed
 from floatframe.errors import ModelError
+from floatframe.shapes import Arrow, Drawn
 from floatframe.wheels.coefficients import COEFFICIENTS, NEEDED_COMBINED
+from floatframe.wheels.looks import tyre_looks
 from floatframe.wheels.magic_formula_law import magic_formula_law, magic_formula_law_at_rest
 from floatframe.wheels.numbers import tyre_law, tyre_numbers
 from floatframe.wheels.reading import Read, properties_of_table, tyre_of_table
@@ -107,6 +109,10 @@ class MagicFormulaTyre(Element):
         """Return the tyre of [elements.NAME]: its file is `file` or `shipped`, with `version` if it does not say it."""
         values = dict(table)
         return tyre_of_table(name, values, read, cls, tyre=properties_of_table(values, read))
+
+    def drawn(self) -> tuple[Drawn | Arrow, ...]:
+        """Show wheel, road and force."""
+        return tyre_looks(self.tyre.radius, self.axis, self.road, width=self.tyre.width, is_in_metres=True)
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law between the markers as placed, in units of the system."""

@@ -23,6 +23,7 @@ from floatframe import (
     integrate,
     static_equilibrium,
     view,
+    wheels,
 )
 from floatframe.errors import ModelError
 from floatframe.pictures.animation import motion_scene
@@ -303,3 +304,36 @@ def test_elements_that_show_what_they_have_not_are_refused(tmp_path, wrong, word
     motion = integrate(system, GeneralizedAlpha(0.8), 0.02, 1e-2)
     with pytest.raises(ModelError, match=words):
         view(motion, tmp_path / "no.html", system=system)
+
+
+def rolling(road, shapes=()):
+    wheel = RigidBody("wheel", 20.0, np.diag([0.5, 0.9, 0.5]), position=(0, 0, 0.3), velocity=(2.0, 0, 0),
+                      omega_B=(0, 2.0 / 0.3, 0), shapes=shapes)  # fmt: skip
+    tyre = wheels.LinearTyre("tyre", Marker(GROUND), Marker("wheel"), 0.31, 2e5, 1e4, 1e4, damping=500.0, road=road)
+    return System([wheel], [], [Gravity((0, 0, -9.81))], elements=[tyre])
+
+
+def test_a_tyre_shows_its_wheel_its_road_and_the_force_of_the_ground(tmp_path):
+    tyre_color = Wheel(0.31, 0.2).pieces()[0].color
+    system = rolling(wheels.FlatRoad())
+    motion = integrate(system, GeneralizedAlpha(0.8), 0.3, 1e-3, output_every=10)
+    view(motion, tmp_path / "flat.html", system=system)
+    read = ReadPage(tmp_path / "flat.html")
+    assert read.record["ground"]["level"] == 0.0  # the road, not a grid below all that moves
+    own = [each for each in read.record["pieces"] if each["kind"] == "body"]
+    assert [each["color"] for each in own] == [piece.color for piece in Wheel(0.31, 0.2).pieces()]  # and no box
+    arrow = next(each for each in read.record["forces"] if each["is_of_element"])
+    force, at = read.array(arrow["values"]), read.array(arrow["at"])
+    load = element_motion(system, motion, "tyre").outputs["Fz"]
+    assert load.max() > 20.0 * 9.81
+    assert_allclose(force[:, 2], load, rtol=0, atol=1e-4 * load.max())  # upwards: on the wheel
+    assert_allclose(at[:, 2], 0.0, atol=1e-6)
+    assert_allclose(at[:, 0], motion.body("wheel").r[:, 0], atol=1e-3)
+    # shapes of the body take the place of the wheel that the tyre would show, and uneven ground that of the plane
+    bump = wheels.GridRoad(np.linspace(-1, 3, 9), 0.0 * np.linspace(-1, 3, 9))
+    other = rolling(bump, [Wheel(0.31, 0.15, n_spokes=7)])
+    view(motion, tmp_path / "own.html", system=other)
+    read = ReadPage(tmp_path / "own.html")
+    assert read.record["ground"] is None
+    assert sum(each["color"] == tyre_color for each in read.record["pieces"]) == 1
+    assert any(each["is_ground"] for each in read.record["pieces"])
