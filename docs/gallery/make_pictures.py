@@ -46,6 +46,23 @@ def slider_crank() -> None:
     save_film(frames, HERE / "slider_crank.gif", fps=15)
 
 
+def antenna() -> None:
+    """The deployable antenna, opened: twelve petals with rigid parts, as its drive moves them."""
+    from floatframe.machines import copy_machine
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copy_machine("antenna", folder)
+        for part in ("petal", "strut"):
+            cms.write(cms.reduce_job(folder / f"{part}.toml"), folder / f"{part}.h5")
+        system, run = read_system(folder / "space.toml")
+        motion = ff.kinematics(system, np.linspace(0.0, run.t_end, 41))
+        film = folder / "film.gif"
+        animate(motion, drawn(system), film, speed=run.t_end / 4, fps=10, magnification=1.0, system=system)
+        frames = [frame[..., :3] for frame in iio.imread(film)]
+    save_film(frames, HERE / "antenna.gif", fps=10)
+
+
 def still(name: str, make: Callable[[], tuple[ff.System, float, float]]) -> None:
     """The last instant of a motion: make returns system, end and step."""
     system, t_end, h = make()
@@ -87,6 +104,7 @@ def chain() -> tuple[ff.System, float, float]:
 
 MECHANISMS: dict[str, Callable[[], None]] = {
     "slider_crank": slider_crank,
+    "antenna": antenna,
     **{maker.__name__: partial(still, maker.__name__, maker) for maker in (four_bar, satellite, chain)},
 }
 
