@@ -47,7 +47,7 @@ def slider_crank() -> None:
 
 
 def antenna() -> None:
-    """The deployable antenna, opened: twelve petals with rigid parts, as its drive moves them."""
+    """The deployable antenna under gravity, opened: twelve petals, as its drive moves them slowly."""
     from floatframe.machines import copy_machine
 
     with tempfile.TemporaryDirectory() as name:
@@ -55,8 +55,8 @@ def antenna() -> None:
         copy_machine("antenna", folder)
         for part in ("petal", "strut"):
             cms.write(cms.reduce_job(folder / f"{part}.toml"), folder / f"{part}.h5")
-        system, run = read_system(folder / "space.toml")
-        motion = ff.kinematics(system, np.linspace(0.0, run.t_end, 41))
+        system, run = read_system(folder / "bare.toml")
+        motion = ff.kinematics(system, np.linspace(0.0, run.t_end, 41), elasticity=ff.quasi_static_bodies)
         film = folder / "film.gif"
         animate(motion, drawn(system), film, speed=run.t_end / 4, fps=10, magnification=1.0, system=system)
         frames = [frame[..., :3] for frame in iio.imread(film)]
