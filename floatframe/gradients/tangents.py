@@ -2,14 +2,17 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.equations.rows import Structure, row_parts
+from floatframe.gradients.evaluation import evaluation_of
 from floatframe.gradients.parameters import Neighbour, Parameter
 from floatframe.kernels.model import Model
 from floatframe.kernels.work import Work
+from floatframe.rotations import rotation_matrix
 from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
 
@@ -29,9 +32,14 @@ class Point:
     w_start: Array | None = None  #: wrenches at the beginning of the step; None: w
     angle: Array = field(default_factory=lambda: np.zeros(0))  #: angles counted through full turns; empty: from zero
 
+    @cached_property
+    def R(self) -> Array:
+        """R_GB of the bodies, (n_b, 3, 3): a point is written for every neighbour of the system."""
+        return rotation_matrix(self.state.p)
+
     def write(self, work: Work) -> None:
         """Write it into working arrays."""
-        set_iterate(work, self.state, self.u_dot, self.w)
+        set_iterate(work, self.state, self.u_dot, self.w, R=self.R)
         work.state.w_start[:] = self.w if self.w_start is None else self.w_start
         work.state.time[...] = self.t
 
@@ -54,13 +62,12 @@ class PointTangents:
 
 def tangents_at(structure: Structure, model: Model, work: Work, point: Point, c_k: float = 1.0) -> PointTangents:
     """Return the matrices at a point, where the equations of motion hold."""
-    from floatframe.kernels.entry import evaluate_and_linearize
-
+    evaluation = evaluation_of(model, work)
     point.write(work)
     n_u, n_w = structure.n_u, len(structure.holds)
     H, G = [], []
     for weights in ((c_k, 0.0, 0.0), (0.0, c_k, c_k), (0.0, 0.0, c_k)):
-        evaluate_and_linearize(model, work, *weights)
+        evaluation.evaluate(*weights)
         H.append(body_matrix(model, work))
         if weights[0] == 0.0:
             rows = row_parts(structure, model, work)
@@ -97,14 +104,13 @@ def whole(structure: Structure, parts: tuple[Array, ...], n_w: int) -> Array:
 
 def residuals_of(neighbour: Neighbour, point: Point, c_k: float) -> Array:
     """Return c_k times the residual of the bodies (ground axes), then that of the rows, (n_u + n_w,)."""
-    from floatframe.kernels.entry import evaluate_and_linearize
-
     work, model = neighbour.work, neighbour.compiled.model
+    evaluation = evaluation_of(model, work)
     point.write(work)
-    evaluate_and_linearize(model, work, 0.0, 0.0, c_k)
+    evaluation.evaluate(0.0, 0.0, c_k)
     own = c_k * work.bodies.residual
-    for i, u0 in enumerate(model.bodies.u0[:-1]):
-        own[u0 : u0 + 3] = work.state.R[i] @ own[u0 : u0 + 3]
+    at = model.bodies.u0[:-1, None] + np.arange(3)
+    own[at] = (work.state.R @ own[at][:, :, None])[:, :, 0]
     return np.concatenate([own, work.connections.g])
 
 

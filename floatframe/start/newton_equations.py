@@ -40,11 +40,12 @@ class Linearized:
     V: sp.csr_array  #: rows by wrenches, (n_w, n_w)
 
 
-def set_iterate(work: Work, state: State, u_dot: Array | None = None, w: Array | None = None) -> None:
-    """Write a state into the working arrays; accelerations and wrenches zero if not given."""
+def set_iterate(
+    work: Work, state: State, u_dot: Array | None = None, w: Array | None = None, *, R: Array | None = None
+) -> None:
+    """Write a state into the working arrays; accelerations and wrenches zero if not given, R of the state if known."""
     work.state.r[:] = state.r
-    for i, p in enumerate(state.p):
-        work.state.R[i] = rotation_matrix(p)
+    work.state.R[:] = rotation_matrix(state.p) if R is None else R
     work.state.q[:] = state.q
     work.state.u[:] = state.u
     work.state.u_dot[:] = 0.0 if u_dot is None else u_dot
