@@ -28,20 +28,26 @@ def gradient_command(
     parameters: Annotated[
         list[str], typer.Option("--parameter", "-p", help="KEY.PATH of a number in the file; repeatable.")
     ] = [],  # noqa: B006
-    analysis: Annotated[str, typer.Option(help="run, static or eig.")] = "run",
+    analysis: Annotated[str, typer.Option(help="run, static, rotation or eig.")] = "run",
+    omega: Annotated[str | None, typer.Option(help='Of rotation: angular velocity "x,y,z", rad per time unit.')] = None,
+    center: Annotated[str, typer.Option(help='Of rotation: a point of the axis, "x,y,z".')] = "0,0,0",
     method: Annotated[str, typer.Option(help="direct or adjoint.")] = "direct",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="A .csv or .json file.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
-    """Derivatives of motions, equilibria or frequencies by numbers of the system file, in one run.
+    """Derivatives of motions, equilibria, steady rotations or frequencies by numbers of the system file, in one run.
 
     Sensors as `floatframe info` lists them. direct costs a solution a parameter in every step, adjoint one an output.
 
     Example: floatframe gradient crank.toml -m "tip x" -p bodies.rod.mass -p forces.spring.stiffness
 
+    Example: floatframe gradient governor.toml --analysis rotation --omega 0,0,6 -m "arm.distance value" -p
+    forces.spring.stiffness
+
     Example: floatframe gradient arm.toml --analysis eig -m "frequency 1" -p forces.bush.stiffness
     """
     from fe_models.foundation.paths import replace_file
+    from floatframe.cli.analyses import vector
     from floatframe.errors import ModelError
     from floatframe.gradients import sensitivities
     from floatframe.studies.study_file import TAKES
@@ -56,7 +62,10 @@ def gradient_command(
         of, colon, take = text.rpartition(":")
         wanted[text] = (of, take) if colon and take in TAKES else text
     with stages() as clock, clock("derivatives"):
-        found = sensitivities(system, wanted, parameters, analysis=analysis, method=method)
+        found = sensitivities(
+            system, wanted, parameters, analysis=analysis, method=method,
+            omega=None if omega is None else vector(omega, "--omega"), center=vector(center, "--center"),
+        )  # fmt: skip
     record = record_of(found)
     if json:
         typer.echo(json_module.dumps(record, indent=2))

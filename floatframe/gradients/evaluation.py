@@ -21,7 +21,8 @@ class Evaluation:
         from floatframe.kernels.compiler.structure import table_of
         from floatframe.kernels.records import filled
 
-        entry.evaluate_and_linearize(model, work, 0.0, 0.0, 0.0)  # compiles where that is still to be done
+        if not entry.run.signatures:
+            entry.prepare()
         self.run, self.model, self.work = entry.run, model, work
         self.order = filled(entry.Order(), **(entry.NOTHING._asdict() | {"what": entry.LINEARIZE}))
         self.memory = entry.no_memory()

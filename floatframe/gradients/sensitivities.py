@@ -13,8 +13,9 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.linear.system_modes import system_modes
-from floatframe.checked_values import number
+from floatframe.checked_values import array_of_shape, number
 from floatframe.compiling.file_frames import motion_of_engine
+from floatframe.compiling.system import compiled_system
 from floatframe.equations.configuration import Configurations
 from floatframe.equations.rows import structure_of
 from floatframe.errors import ModelError
@@ -25,6 +26,7 @@ from floatframe.gradients.eigenvalues import branch_of, eigenvalue_derivatives, 
 from floatframe.gradients.equilibria import equilibrium_adjoint, equilibrium_columns, equilibrium_matrix
 from floatframe.gradients.outputs import Column, Take, Wanted, columns_of, moved, values_at, wanted_of, weights_of
 from floatframe.gradients.parameters import Family, Neighbour, Source, family_of, neighbour
+from floatframe.gradients.steady_rotations import DEPENDS, SteadyRotation, steady_rotation_of
 from floatframe.gradients.tangents import Point, parameter_residuals, tangents_at
 from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
@@ -38,7 +40,7 @@ __all__ = ["ANALYSES", "METHODS", "Sensitivities", "sensitivities"]
 
 log = logging.getLogger(__name__)
 
-ANALYSES = ("run", "static", "eig")
+ANALYSES = ("run", "static", "rotation", "eig")
 METHODS = ("direct", "adjoint")
 TOLERANCE = 1e-11  #: of Newton's method in the steps that are differentiated
 SLOPE_STEP = 2e-4  #: of differences of sensors, relative to the size of what they see
@@ -89,6 +91,8 @@ def sensitivities(
     t_start: float = 0.0,
     state: State | None = None,
     steps: Mapping[str, float] | None = None,
+    omega: Array | tuple[float, float, float] | None = None,
+    center: Array | tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Sensitivities:
     """Return outputs of a motion, an equilibrium or the modes about it, with their derivatives by parameters.
 
@@ -105,7 +109,8 @@ def sensitivities(
         Key paths, "bodies.rod.mass" (docs/sensitivities.md), or a dict from names to them. Of a file: its keys, as in
         studies. Of a function: a dict from names to values.
     analysis
-        "run", a motion by generalized-alpha; "static", the equilibrium at rest; "eig", the modes about it.
+        "run", a motion by generalized-alpha; "static", the equilibrium at rest; "rotation", a steady rotation of the
+        whole system; "eig", the modes about the equilibrium at rest.
     method
         "direct", whose cost grows with the parameters, or "adjoint", whose cost grows with the outputs.
     t_end, h, integrator, t_start, state
@@ -113,6 +118,8 @@ def sensitivities(
     steps
         Steps of the differences by which residuals change with a parameter, by its name, where a thousandth of its
         size does not fit.
+    omega, center
+        Of "rotation": angular velocity and a point of the axis, ground axes, (3,) [rad/s, m].
 
     Raises
     ------
@@ -124,6 +131,8 @@ def sensitivities(
     """
     if analysis not in ANALYSES:
         raise ModelError(f"sensitivities: no analysis {quoted(analysis)}{nearest(analysis, ANALYSES)}")
+    if omega is not None and analysis != "rotation":
+        raise ModelError('sensitivities: omega belongs to analysis = "rotation"')
     if method not in METHODS:
         raise ModelError(f"sensitivities: no method {quoted(method)}{nearest(method, METHODS)}")
     wanted = wanted_of(outputs)
@@ -135,6 +144,14 @@ def sensitivities(
     columns = columns_of(family.system, wanted)
     if analysis == "static":
         return of_equilibrium(family, own, wanted, columns, method)
+    if analysis == "rotation":
+        if omega is None:
+            raise ModelError("sensitivities: a steady rotation needs omega")
+        spin = array_of_shape("sensitivities: omega", omega, (3,))
+        if not spin.any():
+            raise ModelError('sensitivities: omega: expected a rotation other than 0; take analysis = "static"')
+        about = array_of_shape("sensitivities: center", center, (3,))
+        return of_rotation(family, own, wanted, columns, method, steady_rotation_of(family, own, spin, about))
     if isinstance(system, str | os.PathLike):
         t_end, h, integrator = run_of_file(system, t_end, h, integrator)
     if t_end is None or h is None:
@@ -183,6 +200,12 @@ def require_no_memory(system: System) -> None:
                 f"sensitivities: force {force.name!r} has states of its own, which are not differentiated; give its "
                 "forces without states"
             )
+    compiled = compiled_system(system)
+    if len(rows := compiled.model.states.row):
+        owner = int(np.searchsorted(compiled.model.connections.w0, rows[0], side="right")) - 1
+        raise ModelError(
+            f"sensitivities: {compiled.connection_names[owner]!r} has states of its own, which are not differentiated"
+        )
 
 
 def require_smooth_run(family: Family, t_start: float, h: float, n_steps: int) -> None:
@@ -341,6 +364,27 @@ def of_equilibrium(
     else:
         slopes = slopes_at(own, group, columns, point)
         gradient += equilibrium_adjoint(matrix, np.hstack([slopes[:, :n], slopes[:, 3 * n :]]), by_p)
+    return made(family, wanted, values[0], gradient, units)
+
+
+def of_rotation(
+    family: Family, own: Neighbour, wanted: tuple[Wanted, ...], columns: tuple[Column, ...], method: str,
+    steady: SteadyRotation,
+) -> Sensitivities:  # fmt: skip
+    """Return the derivatives of a steady rotation; `ModelError` if an output depends on how far it has turned."""
+    values, units = values_at(own, columns, [steady.point])
+    turned = along(own, steady.group, columns, steady.point, steady.whole(steady.turn[:, None]))[:, 0]
+    for each, value, slope in zip(wanted, values[0], turned, strict=True):
+        if steady.turn.any() and abs(slope) > DEPENDS * max(abs(float(value)), np.abs(values[0]).max(initial=0.0)):
+            raise ModelError(
+                f"output {each.name!r}: {each.of!r} changes while the system turns ({slope:.3g} a radian), so that it "
+                "has no one value; take a coordinate of a joint, a distance, a size, or axes that turn"
+            )
+    gradient = seen_otherwise(family, columns, [steady.point])[0]
+    if method == "direct":
+        gradient += along(own, steady.group, columns, steady.point, steady.whole(steady.columns()))
+    else:
+        gradient += steady.adjoint(slopes_at(own, steady.group, columns, steady.point))
     return made(family, wanted, values[0], gradient, units)
 
 

@@ -10,6 +10,7 @@ import floatframe as ff
 from floatframe.functions.time_functions import constant, harmonic, piecewise
 from floatframe.gradients.paths import value_at, with_value
 from floatframe.mechanisms import pendulum, slider_crank
+from tests.floatframe.elements.test_element_states import lifted
 from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffened_body, stiffness
 
 AGREE = 1e-10  #: of direct and adjoint, relative to the largest derivative of an output
@@ -332,3 +333,70 @@ def test_a_damping_of_zero_is_differentiated_from_its_side():
     both = ff.sensitivities(oscillator(c=0.02), ["place x"], ["forces.spring.damping"], t_end=0.2, h=1e-2)
     assert found.gradient[0, 0] != 0
     assert_allclose(found.gradient, both.gradient, rtol=5e-3)
+
+
+def governor(k=400.0, m=2.0, free=0.5):
+    """Return a mass that slides on a turning arm, held by a spring to the hub."""
+    hub = ff.RigidBody("hub", 5.0, np.diag([0.2, 0.2, 0.4]))
+    bob = ff.RigidBody("bob", m, 0.01 * np.eye(3), position=(0.55, 0, 0))
+    axle = ff.RevoluteJoint("axle", ff.Marker(ff.GROUND), ff.Marker("hub"), axis=(0, 0, 1))
+    arm = ff.PrismaticJoint("arm", ff.Marker("hub"), ff.Marker("bob"), axis=(1, 0, 0))
+    spring = ff.SpringDamper("spring", ff.Marker("hub"), ff.Marker("bob"), k, 3.0, free)
+    sensors = [ff.PlaceSensor("place", ff.Marker("bob")), ff.ReactionSensor("pull", "spring")]
+    return ff.System([hub, bob], [axle, arm], [spring], sensors=sensors)
+
+
+@pytest.mark.parametrize("method", ["direct", "adjoint"])
+def test_a_steady_rotation_has_its_closed_form(method):
+    """r = k l/(k - m w²), pull k (r - l) = m w² r."""
+    k, m, free, w = 400.0, 2.0, 0.5, 6.0
+    paths = ["forces.spring.stiffness", "bodies.bob.mass", "forces.spring.free_length", "bodies.hub.mass"]
+    system = governor(k, m, free)
+    found = ff.sensitivities(
+        system, ["arm.distance value", "pull force size", "place size"], paths, analysis="rotation",
+        omega=(0, 0, w), method=method,
+    )  # fmt: skip
+    d = k - m * w**2
+    r = k * free / d
+    of_r = np.array([free / d - k * free / d**2, k * free * w**2 / d**2, k / d, 0.0])
+    of_pull = m * w**2 * of_r + np.array([0, w**2 * r, 0, 0])
+    assert_allclose(found.values, [r, m * w**2 * r, r], rtol=1e-9)
+    scale = np.array([[r], [m * w**2 * r], [r]])
+    assert_allclose(found.gradient / scale, np.array([of_r, of_pull, of_r]) / scale, rtol=0, atol=1e-8)
+
+
+def test_a_steady_rotation_of_a_flexible_body_and_differences_of_its_solutions():
+    """The body is carried round on a revolute joint; its modes give way to the spin."""
+    base = swinging_body()
+    joint = ff.RevoluteJoint("hinge", ff.Marker(ff.GROUND), ff.Marker("body", "end_a"), axis=(0, 0, 1))
+    system = replace(base, joints=[joint], forces=[])
+    path, omega = "bodies.body.reduced.K.1.1", (0, 0, 1.5)
+    found = ff.sensitivities(system, ["mode q"], [path], analysis="rotation", omega=omega)
+    p = value_at(system, path)
+
+    def value(at):
+        about = ff.steady_rotation(with_value(system, path, at), omega, tolerance=1e-13)
+        return about.state.q[1]
+
+    step = 1e-2 * p
+    f = [value(p + j * step) for j in (-2, -1, 1, 2)]
+    expected = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
+    assert_allclose(found.gradient[0, 0], expected, rtol=1e-6)
+
+
+def test_what_a_turn_changes_has_no_derivative():
+    system = governor()
+    given = {"parameters": ["bodies.bob.mass"], "analysis": "rotation", "omega": (0, 0, 6.0)}
+    with pytest.raises(ff.ModelError, match="'place y' changes while the system turns"):
+        ff.sensitivities(system, ["place y"], **given)
+    with pytest.raises(ff.ModelError, match="a steady rotation needs omega"):
+        ff.sensitivities(system, ["place x"], ["bodies.bob.mass"], analysis="rotation")
+    with pytest.raises(ff.ModelError, match="other than 0"):
+        ff.sensitivities(system, ["place x"], **{**given, "omega": (0, 0, 0)})
+    with pytest.raises(ff.ModelError, match="belongs to analysis"):
+        ff.sensitivities(system, ["place x"], ["bodies.bob.mass"], analysis="static", omega=(0, 0, 1))
+
+
+def test_elements_with_states_of_their_own_are_refused():
+    with pytest.raises(ff.ModelError, match="'jack' has states of its own, which are not differentiated"):
+        ff.sensitivities(lifted(), ["rail.distance value"], ["bodies.b.mass"], t_end=0.02, h=1e-3)
