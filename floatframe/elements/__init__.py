@@ -2,4 +2,7 @@
 
 from floatframe.elements.element import NOTHING, POSITION, VELOCITY, Element, ElementLaw, Placed
 
-__all__ = ["NOTHING", "POSITION", "VELOCITY", "Element", "ElementLaw", "Placed"]
+__all__ = ["ELEMENTS", "NOTHING", "POSITION", "VELOCITY", "Element", "ElementLaw", "Placed"]
+
+#: elements of this room, by their names in system files ("elements.expressions")
+ELEMENTS = {"expressions": "floatframe.elements.expressions:ExpressionElement"}
