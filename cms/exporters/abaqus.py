@@ -4,13 +4,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cms.exporters.interface_model import InterfaceModel, interface_model
+from cms.exporters.interface_model import BoundaryNode, InterfaceModel, interface_model
 from cms.exporters.writer import Made, Request
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.body.numbering import NONE
 from fe_models.foundation.arrays import Array
 
 __all__ = ["make_abaqus"]
 
 FIRST_MODE = 1000001  #: number of the node whose dof 1 is the first mode
+SAME_PLACE = 1e-9  #: distance of a node from a boundary node, of the size of the body, that is none
 PER_LINE = 4  #: entries of a matrix
 
 
@@ -20,11 +23,27 @@ def make_abaqus(request: Request) -> Made:
     Modes are dof 1 of nodes of their own, at the origin. Matrices: column j from row 1 to the diagonal.
     """
     model = interface_model(request.body)
-    lines = [*(f"** {line}" for line in request.header()), *lines_of(model)]
-    notes = [f"interface {node.interface}: node {k + 1}" for k, node in enumerate(model.nodes)]
+    notes = [
+        f"interface {node.interface}: node {k + 1}{in_mesh(request.body, node)}" for k, node in enumerate(model.nodes)
+    ]
+    told = (f"** {note.encode('ascii', 'replace').decode()}" for note in notes)
+    lines = [*(f"** {line}" for line in request.header()), *told, *lines_of(model)]
     if model.n_modes:
         notes.append(f"modes: dof 1 of nodes {FIRST_MODE} to {FIRST_MODE + model.n_modes - 1}")
     return Made({request.path: ("\n".join(lines) + "\n").encode("ascii")}, tuple(notes))
+
+
+def in_mesh(body: ReducedBody, node: BoundaryNode) -> str:
+    """Say which node of the user's mesh stands at a boundary node: a member of its interface there, if it has one."""
+    interface = next(each for each in body.interfaces if each.name == node.interface)
+    place = body.frame.axes.T @ (node.position - body.frame.origin)
+    members = interface.members
+    if not body.numbering.nodes.size or not len(members):
+        return ""
+    away = np.linalg.norm(body.nodes[members] - place, axis=1)
+    row, size = int(members[away.argmin()]), float(np.linalg.norm(np.ptp(body.nodes, axis=0)))
+    is_there = float(away.min()) <= SAME_PLACE * size and body.numbering.nodes[row] != NONE
+    return f", {body.node_name(row)} of the mesh" if is_there else ""
 
 
 def lines_of(model: InterfaceModel) -> Iterator[str]:

@@ -57,6 +57,8 @@ def archive_of(body: ReducedBody) -> dict[str, Any]:
     }
     for k, interface in enumerate(body.interfaces):
         ours[f"floatframe_members_{k}"] = interface.members
+    if body.numbering.nodes.size:  # of the user's mesh, -1 where a node has none
+        ours["floatframe_node_numbers"] = body.numbering.nodes
     return {
         "modeBasis": body.Phi.reshape(-1, n),
         "trigList": body.surface,
@@ -102,7 +104,8 @@ SCRIPT = '''"""{title}
 
 {header}
 
-As a module: `body = add_body(mbs)` adds the body, `marker(mbs, body, "{first}")` a marker of an interface.
+As a module: `body = add_body(mbs)` adds the body, `marker(mbs, body, "{first}")` a marker of an interface;
+`mesh_node(12)` is the mesh node with the number 12 in the mesh it was made from, for sensors.
 As a script: the free body, placed as its mesh, bent into its first mode by Q_0, turns about the mesh origin with the
 angular velocity OMEGA. In floatframe the same motion is
 
@@ -155,6 +158,17 @@ def marker(mbs, body, name, rigid=True):
     weights = np.full(len(members), 1 / len(members))
     return mbs.AddMarker(kind(
         bodyNumber=body["oFFRFreducedOrder"], meshNodeNumbers=members, weightingFactors=weights, **place))
+
+
+def mesh_node(number):
+    """Return which mesh node of the body has a number of the mesh that it was made from."""
+    with np.load(ARCHIVE) as archive:
+        if "floatframe_node_numbers" not in archive:
+            raise ValueError("mesh_node: the body knows no numbers of its mesh")
+        rows = np.flatnonzero(archive["floatframe_node_numbers"] == number)
+    if len(rows) == 0:
+        raise ValueError("mesh_node: the body keeps no node %s" % number)
+    return int(rows[0])
 
 
 def main():

@@ -198,7 +198,10 @@ def fatigue_scene(made: Assessment) -> Scene:
     order = result.worst(made.given.outputs.worst)
     at = result.positions(order)
     worst = separated(at, 0.08 * size)
-    labels = tuple(Triad(at[k], np.eye(3), size=1e-6 * size, label=str(k + 1)) for k in worst[:NUMBERED])
+    labels = tuple(
+        Triad(at[k], np.eye(3), size=1e-6 * size, label=f"{k + 1}: {result.words(int(order[k]))}")
+        for k in worst[:NUMBERED]
+    )
     direction, up = towards(made, order)
     life = made.life[order[0]] if len(order) else math.inf
     first = result.words(int(order[0])) if len(order) else "none"

@@ -14,7 +14,7 @@ from fe_models.foundation.arrays import Array, IntArray
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ResultsError
-from floatframe.pictures.body_colors import DISPLACEMENT, BodyColor
+from floatframe.pictures.body_colors import DISPLACEMENT, VON_MISES, BodyColor
 from floatframe.pictures.element_looks import dressed_bodies, element_pieces
 from floatframe.pictures.film_times import FilmTimes, film_times, round_below, speed_words, time_words
 from floatframe.pictures.glyphs import glyphs
@@ -192,6 +192,8 @@ def motion_scene(
     reach = max(size, 0.5 * float(np.linalg.norm(np.ptp(points, axis=0))))
     drawn = () if system is None else glyphs(system, trajectory, rows, reach, magnification, up_axis)
     words = [speed_words(times.speed)]
+    if color is VON_MISES and flexible:
+        words.append(f"largest stress at {largest_place(flexible, scalars)}")
     if magnification != 1:
         words.append(f"elastic displacement drawn {magnification:,.6g} times larger")
     if not has_ground:
@@ -280,6 +282,14 @@ def chosen_magnification(flexible: Mapping[str, ReducedBody], displacements: Map
         (float(np.abs(displacements[name]).max()) / diagonal(body) for name, body in flexible.items()), default=1.0
     )
     return 1.0 if share >= VISIBLE or share == 0 else round_below(DRAWN / share)
+
+
+def largest_place(bodies: Mapping[str, ReducedBody], scalars: Mapping[str, Array]) -> str:
+    """Return the node with the largest scalar of all frames, as the user numbers it."""
+    name = max(scalars, key=lambda body: float(scalars[body].max(initial=0.0)))
+    row = int(scalars[name].max(axis=0).argmax())
+    where = f"node {bodies[name].node_name(row)}"
+    return where if len(bodies) == 1 else f"{where} of {name}"
 
 
 def largest_of(scalars: Mapping[str, Array]) -> float:

@@ -48,7 +48,7 @@ def plot_measurement(
         line = {"linewidth": 1.0, "color": "k"} if is_sum else {"linewidth": 1.5}
         ax.plot(measurement.t, measurement.columns[name], label=name, **line)
     ax.set_xlabel(f"time [{time_symbol}]")
-    ax.set_title(measurement.sensor, fontsize="medium")
+    ax.set_title("\n".join([measurement.sensor, *measurement.places]), fontsize="medium")
     ax.grid(alpha=0.3)
     if len(columns) == 1:
         ax.set_ylabel(f"{columns[0]} [{unit}]")

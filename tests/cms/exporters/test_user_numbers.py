@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
 import cms
+import fe_models as fm
 from cms.cli.app import app
 from cms.decks.job_text import JobRequest, job_text
 from cms.errors import BodyError
@@ -194,3 +195,33 @@ def test_info_tells_numbers_sets_and_nodes_that_turn(reduced, tmp_path):
     assert "3, from 31 to 77" in shown
     assert "8 by elements" in shown
     assert "Sets of the mesh" in shown
+
+
+def test_abaqus_and_exudyn_files_name_the_nodes_of_the_mesh(tmp_path):
+    """Boundary nodes that are nodes of the mesh in the deck, all kept nodes in the archive; a script finds them."""
+    mesh = replace(fm.straight_line((0, 0, 0), (1, 0, 0), 3), node_numbers=1000 + 10 * np.arange(4))
+    ends = [fm.line_interface(mesh, name, fm.NodeIndices((k,))) for name, k in (("root", 0), ("tip", 3))]
+    body = fm.beam_body(
+        mesh, fm.BeamProperty(fm.Circle(0.02), STEEL), name="rod", units=unit_system("m-kg-s"), interfaces=ends
+    )
+    body = cms.couple(body)
+    reduced = cms.reduce(body, cms.craig_bampton(body, n_modes=2))
+    deck = tmp_path / "rod.inp"
+    exported = export_body(reduced, deck, to="abaqus", units="m-kg-s")
+    text = deck.read_text()
+    assert "** interface root: node 1, 1000 of the mesh" in text
+    assert "** interface tip: node 2, 1030 of the mesh" in text
+    assert any("1030 of the mesh" in note for note in exported.notes)
+    export_body(reduced, tmp_path / "rod.npz", to="exudyn", units="m-kg-s")
+    with np.load(tmp_path / "rod.npz", allow_pickle=True) as archive:
+        numbers, places = archive["floatframe_node_numbers"], archive["xRef"].reshape(-1, 3)
+    assert_array_equal(numbers, reduced.numbering.nodes)
+    (row,) = np.flatnonzero(numbers == 1020)[:1]
+    x = reduced.frame.origin + reduced.frame.axes @ places[row]
+    assert_allclose(x[0], 2 / 3, rtol=1e-9)
+    script = (tmp_path / "rod.py").read_text()
+    found: dict = {"np": np, "ARCHIVE": str(tmp_path / "rod.npz")}
+    exec(script[script.index("def mesh_node") : script.index("def main")], found)
+    assert found["mesh_node"](1020) == row
+    with pytest.raises(ValueError, match="no node 7"):
+        found["mesh_node"](7)

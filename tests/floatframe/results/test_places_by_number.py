@@ -32,6 +32,10 @@ from floatframe import (
     read_results,
 )
 from floatframe.cli.app import app
+from floatframe.pictures.animation import motion_scene
+from floatframe.pictures.body_colors import VON_MISES
+from floatframe.pictures.film_times import film_times
+from floatframe.pictures.sensor_plots import plot_measurement
 from floatframe.results.place_motion import interface_motion, point_motion
 from floatframe.results.sensors import (
     DisplacementSensor,
@@ -281,3 +285,18 @@ def test_the_file_of_a_system_names_nodes_sets_and_elements_and_its_run_says_whi
     refused = CliRunner().invoke(app, ["run", str(tmp_path / "bar.toml"), "-o", str(tmp_path / "out.h5")])
     assert refused.exit_code != 0
     assert "keep" in refused.output
+
+
+def test_pictures_name_the_node_with_the_largest_stress(motions):
+    """In the caption of a film, over the panel of the sensor: the number that the sensor itself tells."""
+    system, run = motions[0]
+    reduced = system.body("bar").reduced
+    told = VonMisesSensor("vm", "bar").measure(system, run)
+    hot = int(told.columns["node"][told.columns["largest"].argmax()])
+    times = film_times(run.t, fps=20.0, speed=0.05)
+    scene = motion_scene(run, {"bar": reduced}, times, color=VON_MISES, system=system)
+    q = run.body("bar").q[times.rows]
+    largest = VON_MISES.values(reduced, q).max(axis=0)
+    assert f"largest stress at node {reduced.node_name(int(largest.argmax()))}" in scene.captions[0]
+    assert "largest stress" not in motion_scene(run, {"bar": reduced}, times, system=system).captions[0]
+    assert f"largest at node {hot}" in plot_measurement(told).get_title()
