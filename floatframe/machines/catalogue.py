@@ -32,6 +32,9 @@ MACHINES: dict[str, Machine] = {
     "railway-engine": Machine(
         "a railway engine", "railway_engine", "its full body and mode sets over a rail defect and through an S-curve"
     ),
+    "landing-gear": Machine(
+        "a landing gear", "landing_gear", "drop with spin-up and spring-back, oleo strut, hydraulic retraction"
+    ),
 }
 
 

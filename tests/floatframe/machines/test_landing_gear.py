@@ -1,0 +1,101 @@
+"""The landing gear: its drop against two masses by SciPy, spin-up and spring-back, its retraction against circles."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import cumulative_trapezoid, solve_ivp
+
+import cms
+import floatframe as ff
+from floatframe.functions.tables import monotone_table
+from floatframe.machines import copy_machine
+from floatframe.machines.landing_gear import retraction
+
+G, SINK, FORWARD, LIFT, CARRIAGE = 9.81, 2.5, 40.0, 7200.0, 1100.0
+RADIUS, TYRE, TYRE_DAMPING, FRICTION, SPIN = 0.35, 2.5e5, 300.0, 0.7, 1.5
+METHOD = ff.GeneralizedAlpha(0.8, 1e-10)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("gear")
+    copy_machine("landing-gear", place)
+    cms.write(cms.reduce_job(place / "piston.toml"), place / "piston.h5")
+    return place
+
+
+def dropped(folder, t_end, h, **changes):
+    system, _ = ff.read_system(folder / "drop.toml", changes)
+    motion = ff.integrate(system, METHOD, t_end, h)
+    strut, tyre = (ff.element_motion(system, motion, name).outputs for name in ("strut", "tyre"))
+    return motion, strut, tyre
+
+
+def two_masses(lower, t_end):
+    """Heights of carriage and axle over those at touch-down, and their speeds."""
+    area = monotone_table([0.0, 0.1, 0.2, 0.32], [1.6e-4, 1.4e-4, 1.0e-4, 0.6e-4])
+    p_a, width = 101325.0, 101325.0 / 50
+
+    def rates(t, y):
+        s, rate = y[1] - y[0], y[3] - y[2]
+        gas = 1.5e6 * (1.6e-3 / (1.6e-3 - 4e-3 * s)) ** 1.3
+        hole = 0.9 * (area(s) if rate > 0 else 6e-5)
+        pressure = gas + np.sign(rate) * 870 / 2 * (3.2e-3 * rate / hole) ** 2
+        oil = (pressure + np.hypot(pressure, width)) / 2
+        force = (gas - p_a) * 4e-3 + (oil - gas) * 3.2e-3
+        force += (300 + 2e-5 * (gas - p_a)) * rate / np.hypot(rate, 0.01)
+        force += 4e6 * min(s, 0) * max(1 - 0.3 * rate, 0) + 4e6 * max(s - 0.32, 0) * max(1 + 0.3 * rate, 0)
+        depth = max(-y[1], 0)
+        part = min(depth / (RADIUS / 500), 1)
+        ground = max(TYRE * depth - TYRE_DAMPING * part**2 * (3 - 2 * part) * y[3], 0) if depth else 0.0
+        return [y[2], y[3], (force + LIFT) / CARRIAGE - G, (ground - force) / lower - G]
+
+    start = [0, 0, -SINK, -SINK]
+    return solve_ivp(rates, (0, t_end), start, method="Radau", rtol=1e-9, atol=1e-11, max_step=2e-3).y
+
+
+def test_the_drop_of_a_rigid_gear_is_that_of_two_masses(folder):
+    t_end = 0.2
+    motion, strut, _ = dropped(folder, t_end, 5e-5, **{"bodies.piston.is_rigid": True})
+    exact = two_masses(cms.read(folder / "piston.h5").moments.gram[0, 0] + 28 + 25, t_end)
+    assert strut["stroke"].max() > 0.25
+    found = [motion.body("carriage").r[-1, 2] - 1.15, motion.body("wheel").r[-1, 2] - RADIUS]
+    assert_allclose(found, exact[:2, -1], rtol=2e-5)
+    assert_allclose(strut["stroke"].max(), (exact[1] - exact[0]).max(), rtol=1e-4)
+
+
+def test_a_standing_wheel_spins_up_by_the_friction_of_the_ground_and_the_piston_springs_back(folder):
+    motion, strut, tyre = dropped(folder, 0.2, 1e-4)
+    spin = motion.body("wheel").omega_B[:, 1]
+    lever = RADIUS - tyre["deflection"] / 3  # of the rolling radius: the power of slip is lost, no more
+    gained = -cumulative_trapezoid(tyre["Fx"] * lever, motion.t, initial=0)
+    assert_allclose(SPIN * spin[-1], gained[-1], rtol=2e-3)
+    slides = (motion.t > 0.02) & (spin < 60)
+    assert_allclose(tyre["Fx"][slides] / tyre["Fz"][slides], -FRICTION, rtol=2e-2)
+    rolling = FORWARD / RADIUS
+    assert rolling < spin[-1] < 1.15 * rolling
+    carriage, wheel = motion.body("carriage").r, motion.body("wheel").r
+    back = wheel[:, 0] - carriage[:, 0]
+    k = np.argmin(back)
+    overhang, between = 0.4 - strut["stroke"][k], 0.4 + strut["stroke"][k]
+    EI = 205e9 * np.pi / 4 * (0.0357**4 - 0.0307**4)
+    static = -tyre["Fx"].min() * overhang**2 * (overhang + between) / (3 * EI)
+    assert 0.5 * static < -back[k] < 2 * static
+    assert back[k:].max() > 0.1 * -back[k]
+
+
+def test_a_retracting_gear_follows_its_circles_and_the_jack_gives_what_it_gains(folder):
+    system, _ = ff.read_system(folder / "retraction.toml")
+    motion = ff.integrate(system, METHOD, 7.0, 4e-3)
+    theta = ff.joint_coordinate(system, motion, "hinge", "angle").value
+    jack = ff.element_motion(system, motion, "hydraulics").outputs
+    exact = retraction(theta)
+    assert theta[-1] > np.radians(88)
+    assert_allclose(jack["stroke jack"] + 0.4, exact.jack, rtol=0, atol=1e-9)
+    assert_allclose(motion.body("lower").r[:, 1:], exact.knee, rtol=0, atol=1e-9)
+    work = cumulative_trapezoid(jack["force jack"], jack["stroke jack"], initial=0)
+    gained = 9.81 * (exact.potential - exact.potential[0])
+    slow = np.abs(np.gradient(theta, motion.t)) < 0.1
+    assert_allclose(work[slow], gained[slow], rtol=0, atol=0.01 * gained.max())
+    for name in ("head", "rod"):
+        assert jack[f"pressure {name}"].min() > 0
