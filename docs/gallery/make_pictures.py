@@ -102,9 +102,26 @@ def chain() -> tuple[ff.System, float, float]:
     return mechanisms.chain(5, rod=bar, angles=(0.0,) * 5), 0.6, 5e-4
 
 
+def railway_engine() -> None:
+    """The railway engine through its S-curve, what bends drawn 2000 times larger."""
+    from floatframe.machines import copy_machine
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copy_machine("railway-engine", folder)
+        cms.write(cms.reduce_job(folder / "carbody.toml"), folder / "carbody.h5")
+        system, run = read_system(folder / "s_curve.toml")
+        motion = ff.integrate(system, run.integrator, t_end=run.t_end, h=run.h, output_every=34)
+        film = folder / "film.gif"
+        animate(motion, drawn(system), film, speed=1.0, fps=6, magnification=2000.0, system=system)
+        frames = [cut(frame) for frame in iio.imread(film)[3:-12]]
+    save_film(frames, HERE / "railway_engine.gif", fps=6)
+
+
 MECHANISMS: dict[str, Callable[[], None]] = {
     "slider_crank": slider_crank,
     "antenna": antenna,
+    "railway_engine": railway_engine,
     **{maker.__name__: partial(still, maker.__name__, maker) for maker in (four_bar, satellite, chain)},
 }
 
