@@ -3,6 +3,7 @@
     python -m benchmarks.railway_engine                  # table and pictures in build/; a quarter of an hour of a core
     python -m benchmarks.railway_engine --draw           # the same again from what was run before
     python -m benchmarks.railway_engine --size 0.75      # a coarser mesh: minutes
+    python -m benchmarks.railway_engine --modes          # where the modes of the body move, free and with seats held
 
 Body of 10602 dofs (cells of 0.5 m), rail defect at 5 m/s with steps of 0.5 ms, S-curve at 7 m/s with steps of 5 ms.
 Sets with 0 to 80 vibration modes, three with 160; those that span the same as `rubin` with 20. Errors as shares of the
@@ -18,10 +19,14 @@ from typing import Any
 
 import numpy as np
 
+import cms
+from cms.jobs.body_of_job import job_body
+from cms.jobs.job import read_job
 from cms.jobs.reduce_job import reduce_job
 from cms.modal_file.file import write
+from fe_models.parts import engine_body_mesh
 from floatframe.laboratory.body_errors import BodyErrors
-from floatframe.laboratory.body_study import SetError
+from floatframe.laboratory.body_study import SetError, lean_body
 from floatframe.machines.railway_engine.mode_sets import MORE_SETS, SETS, engine_study
 from floatframe.machines.railway_engine.write_files import CASES, write_railway_engine
 
@@ -52,6 +57,21 @@ def run(size: float) -> None:
         print(f"{key}: {study.n_dof} dofs, imbalance of the rigid motion {each.imbalance:.1e}")
 
 
+def where_modes_move(size: float) -> None:
+    """Print frequencies of the body and the share of the kinetic energy at the mounts of the equipment."""
+    write_railway_engine(BUILD, size=size)
+    body, sets = lean_body(job_body(read_job(BUILD / "carbody.toml"))), engine_body_mesh(size=size).node_sets
+    equipment = ("transformer", "converter", "cooler", "underfloor", "headstock", "cab")
+    places = body.nodes[[int(sets[name][0]) for name in sets if name.split("_")[0] in equipment]]
+    at_mount = (np.abs(body.nodes[:, None] - places).max(axis=2) < 1e-6).any(axis=1)[body.dofs[:, 0]]
+    with cms.Families(body) as families:
+        for kind, modes in (("free", families.free_modes(n_modes=80)), ("held", families.fixed_modes(n_modes=80))):
+            energy = modes.Phi * (body.M @ modes.Phi)
+            share = energy[at_mount].sum(axis=0) / energy.sum(axis=0)
+            for k in (*range(22), 39, 79):
+                print(f"{kind} mode {k + 1:2d}: {modes.frequencies[k]:5.1f} Hz, {100 * share[k]:3.0f} % at the mounts")
+
+
 def words(r: SetError) -> str:
     """Return a row of the table."""
     if r.failure:
@@ -75,7 +95,11 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("--size", type=float, default=0.5, help="largest edge of a cell [m]")
     asked.add_argument("--draw", action="store_true", help="only the table and the pictures of what was run before")
+    asked.add_argument("--modes", action="store_true", help="only where the modes of the body move")
     given = asked.parse_args()
+    if given.modes:
+        where_modes_move(given.size)
+        return
     if not given.draw:
         run(given.size)
     from floatframe.laboratory.body_figures import error_figure
