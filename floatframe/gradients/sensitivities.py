@@ -30,6 +30,7 @@ from floatframe.gradients.steady_rotations import DEPENDS, SteadyRotation, stead
 from floatframe.gradients.tangents import Point, parameter_residuals, tangents_at
 from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.motion.events import events_of
 from floatframe.motion.integration import number_of_steps
 from floatframe.motion.jumps import jumps_of_steps
 from floatframe.state import State
@@ -200,6 +201,13 @@ def require_no_memory(system: System) -> None:
                 f"sensitivities: force {force.name!r} has states of its own, which are not differentiated; give its "
                 "forces without states"
             )
+    for each in compiled_system(system).laws:
+        if each.law.states or each.law.multipliers:
+            what = "states" if each.law.states else "multipliers"
+            raise ModelError(
+                f"sensitivities: element {each.element.name!r} has {what} of its own, which are not differentiated; "
+                "those of elements without are; else vary its parameter by floatframe sweep"
+            )
     compiled = compiled_system(system)
     if len(rows := compiled.model.states.row):
         owner = int(np.searchsorted(compiled.model.connections.w0, rows[0], side="right")) - 1
@@ -211,7 +219,7 @@ def require_no_memory(system: System) -> None:
 def require_smooth_run(family: Family, t_start: float, h: float, n_steps: int) -> None:
     """Raise `ModelError` for events and jumps, over which a motion begins anew."""
     system = family.system
-    acting = [event for event in system.events if getattr(event, "is_active", True)]
+    acting = [event for event in events_of(system) if getattr(event, "is_active", True)]
     if acting:
         raise ModelError(
             f"sensitivities: event {acting[0].name!r}: motions over events are not differentiated; take the "

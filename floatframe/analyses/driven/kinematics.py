@@ -145,6 +145,12 @@ def kinematics(
 def first_instant(system: System, work: Work, state: State, t: float, elasticity: Elasticity) -> Instant:
     """Return the motion at the first time; `ModelError` unless the drives decide all of it."""
     compiled = compiled_system(system)
+    own = [each for each in compiled.laws if each.law.states or each.law.multipliers]
+    if own:
+        raise ModelError(
+            f"kinematics: element {own[0].element.name!r} has states or multipliers of its own, which need a motion in "
+            "time: integrate it, or take the element out"
+        )
     rolling = np.flatnonzero(is_held_velocity(compiled.model.rows.kind))
     if len(rolling):
         raise ModelError(

@@ -146,6 +146,11 @@ def shaken_system(
     rows += [row for each in observed for row in observed_rows(system, about, each)]
     columns = {column.name: column for row in rows for column in row.columns}
     linear, _ = linearize(system, about, inputs=inputs, outputs=list(columns.values())).with_mass()
+    if linear.states:
+        raise ModelError(
+            f"{where}: state {linear.states[0]!r}: elements and user forces with states of their own are no part of a "
+            "structure with modes; take their forces without states, or integrate the motion"
+        )
     require_symmetric(where, linear)
     omega, Z = modes(where, linear)
     C = (

@@ -1,5 +1,7 @@
 """What is wrong with a law of a user is told: on request, while compiling, and in a motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numba import njit
@@ -10,11 +12,14 @@ from floatframe import (
     ConvergenceError,
     Element,
     ElementLaw,
+    ElementSensor,
     Event,
     GeneralizedAlpha,
     Gravity,
     Marker,
     ModelError,
+    PlaceSensor,
+    PrismaticJoint,
     ResultsError,
     RigidBody,
     SpringDamper,
@@ -22,11 +27,16 @@ from floatframe import (
     check_element,
     element_motion,
     integrate,
+    inverse_dynamics,
+    kinematics,
     open_equations,
     resume,
+    sensitivities,
 )
 from floatframe.elements import POSITION
+from floatframe.functions.time_functions import harmonic
 from floatframe.integrators.variational import Variational
+from floatframe.results.sensors import measured
 from tests.floatframe.elements.laws import Circuit, Disc, Jack, Spring
 from tests.floatframe.elements.test_public_elements import METHOD
 
@@ -265,6 +275,54 @@ def test_schemes_that_do_not_know_elements_name_them():
         integrate(falling(Spring("e", *ENDS, 20.0)), Variational(), 0.01, 1e-3)
     with pytest.raises(ModelError, match="open_equations: 'e' has states of its own"):
         open_equations(falling(Jack("e", ENDS[1])))
+
+
+def driven_guide():
+    motion = {"distance": harmonic(0.1, 2.0)}
+    return PrismaticJoint("guide", Marker(GROUND), Marker("b"), axis=(0, 0, 1), motions=motion)
+
+
+def test_analyses_that_do_not_know_states_name_the_element():
+    guide = PrismaticJoint(
+        "guide", Marker(GROUND), Marker("b"), axis=(0, 0, 1), motions={"distance": harmonic(0.1, 2.0)}
+    )
+    driven = System([RigidBody("b", 1.0, np.eye(3))], [guide], elements=[Jack("e", ENDS[1])])
+    with pytest.raises(ModelError, match="kinematics: element 'e' has states or multipliers of its own"):
+        kinematics(driven, [0.0, 0.1])
+    with pytest.raises(ModelError, match="sensitivities: element 'e' has states of its own"):
+        sensitivities(
+            lambda values: falling(Jack("e", ENDS[1], area=values["A"])), ["p x"], {"A": 1e-3}, t_end=0.1, h=1e-3
+        )
+
+
+def test_a_driven_motion_takes_the_force_of_an_element():
+    """The drive holds weight, inertia and the spring."""
+    guide = PrismaticJoint(
+        "guide", Marker(GROUND), Marker("b"), axis=(0, 0, 1), motions={"distance": harmonic(0.1, 2.0)}
+    )
+    ends = Marker(GROUND, position=(0, 0, -1)), Marker("b")
+    forces = []
+    for parts in ({"elements": [Spring("e", *ends, 40.0)]}, {"forces": [SpringDamper("e", *ends, stiffness=40.0)]}):
+        system = System([RigidBody("b", 1.0, np.eye(3))], [guide], **parts)
+        forces.append(inverse_dynamics(system, [0.0, 0.1, 0.2]).drives["guide.distance"].force)
+    assert_allclose(forces[0], forces[1], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("output", ["p z", "pull tension"])
+def test_motions_are_differentiated_by_numbers_of_an_element(output):
+    def system(values):
+        made = falling(Spring("e", *ENDS, values["k"], 2.0, 1.0))
+        sensors = [PlaceSensor("p", Marker("b"), "position"), ElementSensor("pull", "e", "tension")]
+        return replace(made, sensors=sensors)
+
+    found = sensitivities(system, [output], {"k": 30.0}, t_end=0.2, h=1e-3)
+    sensor, column = output.split()
+    ends = []
+    for k in (29.97, 30.03):
+        whole = system({"k": k})
+        motion = integrate(whole, GeneralizedAlpha(tolerance=1e-13), 0.2, 1e-3)
+        ends.append(measured(whole, motion)[sensor].columns[column][-1])
+    assert_allclose(found.gradient[0, 0], (ends[1] - ends[0]) / 0.06, rtol=1e-4)
 
 
 def test_open_equations_know_springs_as_elements():
