@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["body_of_deck"]
 
+NO_NODES = np.zeros(0, dtype=np.int64)
+
 
 def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any], None] | None) -> FEBody:
     """Read the deck, make a body of each kind of elements, join them, and put loads and interfaces on the whole."""
@@ -41,16 +43,23 @@ def body_of_deck(job: Job, path: Path, stages: Stages, on_report: Callable[[Any]
         raw = replace(raw, node_numbers=np.arange(len(raw.nodes)))  # rows of the deck are the numbers of the parts
     with stages("assemble"):
         parts, meshes = _parts(job, path, raw, on_report)
-        joined = join(
-            str(job.body.name), parts, raw.nodes, _constraints(job, raw), numbers=numbers, node_sets=raw.node_sets
-        )
+        means = _mean_interfaces(job, raw)
+        constraints = _constraints(job, raw, besides=set(means.values()))
+        joined = join(str(job.body.name), parts, raw.nodes, constraints, numbers=numbers, node_sets=raw.node_sets)
         record = {**joined.body.provenance, "deck": str(path), "deck sha256": file_digest(path)}
         record |= {f"file {name}": digest for name, digest in raw.included.items()}
         numbering = joined.body.numbering.with_instances(raw.instances, raw.instance_step)
         body = replace(joined.body, provenance=record, numbering=numbering)
         _require_used_groups(job, raw, joined)
         body = body.with_load_cases(*_load_cases(job, raw, joined, meshes))
-        return body.with_interfaces(*[_interface(name, each, raw, joined) for name, each in job.interfaces.items()])
+        return body.with_interfaces(
+            *[
+                _mean_interface(name, each, means[name], job, raw, joined)
+                if name in means
+                else _interface(name, each, raw, joined)
+                for name, each in job.interfaces.items()
+            ]
+        )
 
 
 def _parts(
@@ -258,7 +267,62 @@ def _attached(job: Job, raw: "RawMesh") -> "Part | None":
     return Part(body, nodes)
 
 
-def _constraints(job: Job, raw: "RawMesh") -> "list[Constraint]":
+def _mean_interfaces(job: Job, raw: "RawMesh") -> dict[str, str]:
+    """Return interface -> coupling of those that are the reference node of one: a node that follows a mean motion.
+
+    Such a node has no dofs of its own; as an interface of the kind "distributing" it carries them. The coupling must be
+    of all components, by one weight a member, and nothing else may sit on its node.
+    """
+    couplings = {_one(raw, f"couplings.{k}.node", each.node): k for k, each in job.couplings.items()}
+    found: dict[str, str] = {}
+    for name, table in job.interfaces.items():
+        group = raw.node_sets.get(table.nodes, NO_NODES) if isinstance(table.nodes, str) else NO_NODES
+        node = int(group[0]) if len(group) == 1 else -1
+        if node not in couplings:
+            continue
+        coupling = job.couplings[couplings[node]]
+        where = f"interfaces.{name}: its node is the reference of coupling {couplings[node]!r}"
+        if len(coupling.components) < 6 or not all(isinstance(w, float) for w in coupling.members.values()):
+            raise JobError(
+                f"{where}, which takes some components only, or a weight for each: it has no dofs of its own; put the "
+                'interface on its members (kind = "distributing")'
+            )
+        others = _used_groups(job)
+        taken = [
+            words
+            for words, each in others
+            if words != f"couplings.{couplings[node]}" and node in _group(raw, words, each)
+        ]
+        if taken:
+            raise JobError(f"{where}, and {taken[0]} sits on it too: as an interface it has the motion of its members "
+                           "alone; put that on another node, or the interface on the members")  # fmt: skip
+        found[name] = couplings[node]
+    return found
+
+
+def _used_groups(job: Job) -> "list[tuple[str, str]]":
+    """Return (table, group of nodes) of all that is attached to nodes or ties them."""
+    found = [(f"masses.{k}", each.node) for k, each in job.masses.items()]
+    found += [(f"springs.{k}", group) for k, each in job.springs.items() for group in each.nodes]
+    found += [(f"links.{k}", group) for k, each in job.links.items() for group in (each.node, *each.followers)]
+    found += [(f"couplings.{k}", group) for k, each in job.couplings.items() for group in (each.node, *each.members)]
+    return found + [(f"equations.{k}", node) for k, each in job.equations.items() for node, _, _ in each.terms]
+
+
+def _mean_interface(
+    name: str, table: InterfaceSection, coupling: str, job: Job, raw: "RawMesh", joined: "Joined"
+) -> Interface:
+    """Return the interface at the reference node of a coupling: the weighted mean motion of its members."""
+    given = job.couplings[coupling]
+    groups = [(_group(raw, f"couplings.{coupling}.members", group), weight) for group, weight in given.members.items()]
+    members = _placed(joined, np.concatenate([rows for rows, _ in groups]), f"couplings.{coupling}.members")
+    weights = np.concatenate([np.full(len(rows), float(weight)) for rows, weight in groups])  # type: ignore[arg-type]
+    triad = np.eye(3) if table.triad is None else np.array(table.triad).T
+    reference = raw.nodes[_one(raw, f"couplings.{coupling}.node", given.node)]
+    return Interface(name, "distributing", members, np.asarray(reference), triad, weights)
+
+
+def _constraints(job: Job, raw: "RawMesh", *, besides: set[str]) -> "list[Constraint]":
     from fe_models.assemblies.constraints import MeanMotion, NodeEquation, RigidNodes
 
     made: list[Constraint] = []
@@ -267,6 +331,8 @@ def _constraints(job: Job, raw: "RawMesh") -> "list[Constraint]":
         followers = np.unique(np.concatenate([_group(raw, f"{where}.followers", group) for group in link.followers]))
         made.append(RigidNodes(where, _one(raw, f"{where}.node", link.node), followers, link.components))
     for name, coupling in job.couplings.items():
+        if name in besides:
+            continue
         where = f"couplings.{name}"
         members = [(_group(raw, f"{where}.members", group), weight) for group, weight in coupling.members.items()]
         nodes = np.concatenate([group for group, _ in members])
