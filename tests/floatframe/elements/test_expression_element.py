@@ -1,5 +1,7 @@
 """Elements of expressions beside built-in forces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -15,6 +17,7 @@ from floatframe import (
     check_element,
     element_motion,
     integrate,
+    point_motion,
 )
 from floatframe.elements.expressions import ExpressionElement
 from floatframe.functions.time_functions import harmonic
@@ -77,6 +80,23 @@ def test_the_tangent_of_expressions_is_exact_for_large_turns():
 
     assert_tangent_is_exact(turning(element), prepare=prepare, tolerance=1e-8)
     assert check_element(turning(element), "e").findings == ()
+
+
+def test_what_acts_on_all_markers_balances():
+    """Forces across the line of the markers too: momentum and angular momentum of free bodies stay."""
+    element = ExpressionElement(
+        "e",
+        {"a": Marker("a", position=(0.1, 0.2, 0)), "b": Marker("b")},
+        {"b_Fx": "3*b_y", "b_Fz": "1 + b_vx", "b_My": "2"},
+    )
+    system = replace(turning(element), forces=())
+    motion = integrate(system, METHOD, 0.05, 1e-3)
+    wrench = element_motion(system, motion, "e").wrench
+    arms = [point_motion(motion, name, place).position for name, place in (("a", (0.1, 0.2, 0)), ("b", (0, 0, 0)))]
+    assert np.abs(wrench[:, 1, :3]).max() > 1
+    assert_allclose(wrench[:, :, :3].sum(axis=1), 0, atol=1e-12)
+    moments = sum(wrench[:, m, 3:] + np.cross(arms[m], wrench[:, m, :3]) for m in range(2))
+    assert_allclose(moments, 0, atol=1e-12)
 
 
 def test_a_turning_spring_is_a_bushing_for_small_turns():
