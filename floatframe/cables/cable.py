@@ -60,7 +60,7 @@ class Cable(Element):
             object.__setattr__(self, "length", number(f"{where}: length", self.length, above=0.0))
 
     @property
-    def markers(self) -> tuple[Marker, ...]:  # type: ignore[override]
+    def markers(self) -> tuple[Marker, ...]:
         """Its points."""
         return tuple(self.points)
 
