@@ -29,7 +29,7 @@ from floatframe.viewer.cast import Between, Cast, Force, Placed
 
 __all__ = ["connections_cast", "distance", "joint_pieces"]
 
-SIZE = 0.012  #: of a joint, by the size of the scene
+SIZE, FEW = 0.012, 4  #: of a joint, by the size of the scene, up to so many bodies; of more they are smaller
 GROUND_COLOR = "#7b8790"
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -48,7 +48,7 @@ def connections_cast(cast: Cast, size: float, up: Array) -> None:
     system = carriers.system
     if system is None:
         return
-    g, placed = SIZE * size, compiled_system(system).placed
+    g, placed = SIZE * size / max(1.0, len(system.bodies) / FEW) ** 0.5, compiled_system(system).placed
     for joint in system.joints:
         at_a, at_b = joint_markers(system, joint, placed)
         a, b = carriers.of_marker(joint.marker_a, at_a), carriers.of_marker(joint.marker_b, at_b)

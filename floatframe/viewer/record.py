@@ -52,6 +52,7 @@ class Stage:
     high: Array
     size: float  #: of the machine: diagonal of its box in the first row [m]
     center: Array  #: of that box, (3,) [m]
+    half: Array  #: half of its edges, (3,) [m]
     up: Array  #: (3,)
     direction: Array  #: of the first view, from the eye, (3,)
     follows: int  #: body the camera follows, -1: none
@@ -86,7 +87,8 @@ def stage_of(shown: Shown, cast: Cast) -> Stage:
     direction, up = view_axes(points, up)
     follows = int(np.argmax(masses)) if max(travel) > TRAVELS * size else -1
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)
-    return Stage(low, high, size, (start.min(axis=0) + start.max(axis=0)) / 2, up, direction, follows)
+    half = np.ptp(start, axis=0) / 2
+    return Stage(low, high, size, start.min(axis=0) + half, half, up, direction, follows)
 
 
 def stage_record(shown: Shown, surfaces: list[FlexibleSurface], block: Block) -> tuple[dict[str, Any], Cast]:
@@ -145,6 +147,7 @@ def stage_record(shown: Shown, surfaces: list[FlexibleSurface], block: Block) ->
             "low": stage.low.tolist(),
             "high": stage.high.tolist(),
             "center": stage.center.tolist(),
+            "half": stage.half.tolist(),
             "size": stage.size,
             "up": stage.up.tolist(),
             "direction": stage.direction.tolist(),

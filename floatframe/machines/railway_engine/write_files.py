@@ -10,12 +10,13 @@ from fe_models.foundation.paths import replace_files
 from fe_models.foundation.words import nearest, quoted
 from fe_models.parts.engine_body import EngineBody, engine_body_mesh, mesh_deck
 from floatframe.errors import ModelError
-from floatframe.machines.railway_engine.wheel_paths import Defect, SCurve, path_table
+from floatframe.machines.railway_engine.wheel_paths import Defect, SCurve, WheelPaths, path_table
 
 __all__ = ["CASES", "railway_engine_files", "write_railway_engine"]
 
 CASES: dict[str, type[Defect] | type[SCurve]] = {"defect": Defect, "s_curve": SCurve}
 SAMPLE = {"defect": 2e-3, "s_curve": 2e-2}  #: times between samples of the paths [s]
+MARGIN, STEP = 12.0, 2.0  #: of the track as drawn: how far it goes beyond the vehicle, between its points [m]
 SIZE = 0.75  #: largest edge of a cell of the mesh that is shipped [m]
 
 
@@ -79,9 +80,18 @@ def railway_engine_files(
     points = ", ".join(f"[{x:.5g}, {y:.5g}, 0]" for x, y, _ in track.middle(np.array(wheelsets)))
     text = re.sub(r"^points = .*$", f"points = [{points}]", text, flags=re.MULTILINE)
     text = re.sub(r"^t_end = .*$", f"t_end = {paths.t[-1]:g}", text, flags=re.MULTILINE)
+    text = re.sub(r"^points = .*$", f"points = {points_of(track, paths)}", text, flags=re.MULTILINE)
     return {
         "carbody.inp": mesh_deck(engine_body_mesh(part, size=size)),
         "carbody.toml": (shipped / "carbody.toml").read_text("utf-8"),
         f"{case}.toml": text,
         f"{case}.csv": path_table(paths),
     }
+
+
+def points_of(track: Defect | SCurve, paths: WheelPaths) -> str:
+    """Return the middle of the track as it is drawn, from before the vehicle to behind where it stops."""
+    along = paths.places[..., 0]
+    x = np.arange(np.floor(along.min()) - MARGIN, np.ceil(along.max()) + MARGIN + STEP, STEP)
+    y = track.y(x) if isinstance(track, SCurve) else np.zeros(len(x))
+    return "[" + ", ".join(f"[{a:g}, {b:.3f}, 0]" for a, b in zip(x, y, strict=True)) + "]"

@@ -40,7 +40,7 @@ View.stage = function (record, canvas, machine) {
   if (ground) scene.add(ground.grid, ground.shadow);
 
   function box() {  // eight corners of what is to be seen
-    const half = follow.body >= 0 ? new THREE.Vector3(1, 1, 1).multiplyScalar(0.36 * size) : high.clone().sub(low).multiplyScalar(0.5);
+    const half = follow.body >= 0 ? new THREE.Vector3(...view.half).addScalar(0.06 * size) : high.clone().sub(low).multiplyScalar(0.5);
     const middle = follow.body >= 0 ? center.clone().add(moved()) : whole;
     return { middle, half };
   }
