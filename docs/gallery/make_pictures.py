@@ -124,7 +124,7 @@ def railway_engine() -> None:
 MECHANISMS: dict[str, Callable[[], None]] = {
     "slider_crank": slider_crank,
     "antenna": antenna,
-    "railway_engine": railway_engine,
+    "railway_engine_film": railway_engine,
     **{maker.__name__: partial(still, maker.__name__, maker) for maker in (four_bar, satellite, chain)},
 }
 
