@@ -35,6 +35,9 @@ MACHINES: dict[str, Machine] = {
     "landing-gear": Machine(
         "a landing gear", "landing_gear", "drop with spin-up and spring-back, oleo strut, hydraulic retraction"
     ),
+    "kart": Machine(
+        "a kart", "kart", "steering step with a flexible and a rigid chassis: radius, wheel loads, yaw-rate gain"
+    ),
 }
 
 

@@ -1,0 +1,111 @@
+"""The kart: its chassis against its finite elements, its loads against levers, its turn rigid and flexible."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse.linalg
+from numpy.testing import assert_allclose
+
+import cms
+import floatframe as ff
+from cms.jobs.body_of_job import job_body
+from cms.jobs.job import read_job
+from floatframe.machines import machine_files
+from floatframe.machines.kart import Kart, chassis_files, kart_files
+from floatframe.machines.kart.figures import torsion_stiffness, turn_of
+
+G = 9.81
+KART = Kart()
+METHOD = ff.GeneralizedAlpha(0.8, 1e-7)
+
+
+def written(folder, files):
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    folder = written(tmp_path_factory.mktemp("kart"), chassis_files(KART))
+    chassis = cms.reduce_job(folder / "chassis.toml")
+    cms.write(chassis, folder / "chassis.h5")
+    return folder, chassis
+
+
+def driven(folder, kart, *, is_rigid):
+    (name, text), *_ = kart_files(kart, is_rigid=is_rigid).items()
+    (folder / name).write_text(text)
+    system, _ = ff.read_system(folder / name)
+    return turn_of(system, ff.integrate(system, METHOD, kart.duration, 2e-3))
+
+
+@pytest.fixture(scope="module")
+def turns(parts):
+    kart = replace(KART, steer_at=0.7, duration=1.8)
+    return {is_rigid: driven(parts[0], kart, is_rigid=is_rigid) for is_rigid in (True, False)}
+
+
+def test_shipped_files_are_those_of_the_description():
+    made = chassis_files(KART) | kart_files(KART) | kart_files(KART, is_rigid=True)
+    assert {path.name: path.read_text() for path in machine_files("kart") if path.name != "README.md"} == made
+
+
+def test_torsion_of_the_reduced_chassis_is_that_of_its_finite_elements(parts):
+    """Craig-Bampton is statically complete: the same forces on the full matrices, held in six components."""
+    folder, chassis = parts
+    body = job_body(read_job(folder / "chassis.toml"))
+    ends = {i.name: i for i in body.interfaces}
+    width = {"kingpin": 2 * KART.kingpin_y, "rear": 2 * (KART.rear_half_track - 0.06)}
+    load = np.zeros(body.n_dof)
+    vertical = {}
+    for name, sign in (("kingpin", 1.0), ("rear", -1.0)):
+        for side, s in (("left", 1.0), ("right", -1.0)):
+            row = vertical[name, side] = int(ends[f"{name}_{side}"].dofs[2])
+            load[row] += sign * s / width[name]
+    held = np.asarray(ends["seat_rear_left"].dofs)
+    free = np.setdiff1d(np.arange(body.n_dof), held)
+    u = np.zeros(body.n_dof)
+    u[free] = scipy.sparse.linalg.spsolve(body.K.tocsc()[free][:, free], load[free])
+    twist = [(u[vertical[n, "left"]] - u[vertical[n, "right"]]) / width[n] for n in ("kingpin", "rear")]
+    assert_allclose(torsion_stiffness(chassis), 1.0 / (twist[0] - twist[1]), rtol=1e-6)
+
+
+def test_engine_and_axle_lower_the_modes_of_the_frame(tmp_path):
+    """Mass added anywhere lowers every frequency (Rayleigh): the engine against the frame with its axle."""
+    found = []
+    for has_engine in (False, True):
+        folder = written(tmp_path, chassis_files(KART, has_engine=has_engine))
+        found.append(cms.reduce_job(folder / "chassis.toml").frequencies[:5])
+    assert np.all(found[1] < found[0])
+
+
+def weight(chassis):
+    """Return that of chassis, pilot, column, knuckles and wheels [N]."""
+    return G * (chassis.moments.gram[0, 0] + KART.pilot_mass + 2.5 + 2 * (1.5 + 2.5 + 4.0))
+
+
+@pytest.mark.parametrize("is_rigid", [True, False])
+def test_straight_on_the_tyres_carry_the_weight(turns, parts, is_rigid):
+    turn = turns[is_rigid]
+    before = turn.loads[(turn.t > 0.4) & (turn.t < 0.69)].mean(axis=0)
+    assert_allclose(before.sum(), weight(parts[1]), rtol=0.01)
+
+
+def test_a_flexible_chassis_turns_wider_and_keeps_the_front_wheels_down(turns):
+    """What the literature says of karts, and what comes out here: see the page."""
+    rigid, flexible = turns[True], turns[False]
+    assert flexible.radius > 1.05 * rigid.radius
+    assert abs(flexible.lateral_acceleration[-1]) < abs(rigid.lateral_acceleration[-1])
+    assert flexible.transfer("rear") < rigid.transfer("rear")
+
+
+def test_in_the_turn_loads_move_by_the_lateral_acceleration_times_the_height_of_the_mass(turns, parts):
+    """Moments about x: the loads' against that before the step is m a_y h."""
+    turn = turns[True]
+    assert_allclose(turn.loads[-1].sum(), weight(parts[1]), rtol=0.01)
+    y = np.array([KART.front_half_track, -KART.front_half_track, KART.rear_half_track, -KART.rear_half_track])
+    before = turn.loads[(turn.t > 0.4) & (turn.t < 0.69)].mean(axis=0)
+    height = -(turn.loads[-1] - before) @ y * G / (weight(parts[1]) * turn.lateral_acceleration[-1])
+    assert 0.17 < height < 0.26  # pilot at 0.28, chassis and wheels near 0.1
