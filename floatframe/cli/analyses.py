@@ -329,6 +329,7 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
 
     from floatframe.analyses.snapshot import snapshot
     from floatframe.compiling.system import compiled_system
+    from floatframe.kernels.model import ELEMENT
     from floatframe.results.sensors import measured
     from floatframe.rotations import rotation_log, rotation_matrix
 
@@ -347,6 +348,8 @@ def equilibrium_record(system: "System", rest: "Equilibrium") -> dict[str, Any]:
         )
     reactions = []
     for c, name in enumerate(names):
+        if model.connections.law[c] == ELEMENT:  # whose unknowns are its own: sensors show them
+            continue
         w = rest.w[model.connections.w0[c] : model.connections.w0[c + 1]]
         reactions.append(
             {"name": name, "force": w[:3].tolist(), "moment": (w[3:6] if len(w) >= 6 else np.zeros(3)).tolist()}

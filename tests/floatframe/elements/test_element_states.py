@@ -7,16 +7,20 @@ from scipy.integrate import solve_ivp
 
 from floatframe import (
     GROUND,
+    BaseMotion,
     Channel,
+    Column,
     ElementSensor,
     GeneralizedAlpha,
     Gravity,
     JointForce,
     Marker,
     ModelError,
+    PlaceSensor,
     PrismaticJoint,
     RigidBody,
     RollingDisc,
+    SpringDamper,
     System,
     consistent_state,
     element_motion,
@@ -149,6 +153,23 @@ def test_outputs_are_linear_in_places_and_velocities():
     scale = linear.N[2, 0]
     assert_allclose(linear.L[0], [50 * scale, 0], rtol=1e-9, atol=1e-9)
     assert_allclose(linear.L_rate[0], [0.7 * scale, 0], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("how", ["complex", "differences", "given", "Python, complex"])
+def test_a_base_shakes_what_elements_hold_to_the_ground(how):
+    ends = Marker(GROUND, position=(0, 0, -2)), Marker("b")
+    rail = lifted().joints
+    shaken = BaseMotion("shake", (0, 0, 1), rate=0, joints=("s",))
+    found = []
+    for parts in (
+        {"elements": [Spring("s", *ends, 50.0, 0.7, how=how)]},
+        {"forces": [SpringDamper("s", *ends, stiffness=50.0, damping=0.7)]},
+    ):
+        linear = linearize(System(lifted().bodies, rail, **parts), inputs=[shaken],
+                           outputs=[Column(PlaceSensor("b", Marker("b"), "position"), "z")])  # fmt: skip
+        found.append(frequency_response(linear, np.array([0.1, 1.0])).values)
+    assert np.abs(found[1]).min() > 1e-3
+    assert_allclose(found[0], found[1], rtol=1e-7)
 
 
 def disc(**parts):
