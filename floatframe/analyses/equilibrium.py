@@ -63,6 +63,7 @@ log = logging.getLogger(__name__)
 LARGEST_TURN = 0.5  #: rad, and part of the size of the system, in one step
 FASTEST_GROWTH, LEAST_GROWTH = 30.0, 2.0  #: of tau in one step, while the residual falls or stands
 STANDING = 0.9  #: last residual by this one, below which it rises: tau shrinks with it
+STANDING_SPRINGS = 1e-9  #: other forces by those of springs as placed, below which springs alone move the system
 ROUNDING = 32 * np.finfo(float).eps  #: of a position or rotation, as springs see it
 STANDSTILL = 1e-200  #: of the first residual, below which it is as good as zero
 LONG_STEP = 1e4  #: step of states by the first one at which states that stand are at rest
@@ -240,7 +241,8 @@ def steady_rotation(
             break
         if tau == 0.0:
             pulled = forces - parts.J.T @ wrenches_by_law(model, parts, gaps, holds | states.own)
-            tau = 0.1 * compiled.length / max(_size(W, pulled) / np.sqrt(_total_mass(W)), STANDSTILL)
+            at_first = size if size > STANDING_SPRINGS * _size(W, pulled) else _size(W, pulled)
+            tau = 0.1 * compiled.length / max(at_first / np.sqrt(_total_mass(W)), STANDSTILL)
         else:
             fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
             tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)

@@ -63,7 +63,7 @@ def test_an_amplitude_acts_at_once_and_in_equilibrium(rest, name):
     at_once = linear.D + linear.L_acceleration @ np.linalg.solve(linear.M, linear.B)
     assert linear.input_units == ("N m" if name == "drive" else "1",)
     found = {True: [], False: []}
-    s = 1e-4
+    s = 5e-4
     for size in (s, -s):
         other = loaded(name, size)
         made = consistent_state(other, about.state, known=about.w)
