@@ -317,7 +317,7 @@ last = {last:.15g}
 {sensors()}
 [run]
 t_end = {antenna.duration:.6g}
-h = {antenna.duration / 240:.6g}
+h = {antenna.duration / 60:.6g}
 """
 
 
