@@ -135,7 +135,7 @@ def circuit_law(t, x, z, lam, data, wrench, z_dot, g, seen):
             elif how != ALWAYS:
                 u = seen[at] if how == BY_SPOOL else -seen[at]
                 part = (u - data[n + 4]) / (1.0 - data[n + 4])
-            if part.real < 0.0:
+            if part.real < 0.0 or (part.real == 0.0 and how == BY_SPOOL_BACK):  # a spool in the middle has one slope
                 part = 0.0 * part
             q = part * data[n] * turbulent(dp, data[n + 1]) + data[n + 5] * dp
             seen[s] = q

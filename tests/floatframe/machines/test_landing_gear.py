@@ -10,6 +10,8 @@ import floatframe as ff
 from floatframe.functions.tables import monotone_table
 from floatframe.machines import copy_machine
 from floatframe.machines.landing_gear import retraction
+from floatframe.results.sensors import measurement_of
+from floatframe.rotations import rotation_matrix
 
 G, SINK, FORWARD, LIFT, CARRIAGE = 9.81, 2.5, 40.0, 7200.0, 1100.0
 RADIUS, TYRE, TYRE_DAMPING, FRICTION, SPIN = 0.35, 2.5e5, 300.0, 0.7, 1.5
@@ -99,3 +101,46 @@ def test_a_retracting_gear_follows_its_circles_and_the_jack_gives_what_it_gains(
     assert_allclose(work[slow], gained[slow], rtol=0, atol=0.01 * gained.max())
     for name in ("head", "rod"):
         assert jack[f"pressure {name}"].min() > 0
+
+
+@pytest.fixture(scope="module")
+def aircraft(folder):
+    cms.write(cms.reduce_job(folder / "wing.toml"), folder / "wing.h5")
+    return folder / "aircraft.toml"
+
+
+def test_an_aircraft_stands_on_its_three_gears_by_the_rule_of_levers(aircraft):
+    none = {f"forces.lift_{side}.force": [0, 0, 0] for side in ("left", "right")}
+    system, _ = ff.read_system(aircraft, none)
+    rest = ff.static_equilibrium(system)
+    motion = ff.integrate(system, METHOD, 1e-3, 1e-3, state=rest.state)
+    weight, moment = 0.0, 0.0
+    for body in system.bodies:
+        is_rigid = isinstance(body, ff.RigidBody)
+        mass, centre = (body.mass, body.center_of_mass) if is_rigid else of_wing(body.reduced.moments.gram)
+        moved = motion.body(body.name)
+        weight += G * mass
+        moment += G * mass * (moved.r[0] + rotation_matrix(moved.p[0]) @ centre)[0]
+    loads = {name: ff.element_motion(system, motion, f"tyre_{name}").outputs for name in ("left", "right", "nose")}
+    assert_allclose(sum(each["Fz"][0] for each in loads.values()), weight, rtol=1e-8)
+    assert_allclose(sum(each["Fz"][0] * each["px"][0] for each in loads.values()), moment, rtol=0, atol=1e-4 * weight)
+    assert_allclose(loads["left"]["Fz"][0], loads["right"]["Fz"][0], rtol=1e-6)
+    assert 0.05 * weight < loads["nose"]["Fz"][0] < 0.2 * weight
+
+
+def of_wing(gram):
+    """Return the mass of a wing and its centre."""
+    return gram[0, 0], gram[0, 1:4] / gram[0, 0]
+
+
+def test_an_aircraft_lands_on_its_main_gears_and_its_wings_go_on(aircraft):
+    system, _ = ff.read_system(aircraft)
+    motion = ff.integrate(system, METHOD, 0.3, 1e-3)
+    loads = {
+        name: ff.element_motion(system, motion, f"tyre_{name}").outputs["Fz"] for name in ("left", "right", "nose")
+    }
+    first = {name: motion.t[np.argmax(load > 100)] for name, load in loads.items()}
+    assert first["left"] == first["right"] < 0.01 < first["nose"]
+    assert_allclose(loads["left"], loads["right"], rtol=0, atol=1e-6 * loads["left"].max())
+    tip = measurement_of(system, motion, "tip").columns["z"]
+    assert tip.min() < -0.02  # the wing goes on down when the wheels have stopped the fuselage
