@@ -1,6 +1,6 @@
 """The Magic Formula written a second time, term by term from the equations of the textbook, with NumPy alone.
 
-Pacejka (2012), Tire and Vehicle Dynamics, for 6.1; Pacejka (2006) for 5.2. No turn slip; zeta = 1.
+Pacejka (2012) for 6.1, the second edition of the same book for 5.2. No turn slip; zeta = 1.
 """
 
 import numpy as np
