@@ -93,10 +93,10 @@ def grid_of(pair: Pair) -> TableGrid:
     return TableGrid(v=(least, most, int(np.ceil((most - least) / 2e-4)) + 1))
 
 
-def law_numbers(wheels: Sequence[Wheel], track: Track, laws: ContactLaws) -> Array:
+def law_numbers(wheels: Sequence[Wheel], track: Track, laws: ContactLaws, spin_inertia: float = 0.0) -> Array:
     """Return the numbers of the law `wheels_on_rails`: head, wheels, cells of the track, irregularities, tables."""
     cells = track.cells
-    n_head, n_wheel = 20, 6
+    n_head, n_wheel = 21, 6
     cells_at = n_head + n_wheel * len(wheels)
     irregular_at = cells_at + cells.size
     deviations = track.irregularities
@@ -139,7 +139,7 @@ def law_numbers(wheels: Sequence[Wheel], track: Track, laws: ContactLaws) -> Arr
     head = [
         len(wheels), n_parts_of(wheels), CREEP_LAWS[laws.creep], *options,
         laws.shear_modulus, laws.friction, laws.low_speed, laws.damping, laws.normal == "constraint",
-        track.start[2], cells_at, len(cells), irregular_at, first, step, n,
+        track.start[2], cells_at, len(cells), irregular_at, first, step, n, spin_inertia,
     ]  # fmt: skip
     return np.concatenate([np.array(head, dtype=float), np.ravel(rows), cells.ravel(), signals, *tables])
 

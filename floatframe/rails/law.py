@@ -9,6 +9,8 @@ For each wheel, with side = +1 on the left and -1 on the right, outward = side �
 (4)  N = K d^(3/2) (1 + damping d_dot) where d > 0, or from the multiplier of 0 = h - q
 (5)  at P = W + x t + side y n + z b: creepages of v + omega x (P - r), creep forces by the law chosen
 (6)  force N (b cos - outward sin) + F_x t + F_y e_y, moment about the marker of the force at P and M about the normal
+(7)  with a spin inertia I the body of the marker does not turn with the wheels: Omega, their angular velocity about the
+     axle, is a state, I Omega' = M·a, and the body bears the rest of the moment, less omega × I Omega a
 """
 
 import numba
@@ -25,6 +27,7 @@ HEAD = (
     "friction",
     "low_speed", "damping", "is_constraint", "height", "cells_at", "n_cells", "irregular_at", "irregular_from",
     "irregular_step", "irregular_n",
+    "spin_inertia",
 )  # fmt: skip
 #: then for each wheel
 WHEEL_HEAD = ("side", "arm", "half", "radius", "table_at", "u_off")
@@ -146,8 +149,15 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
     rx, ry, rz = x[0, 0], x[0, 1], x[0, 2]
     ax, ay, az = x[0, 4], x[0, 7], x[0, 10]  # the axle, to the left
     vx, vy, vz = x[0, 12], x[0, 13], x[0, 14]
-    ox_, oy_, oz_ = x[0, 15], x[0, 16], x[0, 17]
+    wx_, wy_, wz_ = x[0, 15], x[0, 16], x[0, 17]
+    ox_, oy_, oz_ = wx_, wy_, wz_
     zero = 0 * (rx + vx + (lam[0] if is_constraint else 0.0))
+    inertia = data[20]
+    spin_rate = zero
+    if inertia > 0:  # the body does not turn with the wheels: their angular velocity about the axle is a state
+        spin_rate = z[0]
+        more = spin_rate - (wx_ * ax + wy_ * ay + wz_ * az)
+        ox_, oy_, oz_ = wx_ + more * ax, wy_ + more * ay, wz_ + more * az
     field = np.empty(N_FIELDS, dtype=x.dtype)
     energy = zero
     lost = zero
@@ -303,6 +313,14 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
         if off.real > worst.real:
             worst = off
     last = int(data[0]) * (n_w_out + n_parts * n_c_out)
+    if inertia > 0:  # I Omega' a + omega x I Omega a is the wheels' share of the moment
+        about = wrench[0, 3] * ax + wrench[0, 4] * ay + wrench[0, 5] * az
+        z_dot[0] = about / inertia
+        momentum = inertia * spin_rate
+        wrench[0, 3] -= about * ax + momentum * (wy_ * az - wz_ * ay)
+        wrench[0, 4] -= about * ay + momentum * (wz_ * ax - wx_ * az)
+        wrench[0, 5] -= about * az + momentum * (wx_ * ay - wy_ * ax)
+        energy += 0.5 * momentum * spin_rate
     seen[last] = worst
     seen[last + 1] = energy
     seen[last + 2] = lost

@@ -52,6 +52,11 @@ class Wheelset(Element):
     pair: Pair = field(default_factory=Pair)  #: wheel and rail, alike on both sides
     track: Track = field(default_factory=Track)
     laws: ContactLaws = field(default_factory=ContactLaws)
+    spin_inertia: float = 0.0  #: above 0: of what turns about the axle [kg m²], on a body that does not turn with it
+    spin: float = 0.0  #: angular velocity at the start then, a state [rad/s]
+
+    def __post_init__(self) -> None:
+        require_spin(self)
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of both wheels."""
@@ -84,8 +89,11 @@ class WheelOnRail(Element):
     pair: Pair = field(default_factory=Pair)
     track: Track = field(default_factory=Track)
     laws: ContactLaws = field(default_factory=ContactLaws)
+    spin_inertia: float = 0.0  #: above 0: of the wheel about its axle [kg m²], on a body that does not turn with it
+    spin: float = 0.0  #: angular velocity at the start then, a state [rad/s]
 
     def __post_init__(self) -> None:
+        require_spin(self)
         if self.side not in SIDES:
             raise ModelError(f"element {self.name!r}: side: expected left or right, got {self.side!r}")
 
@@ -122,11 +130,15 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
         raise ModelError(f"{where}: marker: expected one on the body that turns, got the ground, where the rails are")
     require_on_track(where, element, placed, wheels)
     names, units = output_names(wheels, WHEEL_OUTPUTS, CONTACT_OUTPUTS)
-    held = element.laws.normal == "constraint"
+    held, turns = element.laws.normal == "constraint", element.spin_inertia > 0
     sides = [("left" if each.side > 0 else "right") + "_V" for each in wheels] if held else []
     return ElementLaw(
         function=wheels_on_rails,
-        data=law_numbers(wheels, element.track, element.laws),
+        data=law_numbers(wheels, element.track, element.laws, element.spin_inertia),
+        states=["spin"] if turns else [],
+        start=[element.spin] if turns else [],
+        state_units=["rad/s"] if turns else [],
+        state_sizes=[10.0] if turns else [],
         multipliers=sides,
         multiplier_units=["N"] * len(sides),
         holds=[POSITION] * len(sides),
@@ -138,6 +150,12 @@ def law_of_wheels(element: Wheelset | WheelOnRail, placed: Placed, wheels: tuple
         power_lost="power_lost",
         stops={"off_track": OFF_TRACK},
     )
+
+
+def require_spin(element: Wheelset | WheelOnRail) -> None:
+    """Raise unless inertia and speed of the spin are numbers."""
+    number(f"element {element.name!r}: spin_inertia", element.spin_inertia, at_least=0.0)
+    number(f"element {element.name!r}: spin", element.spin)
 
 
 def require_on_track(
@@ -199,7 +217,7 @@ def track_shape(
 
 def common_fields(name: str, table: Mapping[str, Any], read: Any, own: tuple[str, ...]) -> dict[str, Any]:
     """Return marker, pair, track and laws of a table; ModelError naming the key that is wrong."""
-    known = (*own, "marker", "wheel", "rail", "track", *PAIR_KEYS, *LAW_KEYS)
+    known = (*own, "marker", "spin_inertia", "spin", "wheel", "rail", "track", *PAIR_KEYS, *LAW_KEYS)
     for key in table:
         if key not in known:
             raise ModelError(f"elements.{name}: unknown key {quoted(key)}; choose among {', '.join(known)}")
@@ -218,6 +236,7 @@ def common_fields(name: str, table: Mapping[str, Any], read: Any, own: tuple[str
         "pair": pair,
         "track": Track.from_table(table.get("track", {}), f"elements.{name}.track"),
         "laws": ContactLaws(**laws),
+        **{key: table[key] for key in ("spin_inertia", "spin") if key in table},
     }
 
 

@@ -40,8 +40,8 @@ def test_the_compiled_law_finds_the_place_beside_a_point(heading):
     track = Track(
         (Segment(300.0), *curve(-200.0, 250.0, transition=60.0, cant=0.1)), start=(5.0, -7.0, 0.3), heading=heading
     )  # fmt: skip
-    data = np.concatenate([np.zeros(20), track.cells.ravel()])
-    data[14], data[15] = 20, len(track.cells)
+    data = np.concatenate([np.zeros(21), track.cells.ravel()])
+    data[14], data[15] = 21, len(track.cells)
     for s in (-40.0, 0.0, 151.0, 320.5, 345.0, 401.7, 599.0, 640.0, 730.0, 900.0):
         frame = track.frame(s)
         for beside in (-0.9, 0.0, 0.8):

@@ -287,3 +287,20 @@ def test_wheels_and_track_are_drawn():
     assert [each.shape.geometry.flange_side for each in wheels.drawn()] == [-1, 1]  # the flange is inside
     track = rails.track_shape(rails.Track(rails.curve(300.0, 60.0, cant=0.1)), 150.0)
     assert track.cant.min() < -0.09
+
+
+def test_wheels_that_spin_on_a_body_that_does_not_turn_are_the_same_machine():
+    """Spin as a state, its gyroscopic moment on the body, against a body that turns: hunting at 25 m/s."""
+    turning = axle(25.0, 25.0 / 0.46, (0, 4e-3, 0.4597))
+    one = System([turning], [], [DOWN], elements=[rails.Wheelset("wheels", Marker("axle"), NEW)])
+    still = replace(turning, inertia=np.diag([I_X, 1e-3, I_X]), omega_B=(0, 0, 0))
+    # what little inertia is left about the axle is held by a spring to the ground that knows no other direction
+    held = Bushing("held", Marker(GROUND, position=(0, 0, 0.4597)), Marker("axle"), [0, 0, 0, 0, 1e3, 0])
+    wheels = rails.Wheelset("wheels", Marker("axle"), NEW, spin_inertia=I_Y, spin=25.0 / 0.46)
+    two = System([still], [], [DOWN, held], elements=[wheels])
+    first, second = (integrate(each, METHOD, 0.8, 5e-4) for each in (one, two))
+    y, other = first.body("axle").r[:, 1], second.body("axle").r[:, 1]
+    assert np.ptp(y) > 5e-3
+    assert_allclose(other, y, rtol=0, atol=2e-2 * np.ptp(y))
+    spin = element_motion(two, second, "wheels").states["spin"]
+    assert_allclose(spin, first.body("axle").omega_B[:, 1], rtol=2e-3)
