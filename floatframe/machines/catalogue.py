@@ -29,6 +29,9 @@ MACHINES: dict[str, Machine] = {
     "antenna": Machine(
         "a deployable antenna", "antenna", "slow opening on a rig and in space, latching shock in free flight"
     ),
+    "bogie": Machine(
+        "a railway vehicle on bogies", "bogie", "hunting over speed, limit cycles, independent wheels, a curve"
+    ),
     "railway-engine": Machine(
         "a railway engine", "railway_engine", "its full body and mode sets over a rail defect and through an S-curve"
     ),

@@ -1,0 +1,20 @@
+"""A four-axle passenger vehicle on bogies: stability over speed, limit cycles, independent wheels, curves."""
+
+from floatframe.machines.bogie.frame import frame_files
+from floatframe.machines.bogie.running import Falling, Hunting, critical_speed, falling_speed, hunting, steady_running
+from floatframe.machines.bogie.vehicle import RailVehicle, flexible_frames, vehicle
+from floatframe.machines.bogie.write_files import bogie_files
+
+__all__ = [
+    "Falling",
+    "Hunting",
+    "RailVehicle",
+    "bogie_files",
+    "critical_speed",
+    "falling_speed",
+    "flexible_frames",
+    "frame_files",
+    "hunting",
+    "steady_running",
+    "vehicle",
+]

@@ -1,0 +1,66 @@
+"""The flexible bogie frame: side members, a transom and posts to the springs, as beams."""
+
+import numpy as np
+
+from floatframe.machines.bogie.vehicle import RailVehicle
+
+__all__ = ["frame_files"]
+
+SIDE = {"width": 0.18, "height": 0.26, "web": 0.012, "flange": 0.014}  #: box of the side members and posts [m]
+TRANSOM = {"width": 0.30, "height": 0.26, "web": 0.012, "flange": 0.014}
+DENSITY = 7850.0
+
+
+def area(section: dict[str, float]) -> float:
+    """Of a box [m²]."""
+    inner = (section["width"] - 2 * section["web"]) * (section["height"] - 2 * section["flange"])
+    return section["width"] * section["height"] - inner
+
+
+def frame_files(data: RailVehicle, axle_height: float = 0.46) -> dict[str, str]:
+    """Return the job of the frame and its tables, by name of the file.
+
+    Brackets, brake gear and dampers are a mass per length that brings the frame to its mass. Interfaces: four seats of
+    the axle boxes (leading_left, ...), two of the air springs (air_left, air_right), the pivot. The origin is at the
+    height of the rails, below the pivot.
+    """
+    b, a, h = data.wheelbase, data.primary_arm, data.frame_height
+    nodes: dict[str, tuple[float, float, float]] = {"pivot": (0.0, 0.0, h)}
+    lines: list[tuple[str, str, str, int]] = []
+    for side, hand in ((1, "left"), (-1, "right")):
+        nodes[f"middle_{hand}"] = (0.0, side * a, h)
+        nodes[f"air_{hand}"] = (0.0, side * data.secondary_arm, data.secondary_height)
+        lines.append((f"middle_{hand}", f"air_{hand}", "side", 1))
+        lines.append(("pivot", f"middle_{hand}", "transom", 4))
+        for end, word in ((1, "leading"), (-1, "trailing")):
+            nodes[f"end_{word}_{hand}"] = (end * b, side * a, h)
+            nodes[f"{word}_{hand}"] = (end * b, side * a, axle_height)
+            lines.append((f"middle_{hand}", f"end_{word}_{hand}", "side", 5))
+            lines.append((f"end_{word}_{hand}", f"{word}_{hand}", "side", 1))
+    place = {name: np.array(point) for name, point in nodes.items()}
+    length = sum(float(np.linalg.norm(place[one] - place[other])) for one, other, _, _ in lines)
+    steel = sum(
+        float(np.linalg.norm(place[one] - place[other])) * DENSITY * area(SIDE if group == "side" else TRANSOM)
+        for one, other, group, _ in lines
+    )
+    added = (data.frame_mass - steel) / length
+    number = {name: k for k, name in enumerate(nodes, start=1)}
+    job = [
+        "# The frame of a bogie: beams between the seats of its springs, reduced by Craig-Bampton.",
+        '[body]\nname = "frame"\nnodes = "frame_nodes.csv"\nlines = "frame_lines.csv"\nunits = "m-kg-s"\n',
+        f"[materials.steel]\nyoung = 2.1e11\npoisson = 0.3\ndensity = {DENSITY}\n",
+    ]
+    for name, section in (("side", SIDE), ("transom", TRANSOM)):
+        values = "\n".join(f"{key} = {value}" for key, value in section.items())
+        job.append(f'[sections.{name}]\nshape = "box"\nlines = "{name}"\n{values}\nadded_mass = {added:.6f}\n')
+    for name in nodes:
+        if not name.startswith(("middle", "end")):
+            job.append(f'[interfaces.{name}]\nkind = "rigid"\nnodes = "{name}"\n')
+    job.append('[reduction]\nset = "craig-bampton"\nn_modes = 6\n\n[damping]\nratio = 0.01\n')
+    table = ["node, x, y, z, sets", *(f"{number[n]}, {x:g}, {y:g}, {z:g}, {n}" for n, (x, y, z) in nodes.items())]
+    cut = ["node1, node2, group, elements", *(f"{number[i]}, {number[j]}, {g}, {n}" for i, j, g, n in lines)]
+    return {
+        "frame.toml": "\n".join(job),
+        "frame_nodes.csv": "\n".join(table) + "\n",
+        "frame_lines.csv": "\n".join(cut) + "\n",
+    }

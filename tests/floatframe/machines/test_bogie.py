@@ -1,0 +1,93 @@
+"""The railway vehicle: its hunting linearised and as motion, conicity, independent wheels, the files as shipped."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+from floatframe import GeneralizedAlpha, ModelError, integrate, rails
+from floatframe.machines import machine_files
+from floatframe.machines.bogie import (
+    RailVehicle,
+    bogie_files,
+    critical_speed,
+    falling_speed,
+    flexible_frames,
+    hunting,
+    steady_running,
+    vehicle,
+)
+from floatframe.machines.bogie.running import lateral_modes
+from floatframe.system_file.read_system import read_system
+
+DATA = RailVehicle()
+LAWS = rails.ContactLaws(creep="kalker", friction=0.4)
+
+
+def on_cones(conicity, speed, **options):
+    return vehicle(DATA, speed, pair=rails.Pair(wheel=rails.cone(conicity)), laws=LAWS, **options)
+
+
+def test_a_disturbance_grows_and_moves_as_the_eigenvalues_say():
+    """Second road: the nonlinear motion after a small blow to one axle is, late, made of the two growing modes."""
+    system = on_cones(0.1, 120.0)
+    roots, _ = lateral_modes(steady_running(system))
+    growing = roots[roots.real > 0]
+    assert len(growing) == 2  # one of each bogie
+    bodies = [
+        replace(each, velocity=np.array([120.0, 1e-3, 0])) if each.name == "axle_front_leading" else each
+        for each in system.bodies
+    ]
+    motion = integrate(replace(system, bodies=bodies), GeneralizedAlpha(0.9, 1e-9), 1.6, 1e-3)
+    t, y = motion.t, motion.body("axle_front_leading").r[:, 1]
+    late = t > 0.8
+    waves = np.exp(np.outer(t[late] - 0.8, growing))
+    basis = np.hstack([waves.real, waves.imag])
+    rest = y[late] - basis @ np.linalg.lstsq(basis, y[late], rcond=None)[0]
+    assert np.abs(rest).max() < 0.03 * np.abs(y[late]).max()
+    assert np.abs(y[late]).max() > 2 * np.abs(y[~late]).max()
+
+
+def test_more_conicity_hunts_faster_and_independent_wheels_not_at_all():
+    low, high = hunting(on_cones(0.05, 110.0)), hunting(on_cones(0.2, 110.0))
+    assert low.damping < 0 > high.damping
+    assert high.frequency > 1.5 * low.frequency  # Klingel: with the root of the conicity
+    assert hunting(on_cones(0.2, 110.0, is_independent=True)).damping > 0.05
+    assert hunting(on_cones(0.05, 50.0)).damping > 0.1
+
+
+def test_the_critical_speed_lies_where_damping_ends():
+    speed = critical_speed(lambda V: on_cones(0.1, V), 85.0, 93.0, tolerance=4.0)
+    assert_allclose(speed, 88.4, rtol=0, atol=2.5)  # finely bisected: 88.4, see docs/bogie.md
+    with pytest.raises(ModelError, match="expected more damping than 0 at 110 m/s"):
+        critical_speed(lambda V: on_cones(0.1, V), 110.0, 120.0)
+
+
+def test_the_files_are_those_of_the_generator_and_make_the_vehicle(tmp_path):
+    shipped = {path.name: path.read_text() for path in machine_files("bogie")}
+    assert {name: text for name, text in shipped.items() if name != "README.md"} == bogie_files()
+    for name, text in shipped.items():
+        (tmp_path / name).write_text(text)
+    frame = cms.reduce_job(tmp_path / "frame.toml")
+    assert_allclose(frame.moments.m, DATA.frame_mass, rtol=1e-6)
+    cms.write(frame, tmp_path / "frame.h5")
+    read = read_system(tmp_path / "straight.toml")[0]
+    plain = replace(read, elements=[replace(each, track=rails.Track()) for each in read.elements])
+    made = vehicle(DATA, 55.0, frames=flexible_frames(DATA, frame, 55.0))
+    one, other = (integrate(each, GeneralizedAlpha(0.8, 1e-8), 0.02, 2e-3) for each in (plain, made))
+    for name in ("body", "axle_rear_trailing", "frame_front"):
+        assert_allclose(one.body(name).r, other.body(name).r, rtol=0, atol=1e-7)
+
+
+@pytest.mark.long
+def test_limit_cycles_live_on_below_the_critical_speed():
+    """S1002: hunting started above it goes on while the speed falls, and ends near where small motions grow."""
+    laws = replace(LAWS, creep="fastsim", strips=8)
+    linear = critical_speed(lambda V: vehicle(DATA, V, laws=LAWS), 60.0, 90.0, tolerance=1.0)
+    found = falling_speed(vehicle(DATA, 82.0, laws=laws), "axle_front_leading", deceleration=1.0, end=60.0, kick=0.1)
+    alive = found.speed[found.amplitude > 2e-3]
+    assert alive.max() > linear
+    assert alive.min() < linear + 1.0
+    assert found.amplitude[-1] < 1e-4
