@@ -21,9 +21,8 @@ from floatframe.rails.splines import coefficients, even_coefficients
 
 __all__ = ["FIELDS", "LEAST_BEND", "ContactTable", "Steel", "TableGrid", "contact_table", "numbers_of_table"]
 
-#: of each part: depth at h = 0, dq/du, lever x over sin psi, levers y and z, rolling radius, Hertz's stiffness, a and
-#: b of
-#: one newton, Kalker's coefficients
+#: of each part: depth at h = 0, dq/du, lever x over sin psi, levers y and z, rolling radius; logarithms, since splines
+#: through numbers that jump do not stay positive, of Hertz's stiffness, a and b of one newton, Kalker's coefficients
 FIELDS = ("q", "slope", "x", "y", "z", "radius", "stiffness", "a_1", "b_1", "c11", "c22", "c23", "c33")
 
 LEAST_BEND = 0.05  #: curvature below which a contact is not taken to be flatter [1/m]
@@ -88,9 +87,9 @@ def made_once(pair: Pair, parts: tuple[str, ...], smoothing: float, steel: Steel
                 shape = ellipse(0.5 * cos / found.radius, 0.5 * np.maximum(found.bend, LEAST_BEND), modulus)
                 values[k, :, i, j, :9] = np.column_stack([
                     found.q, found.slope, found.x / np.sin(yaw), found.y, found.z, found.radius,
-                    shape.stiffness, shape.a_1, shape.b_1,
+                    np.log(shape.stiffness), np.log(shape.a_1), np.log(shape.b_1),
                 ])  # fmt: skip
-                values[k, :, i, j, 9:] = kalker_coefficients(shape.ratio, steel.poisson).T
+                values[k, :, i, j, 9:] = np.log(kalker_coefficients(shape.ratio, steel.poisson)).T
     return ContactTable(grid, values)
 
 

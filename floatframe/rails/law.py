@@ -224,7 +224,7 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
                 g[wheel] = h - field[0]
                 N = lam[wheel] / cos
             elif depth.real > 0:
-                N = field[6] * depth * np.sqrt(depth)
+                N = np.exp(field[6]) * depth * np.sqrt(depth)
                 energy += 0.4 * N * depth
                 if damping > 0:
                     factor = 1 - damping * (ux * mx + uy * my + uz * mz)
@@ -248,8 +248,8 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
                     Q += N * cos
                     Y += N * sin
                 continue
-            cube = np.exp(np.log(N) / 3)
-            a, b = field[7] * cube, field[8] * cube
+            third = np.log(N) / 3
+            a, b = np.exp(field[7] + third), np.exp(field[8] + third)
             xi = (ux * c + uy * sn) / V
             eta = (ux * ex + uy * ey + uz * ez) / V
             spin = (ox_ * mx + oy_ * my + oz_ * mz) / V
@@ -261,10 +261,10 @@ def wheels_on_rails(t, x, z, lam, data, wrench, z_dot, g, seen):
                 N,
                 a,
                 b,
-                field[9],
-                field[10],
-                field[11],
-                field[12],
+                np.exp(field[9]),
+                np.exp(field[10]),
+                np.exp(field[11]),
+                np.exp(field[12]),
                 G,
                 mu,
                 options,

@@ -13,7 +13,6 @@ from floatframe.machines.bogie import (
     RailVehicle,
     bogie_files,
     critical_speed,
-    falling_speed,
     flexible_frames,
     hunting,
     steady_running,
@@ -79,15 +78,3 @@ def test_the_files_are_those_of_the_generator_and_make_the_vehicle(tmp_path):
     one, other = (integrate(each, GeneralizedAlpha(0.8, 1e-8), 0.02, 2e-3) for each in (plain, made))
     for name in ("body", "axle_rear_trailing", "frame_front"):
         assert_allclose(one.body(name).r, other.body(name).r, rtol=0, atol=1e-7)
-
-
-@pytest.mark.long
-def test_limit_cycles_live_on_below_the_critical_speed():
-    """S1002: hunting started above it goes on while the speed falls, and ends near where small motions grow."""
-    laws = replace(LAWS, creep="fastsim", strips=8)
-    linear = critical_speed(lambda V: vehicle(DATA, V, laws=LAWS), 60.0, 90.0, tolerance=1.0)
-    found = falling_speed(vehicle(DATA, 82.0, laws=laws), "axle_front_leading", deceleration=1.0, end=60.0, kick=0.1)
-    alive = found.speed[found.amplitude > 2e-3]
-    assert alive.max() > linear
-    assert alive.min() < linear + 1.0
-    assert found.amplitude[-1] < 1e-4

@@ -267,3 +267,15 @@ def test_friction_only_takes_power():
         seen = law.seen([0, y, z], tilted([0, 0, yaw]), [20, v_y, 0], [0, 20 / 0.46 + slip, 0])
         assert seen["power_lost"] >= 0
         assert_allclose(seen["power_lost"], (seen["left_wear"] + seen["right_wear"]) * 20, rtol=1e-4)
+
+
+def test_wherever_a_wheel_is_pushed_its_forces_are_numbers():
+    """Deep in the rail, beside it, rolled and yawed beyond the table: what Newton's method may try."""
+    law = Law(NEW, strips=6)
+    rng = np.random.default_rng(0)
+    for _ in range(3000):
+        y, roll, yaw, z, slip, spin = rng.uniform([-0.02, -0.02, -0.02, -0.02, -1, -2], [0.02, 0.02, 0.02, 0.01, 1, 2])
+        motion = [0, y, 0.46 + z], tilted([roll, 0, yaw]), [30, slip, 0.1], [0.1, 65 + spin, 0.2]
+        wrench, _, seen = law(*motion)
+        assert np.isfinite(wrench).all()
+        assert np.isfinite(seen).all()
