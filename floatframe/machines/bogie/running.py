@@ -155,7 +155,7 @@ def falling_speed(
         for each in system.bodies
     ]
     brakes = [
-        PointForce(f"brake_{each.name}", Marker(each.name), force=(-deceleration * each.mass, 0.0, 0.0))
+        PointForce(f"brake_{each.name}", Marker(each.name), force=np.array([-deceleration * each.mass, 0.0, 0.0]))
         for each in system.bodies
         if isinstance(each, RigidBody)
     ]

@@ -90,8 +90,8 @@ def vehicle(
             f"frame_{name}",
             data.frame_mass,
             np.diag(data.frame_inertia),
-            position=((1 - 2 * k) * data.pivot, 0, data.frame_height),
-            velocity=(speed, 0, 0),
+            position=np.array([(1 - 2 * k) * data.pivot, 0, data.frame_height]),
+            velocity=np.array([speed, 0, 0]),
         )
         for k, name in enumerate(NAMES)
     ]
@@ -101,7 +101,12 @@ def vehicle(
 def flexible_frames(data: RailVehicle, frame: ReducedBody, speed: float) -> list[FlexibleBody]:
     """Return the two frames of a vehicle from one reduced body, that of `frame_files`."""
     return [
-        FlexibleBody(f"frame_{name}", frame, position=((1 - 2 * k) * data.pivot, 0, 0), velocity=(speed, 0, 0))
+        FlexibleBody(
+            f"frame_{name}",
+            frame,
+            position=np.array([(1 - 2 * k) * data.pivot, 0, 0]),
+            velocity=np.array([speed, 0, 0]),
+        )
         for k, name in enumerate(NAMES)
     ]
 
@@ -126,12 +131,16 @@ def vehicle_parts(
     """Return the parts; springs meet the frames at interfaces by name, or at positions in rigid frames."""
     laws = laws or ContactLaws(friction=0.4)
     rolling = float(quasi_elastic(pair, np.zeros(1), smoothing=laws.smoothing, part="tread").radius[0])
-    spin, velocity = speed / rolling, (speed, 0.0, 0.0)
+    spin, velocity = speed / rolling, np.array([speed, 0.0, 0.0])
     placed = height_on_rails(Wheelset("wheels", Marker("axle"), pair, track, laws), data.wheel_load)
-    parts = Parts([], [Gravity((0, 0, -GRAVITY))], [])
+    parts = Parts([], [Gravity(np.array([0, 0, -GRAVITY]))], [])
     parts.bodies.append(
         RigidBody(
-            "body", data.body_mass, np.diag(data.body_inertia), position=(0, 0, data.body_height), velocity=velocity
+            "body",
+            data.body_mass,
+            np.diag(data.body_inertia),
+            position=np.array([0, 0, data.body_height]),
+            velocity=velocity,
         )
     )
     load_2 = data.body_mass * GRAVITY / 4
@@ -176,7 +185,7 @@ def vehicle_parts(
                     axle,
                     data.axle_mass,
                     np.diag([I_x, BOX_SHARE * I_y, I_z]),
-                    position=(x + arm, 0, placed),
+                    position=np.array([x + arm, 0, placed]),
                     velocity=velocity,
                 )
             )

@@ -3,6 +3,7 @@
 import numpy as np
 
 from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Marker
 from floatframe.forces import Bushing
 from floatframe.machines.bogie.frame import frame_files
 from floatframe.machines.bogie.vehicle import NAMES, RailVehicle, vehicle_parts
@@ -60,7 +61,9 @@ def vehicle_file(data: RailVehicle, words: str, speed: float, seconds: float, tr
         if isinstance(force, Bushing):
             ends = []
             for key, marker in (("a", force.marker_a), ("b", force.marker_b)):
-                place = f'"{marker.interface}"' if marker.interface else numbers(marker.position)
+                assert isinstance(marker, Marker)
+                point = np.zeros(3) if marker.position is None else marker.position
+                place = f'"{marker.interface}"' if marker.interface else numbers(point)
                 ends.append(f'body_{key} = "{marker.body}"\nmarker_{key} = {place}')
             text.append(
                 f'[forces.{force.name}]\ntype = "bushing"\n'

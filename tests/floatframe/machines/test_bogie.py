@@ -13,6 +13,7 @@ from floatframe.machines.bogie import (
     RailVehicle,
     bogie_files,
     critical_speed,
+    falling_speed,
     flexible_frames,
     hunting,
     steady_running,
@@ -78,3 +79,14 @@ def test_the_files_are_those_of_the_generator_and_make_the_vehicle(tmp_path):
     one, other = (integrate(each, GeneralizedAlpha(0.8, 1e-8), 0.02, 2e-3) for each in (plain, made))
     for name in ("body", "axle_rear_trailing", "frame_front"):
         assert_allclose(one.body(name).r, other.body(name).r, rtol=0, atol=1e-7)
+
+
+@pytest.mark.long
+def test_limit_cycles_are_followed_by_falling_speed_to_where_they_end():
+    """S1002: hunting from flange to flange at 75 m/s, none below 66 m/s, in between falling in every second."""
+    laws = replace(LAWS, creep="fastsim", strips=8)
+    found = falling_speed(vehicle(DATA, 80.0, laws=laws), "axle_front_leading", deceleration=1.0, end=65.0, kick=0.1)
+    high, low = found.amplitude[found.speed > 73.0], found.amplitude[found.speed < 67.0]
+    assert high[2:].min() > 5e-3
+    assert low.max() < 2e-4
+    assert np.all(np.diff(found.amplitude[found.speed < 72.0]) < 0)
