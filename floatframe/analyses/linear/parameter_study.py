@@ -10,7 +10,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.analyses.equilibrium import Equilibrium, steady_rotation
 from floatframe.analyses.linear.channels import AnyOutput, outputs_of
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
-from floatframe.analyses.linear.system_modes import system_modes
+from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.analyses.snapshot import snapshot
 from floatframe.checked_values import array_of_shape, unit_vector
 from floatframe.errors import ModelError
@@ -72,16 +72,35 @@ def root_locus(
     n = len(modes.eigenvalues) if n_modes is None else min(n_modes, len(modes.eigenvalues))
     table = np.full((len(values), n), np.nan + 0j)
     table[0] = modes.eigenvalues[:n]
-    shapes = modes.shapes[:, :n]
+    shapes, last = with_states(modes)[:, :n], modes.eigenvalues[:n]
     for done, (row, value) in enumerate(zip(table[1:], values[1:], strict=True), start=1):
         if progress is not None:
             progress(done, len(values))
         modes = system_modes(build(float(value)))
-        rows, columns = linear_sum_assignment(distance(shapes, modes.shapes))
+        others = with_states(modes)
+        apart = distance(shapes, others)
+        if modes.states:  # modes of states alone, or that decay, have shapes which tell little
+            apart = apart + far(last, modes.eigenvalues)
+        rows, columns = linear_sum_assignment(apart)
         row[rows] = modes.eigenvalues[columns]
-        shapes = shapes.copy()
-        shapes[:, rows] = modes.shapes[:, columns]
+        shapes, last = shapes.copy(), last.copy()
+        shapes[:, rows], last[rows] = others[:, columns], modes.eigenvalues[columns]
     return Locus(parameter, values, table)
+
+
+def with_states(modes: SystemModes) -> Array:
+    """Return the shapes of modes with those of states below, each state measured by its largest share in a mode."""
+    if not modes.states:
+        return modes.shapes
+    largest = np.abs(modes.state_shapes).max(axis=1, keepdims=True)
+    return np.vstack([modes.shapes, modes.state_shapes / np.where(largest > 0, largest, 1.0)])
+
+
+def far(eigenvalues: Array, others: Array) -> Array:
+    """Return how far eigenvalues are from others, relative to their sizes, between 0 and 1, (n, n_others)."""
+    a, b = eigenvalues[:, None], others[None]
+    size = np.abs(a) + np.abs(b)
+    return np.asarray(np.divide(np.abs(a - b), size, out=np.zeros(size.shape), where=size > 0))
 
 
 def distance(shapes: Array, others: Array) -> Array:

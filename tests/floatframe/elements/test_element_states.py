@@ -28,6 +28,7 @@ from floatframe import (
     integrate,
     linearize,
     named_state_space,
+    root_locus,
     static_equilibrium,
     system_modes,
 )
@@ -129,6 +130,15 @@ def test_states_are_among_the_modes():
     assert modes.states == ("jack.p",)
     lam, ratio = modes.eigenvalues, modes.state_shapes[0] / modes.shapes[2]  # p/z of each mode
     assert_allclose(ratio, -lam * 1e12 * 1e-3 / (lam + 1e3), rtol=1e-8)
+
+
+def test_modes_with_states_are_followed_where_they_pass_each_other():
+    """A pressure that moves nothing decays faster and faster, past the vibration of the body."""
+    leaks = np.linspace(1e-11, 1e-10, 10)
+    locus = root_locus(lambda leak: linearize(lifted(area=0.0, leak=leak)), leaks)
+    assert_allclose(locus.eigenvalues[:, 0], -1e12 * leaks, rtol=1e-9)
+    body = -DAMPER / (2 * MASS) + 1j * np.sqrt(SPRING / MASS - (DAMPER / (2 * MASS)) ** 2)
+    assert_allclose(locus.eigenvalues[:, 1], np.full(len(leaks), body), rtol=1e-9)
 
 
 def test_a_response_sees_outputs_of_elements():
