@@ -172,8 +172,28 @@ def kart_files(kart: Kart, *, is_rigid: bool = False) -> dict[str, str]:
         )
 
     body("pilot", kart.pilot_mass, (5.0, 6.0, 3.0), kart.pilot_place)
+    out += ["", "[[bodies.pilot.shapes]]", 'type = "box"', "size = [0.25, 0.38, 0.5]", 'color = "red"']
+    out += [
+        "",
+        "[[bodies.pilot.shapes]]",
+        'type = "sphere"',
+        "radius = 0.13",
+        "position = [0.02, 0, 0.4]",
+        'color = "dark"',
+    ]
     column = nodes["column_low"]
     body("column", 2.5, (0.05, 0.05, 0.02), column)
+    out += ["", "[[bodies.column.shapes]]", 'type = "tube"', "radius = 0.01"]
+    out += [f"points = [[0, 0, 0], {numbers(0.5 * up)}]"]
+    out += [
+        "",
+        "[[bodies.column.shapes]]",
+        'type = "cylinder"',
+        "radius = 0.15",
+        "inner_radius = 0.13",
+        "length = 0.02",
+    ]
+    out += [f"axis = {numbers(up)}", f"position = {numbers(0.5 * up)}", 'color = "dark"']
     revolute("column", "chassis", '"column_low"', "column", "[0, 0, 0]", tuple(up))
     out += ["", "[joints.column.motions.angle]  # a haversine in 0.1 s", 'type = "piecewise"']
     half, at = kart.steer / 2, kart.steer_at
