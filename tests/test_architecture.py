@@ -108,6 +108,22 @@ def test_imports_point_downward(package):
     assert upward == {}
 
 
+OF_ELEMENTS = ("cables", "drives", "friction", "hydraulics", "rails", "wheels")  #: rooms of public elements
+
+
+def test_the_core_knows_no_element_by_its_name():
+    """Rooms of public elements come in by the registry alone; only machines and each other may import them."""
+    rooms = tuple(f"floatframe.{room}" for room in OF_ELEMENTS)
+    free = (*rooms, "floatframe.machines")
+    wrong = [
+        f"{name} imports {other}"
+        for name, others in graph().items()
+        for other in others
+        if other.startswith(rooms) and not name.startswith(free)
+    ]
+    assert not wrong, wrong
+
+
 def test_no_module_imports_itself_by_way_of_others():
     assert circles(graph()) == []
 
