@@ -64,6 +64,22 @@ def antenna() -> None:
     save_film(frames, HERE / "antenna.gif", fps=10)
 
 
+def landing_gear() -> None:
+    """The landing gear retracted by its jack, twice as fast."""
+    from floatframe.machines import copy_machine
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copy_machine("landing-gear", folder)
+        system, run = read_system(folder / "retraction.toml")
+        motion = ff.integrate(system, run.integrator, 6.0, h=run.h, output_every=50)
+        film = folder / "film.gif"
+        animate(motion, drawn(system), film, speed=2.0, fps=10, magnification=1.0, system=system)
+        frames = [cut(frame) for frame in iio.imread(film)]
+    size = min(len(frame) for frame in frames)
+    save_film([frame[:size] for frame in frames], HERE / "landing_gear.gif", fps=10)
+
+
 def still(name: str, make: Callable[[], tuple[ff.System, float, float]]) -> None:
     """The last instant of a motion: make returns system, end and step."""
     system, t_end, h = make()
@@ -145,6 +161,7 @@ MECHANISMS: dict[str, Callable[[], None]] = {
     "antenna": antenna,
     "railway_engine_film": railway_engine,
     "kart_film": kart,
+    "landing_gear": landing_gear,
     **{maker.__name__: partial(still, maker.__name__, maker) for maker in (four_bar, satellite, chain)},
 }
 

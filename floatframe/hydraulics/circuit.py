@@ -105,13 +105,14 @@ class Circuit(Element):
         )
 
     def drawn(self) -> tuple[Stretched, ...]:
-        """Return a rod in a cylinder for each cylinder, as wide as its head."""
+        """Return cylinder and rod of each cylinder, as wide as its head and half as wide."""
         attached = [each for each in self.components if isinstance(each, Cylinder | Pump)]
-        return tuple(
-            Stretched("strut", 2 * k, 2 * k + 1, radius=sqrt(each.head_area / pi))
-            for k, each in enumerate(attached)
-            if isinstance(each, Cylinder)
-        )
+        found = []
+        for k, each in enumerate(attached):
+            if isinstance(each, Cylinder):
+                radius = sqrt(each.head_area / pi)
+                found += [Stretched("strut", 2 * k, 2 * k + 1, radius), Stretched("rod", 2 * k, 2 * k + 1, radius / 2)]
+        return tuple(found)
 
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law of the circuit, its cylinders as placed and its pressures at their start."""

@@ -211,4 +211,5 @@ inertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
     lift, motor = read(tmp_path, mechanism + tables).elements
     assert [each.name for each in lift.components] == ["jack", "hole", "ball"]
     assert motor.controller.upper == 24.0
-    assert [piece.radius for piece in lift.drawn()] == [pytest.approx(np.sqrt(2e-3 / np.pi))]
+    radius = np.sqrt(2e-3 / np.pi)
+    assert [piece.radius for piece in lift.drawn()] == pytest.approx([radius, radius / 2])
