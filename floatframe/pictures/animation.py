@@ -32,7 +32,7 @@ DRAWN = 0.06  #: share of the diagonal to which it is then enlarged, at most
 LARGEST = 0.2  #: half edge of the box of a rigid body, by the size of the scene
 HIDDEN = 0.1  #: share of a flexible body's nodes in a box from which that is drawn as glass
 GLASS = 0.35  #: its opacity
-MOST_TRIADS = 12  #: axes with a name that are drawn; of more, none
+MOST_TRIADS = 11  #: axes with a name that are drawn; of more, none
 TRAIL_COLOR, RIGID_COLOR = "#7d5ba6", "#9fb0bf"
 TRAIL_POINTS = 1500  #: of a trail, at most
 
