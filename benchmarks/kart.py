@@ -1,6 +1,6 @@
 """The kart: yaw-rate gain, radius, wheel loads and cost over speed, with a rigid and a flexible chassis.
 
-python -m benchmarks.kart [speeds ...]
+python -m benchmarks.kart [--steer=ANGLE] [speeds ...]
 """
 
 import sys
@@ -17,7 +17,7 @@ from floatframe.machines.kart.figures import torsion_stiffness, turn_of
 METHOD, STEP = ff.GeneralizedAlpha(0.8, 1e-7), 2e-3
 
 
-def main(speeds: list[float]) -> None:
+def main(speeds: list[float], steer: float) -> None:
     """Print a row for each speed and chassis."""
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -31,7 +31,7 @@ def main(speeds: list[float]) -> None:
         cms.write(chassis, folder / "chassis.h5")
         for speed in speeds:
             for is_rigid in (True, False):
-                kart = replace(Kart(), speed=speed)
+                kart = replace(Kart(), speed=speed, steer=steer)
                 (file, text), *_ = kart_files(kart, is_rigid=is_rigid).items()
                 (folder / file).write_text(text)
                 system, _ = ff.read_system(folder / file)
@@ -49,4 +49,6 @@ def main(speeds: list[float]) -> None:
 
 
 if __name__ == "__main__":
-    main([float(word) for word in sys.argv[1:]] or [3.0, 6.0, 9.0, 12.0, 15.0])
+    steers = [float(word.removeprefix("--steer=")) for word in sys.argv[1:] if word.startswith("--steer=")]
+    given = [float(word) for word in sys.argv[1:] if not word.startswith("--")]
+    main(given or [3.0, 6.0, 9.0, 12.0, 15.0], *(steers or [Kart().steer]))
