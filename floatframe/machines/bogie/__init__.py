@@ -1,5 +1,6 @@
 """A four-axle passenger vehicle on bogies: stability over speed, limit cycles, independent wheels, curves."""
 
+from floatframe.machines.bogie.comfort import weighted_rms
 from floatframe.machines.bogie.frame import frame_files
 from floatframe.machines.bogie.running import Falling, Hunting, critical_speed, falling_speed, hunting, steady_running
 from floatframe.machines.bogie.vehicle import RailVehicle, flexible_frames, vehicle
@@ -17,4 +18,5 @@ __all__ = [
     "hunting",
     "steady_running",
     "vehicle",
+    "weighted_rms",
 ]

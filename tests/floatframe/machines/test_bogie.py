@@ -19,6 +19,7 @@ from floatframe.machines.bogie import (
     steady_running,
     vehicle,
 )
+from floatframe.machines.bogie.comfort import weighted_rms, weighting
 from floatframe.machines.bogie.running import lateral_modes
 from floatframe.system_file.read_system import read_system
 
@@ -90,3 +91,18 @@ def test_limit_cycles_are_followed_by_falling_speed_to_where_they_end():
     assert high[2:].min() > 5e-3
     assert low.max() < 2e-4
     assert np.all(np.diff(found.amplitude[found.speed < 72.0]) < 0)
+
+
+def test_weightings_of_comfort_are_those_of_the_standards_tables():
+    """Factors printed in ISO 2631-1 at the nominal frequencies of octaves."""
+    f = np.array([1, 2, 4, 8, 16, 31.5])
+    assert_allclose(weighting(f, "vertical"), [0.482, 0.531, 0.967, 1.036, 0.768, 0.405], rtol=5e-3)
+    assert_allclose(weighting(f, "lateral"), [1.011, 0.890, 0.512, 0.253, 0.125, 0.0632], rtol=5e-3)
+    t = np.arange(0, 20, 0.005)
+    wave = 0.3 * np.sin(2 * np.pi * 4 * t)
+    expected = 0.3 / np.sqrt(2) * weighting(np.array([4.0]), "vertical")[0]
+    assert_allclose(weighted_rms(t, 5.0 + wave, "vertical"), expected, rtol=1e-3)
+    with pytest.raises(ModelError, match="vertical, lateral"):
+        weighting(f, "up")
+    with pytest.raises(ModelError, match="equally spaced"):
+        weighted_rms(t**2, wave, "vertical")
