@@ -5,7 +5,7 @@ With v the sliding velocity, z the mean deflection of the bristles and z_ss(v) =
     G(v) = F_C + (F_S - F_C) exp(-(v/v_S)²)
     dz/dt = v (1 - alpha(z, v) z/z_ss sign(v)),      F = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
-Canudas de Wit et al. (1995) have alpha = 1 (LuGre): then the bristles slip a little under any load that swings, and
+Canudas de Wit and others (1995) have alpha = 1 (LuGre): then the bristles slip a little under any load that swings, and
 what should stick creeps. With Dupont et al. (2002) alpha is 0 while |z| is below a part of z_ss (the deflection is
 elastic) or falls, 1 from z_ss on, and rises smoothly between.
 """
