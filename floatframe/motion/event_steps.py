@@ -53,6 +53,8 @@ class EventWatch:
     resting: dict[str, str] = field(default_factory=dict)  #: side of the limits at which couplers hold
     values: Array = field(init=False)  #: of the events at the last time, angles without jumps, (n_events,)
     row: Rows | None = field(init=False, default=None)  #: results at the last time
+    #: the last two rows that were measured, each with itself in the frames of the files
+    told: tuple[tuple[Rows, Rows], ...] = field(init=False, default=())
     happened: list[dict[str, Any]] = field(default_factory=list)
     recorded: list[Rows] = field(default_factory=list)  #: results at events since they were last taken
     has_stopped: bool = False
@@ -84,23 +86,33 @@ class EventWatch:
     def measured(self, before: Rows, after: Rows) -> Array:
         """Return what each event watches at two times, (2, n_events)."""
         compiled = compiled_system(self.full)
-        arrays = arrays_of([rows_of_file(compiled, row) for row in (before, after)])
-        arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
-        motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
-        columns = []
+        motion, columns = None, []
         for event in self.events:
             if isinstance(event, StopEvent):
                 columns.append(np.array(stop_values(compiled, event, self.resting, (before, after))))
                 continue
             if event.at is not None:
-                columns.append(motion.t)
+                columns.append(np.array([before.t[-1], after.t[-1]]))
                 continue
+            if motion is None:
+                arrays = arrays_of([self.in_files(before), self.in_files(after)])
+                arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
+                motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
             found = sensor_of(self.full, event.watch).measure(self.full, motion).columns
             name = event.column or next(iter(found))
             if name not in found:
                 raise ModelError(f"event {event.name!r}: column: expected one of {', '.join(found)}, got {name!r}")
             columns.append(found[name])
         return np.array(columns).T
+
+    def in_files(self, row: Rows) -> Rows:
+        """Return results in the frames of the files; those after one step are those before the next."""
+        for known, told in self.told:
+            if known is row:
+                return told
+        told = rows_of_file(compiled_system(self.full), row)
+        self.told = (*self.told[-1:], (row, told))
+        return told
 
     def values_after(self, row: Rows) -> Array:
         """Return what is watched at a later time."""
