@@ -131,6 +131,8 @@ from .motion.foreign_units import ForeignUnit as ForeignUnit
 from .motion.integration import Progress as Progress
 from .motion.integration import integrate as integrate
 from .motion.integration import resume as resume
+from .optimization.design_file import read_design as read_design
+from .optimization.optimize import optimize as optimize
 from .pictures.mode_film import animate_mode as animate_mode
 from .pictures.mode_film import draw_mode as draw_mode
 from .results.coordinate_elements import coupler_motion as coupler_motion

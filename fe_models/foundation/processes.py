@@ -12,11 +12,11 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from fe_models.foundation.errors import ReportedError
 
-__all__ = ["ProcessError", "map_in_processes"]
+__all__ = ["ProcessError", "WorkerPool", "map_in_processes"]
 
 MOST_FALSE_STARTS = 3  #: workers that end before their first value
 
@@ -87,37 +87,100 @@ def map_in_processes(
     Exception
         Without `failed`: what the function raised.
     """
-    try:
-        code = pickle.dumps(function)
-    except Exception as error:
-        raise ProcessError(
-            f"{function!r} cannot be sent to other processes ({error}); define it at the top level of a module"
-        ) from error
-    results: dict[int, Result] = {}
-    errors: dict[int, Exception] = {}
-    waiting = deque(range(len(values)))
-    workers: list[Worker] = []
-    false_starts = 0
-    try:
+    with WorkerPool(function, n) as pool:
+        return pool.map(values, failed=failed, progress=progress)
+
+
+class WorkerPool:
+    """Processes that stay for several calls of `map`, all of one function.
+
+    Parameters
+    ----------
+    function
+        At the top level of a module: it is sent to the processes by name.
+    n
+        How many processes at once.
+
+    Raises
+    ------
+    ProcessError
+        If the function cannot be sent.
+    """
+
+    def __init__(self, function: Callable[[Any], Any], n: int) -> None:
+        try:
+            self.code = pickle.dumps(function)
+        except Exception as error:
+            raise ProcessError(
+                f"{function!r} cannot be sent to other processes ({error}); define it at the top level of a module"
+            ) from error
+        self.n = n
+        self.workers: list[Worker] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def end(self) -> None:
+        """End all processes; a later `map` starts others."""
+        for worker in self.workers:
+            worker.end()
+        self.workers.clear()
+
+    def map(
+        self,
+        values: Sequence[Any],
+        *,
+        failed: Callable[[Any, Exception], Any] | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        done: Callable[[int, Any], None] | None = None,
+    ) -> list[Any]:
+        """Return function(value) for every value as `map_in_processes` does; done(k, result) as each comes."""
+        try:
+            return self.answers(values, failed, progress, done)
+        except BaseException:
+            self.end()  # some are at work on values nobody waits for any more
+            raise
+
+    def answers(
+        self,
+        values: Sequence[Any],
+        failed: Callable[[Any, Exception], Any] | None,
+        progress: Callable[[int, int], None] | None,
+        done: Callable[[int, Any], None] | None,
+    ) -> list[Any]:
+        """Return the answers in the order of the values; raise the first error if nothing stands for it."""
+        results: dict[int, Any] = {}
+        errors: dict[int, Exception] = {}
+        waiting = deque(range(len(values)))
+        workers = self.workers
+        false_starts = 0
+        for worker in workers:  # of an earlier call
+            if worker.is_ready:
+                give(worker, values, waiting, errors)
         while waiting or any(worker.number is not None for worker in workers):
-            while len(workers) < min(n, len(waiting) + sum(worker.number is not None for worker in workers)):
-                workers.append(Worker(code))
+            while len(workers) < min(self.n, len(waiting) + sum(worker.number is not None for worker in workers)):
+                workers.append(Worker(self.code))
             ready = wait([worker.pipe for worker in workers])
             for worker in [worker for worker in workers if worker.pipe in ready]:
                 k = worker.number
                 try:
                     answer = received(worker.pipe)
+                    worker.is_ready = True
                 except EOFError:
                     fate = worker.fate()
                     worker.end()
                     workers.remove(worker)
-                    if k is None:
+                    if k is None and not worker.is_ready:
                         false_starts += 1
                         if false_starts > MOST_FALSE_STARTS:
                             raise ProcessError(
                                 f"processes cannot be started: {fate}; a script needs its work under "
                                 "`if __name__ == '__main__':`"
                             ) from None
+                    if k is None:
                         continue
                     answer = ProcessError(fate)
                 if k is not None:
@@ -130,16 +193,15 @@ def map_in_processes(
                             results[k] = failed(values[k], answer)
                     else:
                         results[k] = answer[0]
+                    if done is not None and k in results:
+                        done(k, results[k])
                     if progress is not None:
                         progress(len(results), len(values))
                 if worker in workers:
                     give(worker, values, waiting, errors)
-    finally:
-        for worker in workers:
-            worker.end()
-    if errors and failed is None:
-        raise errors[min(errors)]
-    return [results[k] for k in range(len(values))]
+        if errors and failed is None:
+            raise errors[min(errors)]
+        return [results[k] for k in range(len(values))]
 
 
 def give(worker: Worker, values: Sequence[Any], waiting: "deque[int]", errors: dict[int, Exception]) -> None:

@@ -15,6 +15,7 @@ from floatframe.cli import (
     gradient,
     linear,
     machine,
+    optimize,
     shake,
     spectra,
     study,
@@ -496,6 +497,7 @@ linear.register(app)
 spectra.register(app)
 driven.register(app)
 sweep.register(app)
+optimize.register(app)
 study.register(app)
 shake.register(app)
 gradient.register(app)

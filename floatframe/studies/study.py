@@ -33,6 +33,7 @@ from floatframe.system_file.run_section import RunOptions, required_run
 __all__ = ["StudyRow", "StudyTable", "run_study"]
 
 OF_MODES = {"frequency": "Hz", "damping": "-", "real": "1/s", "imaginary": "rad/s"}
+EXTREMES: dict[str, Callable[[Array], float]] = {"least": np.nanmin, "greatest": np.nanmax}  #: over all modes
 
 
 @dataclass(frozen=True)
@@ -196,6 +197,12 @@ MOTIONS: dict[str, Callable[[System, RunOptions], Trajectory]] = {
 
 def taken(output: Output, system: System, motion: Trajectory) -> tuple[float, str]:
     """Return the number of an output, and its unit; `ModelError` with the choices if there is no such column."""
+    values, unit = column_of(output, system, motion)
+    return float(TAKES[output.take](values)), unit
+
+
+def column_of(output: Output, system: System, motion: Trajectory) -> tuple[Array, str]:
+    """Return the values over time of what an output is taken from, (n_t,), and their unit."""
     coordinates = [f"{joint.name}.{name}" for joint in system.joints for name in joint.coordinates]
     sensors = [*(sensor.name for sensor in system.sensors), *coordinates]
     fitting = [name for name in sensors if output.of == name or output.of.startswith(name + " ")]
@@ -212,12 +219,13 @@ def taken(output: Output, system: System, motion: Trajectory) -> tuple[float, st
     if column not in columns:
         hint = nearest(column, columns) if column else f"; expected one of its columns: {', '.join(columns)}"
         raise ModelError(f"output {output.name!r}: of = {output.of!r}: sensor {name!r} has no column {column!r}{hint}")
-    return float(TAKES[output.take](measurement.columns[column])), measurement.units[column]
+    return measurement.columns[column], measurement.units[column]
 
 
 def taken_of_modes(output: Output, modes: SystemModes, per_second: float) -> tuple[float, str]:
     """Return the number of an output of the modes about the equilibrium, and its unit."""
-    part, k = mode_and_part(output)
+    part, which = mode_and_part(output)
+    k = which if isinstance(which, int) else 1
     if k > len(modes.eigenvalues):
         raise ModelError(f"output {output.name!r}: of = {output.of!r}: the system has {len(modes.eigenvalues)} modes")
     values = {
@@ -226,15 +234,17 @@ def taken_of_modes(output: Output, modes: SystemModes, per_second: float) -> tup
         "real": modes.eigenvalues.real * per_second,
         "imaginary": modes.eigenvalues.imag * per_second,
     }
-    return float(values[part][k - 1]), OF_MODES[part]
+    return float(EXTREMES[which](values[part]) if isinstance(which, str) else values[part][k - 1]), OF_MODES[part]
 
 
-def mode_and_part(output: Output) -> tuple[str, int]:
-    """Return what of which mode an output is; `ModelError` if it says neither."""
+def mode_and_part(output: Output) -> tuple[str, int | str]:
+    """Return what of which mode (or "least", "greatest" of all) an output is; `ModelError` if it says neither."""
     part, _, number = output.of.partition(" ")
+    if part in OF_MODES and number in EXTREMES:
+        return part, number
     if part not in OF_MODES or not number.isdigit() or int(number) < 1:
         raise ModelError(
             f"output {output.name!r}: of = {output.of!r}: expected one of {', '.join(OF_MODES)} and the number of a "
-            'mode, such as "frequency 1"'
+            'mode, such as "frequency 1", or of all modes the least or greatest: "damping least"'
         )
     return part, int(number)

@@ -1,0 +1,162 @@
+"""The command optimize: the best values of parameters of a system."""
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import guarded, output_path, print_table, say, stages
+
+if TYPE_CHECKING:
+    from floatframe.optimization.optimize import Evaluated, OptimizationResult
+
+__all__ = ["register"]
+
+KINDS = ("csv", "json", "png", "svg", "pdf")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command("optimize")(optimize_command)
+
+
+@guarded
+def optimize_command(
+    design: Annotated[Path, typer.Argument(help="Design file (TOML), see docs/optimization.md.")],
+    outputs: Annotated[
+        list[Path],
+        typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable."),
+    ] = [],  # noqa: B006
+    journal: Annotated[
+        Path | None,
+        typer.Option("--journal", help="File that keeps every evaluation; default: beside the design file."),
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option("--processes", "-j", min=1, help="Evaluations at once; default: one a processor.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
+) -> None:
+    """Find the best values of parameters of a system: fits to tables, peaks, frequencies, damping, within limits.
+
+    Every evaluation is kept in a journal (study.toml: study.journal): after an interruption the same command goes on.
+    An evaluation that fails is a row with its reason. Without -o the history stands beside the design file as a
+    table and a picture: study.csv and study.png.
+
+    Example: floatframe optimize study.toml -o history.csv -o history.png
+    """
+    import io
+
+    from fe_models.foundation.paths import replace_file
+    from floatframe.errors import ModelError
+    from floatframe.optimization.design_file import read_design
+    from floatframe.optimization.history_plots import plot_history
+    from floatframe.optimization.optimize import optimize
+    from floatframe.system_file.read_system import read_system
+
+    described = read_design(design)
+    inputs = (design, Path(described.study.system), *read_system(described.study.system)[0].files, *described.tables)
+    kept = output_path(journal, design.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
+    wanted = outputs or ([] if json else [design.with_suffix(".csv"), design.with_suffix(".png")])
+    paths = [output_path(path, None, ModelError, overwrite_of=(*inputs, kept)) for path in wanted]
+    for path in paths:
+        if path.suffix.lower().removeprefix(".") not in KINDS:
+            raise ModelError(f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in KINDS)}")
+    with stages() as clock:
+        if described.study.analysis == "run":
+            from floatframe.kernels.entry import prepare
+
+            with clock("compiled code (made at first use)"):
+                prepare()  # once, before many processes want it
+        with clock(f"{described.method}"):
+            result = optimize(described, processes=processes, journal=kept)
+    record = optimization_record(result)
+    if json:
+        typer.echo(json_module.dumps(record, indent=2))
+    else:
+        print_optimum(result)
+    for path in paths:
+        kind = path.suffix.lower().removeprefix(".")
+        if kind == "csv":
+            replace_file(path, csv_of(result).encode())
+        elif kind == "json":
+            replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
+        else:
+            picture = io.BytesIO()
+            plot_history(result).savefig(picture, format=kind, dpi=130)
+            replace_file(path, picture.getvalue())
+        if not json:
+            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def print_optimum(result: "OptimizationResult") -> None:
+    """Print the best point, and how it was found."""
+    parameters = [
+        (p.name, ", ".join(p.paths), f"{p.start:.8g}", f"{result.values[p.name]:.8g}", bound_of(p, result))
+        for p in result.design.parameters
+    ]
+    print_table("Best values", ("parameter", "key path", "start>", "best>", "note"), parameters)
+    rows = []
+    for q in result.design.quantities:
+        of = f"{q.output.of}, rms deviation" if q.values is not None else q.output.of
+        rows.append((q.output.name, of, f"{result.numbers[q.output.name]:.6g}"))
+    print_table("Objectives and constraints", ("name", "of", "at the best point>"), rows)
+    say(f"{'converged' if result.is_converged else 'NOT CONVERGED'}: {result.message}")
+    n = len(result.history)
+    say(f"{n} evaluations, {n - result.n_computed} of them from the journal, {result.n_failed} failed")
+    for row in [row for row in result.history if row.evaluation.error][:3]:
+        say(f"failed at {', '.join(f'{v:.6g}' for v in row.evaluation.values)}: {row.evaluation.error}")
+
+
+def bound_of(parameter: Any, result: "OptimizationResult") -> str:
+    """Say if a parameter lies at a bound."""
+    near = 1e-6 * (parameter.upper - parameter.lower)
+    value = result.values[parameter.name]
+    if value - parameter.lower < near:
+        return "at its lower bound"
+    return "at its upper bound" if parameter.upper - value < near else ""
+
+
+def row_record(result: "OptimizationResult", row: "Evaluated") -> dict[str, Any]:
+    """Return a row of the history in plain types; what a failed evaluation lacks is null."""
+    from floatframe.optimization.optimize import numbers_by_name
+
+    is_failed = bool(row.evaluation.error)
+    numbers = numbers_by_name(result.design, row.evaluation)
+    return {
+        "parameters": {p.name: v for p, v in zip(result.design.parameters, row.evaluation.values, strict=True)},
+        "numbers": {name: None if is_failed else number for name, number in numbers.items()},
+        "objective": None if is_failed else row.objective,
+        "violation": None if is_failed else row.violation,
+        "purpose": "difference" if row.is_difference else "trial",
+        "error": row.evaluation.error or None,
+    }
+
+
+def optimization_record(result: "OptimizationResult") -> dict[str, Any]:
+    """Return an optimisation in plain types."""
+    return {
+        "system": result.design.study.system,
+        "method": result.design.method,
+        "converged": result.is_converged,
+        "message": result.message,
+        "best": row_record(result, result.best),
+        "computed": result.n_computed,
+        "history": [row_record(result, row) for row in result.history],
+    }
+
+
+def csv_of(result: "OptimizationResult") -> str:
+    """Return the history as comma-separated values, with 17 digits; empty cells and a reason where it failed."""
+    import csv
+    import io
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = [p.name for p in result.design.parameters] + [q.output.name for q in result.design.quantities]
+    writer.writerow(["evaluation", "purpose", *names, "objective", "violation", "error"])
+    for i, row in enumerate(result.history):
+        r = row_record(result, row)
+        cells = [*r["parameters"].values(), *r["numbers"].values(), r["objective"], r["violation"]]
+        writer.writerow([i + 1, r["purpose"], *("" if c is None else repr(c) for c in cells), row.evaluation.error])
+    return text.getvalue()
