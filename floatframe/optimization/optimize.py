@@ -299,6 +299,7 @@ def minimum_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
         options |= {"gtol": design.tolerance, "xtol": design.tolerance}
         if n_limits:
             limits = [NonlinearConstraint(excess, -np.inf, 0.0, jac=excess_rates)]
+            options |= {"gtol": 0.0, "barrier_tol": design.tolerance}  # gtol looks at no complementarity: too early
     found = minimize(
         objective, start, jac=gradient, method=design.method, bounds=[(0.0, 1.0)] * len(start), constraints=limits,
         options=options,
