@@ -264,6 +264,11 @@ def kart_files(kart: Kart, *, is_rigid: bool = False) -> dict[str, str]:
     out += ['marker_b = {body = "rear_left"}', "axis = [0, 1, 0]", f"speed = {rear_spin(kart):.9g}"]
     out += [f'target = {{type = "constant", value = {rear_spin(kart):.9g}}}', "gain = 40.0"]
     out += ["rate_time = 0.02", "filter_time = 0.002"]
+    for wheel in ("front_left", "front_right", "rear_left", "rear_right"):
+        out += ["", f'[sensors."load {wheel.replace("_", " ")}"]', 'type = "element"', f'of = "tyre_{wheel}"']
+        out += ['output = "Fz"']
+    for name, kind in (("yaw rate", "angular-velocity"), ("acceleration of the pilot", "acceleration")):
+        out += ["", f'[sensors."{name}"]', f'type = "{kind}"', 'body = "pilot"', "marker = [0, 0, 0]"]
     out += ["", "[run]", f"t_end = {kart.duration:g}", "h = 2e-3", "rho_inf = 0.8", "output_every = 5"]
     out += ["", "[[scene]]", 'type = "plane"', ""]
     return {"kart_rigid.toml" if is_rigid else "kart.toml": "\n".join(out)}
