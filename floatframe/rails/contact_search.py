@@ -24,7 +24,7 @@ from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import number
 from floatframe.errors import ModelError
 from floatframe.rails.profile import Profile
-from floatframe.rails.standard_profiles import GAUGE_DEPTH, cone, inclined, rail_60e1, turned, wheel_s1002
+from floatframe.rails.standard_profiles import GAUGE_DEPTH, inclined, rail_60e1, turned, wheel_s1002
 
 __all__ = ["ContactPoint", "Pair", "QuasiElastic", "quasi_elastic", "rigid_contacts", "wheel_curve"]
 
@@ -287,17 +287,10 @@ def part_of_wheel(wheel: Profile, s: Array, part: str) -> Array:
     # beyond the steepest place of the flank, the tip and the back of the flange belong to it
     tip = int(np.argmax(wheel.z))
     if wheel.z[tip] > 0.015:
-        first = s[np.argmax(flange >= 1)] if (flange >= 1).any() else wheel.y[tip]
         last = s[len(s) - 1 - np.argmax((flange >= 1)[::-1])] if (flange >= 1).any() else wheel.y[tip]
         flange = np.where(s <= last, 1.0, flange)
-        del first
     if part == "flange":
         return flange
     if part == "tread":
         return 1.0 - flange
     raise ModelError(f"quasi_elastic: part: expected all, tread or flange, got {part!r}")
-
-
-def conical_pair(conicity: float, **options: float) -> Pair:
-    """Return a conical wheel with a flange on a 60E1 rail."""
-    return Pair(cone(conicity), rail_60e1(), **options)
