@@ -6,7 +6,9 @@ from numpy.testing import assert_allclose
 
 import floatframe as ff
 from floatframe import wheels
+from floatframe.functions.time_functions import polynomial_of_time
 from floatframe.results.energy_balance import balance_defect, energy_scale
+from tests.floatframe.wheels.magic_formula_oracle import version_52, version_61
 
 METHOD = ff.GeneralizedAlpha(0.9, 1e-10)
 G, R0, K, M = 9.81, 0.3, 2e5, 20.0
@@ -184,3 +186,30 @@ def test_a_road_that_is_none_is_refused_by_its_key(tmp_path, road, message):
 def test_roads_of_a_system_file_are_read(tmp_path, road):
     (tmp_path / "road.csv").write_text("# x, z\n0.0, 0.0\n1.0, 0.02\n2.0, 0.0\n")
     assert read(tmp_path, road) is not None
+
+
+@pytest.mark.parametrize("version", [52, 61])
+def test_a_rolling_wheel_of_a_tyre_file_settles_at_the_slips_and_forces_of_the_formula(version):
+    """Drawn at 20 m/s, turned by 3 degrees, spinning 4 % too fast: as the formula written a second time."""
+    tyre = wheels.read_tyre_file(wheels.shipped_tyre(f"passenger_car_{version}"))
+    yaw, speed, height = np.radians(3.0), 20.0, tyre.radius - 0.015
+    spin = 1.04 * speed * np.cos(yaw) / (tyre.radius - 0.005)
+    sled = ff.RigidBody("sled", 10.0, np.eye(3), position=(0, 0, height))
+    body = ff.RigidBody("wheel", M, np.diag([0.5, 1.0, 0.5]), position=(0, 0, height))
+    motions = {"distance": polynomial_of_time([0.0, speed])}
+    rail = ff.PrismaticJoint("rail", ff.Marker(ff.GROUND, position=(0, 0, height)), ff.Marker("sled"), axis=(1, 0, 0),
+                             motions=motions)  # fmt: skip
+    along = np.array([-np.sin(yaw), np.cos(yaw), 0.0])  # the axle
+    hub = ff.RevoluteJoint("hub", ff.Marker("sled"), ff.Marker("wheel"), axis=along,
+                           motions={"angle": polynomial_of_time([0.0, spin])})  # fmt: skip
+    element = wheels.MagicFormulaTyre("tyre", ff.Marker(ff.GROUND), ff.Marker("wheel"), tyre, axis=along)
+    system = ff.System([sled, body], [rail, hub], elements=[element])
+    motion = ff.integrate(system, METHOD, 0.6, 1e-3)
+    seen = {name: values[-1] for name, values in ff.element_motion(system, motion, "tyre").outputs.items()}
+    assert_allclose(abs(seen["alpha"]), yaw, rtol=1e-3)
+    common = (seen["Fz"], seen["kappa"], seen["alpha"], seen["gamma"], speed * np.cos(yaw), tyre.speed)
+    write = version_52 if version == 52 else version_61
+    pressures = () if version == 52 else (tyre.pressure, tyre.nominal_pressure)
+    theirs, _ = write(tyre.coefficients, *pressures, *common, tyre.radius, tyre.load)
+    for name, value in zip(("Fx", "Fy"), theirs, strict=False):
+        assert_allclose(seen[name], value, rtol=1e-4)
