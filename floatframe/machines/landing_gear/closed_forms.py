@@ -24,9 +24,7 @@ class Retraction:
 
     knee: Array  #: (n, 2) [m]
     jack: Array  #: distance of the ends of the jack [m]
-    potential: (
-        Array  #: of leg and links over g, zero where all centres of mass are as high as the hinge [kg m]
-    )
+    potential: Array  #: of leg and links over g, zero where all centres of mass are as high as the hinge [kg m]
 
 
 def turned(theta: Array, point: tuple[float, float]) -> Array:

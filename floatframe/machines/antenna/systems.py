@@ -1,0 +1,280 @@
+"""The antenna as systems of as many petals as wanted, and all its files."""
+
+import json
+from typing import Any
+
+import numpy as np
+
+from floatframe.machines.antenna.closed_forms import mechanism
+from floatframe.machines.antenna.description import Antenna
+from floatframe.machines.antenna.parts import PETAL, STRUT, petal_mesh, strut_files
+
+__all__ = ["antenna_files"]
+
+STAND = """
+[joints.stand]
+type = "fixed"
+body_a = "ground"
+marker_a = [0, 0, 0]
+body_b = "bus"
+marker_b = [0, 0, 0]
+"""
+
+
+def numbers(*values: float) -> str:
+    """Return a list of numbers of TOML."""
+    return json.dumps([float(f"{value:.15g}") + 0.0 for value in np.ravel(values)])
+
+
+def about(axis: str, angle: float) -> np.ndarray:
+    """Return the rotation matrix about the axis y or z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]] if axis == "y" else [[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def rotation_vector(R: np.ndarray) -> np.ndarray:
+    """Return the rotation vector of a matrix."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(R).as_rotvec())
+
+
+def place_text(position: np.ndarray, R: np.ndarray) -> str:
+    """Return the keys of a body's place."""
+    return f"position = {numbers(*position)}\nrotation_vector = {numbers(*rotation_vector(R))}\n"
+
+
+def leaf(antenna: Antenna, k: int, theta: float) -> str:
+    """Return petal k and its strut, with their hinges."""
+    geometry, turn = antenna.geometry, about("z", 2 * np.pi * k / antenna.n_petals)
+    found = mechanism(geometry, theta, n_petals=antenna.n_petals)
+    hinge = turn @ [geometry.hinge_radius, 0, 0]
+    petal = turn @ about("y", theta - np.pi / 2)  # x along the petal, y about its hinge
+    foot = turn @ [geometry.slider_radius, 0, 0] + [0, 0, found.slider[0]]
+    strut = turn @ about("y", np.pi / 2 - found.strut_angle[0])
+    radial = turn @ [geometry.slider_radius, 0, 0]
+    axis = numbers(*(turn @ [0, 1, 0]))
+    return f"""
+[bodies.petal_{k}]
+file = "petal.h5"
+{place_text(hinge, petal)}
+[bodies.strut_{k}]
+file = "strut.h5"
+{place_text(foot, strut)}
+[joints.hinge_{k}]
+type = "revolute"
+body_a = "bus"
+marker_a = {numbers(*hinge)}
+body_b = "petal_{k}"
+marker_b = "root"
+axis = {axis}
+
+[joints.foot_{k}]
+type = "universal"
+body_a = "slider"
+marker_a = {numbers(*radial)}
+body_b = "strut_{k}"
+marker_b = "foot"
+axis = {axis}
+axis_b = [0, 0, 1]
+
+[joints.elbow_{k}]
+type = "spherical"
+body_a = "petal_{k}"
+marker_a = "elbow"
+body_b = "strut_{k}"
+marker_b = "head"
+
+[forces.harness_{k}]
+type = "joint-force"
+joint = "hinge_{k}"
+coordinate = "angle"
+stiffness = {antenna.hinge_stiffness:.6g}
+free = {antenna.stowed - theta:.15g}
+damping = {antenna.hinge_damping:.6g}
+friction = {antenna.hinge_friction:.6g}
+friction_speed = {antenna.friction_speed:.6g}
+"""
+
+
+def bus_and_slider(antenna: Antenna, theta: float, *, fixed: bool) -> str:
+    """Return the spacecraft, the slider on its mast, and the scene they are drawn in."""
+    slider = mechanism(antenna.geometry, theta, n_petals=antenna.n_petals).slider[0]
+    (Ix, Iy, Iz), J = antenna.bus_inertia, antenna.slider_inertia
+    return f"""
+[bodies.bus]
+mass = {antenna.bus_mass:.6g}
+inertia = [[{Ix:.6g}, 0, 0], [0, {Iy:.6g}, 0], [0, 0, {Iz:.6g}]]
+center_of_mass = [0, 0, -0.8]
+
+[[bodies.bus.shapes]]
+type = "cylinder"
+radius = {0.95 * antenna.geometry.hinge_radius:.6g}
+length = 1.6
+position = [0, 0, -0.8]
+color = "#c9a227"
+
+[[bodies.bus.shapes]]
+type = "cylinder"
+radius = 0.05
+length = {antenna.travel[0] + 0.1:.6g}
+position = [0, 0, {antenna.travel[0] / 2:.6g}]
+color = "#8a8f98"
+
+[bodies.slider]
+mass = {antenna.slider_mass:.6g}
+inertia = [[{J:.6g}, 0, 0], [0, {J:.6g}, 0], [0, 0, {J:.6g}]]
+position = [0, 0, {slider:.15g}]
+
+[[bodies.slider.shapes]]
+type = "cylinder"
+radius = {antenna.geometry.slider_radius:.6g}
+length = 0.08
+color = "#3b6ea5"
+
+[joints.mast]
+type = "prismatic"
+body_a = "bus"
+marker_a = [0, 0, 0]
+body_b = "slider"
+marker_b = [0, 0, 0]
+axis = [0, 0, 1]
+{STAND if fixed else ""}"""
+
+
+def system_text(
+    antenna: Antenna, title: str, *, theta: float, fixed: bool, gravity: bool, offload: float, tail: str
+) -> str:
+    """Return a system file: bus, slider, petals and struts at an angle; offload is an upward force at every elbow."""
+    text = f'# {title}\n[system]\nunits = "m-kg-s"\n' + ("gravity = [0, 0, -9.81]\n" if gravity else "")
+    text += bus_and_slider(antenna, theta, fixed=fixed)
+    for k in range(1, antenna.n_petals + 1):
+        text += leaf(antenna, k, theta)
+        if offload:
+            text += f"""
+[forces.wire_{k}]
+type = "point-force"
+body = "petal_{k}"
+marker = "elbow"
+force = [0, 0, {offload:.15g}]
+"""
+    return text + tail
+
+
+def driven_tail(antenna: Antenna) -> str:
+    """Return the drive of the slider from stowed to deployed, and what is measured."""
+    first, last = antenna.travel
+    return f"""
+[joints.mast.motions.distance]
+type = "smooth-step"
+t_start = 0.0
+t_end = {antenna.duration:.6g}
+first = {first:.15g}
+last = {last:.15g}
+{sensors()}
+[run]
+t_end = {antenna.duration:.6g}
+h = {antenna.duration / 60:.6g}
+"""
+
+
+def sensors() -> str:
+    """Return the sensors that all systems of the antenna have."""
+    return """
+[sensors.drive]
+type = "coordinate"
+joint = "mast"
+coordinate = "distance"
+
+[sensors.hinge]
+type = "coordinate"
+joint = "hinge_1"
+coordinate = "angle"
+
+[sensors.strut]
+type = "reaction"
+of = "foot_1"
+
+[sensors.tip]
+type = "position"
+body = "petal_1"
+set = "TIP"
+"""
+
+
+def released_tail(antenna: Antenna, *, push: float, rate: float) -> str:
+    """Return the push of the drive spring with its rate limiter, and the latch at the end of the travel."""
+    return f"""
+[forces.drive]
+type = "joint-force"
+joint = "mast"
+coordinate = "distance"
+damping = {rate:.6g}
+
+[forces.drive.motor]
+type = "smooth-step"
+t_start = 0.0
+t_end = 2.0
+first = 0.0
+last = {-push:.6g}
+
+[couplers.latch]
+engaged = false
+terms = [{{ joint = "mast", coordinate = "distance", factor = 1.0 }}]
+
+[events.latched]
+watch = "mast.distance"
+level = {antenna.travel[1]:.15g}
+direction = "falling"
+switch_on = ["latch"]
+switch_off = ["drive"]
+record = true
+{sensors()}
+[sensors.bus]
+type = "acceleration"
+body = "bus"
+marker = [0, 0, 0]
+
+[run]
+t_end = 30.0
+h = 4e-3
+output_every = 5
+"""
+
+
+def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, str]:
+    """Return all files of the machine by name.
+
+    Parameters
+    ----------
+    antenna
+        Its numbers.
+    petal_moment
+        First moment of the mass of a petal about its hinge, for the wires of the rig: mass times distance of the centre
+        of mass, as `cms info petal.h5` tells them [kg m].
+    """
+    wire = 9.81 * petal_moment / antenna.geometry.elbow
+    options: dict[str, Any] = {"theta": antenna.stowed, "fixed": True}
+    tail = driven_tail(antenna)
+    return {
+        "petal.inp": petal_mesh(antenna),
+        "petal.toml": PETAL,
+        "strut.toml": STRUT,
+        **strut_files(antenna),
+        "space.toml": system_text(
+            antenna, "The antenna held, without gravity, driven open slowly: floatframe kinematics space.toml",
+            gravity=False, offload=0.0, tail=tail, **options,
+        ),
+        "rig.toml": system_text(
+            antenna, "The antenna on a rig under gravity, a wire with constant force at every elbow",
+            gravity=True, offload=wire, tail=tail, **options,
+        ),
+        "bare.toml": system_text(
+            antenna, "The antenna under gravity without compensation", gravity=True, offload=0.0, tail=tail, **options
+        ),
+        "latching.toml": system_text(
+            antenna, "The antenna on its free spacecraft, opened by a motor against a damper, then latched",
+            theta=antenna.stowed, fixed=False, gravity=False, offload=0.0,
+            tail=released_tail(antenna, push=60.0, rate=400.0),
+        ),
+    }  # fmt: skip
