@@ -114,11 +114,6 @@ class Defect:
             places[near, k, 3] = np.arcsin(self.lift(s[near]) / self.gauge)
         return WheelPaths(t, places)
 
-    def middle(self, wheelsets: Array) -> Array:
-        """Return points of the middle of the track that it runs over, (n, 3) [m]."""
-        end = 2 * max(wheelsets) - min(wheelsets) + self.begin + self.speed * self.rest
-        return np.array([[min(wheelsets) - 5, 0.0, 0.0], [end + 5, 0.0, 0.0]])
-
 
 @dataclass(frozen=True)
 class SCurve:
@@ -165,12 +160,6 @@ class SCurve:
             places[:, k, 0], places[:, k, 1] = start + along, self.y(along)
             places[:, k, 2] = np.arctan(self.slope(along))
         return WheelPaths(t, places)
-
-    def middle(self, wheelsets: Array) -> Array:
-        """Return points of the middle of the track that it runs over, (n, 3) [m]."""
-        start = max(wheelsets) + self.begin
-        x = np.concatenate([[min(wheelsets) - 5 - start], np.linspace(0, self.length, 51), [1.5 * self.length]])
-        return np.stack([start + x, self.y(x), 0 * x], axis=1)
 
 
 def path_table(paths: WheelPaths) -> str:

@@ -77,8 +77,6 @@ def railway_engine_files(
     wheelsets = [bodies[name]["position"][0] for name in sorted(bodies) if name.startswith("wheelset_")]
     paths = track.paths(np.array(wheelsets), SAMPLE[case])
     text = re.sub(r"^velocity = .*$", f"velocity = [{track.speed:g}, 0, 0]", text, flags=re.MULTILINE)
-    points = ", ".join(f"[{x:.5g}, {y:.5g}, 0]" for x, y, _ in track.middle(np.array(wheelsets)))
-    text = re.sub(r"^points = .*$", f"points = [{points}]", text, flags=re.MULTILINE)
     text = re.sub(r"^t_end = .*$", f"t_end = {paths.t[-1]:g}", text, flags=re.MULTILINE)
     text = re.sub(r"^points = .*$", f"points = {points_of(track, paths)}", text, flags=re.MULTILINE)
     return {

@@ -324,7 +324,7 @@ def test_results_whose_system_file_has_gone_or_changed_are_still_shown(spin, cap
     ('type = "velocity"', 'type = "velocty"', "did you mean 'velocity'"),
     ('type = "velocity"\nbody = "part"', 'type = "velocity"\nbody = "prt"', "sensors.tip.body = "),
     ('type = "von-mises"\n', 'type = "von-mises"\nmode = 3\n', "a sensor of type von-mises has no key mode"),
-    ('of = "hinge"\n', "", "of: missing; expected the name of a joint or spring-damper"),
+    ('of = "hinge"\n', "", "of: missing; expected the name of a joint, spring, bushing, coupler"),
     ('axes = "marker"', 'axes = "body"', "axes: expected one of ground, marker"),
     ('type = "von-mises"', 'type = "stress"', "expected either position or point"),
 ])  # fmt: skip
