@@ -54,8 +54,8 @@ def test_every_error_has_the_one_root(module):
         assert issubclass(getattr(listed, name), ReportedError)
 
 
-#: caught by the scheme that makes a step, never seen outside
-INNER = "floatframe/discrete/newton.py: StepError"
+#: caught where they are raised for, never seen outside
+INNER = ("floatframe/discrete/newton.py: StepError", "floatframe/compiling/callbacks/law_source.py: NoKeyError")
 
 
 def test_no_error_is_raised_that_is_not_reported():

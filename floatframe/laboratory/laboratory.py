@@ -35,7 +35,7 @@ from floatframe.system import System
 
 __all__ = ["CaseResult", "LaboratoryResult", "Reference", "study"]
 
-LEAST_RANGE = 1e-9  #: of a column over the greatest of its sensor, below which it is no motion
+LEAST_RANGE = 1e-6  #: of a column over the greatest of its sensor, below which it is no motion
 
 
 @dataclass(frozen=True, eq=False)
