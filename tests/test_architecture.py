@@ -108,7 +108,8 @@ def test_imports_point_downward(package):
     assert upward == {}
 
 
-OF_ELEMENTS = ("cables", "drives", "friction", "hydraulics", "rails", "wheels")  #: rooms of public elements
+#: rooms of public elements
+OF_ELEMENTS = ("cables", "clearances", "drives", "friction", "hydraulics", "rails", "wheels")
 
 
 def test_the_core_knows_no_element_by_its_name():

@@ -1,0 +1,67 @@
+"""A ball joint with play: a ball in a socket that is wider than it."""
+
+from dataclasses import dataclass
+
+from numba import njit
+
+from fe_models.foundation.copies import frozen_copies
+from floatframe.bodies.markers import Marker
+from floatframe.clearances.contact import NUMBERS, Range, add_contact, contact_numbers, require_numbers
+from floatframe.clearances.hinge import length_of
+from floatframe.elements import Element, ElementLaw, Placed
+from floatframe.elements.unit_names import in_units
+
+__all__ = ["BallWithPlay"]
+
+OUTPUTS = {"eccentricity": "m", "force": "N", "energy": "J", "power lost": "W"}
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class BallWithPlay(Element):
+    """A ball about marker b in a wider socket about marker a; see `contact` for the force where they meet.
+
+    Outputs: how far the centres are apart, the normal force, energy and power lost.
+
+    Raises
+    ------
+    ModelError
+        If a number is out of its range, or markers are none.
+    """
+
+    name: str
+    marker_a: Marker
+    marker_b: Marker
+    play: float  #: difference of the radii [m]
+    stiffness: float  #: k of the contact [N/mⁿ]
+    exponent: float = 1.0  #: n
+    damping: float = 0.0  #: chi, loss by the speed of the approach [s/m]
+    friction: float = 0.0  #: mu
+    friction_speed: float = 1e-3  #: v_s, slip at which friction is 0.71 of its value [m/s]
+    radius: float = 0.0  #: of the ball, arm of the friction [m]
+
+    def __post_init__(self) -> None:
+        require_numbers(self, {"play": Range(above=0.0)})
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return the law of the ball."""
+        return ElementLaw(
+            function=ball_law,
+            data=[*contact_numbers(self), self.play],
+            outputs=tuple(OUTPUTS),
+            output_units=in_units(placed.units, list(OUTPUTS.values())),
+            tangent="complex",
+            acts=("wrench", "wrench"),
+            is_opposite=True,
+            energy="energy",
+            power_lost="power lost",
+        )
+
+
+@njit
+def ball_law(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Write the contact of the ball and the outputs."""
+    p = x[1, 0], x[1, 1], x[1, 2]
+    out = p[0] - x[0, 0], p[1] - x[0, 1], p[2] - x[0, 2]
+    seen[0] = length_of(out)
+    seen[1], seen[2], seen[3] = add_contact(wrench, x, p, out, seen[0], data[NUMBERS], data, 0)
