@@ -1,0 +1,1 @@
+"""Kernels of relative coordinates: the absolute iterate follows from joint coordinates, and forces go back to them."""

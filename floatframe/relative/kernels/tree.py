@@ -1,0 +1,82 @@
+"""The tree of bodies as a record, and what the recursions write.
+
+A joint of the tree has marker A and marker B, of which one is on the body (far), the other on its parent (near). Its
+columns, one for each coordinate rate z_dot_k, say how B moves as seen from A (docs/relative.md §2):
+
+    v_B - v_A - omega_A × d = Σ A_A tau_k z_dot_k        omega_B - omega_A = Σ a_k z_dot_k
+
+with a_k = A_A alpha_k for side 0 (a screw fixed in A, through its point), A_B alpha_k for side 1 (fixed in B). Bodies
+that hang at nothing have a chart of six columns: marker A is the ground frame, marker B the frame of the body.
+
+Sizes beside those of `kernels.model`: n_k columns; n_s unknowns = columns that are not prescribed, and modes, body by
+body: those of body i are s0[i]:s0[i + 1], first its joint.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.kernels.model import Model, n_b, n_c
+from floatframe.kernels.records import Size, integer, real, zeros
+
+__all__ = ["JointWork", "Tree", "new_joint_work"]
+
+n_k, n_s, n_kept = Size("columns"), Size("n_s"), Size("kept")
+
+
+class Tree(NamedTuple):
+    """Bodies and the joints between them that are coordinates."""
+
+    order: IntArray = integer(n_b)  #: bodies, depth first, each after its parent
+    last: IntArray = integer(n_b)  #: end in `order` of what hangs at order[k], itself included
+    parent: IntArray = integer(n_b)  #: of each body, -1 for the ground
+    joint: IntArray = integer(n_b)  #: connection that carries the body, -1 for a free body
+    near: IntArray = integer(n_b)  #: marker on the parent, -1 for the ground frame of a free body
+    far: IntArray = integer(n_b)  #: marker on the body, -1 for the frame of a free body
+    is_reversed: IntArray = integer(n_b)  #: whether the parent holds marker B
+    column0: IntArray = integer(n_b + 1)  #: first column of the joint of each body
+    s0: IntArray = integer(n_b + 1)  #: first unknown of each body
+    m0: IntArray = integer(n_b)  #: first of its modes among the unknowns
+    tau: Array = real(n_k, 3, unit="1 or m/rad")  #: translation, axes of A
+    alpha: Array = real(n_k, 3)  #: rotation, axes of the side
+    side: IntArray = integer(n_k)  #: 0: fixed in A, 1: fixed in B
+    unknown: IntArray = integer(n_k)  #: number among the unknowns, -1 for a prescribed coordinate
+    motion: IntArray = integer(n_k)  #: function of time of a prescribed coordinate, -1 for none
+    factor: Array = real(n_k)  #: of the coordinate by what the function prescribes
+    row: IntArray = integer(n_k)  #: row of the joint that belongs to it, -1 for none
+    is_loaded: IntArray = integer(n_k)  #: whether forces act along it
+    kept: IntArray = integer(n_kept)  #: connections that are no joints of the tree
+    is_kept: IntArray = integer(n_c)  #: whether a connection is among them
+
+
+class JointWork(NamedTuple):
+    """Joints of the tree in a step; overwritten by every evaluation."""
+
+    d: Array = real(n_b, 3, unit="m")  #: from A to B, axes of A
+    Q: Array = real(n_b, 3, 3)  #: A_Aᵀ A_B
+    d_start: Array = real(n_b, 3, unit="m")  #: the same at the beginning of a step
+    Q_start: Array = real(n_b, 3, 3)
+    x: Array = real(n_k, unit="m or rad")  #: increments of coordinates since then
+    rate: Array = real(n_k, unit="m/s or rad/s")  #: z_dot
+    acceleration: Array = real(n_k, unit="m/s² or rad/s²")  #: z_ddot
+    t: Array = real(n_k, 3)  #: A_A tau, ground axes
+    a: Array = real(n_k, 3)  #: rotation, ground axes
+    near: Array = real(n_b, 12, unit="m/s², rad/s², m/s, rad/s")  #: accelerations and velocities of the marker there
+    force: Array = real(n_b, 6, unit="N, N m")  #: wrench of the joint on its marker B, ground axes
+    residual: Array = real(n_s, unit="N, N m")  #: of the projected equations
+    own: Array = real(Size("n_u"), unit="N, N m")  #: residual of the bodies without the joints of the tree
+
+
+def new_joint_work(model: Model, tree: Tree) -> JointWork:
+    """Return working arrays for the joints of a tree."""
+    sizes = {
+        "n_b": len(tree.parent),
+        "columns": len(tree.side),
+        "n_s": int(tree.s0[-1]),
+        "n_u": int(model.bodies.u0[-1]),
+    }
+    work = zeros(JointWork(), sizes)
+    work.Q[:] = np.eye(3)
+    work.Q_start[:] = np.eye(3)
+    return work
