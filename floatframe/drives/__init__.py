@@ -1,8 +1,9 @@
-"""Electric motors, controllers and maps with states of their own, as public elements on a shaft.
+"""Electric motors, brakes, controllers and maps with states of their own, as public elements on a shaft.
 
 `pid` is the controller of them all, `shaft` and `turns` what they share; each other module is one drive with its law.
 """
 
+from floatframe.drives.anti_skid_brake import AntiSkidBrake
 from floatframe.drives.dc_motor import DcMotor
 from floatframe.drives.induction_motor import InductionMotor
 from floatframe.drives.pid import Pid
@@ -11,6 +12,7 @@ from floatframe.drives.speed_control import SpeedControl
 from floatframe.drives.torque_map import TorqueMap
 
 ELEMENTS = {
+    "anti-skid-brake": "floatframe.drives.anti_skid_brake:AntiSkidBrake",
     "dc-motor": "floatframe.drives.dc_motor:DcMotor",
     "induction-motor": "floatframe.drives.induction_motor:InductionMotor",
     "pid": "floatframe.drives.pid_drive:PidDrive",
@@ -18,4 +20,4 @@ ELEMENTS = {
     "torque-map": "floatframe.drives.torque_map:TorqueMap",
 }
 
-__all__ = ["ELEMENTS", "DcMotor", "InductionMotor", "Pid", "PidDrive", "SpeedControl", "TorqueMap"]
+__all__ = ["ELEMENTS", "AntiSkidBrake", "DcMotor", "InductionMotor", "Pid", "PidDrive", "SpeedControl", "TorqueMap"]

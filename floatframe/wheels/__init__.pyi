@@ -8,6 +8,7 @@ from .roads.obstacles import ramp as ramp
 from .roads.obstacles import step as step
 from .roads.road import FlatRoad as FlatRoad
 from .roads.road import GridRoad as GridRoad
+from .roads.road import Grip as Grip
 from .roads.road import Polyline as Polyline
 from .roads.road import profile_road as profile_road
 from .tyre_file import TyreProperties as TyreProperties

@@ -11,6 +11,7 @@ from floatframe.wheels.contact import (
     SIGMA_Y,
     STIFFNESS,
     contact,
+    grip_at,
     normal_force,
     put_wrenches,
     touching,
@@ -47,8 +48,9 @@ def brush_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     R_e = data[RADIUS] - data[FLATTENING] * d if is_down else data[RADIUS] + zero
     V_r = R_e * Omega
     V_sx = V_x - V_r
-    limit = data[FRICTION] * F_z
-    sliding = 3.0 * data[FRICTION] * data[LOAD] / data[SLIP_STIFFNESS]  # sigma_s, the same at all loads
+    mu = data[FRICTION] * grip_at(x, data, point)
+    limit = mu * F_z
+    sliding = 3.0 * mu * data[LOAD] / data[SLIP_STIFFNESS]  # sigma_s, the same at all loads
     length = data[SIGMA_X] + zero, data[SIGMA_Y] + zero
     sigma_x, sigma_y = tread_slip(data, length, (sliding + zero, sliding + zero), z, z_dot, V_r, V_sx, V_y, landed)
     F_x, F_y, M_z = zero, zero, zero

@@ -8,10 +8,11 @@ up to the centre c; the inclination gamma, sin gamma = e · z_W, is positive whe
 import numpy as np
 from numba.extending import register_jitable
 
-from floatframe.wheels.roads.surface import CENTRE, road_height
+from floatframe.wheels.roads.surface import CENTRE, road_grip, road_height
 
 __all__ = ["AXIS", "CENTRE_AT", "COMMON", "DAMPING", "LOW_SPEED", "RADIUS", "ROAD", "SETTLING", "SIGMA_X", "SIGMA_Y"]
-__all__ += ["STIFFNESS", "TURN_AT", "contact", "cross", "dot", "moved", "normal_force", "put_wrenches", "touching"]
+__all__ += ["STIFFNESS", "TURN_AT", "contact", "cross", "dot", "grip_at", "moved", "normal_force", "put_wrenches"]
+__all__ += ["touching"]
 
 # places of the numbers that all tyres have in their data; those of their own begin at COMMON
 RADIUS, STIFFNESS, DAMPING, LANDING, LOW_SPEED, SETTLING, SIGMA_X, SIGMA_Y = range(8)
@@ -125,6 +126,13 @@ def contact(x, data):
     )
     rate = -dot(V, normal) / cosine
     return x_W, y_W, normal, e, point, R_0 - rho, rho, sine, cosine, dot(V, x_W), dot(V, y_W), Omega, rate, left
+
+
+@register_jitable(error_model="numpy")
+def grip_at(x, data, point):
+    """Return the factor of the road on the friction at a point of contact, given in ground axes."""
+    along_road = turned_back(x, 0, (point[0] - x[0, 0], point[1] - x[0, 1], point[2] - x[0, 2]))
+    return road_grip(data, int(data[ROAD]), along_road[0])
 
 
 @register_jitable(error_model="numpy")

@@ -11,6 +11,7 @@ from floatframe.wheels.contact import (
     SIGMA_Y,
     STIFFNESS,
     contact,
+    grip_at,
     normal_force,
     put_wrenches,
     touching,
@@ -29,7 +30,8 @@ def linear_law(t, x, z, lam, data, wrench, z_dot, g, seen):
 
     (1) contact, normal force F_z from k d; V_sx = V_x - R_e Omega, R_e = R_0 - q d
     (2) slips kappa, tan alpha of the tread
-    (3) F_x = C_x kappa, F_y = -C_y tan alpha - C_gamma sin gamma, and both shortened to |F| <= mu F_z
+    (3) F_x = C_x kappa, F_y = -C_y tan alpha - C_gamma sin gamma, and both shortened to |F| <= mu F_z; the grip of
+        the road multiplies mu
     (4) M_z = t C_y tan alpha, shortened alike; M_y = -f_r R_0 F_z sgn Omega - (R_e - rho) F_x: the lever of F_x is
         R_e, so that it loses F_x V_sx and no more
     """
@@ -40,7 +42,7 @@ def linear_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     F_z = normal_force(data, d, landed, rate, cosine, data[STIFFNESS] * d)
     R_e = data[RADIUS] - data[FLATTENING] * d if is_down else data[RADIUS] + zero
     V_sx = V_x - R_e * Omega
-    limit = data[FRICTION] * F_z
+    limit = data[FRICTION] * grip_at(x, data, point) * F_z
     sigma = data[SIGMA_X] + zero, data[SIGMA_Y] + zero  # (2)
     scale = limit / data[C_X], limit / data[C_Y]
     kappa, tangent = tread_slip(data, sigma, scale, z, z_dot, V_x, V_sx, V_y, landed)

@@ -66,8 +66,10 @@ def sign_of(a):
 
 
 @register_jitable(error_model="numpy")
-def peaks_and_stiffnesses(p, F_z, c):
+def peaks_and_stiffnesses(p, F_z, c, grip):
     """Return df, mu_x, K_x, mu_y, K_y at load F_z and inclination c (gamma in 5.2, sin gamma in 6.1).
+
+    The grip of the road multiplies lambda_mu, here and in `forces_and_moments`.
 
     mu = (p_D1 + p_D2 df)(1 + p_3 dp + p_4 dp²)(1 - p_D3 c²) lambda_mu;
     K_x = F_z (p_K1 + p_K2 df) exp(p_K3 df)(1 + p_1 dp + p_2 dp²) lambda_K;
@@ -77,8 +79,10 @@ def peaks_and_stiffnesses(p, F_z, c):
     df = (F_z - F_0) / F_0
     dp = p[DP]
     c_x, c_y = p[LGAX] * c, p[LGAY] * c
-    mu_x = (p[PDX1] + p[PDX2] * df) * (1.0 + p[PPX3] * dp + p[PPX4] * dp * dp) * (1.0 - p[PDX3] * c_x * c_x) * p[LMUX]
-    mu_y = (p[PDY1] + p[PDY2] * df) * (1.0 + p[PPY3] * dp + p[PPY4] * dp * dp) * (1.0 - p[PDY3] * c_y * c_y) * p[LMUY]
+    mu_x = (p[PDX1] + p[PDX2] * df) * (1.0 + p[PPX3] * dp + p[PPX4] * dp * dp) * (1.0 - p[PDX3] * c_x * c_x)
+    mu_x = mu_x * p[LMUX] * grip
+    mu_y = (p[PDY1] + p[PDY2] * df) * (1.0 + p[PPY3] * dp + p[PPY4] * dp * dp) * (1.0 - p[PDY3] * c_y * c_y)
+    mu_y = mu_y * p[LMUY] * grip
     K_x = F_z * (p[PKX1] + p[PKX2] * df) * np.exp(p[PKX3] * df) * (1.0 + p[PPX1] * dp + p[PPX2] * dp * dp) * p[LKX]
     at_peak = (p[PKY2] + p[PKY5] * c_y * c_y) * (1.0 + p[PPY2] * dp)
     K_y = p[PKY1] * F_0 * (1.0 + p[PPY1] * dp) * (1.0 - p[PKY3] * magnitude(c_y))
@@ -87,18 +91,18 @@ def peaks_and_stiffnesses(p, F_z, c):
 
 
 @register_jitable(error_model="numpy")
-def lateral(p, F_z, s, c, df, mu_y, K_y, rolling):
-    """Return F_y0 of pure side slip, S_Hy, S_Vy and B_y C_y."""
+def lateral(p, F_z, s, c, df, mu_y, K_y, rolling, scale):
+    """Return F_y0 of pure side slip, S_Hy, S_Vy and B_y C_y; scale: lambda_mu_y with the grip of the road."""
     F_0 = p[LFZO] * p[LOAD]
     c_y = p[LGAY] * c
     if p[IS_61] > 0.0:
-        fading = LESS_FRICTION * p[LMUY] / (1.0 + (LESS_FRICTION - 1.0) * p[LMUY])
+        fading = LESS_FRICTION * scale / (1.0 + (LESS_FRICTION - 1.0) * scale)
         S_V_c = F_z * (p[PVY3] + p[PVY4] * df) * c * p[LKYC] * fading
         S_V = F_z * (p[PVY1] + p[PVY2] * df) * p[LVY] * fading + S_V_c
         K_c = F_z * (p[PKY6] + p[PKY7] * df) * (1.0 + p[PPY5] * p[DP]) * p[LKYC]
         S_H = (p[PHY1] + p[PHY2] * df) * p[LHY] + (K_c * c - S_V_c) / (K_y + sign_of(K_y) * TINY * F_0)
     else:
-        S_V = F_z * (p[PVY1] + p[PVY2] * df + (p[PVY3] + p[PVY4] * df) * c_y) * p[LVY] * p[LMUY]
+        S_V = F_z * (p[PVY1] + p[PVY2] * df + (p[PVY3] + p[PVY4] * df) * c_y) * p[LVY] * scale
         S_H = (p[PHY1] + p[PHY2] * df + p[PHY3] * c_y) * p[LHY]
     S_H, S_V = rolling * S_H, rolling * S_V
     a = s + S_H
@@ -110,7 +114,7 @@ def lateral(p, F_z, s, c, df, mu_y, K_y, rolling):
 
 
 @register_jitable(error_model="numpy")
-def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling):
+def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling, grip):
     """Return F_x, F_y, M_x, M_y (of rolling, positive), M_z in signs of the file.
 
     Parameters
@@ -125,14 +129,17 @@ def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling):
         Free radius [m], speed [m/s].
     forward, rolling
         Direction of V_x from -1 to 1, and 1 for a wheel that rolls, 0 at a standstill.
+    grip
+        Of the road, a factor on the friction.
     """
     is_61 = p[IS_61] > 0.0
     F_0 = p[LFZO] * p[LOAD]
     s, c = (np.sin(alpha) / np.cos(alpha), np.sin(gamma)) if is_61 else (alpha, gamma)
     cos_alpha = np.cos(alpha)
-    df, mu_x, K_x, mu_y, K_y = peaks_and_stiffnesses(p, F_z, c)
+    df, mu_x, K_x, mu_y, K_y = peaks_and_stiffnesses(p, F_z, c, grip)
+    scale_x, scale_y = p[LMUX] * grip, p[LMUY] * grip
     # longitudinal force of pure slip
-    fading = LESS_FRICTION * p[LMUX] / (1.0 + (LESS_FRICTION - 1.0) * p[LMUX]) if is_61 else p[LMUX]
+    fading = LESS_FRICTION * scale_x / (1.0 + (LESS_FRICTION - 1.0) * scale_x) if is_61 else scale_x
     S_Hx = rolling * (p[PHX1] + p[PHX2] * df) * p[LHX]
     S_Vx = rolling * F_z * (p[PVX1] + p[PVX2] * df) * p[LVX] * fading
     k = kappa + S_Hx
@@ -141,11 +148,11 @@ def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling):
     D_x = mu_x * F_z
     F_x = sine_curve(k, K_x / (C_x * D_x + TINY * F_0), C_x, D_x, at_most_one(E_x)) + S_Vx
     # lateral force of pure slip
-    F_y0, S_Hy, S_Vy, BC_y = lateral(p, F_z, s, c, df, mu_y, K_y, rolling)
+    F_y0, S_Hy, S_Vy, BC_y = lateral(p, F_z, s, c, df, mu_y, K_y, rolling, scale_y)
     F_y, F_y_trail, S_Vyk = F_y0, F_y0, 0.0 * F_y0
     if is_61:  # the trail carries the force of an upright wheel
-        _, _, _, mu_upright, K_upright = peaks_and_stiffnesses(p, F_z, 0.0 * c)
-        F_y_trail, _, _, _ = lateral(p, F_z, s, 0.0 * c, df, mu_upright, K_upright, rolling)
+        _, _, _, mu_upright, K_upright = peaks_and_stiffnesses(p, F_z, 0.0 * c, grip)
+        F_y_trail, _, _, _ = lateral(p, F_z, s, 0.0 * c, df, mu_upright, K_upright, rolling, scale_y)
     if p[IS_COMBINED] > 0.0:
         B = (p[RBX1] + p[RBX3] * c * c) * np.cos(np.arctan(p[RBX2] * kappa)) * p[LXAL]
         E = at_most_one(p[REX1] + p[REX2] * df)
@@ -171,16 +178,16 @@ def forces_and_moments(p, F_z, kappa, alpha, gamma, R_0, V_x, forward, rolling):
         else:
             a_t = np.arctan(np.sqrt(square(np.tan(a_t)) + q * q + 1e-30)) * sign_of(a_t)
             a_r = np.arctan(np.sqrt(square(np.tan(a_r)) + q * q + 1e-30)) * sign_of(a_r)
-    B_t = (p[QBZ1] + p[QBZ2] * df + p[QBZ3] * df * df) * (1.0 + p[QBZ4] * c_z + p[QBZ5] * size) * p[LKY] / p[LMUY]
+    B_t = (p[QBZ1] + p[QBZ2] * df + p[QBZ3] * df * df) * (1.0 + p[QBZ4] * c_z + p[QBZ5] * size) * p[LKY] / scale_y
     D_t = F_z * R_0 / F_0 * (p[QDZ1] + p[QDZ2] * df) * (1.0 - p[PPZ1] * p[DP]) * p[LTR]
     D_t = D_t * (1.0 + p[QDZ3] * (size if is_61 else c_z) + p[QDZ4] * c_z * c_z)
     E_t = p[QEZ1] + p[QEZ2] * df + p[QEZ3] * df * df
     E_t = E_t * (1.0 + (p[QEZ4] + p[QEZ5] * c_z) * 2.0 / np.pi * np.arctan(B_t * p[QCZ1] * a_t))
     trail = D_t * cosine_curve(a_t, B_t, p[QCZ1], at_most_one(E_t)) * cos_alpha
-    B_r = p[QBZ9] * p[LKY] / p[LMUY] + p[QBZ10] * BC_y
+    B_r = p[QBZ9] * p[LKY] / scale_y + p[QBZ10] * BC_y
     D_r = (p[QDZ6] + p[QDZ7] * df) * p[LRES]
     D_r = D_r + ((p[QDZ8] + p[QDZ9] * df) * (1.0 + p[PPZ2] * p[DP]) + (p[QDZ10] + p[QDZ11] * df) * size) * c_z * p[LKZC]
-    residual = F_z * R_0 * D_r * p[LMUY] * np.cos(np.arctan(B_r * a_r)) * cos_alpha
+    residual = F_z * R_0 * D_r * scale_y * np.cos(np.arctan(B_r * a_r)) * cos_alpha
     lever = R_0 * (p[SSZ1] + p[SSZ2] * F_y / F_0 + (p[SSZ3] + p[SSZ4] * df) * c_z) * p[LS]
     M_z = forward * (-trail * F_y_trail + residual) + rolling * lever * F_x
     # overturning and rolling moments

@@ -10,6 +10,7 @@ from floatframe.wheels.contact import (
     SIGMA_X,
     SIGMA_Y,
     contact,
+    grip_at,
     normal_force,
     put_wrenches,
     touching,
@@ -136,7 +137,8 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     clamped += over
     side, sign = data[SIDE], data[SIGN]
     c = np.sin(gamma) if data[IS_61] > 0.0 else gamma
-    df, mu_x, K_x, mu_y, K_y = peaks_and_stiffnesses(data, load, side * c)
+    grip = grip_at(x, data, point)
+    df, mu_x, K_x, mu_y, K_y = peaks_and_stiffnesses(data, load, side * c, grip)
     sigma = relaxation(data, df, load, K_x, K_y, gamma)
     scale = 3.0 * mu_x * load / magnitude(K_x), 3.0 * mu_y * load / magnitude(K_y)
     kappa, tangent = tread_slip(data, sigma, scale, z, z_dot, V_x, V_sx, V_y, landed)
@@ -149,7 +151,7 @@ def magic_formula_law(t, x, z, lam, data, wrench, z_dot, g, seen):
     if F_z.real > 0.0:
         forward = direction(V_x, data[LOW_SPEED])
         F_x, F_y, M_x, M_y, M_z = forces_and_moments(
-            data, load, kappa_held, side * alpha_held, side * gamma, R_0, V_x, forward, magnitude(forward)
+            data, load, kappa_held, side * alpha_held, side * gamma, R_0, V_x, forward, magnitude(forward), grip
         )
         turning = direction(R_0 * Omega, data[LOW_SPEED])
         F = share * F_x, sign * side * share * F_y, F_z

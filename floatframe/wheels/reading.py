@@ -1,6 +1,7 @@
 """Tyres and roads from tables of a system file."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -10,7 +11,7 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.wheels.roads.iso_8608 import iso_8608_road
 from floatframe.wheels.roads.obstacles import bump, cosine_bump, ramp, step
-from floatframe.wheels.roads.road import FlatRoad, GridRoad, Polyline, Road
+from floatframe.wheels.roads.road import FlatRoad, GridRoad, Grip, Polyline, Road
 from floatframe.wheels.tyre_file import TyreProperties, read_tyre_file, shipped_tyre
 
 __all__ = ["Read", "properties_of_table", "road_of_table", "tyre_of_table"]
@@ -52,14 +53,28 @@ def road_of_table(table: Any, read: Read) -> Road:
 
     Keys by type: flat; profile, grid: x, z, y, linear, or `file` (a text table, x in its first column, heights at `y`
     in the others); iso-8608: those of `iso_8608_road`; step, ramp, bump, cosine-bump: at, height, run or width, length,
-    between. `envelope`, the radius of the wheel, and `envelope_width` give what a disc feels of it.
+    between. `envelope`, the radius of the wheel, and `envelope_width` give what a disc feels of it. `grip`, a table of
+    x and factor, multiplies the friction along it.
     """
     where = f"{read.where}.road"
     if not isinstance(table, dict) or not isinstance(table.get("type"), str):
         raise ModelError(f'{where}: expected a table such as {{type = "flat"}}, got {quoted(table)}')
-    kind, values = table["type"], {key: value for key, value in table.items() if key != "type"}
+    kind, values = table["type"], {key: value for key, value in table.items() if key not in ("type", "grip")}
     if kind not in TYPES:
         raise ModelError(f"{where}.type: expected one of {', '.join(TYPES)}, got {quoted(kind)}{nearest(kind, TYPES)}")
+    road = ground_of_table(where, kind, values, read)
+    return replace(road, grip=grip_of_table(where, table["grip"], read)) if "grip" in table else road
+
+
+def grip_of_table(where: str, table: Any, read: Read) -> Grip:
+    """Return the grip of {x = [...], factor = [...]}."""
+    if not isinstance(table, dict) or set(table) != {"x", "factor"}:
+        raise ModelError(f"{where}.grip: expected a table {{x = [...], factor = [...]}}, got {quoted(table)}")
+    return Grip(*(read.value(np.ndarray, table[key], f"road.grip.{key}") for key in ("x", "factor")))
+
+
+def ground_of_table(where: str, kind: str, values: dict[str, Any], read: Read) -> Road:
+    """Return the road of a type without its grip."""
 
     def number(key: str, default: float | None = None) -> Any:
         if key not in values and default is not None:

@@ -11,11 +11,44 @@ from fe_models.foundation.copies import frozen_copies
 from floatframe.checked_values import array_of_shape, number
 from floatframe.errors import ModelError
 from floatframe.wheels.roads.envelope import profile_envelope
-from floatframe.wheels.roads.surface import CENTRE, CUBIC, FLAT, GRID, road_height
+from floatframe.wheels.roads.surface import CENTRE, CUBIC, FLAT, GRID, GRIP, road_height
 
-__all__ = ["FlatRoad", "GridRoad", "Polyline", "Road", "profile_road"]
+__all__ = ["FlatRoad", "GridRoad", "Grip", "Polyline", "Road", "profile_road"]
 
 ENVELOPE_STEPS = 20  #: of an envelope in a radius
+
+
+@frozen_copies
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """A factor on the friction of tyres along the road, such as of a wet patch: straight between knots."""
+
+    x: Array  #: knots along the road, (n,) [m], increasing
+    factor: Array  #: above 0, (n,); held before the first knot and beyond the last
+
+    def __post_init__(self) -> None:
+        x = knots("road: grip: x", self.x)
+        factor = array_of_shape("road: grip: factor", self.factor, x.shape)
+        if np.any(factor <= 0):
+            k = int(np.argmin(factor))
+            raise ModelError(f"road: grip: factor: expected numbers above 0, got {factor[k]:g} at x = {x[k]:g}")
+        object.__setattr__(self, "x", x)
+        object.__setattr__(self, "factor", factor)
+
+
+def with_grip(numbers: Array, grip: Grip | None) -> Array:
+    """Return the numbers of a road with those of its grip behind them, if it has one."""
+    if grip is None:
+        return numbers
+    begun = numbers.copy()
+    begun[GRIP] = len(numbers)
+    return np.concatenate([begun, [len(grip.x)], grip.x, grip.factor])
+
+
+def check_grip(road: Any) -> None:
+    """Raise `ModelError` unless the grip of a road is one, or none."""
+    if not isinstance(road.grip, Grip | None):
+        raise ModelError(f"road: grip: expected a Grip(x, factor) or None, got {road.grip!r}")
 
 
 @frozen_copies
@@ -23,9 +56,14 @@ ENVELOPE_STEPS = 20  #: of an envelope in a radius
 class FlatRoad:
     """The plane z = 0 without an end."""
 
+    grip: Grip | None = None  #: factor on the friction of tyres along the road; None: one
+
+    def __post_init__(self) -> None:
+        check_grip(self)
+
     def numbers(self) -> Array:
-        """What `surface.road_height` reads, (5,)."""
-        return np.array([FLAT, 0.0, 0.0, 0.0, 0.0])
+        """What `surface.road_height` and `surface.road_grip` read: header, grip."""
+        return with_grip(np.array([FLAT, 0.0, 0.0, 0.0, 0.0, 0.0]), self.grip)
 
     def height(self, x: float, y: float = 0.0) -> float:
         """Zero [m]."""
@@ -48,6 +86,7 @@ class GridRoad:
     y: Array = (0.0,)  # type: ignore[assignment]  #: knots across, (n_y,) [m], increasing
     is_linear: bool = False  #: straight between the knots
     envelope_radius: float | None = None  #: of the disc whose lowest point z is [m]; None: z is the ground itself
+    grip: Grip | None = None  #: factor on the friction of tyres along the road; None: one
 
     def __post_init__(self) -> None:
         x, y = knots("road: x", self.x), knots("road: y", self.y, least=1)
@@ -58,6 +97,7 @@ class GridRoad:
             object.__setattr__(self, name, value)
         if self.envelope_radius is not None:
             number("road: envelope_radius", self.envelope_radius, above=0.0)
+        check_grip(self)
 
     @property
     def steepest(self) -> tuple[float, float]:
@@ -66,14 +106,15 @@ class GridRoad:
         return float(rise.max()), float(self.x[int(rise.argmax())])
 
     def numbers(self) -> Array:
-        """What `surface.road_height` reads: header, knots, z, z_x, z_y, z_xy."""
+        """What `surface.road_height` and `surface.road_grip` read: header, knots, z, z_x, z_y, z_xy, grip."""
         z_x = slopes(self.x, self.z)
         z_y = slopes(self.y, self.z.T).T
         z_xy = slopes(self.y, z_x.T).T
-        header = [GRID, len(self.x), len(self.y), 0.0 if self.is_linear else CUBIC, 0.0]
+        header = [float(GRID), len(self.x), len(self.y), 0.0 if self.is_linear else CUBIC, 0.0, 0.0]
         if self.envelope_radius is not None:
             header[4] = CENTRE
-        return np.concatenate([header, self.x, self.y, *(part.ravel() for part in (self.z, z_x, z_y, z_xy))])
+        tables = [part.ravel() for part in (self.z, z_x, z_y, z_xy)]
+        return with_grip(np.concatenate([header, self.x, self.y, *tables]), self.grip)
 
     def height(self, x: float, y: float = 0.0) -> float:
         """Height at a place [m]."""

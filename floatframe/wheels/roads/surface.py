@@ -2,12 +2,14 @@
 
 from numba.extending import register_jitable
 
-__all__ = ["CENTRE", "CUBIC", "FLAT", "GRID", "HEADER", "road_height"]
+__all__ = ["CENTRE", "CUBIC", "FLAT", "GRID", "GRIP", "HEADER", "road_grip", "road_height"]
 
 FLAT, GRID = 0, 1  #: kinds of roads
 CENTRE = 1.0  #: heights are those that a disc sees whose centre is above the place; 0: those of the ground itself
 CUBIC = 1.0  #: between the knots; 0: linear
-HEADER = 5  #: kind, n_x, n_y, interpolation, reference; then x, y, and z, z_x, z_y, z_xy of (n_x, n_y)
+#: kind, n_x, n_y, interpolation, reference, grip; then x, y, and z, z_x, z_y, z_xy of (n_x, n_y)
+HEADER = 6
+GRIP = 5  #: where n, x (n), factors (n) of the grip begin, from the header on; 0: one everywhere
 
 
 @register_jitable(error_model="numpy")
@@ -96,3 +98,17 @@ def road_height(data, at, x, y):
         z_y = (z_1 - z_0) / b
         z_x = ((1.0 - r) * (data[k + n_y] - data[k]) + r * (data[k + n_y + 1] - data[k + 1])) / h
     return z, inside_x * z_x, inside_y * z_y, left
+
+
+@register_jitable(error_model="numpy")
+def road_grip(data, at, x):
+    """Return the factor on the friction of tyres at x: straight between its knots, held beyond them."""
+    one = 1.0 + 0.0 * x
+    if data[at + GRIP] == 0.0:
+        return one
+    first = at + int(data[at + GRIP])
+    n = int(data[first])
+    k = interval(data, first + 1, n, x)
+    low, high = data[first + 1 + k], data[first + 2 + k]
+    s = (held(x, low, high) - low) / (high - low)
+    return data[first + 1 + n + k] * (1.0 - s) + data[first + 2 + n + k] * s

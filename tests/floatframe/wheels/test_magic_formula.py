@@ -51,7 +51,7 @@ def test_version_61_is_the_formula_of_the_textbook(tyres, combined, with_factors
     tyre = scaled(tyres[61]) if with_factors else tyres[61]
     data = element(tyre, is_combined=combined, pressure=250e3).law(placed(HEIGHT)).data
     for Fz, kappa, alpha, gamma in CASES:
-        ours = forces_and_moments(data, Fz, kappa, alpha, gamma, tyre.radius, 25.0, 1.0, 1.0)
+        ours = forces_and_moments(data, Fz, kappa, alpha, gamma, tyre.radius, 25.0, 1.0, 1.0, 1.0)
         theirs, _ = version_61(
             tyre.coefficients, 250e3, 220e3, Fz, kappa, alpha, gamma, 25.0, 16.7, tyre.radius, 4000.0, combined=combined
         )
@@ -64,7 +64,7 @@ def test_version_52_is_the_formula_of_the_textbook(tyres, combined, with_factors
     tyre = scaled(tyres[52]) if with_factors else tyres[52]
     data = element(tyre, is_combined=combined).law(placed(HEIGHT)).data
     for Fz, kappa, alpha, gamma in CASES:
-        ours = forces_and_moments(data, Fz, kappa, alpha, gamma, tyre.radius, 25.0, 1.0, 1.0)
+        ours = forces_and_moments(data, Fz, kappa, alpha, gamma, tyre.radius, 25.0, 1.0, 1.0, 1.0)
         theirs, _ = version_52(
             tyre.coefficients, Fz, kappa, alpha, gamma, 25.0, 16.7, tyre.radius, 4000.0, combined=combined
         )
@@ -100,7 +100,7 @@ def test_slopes_and_peaks_of_pure_slip_are_those_of_the_coefficients(tyres, vers
     data = element(tyre, is_combined=False).law(placed(HEIGHT)).data
 
     def force(kappa=0.0, alpha=0.0):
-        return np.array(forces_and_moments(data, Fz, kappa, alpha, 0.0, tyre.radius, 20.0, 1.0, 1.0)[:2])
+        return np.array(forces_and_moments(data, Fz, kappa, alpha, 0.0, tyre.radius, 20.0, 1.0, 1.0, 1.0)[:2])
 
     K_x, K_y = p["PKX1"] * Fz, tyre.cornering_stiffness
     h = 1e-20j
@@ -242,3 +242,19 @@ def test_a_pressure_out_of_the_range_of_the_file_is_refused(tyres):
         element(tyres[61], pressure=4e5).law(placed(HEIGHT))
     with pytest.raises(ModelError, match="no NOMPRES"):
         element(tyres[52], pressure=2e5).law(placed(HEIGHT))
+
+
+@pytest.mark.parametrize("version", [52, 61])
+def test_the_grip_of_a_road_is_the_factor_of_both_frictions(tyres, version):
+    """Second road: LMUX and LMUY of the file multiplied by it."""
+    tyre, grip = scaled(tyres[version]), 0.55
+    slippery = dict(tyre.coefficients) | {key: grip * tyre.coefficients[key] for key in ("LMUX", "LMUY")}
+    one, other = (element(each).law(placed(HEIGHT)).data for each in (tyre, replace(tyre, coefficients=slippery)))
+    for case in CASES[:5]:
+        ours = forces_and_moments(one, *case, tyre.radius, 25.0, 1.0, 1.0, grip)
+        assert_allclose(ours, forces_and_moments(other, *case, tyre.radius, 25.0, 1.0, 1.0, 1.0), rtol=1e-12)
+    wet = element(tyre, road=wheels.FlatRoad(wheels.Grip([-1, 1], [grip, grip]))).law(placed(HEIGHT))
+    x = motion(height=0.3, v=(20, 2, 0), omega=(0, 55, 0))
+    dry = element(replace(tyre, coefficients=slippery)).law(placed(HEIGHT))
+    z = [2e-3, 1e-3]
+    assert_allclose(answer(wet, x, z)[1], answer(dry, x, z)[1], rtol=1e-12)

@@ -1,5 +1,7 @@
 """Roads: interpolation, envelopes against circles, obstacles, random roads against their classes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -7,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from floatframe import wheels
 from floatframe.errors import ModelError
 from floatframe.wheels.roads.iso_8608 import ROUGHNESS, density, track_correlation
-from floatframe.wheels.roads.surface import road_height
+from floatframe.wheels.roads.surface import road_grip, road_height
 
 R = 0.3
 
@@ -197,3 +199,28 @@ def test_a_given_coherence_is_that_of_the_tracks():
 def test_roads_that_are_none_are_refused(make, message):
     with pytest.raises(ModelError, match=message):
         make()
+
+
+def test_grip_is_straight_between_its_knots_and_stays_with_a_road_that_is_enveloped():
+    grip = wheels.Grip([10.0, 12.0, 30.0], [1.0, 0.4, 0.4])
+    bump = wheels.cosine_bump(5.0, 0.05, 2.0, length=40.0).road()
+    for road in (wheels.FlatRoad(grip), replace(bump, grip=grip), replace(bump, grip=grip).enveloped(R)):
+        numbers = np.concatenate([[7.0], road.numbers()])
+        found = [road_grip(numbers, 1, x) for x in (-5.0, 10.0, 11.0, 12.0, 20.0, 99.0)]
+        assert_allclose(found, [1.0, 1.0, 0.7, 0.4, 0.4, 0.4], rtol=1e-14)
+        assert_allclose(road_grip(numbers, 1, 11.0 + 1e-30j).imag / 1e-30, -0.3, rtol=1e-12)
+        assert_allclose(road.height(6.0), 0.0 if isinstance(road, wheels.FlatRoad) else 0.05, atol=1e-5)
+    assert road_grip(wheels.FlatRoad().numbers(), 0, 3.0) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("x", "factor", "message"),
+    [
+        ([0.0, 0.0], [1.0, 0.5], "grip: x: expected increasing"),
+        ([0.0, 1.0], [1.0, 0.0], "grip: factor: expected numbers above 0, got 0 at x = 1"),
+        ([0.0, 1.0], [1.0], "grip: factor"),
+    ],
+)
+def test_a_grip_that_is_none_is_refused(x, factor, message):
+    with pytest.raises(ModelError, match=message):
+        wheels.Grip(x, factor)

@@ -159,3 +159,12 @@ def test_steady_slip_loses_force_times_slip_velocity(make):
 def test_numbers_out_of_their_range_are_refused(make, changes, message):
     with pytest.raises(ModelError, match=message):
         make(**changes)
+
+
+@pytest.mark.parametrize("make", [linear, brush])
+def test_grip_multiplies_friction(make):
+    road = wheels.FlatRoad(wheels.Grip([-1, 1], [0.3, 0.3]))
+    wet = rolled(make(friction=0.9, road=road).law(placed()), slip=(-0.2, 0.1))
+    other = rolled(make(friction=0.27).law(placed()), slip=(-0.2, 0.1))
+    for key in ("Fx", "Fy", "Mz"):
+        assert_allclose(wet[key], other[key], rtol=1e-12)
