@@ -172,7 +172,7 @@ class Element:
     def events(self) -> Sequence[Any]:
         """Return the events that the element brings with it, `floatframe.Event` on "NAME.OUTPUT"; none by default.
 
-        A run that watches for events calls Python after every step; `ElementLaw.stops` costs nothing.
+        What they watch is measured after blocks of steps, in Python; `ElementLaw.stops` costs nothing.
         """
         return ()
 

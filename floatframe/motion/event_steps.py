@@ -1,4 +1,9 @@
-"""Steps with events: values watched at both ends of a step, and the step refined to where one passes its level."""
+"""Steps with events: values watched after each of many steps, and the step refined to where one passes its level.
+
+Steps are taken by the compiled loop in blocks, and what is watched is measured for a whole block at once. A block in
+which something happens is taken again up to the step in question, from the memory and the factors that it began with:
+the same numbers, bit for bit.
+"""
 
 import json
 from collections.abc import Mapping
@@ -12,7 +17,9 @@ from floatframe.compiling.file_frames import rows_of_file, state_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator
+from floatframe.integrators.ida import Ida
 from floatframe.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Rows
+from floatframe.kernels.records import leaves
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.events import Event, events_of, off_at_start, require_events, switched
 from floatframe.motion.stop_events import (
@@ -36,6 +43,7 @@ from floatframe.system import System
 
 __all__ = ["EventWatch"]
 
+BLOCK = 32  #: most steps between which what is watched is not measured; blocks end where a multiple of it does
 SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
 MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
 
@@ -58,6 +66,8 @@ class EventWatch:
     happened: list[dict[str, Any]] = field(default_factory=list)
     recorded: list[Rows] = field(default_factory=list)  #: results at events since they were last taken
     has_stopped: bool = False
+    due: int = -1  #: number of the step in which something is known to happen
+    calm: int = BLOCK  #: most steps of the next block: few after an event, which may be one of many
 
     def __post_init__(self) -> None:
         require_events(self.full)
@@ -83,19 +93,19 @@ class EventWatch:
             require_within_limits(compiled_system(self.full), self.events, self.values)
             self.take_inside()
 
-    def measured(self, before: Rows, after: Rows) -> Array:
-        """Return what each event watches at two times, (2, n_events)."""
+    def measured(self, *rows: Rows) -> Array:
+        """Return what each event watches at the times of rows of results, (n_times, n_events)."""
         compiled = compiled_system(self.full)
         motion, columns = None, []
         for event in self.events:
             if isinstance(event, StopEvent):
-                columns.append(np.array(stop_values(compiled, event, self.resting, (before, after))))
+                columns.append(stop_values(compiled, event, self.resting, rows))
                 continue
             if event.at is not None:
-                columns.append(np.array([before.t[-1], after.t[-1]]))
+                columns.append(np.concatenate([row.t for row in rows]))
                 continue
             if motion is None:
-                arrays = arrays_of([self.in_files(before), self.in_files(after)])
+                arrays = arrays_of([self.in_files(row) for row in rows])
                 arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
                 motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
             found = sensor_of(self.full, event.watch).measure(self.full, motion).columns
@@ -111,13 +121,60 @@ class EventWatch:
             if known is row:
                 return told
         told = rows_of_file(compiled_system(self.full), row)
-        self.told = (*self.told[-1:], (row, told))
+        if len(row.t) == 1:
+            self.told = (*self.told[-1:], (row, told))
         return told
 
     def values_after(self, row: Rows) -> Array:
         """Return what is watched at a later time."""
         assert self.row is not None
         return np.asarray(self.measured(self.row, row)[1])
+
+    def steps(
+        self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int
+    ) -> tuple[Carry, Rows, Work, int, Failure | None]:
+        """Take steps of size h, the first of them number `first` from t0, as many as make a block, n_steps at most.
+
+        Return the results after each of them (those at a stop, if the run ends there), and how many are done.
+
+        (1) the steps of a block, as many as there were without an event, by one call; what is watched, after each
+        (2) nothing happens: the block is done
+        (3) something happens in its first step: that step is taken by `step`
+        (4) something happens later: the steps before are taken again from where the block began, and are done
+        """
+        n = min(n_steps, BLOCK - first % BLOCK, self.calm)
+        if n == 1 or first == self.due or isinstance(integrator, Ida):  # each call of Ida begins anew
+            n_before = len(self.happened)
+            carry, row, work, failure = self.step(integrator, carry, work, t0=t0, h=h, k=first)
+            self.calm = min(2 * self.calm, BLOCK) if len(self.happened) == n_before else 1
+            return carry, row, work, int(failure is None), failure
+        begin, kept = carry, tuple(array.copy() for _, array in leaves(work))
+        carry, rows, n_good, failure = integrator.advance(
+            self.system, begin, work, t0=t0, h=h, first=first, n_steps=n, every=1
+        )
+        assert self.row is not None
+        values = np.concatenate([self.values[None], self.measured(self.row, rows)[1:]])
+        passed = (
+            k
+            for k in range(n_good)
+            for event, before, after in zip(self.events, values[k], values[k + 1], strict=True)
+            if event.happens(float(before), float(after))
+        )
+        n_free = next(passed, n_good)
+        if n_free < n_good:
+            for (_, array), value in zip(leaves(work), kept, strict=True):
+                array[...] = value
+            self.due = first + n_free
+            carry = begin
+            if n_free == 0:
+                return self.steps(integrator, carry, work, t0=t0, h=h, first=first, n_steps=1)
+            carry, rows, n_free, failure = integrator.advance(
+                self.system, begin, work, t0=t0, h=h, first=first, n_steps=n_free, every=1
+            )
+        if n_free:
+            self.values, self.row = values[n_free], Rows(*(array[n_free - 1 : n_free] for array in rows))
+        self.calm = min(2 * self.calm, BLOCK)
+        return carry, rows, work, n_free, failure
 
     def step(
         self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, k: int
@@ -327,7 +384,8 @@ class EventWatch:
     def record(self) -> dict[str, Array]:
         """Return what a run needs to go on."""
         words = json.dumps(
-            {"off": sorted(self.off), "happened": self.happened, "caught": self.caught, "resting": self.resting}
+            {"off": sorted(self.off)}
+            | {name: getattr(self, name) for name in ("happened", "caught", "resting", "calm")}
         )
         return {"event_values": self.values, "events": np.frombuffer(words.encode(), dtype=np.uint8)}
 
@@ -335,6 +393,7 @@ class EventWatch:
         """Go on from a record."""
         data = json.loads(np.asarray(record["events"], dtype=np.uint8).tobytes().decode())
         self.caught, self.resting = data.get("caught", {}), data.get("resting", {})
+        self.calm = data.get("calm", BLOCK)
         self.switch(frozenset(data["off"]))
         self.happened = data["happened"]
         self.values = np.array(record["event_values"], dtype=float)

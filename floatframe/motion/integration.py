@@ -281,8 +281,17 @@ class Run:
         self.watch = ValidityWatch(self.system, self.notes)
         self.closed = time.monotonic()  # when the last segment was
 
+    def wanted(self, rows: Rows, n_done: int, n_good: int, has_stopped: bool) -> Rows:
+        """Return of the results after each of n_good steps those at output times, and those at a stop."""
+        is_due = (n_done + 1 + np.arange(n_good)) % self.output_every == 0
+        if has_stopped:
+            is_due[-1:] = True
+        return Rows(*(array[:n_good][is_due] for array in rows))
+
     def keep(self, rows: Rows) -> None:
         """Take rows of results; tell when a body leaves the range of its linear frame."""
+        if not len(rows.t):
+            return
         for note in self.watch.observe(rows):
             log.warning("%s", note.words)
         told = rows_of_file(compiled_system(self.system), rows)
@@ -314,32 +323,30 @@ class Run:
                         closed = time.monotonic()
                 n_batch = min(batch_steps, self.n_total - n_done, RESTART_STEPS - n_done % RESTART_STEPS)
                 n_smooth = min((k - n_done for k in jumps if k >= n_done), default=n_batch)
-                if self.events is None and n_smooth > 0:
-                    n_batch = min(n_batch, n_smooth)
-                    carry, rows, n_good, failure = self.integrator.advance(
-                        self.system, carry, work, t0=self.t_start, h=self.h, first=n_done, n_steps=n_batch,
-                        every=self.output_every,
+                if n_smooth == 0:
+                    acting = self.system if self.events is None else self.events.system
+                    carry, rows, work, failure = over_jumps(
+                        self.integrator, acting, carry, work, t=self.t_start + n_done * self.h, h=self.h,
+                        jumps=jumps[n_done], events=self.events,
                     )  # fmt: skip
-                    self.keep(rows)
-                else:
-                    if n_smooth == 0:
-                        acting = self.system if self.events is None else self.events.system
-                        carry, rows, work, failure = over_jumps(
-                            self.integrator, acting, carry, work, t=self.t_start + n_done * self.h, h=self.h,
-                            jumps=jumps[n_done], events=self.events,
-                        )  # fmt: skip
-                    else:
-                        assert self.events is not None
-                        carry, rows, work, failure = self.events.step(
-                            self.integrator, carry, work, t0=self.t_start, h=self.h, k=n_done
-                        )
                     n_good = int(failure is None)
-                    if self.events is not None:
-                        has_stopped = self.events.has_stopped
-                        for recorded in self.events.taken():
-                            self.keep(recorded)
-                    if failure is None and (has_stopped or (n_done + 1) % self.output_every == 0):
-                        self.keep(rows)
+                elif self.events is None:
+                    carry, rows, n_good, failure = self.integrator.advance(
+                        self.system, carry, work, t0=self.t_start, h=self.h, first=n_done,
+                        n_steps=min(n_batch, n_smooth), every=self.output_every,
+                    )  # fmt: skip
+                else:
+                    carry, rows, work, n_good, failure = self.events.steps(
+                        self.integrator, carry, work, t0=self.t_start, h=self.h, first=n_done,
+                        n_steps=min(n_batch, n_smooth),
+                    )  # fmt: skip
+                if self.events is not None:
+                    has_stopped = self.events.has_stopped
+                    for recorded in self.events.taken():
+                        self.keep(recorded)
+                if self.events is not None or n_smooth == 0:
+                    rows = self.wanted(rows, n_done, n_good, has_stopped)
+                self.keep(rows)
                 n_done += n_good
                 if progress is not None:
                     t = self.t_start + n_done * self.h
@@ -414,8 +421,9 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
     """Return the head of the results of a run."""
     compiled = compiled_system(system)
     entries = []
-    for i, body in enumerate(system.bodies):
-        source = body.source if isinstance(body, FlexibleBody) else ""
+    sources = [body.source if isinstance(body, FlexibleBody) else "" for body in system.bodies]
+    digests = {source: digest_of(source) for source in set(sources)}  # files of many bodies are read once
+    for i, (body, source) in enumerate(zip(system.bodies, sources, strict=True)):
         entries.append(
             BodyEntry(
                 body.name,
@@ -423,7 +431,7 @@ def head_of(system: System, integrator: Integrator, t_start: float, t_end: float
                 int(compiled.model.bodies.q0[i]),
                 int(compiled.model.bodies.u0[i]),
                 source,
-                digest_of(source),
+                digests[source],
                 isinstance(body, FlexibleBody) and body.is_stiffened,
             )
         )

@@ -75,20 +75,21 @@ def coupled_sum(compiled: CompiledSystem, name: str, w: Array) -> float:
 
 def stop_values(
     compiled: CompiledSystem, event: StopEvent, resting: Mapping[str, str], rows: Sequence[Rows]
-) -> list[float]:
-    """Return what the event of a stop watches, at each of some rows of results.
+) -> Array:
+    """Return what the event of a stop watches, at the times of rows of results, (n_times,).
 
     A limit on which the sum rests is not reached again; one on which it does not rest cannot let go.
     """
-    side = resting.get(event.coupler)
+    side, w = resting.get(event.coupler), np.concatenate([row.w for row in rows])
     if event.side == "release":
         if side is None:
-            return [1.0] * len(rows)
+            return np.ones(len(w))
         _, _, core = sum_rows(compiled, event.coupler)
-        return [INWARD[side] * float(row.w[-1, core]) for row in rows]
+        return INWARD[side] * w[:, core]
     if side is not None:
-        return [event.level + INWARD[event.side]] * len(rows)
-    return [coupled_sum(compiled, event.coupler, row.w[-1]) for row in rows]
+        return np.full(len(w), event.level + INWARD[event.side])
+    held, factors, _ = sum_rows(compiled, event.coupler)
+    return np.array([float(factors @ one[held]) for one in w])
 
 
 def require_within_limits(compiled: CompiledSystem, events: Sequence[Event], values: Array) -> None:
