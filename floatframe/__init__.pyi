@@ -26,6 +26,7 @@ from .analyses import resolved_frequencies as resolved_frequencies
 from .analyses import root_locus as root_locus
 from .analyses import snapshot as snapshot
 from .analyses import static_equilibrium as static_equilibrium
+from .analyses import steady_motion as steady_motion
 from .analyses import steady_rotation as steady_rotation
 from .analyses import sweep as sweep
 from .analyses import system_modes as system_modes

@@ -14,6 +14,7 @@ from floatframe.analyses.linear.parameter_study import Locus, campbell, root_loc
 from floatframe.analyses.linear.state_space import NamedStateSpace, named_state_space, write_state_space
 from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.steady.steady_motion import SteadyMotion, steady_motion
 from floatframe.analyses.sweep import sweep
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "Locus",
     "NamedStateSpace",
     "ParameterInput",
+    "SteadyMotion",
     "SystemModes",
     "campbell",
     "check_element",
@@ -44,6 +46,7 @@ __all__ = [
     "root_locus",
     "snapshot",
     "static_equilibrium",
+    "steady_motion",
     "steady_rotation",
     "sweep",
     "system_modes",

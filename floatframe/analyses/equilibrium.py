@@ -82,6 +82,7 @@ class Equilibrium:
     residual: float  #: largest force out of balance, relative to the forces at work
     n_iterations: int
     validity: tuple[ValidityNote, ...] = ()  #: bodies that are out of the range of their frame, as for a motion
+    t: float = 0.0  #: time of all functions of time [s]
 
 
 @dataclass(eq=False)
@@ -198,8 +199,8 @@ def steady_rotation(
     rolling = [name for name, rolls in zip(compiled.owners, is_held_velocity(model.rows.kind), strict=True) if rolls]
     if rolling:
         raise ModelError(
-            f"joint {rolling[0]!r} rolls without slip: equilibria and linearisations do not know held velocities; "
-            "hold the body by other joints, or integrate the motion"
+            f"joint {rolling[0]!r} rolls without slip: equilibria and steady rotations do not know held velocities; "
+            "take steady_motion, also for speed 0"
         )
     resting = compiled.resting_model
     states = StatesAtRest.of(compiled)
@@ -215,18 +216,20 @@ def steady_rotation(
         state, u_dot = turning(compiled, state, omega, center)
         set_iterate(work, state, u_dot, w)
         states.prepare(work, w, tau)
-        parts, K = _tangent(resting, work)
+        parts, K = _tangent(resting, work, omega)
         raise_errors_of(compiled.callbacks)
         require_numbers(compiled, work)
         W = with_modal_weight(model, linearized(resting, work, 1.0, 0.0, 0.0).H)
         forces, gaps = work.bodies.residual.copy(), work.connections.g.copy()
-        size = _size(W, forces)
-        scale_of_forces = _forces_at_work(compiled, work, parts, W)
+        size = size_of(W, forces)
+        scale_of_forces = forces_at_work(compiled, work, parts, W)
         if not np.isfinite(size + scale_of_forces):  # a stiffened body beyond the second order
             error = np.inf
             break
-        noise = _rounding(compiled, parts, state)
-        is_nothing = scale_of_forces <= _size(W, abs(parts.J).T @ np.where(holds, 0.0, noise))  # springs relax to none
+        noise = rounding_of(compiled, parts, state)
+        is_nothing = scale_of_forces <= size_of(
+            W, abs(parts.J).T @ np.where(holds, 0.0, noise)
+        )  # springs relax to none
         error = 0.0 if is_nothing else size / scale_of_forces
         is_closed = np.abs(gaps[holds]).max(initial=0.0) <= CLOSED * max(compiled.length, 1.0)
         told = tolerance * np.abs(w[~states.own]).max(initial=0.0) + noise
@@ -241,7 +244,7 @@ def steady_rotation(
             break
         if tau == 0.0:
             pulled = forces - parts.J.T @ wrenches_by_law(model, parts, gaps, holds | states.own)
-            at_first = size if size > STANDING_SPRINGS * _size(W, pulled) else _size(W, pulled)
+            at_first = size if size > STANDING_SPRINGS * size_of(W, pulled) else size_of(W, pulled)
             tau = 0.1 * compiled.length / max(at_first / np.sqrt(_total_mass(W)), STANDSTILL)
         else:
             fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
@@ -250,7 +253,7 @@ def steady_rotation(
         y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
         if not np.isfinite(y).all():
             break
-        part = min(1.0, LARGEST_TURN / max(_largest_motion(compiled, y), 1e-300))
+        part = min(1.0, LARGEST_TURN / max(largest_motion(compiled, y), 1e-300))
         state = displaced(model, state, part * in_ground_axes(model, state, y))
         w = w + part * dw
         states.follow(w, dw)
@@ -260,7 +263,7 @@ def steady_rotation(
         f"{indefinite_mass_words(lost)}"
         if lost
         else f"no equilibrium found in {iteration} steps: forces are out of balance by {error:.2g} of those at work, "
-        f"most at body {_worst_body(compiled, W, forces)!r}{states.words(tolerance)}; hold what can fall or drift, "
+        f"most at body {worst_body(compiled, W, forces)!r}{states.words(tolerance)}; hold what can fall or drift, "
         "start nearer, or add damping and integrate until it rests",
         t=0.0,
         h=0.0,
@@ -304,12 +307,12 @@ def turning(compiled: CompiledSystem, state: State, omega: Array, center: Array)
     return State(state.r, state.p, state.q, u), u_dot
 
 
-def _tangent(model: Model, work: Work) -> tuple[Linearized, tuple[Array, ...]]:
+def _tangent(model: Model, work: Work, omega: Array) -> tuple[Linearized, tuple[Array, ...]]:
     """Return rows and wrenches, and of each body the derivative of the residual along the steady rotations."""
     parts = linearized(model, work, 0.0, 0.0, 1.0)
     if not work.state.u.any():
         return parts, parts.H
-    Omega, Omega_t = turning_matrices(model, work)
+    Omega, Omega_t = turning_matrices(model, work, omega)
     by_both = linearized(model, work, 0.0, 1.0, 1.0)
     mass = linearized(model, work, 1.0, 0.0, 0.0).H
     K = []
@@ -320,7 +323,7 @@ def _tangent(model: Model, work: Work) -> tuple[Linearized, tuple[Array, ...]]:
     return Linearized(parts.H, parts.J, sp.csr_array(G), parts.V), tuple(K)
 
 
-def _size(W: tuple[Array, ...], forces: Array) -> float:
+def size_of(W: tuple[Array, ...], forces: Array) -> float:
     """Return the length of forces in the norm of W⁻¹: for one mass, force by the root of its mass; nan without one."""
     total, first = 0.0, 0
     for block in W:
@@ -330,7 +333,7 @@ def _size(W: tuple[Array, ...], forces: Array) -> float:
     return float(np.sqrt(total)) if total >= 0 else float("nan")
 
 
-def _forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: tuple[Array, ...]) -> float:
+def forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: tuple[Array, ...]) -> float:
     """Return the length of the forces of joints, springs, weight and deformation, in the norm of the residual."""
     bodies, residual = compiled.model.bodies, work.bodies.residual
     reactions = parts.J.T @ work.state.w if len(work.state.w) else np.zeros_like(residual)
@@ -338,10 +341,10 @@ def _forces_at_work(compiled: CompiledSystem, work: Work, parts: Linearized, W: 
     for i, u0 in enumerate(bodies.u0[:-1]):
         q = work.state.q[int(bodies.q0[i]) : int(bodies.q0[i + 1])]
         elastic[int(u0) + 6 : int(bodies.u0[i + 1])] = modal_matrix(compiled.model, i, STIFFNESS) @ q
-    return max(_size(W, part) for part in (reactions, residual + reactions, elastic))
+    return max(size_of(W, part) for part in (reactions, residual + reactions, elastic))
 
 
-def _rounding(compiled: CompiledSystem, parts: Linearized, state: State) -> Array:
+def rounding_of(compiled: CompiledSystem, parts: Linearized, state: State) -> Array:
     """Return what the rounding of positions alone leaves of the rows, (n_w,): much where a spring is stiff."""
     reach = np.ones(len(state.u))
     for i, u0 in enumerate(compiled.model.bodies.u0[:-1]):
@@ -355,7 +358,7 @@ def _total_mass(W: tuple[Array, ...]) -> float:
     return float(sum(block[0, 0] for block in W))
 
 
-def _largest_motion(compiled: CompiledSystem, y: Array) -> float:
+def largest_motion(compiled: CompiledSystem, y: Array) -> float:
     """Return the largest translation, relative to the size of the system, or rotation of a body."""
     largest = 0.0
     for u0 in compiled.model.bodies.u0[:-1]:
@@ -367,9 +370,9 @@ def _largest_motion(compiled: CompiledSystem, y: Array) -> float:
     return largest
 
 
-def _worst_body(compiled: CompiledSystem, W: tuple[Array, ...], forces: Array) -> str:
+def worst_body(compiled: CompiledSystem, W: tuple[Array, ...], forces: Array) -> str:
     u0 = compiled.model.bodies.u0
-    sizes = [_size((block,), forces[u0[i] : u0[i + 1]]) for i, block in enumerate(W)]
+    sizes = [size_of((block,), forces[u0[i] : u0[i + 1]]) for i, block in enumerate(W)]
     return compiled.body_names[int(np.argmax(sizes))]
 
 

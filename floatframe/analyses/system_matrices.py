@@ -1,12 +1,15 @@
 """Mass, damping and stiffness of the whole system at one state, as they follow from the Newton matrix.
 
-Small motions about a state in which every body turns with a constant angular velocity omega in its own axes:
+Small motions about a steady one: axes in which nothing changes turn with omega, the same for all bodies, which turn
+with it, or spin in them with a constant sigma besides (a wheel, whose inertia and forces do not see by how much):
 
-    xi    position of the frame origin and rotation in body axes, modal coordinates
-    nu    change of the velocities (v_G turned to body axes, omega_B, q_dot):      nu  = xi_dot + Omega xi
-    eta   change of the accelerations (v_G_dot turned to body axes, ...):          eta = nu_dot + Omega' nu
+    xi    position of the frame origin and rotation in the axes that coincide with those of the body now and turn with
+          omega, modal coordinates
+    nu    change of the velocities (v_G, omega_B turned to these axes, q_dot):     nu  = xi_dot + Omega xi
+    eta   change of the accelerations (v_G_dot turned to these axes, ...):         eta = nu_dot + Omega' nu
 
-with Omega = diag(omega~, omega~, 0) and Omega' = diag(omega~, 0, 0) for every body. The equations of motion become
+with Omega = diag(omega~, omega~, 0) and Omega' = diag(omega~, -sigma~, 0) for every body, since components in its own
+axes have the rate d/dt - sigma × in these. Without spin they are body axes. The equations of motion become
 
     M eta + C nu + K xi - Jᵀ dw = F s            bodies
     G_x xi + G_v nu + V dw + E s + E' s' = 0     rows: V = 0 and G_v = 0 for what joints hold
@@ -32,7 +35,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.errors import ModelError
-from floatframe.joints.rows import is_held
+from floatframe.joints.rows import is_held, is_held_position, is_held_velocity
 from floatframe.kernels.model import Model
 from floatframe.kernels.work import Work
 from floatframe.rotations import tilde
@@ -42,6 +45,7 @@ __all__ = ["Inputs", "Tangents", "Wrenches", "held_rows", "settled", "tangents",
 
 CANCELLED = 1e-10  #: of terms: what is left of their sum is rounding
 RANK = 1e-10  #: singular value, relative to the largest, below which one repeats others
+SPINLESS = 1e-12  #: of the angular velocity: a spin that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +68,13 @@ class Tangents:
     M: Array  #: (n_u, n_u)
     C: Array  #: (n_u, n_u)
     K: Array  #: (n_u, n_u)
-    G: Array  #: what the joints hold, (n_held, n_u)
+    G: Array  #: what the joints hold of positions, (n_held, n_u)
     J: Array  #: from wrenches to the forces on bodies, (n_w, n_u)
     G_x: Array  #: all rows by positions, (n_w, n_u)
     G_v: Array  #: by velocities, (n_w, n_u)
     V: Array  #: by wrenches, (n_w, n_w)
-    holds: NDArray[np.bool_]  #: which rows hold something, (n_w,) bool
+    holds: NDArray[np.bool_]  #: which rows hold a position, (n_w,) bool
+    rolls: NDArray[np.bool_]  #: which rows hold a velocity, (n_w,) bool
     free: NDArray[np.bool_]  #: which say what a wrench is, (n_w,) bool
     states: IntArray  #: rows of the values of states, those of their rates follow, (n_states,)
     soft: Array  #: compliance of held rows that share their reactions, zero for all others, (n_w,)
@@ -197,10 +202,10 @@ def tangents(model: Model, work: Work) -> Tangents:
     C = la.block_diag(*by_both.H) - K
     G, G_v = by_position.G.toarray(), by_both.G.toarray() - by_position.G.toarray()
     J, V = by_position.J.toarray(), by_position.V.toarray()
-    holds = held_rows(model)
+    holds, rolls = is_held_position(model.rows.kind), is_held_velocity(model.rows.kind)
     states = np.asarray(model.states.row)
     of_states = rows_of_states(states, len(V))
-    free = ~holds & ~of_states
+    free = ~holds & ~rolls & ~of_states
     by_rows = np.zeros((len(V), int(free.sum())))
     if free.any():
         by_rows[~of_states] = np.linalg.pinv(V[np.ix_(free, ~of_states)])
@@ -208,7 +213,7 @@ def tangents(model: Model, work: Work) -> Tangents:
         to_bodies = J.T @ by_rows
         K += to_bodies @ G[free]
         C += to_bodies @ G_v[free]
-    return Tangents(M, C, K, G[holds], J, G, G_v, V, holds, free, states, np.asarray(model.rows.soft), by_rows)
+    return Tangents(M, C, K, G[holds], J, G, G_v, V, holds, rolls, free, states, np.asarray(model.rows.soft), by_rows)
 
 
 def rows_of_states(states: IntArray, n_w: int) -> NDArray[np.bool_]:
@@ -219,13 +224,16 @@ def rows_of_states(states: IntArray, n_w: int) -> NDArray[np.bool_]:
     return found
 
 
-def turning_matrices(model: Model, work: Work) -> tuple[Array, Array]:
-    """Return Omega and Omega' for the angular velocities in `work`, each (n_u, n_u)."""
+def turning_matrices(model: Model, work: Work, omega: Array) -> tuple[Array, Array]:
+    """Return Omega and Omega' for the velocities in `work`, in axes that turn with omega (ground axes), (n_u, n_u)."""
     n_u = int(model.bodies.u0[-1])
     Omega, Omega_t = np.zeros((n_u, n_u)), np.zeros((n_u, n_u))
-    for u0 in model.bodies.u0[:-1]:
-        omega = tilde(work.state.u[u0 + 3 : u0 + 6])
-        Omega[u0 : u0 + 3, u0 : u0 + 3] = omega
-        Omega[u0 + 3 : u0 + 6, u0 + 3 : u0 + 6] = omega
-        Omega_t[u0 : u0 + 3, u0 : u0 + 3] = omega
+    for i, u0 in enumerate(model.bodies.u0[:-1]):
+        turning = work.state.R[i].T @ omega
+        v, turn = slice(u0, u0 + 3), slice(u0 + 3, u0 + 6)
+        spin = work.state.u[turn] - turning
+        if np.abs(spin).max() <= SPINLESS * np.abs(turning).max():
+            spin = np.zeros(3)
+        Omega[v, v] = Omega[turn, turn] = Omega_t[v, v] = tilde(turning)
+        Omega_t[turn, turn] = -tilde(spin)
     return Omega, Omega_t

@@ -1,11 +1,12 @@
-"""Linearisation of a system about an equilibrium or a steady rotation, in coordinates that fulfil the joints.
+"""Linearisation of a system about an equilibrium or a steady motion, in coordinates that fulfil the joints.
 
 With N a basis of the motions the joints allow (G N = 0) and the matrices of `tangents`:
 
     xi = N z,  nu = N z_dot + Omega N z
     M_z = Nᵀ M N,  C_z = Nᵀ (C N + M (Omega + Omega') N),  K_z = Nᵀ (K + C Omega + M Omega' Omega) N
 
-N does not change in time, because in body axes nothing does. Inputs s enter as forces, or move what joints hold:
+N does not change in time, because nothing does in axes that turn with the system; `steadiness` sees to that. Velocities
+that are held take some of the motions away, see `held_velocities`. Inputs s enter as forces, or move what joints hold:
 G Y + E = 0, and xi = N z + Y s with the Y that needs no force besides, the quasi-static shape, where K_z is regular:
 
     M_z z'' + C_z z' + K_z z = B s + B_rate s' + B_acceleration s''
@@ -34,6 +35,7 @@ from floatframe.analyses.linear.channels import (
     outputs_of,
     require_input,
 )
+from floatframe.analyses.linear.held_velocities import Rolling, rolled, rolling
 from floatframe.analyses.linear.inputs import (
     BaseMotion,
     DriveMotion,
@@ -43,6 +45,7 @@ from floatframe.analyses.linear.inputs import (
     interface_forces,
 )
 from floatframe.analyses.snapshot import snapshot
+from floatframe.analyses.steady.steadiness import require_steady
 from floatframe.analyses.system_matrices import Inputs, Tangents, settled, tangents, turning_matrices
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
@@ -117,7 +120,8 @@ class LinearSystem:
     output_values: Array = field(default_factory=empty)  #: outputs in the steady motion, (n_outputs,)
     left_out: Mapping[str, str] = field(default_factory=dict)  #: columns of outputs that are not linear here, and why
     motions: NamedMotions | None = None  #: of which states can be made, see `state_space`
-    #: states of elements and user forces, the last of z: their rows of C are those of a unit matrix, of M by z'' alone
+    #: ways of held velocities, states of elements and user forces, the last of z: their rows of C are those of a unit
+    #: matrix, of M by z'' alone
     states: tuple[str, ...] = ()
     state_units: tuple[str, ...] = ()
 
@@ -318,14 +322,14 @@ def linearize(
     inputs: Sequence[AnyInput] | None = None,
     outputs: Sequence[AnyOutput] | None = None,
 ) -> LinearSystem:
-    """Linearise a system about an equilibrium or a steady rotation.
+    """Linearise a system about an equilibrium, a steady rotation or steady running.
 
     Parameters
     ----------
     system
         The system.
     about
-        As `static_equilibrium` or `steady_rotation` returns it; the equilibrium at rest by default.
+        As `static_equilibrium`, `steady_rotation` or `steady_motion` return it; the equilibrium at rest by default.
     inputs
         Channels (forces along them), `DriveMotion`, `BaseMotion`, `ParameterInput`. None: those of the system.
     outputs
@@ -335,7 +339,8 @@ def linearize(
     Raises
     ------
     ModelError
-        If nothing can move, a channel is at a place that does not exist, or a column asked for is not linear here.
+        If nothing can move, the state moves but is not steady, a channel is at a place that does not exist, or a column
+        asked for is not linear here.
     """
     inputs = inputs_of(system.inputs) if inputs is None else tuple(inputs)
     outputs = outputs_of(system.outputs) if outputs is None else tuple(outputs)
@@ -344,6 +349,7 @@ def linearize(
     about = static_equilibrium(system) if about is None else about
     compiled = compiled_system(system)
     model, work = compiled.model, new_work(compiled.model)
+    work.state.time[...] = about.t
     state, u_dot = motion_of_engine(compiled, about.state, about.u_dot)
     set_iterate(work, state, u_dot, about.w)
     shown = small_motions_of_file(compiled, state.q)
@@ -355,10 +361,12 @@ def linearize(
     forces = (*interface_forces(system, now, inputs), *(() for _ in states.names))
     small = SmallMotions(system, compiled, work, state, about.omega, now, bases, forces)
     by_inputs = input_columns(small, inputs).beside(parts.by_states)
-    Omega, Omega_t = turning_matrices(model, work)
+    Omega, Omega_t = turning_matrices(model, work, about.omega)
     N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.bodies.u0[:-1]])
     if N.shape[1] == 0:
         raise ModelError(f"system {system.name!r}: its joints and drives allow no motion; nothing can be linearised")
+    roll = rolling(parts, Omega, N, by_inputs)
+    require_steady(compiled, about, work, parts, N, np.eye(N.shape[1]) if roll is None else roll.S)
     D_0, D_1, D_2 = parts.full(Omega, Omega_t)
     K_z = N.T @ D_0 @ N
     force, force_rate = parts.body_forces(by_inputs)
@@ -386,9 +394,14 @@ def linearize(
         "D_acceleration": settled(of_inputs[2] + of_motions[2] @ Y, (of_motions[2], size), (one, of_inputs[2])),
     }
     matrices = {"M": N.T @ D_2 @ N, "C": N.T @ D_1 @ N, "K": K_z, **coefficients, "N": by_bodies}
+    matrices = with_states(matrices, n_states)
+    motions = named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N, n_states)
+    if roll is not None:
+        matrices, states = rolled(matrices, roll, n_states), states.behind(roll, system.units.length_symbol)
+        motions = replace(motions, rows=motions.rows @ roll.places(n_states))
     return LinearSystem(
         about,
-        **with_states(matrices, n_states),
+        **matrices,
         Y=(la.block_diag(*shown) @ Y)[:, : len(inputs)],
         inputs=tuple(channel.name for channel in inputs),
         outputs=seen.names,
@@ -401,7 +414,7 @@ def linearize(
         output_units=seen.units,
         output_values=seen.values,
         left_out=seen.left_out,
-        motions=named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N, n_states),
+        motions=motions,
         states=states.names,
         state_units=states.units,
     )
@@ -413,6 +426,11 @@ class NamedStates:
 
     names: tuple[str, ...]
     units: tuple[str, ...]
+
+    def behind(self, roll: Rolling, unit: str) -> "NamedStates":
+        """Return them behind the ways along which held velocities let nothing slip."""
+        n = len(roll.by_eta)
+        return NamedStates((*(f"rolled way {k + 1}" for k in range(n)), *self.names), (*(unit,) * n, *self.units))
 
 
 def states_of(system: System, compiled: CompiledSystem, work: Work, parts: Tangents) -> NamedStates:

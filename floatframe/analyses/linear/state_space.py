@@ -90,12 +90,16 @@ def named_state_space(linear: LinearSystem) -> NamedStateSpace:
         )
     system, T_mass = linear.with_mass()
     motions = linear.motions
-    rows = (motions.rows @ T_mass)[:, : system.n_z]  # (1)
-    chosen = independent_rows(rows, system.M[: system.n_z, : system.n_z], motions)  # (2)
-    R = rows[chosen]
+    n_z, rows = system.n_z, motions.rows @ T_mass  # (1)
+    chosen = independent_rows(rows[:, :n_z], system.M[:n_z, :n_z], motions)  # (2)
+    R = rows[chosen, :n_z]
     space, n = linear.state_space(), len(chosen)
     kept = system.kept_inputs()
     T = la.block_diag(R, R, np.eye(len(system.states) + len(kept)))  # (3)
+    by_states, states = rows[chosen, n_z:], slice(2 * n, 2 * n + len(system.states))
+    if by_states.any():  # ways of held velocities are places too
+        T[:n, states] = by_states
+        T[n : 2 * n] += by_states @ space.A[states]
     backward = np.linalg.inv(T)  # well conditioned by (2)
     A = T @ space.A @ backward
     A[:n] = np.eye(n, len(A), k=n)  # as it is but for rounding

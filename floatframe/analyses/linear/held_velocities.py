@@ -1,0 +1,116 @@
+"""Velocities that are held (rolling without slip) in the equations of small motions.
+
+With xi = N z, in which what joints hold of positions is fulfilled, rows that hold velocities say
+
+    A z' + B z = 0,   A = G_v N,   B = (G_x + G_v Omega) N
+
+of first order. With A = U diag(sigma) Tᵀ and A S = 0, z = S y + T eta: eta is how far the system has come along what it
+may not slip. It stands among the states, and only the y, along which it rolls, have accelerations:
+
+    eta' = -E y - F eta,   [E F] = diag(1/sigma) Uᵀ B [S T],   eta'' = -E y' + F E y + F F eta
+
+put into M z'' + C z' + K z = F, and Sᵀ before it, in which the forces Aᵀ lam that hold the velocities drop out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from fe_models.foundation.arrays import Array
+from floatframe.analyses.system_matrices import Inputs, Tangents
+from floatframe.errors import ModelError
+
+__all__ = ["Rolling", "rolled", "rolling"]
+
+RANK = 1e-10  #: singular value of the scaled rows below which one repeats others
+
+
+@dataclass(frozen=True, eq=False)
+class Rolling:
+    """How a system with held velocities may move."""
+
+    S: Array  #: (n_z, n_y)
+    T: Array  #: (n_z, n_eta)
+    by_y: Array  #: E, (n_eta, n_y)
+    by_eta: Array  #: F, (n_eta, n_eta)
+
+    def places(self, n_states: int) -> Array:
+        """Return (z, states) by (y, eta, states)."""
+        return la.block_diag(np.hstack([self.S, self.T]), np.eye(n_states))
+
+
+def rolling(parts: Tangents, Omega: Array, N: Array, inputs: Inputs) -> Rolling | None:
+    """Return how held velocities split motions N z; None if there are none.
+
+    Raises
+    ------
+    ModelError
+        If an input moves what rolls, or held velocities depend on states or wrenches.
+    """
+    rows = parts.rolls
+    if not rows.any():
+        return None
+    if inputs.E[rows].any() or inputs.E_rate[rows].any() or parts.V[rows].any():
+        raise ModelError(
+            "linearize: a held velocity that an input, a state or a wrench changes is not known here; take the input "
+            "out, or give the element a state in the place of its multiplier"
+        )
+    A = parts.G_v[rows] @ N
+    B = (parts.G_x[rows] + parts.G_v[rows] @ Omega) @ N
+    size = np.linalg.norm(A, axis=1)
+    if not (size > 0).all():
+        raise ModelError("linearize: an element holds a velocity that no motion changes")
+    left, values, right = la.svd(A / size[:, None])
+    rank = int((values > RANK * values[0]).sum())
+    known = left[:, :rank].T @ (B / size[:, None])
+    repeated = left[:, rank:].T @ (B / size[:, None])
+    if np.abs(repeated).max(initial=0.0) > 1e-8 * np.abs(B / size[:, None]).max(initial=1.0):
+        raise ModelError(
+            "linearize: joints that roll contradict each other: velocities they hold repeat, places do not"
+        )
+    S, T = right[rank:].T, right[:rank].T
+    known = known / values[:rank, None]
+    return Rolling(S, T, known @ S, known @ T)
+
+
+def rolled(parts: dict[str, Array], roll: Rolling, n_states: int) -> dict[str, Array]:
+    """Return matrices over (y, eta, states) from those over (z, states), see the module."""
+    one, zero = np.eye(n_states), np.zeros
+    n_z, n_y = roll.S.shape
+    n_eta = roll.T.shape[1]
+    n = n_y + n_eta + n_states
+
+    def motions(by_y: Array, by_eta: Array, by_states: Array) -> Array:
+        """Return columns of (z, states) by (y, eta, states)."""
+        of_z = np.hstack([by_y, by_eta, zero((n_z, n_states))])
+        return np.vstack([of_z, np.hstack([zero((n_states, n_y + n_eta)), by_states])])
+
+    T, none = roll.T, zero((n_z, n_eta))
+    A_0 = roll.places(n_states)  # (z, states) = A_0 x
+    A_1 = motions(roll.S, none, one)  # rates = A_1 x' + B_1 x
+    B_1 = motions(-T @ roll.by_y, -T @ roll.by_eta, 0 * one)
+    A_2 = motions(roll.S, none, one)  # second rates = A_2 x'' + C_2 x' + B_2 x
+    C_2 = motions(-T @ roll.by_y, none, 0 * one)
+    B_2 = motions(T @ roll.by_eta @ roll.by_y, T @ roll.by_eta @ roll.by_eta, 0 * one)
+    left = la.block_diag(roll.S.T, one)
+    found: dict[str, Array] = {}
+
+    def by_x(second: Array, first: Array, zeroth: Array) -> tuple[Array, Array, Array]:
+        return second @ A_2, second @ C_2 + first @ A_1, second @ B_2 + first @ B_1 + zeroth @ A_0
+
+    def with_eta(rows: Array, own: Array) -> Array:
+        """Return rows of y and states with those of eta between them."""
+        return np.vstack([rows[:n_y], own, rows[n_y:]])
+
+    M, C, K = by_x(*(left @ parts[name] for name in "MCK"))
+    found["M"] = with_eta(M, zero((n_eta, n)))
+    found["C"] = with_eta(C, np.hstack([zero((n_eta, n_y)), np.eye(n_eta), zero((n_eta, n_states))]))
+    found["K"] = with_eta(K, np.hstack([roll.by_y, roll.by_eta, zero((n_eta, n_states))]))
+    found["L_acceleration"], found["L_rate"], found["L"] = by_x(parts["L_acceleration"], parts["L_rate"], parts["L"])
+    for suffix in ("", "_rate", "_acceleration"):
+        B = left @ parts[f"B{suffix}"]
+        found[f"B{suffix}"] = with_eta(B, zero((n_eta, B.shape[1])))
+        found[f"D{suffix}"] = parts[f"D{suffix}"]
+    found["N"] = parts["N"] @ A_0
+    return found

@@ -1,0 +1,1 @@
+"""Steady running: vehicles that go straight on or turn with a constant radius, their wheels spinning."""

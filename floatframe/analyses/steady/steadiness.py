@@ -1,0 +1,234 @@
+"""Whether a state that moves is a steady one, about which small motions have constant coefficients.
+
+(1) now: one velocity field v_0 + Omega × r for all bodies, forces in balance with accelerations of the steady motion
+(2) a little later, all bodies moved on and spinning ones turned: forces in balance again with wrenches of their own,
+    and the same matrices in axes that turn with the system. A wheel that is not round, a road that is not even, or a
+    function of time that is not constant show themselves here.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.linalg as la
+from numpy.typing import NDArray
+
+from fe_models.foundation.arrays import Array
+from floatframe.analyses.equilibrium import Equilibrium, forces_at_work, size_of, worst_body
+from floatframe.analyses.steady.carrier import Carrier, moved_on, turned_axes
+from floatframe.analyses.system_matrices import Tangents, rows_of_states, tangents, turning_matrices
+from floatframe.compiling.file_frames import motion_of_engine
+from floatframe.compiling.system import CompiledSystem
+from floatframe.errors import ModelError
+from floatframe.joints.rows import is_held
+from floatframe.kernels.work import Work, new_work
+from floatframe.rotations import rotation_matrix
+from floatframe.start.newton_equations import Linearized, linearized, set_iterate, with_modal_weight
+from floatframe.state import State
+
+__all__ = ["require_steady"]
+
+BALANCED = 1e-5  #: forces out of balance, relative to those at work
+LEAST = 1e-3  #: of the forces that turn velocities round: what counts as forces at work
+ALONG = 1e-6  #: velocities against the common motion, relative to the largest
+SAME = 1e-6  #: change of a matrix, relative to its largest entry
+TURN = 1.234  #: angle by which the fastest body has turned later, no part of a circle [rad]
+AHEAD = 0.1  #: way of a system in which nothing turns, by its size
+MOST_ITERATIONS = 10
+NOT = "linearize: this state is not steady:"
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Forces out of balance at a state."""
+
+    error: float  #: relative to the forces at work
+    body: str  #: where most
+    w: Array  #: wrenches with which they are in balance best
+
+
+def require_steady(
+    compiled: CompiledSystem, about: Equilibrium, work: Work, parts: Tangents, N: Array, S: Array
+) -> None:
+    """Raise `ModelError` if a state that moves is not steady, naming what is not.
+
+    Parameters
+    ----------
+    compiled
+        The system.
+    about
+        The state; one at rest is not looked at.
+    work
+        Evaluated at it.
+    parts
+        Its matrices.
+    N
+        The motions that joints allow, (n_u, n_z).
+    S
+        Those of them that held velocities allow, (n_z, n_y).
+    """
+    state, _ = motion_of_engine(compiled, about.state, about.u_dot)
+    if not state.u.any():
+        return
+    carrier = carrier_of(compiled, state, about.omega)
+    now = balance(compiled, work, about.w)
+    require_balance(now, about.residual, "forces are out of balance")
+    model, spins = compiled.model, spins_in(compiled, state, about.omega)
+    fastest = max((float(np.linalg.norm(spin)) for spin in spins), default=0.0)
+    fastest = fastest or float(np.linalg.norm(about.omega))
+    speed = float(np.abs(carrier.velocity).max())
+    later = TURN / fastest if fastest else AHEAD * compiled.length / speed
+    moved, moved_u_dot = moved_on(model, state, carrier, spins, later)
+    turned = turned_axes(model, spins, later)
+    other = new_work(model)
+    other.state.time[...] = about.t + later
+    other.states.base[:] = work.states.base
+    set_iterate(other, moved, moved_u_dot, about.w)
+    require_round(compiled, work, other, turned)
+    after = balance(compiled, other, about.w)
+    require_balance(after, about.residual, f"moved on by {later:.3g}, forces are out of balance")
+    set_iterate(other, moved, moved_u_dot, after.w)
+    others = tangents(model, other)
+    N_later = turned.T @ N
+    of_now = parts.full(*turning_matrices(model, work, about.omega))
+    of_then = others.full(*turning_matrices(model, other, about.omega))
+    size = np.abs(parts.G).max(initial=0.0) * max(compiled.length, 1.0)
+    gaps = others.G @ N_later
+    if np.abs(gaps).max(initial=0.0) > SAME * size:
+        raise ModelError(f"{NOT} moved on by {later:.3g}, its joints allow other motions")
+    for name, one, two in zip(("stiffness", "damping"), of_now, of_then, strict=False):
+        first, second = S.T @ (N.T @ one @ N), S.T @ (N_later.T @ two @ N_later)
+        change = np.abs(second - first)
+        if change.max(initial=0.0) > SAME * np.abs(first).max(initial=0.0):
+            motion = np.abs(N) @ change.max(axis=0)
+            raise ModelError(
+                f"{NOT} moved on by {later:.3g}, its {name} is another by "
+                f"{change.max() / np.abs(first).max():.2g}, most at body {body_of(compiled, motion)!r}: what spins "
+                "must look the same however far it is turned, and the road wherever it is"
+            )
+
+
+def carrier_of(compiled: CompiledSystem, state: State, omega: Array) -> Carrier:
+    """Return the common motion of the bodies of a state that turns with omega.
+
+    Raises
+    ------
+    ModelError
+        If a body has another velocity, or modes that move.
+    """
+    bodies = compiled.model.bodies
+    v = np.array([state.u[u0 : u0 + 3] for u0 in bodies.u0[:-1]])
+    rest = v - np.cross(omega, state.r - state.r[0])
+    size = max(float(np.abs(v).max()), float(np.linalg.norm(omega)) * compiled.length)
+    apart = np.abs(rest - np.median(rest, axis=0)).max(axis=1)
+    if apart.max() > ALONG * size:
+        i = int(np.argmax(apart))
+        raise ModelError(
+            f"{NOT} body {compiled.body_names[i]!r} moves by {apart[i]:.3g} against the others; take the state of "
+            "steady_motion or steady_rotation"
+        )
+    for i, u0 in enumerate(bodies.u0[:-1]):
+        rates = state.u[u0 + 6 : bodies.u0[i + 1]]
+        own = state.q[bodies.q0[i] : bodies.q0[i + 1]]
+        if np.abs(rates).max(initial=0.0) * compiled.length > ALONG * size * max(np.abs(own).max(initial=0.0), 1.0):
+            raise ModelError(
+                f"{NOT} modes of body {compiled.body_names[i]!r} move; take the state of steady_motion, or let them "
+                "settle first"
+            )
+    return Carrier(state.r[0], np.median(rest, axis=0), omega)
+
+
+def spins_in(compiled: CompiledSystem, state: State, omega: Array) -> list[Array]:
+    """Return the angular velocity of each body against the turning system, body axes, (3,).
+
+    Raises
+    ------
+    ModelError
+        If a flexible body has one.
+    """
+    spins = []
+    for i, u0 in enumerate(compiled.model.bodies.u0[:-1]):
+        own = state.u[u0 + 3 : u0 + 6] - rotation_matrix(state.p[i]).T @ omega
+        speed = float(np.linalg.norm(state.u[u0 : u0 + 3])) / compiled.length
+        if np.linalg.norm(own) <= ALONG * max(float(np.linalg.norm(omega)), speed):
+            own = np.zeros(3)
+        elif compiled.model.bodies.n_q[i]:
+            raise ModelError(
+                f"{NOT} body {compiled.body_names[i]!r} is flexible and spins by {np.linalg.norm(own):.3g} against the "
+                "turning system, its modes with it; make it rigid (is_rigid)"
+            )
+        spins.append(own)
+    return spins
+
+
+def balance(compiled: CompiledSystem, work: Work, w: Array) -> Balance:
+    """Return what forces are out of balance at the motion in `work` with the wrenches that leave least of them."""
+    model, w = compiled.model, w.copy()
+    own = rows_of_states(np.asarray(model.states.row), len(w))
+    free = ~is_held(model.rows.kind) & ~own
+    mass = linearized(model, work, 1.0, 0.0, 0.0).H
+    W, least = with_modal_weight(model, mass), LEAST * speed_changes(compiled, work, mass)
+    for _ in range(MOST_ITERATIONS):
+        work.state.w[:] = w
+        parts = linearized(model, work, 0.0, 0.0, 1.0)
+        f = work.bodies.residual.copy()
+        error = size_of(W, f) / max(forces_at_work(compiled, work, parts, W), least)
+        step = next_wrenches(parts, f, work.connections.g, free, ~own)
+        size = np.abs(w[~own]).max(initial=0.0)
+        w[~own] += step
+        if np.abs(step).max(initial=0.0) <= 1e-9 * size:
+            break
+    return Balance(error, worst_body(compiled, W, f), w)
+
+
+def speed_changes(compiled: CompiledSystem, work: Work, mass: Sequence[Array]) -> float:
+    """Return the size of the forces that would turn all velocities round while bodies move by their size."""
+    u, total, u0 = work.state.u, 0.0, compiled.model.bodies.u0
+    for block, (first, last) in zip(mass, pairwise(u0.tolist()), strict=True):
+        own = u[first:last].copy()
+        own[:3] = work.state.R[list(u0).index(first)].T @ own[:3]
+        total += float(own @ block @ own)
+    speed = max(float(np.abs(u[u0[i] : u0[i] + 3]).max()) for i in range(len(u0) - 1)) / compiled.length
+    turning = max(float(np.abs(u[u0[i] + 3 : u0[i] + 6]).max()) for i in range(len(u0) - 1))
+    return float(np.sqrt(total)) * max(speed, turning)
+
+
+def next_wrenches(parts: Linearized, f: Array, g: Array, free: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> Array:
+    """Return the smallest change of wrenches that brings forces and laws nearest to balance."""
+    if not unknown.any():
+        return np.zeros(0)
+    J, V = parts.J.toarray()[unknown], parts.V.toarray()[np.ix_(free, unknown)]
+    size = max(float(np.abs(J).max(initial=0.0)), 1e-300)
+    A, b = np.vstack([-J.T / size, V]), -np.concatenate([f / size, g[free]])
+    return np.asarray(la.lstsq(A, b, cond=1e-12)[0])
+
+
+def require_balance(found: Balance, residual: float, words: str) -> None:
+    """Raise `ModelError` if forces are out of balance, by more than those of an equilibrium that was given."""
+    if not found.error <= max(BALANCED, 10 * residual):
+        raise ModelError(
+            f"{NOT} {words} by {found.error:.2g} of those at work, most at body {found.body!r}; take the state of "
+            "steady_motion or steady_rotation"
+        )
+
+
+def require_round(compiled: CompiledSystem, work: Work, later: Work, turned: Array) -> None:
+    """Raise `ModelError` naming a body whose mass another turn shows."""
+    masses = (linearized(compiled.model, each, 1.0, 0.0, 0.0).H for each in (work, later))
+    for i, (one, two) in enumerate(zip(*masses, strict=True)):
+        u = slice(int(compiled.model.bodies.u0[i]), int(compiled.model.bodies.u0[i + 1]))
+        change = np.abs(turned[u, u] @ two @ turned[u, u].T - one)[:6, :6]
+        m, J = one[0, 0], np.abs(one[3:6, 3:6]).max()
+        allowed = SAME * np.kron([[m, np.sqrt(m * J)], [np.sqrt(m * J), J]], np.ones((3, 3)))
+        if (change > allowed).any():
+            raise ModelError(
+                f"{NOT} body {compiled.body_names[i]!r} spins about an axis about which its mass is not round: its "
+                "centre belongs on the axis, and its moments of inertia across it should be alike"
+            )
+
+
+def body_of(compiled: CompiledSystem, motion: Array) -> str:
+    """Return the body that moves most in a motion, (n_u,)."""
+    u0 = compiled.model.bodies.u0
+    return compiled.body_names[int(np.argmax([np.abs(motion[a:b]).max() for a, b in pairwise(u0)]))]
