@@ -110,8 +110,7 @@ def aircraft(folder):
 
 
 def test_an_aircraft_stands_on_its_three_gears_by_the_rule_of_levers(aircraft):
-    none = {f"forces.lift_{side}.force": [0, 0, 0] for side in ("left", "right")}
-    system, _ = ff.read_system(aircraft, none)
+    system, _ = ff.read_system(aircraft)
     rest = ff.static_equilibrium(system)
     motion = ff.integrate(system, METHOD, 1e-3, 1e-3, state=rest.state)
     weight, moment = 0.0, 0.0
@@ -133,7 +132,7 @@ def of_wing(gram):
     return gram[0, 0], gram[0, 1:4] / gram[0, 0]
 
 
-def test_an_aircraft_lands_on_its_main_gears_and_its_wings_go_on(aircraft):
+def test_an_aircraft_lands_on_its_main_gears_with_the_lift_of_its_attitude(aircraft):
     system, _ = ff.read_system(aircraft)
     motion = ff.integrate(system, METHOD, 0.3, 1e-3)
     loads = {
@@ -143,4 +142,9 @@ def test_an_aircraft_lands_on_its_main_gears_and_its_wings_go_on(aircraft):
     assert first["left"] == first["right"] < 0.01 < first["nose"]
     assert_allclose(loads["left"], loads["right"], rtol=0, atol=1e-6 * loads["left"].max())
     tip = measurement_of(system, motion, "tip").columns["z"]
-    assert tip.min() < -0.02  # the wing goes on down when the wheels have stopped the fuselage
+    assert tip.max() > 0.1  # the lift bends it up
+    left, right = (ff.element_motion(system, motion, f"lift_{side}_outer").outputs for side in ("left", "right"))
+    assert_allclose(left["lift"], right["lift"], rtol=1e-6)
+    sinks = np.arctan2(2.0, 40.0) + np.radians(4)  # of the path and of the nose
+    assert_allclose(left["alpha"][0], sinks, rtol=1e-6)
+    assert_allclose(left["lift"][0], 0.5 * 1.225 * 1604 * 3.7 * 4.8 * (sinks + 0.14), rtol=1e-6)
