@@ -136,6 +136,8 @@ from .optimization.design_file import read_design as read_design
 from .optimization.optimize import optimize as optimize
 from .pictures.mode_film import animate_mode as animate_mode
 from .pictures.mode_film import draw_mode as draw_mode
+from .relative.recursive import RelativeModel as RelativeModel
+from .relative.recursive import relative_model as relative_model
 from .results.coordinate_elements import coupler_motion as coupler_motion
 from .results.coordinate_elements import user_force_motion as user_force_motion
 from .results.element_motion import ElementMotion as ElementMotion

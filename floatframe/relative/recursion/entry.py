@@ -1,0 +1,91 @@
+"""The compiled entry of the recursive equations, and a plain function for each thing it does."""
+
+from typing import NamedTuple
+
+from fe_models.foundation.arrays import IntArray
+from floatframe.kernels.compiler.choice import is_lean
+from floatframe.kernels.compiler.compilation import entry
+from floatframe.kernels.compiler.sources import source_digest
+from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
+from floatframe.kernels.model import Model
+from floatframe.kernels.records import filled, integer, zeros
+from floatframe.kernels.work import Work
+from floatframe.relative.recursion.articulated import articulate, solve_articulated, solve_columns
+from floatframe.relative.recursion.columns import motion_in_ground, rate_columns
+from floatframe.relative.recursion.composite import evaluate_flexible, mass_matrix
+from floatframe.relative.recursion.newton_euler import newton_euler
+from floatframe.relative.recursion.nodes import Nodes, NodeWork
+from floatframe.relative.recursion.poses import place_in_ground, place_in_parent, set_modes
+
+__all__ = ["FORWARD", "INVERSE", "MASS", "PLACE", "SOLVE", "Task", "run_task"]
+
+PLACE, INVERSE, MASS, FORWARD, SOLVE = range(5)  #: values of `Task.what`
+
+
+class Task(NamedTuple):
+    """What the entry is asked for."""
+
+    what: IntArray = integer()
+    times: IntArray = integer()  #: how often, for measurements
+
+
+as_nodes, as_node_work, as_model = converter(Nodes()), converter(NodeWork()), converter(Model())
+as_work, as_task = converter(Work()), converter(Task())
+
+
+def make_entry(digest):
+    """Return the cached entry; the digest of the sources enters its key."""
+
+    def run(nodes_table, work_table, model_table, marker_table, task_table):
+        if digest == 0:
+            return -1
+        nodes, work = as_nodes(nodes_table), as_node_work(work_table)
+        model, marker_work, task = as_model(model_table), as_work(marker_table), as_task(task_table)
+        for _ in range(task.times):
+            what = task.what
+            if what == FORWARD:
+                for j in range(work.a.shape[0]):
+                    work.a[j] = 0.0
+            set_modes(nodes, work, marker_work.state)
+            place_in_parent(nodes, work, model, marker_work)
+            if what == INVERSE:
+                newton_euler(nodes, work, model, marker_work)
+            else:
+                if what == FORWARD:
+                    newton_euler(nodes, work, model, marker_work)
+                    for j in range(work.a.shape[0]):
+                        work.right[j] = work.force_given[j] - work.force[j]
+                elif what == MASS or what == SOLVE:
+                    evaluate_flexible(nodes, model, marker_work)
+                place_in_ground(nodes, work)
+                rate_columns(nodes, work, model, marker_work)
+                if what == PLACE:
+                    motion_in_ground(nodes, work)
+                elif what == MASS:
+                    mass_matrix(nodes, work, model, marker_work)
+                else:
+                    singular = articulate(nodes, work, model, marker_work)
+                    if singular >= 0:
+                        return singular
+                    if what == FORWARD:
+                        solve_articulated(nodes, work)
+                    else:
+                        solve_columns(nodes, work)
+        return -1
+
+    try:
+        return entry(run)
+    except RuntimeError:  # nowhere to keep the cache: compiled anew in each process
+        return entry(run, cache=False)
+
+
+run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
+NOTHING = zeros(Task(), {})
+
+
+def run_task(nodes: Nodes, work: NodeWork, model: Model, marker_work: Work, what: int, times: int = 1) -> int:
+    """Do what is asked for with the numbers in `work`; return -1, or the node whose matrix is singular."""
+    task = filled(Task(), **(NOTHING._asdict() | {"what": what, "times": times}))
+    return int(
+        run(kept_table_of(nodes), kept_table_of(work), kept_table_of(model), kept_table_of(marker_work), table_of(task))
+    )
