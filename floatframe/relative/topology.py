@@ -18,7 +18,7 @@ from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.kernels.model import Model
 from floatframe.kernels.records import filled
 from floatframe.relative.charts import FREE, Column, chart_of
-from floatframe.relative.kernels.tree import Tree
+from floatframe.relative.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE, Tree
 from floatframe.system import System
 
 __all__ = ["CoordinateName", "SystemTree", "tree_of"]
@@ -200,6 +200,27 @@ def depth_first(branches: list[Branch]) -> tuple[list[int], list[int]]:
     return order, [last[body] for body in order]
 
 
+def jets_of(
+    model: Model,
+    ordered: list[Branch],
+    near: list[int],
+    far: list[int],
+    unknown: list[int],
+    column0: list[int],
+    m0: list[int],
+) -> tuple[list[int], list[tuple[int, int, int]]]:
+    """Return where the jets of each body begin, and kind, item and unknown of each, see `Tree`."""
+    jet0, jets = [0], []
+    for i, each in enumerate(ordered):
+        jets += [(COLUMN, k, unknown[k]) for k in range(column0[i], column0[i + 1]) if unknown[k] >= 0]
+        if each.parent >= 0 and near[i] >= 0 and model.markers.psi0[near[i]] >= 0:
+            jets += [(NEAR_MODE, k, m0[each.parent] + k) for k in range(int(model.bodies.n_q[each.parent]))]
+        if far[i] >= 0 and model.markers.psi0[far[i]] >= 0:
+            jets += [(FAR_MODE, k, m0[i] + k) for k in range(int(model.bodies.n_q[i]))]
+        jet0.append(len(jets))
+    return jet0, jets
+
+
 def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
     """Return the tree as the kernels see it."""
     model = compiled.model
@@ -234,9 +255,11 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         column0.append(column0[-1] + len(each.columns))
         m0.append(s0[-1] + n_free)
         s0.append(m0[-1] + int(model.bodies.n_q[each.body]))
+    jet0, jets = jets_of(model, ordered, near, far, lists["unknown"], column0, m0)
     taken = {each.joint for each in branches}
     kept = [c for c in range(len(model.connections.size)) if c not in taken]
     is_kept: IntArray = np.isin(np.arange(len(model.connections.size)), kept).astype(np.int64)
+    row_is_kept = np.repeat(is_kept, model.connections.size) > 0
     tau: Array = np.array(lists.pop("tau")).reshape(-1, 3)
     alpha: Array = np.array(lists.pop("alpha")).reshape(-1, 3)
     return filled(
@@ -256,4 +279,9 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         **lists,
         kept=kept,
         is_kept=is_kept,
+        kept_row=np.where(row_is_kept, np.cumsum(row_is_kept) - 1, -1),
+        jet0=jet0,
+        jet_kind=[kind for kind, _, _ in jets],
+        jet_item=[item for _, item, _ in jets],
+        jet_s=[s for _, _, s in jets],
     )

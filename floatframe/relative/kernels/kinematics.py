@@ -31,7 +31,7 @@ from floatframe.kernels.vector import (
     vector,
 )
 
-__all__ = ["end_motion", "joint_motion", "marker_acceleration", "move_joints", "place_bodies"]
+__all__ = ["end_acceleration", "end_motion", "joint_motion", "marker_acceleration", "move_joints", "place_bodies"]
 
 
 @inner

@@ -17,12 +17,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array, IntArray
-from floatframe.kernels.model import Model, n_b, n_c
+from floatframe.kernels.model import Model, n_b, n_c, n_w
 from floatframe.kernels.records import Size, integer, real, zeros
 
-__all__ = ["JointWork", "Tree", "new_joint_work"]
+__all__ = ["COLUMN", "FAR_MODE", "NEAR_MODE", "JointWork", "TangentWork", "Tree", "new_joint_work", "new_tangent_work"]
 
-n_k, n_s, n_kept = Size("columns"), Size("n_s"), Size("kept")
+COLUMN, NEAR_MODE, FAR_MODE = range(3)  #: kinds of jets
+
+n_k, n_s, n_kept, n_j = Size("columns"), Size("n_s"), Size("kept"), Size("jets")
 
 
 class Tree(NamedTuple):
@@ -48,6 +50,13 @@ class Tree(NamedTuple):
     is_loaded: IntArray = integer(n_k)  #: whether forces act along it
     kept: IntArray = integer(n_kept)  #: connections that are no joints of the tree
     is_kept: IntArray = integer(n_c)  #: whether a connection is among them
+    kept_row: IntArray = integer(n_w)  #: number of a row among those of connections that are kept, -1 for others
+    #: first of what moves a body with its subtree against its parent: columns that are unknown, modes of the parent at
+    #: the near marker, modes of the body at the far marker
+    jet0: IntArray = integer(n_b + 1)
+    jet_kind: IntArray = integer(n_j)  #: COLUMN, NEAR_MODE or FAR_MODE
+    jet_item: IntArray = integer(n_j)  #: number of the column, or of the mode in its body
+    jet_s: IntArray = integer(n_j)  #: number among the unknowns
 
 
 class JointWork(NamedTuple):
@@ -68,6 +77,26 @@ class JointWork(NamedTuple):
     own: Array = real(Size("n_u"), unit="N, N m")  #: residual of the bodies without the joints of the tree
 
 
+class TangentWork(NamedTuple):
+    """The Newton matrix in relative coordinates, see kernels/tangent.py; spatial vectors about the point `origin`."""
+
+    origin: Array = real(3, unit="m")
+    screw: Array = real(n_j, 6)  #: by which a jet moves bodies with unit rate
+    jet: Array = real(n_j, 18)  #: variations xi, xi_dot, xi_ddot, weighted
+    reach: Array = real(n_j, 12)  #: xi, xi_dot by an increment of the step
+    D: Array = real(n_b, 6, 18)  #: derivative of the force of a body, with its subtree, by jets
+    F: Array = real(n_b, 6, unit="N, N m")  #: force of a body with its subtree
+    modal: Array = real(Size("n_q"), 18)  #: derivative of the modal residual by jets
+    rigid: Array = real(Size("n_most") + 6, 9)  #: residual of one body by accelerations and angular velocity
+    y: Array = real(12)
+    by_jet: Array = real(Size("n_most") + 6)
+    f: Array = real(6)
+    motion: Array = real(12)
+    K: Array = real(Size("n_newton"), Size("n_newton"))  #: [unknowns, wrenches that are kept], row by row
+    pivot: IntArray = integer(Size("n_newton"))
+    step: Array = real(Size("n_newton"))  #: right side, then the correction
+
+
 def new_joint_work(model: Model, tree: Tree) -> JointWork:
     """Return working arrays for the joints of a tree."""
     sizes = {
@@ -80,3 +109,16 @@ def new_joint_work(model: Model, tree: Tree) -> JointWork:
     work.Q[:] = np.eye(3)
     work.Q_start[:] = np.eye(3)
     return work
+
+
+def new_tangent_work(model: Model, tree: Tree) -> TangentWork:
+    """Return working arrays for the Newton matrix of a tree."""
+    n_s = int(tree.s0[-1])
+    sizes = {
+        "n_b": len(tree.parent),
+        "jets": len(tree.jet_s),
+        "n_q": int(model.bodies.q0[-1]),
+        "n_most": int(max(model.bodies.n_q, default=0)),
+        "n_newton": n_s + int((tree.kept_row >= 0).sum()),
+    }
+    return zeros(TangentWork(), sizes)

@@ -1,0 +1,223 @@
+"""Variations of the motion of bodies by the unknowns, with their rates (docs/relative.md §5).
+
+A variation xi = (delta of the point at O, rotation), a spatial vector about a point O at rest, is that of a body and of
+all that hangs at it: xi of a body = xi of its parent + those of the columns of its joint, of the modes of the parent at
+the near marker, less those of its own modes at the far marker. With V the spatial velocity of the frame in which a
+screw S is fixed, V' its rate, a variation S theta has
+
+    xi = S theta      xi_dot = S theta_dot + V × S theta
+    xi_ddot = S theta_ddot + 2 V × S theta_dot + (V' × S + V × (V × S)) theta
+
+where V × S = (omega × S_v + v × S_w, omega × S_w). In a step theta, theta_dot, theta_ddot are c_k, c_d, c_m times the
+correction of the unknown. For the group of rotations, of which the unknown is the vector x with Q = Q_start exp(x),
+theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) = theta_dot + z_dot × theta.
+"""
+
+from floatframe.kernels.compiler.compilation import inner, small
+from floatframe.kernels.marker import shape
+from floatframe.kernels.rotation import left_jacobian_derivative, right_jacobian
+from floatframe.kernels.vector import (
+    add,
+    cross,
+    norm,
+    put,
+    scaled,
+    sub,
+    turned,
+    vector,
+)
+from floatframe.relative.kernels.kinematics import end_acceleration, end_motion
+from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
+
+__all__ = ["mode_screw", "mode_screws", "put_jets", "spatial_cross", "world_screw", "write_jets"]
+
+SMALL_TURN = 1e-4  #: rad, of the difference that stands for the second derivative of the left Jacobian
+
+
+@small
+def spatial_cross(V, S):
+    """Return V × S of spatial motions ((3,), (3,))."""
+    return add(cross(V[1], S[0]), cross(V[0], S[1])), cross(V[1], S[1])
+
+
+@small
+def pair_sum(S, U):
+    """Return S + U."""
+    return add(S[0], U[0]), add(S[1], U[1])
+
+
+@small
+def scaled_pair(f, S):
+    """Return f S."""
+    return scaled(f, S[0]), scaled(f, S[1])
+
+
+@small
+def put_pair_of(out, first, S):
+    """Write a spatial vector into an array."""
+    put(out, first, S[0])
+    put(out, first + 3, S[1])
+
+
+@inner
+def put_jets(out, S_0, S_1, S_2, V, V_dot):
+    """Write xi, xi_dot, xi_ddot, (18,), of a variation with S theta = S_0, S theta_dot = S_1, S theta_ddot = S_2."""
+    turned_once = spatial_cross(V, S_0)
+    put_pair_of(out, 0, S_0)
+    put_pair_of(out, 6, pair_sum(S_1, turned_once))
+    own = pair_sum(scaled_pair(2.0, spatial_cross(V, S_1)), spatial_cross(V_dot, S_0))
+    put_pair_of(out, 12, pair_sum(S_2, pair_sum(own, spatial_cross(V, turned_once))))
+
+
+@inner
+def put_reach(out, S_0, S_1, V):
+    """Write xi and xi_dot, (12,)."""
+    put_pair_of(out, 0, S_0)
+    put_pair_of(out, 6, pair_sum(S_1, spatial_cross(V, S_0)))
+
+
+@inner
+def spatial_motion(r, v, omega, a, alpha, origin):
+    """Return spatial velocity and its rate about the origin of a frame that moves as given."""
+    p = sub(r, origin)
+    V = (sub(v, cross(omega, p)), omega)
+    return V, (sub(sub(a, cross(alpha, p)), cross(omega, v)), alpha)
+
+
+@small
+def world_screw(R, p, S):
+    """Return a spatial vector of a frame with axes R at p from the origin, given about its own point and axes."""
+    ang = turned(R, S[1])
+    return add(turned(R, S[0]), cross(p, ang)), ang
+
+
+@inner
+def mode_screw(model, work, m, i, k):
+    """Return by which screw mode k moves marker m in body i, about the frame origin, body axes."""
+    d, th = shape(work.markers.psi[model.markers.psi0[m] :], model.bodies.n_q[i], k)
+    b = turned(work.markers.T_left[m], th)
+    return add(d, cross(vector(work.markers.rho[m]), b)), b
+
+
+@inner
+def mode_screws(model, work, m, i, k):
+    """Return the screw of `mode_screw`, its rate and its second rate as the body sees them.
+
+    (Psi_t + rho × b, b), b = T' Psi_r; the second derivative of T' along th_dot is a difference.
+    """
+    markers, n, o, first = work.markers, model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
+    u0, T, angle, zero = model.bodies.u0[i] + 6, work.markers.T_left[m], vector(work.markers.angle[m]), (0.0, 0.0, 0.0)
+    psi = markers.psi[o : o + 6 * n]
+    d, th = shape(psi, n, k)
+    d_1, th_1, d_2, th_2 = zero, zero, zero, zero  # rates of Psi(q)
+    rho_2, angle_2 = zero, zero  # accelerations of rho and of the angle
+    for j in range(n):
+        q_dot, q_ddot = work.state.u[u0 + j], work.state.u_dot[u0 + j]
+        d_j, th_j = shape(psi, n, j)
+        rho_2, angle_2 = add(rho_2, scaled(q_ddot, d_j)), add(angle_2, scaled(q_ddot, th_j))
+        if first >= 0:
+            bend = model.markers.bend[first + 6 * n * j : first + 6 * n * (j + 1)]
+            d_j, th_j = shape(bend, n, k)
+            d_1, th_1 = sub(d_1, scaled(q_dot, d_j)), sub(th_1, scaled(q_dot, th_j))
+            d_2, th_2 = sub(d_2, scaled(q_ddot, d_j)), sub(th_2, scaled(q_ddot, th_j))
+            for l in range(n):  # noqa: E741
+                d_j, th_j = shape(bend, n, l)
+                both = q_dot * work.state.u[u0 + l]
+                rho_2, angle_2 = sub(rho_2, scaled(both, d_j)), sub(angle_2, scaled(both, th_j))
+    rho, rho_1, angle_1 = vector(markers.rho[m]), vector(markers.rho_dot[m]), vector(markers.angle_dot[m])
+    slope = left_jacobian_derivative(angle, th, 1.0)
+    b, b_1 = turned(T, th), add(turned(slope, angle_1), turned(T, th_1))
+    b_2 = add(turned(slope, angle_2), turned(T, th_2))
+    b_2 = add(b_2, scaled(2.0, turned(left_jacobian_derivative(angle, th_1, 1.0), angle_1)))
+    speed = norm(angle_1)
+    if speed > 0.0:
+        s = SMALL_TURN / speed
+        ahead = turned(left_jacobian_derivative(add(angle, scaled(s, angle_1)), th, 1.0), angle_1)
+        behind = turned(left_jacobian_derivative(sub(angle, scaled(s, angle_1)), th, 1.0), angle_1)
+        b_2 = add(b_2, scaled(0.5 / s, sub(ahead, behind)))
+    s_1 = add(d_1, add(cross(rho_1, b), cross(rho, b_1)))
+    s_2 = add(d_2, add(cross(rho_2, b), add(scaled(2.0, cross(rho_1, b_1)), cross(rho, b_2))))
+    return (add(d, cross(rho, b)), b), (s_1, b_1), (s_2, b_2)
+
+
+@inner
+def write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate):
+    """Write screws, jets with the weights c_m, c_d, c_k, and reaches with 1 and `rate`, of all joints."""
+    put(tangent.origin, 0, vector(work.state.r[tree.order[0]]))
+    for i in range(tree.parent.shape[0]):
+        column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate)
+        for j in range(tree.jet0[i], tree.jet0[i + 1]):
+            if tree.jet_kind[j] == NEAR_MODE:
+                S = tangent.screw[j], tangent.jet[j], tangent.reach[j]
+                mode_jet(model, work, tree.near[i], tree.jet_item[j], 1.0, tangent.origin, S, c_m, c_d, c_k, rate)
+            elif tree.jet_kind[j] != COLUMN:
+                S = tangent.screw[j], tangent.jet[j], tangent.reach[j]
+                mode_jet(model, work, tree.far[i], tree.jet_item[j], -1.0, tangent.origin, S, c_m, c_d, c_k, rate)
+
+
+@inner
+def mode_jet(model, work, m, k, sign, origin, out, c_m, c_d, c_k, rate):
+    """Write screw, jet and reach of mode k at marker m into the arrays of `out`."""
+    i = model.markers.body[m]
+    r, R, v, omega = end_motion(model, work, -1, i)
+    a, alpha = end_acceleration(model, work, -1, i)
+    V, V_dot = spatial_motion(r, v, omega, a, alpha, vector(origin))
+    p = sub(r, vector(origin))
+    s, s_1, s_2 = mode_screws(model, work, m, i, k)
+    S = scaled_pair(sign, world_screw(R, p, s))
+    S_1 = scaled_pair(sign, world_screw(R, p, s_1))
+    S_2 = scaled_pair(sign, world_screw(R, p, s_2))
+    screw, jet, reach = out
+    put_pair_of(screw, 0, S)
+    by_rate = pair_sum(scaled_pair(c_d, S), scaled_pair(c_k, S_1))
+    by_second = pair_sum(scaled_pair(c_m, S), pair_sum(scaled_pair(2 * c_d, S_1), scaled_pair(c_k, S_2)))
+    put_jets(jet, scaled_pair(c_k, S), by_rate, by_second, V, V_dot)
+    put_reach(reach, S, pair_sum(scaled_pair(rate, S), S_1), V)
+
+
+@inner
+def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
+    """Write screws, jets and reaches of the columns of the joint of body i."""
+    if tree.column0[i] == tree.column0[i + 1]:
+        return
+    origin, zero = vector(tangent.origin), (0.0, 0.0, 0.0)
+    r_a, A_a, v_a, omega_a = end_motion(model, work, tree.near[i], tree.parent[i])
+    a_a, alpha_a = end_acceleration(model, work, tree.near[i], tree.parent[i])
+    r_b, A_b, v_b, omega_b = end_motion(model, work, tree.far[i], i)
+    a_b, alpha_b = end_acceleration(model, work, tree.far[i], i)
+    if tree.is_reversed[i] != 0:
+        r_a, A_a, v_a, omega_a, r_b, A_b, v_b, omega_b = r_b, A_b, v_b, omega_b, r_a, A_a, v_a, omega_a
+        a_a, alpha_a, a_b, alpha_b = a_b, alpha_b, a_a, alpha_a
+    V_a, V_a_dot = spatial_motion(r_a, v_a, omega_a, a_a, alpha_a, origin)
+    V_b, V_b_dot = spatial_motion(r_b, v_b, omega_b, a_b, alpha_b, origin)
+    x, spin, spin_dot = zero, zero, zero  # of the rotations fixed in B, axes of B
+    for k in range(tree.column0[i], tree.column0[i + 1]):
+        if tree.side[k] != 0:
+            alpha = vector(tree.alpha[k])
+            x = add(x, scaled(joints.x[k], alpha))
+            spin = add(spin, scaled(joints.rate[k], alpha))
+            spin_dot = add(spin_dot, scaled(joints.acceleration[k], alpha))
+    T = right_jacobian(x)
+    sense = -1.0 if tree.is_reversed[i] != 0 else 1.0
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] != COLUMN:
+            continue
+        k = tree.jet_item[j]
+        alpha = scaled(sense, vector(tree.alpha[k]))
+        screw, jet, reach = tangent.screw[j], tangent.jet[j], tangent.reach[j]
+        if tree.side[k] == 0:
+            S = world_screw(A_a, sub(r_a, origin), (scaled(sense, vector(tree.tau[k])), alpha))
+            put_pair_of(screw, 0, S)
+            put_jets(jet, scaled_pair(c_k, S), scaled_pair(c_d, S), scaled_pair(c_m, S), V_a, V_a_dot)
+            put_reach(reach, S, scaled_pair(rate, S), V_a)
+        else:
+            p = sub(r_b, origin)
+            theta = turned(T, alpha)
+            put_pair_of(screw, 0, world_screw(A_b, p, (zero, alpha)))
+            th_1 = sub(scaled(c_d, alpha), scaled(c_k, cross(spin, theta)))
+            th_2 = sub(sub(scaled(c_m, alpha), scaled(c_k, cross(spin_dot, theta))), cross(spin, th_1))
+            S_0 = world_screw(A_b, p, (zero, scaled(c_k, theta)))
+            S_1, S_2 = world_screw(A_b, p, (zero, th_1)), world_screw(A_b, p, (zero, th_2))
+            put_jets(jet, S_0, S_1, S_2, V_b, V_b_dot)
+            th_1 = sub(scaled(rate, alpha), cross(spin, theta))
+            put_reach(reach, world_screw(A_b, p, (zero, theta)), world_screw(A_b, p, (zero, th_1)), V_b)

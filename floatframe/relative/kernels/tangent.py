@@ -1,0 +1,402 @@
+"""The Newton matrix in relative coordinates, exact (docs/relative.md §5).
+
+With the force F_i of body i (its residual as a spatial vector about O), F the sum over a subtree, J the screw of an
+unknown, residuals are ρ = J · F for columns, and those of modes with the same sums at their markers. Then
+
+    d rho = J · dF + (xi × J) · F        dF = D jet,   D the sum of the bodies of the subtree, (6, 18)
+
+since all bodies of a subtree move alike by what moves its first. Derivatives of the projection, of the kinematics and
+of the forces that stay in axes of bodies or ground are all there.
+"""
+
+from floatframe.kernels.body import axial, block, column, column_sum, put_block, tensor, trace_less
+from floatframe.kernels.compiler.compilation import inner, loops, small
+from floatframe.kernels.connections.connection import connection_derivatives
+from floatframe.kernels.dense import lu_factor, lu_solve
+from floatframe.kernels.evaluation import tangent_of_body
+from floatframe.kernels.marker import shape
+from floatframe.kernels.model import C2, C3
+from floatframe.kernels.rotation import left_jacobian_derivative
+from floatframe.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_matrix,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    turned_back,
+    unit_matrix,
+    vector,
+)
+from floatframe.relative.kernels.jets import mode_screw, spatial_cross, world_screw, write_jets
+from floatframe.relative.kernels.projection import force_slopes
+from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
+
+__all__ = ["assemble", "rigid_columns", "solve_dense", "write_tangent"]
+
+
+@loops
+def rigid_columns(model, work, i, A):
+    """Write the derivative of the residual of body i by a, alpha, omega, body axes, into A, (6 + n, 9).
+
+    As `kernels.body.body_tangent`, column by column.
+    """
+    bodies, t, n, u0 = work.bodies, model.bodies.kind[i], model.bodies.n_q[i], model.bodies.u0[i]
+    q0, s, J = model.bodies.q0[i], vector(bodies.s[i]), bodies.J[i]
+    first = bodies.C1[3 * q0 : 3 * (q0 + n)]
+    omega, q_dot = vector(work.state.u[u0 + 3 :]), work.state.u[u0 + 6 : u0 + 6 + n]
+    v = column_sum(first, n, q_dot)
+    spin = matrix_sum(tilde(add(scaled(2.0, v), cross(omega, s))), product(tilde(omega), tilde(s)))
+    gyro = matrix_sum(product(tilde(omega), J), tilde(scaled(-1.0, turned(J, omega))))
+    put_block(A, 0, 0, scaled_matrix(model.body_types.mass[t], unit_matrix()))
+    put_block(A, 0, 3, tilde(scaled(-1.0, s)))
+    put_block(A, 0, 6, scaled_matrix(-1.0, spin))
+    put_block(A, 3, 0, tilde(s))
+    put_block(A, 3, 3, matrix(J))
+    put_block(A, 3, 6, matrix_sum(scaled_matrix(2.0, matrix(bodies.D_q_dot[i])), gyro))
+    if n > 0:
+        W, Y = bodies.W[9 * q0 : 9 * (q0 + n)], bodies.Y[3 * q0 : 3 * (q0 + n)]
+        second, third = block(model.body_types, t, C2, 3 * n), block(model.body_types, t, C3, 9 * n)
+        for k in range(n):
+            W_k = tensor(W, n, k)
+            D_k, B_k = matrix_sum(tensor(third, n, k), trace_less(W_k)), add(column(second, n, k), axial(W_k))
+            J_omega = turned(matrix_sum(D_k, transposed(D_k)), omega)
+            put(A[6 + k], 0, column(first, n, k))
+            put(A[6 + k], 3, B_k)
+            put(A[6 + k], 6, sub(scaled(2.0, column(Y, n, k)), J_omega))
+
+
+@inner
+def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
+    """Write jets, derivatives of the bodies, and P, V of the connections that are kept.
+
+    `evaluate_bodies` has been called for the iterate; wrenches of joints of the tree are taken away.
+    """
+    rate = c_d / c_k if c_k > 0.0 else 0.0
+    write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate)
+    for i in range(tree.parent.shape[0]):
+        for m in (tree.near[i], tree.far[i]):
+            if m >= 0:
+                for k in range(6):
+                    work.markers.wrench[m, k] = 0.0
+    for i in range(tree.parent.shape[0]):
+        of_body(model, work, joints, tangent, i, c_m, c_d, c_k)
+    for e in range(tree.kept.shape[0]):
+        connection_derivatives(model, work, tree.kept[e], c_k)
+
+
+@inner
+def of_body(model, work, joints, tangent, i, c_m, c_d, c_k):
+    """Write D, F and the derivatives of the modal residual of body i alone, and H with the columns of its modes."""
+    n, u0, q0 = model.bodies.n_q[i], model.bodies.u0[i], model.bodies.q0[i]
+    turning = work.bodies.T_right[i]
+    put_matrix(turning, unit_matrix())
+    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning)
+    A, turn = tangent.rigid, work.bodies.by_turn
+    rigid_columns(model, work, i, A)
+    R, residual = matrix(work.state.R[i]), joints.own[u0 : u0 + 6 + n]
+    p = sub(vector(work.state.r[i]), vector(tangent.origin))
+    v, omega = vector(work.state.u[u0:]), turned(R, work.state.u[u0 + 3 :])
+    a = vector(work.state.u_dot[u0:])
+    f, tau = turned(R, residual), turned(R, residual[3:])
+    put(tangent.F[i], 0, f)
+    put(tangent.F[i], 3, add(tau, cross(p, f)))
+    y, out, D = tangent.y, tangent.by_jet, tangent.D[i]
+    for e in range(18):
+        xi, xi_w = unit_of(e, 0), unit_of(e, 3)
+        _, one_w, two, two_w = unit_of(e, 6), unit_of(e, 9), unit_of(e, 12), unit_of(e, 15)
+        change = add(add(two, cross(two_w, p)), add(scaled(2.0, cross(one_w, v)), cross(xi_w, a)))
+        put(y, 0, turned_back(R, change))
+        put(y, 3, turned_back(R, sub(two_w, cross(omega, one_w))))
+        put(y, 6, turned_back(R, one_w))
+        put(y, 9, turned_back(R, xi_w))
+        for r in range(6 + n):
+            total = turn[r, 0] * y[9] + turn[r, 1] * y[10] + turn[r, 2] * y[11]
+            for k in range(9):
+                total += A[r, k] * y[k]
+            out[r] = total
+        moved = add(xi, cross(xi_w, p))
+        df = add(cross(xi_w, f), turned(R, out))
+        dm = add(add(cross(xi_w, tau), turned(R, out[3:])), add(cross(moved, f), cross(p, df)))
+        D[0, e], D[1, e], D[2, e] = df[0], df[1], df[2]
+        D[3, e], D[4, e], D[5, e] = dm[0], dm[1], dm[2]
+        for k in range(n):
+            tangent.modal[q0 + k, e] = out[6 + k]
+
+
+@small
+def unit_of(e, first):
+    """Return the part from `first` on of the unit vector e of a jet."""
+    return 1.0 if e == first else 0.0, 1.0 if e == first + 1 else 0.0, 1.0 if e == first + 2 else 0.0
+
+
+@inner
+def product_of(A, x, out):
+    """Write A x into out."""
+    for r in range(A.shape[0]):
+        total = 0.0
+        for k in range(A.shape[1]):
+            total += A[r, k] * x[k]
+        out[r] = total
+
+
+@inner
+def inner_product(x, y):
+    """Return x · y of vectors of six numbers."""
+    return dot(x, y) + dot(x[3:], y[3:])
+
+
+@small
+def turned_power(xi, screw, F):
+    """Return (xi × J) · F of arrays of six."""
+    S = spatial_cross((vector(xi), vector(xi[3:])), (vector(screw), vector(screw[3:])))
+    return dot(S[0], F) + dot(S[1], F[3:])
+
+
+@inner
+def assemble(model, work, tree, tangent, c_d, c_k):
+    """Write the matrix K of the unknowns and of the wrenches that are kept; sums over subtrees overwrite D and F."""
+    K = tangent.K
+    for r in range(K.shape[0]):
+        for s in range(K.shape[0]):
+            K[r, s] = 0.0
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        i = tree.order[place]
+        of_modes(model, work, tree, tangent, i)
+        of_subtree(tree, tangent, i)
+        turning_columns(model, tree, tangent, i)
+        turning_modes(model, work, tree, tangent, i, c_k)
+        loaded_columns(model, work, tree, tangent, i, c_d, c_k)
+        parent = tree.parent[i]
+        if parent >= 0:
+            for r in range(6):
+                tangent.F[parent, r] += tangent.F[i, r]
+                for e in range(18):
+                    tangent.D[parent, r, e] += tangent.D[i, r, e]
+    n_s = tree.s0[tree.s0.shape[0] - 1]
+    for e in range(tree.kept.shape[0]):
+        c = tree.kept[e]
+        first = n_s + tree.kept_row[model.connections.w0[c]] if model.connections.size[c] > 0 else n_s
+        for r in range(model.connections.size[c]):
+            for k in range(model.connections.size[c]):
+                K[first + r, first + k] += work.connections.V[c, r, k]
+    for m in range(model.markers.body.shape[0]):
+        c = model.markers.connection[m]
+        if c >= 0 and model.markers.body[m] >= 0 and tree.is_kept[c] != 0 and model.connections.size[c] > 0:
+            kept_marker(model, work, tree, tangent, m, n_s + tree.kept_row[model.connections.w0[c]], c_d, c_k)
+
+
+@inner
+def of_modes(model, work, tree, tangent, i):
+    """Add rows and columns of the modes of body i, its frame and that of the bodies on it held or moved by jets."""
+    n, q0, m0, K = model.bodies.n_q[i], model.bodies.q0[i], tree.m0[i], tangent.K
+    if n == 0:
+        return
+    H = work.solver.H[model.bodies.h0[i] : model.bodies.h0[i + 1]].reshape((6 + n, 6 + n))
+    R, p, f = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin)), tangent.f
+    for k in range(n):
+        df = turned(R, (H[0, 6 + k], H[1, 6 + k], H[2, 6 + k]))
+        put(f, 0, df)
+        put(f, 3, add(turned(R, (H[3, 6 + k], H[4, 6 + k], H[5, 6 + k])), cross(p, df)))
+        b = i
+        while b >= 0:
+            for j in range(tree.jet0[b], tree.jet0[b + 1]):
+                K[tree.jet_s[j], m0 + k] += inner_product(tangent.screw[j], f)
+                total = 0.0
+                for e in range(18):
+                    total += tangent.modal[q0 + k, e] * tangent.jet[j, e]
+                K[m0 + k, tree.jet_s[j]] += total
+            b = tree.parent[b]
+        for l in range(n):  # noqa: E741
+            K[m0 + k, m0 + l] += H[6 + k, 6 + l]
+
+
+@inner
+def of_subtree(tree, tangent, i):
+    """Add J · D jet of all pairs of which one belongs to the joint of body i, the other to it or one before."""
+    K, f, D = tangent.K, tangent.f, tangent.D[i]
+    b = i
+    while b >= 0:
+        for j in range(tree.jet0[b], tree.jet0[b + 1]):
+            product_of(D, tangent.jet[j], f)
+            for k in range(tree.jet0[i], tree.jet0[i + 1]):
+                K[tree.jet_s[k], tree.jet_s[j]] += inner_product(tangent.screw[k], f)
+            if b == i:
+                a = tree.parent[i]
+                while a >= 0:
+                    for k in range(tree.jet0[a], tree.jet0[a + 1]):
+                        K[tree.jet_s[k], tree.jet_s[j]] += inner_product(tangent.screw[k], f)
+                    a = tree.parent[a]
+        b = tree.parent[b]
+
+
+@inner
+def turning_columns(model, tree, tangent, i):
+    """Add (xi × J) · F of the columns of the joint of body i, xi that of the frame in which J is fixed."""
+    K, F = tangent.K, tangent.F[i]
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] != COLUMN:
+            continue
+        s, screw = tree.jet_s[j], tangent.screw[j]
+        is_far = tree.side[tree.jet_item[j]] != tree.is_reversed[i]  # fixed in the marker on the body
+        b = i
+        while b >= 0:
+            for k in range(tree.jet0[b], tree.jet0[b + 1]):
+                of_marker = b != i or tree.jet_kind[k] == NEAR_MODE or (is_far and tree.jet_kind[k] == COLUMN)
+                if of_marker:
+                    K[s, tree.jet_s[k]] += turned_power(tangent.jet[k], screw, F)
+            b = tree.parent[b]
+
+
+@inner
+def turning_modes(model, work, tree, tangent, i, c_k):
+    """Add what the screws of modes at both ends of the joint of body i change by, times the force of the subtree."""
+    K, F = tangent.K, tangent.F[i]
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] == COLUMN:
+            continue
+        s, screw, k = tree.jet_s[j], tangent.screw[j], tree.jet_item[j]
+        is_near = tree.jet_kind[j] == NEAR_MODE
+        body = tree.parent[i] if is_near else i
+        b = body
+        while b >= 0:
+            for e in range(tree.jet0[b], tree.jet0[b + 1]):
+                K[s, tree.jet_s[e]] += turned_power(tangent.jet[e], screw, F)
+            b = tree.parent[b]
+        m, sign = (tree.near[i], 1.0) if is_near else (tree.far[i], -1.0)
+        second_order(model, work, tree, tangent, body, m, k, sign * c_k, F)
+
+
+@inner
+def second_order(model, work, tree, tangent, i, m, k, factor, F):
+    """Add the change of the screw of mode k at marker m of body i by all its modes, as the body sees it, times F."""
+    n, o, first, m0 = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m], tree.m0[i]
+    R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
+    force = turned_back(R, F)
+    moment = turned_back(R, sub(vector(F[3:]), cross(p, vector(F))))
+    psi, T, rho = work.markers.psi[o : o + 6 * n], work.markers.T_left[m], vector(work.markers.rho[m])
+    _, th_k = shape(psi, n, k)
+    b = turned(T, th_k)
+    slope = left_jacobian_derivative(vector(work.markers.angle[m]), th_k, 1.0)
+    for l in range(n):  # noqa: E741
+        d, th = shape(psi, n, l)
+        db, dd = turned(slope, th), (0.0, 0.0, 0.0)
+        if first >= 0:
+            d_kl, th_kl = shape(model.markers.bend[first + 6 * n * l :], n, k)
+            dd, db = scaled(-1.0, d_kl), sub(db, turned(T, th_kl))
+        moved = add(dd, add(cross(d, b), cross(rho, db)))
+        tangent.K[m0 + k, m0 + l] += factor * (dot(moved, force) + dot(db, moment))
+
+
+@inner
+def loaded_columns(model, work, tree, tangent, i, c_d, c_k):
+    """Subtract the derivatives of forces along the coordinates of the joint of body i."""
+    for k in range(tree.column0[i], tree.column0[i + 1]):
+        s = tree.unknown[k]
+        if s >= 0 and tree.row[k] >= 0:
+            _, Q_x, Q_v = force_slopes(model, work, tree, i, tree.row[k])
+            tangent.K[s, s] -= c_k * Q_x + c_d * Q_v
+
+
+@inner
+def kept_marker(model, work, tree, tangent, m, first, c_d, c_k):
+    """Add rows and columns of the connection of marker m, whose rows begin at `first`, by what moves the marker."""
+    i, c = model.markers.body[m], model.markers.connection[m]
+    rate = c_d / c_k if c_k > 0.0 else 0.0
+    p = sub(vector(work.markers.r[m]), vector(tangent.origin))
+    v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
+    b = i
+    while b >= 0:
+        for j in range(tree.jet0[b], tree.jet0[b + 1]):
+            reach, screw = tangent.reach[j], tangent.screw[j]
+            xi = vector(reach), vector(reach[3:])
+            xi_dot = vector(reach[6:]), vector(reach[9:])
+            unit = vector(screw), vector(screw[3:])
+            kept_pair(model, work, tangent, m, c, first, tree.jet_s[j], xi, xi_dot, unit, p, v, omega)
+        b = tree.parent[b]
+    if model.markers.psi0[m] < 0:
+        return
+    state, u0 = work.state, model.bodies.u0[i]
+    R, origin = state.R[i], sub(vector(state.r[i]), vector(tangent.origin))
+    spin = turned(R, state.u[u0 + 3 :])
+    V = sub(vector(state.u[u0:]), cross(spin, origin)), spin
+    for k in range(model.bodies.n_q[i]):
+        s, s_1 = mode_rate(model, work, m, i, k)
+        unit = world_screw(R, origin, s)
+        own = world_screw(R, origin, s_1)
+        turn = spatial_cross(V, unit)
+        xi_dot = (
+            add(add(scaled(rate, unit[0]), own[0]), turn[0]),
+            add(add(scaled(rate, unit[1]), own[1]), turn[1]),
+        )
+        kept_pair(model, work, tangent, m, c, first, tree.m0[i] + k, unit, xi_dot, unit, p, v, omega)
+
+
+@inner
+def mode_rate(model, work, m, i, k):
+    """Return the screw of mode k at marker m and its rate, as the body sees them."""
+    n, o, first, u0 = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m], model.bodies.u0[i] + 6
+    s = mode_screw(model, work, m, i, k)
+    _, th = shape(work.markers.psi[o : o + 6 * n], n, k)
+    d_1, th_1 = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if first >= 0:
+        for j in range(n):
+            d_j, th_j = shape(model.markers.bend[first + 6 * n * j :], n, k)
+            q_dot = work.state.u[u0 + j]
+            d_1, th_1 = sub(d_1, scaled(q_dot, d_j)), sub(th_1, scaled(q_dot, th_j))
+    slope = left_jacobian_derivative(vector(work.markers.angle[m]), th, 1.0)
+    b_1 = add(turned(slope, vector(work.markers.angle_dot[m])), turned(work.markers.T_left[m], th_1))
+    rho, rho_dot = vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
+    return s, (add(d_1, add(cross(rho_dot, s[1]), cross(rho, b_1))), b_1)
+
+
+@inner
+def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omega):
+    """Add row and column of unknown s, which moves marker m of connection c by xi, xi_dot; unit: its screw."""
+    K, motion, P = tangent.K, tangent.motion, work.connections.P[m]
+    put(motion, 0, add(xi[0], cross(xi[1], p)))
+    put(motion, 3, xi[1])
+    put(motion, 6, add(add(xi_dot[0], cross(xi_dot[1], p)), cross(xi[1], v)))
+    put(motion, 9, add(xi_dot[1], cross(xi[1], omega)))
+    for r in range(model.connections.size[c]):
+        total = 0.0
+        for k in range(12):
+            total += P[r, k] * motion[k]
+        K[first + r, s] += total
+    sign = model.markers.sign[m]
+    moved = add(unit[0], cross(unit[1], p))
+    if model.markers.force[m] >= 0:
+        o = first + model.markers.force[m]
+        K[s, o] -= sign * moved[0]
+        K[s, o + 1] -= sign * moved[1]
+        K[s, o + 2] -= sign * moved[2]
+    if model.markers.moment[m] >= 0:
+        o = first + model.markers.moment[m]
+        K[s, o] -= sign * unit[1][0]
+        K[s, o + 1] -= sign * unit[1][1]
+        K[s, o + 2] -= sign * unit[1][2]
+
+
+@inner
+def solve_dense(model, work, tree, joints, tangent, c_k, is_new):
+    """Write the correction of unknowns and kept wrenches, times c_k, into tangent.step; whether K could be solved."""
+    n_s, step = tree.s0[tree.s0.shape[0] - 1], tangent.step
+    if is_new and step.shape[0] > 0 and not lu_factor(tangent.K, tangent.pivot):
+        return False
+    for s in range(n_s):
+        step[s] = -c_k * joints.residual[s]
+    for k in range(tree.kept_row.shape[0]):
+        if tree.kept_row[k] >= 0:
+            step[n_s + tree.kept_row[k]] = -work.connections.g[k]
+    if step.shape[0] > 0:
+        lu_solve(tangent.K, tangent.pivot, step)
+    return True

@@ -1,0 +1,80 @@
+"""The Newton matrix in relative coordinates is the derivative of its residual, that of the projection included."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from floatframe.compiling.system import compiled_system
+from floatframe.relative.kernels.entry import moved, newton_matrix
+from floatframe.relative.kernels.tree import new_tangent_work
+from floatframe.start.initial import consistent_motion
+from tests.floatframe.kernels.test_tangent import C_D, C_K, C_M, system_with_everything
+from tests.floatframe.relative.pairs import RelativeIterate, pair
+from tests.floatframe.relative.test_kinematics import CASES
+
+
+class Point:
+    """A random iterate of a system, moved along its unknowns and kept wrenches."""
+
+    def __init__(self, system, is_closed, seed=1, t=0.37):
+        start = consistent_motion(system, t=t).state if is_closed else compiled_system(system).placed
+        self.iterate = it = RelativeIterate(system, start, t=t)
+        if not is_closed:  # joints of the tree are closed at least: none of them leaves a distance free
+            it.joints.d_start[:] = 0.0
+        rng = np.random.default_rng(seed)
+        for part in (it.work.state.q, it.work.state.u, it.work.state.u_dot):
+            part[:] = 0.3 * rng.normal(size=len(part))
+        self.x = 0.3 * rng.normal(size=len(it.tree.side))  # increments since the beginning of the step
+        it.joints.rate[:] = rng.normal(size=len(self.x))
+        it.joints.acceleration[:] = rng.normal(size=len(self.x))
+        self.w = rng.normal(size=len(it.work.state.w)) * (it.tree.kept_row >= 0)
+        state = it.work.state
+        self.start = [part.copy() for part in (it.joints.rate, it.joints.acceleration, state.q, state.u, state.u_dot)]
+
+    def residual(self, y):
+        """Rows of unknowns times c_k, then rows that are kept, moved by y = (unknowns, c_k wrenches)."""
+        it, n_s = self.iterate, int(self.iterate.tree.s0[-1])
+        rate, acceleration, q, u, u_dot = (part.copy() for part in self.start)
+        x, is_free = self.x.copy(), it.tree.unknown >= 0
+        step = y[it.tree.unknown[is_free]]
+        x[is_free] += step
+        rate[is_free] += C_D / C_K * step
+        acceleration[is_free] += C_M / C_K * step
+        for i, m0 in enumerate(it.tree.m0):
+            n, q0, u0 = int(it.model.bodies.n_q[i]), int(it.model.bodies.q0[i]), int(it.model.bodies.u0[i]) + 6
+            own = y[m0 : m0 + n]
+            q[q0 : q0 + n] += own
+            u[u0 : u0 + n] += C_D / C_K * own
+            u_dot[u0 : u0 + n] += C_M / C_K * own
+        state = it.work.state
+        state.q[:], state.u[:], state.u_dot[:] = q, u, u_dot
+        kept = it.tree.kept_row >= 0
+        state.w[kept] = self.w[kept] + y[n_s:][it.tree.kept_row[kept]] / C_K
+        it.joints.rate[:], it.joints.acceleration[:] = rate, acceleration
+        moved(it.model, it.work, it.tree, it.joints, x)
+        rows = it.project(C_K)
+        return np.concatenate([C_K * rows, it.work.connections.g[kept]])
+
+
+def matrices(system, is_closed=True):
+    """Exact and approximate Newton matrix."""
+    point = Point(system, is_closed)
+    it = point.iterate
+    tangent = new_tangent_work(it.model, it.tree)
+    n = len(tangent.step)
+    point.residual(np.zeros(n))
+    exact = newton_matrix(it.model, it.work, it.tree, it.joints, tangent, C_M, C_D, C_K)
+    s = 1e-5
+    approximate = np.array([(point.residual(s * e) - point.residual(-s * e)) / (2 * s) for e in np.eye(n)]).T
+    return exact, approximate
+
+
+@pytest.mark.parametrize(("make", "is_apart", "n_free", "swap"), CASES)
+def test_newton_matrix_is_the_derivative_of_the_residual(make, is_apart, n_free, swap):
+    exact, approximate = matrices(pair(make, is_apart=is_apart, swap=swap))
+    assert_allclose(exact, approximate, rtol=0, atol=1e-8 * np.abs(approximate).max())
+
+
+def test_newton_matrix_is_exact_with_loops_and_force_elements():
+    exact, approximate = matrices(system_with_everything(), is_closed=False)
+    assert_allclose(exact, approximate, rtol=0, atol=1e-8 * np.abs(approximate).max())
