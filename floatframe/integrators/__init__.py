@@ -6,6 +6,7 @@ from floatframe.integrators.carry import Integrator
 from floatframe.integrators.energy_momentum import EnergyDecaying, EnergyMomentum
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
 from floatframe.integrators.ida import Ida
+from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
 from floatframe.integrators.variational import Variational
 
 __all__ = [
@@ -15,8 +16,10 @@ __all__ = [
     "EnergyMomentum",
     "GeneralizedAlpha",
     "Ida",
+    "RelativeGeneralizedAlpha",
     "Variational",
     "hht",
+    "in_formulation",
     "newmark",
     "trapezoidal",
 ]
@@ -34,4 +37,7 @@ INTEGRATORS: dict[str, Callable[..., Integrator]] = {
 }
 
 #: their classes, by the name in a results file
-CLASSES = {cls.__name__: cls for cls in (GeneralizedAlpha, EnergyMomentum, EnergyDecaying, Variational, Ida)}
+CLASSES = {
+    cls.__name__: cls
+    for cls in (GeneralizedAlpha, RelativeGeneralizedAlpha, EnergyMomentum, EnergyDecaying, Variational, Ida)
+}

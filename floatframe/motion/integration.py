@@ -19,7 +19,7 @@ from floatframe.compiling.callbacks import raise_errors_of
 from floatframe.compiling.file_frames import rows_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError, ModelError, ResultsError
-from floatframe.integrators import CLASSES
+from floatframe.integrators import CLASSES, in_formulation
 from floatframe.integrators.carry import Carry, Integrator
 from floatframe.kernels.memory import Rows
 from floatframe.kernels.work import new_work
@@ -76,6 +76,7 @@ def integrate(
     output_every: int = 1,
     batch_steps: int = BATCH_STEPS,
     progress: Callable[[Progress], None] | None = None,
+    formulation: str = "absolute",
 ) -> Trajectory:
     """Compute a motion from t_start to t_end.
 
@@ -102,6 +103,8 @@ def integrate(
         Steps per call of the compiled loop; the motion does not depend on it, bit for bit.
     progress
         Called after every batch. What it raises ends the run; closed results stay.
+    formulation
+        "absolute", or "relative": in the coordinates of joints, see docs/relative.md; results are the same.
 
     Returns
     -------
@@ -119,6 +122,7 @@ def integrate(
     """
     t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
     h = number("integrate: h", h, above=0.0)
+    integrator = in_formulation(integrator, formulation)
     if t_end <= t_start:
         raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
     if output_every < 1 or batch_steps < 1:

@@ -15,6 +15,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.compiling.markers import joint_markers, marker_pose, n_q_of
 from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.kernels.model import Model
 from floatframe.kernels.records import filled
 from floatframe.relative.charts import FREE, Column, chart_of
@@ -49,6 +50,7 @@ class SystemTree:
 
     tree: Tree
     columns: tuple[CoordinateName, ...]
+    motions: tuple[TimeFunction | None, ...]  #: that prescribe the columns
     cut: tuple[str, ...]  #: joints that would have a chart, but close a loop
     constrained: tuple[str, ...]  #: joints without a chart, or with a law that keeps them constraints
 
@@ -93,6 +95,11 @@ def make_tree(system: System) -> SystemTree:
                 column.unit,
                 each.joint >= 0 and driving_row(compiled, each.joint, column)[0] >= 0,
             )
+            for each in sorted(branches, key=lambda branch: branch.body)
+            for column in each.columns
+        ),
+        tuple(
+            driving_motion(system, compiled, each, column)
             for each in sorted(branches, key=lambda branch: branch.body)
             for column in each.columns
         ),
@@ -172,6 +179,14 @@ def driving_row(compiled: CompiledSystem, joint: int, column: Column) -> tuple[i
     return -1, 1.0
 
 
+def driving_motion(system: System, compiled: CompiledSystem, each: Branch, column: Column) -> TimeFunction | None:
+    """Return the motion that prescribes a coordinate, None for none."""
+    row = -1 if each.joint < 0 else driving_row(compiled, each.joint, column)[0]
+    if row < 0:
+        return None
+    return system.joints[each.joint].motions[compiled.coordinates[row]]  # type: ignore[union-attr]
+
+
 def own_row(compiled: CompiledSystem, joint: int, column: Column) -> int:
     """Return the row of a joint along whose coordinate forces act, -1 if none do."""
     model = compiled.model
@@ -231,8 +246,11 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         name: [] for name in ("tau", "alpha", "side", "unknown", "motion", "factor", "row", "is_loaded")
     }
     column0, s0, m0 = [0], [0], []
+    unknowns: list[tuple[int, int, int]] = []  # column, mode, slot
     for each in ordered:
         n_free = 0
+        n_q, q0 = int(model.bodies.n_q[each.body]), int(model.bodies.q0[each.body])
+        u0 = int(model.bodies.u0[each.body])
         a, b = (
             (-1, -1) if each.joint < 0 else (int(model.connections.a[each.joint]), int(model.connections.b[each.joint]))
         )
@@ -247,6 +265,8 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
             lists["alpha"].append(column.alpha)
             lists["side"].append(column.side)
             lists["unknown"].append(-1 if driver >= 0 else s0[-1] + n_free)
+            if driver < 0:
+                unknowns.append((len(lists["unknown"]) - 1, -1, u0 + n_free))
             lists["motion"].append(-1 if driver < 0 else int(model.rows.motion[driver]))
             lists["factor"].append(factor)
             lists["row"].append(row)
@@ -254,7 +274,8 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
             n_free += int(driver < 0)
         column0.append(column0[-1] + len(each.columns))
         m0.append(s0[-1] + n_free)
-        s0.append(m0[-1] + int(model.bodies.n_q[each.body]))
+        s0.append(m0[-1] + n_q)
+        unknowns += [(-1, q0 + k, u0 + 6 + k) for k in range(n_q)]
     jet0, jets = jets_of(model, ordered, near, far, lists["unknown"], column0, m0)
     taken = {each.joint for each in branches}
     kept = [c for c in range(len(model.connections.size)) if c not in taken]
@@ -274,6 +295,9 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         column0=column0,
         s0=s0,
         m0=m0,
+        column=[column for column, _, _ in unknowns],
+        mode=[mode for _, mode, _ in unknowns],
+        slot=[slot for _, _, slot in unknowns],
         tau=tau,
         alpha=alpha,
         **lists,

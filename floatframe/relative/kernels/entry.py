@@ -1,53 +1,63 @@
 """The compiled entry of relative coordinates, and a plain function for each thing it does."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import types
 
-from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.arrays import Array
 from floatframe.kernels.compiler.choice import is_lean
 from floatframe.kernels.compiler.compilation import entry
 from floatframe.kernels.compiler.sources import source_digest
 from floatframe.kernels.compiler.structure import converter, table_of
+from floatframe.kernels.diagnostics import power
+from floatframe.kernels.entry import NO_ROWS, Order, Outcome, no_memory
+from floatframe.kernels.generalized_alpha import DONE
+from floatframe.kernels.memory import Memory, Rows, new_rows
 from floatframe.kernels.model import Model
-from floatframe.kernels.records import filled, integer, real, zeros
+from floatframe.kernels.records import filled, zeros
 from floatframe.kernels.work import Work
 from floatframe.relative.kernels.evaluation import evaluate_tree
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
 from floatframe.relative.kernels.projection import put_reactions
+from floatframe.relative.kernels.steps import advance_tree, write_tree_row
 from floatframe.relative.kernels.tangent import assemble, write_tangent
 from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree
 
-__all__ = ["motion_of_bodies", "motion_of_joints", "moved", "newton_matrix", "projected"]
+__all__ = [
+    "advance_tree_steps",
+    "motion_of_bodies",
+    "motion_of_joints",
+    "moved",
+    "newton_matrix",
+    "observe_tree",
+    "projected",
+]
 
-MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT = range(5)
-
-
-class RelativeOrder(NamedTuple):
-    """What the entry is asked for."""
-
-    what: IntArray = integer()
-    c_m: Array = real()  #: weights of the parts of mass, damping, stiffness
-    c_d: Array = real(unit="s")
-    c_k: Array = real(unit="s²")
+MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT, OBSERVE, ADVANCE = range(7)
 
 
 as_model, as_work, as_tree = converter(Model()), converter(Work()), converter(Tree())
-as_joints, as_order = converter(JointWork()), converter(RelativeOrder())
+as_joints, as_order = converter(JointWork()), converter(Order())
+as_memory, as_rows = converter(Memory()), converter(Rows())
 as_tangent = converter(TangentWork())
 
 
 def make_entry(digest):
     """Return the cached entry; the digest of the sources enters its key."""
 
-    def run(model_table, work_table, tree_table, joint_table, tangent_table, order_table):
+    def run(model_table, work_table, tree_table, joint_table, tangent_table, memory_table, rows_table, order_table):
         if digest == 0:
-            return 0
+            return DONE, 0, 0, -1, 0.0
         model, work, tree = as_model(model_table), as_work(work_table), as_tree(tree_table)
         joints, tangent, order = as_joints(joint_table), as_tangent(tangent_table), as_order(order_table)
+        memory, rows = as_memory(memory_table), as_rows(rows_table)
         what = order.what
-        if what == MOTION_OF_JOINTS:
+        if what == ADVANCE:
+            return advance_tree(model, work, memory, rows, tree, joints, tangent, order)
+        if what == OBSERVE:
+            work.counted.rows = 0
+            write_tree_row(model, work, memory, tree, joints, order.t0, rows)
+            memory.power_given, memory.power_taken = power(model, work)
+        elif what == MOTION_OF_JOINTS:
             joint_motion(model, work, tree, joints)
         elif what == MOTION_OF_BODIES:
             place_bodies(model, work, tree, joints)
@@ -62,7 +72,7 @@ def make_entry(digest):
             evaluate_tree(model, work, tree, joints, c_k if c_k > 0.0 else 1.0)
             write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
             assemble(model, work, tree, tangent, c_d, c_k)
-        return 0
+        return DONE, 0, 0, -1, 0.0
 
     try:
         return entry(run)
@@ -71,22 +81,29 @@ def make_entry(digest):
 
 
 run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
-SIGNATURE = (types.Array(types.int64, 1, "C"),) * 6
-NOTHING = zeros(RelativeOrder(), {})
+SIGNATURE = (types.Array(types.int64, 1, "C"),) * 8
+NOTHING = zeros(Order(), {})
 
 
-NO_TANGENT = zeros(TangentWork(), dict.fromkeys(("n_b", "jets", "n_q", "n_most", "n_newton"), 0))
+NO_TANGENT = zeros(TangentWork(), dict.fromkeys(("n_b", "n_s", "jets", "n_q", "n_most", "n_newton"), 0))
 
 
 def call(
-    model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork = NO_TANGENT, **order: float
-) -> int:
-    """Run the entry with an order, what it does not name being zero."""
+    model: Model,
+    work: Work,
+    tree: Tree,
+    joints: JointWork,
+    tangent: TangentWork = NO_TANGENT,
+    memory: Memory | None = None,
+    rows: Rows = NO_ROWS,
+    **order: float,
+) -> Outcome:
+    """Run the entry with an order, what it does not name being zero; all arrays live until it returns."""
     if not run.signatures:
         run.compile(SIGNATURE)
-    ordered = filled(RelativeOrder(), **(NOTHING._asdict() | order))
-    records = (model, work, tree, joints, tangent)
-    return run(*(table_of(record) for record in records), table_of(ordered))
+    ordered = filled(Order(), **(NOTHING._asdict() | order))
+    records = (model, work, tree, joints, tangent, no_memory() if memory is None else memory, rows, ordered)
+    return Outcome(*run(*(table_of(record) for record in records)))
 
 
 def motion_of_joints(model: Model, work: Work, tree: Tree, joints: JointWork) -> None:
@@ -117,3 +134,30 @@ def newton_matrix(
     """Return the Newton matrix, unknowns and kept wrenches (times c_k), (n_newton, n_newton), at the iterate."""
     call(model, work, tree, joints, tangent, what=TANGENT, c_m=c_m, c_d=c_d, c_k=c_k)
     return tangent.K.copy()
+
+
+def observe_tree(model: Model, work: Work, tree: Tree, joints: JointWork, memory: Memory, t: float) -> Rows:
+    """Return the results at the state in the memory; the power at it goes into the memory."""
+    rows = new_rows(model, 1)
+    call(model, work, tree, joints, NO_TANGENT, memory, rows, what=OBSERVE, t0=t)
+    return rows
+
+
+def advance_tree_steps(
+    model: Model,
+    work: Work,
+    tree: Tree,
+    joints: JointWork,
+    tangent: TangentWork,
+    memory: Memory,
+    rows: Rows,
+    *,
+    coefficients: tuple[float, float, float, float],
+    **order: float,
+) -> Outcome:
+    """Advance the memory by steps of the generalized-alpha method in relative coordinates."""
+    alpha_m, alpha_f, beta, gamma = coefficients
+    return call(
+        model, work, tree, joints, tangent, memory, rows, what=ADVANCE, alpha_m=alpha_m, alpha_f=alpha_f, beta=beta,
+        gamma=gamma, **order,
+    )  # fmt: skip

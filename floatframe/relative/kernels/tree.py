@@ -40,6 +40,9 @@ class Tree(NamedTuple):
     column0: IntArray = integer(n_b + 1)  #: first column of the joint of each body
     s0: IntArray = integer(n_b + 1)  #: first unknown of each body
     m0: IntArray = integer(n_b)  #: first of its modes among the unknowns
+    column: IntArray = integer(n_s)  #: of each unknown, -1 for a mode
+    mode: IntArray = integer(n_s)  #: place in q of each unknown, -1 for a coordinate
+    slot: IntArray = integer(n_s)  #: place of its algorithmic acceleration among those of the bodies, of a mode its own
     tau: Array = real(n_k, 3, unit="1 or m/rad")  #: translation, axes of A
     alpha: Array = real(n_k, 3)  #: rotation, axes of the side
     side: IntArray = integer(n_k)  #: 0: fixed in A, 1: fixed in B
@@ -69,6 +72,9 @@ class JointWork(NamedTuple):
     x: Array = real(n_k, unit="m or rad")  #: increments of coordinates since then
     rate: Array = real(n_k, unit="m/s or rad/s")  #: z_dot
     acceleration: Array = real(n_k, unit="m/s² or rad/s²")  #: z_ddot
+    rate_start: Array = real(n_k, unit="m/s or rad/s")  #: z_dot at the beginning of a step
+    acceleration_start: Array = real(n_k, unit="m/s² or rad/s²")
+    increment: Array = real(n_s)  #: of all unknowns since then
     t: Array = real(n_k, 3)  #: A_A tau, ground axes
     a: Array = real(n_k, 3)  #: rotation, ground axes
     near: Array = real(n_b, 12, unit="m/s², rad/s², m/s, rad/s")  #: accelerations and velocities of the marker there
@@ -94,6 +100,7 @@ class TangentWork(NamedTuple):
     motion: Array = real(12)
     K: Array = real(Size("n_newton"), Size("n_newton"))  #: [unknowns, wrenches that are kept], row by row
     pivot: IntArray = integer(Size("n_newton"))
+    weight: Array = real(n_s, unit="kg, kg m²")  #: of the norm of corrections
     step: Array = real(Size("n_newton"))  #: right side, then the correction
 
 
@@ -119,6 +126,7 @@ def new_tangent_work(model: Model, tree: Tree) -> TangentWork:
         "jets": len(tree.jet_s),
         "n_q": int(model.bodies.q0[-1]),
         "n_most": int(max(model.bodies.n_q, default=0)),
+        "n_s": n_s,
         "n_newton": n_s + int((tree.kept_row >= 0).sum()),
     }
     return zeros(TangentWork(), sizes)

@@ -1,0 +1,253 @@
+"""The generalized-alpha method in relative coordinates: joints and modes, with constraints of closed loops alone."""
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.errors import ModelError
+from floatframe.integrators.carry import Carry, Failure, Integrator, memory_of, one_step_of, with_angles
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha, squared_frequencies
+from floatframe.joints.rows import is_held_position
+from floatframe.kernels.memory import Rows, new_rows
+from floatframe.kernels.work import Work, new_work
+from floatframe.relative.kernels.tree import JointWork, Tree, new_joint_work, new_tangent_work
+from floatframe.relative.topology import tree_of
+from floatframe.start.initial import acceleration_rates, consistent_motion, work_from
+from floatframe.start.newton_equations import displaced, set_iterate
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["FORMULATIONS", "RelativeGeneralizedAlpha", "in_formulation"]
+
+FORMULATIONS = ("absolute", "relative")  #: by their names
+NEAR_BY = 1e-3  #: of a step, of the difference that gives the rates of accelerations
+
+
+@dataclass(frozen=True)
+class RelativeGeneralizedAlpha:
+    """Generalized-alpha in the coordinates of joints and modes (docs/relative.md §6), as `GeneralizedAlpha` otherwise.
+
+    (1) predict: a_new = a for every unknown s = (z, q)
+    (2) Newton on  rho(s, s_dot, s_ddot, w) = 0, g = 0  over the increment x of the step, where rho is the residual
+        projected along the coordinates, g what loops, couplers and force elements say, and
+        x = h s_dot + h² ((1/2 - beta) a + beta a_new),  Q exp(x) for rotations
+        s_dot_new = s_dot + h ((1 - gamma) a + gamma a_new)
+    (3) (1 - alpha_m) a_new + alpha_m a = (1 - alpha_f) s_ddot_new + alpha_f s_ddot
+
+    Trees have no constraints: joints stay closed to rounding, positions, velocities and accelerations alike. Loops are
+    closed by the constraints of their cut joints, of index 3, and begin as those of `GeneralizedAlpha` do. The error
+    that steers the step is measured with the mass that a coordinate moves.
+    """
+
+    rho_inf: float = 0.8  #: spectral radius at infinite frequency, 0 <= rho_inf <= 1
+    tolerance: float = 1e-8  #: largest last correction over the one that the accelerations of the step amount to
+    max_iterations: int = 25
+    error_tolerance: float | None = None  #: largest local error of a step over the size of the system; None: fixed step
+    h_min: float | None = None  #: least step, to which one that fails is divided [s]; None as in `GeneralizedAlpha`
+    #: alpha_m, alpha_f, beta, gamma in place of those that follow from rho_inf
+    parameters: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", self.absolute.parameters)
+
+    @property
+    def absolute(self) -> GeneralizedAlpha:
+        """The same method in absolute coordinates."""
+        return GeneralizedAlpha(**asdict(self))
+
+    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+        """Return the memory at the beginning: the state made consistent, its accelerations and their rates."""
+        consistent = consistent_motion(system, state, t=t, known=None if before is None else before.w)
+        rates = acceleration_rates(compiled_system(system), consistent, t)
+        carry = Carry(consistent.state, consistent.u_dot, rates, 0.0, consistent.w, np.zeros(2), np.zeros(2))
+        return with_angles(system, t, carry, before)
+
+    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+        """Return the memory one step of size h later; `ConvergenceError` if Newton's method fails."""
+        return one_step_of(self, system, t, h, carry)
+
+    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the results at the carried state; the carry learns the power at it."""
+        from floatframe.relative.kernels.entry import observe_tree
+
+        model, tree = compiled_system(system).model, tree_of(system).tree
+        memory = memory_of(carry)
+        rows = observe_tree(model, work, tree, new_joint_work(model, tree), memory, t)
+        return replace(carry, power=np.array([memory.power_given, memory.power_taken])), rows
+
+    def advance(
+        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Carry, Rows, int, Failure | None]:
+        """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
+        from floatframe.relative.kernels.entry import advance_tree_steps
+
+        compiled, tree = compiled_system(system), tree_of(system).tree
+        model = compiled.model
+        carry = self.prepared(system, carry, h, t0 + first * h)
+        memory = memory_of(carry)
+        memory.a[:] = carry.a
+        rows = new_rows(model, (first + n_steps) // every - first // every)
+        iterations = int(work.counted.iterations)
+        outcome = advance_tree_steps(
+            model, work, tree, new_joint_work(model, tree), new_tangent_work(model, tree), memory, rows,
+            coefficients=self.absolute.coefficients, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
+            tolerance=self.tolerance, max_iterations=self.max_iterations, length=compiled.length,
+            most_error=self.error_tolerance or 0.0, h_min=self.absolute.least_step(h),
+        )  # fmt: skip
+        after = Carry(
+            State(memory.r, memory.p, memory.q, memory.u),
+            memory.u_dot,
+            memory.a,
+            float(memory.h),
+            memory.w,
+            np.array([memory.work_given, memory.work_taken]),
+            np.array([memory.power_given, memory.power_taken]),
+            carry.n_iterations + int(work.counted.iterations) - iterations,
+            float(memory.h_wanted),
+            int(memory.n_accepted),
+            int(memory.n_rejected),
+            memory.angle,
+            memory.angle_rate,
+        )
+        rows = Rows(*(array[: outcome.n_rows] for array in rows))
+        return after, rows, outcome.n_steps, self.explain(system, work, outcome, h)
+
+    def prepared(self, system: System, carry: Carry, h: float, t: float) -> Carry:
+        """Return the memory with algorithmic accelerations of the unknowns for steps of size h.
+
+        At the start: a = s_ddot + (alpha_m - alpha_f) h d(s_ddot)/dt, where rates of modes that h does not resolve are
+        left out smoothly, and velocities are shifted so that the first step closes the loops without a kick.
+        """
+        is_divided = self.absolute.least_step(h) > 0.0
+        if carry.h != 0.0:
+            return replace(carry, h_next=min(carry.h_next or h, h) if is_divided else h)
+        compiled, tree = compiled_system(system), tree_of(system).tree
+        h = self.absolute.first_step(compiled, h, carry.a)
+        alpha_m, alpha_f, beta, _ = self.absolute.coefficients
+        now, rates = joint_accelerations(compiled, tree, carry, h)
+        rates = rates / (1 + h**2 * squared_frequencies(compiled.model))
+        a = now + (alpha_m - alpha_f) * h * rates
+        carry = shifted(system, carry, 0.5 * a + beta * h * rates, h, beta, t)
+        return replace(carry, a=a, h=h, h_next=h)
+
+    def explain(self, system: System, work: Work, outcome: tuple, h: float) -> Failure | None:
+        """Say why a step failed; None if none did."""
+        from floatframe.relative.kernels.steps import SINGULAR
+
+        if outcome[0] == 0:
+            return None
+        if outcome[0] != SINGULAR:
+            return self.absolute.explain(system, work, outcome, self.absolute.least_step(h))  # type: ignore[arg-type]
+        parts = tree_of(system)
+        held = [*parts.cut, *parts.constrained]
+        words = "the Newton matrix in relative coordinates is singular here: "
+        if held:
+            words += (
+                f"constraints of joints {', '.join(repr(name) for name in held)} depend on each other (a singular "
+                "position, or redundant ones)"
+            )
+        else:
+            words += "a coordinate moves no mass; check masses, inertias and massless modes"
+        return Failure(words, outcome[4])
+
+
+def in_formulation(integrator: Integrator, formulation: str) -> Integrator:
+    """Return the method in a formulation by its name, "absolute" (as it is) or "relative".
+
+    Raises
+    ------
+    ModelError
+        If there is no such formulation, or the method is absolute alone.
+    """
+    if formulation not in FORMULATIONS:
+        raise ModelError(f"formulation: expected one of {', '.join(FORMULATIONS)}, got {formulation!r}")
+    if formulation == "absolute" or isinstance(integrator, RelativeGeneralizedAlpha):
+        return integrator
+    if not isinstance(integrator, GeneralizedAlpha):
+        raise ModelError(
+            f"formulation: {type(integrator).__name__} works in absolute coordinates alone; choose GeneralizedAlpha "
+            '(or hht, newmark, trapezoidal), or formulation = "absolute"'
+        )
+    return RelativeGeneralizedAlpha(**asdict(integrator))
+
+
+def joint_iterate(compiled: CompiledSystem, tree: Tree, state: State, u_dot: Array) -> tuple[Work, JointWork]:
+    """Return working arrays with the motion of the joints at a state."""
+    from floatframe.relative.kernels.entry import motion_of_joints
+
+    work, joints = new_work(compiled.model), new_joint_work(compiled.model, tree)
+    set_iterate(work, state, u_dot)
+    motion_of_joints(compiled.model, work, tree, joints)
+    return work, joints
+
+
+def in_slots(tree: Tree, joints: JointWork, of_bodies: Array, of_columns: Array) -> Array:
+    """Return values of all unknowns in their slots, (n_u,), zero elsewhere."""
+    result = np.zeros_like(of_bodies)
+    is_mode = tree.mode >= 0
+    result[tree.slot[is_mode]] = of_bodies[tree.slot[is_mode]]
+    result[tree.slot[~is_mode]] = of_columns[tree.column[~is_mode]]
+    return result
+
+
+def joint_accelerations(compiled: CompiledSystem, tree: Tree, carry: Carry, h: float) -> tuple[Array, Array]:
+    """Return s_ddot and its rate in the slots of the unknowns, (n_u,), of the start of a motion."""
+    state, u_dot, jerk, s = carry.state, carry.u_dot, carry.a, NEAR_BY * h
+
+    def at(t: float) -> Array:
+        place = displaced(compiled.model, state, t * state.u + 0.5 * t**2 * u_dot + t**3 / 6 * jerk)
+        moved = State(place.r, place.p, place.q, state.u + t * u_dot + 0.5 * t**2 * jerk)
+        _, joints = joint_iterate(compiled, tree, moved, u_dot + t * jerk)
+        return in_slots(tree, joints, u_dot + t * jerk, joints.acceleration)
+
+    return at(0.0), (at(s) - at(-s)) / (2 * s)
+
+
+def shifted(system: System, carry: Carry, a: Array, h: float, beta: float, t: float) -> Carry:
+    """Return the memory with velocities changed by O(h²), so that x = h s_dot + h² a closes the loops.
+
+    G ds = -g(after)/h with the weights of one step, M + beta h² K, as `velocity_correction` of the absolute start.
+    """
+    from floatframe.relative.kernels.entry import motion_of_bodies, moved, newton_matrix, projected
+
+    compiled, tree = compiled_system(system), tree_of(system).tree
+    model = compiled.model
+    kept = tree.kept_row >= 0
+    holds = is_held_position(model.rows.kind)[kept]
+    if not holds.any():
+        return carry
+    state = carry.state
+    work, joints = joint_iterate(compiled, tree, state, carry.u_dot)
+    work.states.base[:] = work_from(model, carry.w).states.base
+    joints.d_start[:], joints.Q_start[:] = joints.d, joints.Q
+    rate, is_column = joints.rate.copy(), tree.column >= 0
+    s_dot = in_slots(tree, joints, state.u, rate)[tree.slot]
+    x = h * s_dot + h**2 * a[tree.slot]
+    increments = np.zeros_like(rate)
+    increments[tree.column[is_column]] = x[is_column]
+    for k in np.flatnonzero(tree.motion >= 0):
+        motion = tree_of(system).motions[k]
+        assert motion is not None
+        increments[k] = tree.factor[k] * (motion(t + h) - motion(t))
+    work.state.q[tree.mode[~is_column]] += x[~is_column]
+    work.state.time[...] = t + h
+    work.state.w[:] = carry.w
+    work.state.w[model.coordinates.row] += h * carry.w[model.coordinates.row + 1]
+    moved(model, work, tree, joints, increments)
+    projected(model, work, tree, joints)
+    gap = np.where(holds, work.connections.g[kept], 0.0)
+    set_iterate(work, state, None, carry.w)
+    work.state.time[...] = t
+    joints.x[:] = 0.0
+    joints.d[:], joints.Q[:], joints.acceleration[:] = joints.d_start, joints.Q_start, 0.0
+    n_s = len(tree.slot)
+    K = newton_matrix(model, work, tree, joints, new_tangent_work(model, tree), 1.0, 0.0, 0.0)
+    weight = beta * h**2 * squared_frequencies(model)[tree.slot]
+    K[:n_s, :n_s] += np.diag(np.where(is_column, 0.0, weight * np.diag(K)[:n_s]))
+    change = np.linalg.lstsq(K, np.concatenate([np.zeros(n_s), -gap / h]), rcond=1e-12)[0][:n_s]
+    joints.rate[tree.column[is_column]] += change[is_column]
+    work.state.u[tree.slot[~is_column]] += change[~is_column]
+    motion_of_bodies(model, work, tree, joints)
+    return replace(carry, state=replace(state, u=work.state.u.copy()))

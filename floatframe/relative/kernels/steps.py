@@ -1,0 +1,337 @@
+"""Time loop of the generalized-alpha method in relative coordinates; see `floatframe.integrators.relative`.
+
+What is remembered from step to step is absolute (`kernels.memory.Memory`), but for the algorithmic accelerations: those
+of an unknown stand where `Tree.slot` says. Joints are found from the bodies at the beginning of each step.
+"""
+
+import math
+
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.connections.user_force import resize_states
+from floatframe.kernels.diagnostics import power
+from floatframe.kernels.generalized_alpha import (
+    DIVERGED,
+    DONE,
+    INACCURATE,
+    LEAST,
+    SAFETY,
+    SAME,
+    STOPPED,
+    copy,
+    correction_of_states,
+    load_state,
+    put_weights,
+    roundoff_floor,
+    step_after,
+    write_row,
+)
+from floatframe.kernels.step_start import begin_step
+from floatframe.kernels.time_function import time_function
+from floatframe.kernels.turns import count_turns
+from floatframe.kernels.vector import dot
+from floatframe.relative.kernels.evaluation import evaluate_tree
+from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
+from floatframe.relative.kernels.projection import put_reactions
+from floatframe.relative.kernels.tangent import assemble, solve_dense, write_tangent
+
+__all__ = ["SINGULAR", "advance_tree", "write_tree_row"]
+
+SINGULAR = 6  #: status: the Newton matrix is
+SLOW = 0.2  # ratio of corrections above which the matrix is made anew
+
+
+@inner
+def begin(model, work, tree, joints, memory):
+    """Take the iterate from the memory; write motion of the joints at the beginning of a step."""
+    load_state(work.state, memory)
+    joint_motion(model, work, tree, joints)
+    for i in range(tree.parent.shape[0]):
+        for a in range(3):
+            joints.d_start[i, a] = joints.d[i, a]
+            for b in range(3):
+                joints.Q_start[i, a, b] = joints.Q[i, a, b]
+    copy(joints.rate, joints.rate_start)
+    copy(joints.acceleration, joints.acceleration_start)
+    for k in range(joints.x.shape[0]):
+        joints.x[k] = 0.0
+
+
+@inner
+def resize(model, tree, joints, memory, h):
+    """Turn the algorithmic accelerations into those of steps of size h; joints are those of the memory."""
+    ratio = h / memory.h
+    for s in range(tree.slot.shape[0]):
+        k = tree.slot[s]
+        now = memory.u_dot[k] if tree.mode[s] >= 0 else joints.acceleration_start[tree.column[s]]
+        memory.a[k] = now + ratio * (memory.a[k] - now)
+    resize_states(model.states.row, memory, ratio)
+    memory.h = h
+
+
+@inner
+def predict(model, work, tree, joints, memory, h, alpha_f):
+    """(1): a_new = a, in every unknown; prescribed coordinates are where their functions lead."""
+    begin_step(model, work, memory, h, alpha_f)
+    state = work.state
+    for s in range(tree.slot.shape[0]):
+        slot, k = tree.slot[s], tree.column[s]
+        a = memory.a[slot]
+        if k >= 0:
+            u = joints.rate_start[k]
+            joints.x[k] = h * (u + 0.5 * h * a)
+            joints.rate[k] = u + h * a
+            joints.acceleration[k] = (a - alpha_f * joints.acceleration_start[k]) / (1 - alpha_f)
+            joints.increment[s] = joints.x[k]
+        else:
+            u = memory.u[slot]
+            joints.increment[s] = h * (u + 0.5 * h * a)
+            state.q[tree.mode[s]] = memory.q[tree.mode[s]] + joints.increment[s]
+            state.u[slot] = u + h * a
+            state.u_dot[slot] = (a - alpha_f * memory.u_dot[slot]) / (1 - alpha_f)
+    for k in range(tree.motion.shape[0]):
+        if tree.motion[k] >= 0:
+            factor = tree.factor[k]
+            before, _, _ = time_function(model.functions, tree.motion[k], state.time - h)
+            value, rate, second = time_function(model.functions, tree.motion[k], state.time)
+            joints.x[k] = factor * (value - before)
+            joints.rate[k] = factor * rate
+            joints.acceleration[k] = factor * second
+    move_joints(tree, joints)
+    place_bodies(model, work, tree, joints)
+
+
+@inner
+def weigh(model, work, tree, tangent):
+    """Write the weights of the norm of unknowns: what of the mass a unit of a coordinate moves, M + c_k K of a mode."""
+    for i in range(tree.parent.shape[0]):
+        for j in range(tree.jet0[i], tree.jet0[i + 1]):
+            total = 0.0
+            for r in range(6):
+                for e in range(6):
+                    total += tangent.screw[j, r] * tangent.D[i, r, 12 + e] * tangent.screw[j, e]
+            tangent.weight[tree.jet_s[j]] = abs(total)
+        for k in range(model.bodies.n_q[i]):
+            tangent.weight[tree.m0[i] + k] = work.solver.weight[model.bodies.u0[i] + 6 + k]
+
+
+@inner
+def sizes(model, work, tree, joints, tangent, gravity):
+    """Return the squared size of the accelerations and of the increments of a step."""
+    size, size_x, mass = 0.0, 0.0, 0.0
+    for s in range(tree.slot.shape[0]):
+        k = tree.column[s]
+        acceleration = joints.acceleration[k] if k >= 0 else work.state.u_dot[tree.slot[s]]
+        size += tangent.weight[s] * acceleration**2
+        size_x += tangent.weight[s] * joints.increment[s] ** 2
+    for i in range(model.bodies.kind.shape[0]):
+        mass += model.body_types.mass[model.bodies.kind[i]]
+    return size + mass * dot(gravity, gravity), size_x
+
+
+@inner
+def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
+    """Add the correction to the iterate; return its squared norm."""
+    total, step, state = 0.0, tangent.step, work.state
+    n_s = tree.slot.shape[0]
+    for s in range(n_s):
+        k, slot, x = tree.column[s], tree.slot[s], step[s]
+        total += tangent.weight[s] * x * x
+        joints.increment[s] += x
+        if k >= 0:
+            joints.x[k] += x
+            joints.rate[k] += by_rate * x
+            joints.acceleration[k] += by_acceleration * x
+        else:
+            state.q[tree.mode[s]] += x
+            state.u[slot] += by_rate * x
+            state.u_dot[slot] += by_acceleration * x
+    for k in range(tree.kept_row.shape[0]):
+        work.solver.mu[k] = step[n_s + tree.kept_row[k]] if tree.kept_row[k] >= 0 else 0.0
+        state.w[k] += work.solver.mu[k] / c_k
+    move_joints(tree, joints)
+    place_bodies(model, work, tree, joints)
+    return total
+
+
+@inner
+def local_error(model, work, tree, joints, tangent, memory, order, h):
+    """Return the estimated error of the increment of a step that has converged, as the absolute method does."""
+    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
+    total, mass = 0.0, 0.0
+    for s in range(tree.slot.shape[0]):
+        now, before = accelerations(work, tree, joints, memory, s)
+        a = memory.a[tree.slot[s]]
+        jump = ((1 - alpha_f) * now + alpha_f * before - alpha_m * a) / (1 - alpha_m) - a
+        weight = tangent.weight[s]
+        total += weight * jump * jump
+    for i in range(model.bodies.kind.shape[0]):
+        mass += model.body_types.mass[model.bodies.kind[i]]
+    factor = abs(0.5 * gamma - beta - 1.0 / 12.0) * h * h
+    return factor * math.sqrt(total / mass) / order.length
+
+
+@inner
+def accelerations(work, tree, joints, memory, s):
+    """Return the acceleration of an unknown at the iterate and at the beginning of the step."""
+    k = tree.column[s]
+    if k >= 0:
+        return joints.acceleration[k], joints.acceleration_start[k]
+    return work.state.u_dot[tree.slot[s]], memory.u_dot[tree.slot[s]]
+
+
+@inner
+def one_step(model, work, memory, tree, joints, tangent, order, h):
+    """Advance the memory by one step, unless its error is above the one that is allowed.
+
+    Return (status, last correction by the allowed one, error; -1 if not estimated). The Newton matrix is made at the
+    first iterate of each step, and again where corrections shrink slowly.
+    """
+    alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
+    c_k = beta * h * h
+    c_d = gamma * h
+    c_m = (1 - alpha_m) / (1 - alpha_f)
+    predict(model, work, tree, joints, memory, h, alpha_f)
+    work.counted.no_number = 0
+    work.counted.stopped = 0
+    last, last_of_states, excess, allowed = math.inf, math.inf, math.inf, 0.0
+    is_due, iteration = True, 0
+    has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
+    while iteration < order.max_iterations:
+        evaluate_tree(model, work, tree, joints, c_k)
+        is_new = is_due
+        if is_due:
+            write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+            assemble(model, work, tree, tangent, c_d, c_k)
+            weigh(model, work, tree, tangent)
+            work.counted.factorisations += 1
+            is_due = False
+        if not solve_dense(model, work, tree, joints, tangent, c_k, is_new):
+            return SINGULAR, excess, -1.0
+        if iteration == 0:
+            size, size_x = sizes(model, work, tree, joints, tangent, model.gravity)
+            allowed = order.tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
+            allowed += math.sqrt(roundoff_floor(model, work, order.length))
+        norm = math.sqrt(update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
+        work.counted.iterations += 1
+        if not math.isfinite(norm):
+            return DIVERGED, math.inf, -1.0
+        excess = norm / allowed if allowed > 0.0 else math.inf
+        of_states = 0.0
+        if has_states:
+            of_states = correction_of_states(model, work, c_k) / order.tolerance
+            if not math.isfinite(of_states):
+                return DIVERGED, math.inf, -1.0
+        is_small = norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
+        if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
+            error = -1.0
+            if order.most_error > 0.0:
+                error = local_error(model, work, tree, joints, tangent, memory, order, h)
+                if not error <= order.most_error:
+                    return INACCURATE, excess, error
+            accept(model, work, memory, tree, joints, h, alpha_m, alpha_f)
+            return DONE, excess, error
+        is_due = (norm > SLOW * last and not is_small) or of_states > max(1.0, SLOW * last_of_states)
+        last, last_of_states = norm, of_states
+        excess = max(excess, of_states)
+        iteration += 1
+    return DIVERGED, excess, -1.0
+
+
+@inner
+def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
+    """(3): write the iterate and the new algorithmic accelerations into the memory."""
+    put_reactions(model, work, tree, joints)
+    for s in range(tree.slot.shape[0]):
+        now, before = accelerations(work, tree, joints, memory, s)
+        slot = tree.slot[s]
+        memory.a[slot] = ((1 - alpha_f) * now + alpha_f * before - alpha_m * memory.a[slot]) / (1 - alpha_m)
+    copy(work.state.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
+    copy(work.state.q, memory.q)
+    copy(work.state.u, memory.u)
+    copy(work.state.u_dot, memory.u_dot)
+    copy(work.state.w, memory.w)
+    for i in range(model.bodies.kind.shape[0]):
+        put_euler_parameters(work.state.R[i], memory.p[i])
+    count_turns(model, work, memory, h)
+    loads, dissipated = power(model, work)
+    memory.work_given += 0.5 * h * (memory.power_given + loads)
+    memory.work_taken += 0.5 * h * (memory.power_taken + dissipated)
+    memory.power_given = loads
+    memory.power_taken = dissipated
+
+
+@inner
+def put_euler_parameters(R, p):
+    """Write the Euler parameters of a rotation matrix, of the two signs that nearer to those that are there.
+
+    The largest of w², x², y², z² by the diagonal; the others from sums and differences across it.
+    """
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    w, x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 0.0
+    if trace >= R[0, 0] and trace >= R[1, 1] and trace >= R[2, 2]:
+        w, x, y, z = 1.0 + trace, w, x, y
+    elif R[0, 0] >= R[1, 1] and R[0, 0] >= R[2, 2]:
+        w, x, y, z = w, 1.0 + R[0, 0] - R[1, 1] - R[2, 2], R[1, 0] + R[0, 1], R[0, 2] + R[2, 0]
+    elif R[1, 1] >= R[2, 2]:
+        w, x, y, z = x, R[1, 0] + R[0, 1], 1.0 + R[1, 1] - R[0, 0] - R[2, 2], R[2, 1] + R[1, 2]
+    else:
+        w, x, y, z = y, R[0, 2] + R[2, 0], R[2, 1] + R[1, 2], 1.0 + R[2, 2] - R[0, 0] - R[1, 1]
+    scale = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+    if w * p[0] + x * p[1] + y * p[2] + z * p[3] < 0.0:
+        scale = -scale
+    p[0], p[1], p[2], p[3] = scale * w, scale * x, scale * y, scale * z
+
+
+@inner
+def write_tree_row(model, work, memory, tree, joints, t, rows):
+    """Write the next row of the results, with the reactions of the tree at the very state in the memory."""
+    work.state.time = t
+    begin(model, work, tree, joints, memory)
+    evaluate_tree(model, work, tree, joints, 1.0)
+    put_reactions(model, work, tree, joints)
+    copy(work.state.w, memory.w)
+    write_row(model, work, memory, t, rows)
+
+
+@inner
+def advance_tree(model, work, memory, rows, tree, joints, tangent, order):
+    """Advance by n_steps of size h, as `kernels.generalized_alpha.advance`; return what it returns."""
+    h, first, h_min, most_error = order.h, order.first, order.h_min, order.most_error
+    put_weights(model, work, order.beta * memory.h**2)
+    work.counted.rows = 0
+    excess = 0.0
+    for k in range(order.n_steps):
+        end = order.t0 + (first + k + 1) * h
+        left = h
+        has_failed = False
+        while left > 0.0:
+            n_parts = 1.0
+            if h_min > 0.0:
+                n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
+            part = left / n_parts
+            begin(model, work, tree, joints, memory)
+            if abs(part - memory.h) > SAME * part:
+                resize(model, tree, joints, memory, part)
+                put_weights(model, work, order.beta * part * part)
+            work.state.time = end - (left - part)
+            status, excess, error = one_step(model, work, memory, tree, joints, tangent, order, memory.h)
+            if status == DONE:
+                memory.n_accepted += 1
+                if work.counted.stopped > 0:
+                    return STOPPED, k, work.counted.rows, work.counted.stopped - 1, excess
+                left = left - part if n_parts > 1.0 else 0.0
+                if h_min > 0.0:
+                    memory.h_wanted = min(step_after(part, error, most_error, has_failed), h)
+                has_failed = False
+                continue
+            if h_min <= 0.0 or part <= h_min:
+                return status, k, work.counted.rows, -1, excess
+            memory.n_rejected += 1
+            shorter = 0.5 * part
+            if status == INACCURATE:
+                shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
+            memory.h_wanted = max(shorter, h_min)
+            has_failed = True
+        if (first + k + 1) % order.every == 0:
+            write_tree_row(model, work, memory, tree, joints, end, rows)
+    return DONE, order.n_steps, work.counted.rows, -1, excess
