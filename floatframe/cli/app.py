@@ -44,6 +44,10 @@ ResultsFile = Annotated[Path, typer.Argument(help="A results file, as floatframe
 def run_command(
     system: Annotated[Path, typer.Argument(help="System file (TOML), see docs/system_file.md.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Results file to write.")] = None,
+    formulation: Annotated[
+        str | None,
+        typer.Option("--formulation", help="absolute or relative (joint) coordinates; default: as in [run]."),
+    ] = None,
 ) -> None:
     """Compute the motion of a system.
 
@@ -53,12 +57,14 @@ def run_command(
     """
     from floatframe.cosimulation.coupled_motion import co_simulate
     from floatframe.errors import ResultsError
+    from floatframe.integrators import in_formulation
     from floatframe.motion.integration import integrate
     from floatframe.system_file.read_system import read_system
     from floatframe.system_file.run_section import required_run
 
     model, given = read_system(system)
     options = required_run(given, system)
+    integrator = options.integrator if formulation is None else in_formulation(options.integrator, formulation)
     inputs = (system, *model.files)
     path = output_path(output, system.with_suffix(".h5"), ResultsError, overwrite_of=inputs, needs_file=True)
     compute(
@@ -66,12 +72,12 @@ def run_command(
         path,
         lambda on_progress: (
             co_simulate(
-                model, options.integrator, options.t_end, options.h, options.coupling, output=path,
+                model, integrator, options.t_end, options.h, options.coupling, output=path,
                 output_every=options.output_every, progress=on_progress,
             )
             if model.fmus
             else integrate(
-                model, options.integrator, options.t_end, options.h, output=path, output_every=options.output_every,
+                model, integrator, options.t_end, options.h, output=path, output_every=options.output_every,
                 progress=on_progress,
             )
         ),

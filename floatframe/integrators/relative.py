@@ -139,7 +139,7 @@ class RelativeGeneralizedAlpha:
         if outcome[0] == 0:
             return None
         if outcome[0] != SINGULAR:
-            return self.absolute.explain(system, work, outcome, self.absolute.least_step(h))  # type: ignore[arg-type]
+            return self.absolute.explain(system, work, outcome, self.absolute.least_step(h))
         parts = tree_of(system)
         held = [*parts.cut, *parts.constrained]
         words = "the Newton matrix in relative coordinates is singular here: "
@@ -163,7 +163,9 @@ def in_formulation(integrator: Integrator, formulation: str) -> Integrator:
     """
     if formulation not in FORMULATIONS:
         raise ModelError(f"formulation: expected one of {', '.join(FORMULATIONS)}, got {formulation!r}")
-    if formulation == "absolute" or isinstance(integrator, RelativeGeneralizedAlpha):
+    if formulation == "absolute":
+        return integrator.absolute if isinstance(integrator, RelativeGeneralizedAlpha) else integrator
+    if isinstance(integrator, RelativeGeneralizedAlpha):
         return integrator
     if not isinstance(integrator, GeneralizedAlpha):
         raise ModelError(

@@ -76,7 +76,7 @@ def integrate(
     output_every: int = 1,
     batch_steps: int = BATCH_STEPS,
     progress: Callable[[Progress], None] | None = None,
-    formulation: str = "absolute",
+    formulation: str | None = None,
 ) -> Trajectory:
     """Compute a motion from t_start to t_end.
 
@@ -104,7 +104,8 @@ def integrate(
     progress
         Called after every batch. What it raises ends the run; closed results stay.
     formulation
-        "absolute", or "relative": in the coordinates of joints, see docs/relative.md; results are the same.
+        "absolute", or "relative": in the coordinates of joints (docs/relative.md), with results of the same form; None:
+        that of the integrator.
 
     Returns
     -------
@@ -122,7 +123,7 @@ def integrate(
     """
     t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
     h = number("integrate: h", h, above=0.0)
-    integrator = in_formulation(integrator, formulation)
+    integrator = integrator if formulation is None else in_formulation(integrator, formulation)
     if t_end <= t_start:
         raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
     if output_every < 1 or batch_steps < 1:

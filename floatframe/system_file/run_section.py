@@ -14,13 +14,16 @@ from fe_models.foundation.words import nearest
 from floatframe.errors import SystemFileError
 from floatframe.integrators import INTEGRATORS
 from floatframe.integrators.carry import Integrator
-from floatframe.integrators.generalized_alpha import GeneralizedAlpha
+from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
+from floatframe.integrators.relative import FORMULATIONS, in_formulation
 from floatframe.motion.foreign_units import Coupling
 
 __all__ = ["RunOptions", "RunSection", "required_run"]
 
 MOST_TIMES = 1e8  #: at which a driven motion is computed
-NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme")
+NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme", "formulation")
+#: schemes that also know joint coordinates
+OF_BOTH_FORMULATIONS = (GeneralizedAlpha, hht, newmark, trapezoidal)
 
 
 def keys_of(scheme: str) -> tuple[str, ...]:
@@ -41,6 +44,9 @@ class RunSection(Table):
     )
     scheme: choice("scheme", lambda: tuple(INTEGRATORS)) = Field(  # type: ignore[valid-type]
         "generalized-alpha", description=f"one of {', '.join(INTEGRATORS)}"
+    )
+    formulation: choice("formulation", lambda: FORMULATIONS) = Field(  # type: ignore[valid-type]
+        "absolute", description=f"one of {', '.join(FORMULATIONS)}: coordinates of bodies, or of joints"
     )
     rho_inf: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None, description="a number between 0 and 1, the spectral radius at infinite frequency"
@@ -72,6 +78,8 @@ class RunSection(Table):
     @model_validator(mode="after")
     def _fits_the_scheme(self) -> "RunSection":
         allowed = keys_of(self.scheme)
+        if self.formulation != "absolute" and INTEGRATORS[self.scheme] not in OF_BOTH_FORMULATIONS:
+            raise ValueError(f"the scheme {self.scheme} works in absolute coordinates alone; take away formulation")
         for key in type(self).model_fields:
             if key not in NOT_OF_A_METHOD and getattr(self, key) is not None and key not in allowed:
                 raise ValueError(f"the scheme {self.scheme} has no key {key}{nearest(key, allowed)}")
@@ -82,7 +90,8 @@ class RunSection(Table):
         parameters: dict[str, Any] = {
             key: getattr(self, key) for key in keys_of(self.scheme) if getattr(self, key, None) is not None
         }
-        return RunOptions(self.t_end, self.h, self.output_every, INTEGRATORS[self.scheme](**parameters))
+        integrator = in_formulation(INTEGRATORS[self.scheme](**parameters), self.formulation)
+        return RunOptions(self.t_end, self.h, self.output_every, integrator)
 
 
 @dataclass(frozen=True)
