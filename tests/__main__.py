@@ -5,40 +5,56 @@
     python -m tests --external   # beside other programs; those that are not there are skipped, visibly
     python -m tests --campaign   # seeded bad inputs and kills
 
-Each check prints its own report, the first failure ends the run. The last line says how long the group took, and what
-it may take on a machine with two cores.
+A group is a row of stages. The checks of a stage run side by side, each as its own process, and each report is printed
+as a whole when its check ends; the first stage in which one fails ends the run. The last line says how long the group
+took, and what it may take on a machine with two cores.
+
+Tests and notebooks are spread over workers, a processor each (file by file, so that fixtures of a module are made
+once). A worker leaves the other processors to the other workers: the libraries in it have one thread, whatever the
+machine, unless OMP_NUM_THREADS says otherwise. Results may not depend on either number.
 """
 
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+MOST_WORKERS = 4  #: each takes up to 3 GB
+
+n_processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
 
 LINT = ("lint", "ruff", "check", ".")
 TYPES = ("types", "mypy")
-TESTS = ("tests", "pytest", "-q", "-m", "not long and not external", "tests")
+KERNELS = ("kernels", "floatframe.cli.compile_kernels")  # each worker would compile them otherwise
+TESTS = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external and not alone", "tests")
+ALONE = ("tests that run alone", "pytest", "-q", "-m", "alone and not long and not external", "tests")
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
 EXTERNAL = ("tests beside other programs", "pytest", "-q", "-rs", "-m", "external", "tests")
-NOTEBOOKS = ("notebooks", "pytest", "-q", "--nbmake", "--nbmake-timeout=300", "-o", "filterwarnings=", "notebooks")
+NOTEBOOKS = (
+    "notebooks", "pytest", "-q", *SPREAD, "--nbmake", "--nbmake-timeout=300", "-o", "filterwarnings=", "notebooks",
+)  # fmt: skip
 DOCUMENTATION = ("documentation", "sphinx", "-W", "--keep-going", "-q", "-b", "html", "docs", "build/site")
+
+Check = tuple[str, ...]  #: its name, then the module of Python that makes it with its arguments
 
 
 @dataclass(frozen=True)
 class Group:
     """Checks that are run together."""
 
-    checks: tuple[tuple[str, ...], ...]  #: name of a check, then the module of Python that makes it with its arguments
+    stages: tuple[tuple[Check, ...], ...]  #: one after another; the checks of one side by side
     minutes: float  #: it may take, on two cores
 
 
 GROUPS = {
-    "ci": Group((LINT, TYPES, TESTS, NOTEBOOKS, DOCUMENTATION), 30),
-    "long": Group((LONG,), 90),
-    "external": Group((EXTERNAL,), 10),
+    "ci": Group(((LINT,), (TYPES, KERNELS, DOCUMENTATION), (TESTS,), (NOTEBOOKS,), (ALONE,)), 20),
+    "long": Group(((LONG,),), 90),
+    "external": Group(((EXTERNAL,),), 10),
 }
 
 
@@ -63,17 +79,60 @@ def main(arguments: list[str]) -> int:
 
 
 def run(group: Group) -> int:
-    """Run the checks of a group up to the first that fails, and return its exit code."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
-    for name, *command in group.checks:
-        print(f"\n== {name}: {' '.join(command)}", flush=True)
-        begun = time.monotonic()
-        code = subprocess.run([sys.executable, "-m", *command], cwd=ROOT, env=environment, check=False).returncode
-        print(f"== {name}: {(time.monotonic() - begun) / 60:.1f} minutes", flush=True)
-        if code:
-            print(f"== {name} failed with exit code {code}", flush=True)
+    """Run the stages of a group up to the first in which a check fails, and return the exit code of that check."""
+    for stage in group.stages:
+        codes = [run_alone(stage[0])] if len(stage) == 1 else run_side_by_side(stage)
+        if code := next((code for code in codes if code), 0):
             return code
     return 0
+
+
+def environment(command: list[str]) -> dict[str, str]:
+    """Return the environment of a check; its workers, if there are several, have one thread each."""
+    threads = {"OMP_NUM_THREADS": "1"} if set(SPREAD) <= set(command) else {}
+    return {**threads, **os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+
+
+def run_alone(check: Check) -> int:
+    """Run one check, whose report appears as it is written; return its exit code."""
+    name, *command = check
+    print(f"\n== {name}: {' '.join(command)}", flush=True)
+    begun = time.monotonic()
+    done = subprocess.run([sys.executable, "-m", *command], cwd=ROOT, env=environment(command), check=False)
+    conclude(name, done.returncode, begun)
+    return done.returncode
+
+
+def run_side_by_side(checks: tuple[Check, ...]) -> list[int]:
+    """Run checks at the same time, print the report of each when it ends; return their exit codes in order of ends."""
+    begun, running, codes = time.monotonic(), {}, []
+    for name, *command in checks:
+        report = tempfile.TemporaryFile()
+        started = [sys.executable, "-m", *command]
+        process = subprocess.Popen(
+            started, cwd=ROOT, env=environment(command), stdout=report, stderr=subprocess.STDOUT
+        )
+        running[name] = process, report, command
+    while running:
+        name = next((name for name, (process, *_) in running.items() if process.poll() is not None), None)
+        if name is None:
+            time.sleep(0.1)
+            continue
+        process, report, command = running.pop(name)
+        print(f"\n== {name}, beside others: {' '.join(command)}", flush=True)
+        report.seek(0)
+        print(report.read().decode(errors="replace"), end="")
+        report.close()
+        conclude(name, process.returncode, begun)
+        codes.append(process.returncode)
+    return codes
+
+
+def conclude(name: str, code: int, begun: float) -> None:
+    """Print how long a check took, and that it failed if it did."""
+    print(f"== {name}: {(time.monotonic() - begun) / 60:.1f} minutes", flush=True)
+    if code:
+        print(f"== {name} failed with exit code {code}", flush=True)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,10 @@ import os
 
 import pytest
 
+if "PYTEST_XDIST_WORKER" in os.environ:
+    for name in ("COLUMNS", "LINES"):  # a worker has those of a terminal, and tables would be cut to its width
+        os.environ.pop(name, None)
+
 REQUIRES_ALL = os.environ.get("FLOATFRAME_REQUIRE_ALL") == "1"
 
 

@@ -1,5 +1,6 @@
 """The groups of tests: every test is in one, nothing skips where everything is required, and budgets are told."""
 
+import itertools
 import os
 import re
 import subprocess
@@ -12,11 +13,17 @@ from tests.__main__ import GROUPS, Group, main, run
 from tests.root import ROOT
 
 
-def test_every_marker_of_the_project_is_a_group():
+def test_a_test_of_any_markers_is_in_one_check_of_one_group():
     import tomllib
 
-    markers = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]["markers"]
-    assert {marker.split(":")[0] for marker in markers} == set(GROUPS) - {"ci"}
+    options = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
+    markers = [marker.split(":")[0] for marker in options["markers"]]
+    checks = [check for group in GROUPS.values() for stage in group.stages for check in stage]
+    chosen = [check[check.index("-m") + 1] for check in checks if check[-1] == "tests"]
+    assert len(chosen) == 4
+    for given in itertools.product((False, True), repeat=len(markers)):
+        marked = dict(zip(markers, given, strict=True))
+        assert sum(eval(expression, {}, marked) for expression in chosen) == 1, marked
 
 
 def test_an_unknown_group_is_refused_with_the_choices(capsys):
@@ -26,9 +33,20 @@ def test_an_unknown_group_is_refused_with_the_choices(capsys):
 
 def test_the_first_check_that_fails_ends_a_group_with_its_exit_code(capfd, monkeypatch):
     monkeypatch.setitem(sys.modules, "tests.nothing", None)
-    assert run(Group((("bad", "no_such_module"), ("next", "this")), 1.0)) != 0
+    assert run(Group(((("bad", "no_such_module"),), (("next", "this"),)), 1.0)) != 0
     printed = capfd.readouterr().out
     assert "== bad failed with exit code" in printed
+    assert "== next" not in printed
+
+
+def test_checks_side_by_side_all_report_and_one_that_fails_ends_the_group(capfd):
+    stage = (("good", "this"), ("bad", "no_such_module"), ("other", "this"))
+    assert run(Group((stage, (("next", "this"),)), 1.0)) != 0
+    printed = capfd.readouterr().out
+    assert printed.count("Beautiful is better than ugly") == 2
+    assert "No module named no_such_module" in printed
+    assert "== bad failed with exit code" in printed
+    assert printed.count("failed") == 1
     assert "== next" not in printed
 
 

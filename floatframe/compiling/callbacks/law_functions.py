@@ -100,10 +100,16 @@ def compiled_callback(where: str, function: Any, kind: str, template: Callable[[
 
 
 def filled(template: Callable[[int], FunctionType], function: Any, digest: int) -> FunctionType:
-    """Return the function that a template makes, with the function of the user in the place of `law`."""
+    """Return the function that a template makes, with the function of the user in the place of `law`.
+
+    Its name says the digest, so that each law has an index of its own in the cache: two processes that add different
+    laws to one index at the same moment give both the same file, and the code of one law under the key of the other.
+    """
     made = template(digest)
     names = made.__globals__ | {"law": function}
-    return FunctionType(made.__code__, names, made.__name__, made.__defaults__, made.__closure__)
+    named = FunctionType(made.__code__, names, made.__name__, made.__defaults__, made.__closure__)
+    named.__qualname__ = f"{made.__name__}_{digest:x}"
+    return named
 
 
 def array_at(pointer: Any, shape: Any) -> Array:

@@ -24,16 +24,11 @@ from cms.reduced_basis.frames import TisserandFrame
 from fe_models.foundation.sealed_hdf5 import Content, write_sealed
 from tests.bodies import box_mesh
 from tests.decks import JOB, write_deck
-from tests.root import ROOT
+from tests.root import ROOT, heed_interrupts
 from tests.synthetic import synthetic_reduced_body
 
 PROGRAM = [sys.executable, "-c", "from cms.cli import main; main()"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
-
-
-def heed_interrupts():
-    """A process started in the background of a shell ignores SIGINT, and its children after it; ours must not."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def bar():

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fe_models.foundation.processes import ProcessError, map_in_processes
-from tests.root import ROOT
+from tests.root import ROOT, heed_interrupts
 
 
 class UnpicklableError(Exception):
@@ -115,7 +115,7 @@ def test_workers_end_with_the_process_that_started_them(tmp_path, name):
     script.write_text(textwrap.dedent(SLEEPS))
     with subprocess.Popen(
         [sys.executable, str(script), str(tmp_path)], env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts,
     ) as process:  # fmt: skip
         deadline = time.monotonic() + 60
         while len(list(tmp_path.glob("*.pid"))) < 2 and time.monotonic() < deadline:

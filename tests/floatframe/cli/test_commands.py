@@ -17,7 +17,7 @@ from floatframe.cli.record import run_record
 from floatframe.pictures.animation import bodies_of
 from floatframe.results.energy_balance import balance_defect, energy_scale
 from floatframe.results.trajectory import read_results
-from tests.root import ROOT
+from tests.root import ROOT, heed_interrupts
 from tests.synthetic import synthetic_reduced_body
 
 PROGRAM = [sys.executable, "-c", "from floatframe.cli import main; main()"]
@@ -73,11 +73,6 @@ def results(tmp_path_factory) -> Path:
     result = run("run", folder / "swing.toml")
     assert result.exit_code == 0, result.output
     return folder / "swing.h5"
-
-
-def heed_interrupts():
-    """A process started in the background of a shell ignores SIGINT, and its children after it; ours must not."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def run(*arguments):
@@ -259,13 +254,14 @@ def test_the_output_is_checked_before_the_work(folder):
 
 
 @pytest.mark.parametrize("command", ["info", "plot", "animate"])
-def test_a_file_that_holds_no_results_is_refused(folder, command, results):
+def test_a_file_that_holds_no_results_is_refused(folder, command, results, monkeypatch):
+    monkeypatch.chdir(folder)  # messages cut long paths
     write(synthetic_reduced_body(), folder / "part.h5")
     (folder / "text.h5").write_text("no results")
     (folder / "short.h5").write_bytes(results.read_bytes()[:3000])
     for name in ("part.h5", "text.h5", "short.h5", "missing.h5"):
         before = contents(folder)
-        assert_refused(run(command, folder / name), name)
+        assert_refused(run(command, name), name)
         assert contents(folder) == before
 
 
