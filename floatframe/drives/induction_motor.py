@@ -50,7 +50,8 @@ class InductionMotor(Element):
     The voltage is the peak value of a phase. Without it the amplitude follows the frequency (V/f): boost +
     (rated_voltage - boost) |f|/rated_frequency, and rated_voltage above the rated frequency. A negative frequency
     turns the field backwards. `harmonics` are added to the supply, each [order, amplitude over the fundamental]; an
-    inverter in six steps has [-5, 1/5], [7, 1/7], [-11, 1/11], [13, 1/13], a negative order turning backwards.
+    inverter in six steps has [-5, 1/5], [7, -1/7], [-11, -1/11], [13, 1/13], a negative order turning backwards; an
+    unbalanced supply has the order -1.
 
     A gear makes the motor turn `ratio` times as fast as b against a, its torque on b is `ratio` times as large.
     """

@@ -32,6 +32,9 @@ MACHINES: dict[str, Machine] = {
     "bogie": Machine(
         "a railway vehicle on bogies", "bogie", "hunting over speed, limit cycles, independent wheels, a curve"
     ),
+    "motor-bogie": Machine(
+        "a bogie with induction motors", "motor_bogie", "torque ripple of the supply loads the mounts of its motors"
+    ),
     "railway-engine": Machine(
         "a railway engine", "railway_engine", "its full body and mode sets over a rail defect and through an S-curve"
     ),

@@ -1,5 +1,8 @@
 """The flexible bogie frame: side members, a transom and posts to the springs, as beams."""
 
+from collections.abc import Mapping
+from itertools import pairwise
+
 import numpy as np
 
 from floatframe.machines.bogie.vehicle import RailVehicle
@@ -17,26 +20,35 @@ def area(section: dict[str, float]) -> float:
     return section["width"] * section["height"] - inner
 
 
-def frame_files(data: RailVehicle, axle_height: float = 0.46) -> dict[str, str]:
+def frame_files(
+    data: RailVehicle,
+    axle_height: float = 0.46,
+    supports: Mapping[str, tuple[float, float, float]] | None = None,
+) -> dict[str, str]:
     """Return the job of the frame and its tables, by name of the file.
 
     Brackets, brake gear and dampers are a mass per length that brings the frame to its mass. Interfaces: four seats of
     the axle boxes (leading_left, ...), two of the air springs (air_left, air_right), the pivot. The origin is at the
-    height of the rails, below the pivot.
+    height of the rails, below the pivot. `supports` are further interfaces by name, each on a
+    bracket, a box as the side members have, from the transom beside it.
     """
     b, a, h = data.wheelbase, data.primary_arm, data.frame_height
     nodes: dict[str, tuple[float, float, float]] = {"pivot": (0.0, 0.0, h)}
     lines: list[tuple[str, str, str, int]] = []
+    supports = supports or {}
     for side, hand in ((1, "left"), (-1, "right")):
         nodes[f"middle_{hand}"] = (0.0, side * a, h)
         nodes[f"air_{hand}"] = (0.0, side * data.secondary_arm, data.secondary_height)
         lines.append((f"middle_{hand}", f"air_{hand}", "side", 1))
-        lines.append(("pivot", f"middle_{hand}", "transom", 4))
+        lines.extend(transom_lines(nodes, {side * y for _, y, _ in supports.values()}, side, hand, a, h))
         for end, word in ((1, "leading"), (-1, "trailing")):
             nodes[f"end_{word}_{hand}"] = (end * b, side * a, h)
             nodes[f"{word}_{hand}"] = (end * b, side * a, axle_height)
             lines.append((f"middle_{hand}", f"end_{word}_{hand}", "side", 5))
             lines.append((f"end_{word}_{hand}", f"{word}_{hand}", "side", 1))
+    for name, (x, y, z) in supports.items():
+        nodes[name] = (x, y, z)
+        lines.append((transom_node(y), name, "side", 2))
     place = {name: np.array(point) for name, point in nodes.items()}
     length = sum(float(np.linalg.norm(place[one] - place[other])) for one, other, _, _ in lines)
     steel = sum(
@@ -54,7 +66,7 @@ def frame_files(data: RailVehicle, axle_height: float = 0.46) -> dict[str, str]:
         values = "\n".join(f"{key} = {value}" for key, value in section.items())
         job.append(f'[sections.{name}]\nshape = "box"\nlines = "{name}"\n{values}\nadded_mass = {added:.6f}\n')
     for name in nodes:
-        if not name.startswith(("middle", "end")):
+        if not name.startswith(("middle", "end", "transom")):
             job.append(f'[interfaces.{name}]\nkind = "rigid"\nnodes = "{name}"\n')
     job.append('[reduction]\nset = "craig-bampton"\nn_modes = 6\n\n[damping]\nratio = 0.01\n')
     table = ["node, x, y, z, sets", *(f"{number[n]}, {x:g}, {y:g}, {z:g}, {n}" for n, (x, y, z) in nodes.items())]
@@ -64,3 +76,20 @@ def frame_files(data: RailVehicle, axle_height: float = 0.46) -> dict[str, str]:
         "frame_nodes.csv": "\n".join(table) + "\n",
         "frame_lines.csv": "\n".join(cut) + "\n",
     }
+
+
+def transom_node(y: float) -> str:
+    """Return the name of the node of the transom at y."""
+    return "pivot" if y == 0 else f"transom_{1e3 * y:+.0f}"
+
+
+def transom_lines(
+    nodes: dict[str, tuple[float, float, float]], where: set[float], side: int, hand: str, arm: float, height: float
+) -> list[tuple[str, str, str, int]]:
+    """Return the lines of half a transom, which has a node at each of the distances `where`; add those nodes."""
+    stops = sorted(y for y in where if 0 < y < arm)
+    for y in stops:
+        nodes[transom_node(side * y)] = (0.0, side * y, height)
+    names = ["pivot", *(transom_node(side * y) for y in stops), f"middle_{hand}"]
+    n = 4 if not stops else 2
+    return [(one, other, "transom", n) for one, other in pairwise(names)]
