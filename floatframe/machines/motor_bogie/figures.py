@@ -1,12 +1,12 @@
 """What is read off a start: modes, the lines of the supply in the loads of the mounts, and what they should be."""
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.linear.channels import Column
+from floatframe.analyses.linear.channels import AnyOutput, Column
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.drives import InductionMotor
@@ -42,7 +42,7 @@ def at_rest(system: System, load: str = "leading_lower", column: str = "force x"
         raise ModelError(f"at_rest: the system has no sensor {load!r}")
     torques = [CoordinateChannel(f"torque {word}", f"{word}_spindle", "angle") for word in ENDS]
     speed = CoordinateChannel("speed", "leading_spindle", "angle", 1)
-    return linearize(still, inputs=torques, outputs=[Column(sensor, column), speed])
+    return linearize(still, inputs=torques, outputs=[Column(cast(AnyOutput, sensor), column), speed])
 
 
 class ModeOfBogie(NamedTuple):
