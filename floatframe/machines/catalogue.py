@@ -39,7 +39,9 @@ MACHINES: dict[str, Machine] = {
         "a railway engine", "railway_engine", "its full body and mode sets over a rail defect and through an S-curve"
     ),
     "landing-gear": Machine(
-        "a landing gear", "landing_gear", "drop, anti-skid braking, hydraulic retraction, an aircraft that lands"
+        "a landing gear",
+        "landing_gear",
+        "drop, anti-skid braking, shimmy, hydraulic retraction, an aircraft that lands",
     ),
     "kart": Machine(
         "a kart", "kart", "steering step with a flexible and a rigid chassis: radius, wheel loads, yaw-rate gain"

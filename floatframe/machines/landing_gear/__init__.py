@@ -1,5 +1,6 @@
-"""A landing gear: a drop on a flexible piston with an oleo-pneumatic strut, retraction by a jack; and closed forms."""
+"""A landing gear: drop, braking, shimmy, taxi, landing and retraction; closed forms and small motions."""
 
 from floatframe.machines.landing_gear.closed_forms import Retraction, retraction
+from floatframe.machines.landing_gear.shimmy import critical_speed, growth, rolling, shimmy_locus
 
-__all__ = ["Retraction", "retraction"]
+__all__ = ["Retraction", "critical_speed", "growth", "retraction", "rolling", "shimmy_locus"]
