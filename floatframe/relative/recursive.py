@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,18 +15,34 @@ from floatframe.compiling.markers import find_marker
 from floatframe.errors import ModelError
 from floatframe.forces import Gravity
 from floatframe.kernels.work import Work, new_work
-from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, PLACE, SOLVE, run_task
+from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, PLACE, SOLVE, TANGENTS, run_task
 from floatframe.relative.recursion.expansion import Expansion, expansion_of
-from floatframe.relative.recursion.nodes import ROTATION, NodeWork, new_node_work
+from floatframe.relative.recursion.nodes import ROTATION, Dense, NodeWork, new_dense, new_node_work
 from floatframe.relative.recursion.positions import positions_of_state
 from floatframe.relative.topology import tree_of
 from floatframe.rotations import cross, euler_parameter_product, euler_parameters, euler_parameters_of_rotation_vector
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["RelativeModel", "relative_model"]
+__all__ = ["AccelerationDerivatives", "ForceDerivatives", "RelativeModel", "relative_model"]
 
 UNIT_DEFECT = 1e-6  #: by which the length of Euler parameters may differ from one
+
+
+class ForceDerivatives(NamedTuple):
+    """Derivatives of the forces of a motion, each (n_rates, n_rates); row: force, column: coordinate."""
+
+    by_z: Array  #: along the rates, the others held [N/rad, ...]
+    by_z_dot: Array
+    by_z_ddot: Array  #: the mass matrix
+
+
+class AccelerationDerivatives(NamedTuple):
+    """Derivatives of the accelerations under forces, each (n_rates, n_rates); row: acceleration."""
+
+    by_z: Array  #: along the rates, rates and forces held
+    by_z_dot: Array
+    by_force: Array  #: M⁻¹
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +160,7 @@ class RelativeModel:
         """Return M(z), (n_rates, n_rates), symmetric, by composite bodies (Featherstone 2008, chapter 6)."""
         self.take(z)
         self.run(MASS)
-        return self.work.M.copy()
+        return self.dense.M.copy()
 
     def forward_dynamics(
         self, z: Array, z_dot: Array, force: Array | None = None, *, wrenches: Mapping[Marker, Array] | None = None
@@ -188,15 +205,27 @@ class RelativeModel:
         n = self.n_rates
         if columns.ndim not in (1, 2) or len(columns) != n or not np.isfinite(columns).all():
             raise ModelError(f"solve: right: expected {n} finite rows, got shape {columns.shape}")
-        rows = columns.reshape(n, -1).T
-        solved = []
-        for first in range(0, len(rows), n):
-            part = rows[first : first + n]
-            self.work.M[:] = 0.0
-            self.work.M[: len(part)] = part
-            self.run(SOLVE)
-            solved.append(self.work.M[: len(part)].copy())
-        return np.concatenate([*solved, np.zeros((0, n))]).T.reshape(columns.shape)
+        rows = np.ascontiguousarray(columns.reshape(n, -1).T)
+        dense = self.none._replace(columns=rows.copy())
+        self.run(SOLVE, dense=dense)
+        return np.asarray(dense.columns.T.reshape(columns.shape))
+
+    def derivatives(self, z: Array, z_dot: Array, z_ddot: Array) -> "ForceDerivatives":
+        """Return the derivatives of `inverse_dynamics` (without wrenches from outside), recursive and exact.
+
+        By positions along the rates (rotations: R exp(dz)), by rates, by accelerations: docs/recursive.md §5, after
+        Carpentier & Mansard (2018) and Singh, Russell & Wensing (2022).
+        """
+        self.take(z, z_dot, z_ddot)
+        self.run(TANGENTS)
+        return ForceDerivatives(self.dense.by_z.copy(), self.dense.by_rate.copy(), self.dense.M.copy())
+
+    def forward_derivatives(self, z: Array, z_dot: Array, force: Array | None = None) -> "AccelerationDerivatives":
+        """Return the derivatives of `forward_dynamics`: -M⁻¹ times those of the forces at its end, and M⁻¹."""
+        z_ddot = self.forward_dynamics(z, z_dot, force)
+        forces = self.derivatives(z, z_dot, z_ddot)
+        solved = self.solve(z, np.hstack([-forces.by_z, -forces.by_z_dot, np.eye(self.n_rates)]))
+        return AccelerationDerivatives(*np.hsplit(solved, 3))
 
     def state(self, z: Array, z_dot: Array | None = None) -> State:
         """Return positions and velocities of all bodies in the frames of their files."""
@@ -313,10 +342,21 @@ class RelativeModel:
         work.v[:] = 0.0 if z_dot is None else checked("z_dot", z_dot, n)
         work.a[:] = 0.0 if z_ddot is None else checked("z_ddot", z_ddot, n)
 
-    def run(self, what: int, times: int = 1) -> None:
+    @cached_property
+    def none(self) -> Dense:
+        """Matrices without entries, for what needs none."""
+        return new_dense(self.expansion.nodes, self.n_rates, 0, is_whole=False)
+
+    @cached_property
+    def dense(self) -> Dense:
+        """Matrices over the rates."""
+        return new_dense(self.expansion.nodes, self.n_rates, 0, is_whole=True)
+
+    def run(self, what: int, times: int = 1, dense: Dense | None = None) -> None:
         """Run the kernels; `ModelError` where there is no inertia along a coordinate."""
         e = self.expansion
-        node = run_task(e.nodes, self.work, e.compiled.model, self.marker_work, what, times)
+        matrices = dense or (self.dense if what in (MASS, TANGENTS) else self.none)
+        node = run_task(e.nodes, self.work, matrices, e.compiled.model, self.marker_work, what, times)
         if node >= 0:
             first = int(e.nodes.v0[node])
             raise ModelError(

@@ -242,12 +242,12 @@ def solve_articulated(nodes, work):
 
 
 @loops
-def solve_columns(nodes, work):
-    """Overwrite the rows of `M`, (n_v, n_v), by M⁻¹ of each: right sides in, accelerations out."""
+def solve_columns(nodes, work, columns):
+    """Overwrite the rows of columns, (m, n_v), by M⁻¹ of each: right sides in, accelerations out."""
     n = work.right.shape[0]
-    for i in range(n):
+    for i in range(columns.shape[0]):
         for j in range(n):
-            work.right[j] = work.M[i, j]
+            work.right[j] = columns[i, j]
         solve_articulated(nodes, work)
         for j in range(n):
-            work.M[i, j] = work.right[j]
+            columns[i, j] = work.right[j]

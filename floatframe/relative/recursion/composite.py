@@ -162,9 +162,9 @@ def along(S, f, t):
 
 
 @loops
-def go_up(nodes, work, k, v, f, t):
+def go_up(nodes, work, M, k, v, f, t):
     """Write M of rate v of node k with the rates of all nodes above (4)."""
-    M, S = work.M, work.S
+    S = work.S
     while True:
         above = nodes.parent[k]
         if above < 0:
@@ -187,7 +187,7 @@ def go_up(nodes, work, k, v, f, t):
 
 
 @loops
-def flexible_columns(nodes, work, k):
+def flexible_columns(nodes, work, M, k):
     """Write U of the rates of a flexible body and their part of M (3)."""
     n, n_z, v0, vq = nodes.n_q[k], nodes.n_z[k], nodes.v0[k], nodes.vq[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
@@ -204,23 +204,23 @@ def flexible_columns(nodes, work, k):
         put(work.U[v], 3, t)
         for i in range(n_z + n):
             row = v0 + i if i < n_z else vq + i - n_z
-            work.M[row, v] = along(work.S[row], f, t) + (column_j[6 + i - n_z] if i >= n_z else 0.0)
+            M[row, v] = along(work.S[row], f, t) + (column_j[6 + i - n_z] if i >= n_z else 0.0)
 
 
 @loops
-def mass_matrix(nodes, work, model, marker_work):
+def mass_matrix(nodes, work, M, model, marker_work):
     """Write the mass matrix; nodes are placed in the ground, flexible bodies evaluated."""
     n_n, S = nodes.parent.shape[0], work.S
     for k in range(n_n):
         moments_in_ground(nodes, work, model, marker_work, k)
-    work.M[:, :] = 0.0
+    M[:, :] = 0.0
     for k in range(n_n - 1, -1, -1):
         v0, n_z, n = nodes.v0[k], nodes.n_z[k], nodes.n_q[k]
         if n > 0:
-            flexible_columns(nodes, work, k)
+            flexible_columns(nodes, work, M, k)
             for j in range(n):
                 v = nodes.vq[k] + j
-                go_up(nodes, work, k, v, vector(work.U[v]), vector(work.U[v, 3:]))
+                go_up(nodes, work, M, k, v, vector(work.U[v]), vector(work.U[v, 3:]))
         else:
             m, s, J = work.mass[k], vector(work.s[k]), matrix(work.J[k])
             for v in range(v0, v0 + n_z):
@@ -228,9 +228,9 @@ def mass_matrix(nodes, work, model, marker_work):
                 put(work.U[v], 0, f)
                 put(work.U[v], 3, t)
                 for j in range(v0, v0 + n_z):
-                    work.M[j, v] = along(S[j], f, t)
+                    M[j, v] = along(S[j], f, t)
         for v in range(v0, v0 + n_z):
-            go_up(nodes, work, k, v, vector(work.U[v]), vector(work.U[v, 3:]))
+            go_up(nodes, work, M, k, v, vector(work.U[v]), vector(work.U[v, 3:]))
         if nodes.parent[k] >= 0:
             add_to_parent(nodes, work, k)
 

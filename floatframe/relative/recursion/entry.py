@@ -14,12 +14,13 @@ from floatframe.relative.recursion.articulated import articulate, solve_articula
 from floatframe.relative.recursion.columns import motion_in_ground, rate_columns
 from floatframe.relative.recursion.composite import evaluate_flexible, mass_matrix
 from floatframe.relative.recursion.newton_euler import newton_euler
-from floatframe.relative.recursion.nodes import Nodes, NodeWork
+from floatframe.relative.recursion.nodes import Dense, Nodes, NodeWork
 from floatframe.relative.recursion.poses import place_in_ground, place_in_parent, set_modes
+from floatframe.relative.recursion.tangents import force_tangents
 
-__all__ = ["FORWARD", "INVERSE", "MASS", "PLACE", "SOLVE", "Task", "run_task"]
+__all__ = ["FORWARD", "INVERSE", "MASS", "PLACE", "SOLVE", "TANGENTS", "Task", "run_task"]
 
-PLACE, INVERSE, MASS, FORWARD, SOLVE = range(5)  #: values of `Task.what`
+PLACE, INVERSE, MASS, FORWARD, SOLVE, TANGENTS = range(6)  #: values of `Task.what`
 
 
 class Task(NamedTuple):
@@ -30,16 +31,16 @@ class Task(NamedTuple):
 
 
 as_nodes, as_node_work, as_model = converter(Nodes()), converter(NodeWork()), converter(Model())
-as_work, as_task = converter(Work()), converter(Task())
+as_work, as_task, as_dense = converter(Work()), converter(Task()), converter(Dense())
 
 
 def make_entry(digest):
     """Return the cached entry; the digest of the sources enters its key."""
 
-    def run(nodes_table, work_table, model_table, marker_table, task_table):
+    def run(nodes_table, work_table, dense_table, model_table, marker_table, task_table):
         if digest == 0:
             return -1
-        nodes, work = as_nodes(nodes_table), as_node_work(work_table)
+        nodes, work, dense = as_nodes(nodes_table), as_node_work(work_table), as_dense(dense_table)
         model, marker_work, task = as_model(model_table), as_work(marker_table), as_task(task_table)
         for _ in range(task.times):
             what = task.what
@@ -51,9 +52,9 @@ def make_entry(digest):
             if what == INVERSE:
                 newton_euler(nodes, work, model, marker_work)
             else:
-                if what == FORWARD:
+                if what == FORWARD or what == TANGENTS:
                     newton_euler(nodes, work, model, marker_work)
-                    for j in range(work.a.shape[0]):
+                    for j in range(work.right.shape[0]):
                         work.right[j] = work.force_given[j] - work.force[j]
                 elif what == MASS or what == SOLVE:
                     evaluate_flexible(nodes, model, marker_work)
@@ -61,8 +62,12 @@ def make_entry(digest):
                 rate_columns(nodes, work, model, marker_work)
                 if what == PLACE:
                     motion_in_ground(nodes, work)
+                elif what == TANGENTS:
+                    motion_in_ground(nodes, work)
+                    mass_matrix(nodes, work, dense.M, model, marker_work)
+                    force_tangents(nodes, work, dense, model, marker_work)
                 elif what == MASS:
-                    mass_matrix(nodes, work, model, marker_work)
+                    mass_matrix(nodes, work, dense.M, model, marker_work)
                 else:
                     singular = articulate(nodes, work, model, marker_work)
                     if singular >= 0:
@@ -70,7 +75,7 @@ def make_entry(digest):
                     if what == FORWARD:
                         solve_articulated(nodes, work)
                     else:
-                        solve_columns(nodes, work)
+                        solve_columns(nodes, work, dense.columns)
         return -1
 
     try:
@@ -83,9 +88,11 @@ run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
 NOTHING = zeros(Task(), {})
 
 
-def run_task(nodes: Nodes, work: NodeWork, model: Model, marker_work: Work, what: int, times: int = 1) -> int:
+def run_task(
+    nodes: Nodes, work: NodeWork, dense: Dense, model: Model, marker_work: Work, what: int, times: int = 1
+) -> int:
     """Do what is asked for with the numbers in `work`; return -1, or the node whose matrix is singular."""
     task = filled(Task(), **(NOTHING._asdict() | {"what": what, "times": times}))
-    return int(
-        run(kept_table_of(nodes), kept_table_of(work), kept_table_of(model), kept_table_of(marker_work), table_of(task))
-    )
+    tables = (kept_table_of(each) for each in (nodes, work, model, marker_work))
+    of_nodes, of_work, of_model, of_markers = tables
+    return int(run(of_nodes, of_work, table_of(dense), of_model, of_markers, table_of(task)))

@@ -5,8 +5,8 @@ velocity being needed:
 
     (1) forward   omega' = Rᵀ omega, alpha' = Rᵀ alpha, a' = Rᵀ (a + alpha × p + omega × (omega × p)) of the parent,
                   to which the joint adds its rates; markers of flexible bodies what they do in their body
-    (2) body      f = m a + alpha × s + omega × (omega × s),  t = s × a + J alpha + omega × J omega, less what is
-                  applied; flexible: the equations of kernels/body.py
+    (2) body      f = m a + alpha × s + omega × (omega × s),  t = s × a + J alpha + omega × J omega; of a flexible one
+                  the equations of kernels/body.py
     (3) backward  generalised forces: the wrench along the rates of the joint; the wrench goes on to the parent, and by
                   the markers to the modal forces of both bodies
 
@@ -33,7 +33,7 @@ from floatframe.kernels.vector import (
 from floatframe.relative.recursion.elastic import add_modal_forces, marker_acceleration, relative_acceleration
 from floatframe.relative.recursion.nodes import ROTATION, SCREW, TRANSLATION
 
-__all__ = ["newton_euler"]
+__all__ = ["elastic_carrier", "newton_euler"]
 
 
 @loops
@@ -122,7 +122,7 @@ def forward(nodes, work, model, marker_work):
         put(work.omega[k], 0, omega)
         put(work.alpha[k], 0, alpha)
         put(work.acc[k], 0, a)
-        f, t = scaled(-1.0, vector(work.f_given[k])), scaled(-1.0, vector(work.t_given[k]))
+        f, t = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         if nodes.n_q[k] > 0:
             i, u0 = nodes.body[k], nodes.u0[k]
             put_matrix(marker_work.state.R[i], unit_matrix())
@@ -131,13 +131,13 @@ def forward(nodes, work, model, marker_work):
             put(marker_work.state.u_dot, u0 + 3, alpha)
             body_forces(model, marker_work, i)
             residual = marker_work.bodies.residual
-            f, t = add(f, vector(residual[u0:])), add(t, vector(residual[u0 + 3 :]))
+            f, t = vector(residual[u0:]), vector(residual[u0 + 3 :])
         elif nodes.body[k] >= 0:
             s, J = vector(nodes.s[k]), nodes.J[k]
             turning = add(cross(alpha, s), cross(omega, cross(omega, s)))
-            f = add(f, add(scaled(nodes.mass[k], a), turning))
+            f = add(scaled(nodes.mass[k], a), turning)
             turning = add(turned(J, alpha), cross(omega, turned(J, omega)))
-            t = add(t, add(cross(s, a), turning))
+            t = add(cross(s, a), turning)
         put(work.f[k], 0, f)
         put(work.t[k], 0, t)
 

@@ -17,11 +17,23 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.records import Size, integer, real, zeros
 
-__all__ = ["FIXED", "NO_MARKER", "ROTATION", "SCREW", "TRANSLATION", "NodeWork", "Nodes", "new_node_work"]
+__all__ = [
+    "FIXED",
+    "NO_MARKER",
+    "ROTATION",
+    "SCREW",
+    "TRANSLATION",
+    "Dense",
+    "NodeWork",
+    "Nodes",
+    "new_dense",
+    "new_node_work",
+]
 
 FIXED, SCREW, TRANSLATION, ROTATION = 0, 1, 2, 3  #: values of `Nodes.kind`
 NO_MARKER = -1
 
+n_d, n_dn = Size("rates of matrices"), Size("nodes of matrices")
 n_n, n_b, n_v, n_x, n_above = (Size(name) for name in ("nodes", "n_b", "rates", "positions", "columns above"))
 
 
@@ -71,8 +83,6 @@ class NodeWork(NamedTuple):
     acc: Array = real(n_n, 3, unit="m/s²")  #: acceleration of the origin minus gravity
     f: Array = real(n_n, 3, unit="N")  #: force that the subtree needs
     t: Array = real(n_n, 3, unit="N m")  #: moment about the origin
-    f_given: Array = real(n_n, 3, unit="N")  #: applied from outside
-    t_given: Array = real(n_n, 3, unit="N m")
     reaction: Array = real(n_n, 6, unit="N, N m")  #: wrench of the joint on its outer frame, axes and point of that
     R_G: Array = real(n_n, 3, 3)  #: axes in those of the ground
     r_G: Array = real(n_n, 3, unit="m")  # noqa: N815  #: origin, ground axes
@@ -86,7 +96,6 @@ class NodeWork(NamedTuple):
     mass: Array = real(n_n, unit="kg")  #: of the subtree, its joints and modes held
     s: Array = real(n_n, 3, unit="kg m")  #: first moment about the origin of the node
     J: Array = real(n_n, 3, 3, unit="kg m²")
-    M: Array = real(n_v, n_v, unit="kg m²")  #: mass matrix
     I_ff: Array = real(n_n, 3, 3, unit="kg")  #: articulated inertia: force by acceleration
     I_ft: Array = real(n_n, 3, 3, unit="kg m")  #: force by angular acceleration
     I_tt: Array = real(n_n, 3, 3, unit="kg m²")  #: moment by it
@@ -99,6 +108,45 @@ class NodeWork(NamedTuple):
     right: Array = real(n_v, unit="N, N m")  #: right side, then accelerations
     wrench: Array = real(n_n, 6, unit="N, N m")  #: that hangs on a node
     motion: Array = real(n_n, 6, unit="m/s², rad/s²")  #: acceleration of a node, at its origin
+
+
+class Dense(NamedTuple):
+    """What grows with the square of the rates, and what derivatives need; without entries where it is not asked for.
+
+    Ground axes, motions and wrenches about the origin of the ground.
+    """
+
+    M: Array = real(n_d, n_d, unit="kg m²")  #: mass matrix
+    columns: Array = real(Size("right sides"), n_d)  #: right sides, then solutions
+    by_z: Array = real(n_d, n_d)  #: forces by positions
+    by_rate: Array = real(n_d, n_d)  #: forces by rates
+    S: Array = real(n_d, 6, unit="m, rad")  #: motion of what hangs at a rate
+    change: Array = real(n_d, 18)  #: Y and X by its position, X by its rate, see recursion/tangents.py
+    above: Array = real(n_above, 6)  #: the same by a mode of a flexible parent
+    above_change: Array = real(n_above, 18)
+    momentum: Array = real(n_dn, 3, unit="kg m/s")  #: of a subtree
+    Q: Array = real(n_dn, 3, 3, unit="kg m²/s")  #: moment by the common change of its angular velocities
+    s: Array = real(n_dn, 3, unit="kg m")  #: first moment of a subtree
+    J: Array = real(n_dn, 3, 3, unit="kg m²")
+    wrench: Array = real(n_dn, 6, unit="N, N m")  #: that a subtree needs
+    row_a: Array = real(n_d, 6)  #: force along a rate by X of all it hangs at
+    row_b: Array = real(n_d, 3)  #: by the rotation of Y
+    by_mode: Array = real(n_d, 12)  #: wrench by a mode of a body and by its rate
+    scratch: Array = real(2, Size("most six"))
+
+
+def new_dense(nodes: Nodes, n_v: int, n_right: int, *, is_whole: bool) -> Dense:
+    """Return arrays for matrices; whole: for the mass matrix and derivatives, else for nothing but right sides."""
+    sizes = {
+        "rates of matrices": n_v,
+        "right sides": n_right,
+        "columns above": int(nodes.c0[-1]),
+        "nodes of matrices": len(nodes.parent),
+        "most six": 6 * int(max(nodes.n_q, default=0)),
+    }
+    if is_whole:
+        return zeros(Dense(), sizes)
+    return zeros(Dense(), dict.fromkeys(sizes, 0))._replace(columns=np.zeros((n_right, n_v)))
 
 
 def new_node_work(nodes: Nodes, n_x: int, n_v: int) -> NodeWork:

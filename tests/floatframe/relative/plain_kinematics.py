@@ -198,7 +198,8 @@ def flexible_tree(seed=0, *, is_free=False, is_stiffened=True, n=3):
             bodies.append(ff.FlexibleBody(f"b{i}", reduced, position=r, orientation=euler_parameters(R)))
         if is_free and i == 0:
             continue
-        markers = (far, near) if i % 3 == 2 or kind == "universal" else (near, far)
+        is_reversed = kind in (("universal", "planar", "spherical") if is_stiffened else ("screw", "cylindrical"))
+        markers = (far, near) if is_reversed else (near, far)
         joints.append(made[kind](f"j{i}", *markers))
     return ff.System(bodies, joints, [ff.Gravity((0.5, -1.0, -9.81))])
 

@@ -203,3 +203,14 @@ class PinocchioTree:
     def forward_dynamics(self, x, v, force):
         """Return accelerations."""
         return self.ours(self.pin.aba(self.model, self.data, self.x(x), self.v(v), self.v(force)))
+
+    def derivatives(self, x, v, a):
+        """Return derivatives of the forces by positions, by rates."""
+        x, v, a = self.x(x), self.v(v), self.v(a)
+        return [self.ours(A) for A in self.pin.computeRNEADerivatives(self.model, self.data, x, v, a)[:2]]
+
+    def forward_derivatives(self, x, v, force):
+        """Return derivatives of the accelerations by positions, by rates, by forces."""
+        x, v, force = self.x(x), self.v(v), self.v(force)
+        made = self.pin.computeABADerivatives(self.model, self.data, x, v, force)
+        return [self.ours(A) for A in made]

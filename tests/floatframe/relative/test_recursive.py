@@ -57,6 +57,22 @@ def test_accelerations_are_those_of_pinocchio(rigid):
     assert_allclose(model.forward_dynamics(z, z_dot, force), expected, rtol=0, atol=atol)
 
 
+def test_derivatives_of_forces_are_those_of_pinocchio(rigid):
+    model, other, z, z_dot, z_ddot, _ = rigid
+    got = model.derivatives(z, z_dot, z_ddot)
+    for ours, theirs in zip(got, other.derivatives(z, z_dot, z_ddot), strict=False):
+        assert_allclose(ours, theirs, rtol=0, atol=100 * ROUNDOFF * np.abs(theirs).max())
+
+
+def test_derivatives_of_accelerations_are_those_of_pinocchio(rigid):
+    model, other, z, z_dot, _, rng = rigid
+    force = rng.normal(size=model.n_rates)
+    condition = np.linalg.cond(other.mass_matrix(z))
+    got = model.forward_derivatives(z, z_dot, force)
+    for ours, theirs in zip(got, other.forward_derivatives(z, z_dot, force), strict=True):
+        assert_allclose(ours, theirs, rtol=0, atol=min(BESIDE * condition, 1e-6) * np.abs(theirs).max())
+
+
 FLEXIBLE = {
     "plain": {"is_stiffened": False},
     "stiffened": {},
@@ -109,6 +125,24 @@ def test_forward_dynamics_undoes_inverse_dynamics(flexible):
     condition = np.linalg.cond(model.mass_matrix(z))
     got = model.forward_dynamics(z, z_dot, model.inverse_dynamics(z, z_dot, z_ddot))
     assert_allclose(got, z_ddot, rtol=0, atol=100 * ROUNDOFF * condition)
+
+
+def differences(function, size, step):
+    """Return the derivative by central differences of sixth order."""
+    columns = []
+    for e in np.eye(size) * step:
+        near, far, furthest = (function(k * e) - function(-k * e) for k in (1, 2, 3))
+        columns.append((45 * near - 9 * far + furthest) / (60 * step))
+    return np.array(columns).T
+
+
+def test_derivatives_of_flexible_trees_are_those_of_differences(flexible):
+    model, (z, z_dot, z_ddot) = flexible.model, (flexible.z, flexible.z_dot, flexible.z_ddot)
+    by_z = differences(lambda d: model.inverse_dynamics(model.moved(z, d), z_dot, z_ddot), model.n_rates, 1e-3)
+    by_z_dot = differences(lambda d: model.inverse_dynamics(z, z_dot + d, z_ddot), model.n_rates, 1e-2)
+    got = model.derivatives(z, z_dot, z_ddot)
+    assert_allclose(got.by_z, by_z, rtol=0, atol=1e-10 * np.abs(by_z).max())
+    assert_allclose(got.by_z_dot, by_z_dot, rtol=0, atol=1e-10 * np.abs(by_z_dot).max())
 
 
 def test_the_state_of_the_bodies_is_that_of_plain_kinematics_and_back(flexible):
