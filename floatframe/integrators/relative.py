@@ -153,14 +153,16 @@ class RelativeGeneralizedAlpha:
         return Failure(words, outcome[4])
 
 
-def in_formulation(integrator: Integrator, formulation: str) -> Integrator:
-    """Return the method in a formulation by its name, "absolute" (as it is) or "relative".
+def in_formulation(integrator: Integrator, formulation: str | None) -> Integrator:
+    """Return the method in a formulation by its name, "absolute" or "relative"; None: as it is.
 
     Raises
     ------
     ModelError
         If there is no such formulation, or the method is absolute alone.
     """
+    if formulation is None:
+        return integrator
     if formulation not in FORMULATIONS:
         raise ModelError(f"formulation: expected one of {', '.join(FORMULATIONS)}, got {formulation!r}")
     if formulation == "absolute":

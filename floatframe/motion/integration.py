@@ -123,7 +123,7 @@ def integrate(
     """
     t_start, t_end = number("integrate: t_start", t_start), number("integrate: t_end", t_end)
     h = number("integrate: h", h, above=0.0)
-    integrator = integrator if formulation is None else in_formulation(integrator, formulation)
+    integrator = in_formulation(integrator, formulation)
     if t_end <= t_start:
         raise ModelError(f"integrate: expected t_end above t_start = {t_start:g}, got {t_end:g}")
     if output_every < 1 or batch_steps < 1:
