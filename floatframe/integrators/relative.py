@@ -247,7 +247,7 @@ def shifted(system: System, carry: Carry, a: Array, h: float, beta: float, t: fl
     joints.x[:] = 0.0
     joints.d[:], joints.Q[:], joints.acceleration[:] = joints.d_start, joints.Q_start, 0.0
     n_s = len(tree.slot)
-    K = newton_matrix(model, work, tree, joints, new_tangent_work(model, tree), 1.0, 0.0, 0.0)
+    K = newton_matrix(model, work, tree, joints, 1.0, 0.0, 0.0)
     weight = beta * h**2 * squared_frequencies(model)[tree.slot]
     K[:n_s, :n_s] += np.diag(np.where(is_column, 0.0, weight * np.diag(K)[:n_s]))
     change = np.linalg.lstsq(K, np.concatenate([np.zeros(n_s), -gap / h]), rcond=1e-12)[0][:n_s]

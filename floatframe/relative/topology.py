@@ -277,6 +277,10 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         s0.append(m0[-1] + n_q)
         unknowns += [(-1, q0 + k, u0 + 6 + k) for k in range(n_q)]
     jet0, jets = jets_of(model, ordered, near, far, lists["unknown"], column0, m0)
+    own_jet = np.full(s0[-1], -1)
+    for j, (kind, _, s) in enumerate(jets):
+        if kind != NEAR_MODE:
+            own_jet[s] = j
     taken = {each.joint for each in branches}
     kept = [c for c in range(len(model.connections.size)) if c not in taken]
     is_kept: IntArray = np.isin(np.arange(len(model.connections.size)), kept).astype(np.int64)
@@ -308,4 +312,6 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         jet_kind=[kind for kind, _, _ in jets],
         jet_item=[item for _, item, _ in jets],
         jet_s=[s for _, _, s in jets],
+        own_jet=own_jet,
+        l0=np.concatenate([[0], np.cumsum(np.diff(s0) ** 2)]),
     )

@@ -18,9 +18,10 @@ from floatframe.kernels.work import Work
 from floatframe.relative.kernels.evaluation import evaluate_tree
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
 from floatframe.relative.kernels.projection import put_reactions
-from floatframe.relative.kernels.steps import advance_tree, write_tree_row
+from floatframe.relative.kernels.steps import SINGULAR, advance_tree, write_tree_row
 from floatframe.relative.kernels.tangent import assemble, write_tangent
-from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree
+from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree, new_tangent_work
+from floatframe.relative.kernels.tree_factors import factorize_tree, solve_newton
 
 __all__ = [
     "advance_tree_steps",
@@ -28,11 +29,12 @@ __all__ = [
     "motion_of_joints",
     "moved",
     "newton_matrix",
+    "newton_step",
     "observe_tree",
     "projected",
 ]
 
-MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT, OBSERVE, ADVANCE = range(7)
+MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT, OBSERVE, ADVANCE, CORRECT = range(8)
 
 
 as_model, as_work, as_tree = converter(Model()), converter(Work()), converter(Tree())
@@ -67,6 +69,13 @@ def make_entry(digest):
         elif what == PROJECT:
             evaluate_tree(model, work, tree, joints, order.c_k)
             put_reactions(model, work, tree, joints)
+        elif what == CORRECT:
+            c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
+            evaluate_tree(model, work, tree, joints, c_k)
+            write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+            if not factorize_tree(model, work, tree, tangent, c_d, c_k):
+                return SINGULAR, 0, 0, -1, 0.0
+            solve_newton(work, tree, joints, tangent, c_k)
         else:
             c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
             evaluate_tree(model, work, tree, joints, c_k if c_k > 0.0 else 1.0)
@@ -85,7 +94,9 @@ SIGNATURE = (types.Array(types.int64, 1, "C"),) * 8
 NOTHING = zeros(Order(), {})
 
 
-NO_TANGENT = zeros(TangentWork(), dict.fromkeys(("n_b", "n_s", "jets", "n_q", "n_most", "n_newton"), 0))
+NO_TANGENT = zeros(
+    TangentWork(), dict.fromkeys((("n_b", "n_s", "jets", "n_q", "n_most", "kept rows", "numbers of L", "n_dense")), 0)
+)
 
 
 def call(
@@ -128,12 +139,20 @@ def projected(model: Model, work: Work, tree: Tree, joints: JointWork, c_k: floa
     return joints.residual.copy()
 
 
-def newton_matrix(
-    model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork, c_m: float, c_d: float, c_k: float
-) -> Array:
-    """Return the Newton matrix, unknowns and kept wrenches (times c_k), (n_newton, n_newton), at the iterate."""
+def newton_matrix(model: Model, work: Work, tree: Tree, joints: JointWork, c_m: float, c_d: float, c_k: float) -> Array:
+    """Return the Newton matrix at the iterate, unknowns and kept wrenches (times c_k), (n_s + n_rows,) squared."""
+    tangent = new_tangent_work(model, tree, is_dense=True)
     call(model, work, tree, joints, tangent, what=TANGENT, c_m=c_m, c_d=c_d, c_k=c_k)
-    return tangent.K.copy()
+    return tangent.K
+
+
+def newton_step(
+    model: Model, work: Work, tree: Tree, joints: JointWork, c_m: float, c_d: float, c_k: float
+) -> tuple[Array, Array]:
+    """Return Newton's correction of unknowns, (n_s,), and of kept wrenches times c_k, (n_rows,), at the iterate."""
+    tangent = new_tangent_work(model, tree)
+    call(model, work, tree, joints, tangent, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k)
+    return tangent.step, tangent.mu
 
 
 def observe_tree(model: Model, work: Work, tree: Tree, joints: JointWork, memory: Memory, t: float) -> Rows:

@@ -14,7 +14,7 @@ theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) =
 """
 
 from floatframe.kernels.compiler.compilation import inner, small
-from floatframe.kernels.marker import shape
+from floatframe.kernels.marker import bent_rate, shape
 from floatframe.kernels.rotation import left_jacobian_derivative, right_jacobian
 from floatframe.kernels.vector import (
     add,
@@ -27,7 +27,7 @@ from floatframe.kernels.vector import (
     vector,
 )
 from floatframe.relative.kernels.kinematics import end_acceleration, end_motion
-from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
+from floatframe.relative.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
 __all__ = ["mode_screw", "mode_screws", "put_jets", "spatial_cross", "world_screw", "write_jets"]
 
@@ -100,30 +100,42 @@ def mode_screw(model, work, m, i, k):
 
 
 @inner
-def mode_screws(model, work, m, i, k):
+def deformation_accelerations(model, work, m, i):
+    """Return the second rates of place and elastic angle of marker m as body i sees them."""
+    n, o, first = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
+    u0, psi = model.bodies.u0[i] + 6, work.markers.psi[o : o + 6 * n]
+    rho_2, angle_2 = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for j in range(n):
+        q_ddot = work.state.u_dot[u0 + j]
+        d, th = shape(psi, n, j)
+        rho_2, angle_2 = add(rho_2, scaled(q_ddot, d)), add(angle_2, scaled(q_ddot, th))
+    if first >= 0:
+        bend_dot = work.markers.bend_dot[: 6 * n]
+        bent_rate(model, work, m, i, bend_dot)
+        for j in range(n):
+            q_dot = work.state.u[u0 + j]
+            d, th = shape(bend_dot, n, j)
+            rho_2, angle_2 = sub(rho_2, scaled(q_dot, d)), sub(angle_2, scaled(q_dot, th))
+    return rho_2, angle_2
+
+
+@inner
+def mode_screws(model, work, m, i, k, rho_2, angle_2):
     """Return the screw of `mode_screw`, its rate and its second rate as the body sees them.
 
-    (Psi_t + rho × b, b), b = T' Psi_r; the second derivative of T' along th_dot is a difference.
+    (Psi_t + rho × b, b), b = T' Psi_r; rho_2, angle_2 as of `deformation_accelerations`; the second derivative of T'
+    along th_dot is a difference.
     """
     markers, n, o, first = work.markers, model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
     u0, T, angle, zero = model.bodies.u0[i] + 6, work.markers.T_left[m], vector(work.markers.angle[m]), (0.0, 0.0, 0.0)
-    psi = markers.psi[o : o + 6 * n]
-    d, th = shape(psi, n, k)
+    d, th = shape(markers.psi[o : o + 6 * n], n, k)
     d_1, th_1, d_2, th_2 = zero, zero, zero, zero  # rates of Psi(q)
-    rho_2, angle_2 = zero, zero  # accelerations of rho and of the angle
-    for j in range(n):
-        q_dot, q_ddot = work.state.u[u0 + j], work.state.u_dot[u0 + j]
-        d_j, th_j = shape(psi, n, j)
-        rho_2, angle_2 = add(rho_2, scaled(q_ddot, d_j)), add(angle_2, scaled(q_ddot, th_j))
-        if first >= 0:
-            bend = model.markers.bend[first + 6 * n * j : first + 6 * n * (j + 1)]
-            d_j, th_j = shape(bend, n, k)
+    if first >= 0:
+        for j in range(n):
+            q_dot, q_ddot = work.state.u[u0 + j], work.state.u_dot[u0 + j]
+            d_j, th_j = shape(model.markers.bend[first + 6 * n * j : first + 6 * n * (j + 1)], n, k)
             d_1, th_1 = sub(d_1, scaled(q_dot, d_j)), sub(th_1, scaled(q_dot, th_j))
             d_2, th_2 = sub(d_2, scaled(q_ddot, d_j)), sub(th_2, scaled(q_ddot, th_j))
-            for l in range(n):  # noqa: E741
-                d_j, th_j = shape(bend, n, l)
-                both = q_dot * work.state.u[u0 + l]
-                rho_2, angle_2 = sub(rho_2, scaled(both, d_j)), sub(angle_2, scaled(both, th_j))
     rho, rho_1, angle_1 = vector(markers.rho[m]), vector(markers.rho_dot[m]), vector(markers.angle_dot[m])
     slope = left_jacobian_derivative(angle, th, 1.0)
     b, b_1 = turned(T, th), add(turned(slope, angle_1), turned(T, th_1))
@@ -146,33 +158,33 @@ def write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate):
     put(tangent.origin, 0, vector(work.state.r[tree.order[0]]))
     for i in range(tree.parent.shape[0]):
         column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate)
-        for j in range(tree.jet0[i], tree.jet0[i + 1]):
-            if tree.jet_kind[j] == NEAR_MODE:
-                S = tangent.screw[j], tangent.jet[j], tangent.reach[j]
-                mode_jet(model, work, tree.near[i], tree.jet_item[j], 1.0, tangent.origin, S, c_m, c_d, c_k, rate)
-            elif tree.jet_kind[j] != COLUMN:
-                S = tangent.screw[j], tangent.jet[j], tangent.reach[j]
-                mode_jet(model, work, tree.far[i], tree.jet_item[j], -1.0, tangent.origin, S, c_m, c_d, c_k, rate)
+        mode_jets(model, work, tree, tangent, i, NEAR_MODE, tree.near[i], 1.0, c_m, c_d, c_k, rate)
+        mode_jets(model, work, tree, tangent, i, FAR_MODE, tree.far[i], -1.0, c_m, c_d, c_k, rate)
 
 
 @inner
-def mode_jet(model, work, m, k, sign, origin, out, c_m, c_d, c_k, rate):
-    """Write screw, jet and reach of mode k at marker m into the arrays of `out`."""
-    i = model.markers.body[m]
-    r, R, v, omega = end_motion(model, work, -1, i)
-    a, alpha = end_acceleration(model, work, -1, i)
-    V, V_dot = spatial_motion(r, v, omega, a, alpha, vector(origin))
-    p = sub(r, vector(origin))
-    s, s_1, s_2 = mode_screws(model, work, m, i, k)
-    S = scaled_pair(sign, world_screw(R, p, s))
-    S_1 = scaled_pair(sign, world_screw(R, p, s_1))
-    S_2 = scaled_pair(sign, world_screw(R, p, s_2))
-    screw, jet, reach = out
-    put_pair_of(screw, 0, S)
-    by_rate = pair_sum(scaled_pair(c_d, S), scaled_pair(c_k, S_1))
-    by_second = pair_sum(scaled_pair(c_m, S), pair_sum(scaled_pair(2 * c_d, S_1), scaled_pair(c_k, S_2)))
-    put_jets(jet, scaled_pair(c_k, S), by_rate, by_second, V, V_dot)
-    put_reach(reach, S, pair_sum(scaled_pair(rate, S), S_1), V)
+def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate):
+    """Write screws, jets and reaches of the modes at marker m of the joint of body i."""
+    if m < 0 or model.markers.psi0[m] < 0:
+        return
+    body, origin = model.markers.body[m], vector(tangent.origin)
+    r, R, v, omega = end_motion(model, work, -1, body)
+    a, alpha = end_acceleration(model, work, -1, body)
+    V, V_dot = spatial_motion(r, v, omega, a, alpha, origin)
+    p = sub(r, origin)
+    rho_2, angle_2 = deformation_accelerations(model, work, m, body)
+    for j in range(tree.jet0[i], tree.jet0[i + 1]):
+        if tree.jet_kind[j] != kind:
+            continue
+        s, s_1, s_2 = mode_screws(model, work, m, body, tree.jet_item[j], rho_2, angle_2)
+        S = scaled_pair(sign, world_screw(R, p, s))
+        S_1 = scaled_pair(sign, world_screw(R, p, s_1))
+        S_2 = scaled_pair(sign, world_screw(R, p, s_2))
+        put_pair_of(tangent.screw[j], 0, S)
+        by_rate = pair_sum(scaled_pair(c_d, S), scaled_pair(c_k, S_1))
+        by_second = pair_sum(scaled_pair(c_m, S), pair_sum(scaled_pair(2 * c_d, S_1), scaled_pair(c_k, S_2)))
+        put_jets(tangent.jet[j], scaled_pair(c_k, S), by_rate, by_second, V, V_dot)
+        put_reach(tangent.reach[j], S, pair_sum(scaled_pair(rate, S), S_1), V)
 
 
 @inner

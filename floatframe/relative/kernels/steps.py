@@ -32,7 +32,8 @@ from floatframe.kernels.vector import dot
 from floatframe.relative.kernels.evaluation import evaluate_tree
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
 from floatframe.relative.kernels.projection import put_reactions
-from floatframe.relative.kernels.tangent import assemble, solve_dense, write_tangent
+from floatframe.relative.kernels.tangent import write_tangent
+from floatframe.relative.kernels.tree_factors import factorize_tree, solve_newton
 
 __all__ = ["SINGULAR", "advance_tree", "write_tree_row"]
 
@@ -102,14 +103,28 @@ def predict(model, work, tree, joints, memory, h, alpha_f):
 
 @inner
 def weigh(model, work, tree, tangent):
-    """Write the weights of the norm of unknowns: what of the mass a unit of a coordinate moves, M + c_k K of a mode."""
+    """Write the weights of the norm of unknowns: what of the mass a unit of a coordinate moves, M + c_k K of a mode.
+
+    The mass of a subtree is the derivative of its force by xi_ddot.
+    """
+    mass = tangent.mass
     for i in range(tree.parent.shape[0]):
+        for r in range(6):
+            for e in range(6):
+                mass[i, r, e] = tangent.D[i, r, 12 + e]
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        i = tree.order[place]
         for j in range(tree.jet0[i], tree.jet0[i + 1]):
             total = 0.0
             for r in range(6):
                 for e in range(6):
-                    total += tangent.screw[j, r] * tangent.D[i, r, 12 + e] * tangent.screw[j, e]
+                    total += tangent.screw[j, r] * mass[i, r, e] * tangent.screw[j, e]
             tangent.weight[tree.jet_s[j]] = abs(total)
+        if tree.parent[i] >= 0:
+            for r in range(6):
+                for e in range(6):
+                    mass[tree.parent[i], r, e] += mass[i, r, e]
+    for i in range(tree.parent.shape[0]):
         for k in range(model.bodies.n_q[i]):
             tangent.weight[tree.m0[i] + k] = work.solver.weight[model.bodies.u0[i] + 6 + k]
 
@@ -132,8 +147,7 @@ def sizes(model, work, tree, joints, tangent, gravity):
 def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
     """Add the correction to the iterate; return its squared norm."""
     total, step, state = 0.0, tangent.step, work.state
-    n_s = tree.slot.shape[0]
-    for s in range(n_s):
+    for s in range(tree.slot.shape[0]):
         k, slot, x = tree.column[s], tree.slot[s], step[s]
         total += tangent.weight[s] * x * x
         joints.increment[s] += x
@@ -146,7 +160,7 @@ def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
             state.u[slot] += by_rate * x
             state.u_dot[slot] += by_acceleration * x
     for k in range(tree.kept_row.shape[0]):
-        work.solver.mu[k] = step[n_s + tree.kept_row[k]] if tree.kept_row[k] >= 0 else 0.0
+        work.solver.mu[k] = tangent.mu[tree.kept_row[k]] if tree.kept_row[k] >= 0 else 0.0
         state.w[k] += work.solver.mu[k] / c_k
     move_joints(tree, joints)
     place_bodies(model, work, tree, joints)
@@ -198,15 +212,14 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     while iteration < order.max_iterations:
         evaluate_tree(model, work, tree, joints, c_k)
-        is_new = is_due
         if is_due:
             write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
-            assemble(model, work, tree, tangent, c_d, c_k)
             weigh(model, work, tree, tangent)
             work.counted.factorisations += 1
             is_due = False
-        if not solve_dense(model, work, tree, joints, tangent, c_k, is_new):
-            return SINGULAR, excess, -1.0
+            if not factorize_tree(model, work, tree, tangent, c_d, c_k):
+                return SINGULAR, excess, -1.0
+        solve_newton(work, tree, joints, tangent, c_k)
         if iteration == 0:
             size, size_x = sizes(model, work, tree, joints, tangent, model.gravity)
             allowed = order.tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))

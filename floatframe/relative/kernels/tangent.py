@@ -12,7 +12,6 @@ of the forces that stay in axes of bodies or ground are all there.
 from floatframe.kernels.body import axial, block, column, column_sum, put_block, tensor, trace_less
 from floatframe.kernels.compiler.compilation import inner, loops, small
 from floatframe.kernels.connections.connection import connection_derivatives
-from floatframe.kernels.dense import lu_factor, lu_solve
 from floatframe.kernels.evaluation import tangent_of_body
 from floatframe.kernels.marker import shape
 from floatframe.kernels.model import C2, C3
@@ -40,7 +39,16 @@ from floatframe.relative.kernels.jets import mode_screw, spatial_cross, world_sc
 from floatframe.relative.kernels.projection import force_slopes
 from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
 
-__all__ = ["assemble", "rigid_columns", "solve_dense", "write_tangent"]
+__all__ = [
+    "assemble",
+    "inner_product",
+    "product_of",
+    "rigid_columns",
+    "second_order",
+    "turned_power",
+    "unit_of",
+    "write_tangent",
+]
 
 
 @loops
@@ -91,6 +99,22 @@ def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
         of_body(model, work, joints, tangent, i, c_m, c_d, c_k)
     for e in range(tree.kept.shape[0]):
         connection_derivatives(model, work, tree.kept[e], c_k)
+    for r in range(tangent.V.shape[0]):
+        for k in range(tangent.V.shape[0]):
+            tangent.V[r, k] = 0.0
+        for k in range(tangent.C.shape[1]):
+            tangent.C[r, k] = 0.0
+            tangent.B[r, k] = 0.0
+    for e in range(tree.kept.shape[0]):
+        c = tree.kept[e]
+        for r in range(model.connections.size[c]):
+            for k in range(model.connections.size[c]):
+                first = tree.kept_row[model.connections.w0[c]]
+                tangent.V[first + r, first + k] = work.connections.V[c, r, k]
+    for m in range(model.markers.body.shape[0]):
+        c = model.markers.connection[m]
+        if c >= 0 and model.markers.body[m] >= 0 and tree.is_kept[c] != 0 and model.connections.size[c] > 0:
+            kept_marker(model, work, tree, tangent, m, tree.kept_row[model.connections.w0[c]], rate)
 
 
 @inner
@@ -183,16 +207,12 @@ def assemble(model, work, tree, tangent, c_d, c_k):
                 for e in range(18):
                     tangent.D[parent, r, e] += tangent.D[i, r, e]
     n_s = tree.s0[tree.s0.shape[0] - 1]
-    for e in range(tree.kept.shape[0]):
-        c = tree.kept[e]
-        first = n_s + tree.kept_row[model.connections.w0[c]] if model.connections.size[c] > 0 else n_s
-        for r in range(model.connections.size[c]):
-            for k in range(model.connections.size[c]):
-                K[first + r, first + k] += work.connections.V[c, r, k]
-    for m in range(model.markers.body.shape[0]):
-        c = model.markers.connection[m]
-        if c >= 0 and model.markers.body[m] >= 0 and tree.is_kept[c] != 0 and model.connections.size[c] > 0:
-            kept_marker(model, work, tree, tangent, m, n_s + tree.kept_row[model.connections.w0[c]], c_d, c_k)
+    for r in range(tangent.V.shape[0]):
+        for k in range(tangent.V.shape[0]):
+            K[n_s + r, n_s + k] = tangent.V[r, k]
+        for k in range(n_s):
+            K[n_s + r, k] = tangent.C[r, k]
+            K[k, n_s + r] = tangent.B[r, k]
 
 
 @inner
@@ -273,28 +293,28 @@ def turning_modes(model, work, tree, tangent, i, c_k):
                 K[s, tree.jet_s[e]] += turned_power(tangent.jet[e], screw, F)
             b = tree.parent[b]
         m, sign = (tree.near[i], 1.0) if is_near else (tree.far[i], -1.0)
-        second_order(model, work, tree, tangent, body, m, k, sign * c_k, F)
+        for l in range(model.bodies.n_q[body]):  # noqa: E741
+            own = second_order(model, work, tangent, body, m, k, l, F)
+            K[s, tree.m0[body] + l] += sign * c_k * own
 
 
 @inner
-def second_order(model, work, tree, tangent, i, m, k, factor, F):
-    """Add the change of the screw of mode k at marker m of body i by all its modes, as the body sees it, times F."""
-    n, o, first, m0 = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m], tree.m0[i]
+def second_order(model, work, tangent, i, m, k, l, F):  # noqa: E741
+    """Return the change of the screw of mode k at marker m of body i by mode l, as the body sees it, times F."""
+    n, o, first = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
     R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
     force = turned_back(R, F)
     moment = turned_back(R, sub(vector(F[3:]), cross(p, vector(F))))
     psi, T, rho = work.markers.psi[o : o + 6 * n], work.markers.T_left[m], vector(work.markers.rho[m])
     _, th_k = shape(psi, n, k)
+    d, th = shape(psi, n, l)
     b = turned(T, th_k)
-    slope = left_jacobian_derivative(vector(work.markers.angle[m]), th_k, 1.0)
-    for l in range(n):  # noqa: E741
-        d, th = shape(psi, n, l)
-        db, dd = turned(slope, th), (0.0, 0.0, 0.0)
-        if first >= 0:
-            d_kl, th_kl = shape(model.markers.bend[first + 6 * n * l :], n, k)
-            dd, db = scaled(-1.0, d_kl), sub(db, turned(T, th_kl))
-        moved = add(dd, add(cross(d, b), cross(rho, db)))
-        tangent.K[m0 + k, m0 + l] += factor * (dot(moved, force) + dot(db, moment))
+    db, dd = turned(left_jacobian_derivative(vector(work.markers.angle[m]), th_k, 1.0), th), (0.0, 0.0, 0.0)
+    if first >= 0:
+        d_kl, th_kl = shape(model.markers.bend[first + 6 * n * l : first + 6 * n * (l + 1)], n, k)
+        dd, db = scaled(-1.0, d_kl), sub(db, turned(T, th_kl))
+    moved = add(dd, add(cross(d, b), cross(rho, db)))
+    return dot(moved, force) + dot(db, moment)
 
 
 @inner
@@ -308,10 +328,9 @@ def loaded_columns(model, work, tree, tangent, i, c_d, c_k):
 
 
 @inner
-def kept_marker(model, work, tree, tangent, m, first, c_d, c_k):
+def kept_marker(model, work, tree, tangent, m, first, rate):
     """Add rows and columns of the connection of marker m, whose rows begin at `first`, by what moves the marker."""
     i, c = model.markers.body[m], model.markers.connection[m]
-    rate = c_d / c_k if c_k > 0.0 else 0.0
     p = sub(vector(work.markers.r[m]), vector(tangent.origin))
     v, omega = vector(work.markers.v[m]), vector(work.markers.omega[m])
     b = i
@@ -362,7 +381,7 @@ def mode_rate(model, work, m, i, k):
 @inner
 def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omega):
     """Add row and column of unknown s, which moves marker m of connection c by xi, xi_dot; unit: its screw."""
-    K, motion, P = tangent.K, tangent.motion, work.connections.P[m]
+    C, B, motion, P = tangent.C, tangent.B, tangent.motion, work.connections.P[m]
     put(motion, 0, add(xi[0], cross(xi[1], p)))
     put(motion, 3, xi[1])
     put(motion, 6, add(add(xi_dot[0], cross(xi_dot[1], p)), cross(xi[1], v)))
@@ -371,32 +390,14 @@ def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omeg
         total = 0.0
         for k in range(12):
             total += P[r, k] * motion[k]
-        K[first + r, s] += total
+        C[first + r, s] += total
     sign = model.markers.sign[m]
     moved = add(unit[0], cross(unit[1], p))
     if model.markers.force[m] >= 0:
         o = first + model.markers.force[m]
-        K[s, o] -= sign * moved[0]
-        K[s, o + 1] -= sign * moved[1]
-        K[s, o + 2] -= sign * moved[2]
+        for a in range(3):
+            B[o + a, s] -= sign * moved[a]
     if model.markers.moment[m] >= 0:
         o = first + model.markers.moment[m]
-        K[s, o] -= sign * unit[1][0]
-        K[s, o + 1] -= sign * unit[1][1]
-        K[s, o + 2] -= sign * unit[1][2]
-
-
-@inner
-def solve_dense(model, work, tree, joints, tangent, c_k, is_new):
-    """Write the correction of unknowns and kept wrenches, times c_k, into tangent.step; whether K could be solved."""
-    n_s, step = tree.s0[tree.s0.shape[0] - 1], tangent.step
-    if is_new and step.shape[0] > 0 and not lu_factor(tangent.K, tangent.pivot):
-        return False
-    for s in range(n_s):
-        step[s] = -c_k * joints.residual[s]
-    for k in range(tree.kept_row.shape[0]):
-        if tree.kept_row[k] >= 0:
-            step[n_s + tree.kept_row[k]] = -work.connections.g[k]
-    if step.shape[0] > 0:
-        lu_solve(tangent.K, tangent.pivot, step)
-    return True
+        for a in range(3):
+            B[o + a, s] -= sign * unit[1][a]

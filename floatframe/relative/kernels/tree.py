@@ -24,7 +24,7 @@ __all__ = ["COLUMN", "FAR_MODE", "NEAR_MODE", "JointWork", "TangentWork", "Tree"
 
 COLUMN, NEAR_MODE, FAR_MODE = range(3)  #: kinds of jets
 
-n_k, n_s, n_kept, n_j = Size("columns"), Size("n_s"), Size("kept"), Size("jets")
+n_k, n_s, n_kept, n_j, n_rows = (Size(name) for name in ("columns", "n_s", "kept", "jets", "kept rows"))
 
 
 class Tree(NamedTuple):
@@ -60,6 +60,8 @@ class Tree(NamedTuple):
     jet_kind: IntArray = integer(n_j)  #: COLUMN, NEAR_MODE or FAR_MODE
     jet_item: IntArray = integer(n_j)  #: number of the column, or of the mode in its body
     jet_s: IntArray = integer(n_j)  #: number among the unknowns
+    own_jet: IntArray = integer(n_s)  #: jet of each unknown at the joint of its own body, -1 for none
+    l0: IntArray = integer(n_b + 1)  #: where the matrix of the unknowns of each body begins in a flat store
 
 
 class JointWork(NamedTuple):
@@ -98,10 +100,23 @@ class TangentWork(NamedTuple):
     by_jet: Array = real(Size("n_most") + 6)
     f: Array = real(6)
     motion: Array = real(12)
-    K: Array = real(Size("n_newton"), Size("n_newton"))  #: [unknowns, wrenches that are kept], row by row
-    pivot: IntArray = integer(Size("n_newton"))
+    C: Array = real(n_rows, n_s)  #: rows that are kept by unknowns
+    B: Array = real(n_rows, n_s)  #: equations of unknowns by wrenches that are kept, transposed; then K⁻¹ of them
+    V: Array = real(n_rows, n_rows)  #: rows that are kept by their wrenches; then the factors of V - C K⁻¹ B
+    V_pivot: IntArray = integer(n_rows)
+    by_mode: Array = real(Size("n_q"), 6)  #: force of a body, with its subtree, by its own modes
+    L: Array = real(Size("numbers of L"))  #: equations by unknowns of each body, then their factors, flat
+    L_pivot: IntArray = integer(n_s)
+    G: Array = real(n_s, 18)  #: unknowns of a body by the jet of its near marker
+    W: Array = real(n_s, 6)  #: force of a subtree by the unknowns of its first body
+    b: Array = real(n_b, 6, unit="N, N m")  #: force of subtrees in a solution
+    X: Array = real(n_b, 18)  #: jets of bodies in a solution
+    Y: Array = real(18)
+    mass: Array = real(n_b, 6, 6, unit="kg, kg m, kg m²")  #: of subtrees
     weight: Array = real(n_s, unit="kg, kg m²")  #: of the norm of corrections
-    step: Array = real(Size("n_newton"))  #: right side, then the correction
+    step: Array = real(n_s)  #: right side, then the correction of the unknowns
+    mu: Array = real(n_rows)  #: that of the wrenches that are kept, times c_k
+    K: Array = real(Size("n_dense"), Size("n_dense"))  #: [unknowns, wrenches that are kept], where it is asked for
 
 
 def new_joint_work(model: Model, tree: Tree) -> JointWork:
@@ -118,15 +133,17 @@ def new_joint_work(model: Model, tree: Tree) -> JointWork:
     return work
 
 
-def new_tangent_work(model: Model, tree: Tree) -> TangentWork:
-    """Return working arrays for the Newton matrix of a tree."""
-    n_s = int(tree.s0[-1])
+def new_tangent_work(model: Model, tree: Tree, *, is_dense: bool = False) -> TangentWork:
+    """Return working arrays for the Newton matrix of a tree; is_dense: with room for all of it as one matrix."""
+    n_s, n_rows = int(tree.s0[-1]), int((tree.kept_row >= 0).sum())
     sizes = {
         "n_b": len(tree.parent),
         "jets": len(tree.jet_s),
         "n_q": int(model.bodies.q0[-1]),
         "n_most": int(max(model.bodies.n_q, default=0)),
         "n_s": n_s,
-        "n_newton": n_s + int((tree.kept_row >= 0).sum()),
+        "kept rows": n_rows,
+        "numbers of L": int(tree.l0[-1]),
+        "n_dense": n_s + n_rows if is_dense else 0,
     }
     return zeros(TangentWork(), sizes)
