@@ -1,5 +1,6 @@
 """The generalized-alpha method in relative coordinates: joints and modes, with constraints of closed loops alone."""
 
+import weakref
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -11,8 +12,9 @@ from floatframe.integrators.carry import Carry, Failure, Integrator, memory_of, 
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, squared_frequencies
 from floatframe.joints.rows import is_held_position
 from floatframe.kernels.memory import Rows, new_rows
+from floatframe.kernels.model import Model
 from floatframe.kernels.work import Work, new_work
-from floatframe.relative.kernels.tree import JointWork, Tree, new_joint_work, new_tangent_work
+from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree, new_joint_work, new_tangent_work
 from floatframe.relative.topology import tree_of
 from floatframe.start.initial import acceleration_rates, consistent_motion, work_from
 from floatframe.start.newton_equations import displaced, set_iterate
@@ -91,7 +93,7 @@ class RelativeGeneralizedAlpha:
         rows = new_rows(model, (first + n_steps) // every - first // every)
         iterations = int(work.counted.iterations)
         outcome = advance_tree_steps(
-            model, work, tree, new_joint_work(model, tree), new_tangent_work(model, tree), memory, rows,
+            model, work, tree, new_joint_work(model, tree), factors_of(work, model, tree), memory, rows,
             coefficients=self.absolute.coefficients, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=compiled.length,
             most_error=self.error_tolerance or 0.0, h_min=self.absolute.least_step(h),
@@ -175,6 +177,20 @@ def in_formulation(integrator: Integrator, formulation: str | None) -> Integrato
             '(or hht, newmark, trapezoidal), or formulation = "absolute"'
         )
     return RelativeGeneralizedAlpha(**asdict(integrator))
+
+
+#: factors that belong to working arrays, by the identity of an array of these; they live as long as it
+KEPT: dict[int, TangentWork] = {}
+
+
+def factors_of(work: Work, model: Model, tree: Tree) -> TangentWork:
+    """Return the factors of the Newton matrix that go with working arrays, as `work.solver` has the absolute ones."""
+    key = id(work.solver.pivot)
+    if key not in KEPT:
+        KEPT[key] = new_tangent_work(model, tree)
+        weakref.finalize(work.solver.pivot, KEPT.pop, key, None)
+        work.solver.is_due[...] = 1
+    return KEPT[key]
 
 
 def joint_iterate(compiled: CompiledSystem, tree: Tree, state: State, u_dot: Array) -> tuple[Work, JointWork]:

@@ -14,8 +14,10 @@ from floatframe.kernels.generalized_alpha import (
     DONE,
     INACCURATE,
     LEAST,
+    MANY,
     SAFETY,
     SAME,
+    SLOW,
     STOPPED,
     copy,
     correction_of_states,
@@ -38,7 +40,7 @@ from floatframe.relative.kernels.tree_factors import factorize_tree, solve_newto
 __all__ = ["SINGULAR", "advance_tree", "write_tree_row"]
 
 SINGULAR = 6  #: status: the Newton matrix is
-SLOW = 0.2  # ratio of corrections above which the matrix is made anew
+MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
 
 
 @inner
@@ -197,8 +199,9 @@ def accelerations(work, tree, joints, memory, s):
 def one_step(model, work, memory, tree, joints, tangent, order, h):
     """Advance the memory by one step, unless its error is above the one that is allowed.
 
-    Return (status, last correction by the allowed one, error; -1 if not estimated). The Newton matrix is made at the
-    first iterate of each step, and again where corrections shrink slowly.
+    Return (status, last correction by the allowed one, error; -1 if not estimated). Factors of an earlier step serve as
+    long as corrections shrink fast with them; where they do not, the step is begun anew with its own, and the more
+    steps have theirs at once the more often that happens (long chains: their mass matrix changes much with the shape).
     """
     alpha_m, alpha_f, beta, gamma = order.alpha_m, order.alpha_f, order.beta, order.gamma
     c_k = beta * h * h
@@ -208,16 +211,26 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     work.counted.no_number = 0
     work.counted.stopped = 0
     last, last_of_states, excess, allowed = math.inf, math.inf, math.inf, 0.0
-    is_due, iteration = True, 0
+    solver, iteration = work.solver, 0
+    if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
+        work.solver.is_due = 1
+        tangent.patience, tangent.left = 0, 0
+    elif tangent.left > 0:
+        work.solver.is_due = 1
+        tangent.left -= 1
+    is_old = work.solver.is_due == 0
+    factorisations = work.counted.factorisations
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     while iteration < order.max_iterations:
         evaluate_tree(model, work, tree, joints, c_k)
-        if is_due:
+        if work.solver.is_due == 1:
             write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
             weigh(model, work, tree, tangent)
             work.counted.factorisations += 1
-            is_due = False
+            work.solver.is_due = 0
+            solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
             if not factorize_tree(model, work, tree, tangent, c_d, c_k):
+                work.solver.is_due = 1
                 return SINGULAR, excess, -1.0
         solve_newton(work, tree, joints, tangent, c_k)
         if iteration == 0:
@@ -226,16 +239,31 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             allowed += math.sqrt(roundoff_floor(model, work, order.length))
         norm = math.sqrt(update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
         work.counted.iterations += 1
+        if is_old and work.counted.factorisations > factorisations:
+            is_old = False
+        if is_old and not norm <= max(SLOW * last, allowed):
+            work.solver.is_due = 1
+            is_old = False
+            tangent.patience = min(2 * tangent.patience + 1, MOST_PATIENCE)
+            tangent.left = tangent.patience
+            predict(model, work, tree, joints, memory, h, alpha_f)
+            last, last_of_states = math.inf, math.inf
+            iteration += 1
+            continue
         if not math.isfinite(norm):
+            work.solver.is_due = 1
             return DIVERGED, math.inf, -1.0
         excess = norm / allowed if allowed > 0.0 else math.inf
         of_states = 0.0
         if has_states:
             of_states = correction_of_states(model, work, c_k) / order.tolerance
             if not math.isfinite(of_states):
+                work.solver.is_due = 1
                 return DIVERGED, math.inf, -1.0
         is_small = norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
+            if iteration >= MANY:
+                work.solver.is_due = 1
             error = -1.0
             if order.most_error > 0.0:
                 error = local_error(model, work, tree, joints, tangent, memory, order, h)
@@ -243,10 +271,12 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                     return INACCURATE, excess, error
             accept(model, work, memory, tree, joints, h, alpha_m, alpha_f)
             return DONE, excess, error
-        is_due = (norm > SLOW * last and not is_small) or of_states > max(1.0, SLOW * last_of_states)
+        if (norm > SLOW * last and not is_small) or of_states > max(1.0, SLOW * last_of_states) or iteration >= MANY:
+            work.solver.is_due = 1
         last, last_of_states = norm, of_states
         excess = max(excess, of_states)
         iteration += 1
+    work.solver.is_due = 1
     return DIVERGED, excess, -1.0
 
 

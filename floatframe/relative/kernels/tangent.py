@@ -40,11 +40,11 @@ from floatframe.relative.kernels.projection import force_slopes
 from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
 
 __all__ = [
+    "add_second_order",
     "assemble",
     "inner_product",
     "product_of",
     "rigid_columns",
-    "second_order",
     "turned_power",
     "unit_of",
     "write_tangent",
@@ -293,28 +293,31 @@ def turning_modes(model, work, tree, tangent, i, c_k):
                 K[s, tree.jet_s[e]] += turned_power(tangent.jet[e], screw, F)
             b = tree.parent[b]
         m, sign = (tree.near[i], 1.0) if is_near else (tree.far[i], -1.0)
-        for l in range(model.bodies.n_q[body]):  # noqa: E741
-            own = second_order(model, work, tangent, body, m, k, l, F)
-            K[s, tree.m0[body] + l] += sign * c_k * own
+        add_second_order(model, work, tangent, body, m, k, sign * c_k, F, K[s, tree.m0[body] :])
 
 
 @inner
-def second_order(model, work, tangent, i, m, k, l, F):  # noqa: E741
-    """Return the change of the screw of mode k at marker m of body i by mode l, as the body sees it, times F."""
+def add_second_order(model, work, tangent, i, m, k, factor, F, row):
+    """Add the change of the screw of mode k at marker m of body i by all its modes, as the body sees it, times F.
+
+    With b = T' Psi_r,k, its derivative slope, and f, m' the force and its moment about the marker, body axes:
+    Psi_t,l · (b × f) + Psi_r,l · (slopeᵀ m') - K_t,kl · f - K_r,kl · (T'ᵀ m').
+    """
     n, o, first = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
     R, p = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
-    force = turned_back(R, F)
-    moment = turned_back(R, sub(vector(F[3:]), cross(p, vector(F))))
-    psi, T, rho = work.markers.psi[o : o + 6 * n], work.markers.T_left[m], vector(work.markers.rho[m])
+    f, T = turned_back(R, F), work.markers.T_left[m]
+    moment = sub(turned_back(R, sub(vector(F[3:]), cross(p, vector(F)))), cross(vector(work.markers.rho[m]), f))
+    psi = work.markers.psi[o : o + 6 * n]
     _, th_k = shape(psi, n, k)
-    d, th = shape(psi, n, l)
-    b = turned(T, th_k)
-    db, dd = turned(left_jacobian_derivative(vector(work.markers.angle[m]), th_k, 1.0), th), (0.0, 0.0, 0.0)
-    if first >= 0:
-        d_kl, th_kl = shape(model.markers.bend[first + 6 * n * l : first + 6 * n * (l + 1)], n, k)
-        dd, db = scaled(-1.0, d_kl), sub(db, turned(T, th_kl))
-    moved = add(dd, add(cross(d, b), cross(rho, db)))
-    return dot(moved, force) + dot(db, moment)
+    slope = left_jacobian_derivative(vector(work.markers.angle[m]), th_k, 1.0)
+    by_place, by_turn, of_turn = cross(turned(T, th_k), f), turned_back(slope, moment), turned_back(T, moment)
+    for l in range(n):  # noqa: E741
+        d, th = shape(psi, n, l)
+        total = dot(d, by_place) + dot(th, by_turn)
+        if first >= 0:
+            d, th = shape(model.markers.bend[first + 6 * n * l : first + 6 * n * (l + 1)], n, k)
+            total -= dot(d, f) + dot(th, of_turn)
+        row[l] += factor * total
 
 
 @inner

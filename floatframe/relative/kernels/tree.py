@@ -112,6 +112,8 @@ class TangentWork(NamedTuple):
     b: Array = real(n_b, 6, unit="N, N m")  #: force of subtrees in a solution
     X: Array = real(n_b, 18)  #: jets of bodies in a solution
     Y: Array = real(18)
+    patience: IntArray = integer()  #: steps that make their own factors after the next that finds old ones too old
+    left: IntArray = integer()  #: of them, still to come
     mass: Array = real(n_b, 6, 6, unit="kg, kg m, kg m²")  #: of subtrees
     weight: Array = real(n_s, unit="kg, kg m²")  #: of the norm of corrections
     step: Array = real(n_s)  #: right side, then the correction of the unknowns

@@ -16,7 +16,7 @@ from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.vector import add, cross, put, sub, turned, vector
 from floatframe.relative.kernels.projection import force_slopes
-from floatframe.relative.kernels.tangent import inner_product, product_of, second_order, turned_power, unit_of
+from floatframe.relative.kernels.tangent import add_second_order, inner_product, product_of, turned_power, unit_of
 from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
 
 __all__ = ["factorize_tree", "solve_newton"]
@@ -104,8 +104,7 @@ def factorize_joint(model, work, tree, tangent, i, c_d, c_k):
             own_mode = s >= m0
             if own_mode:
                 add_turning(row, screw, F)  # with the jet of the body
-                for l in range(n):  # noqa: E741
-                    L[k, m0 - s0 + l] -= c_k * second_order(model, work, tangent, i, tree.far[i], s - m0, l, F)
+                add_second_order(model, work, tangent, i, tree.far[i], s - m0, -c_k, F, L[k, m0 - s0 :])
             for l in range(n_l):  # noqa: E741
                 o = tree.own_jet[s0 + l]
                 if o >= 0:
@@ -177,8 +176,7 @@ def add_to_parent(model, work, tree, tangent, i, c_k):
         for o in range(tree.jet0[i], tree.jet0[i + 1]):
             if tree.jet_kind[o] == NEAR_MODE:
                 H[6 + tree.jet_item[o], 6 + k] += inner_product(tangent.screw[o], f)
-        for l in range(n):  # noqa: E741
-            H[6 + k, 6 + l] += c_k * second_order(model, work, tangent, parent, tree.near[i], k, l, F)
+        add_second_order(model, work, tangent, parent, tree.near[i], k, c_k, F, H[6 + k, 6:])
     for r in range(6):
         for e in range(18):
             tangent.D[parent, r, e] += P[r, e]
