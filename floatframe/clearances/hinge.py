@@ -3,6 +3,7 @@
 The axis of the bearing goes through marker a, that of the pin through marker b. In two planes of the pin, at the ends
 of the bearing (s = ±L/2 from marker b along the pin), the pin may be off the axis of the bearing by the radial play c;
 so it may tilt by up to 2 c/L. Along the axis marker b moves by the axial play to each side. Beyond, see `contact`.
+About the axis a spring and a damper may act, such as a harness: torque -k_t (angle - free) - d_t (rate of the angle).
 """
 
 from dataclasses import dataclass
@@ -19,11 +20,13 @@ from floatframe.clearances.contact import NUMBERS, Range, add_contact, contact_n
 from floatframe.elements import Element, ElementLaw, Placed
 from floatframe.elements.pairs import (
     add_axial_force,
+    add_torque,
     angle_about,
     angle_numbers,
     axial_motion,
     direction_of,
     inner_product,
+    turning_speed,
 )
 from floatframe.elements.smooth import absolute
 from floatframe.elements.unit_names import in_units
@@ -65,6 +68,9 @@ class HingeWithPlay(Element):
     friction: float = 0.0  #: mu
     friction_speed: float = 1e-3  #: v_s, slip at which friction is 0.71 of its value [m/s]
     radius: float = 0.0  #: of the pin, arm of the friction [m]
+    turn_stiffness: float = 0.0  #: k_t about the axis [N m/rad]
+    turn_damping: float = 0.0  #: d_t [N m s/rad]
+    turn_free: float = 0.0  #: angle at which the spring about the axis is free, from the angle as placed [rad]
     axis: Array = (0.0, 0.0, 1.0)  # type: ignore[assignment]  #: in the axes of marker a, (3,)
 
     def __post_init__(self) -> None:
@@ -75,6 +81,9 @@ class HingeWithPlay(Element):
                 "length": Range(at_least=0.0),
                 "axial_play": Range(at_least=0.0),
                 "axial_stiffness": Range(above=0.0),
+                "turn_stiffness": Range(at_least=0.0),
+                "turn_damping": Range(at_least=0.0),
+                "turn_free": Range(),
             },
         )
         object.__setattr__(self, "axis", unit_vector(f"element {self.name!r}: axis", self.axis))
@@ -86,6 +95,7 @@ class HingeWithPlay(Element):
         data = [*contact_numbers(self), self.radial_play, self.length, axial, self.exponent, self.damping]
         data += [-1.0 if self.slides else self.axial_play, *along]
         data += angle_numbers(self.axis, placed.A[0], placed.A[1])
+        data += [self.turn_stiffness, self.turn_damping, self.turn_free]
         return ElementLaw(
             function=hinge_law,
             data=data,
@@ -100,7 +110,7 @@ class HingeWithPlay(Element):
 
 
 PLAY, LENGTH, AXIAL, AXIAL_PLAY = NUMBERS, NUMBERS + 1, NUMBERS + 2, NUMBERS + 5  #: places in `data`
-ALONG, ABOUT = NUMBERS + 6, NUMBERS + 9
+ALONG, ABOUT, TURN = NUMBERS + 6, NUMBERS + 9, NUMBERS + 18
 
 
 @njit
@@ -124,13 +134,17 @@ def hinge_law(t, x, z, lam, data, wrench, z_dot, g, seen):
         add_axial_force(wrench, x, 0, 1, -side * N, e)
         seen[6] += energy
         seen[7] += (N - spring) * side * rate
-    seen[0] = angle_about(x, 0, 1, data, ABOUT)
+    seen[4] = length_of((wrench[1, 0], wrench[1, 1], wrench[1, 2]))
+    seen[0], speed = angle_about(x, 0, 1, data, ABOUT), turning_speed(x, 0, 1, e)
+    turn = seen[0] - data[TURN + 2]
+    add_torque(wrench, 0, 1, -data[TURN] * turn - data[TURN + 1] * speed, e)
+    seen[6] += 0.5 * data[TURN] * turn * turn
+    seen[7] += data[TURN + 1] * speed * speed
     seen[1], _ = off_axis(x, (x[1, 0], x[1, 1], x[1, 2]), e)
     seen[2] = along
     cosine = inner_product(e, pin)
     across = pin[0] - cosine * e[0], pin[1] - cosine * e[1], pin[2] - cosine * e[2]
     seen[3] = np.arctan(length_of(across) / absolute(cosine))
-    seen[4] = length_of((wrench[1, 0], wrench[1, 1], wrench[1, 2]))
 
 
 @register_jitable

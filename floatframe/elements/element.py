@@ -68,6 +68,7 @@ class ElementLaw:
     held_units: Sequence[str] = ()  #: of g; default "m", or "m/s" of a velocity; "rad" and "1" are measured as angles
     outputs: Sequence[str] = ()  #: what sensors and reports may ask for
     output_units: Sequence[str] = ()
+    off: Callable[..., None] | None = None  #: what it does while events have it off; default: nothing
     #: derivatives: "differences" (central), "complex" (a step along the imaginary axis: exact, see
     #: `floatframe.elements.smooth`), or tangent(t, x, z, lam, data, slopes), which writes d(wrench, z_dot, g) by dr,
     #: dphi, dv, domega of each marker (3 each, ground axes), z and lam, into slopes (6 n + n_z + n_lam,

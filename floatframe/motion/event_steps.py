@@ -14,10 +14,12 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.file_frames import rows_of_file, state_of_file
+from floatframe.compiling.public_elements import PlacedLaw
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator
 from floatframe.integrators.ida import Ida
+from floatframe.joints.rows import NOTHING, POSITION
 from floatframe.kernels.memory import KINETIC, SPRINGS, WORK_GIVEN, WORK_TAKEN, Rows
 from floatframe.kernels.records import leaves
 from floatframe.kernels.work import Work, new_work
@@ -56,7 +58,7 @@ class EventWatch:
     head: Head
     system: System = field(init=False)  #: with some off
     events: tuple[Event, ...] = field(init=False)  #: those of the system, then those of its stops
-    off: frozenset[str] = field(init=False)  #: forces at zero and couplers not engaged
+    off: frozenset[str] = field(init=False)  #: forces at zero, couplers not engaged, elements that do nothing
     caught: dict[str, float] = field(default_factory=dict)  #: what couplers that have been engaged hold
     resting: dict[str, str] = field(default_factory=dict)  #: side of the limits at which couplers hold
     values: Array = field(init=False)  #: of the events at the last time, angles without jumps, (n_events,)
@@ -107,7 +109,8 @@ class EventWatch:
             if motion is None:
                 arrays = arrays_of([self.in_files(row) for row in rows])
                 arrays["drift"] = arrays["drift"][:, : len(self.head.joints)]
-                motion = Trajectory(self.head, MemorySource(arrays), is_complete=False)
+                head = replace(self.head, summary={"events": self.happened})
+                motion = Trajectory(head, MemorySource(arrays), is_complete=False)
             found = sensor_of(self.full, event.watch).measure(self.full, motion).columns
             name = event.column or next(iter(found))
             if name not in found:
@@ -282,12 +285,24 @@ class EventWatch:
                     f"event {event.name!r} at t = {t:g}: coupler {name!r} is to hold {wanted:.6g}, but finds "
                     f"{caught:.6g}; leave its constant out, so that it holds what it catches, or let the event watch it"
                 )
+        holding = [
+            placed
+            for placed in compiled.laws
+            if placed.element.name in self.off.intersection(event.switch_on)
+            and any(each != NOTHING for each in placed.law.holds)
+        ]
         self.switch((self.off | set(event.switch_off)) - set(event.switch_on))
-        if not engaged:
+        if not engaged and not holding:
             return carry.state
         hit = impact(compiled_system(self.system), carry.state, t=t, known=carry.w, restitution={})
+        for placed in holding:
+            require_shut(event, placed, hit.gap, t, compiled.length)
         cores = [sum_rows(compiled, name)[2] for name in engaged]
-        self.happened[-1]["impulse"] = {name: float(hit.impulse[k]) for name, k in zip(engaged, cores, strict=True)}
+        impulse = {name: float(hit.impulse[k]) for name, k in zip(engaged, cores, strict=True)}
+        for placed in holding:
+            for name, row in zip(placed.law.multipliers, placed.multipliers, strict=True):
+                impulse[f"{placed.element.name}.{name}"] = float(hit.impulse[row])
+        self.happened[-1]["impulse"] = impulse
         return hit.state
 
     def strike(self, integrator: Integrator, carry: Carry, event: StopEvent, t: float, h: float) -> State:
@@ -397,3 +412,13 @@ class EventWatch:
         self.switch(frozenset(data["off"]))
         self.happened = data["happened"]
         self.values = np.array(record["event_values"], dtype=float)
+
+
+def require_shut(event: Event, placed: PlacedLaw, gap: Array, t: float, length: float) -> None:
+    """Raise `ModelError` if an element that is switched on is to hold a position which the motion does not have."""
+    for name, row, holds in zip(placed.law.multipliers, placed.multipliers, placed.law.holds, strict=True):
+        if holds == POSITION and abs(gap[row]) > SHUT * max(1.0, length):
+            raise ModelError(
+                f"event {event.name!r} at t = {t:g}: element {placed.element.name!r} is to hold the position of its "
+                f"multiplier {name!r}, but finds it open by {gap[row]:.6g}; let the event watch what it holds"
+            )

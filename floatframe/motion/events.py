@@ -6,7 +6,7 @@ Event("brake", at=1.5, switch_on=("brake",))
 Event("crossing", "place", column="x", record=True)
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -14,6 +14,8 @@ import numpy as np
 
 from fe_models.foundation.words import nearest, quoted
 from floatframe.checked_values import number
+from floatframe.elements.element import Element
+from floatframe.elements.switched_off import SwitchedOff, off_at_start
 from floatframe.errors import ModelError
 from floatframe.forces import BodyLoad, Bushing, Force, JointForce, PointForce, SpringDamper
 from floatframe.functions.time_functions import constant
@@ -62,9 +64,9 @@ SILENT: dict[type, dict[str, Any]] = {
 class Event:
     """What happens when a measured value passes a level, or at a time.
 
-    The time where a value passes its level is found to `tolerance` by steps of other sizes. A force is off at the
-    start if the first event that names it switches it on; a coupler (a latch, a clutch) if it is not `engaged`. An
-    event that only records does not change the motion, bit for bit.
+    The time where a value passes its level is found to `tolerance` by steps of other sizes. A force or an element is
+    off at the start if the first event that names it switches it on; a coupler (a latch, a clutch) if it is not
+    `engaged`. An event that only records does not change the motion, bit for bit.
     """
 
     name: str
@@ -73,7 +75,7 @@ class Event:
     direction: str = "both"  #: "rising", "falling" or "both"
     column: str = ""  #: of the sensor, such as "x" or "rate"; "": its first
     stop: bool = False  #: end the run there
-    switch_on: tuple[str, ...] = ()  #: names of forces and couplers
+    switch_on: tuple[str, ...] = ()  #: names of forces, couplers and elements
     switch_off: tuple[str, ...] = ()
     tolerance: float = 1e-9  #: of the time, in parts of the step
     at: float | None = None  #: instead of `watch`: the time of the event, after the start of the run [s]
@@ -126,6 +128,7 @@ class Event:
 def require_events(system: System) -> None:
     """Raise `ModelError` if an event watches or switches what does not exist, or cannot be switched."""
     forces = {getattr(force, "name", ""): force for force in system.forces}
+    elements = {element.name for element in system.elements}
     couplers = {coupler.name: coupler for coupler in system.couplers}
     first_on = off_at_start(events_of(system))
     for event in events_of(system):
@@ -139,9 +142,11 @@ def require_events(system: System) -> None:
             if name in couplers:
                 require_switched(where, couplers[name], is_first_on=name in first_on)
                 continue
+            if name in elements:
+                continue
             if name not in forces or not name:
-                choices = [key for key in (*forces, *couplers) if key]
-                raise ModelError(f"{where}: no force or coupler {quoted(name)}{nearest(name, choices)}")
+                choices = [key for key in (*forces, *couplers, *elements) if key]
+                raise ModelError(f"{where}: no force, coupler or element {quoted(name)}{nearest(name, choices)}")
             if type(forces[name]) not in SILENT:
                 raise ModelError(f"{where}: a force of the kind {type(forces[name]).__name__} cannot be switched")
 
@@ -177,19 +182,8 @@ def require_times_of_events(system: System, t_start: float) -> None:
             raise ModelError(f"event {event.name!r}: at: {words}")
 
 
-def off_at_start(events: Sequence[Event]) -> frozenset[str]:
-    """Return the forces and couplers that the first event which names them switches on."""
-    first: dict[str, bool] = {}
-    for event in events:
-        for name in event.switch_on:
-            first.setdefault(name, True)
-        for name in event.switch_off:
-            first.setdefault(name, False)
-    return frozenset(name for name, is_off in first.items() if is_off)
-
-
 def switched(system: System, off: frozenset[str], held: Mapping[str, float]) -> System:
-    """Return the system with these forces at zero and these couplers not engaged; its results have the same columns.
+    """Return the system with these forces at zero, couplers not engaged, elements off, and the same columns of results.
 
     held: what couplers that have been switched on hold, by name.
     """
@@ -206,4 +200,5 @@ def switched(system: System, off: frozenset[str], held: Mapping[str, float]) -> 
         elif coupler.name in held:
             coupler = replace(coupler, engaged=True, limits=None, constant=held[coupler.name])
         couplers.append(coupler)
-    return replace(system, forces=forces, couplers=couplers)
+    elements: list[Element] = [SwitchedOff(each) if each.name in off else each for each in system.elements]
+    return replace(system, forces=forces, couplers=couplers, elements=elements)

@@ -9,10 +9,11 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.callbacks import raise_errors_of
-from floatframe.compiling.callbacks.law_functions import called_law
+from floatframe.compiling.callbacks.law_functions import called_law, law_callbacks
 from floatframe.compiling.markers import MarkerData
 from floatframe.compiling.public_elements import PlacedLaw
 from floatframe.compiling.system import compiled_system
+from floatframe.elements.switched_off import law_switched_off, times_off
 from floatframe.errors import ResultsError
 from floatframe.results.coordinate_elements import unknowns
 from floatframe.results.place_motion import PlaceMotion, as_moved, shape_motion, still_place
@@ -46,7 +47,7 @@ def element_motion(system: System, trajectory: Trajectory, name: str) -> Element
     """Return what a public element sees and does over a motion of the system.
 
     States and multipliers are those of the motion; outputs and wrenches follow from them and from the motion of the
-    markers, by the law of the element.
+    markers, by the law of the element, while events have it off by what it does then.
 
     Raises
     ------
@@ -59,8 +60,14 @@ def element_motion(system: System, trajectory: Trajectory, name: str) -> Element
     inputs = np.column_stack([trajectory.t, *(motion_row(place) for place in places), w[:, placed.states],
                               w[:, placed.multipliers]])  # fmt: skip
     law = placed.law
-    out = called_law(placed.value.address, placed.head, np.asarray(law.data), inputs, placed.n_out + len(law.outputs))
+    n_all, data = placed.n_out + len(law.outputs), np.asarray(law.data)
+    out = called_law(placed.value.address, placed.head, data, inputs, n_all)
     raise_errors_of([placed.value])
+    happened = trajectory.head.summary.get("events", ())
+    is_off = times_off([*system.events, *placed.element.events()], happened, trajectory.t, name)
+    if is_off.any():
+        value, _ = law_callbacks(f"element {name!r}", law_switched_off(law), placed.head)
+        out[is_off] = called_law(value.address, placed.head, data, inputs[is_off], n_all)
     n = len(placed.markers)
     return ElementMotion(
         trajectory.t,

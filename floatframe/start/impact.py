@@ -29,6 +29,7 @@ class Impact:
     state: State  #: with the velocities after it
     rate: Array  #: of what each row holds, before it, (n_w,)
     impulse: Array  #: of the unknown of each row, (n_w,) [N s, N m s]
+    gap: Array  #: by which what each row holds is open, (n_w,) [m, rad; of velocities held m/s]
 
 
 def impact(
@@ -52,10 +53,11 @@ def impact(
     work.state.time[...] = t
     set_iterate(work, state, w=start_unknowns(model, known))
     parts = linearized(model, work, 1.0, 0.0, 0.0)
+    gap = work.connections.g.copy()
     rate, _ = rates_of_constraints(model, work)
     wanted = -rate
     for row, e in restitution.items():
         wanted[row] = -(1.0 + e) * rate[row]
     y, impulse = solve(with_mass_for_all(model, parts.H), parts, np.zeros(len(state.u)), wanted)
     after = State(state.r, state.p, state.q, state.u + in_ground_axes(model, state, y))
-    return Impact(after, rate, impulse)
+    return Impact(after, rate, impulse, gap)

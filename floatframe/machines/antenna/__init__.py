@@ -1,7 +1,7 @@
 """A deployable antenna: petals hinged at a spacecraft, pushed outward by struts from one slider on a mast."""
 
 from floatframe.machines.antenna.closed_forms import AntennaGeometry, mechanism
-from floatframe.machines.antenna.description import Antenna
-from floatframe.machines.antenna.systems import antenna_files
+from floatframe.machines.antenna.description import FINE, Antenna, HingePlay
+from floatframe.machines.antenna.systems import antenna_files, fine_files
 
-__all__ = ["Antenna", "AntennaGeometry", "antenna_files", "mechanism"]
+__all__ = ["FINE", "Antenna", "AntennaGeometry", "HingePlay", "antenna_files", "fine_files", "mechanism"]

@@ -6,7 +6,21 @@ import numpy as np
 
 from floatframe.machines.antenna.closed_forms import AntennaGeometry, mechanism
 
-__all__ = ["Antenna"]
+__all__ = ["FINE", "Antenna", "HingePlay"]
+
+
+@dataclass(frozen=True)
+class HingePlay:
+    """Pin and bearing of a petal hinge that has play, see `floatframe.clearances.HingeWithPlay`."""
+
+    radial: float = 1e-4  #: [m]
+    axial: float = 1e-4  #: to each side [m]
+    length: float = 0.08  #: of the bearing [m]
+    pin_radius: float = 0.008
+    stiffness: float = 2e6  #: of the contact in one plane, with the fitting around it [N/m]
+    damping: float = 5.0  #: loss by the speed of the approach [s/m]
+    friction: float = 0.15
+    friction_speed: float = 2e-3  #: [m/s]
 
 
 @dataclass(frozen=True)
@@ -30,9 +44,21 @@ class Antenna:
     hinge_damping: float = 0.3  #: [N m s/rad]
     hinge_friction: float = 0.5  #: [N m]
     friction_speed: float = 0.02  #: at which friction reaches 76 % [rad/s]
+    begin: float | None = None  #: angle at which opening in flight begins [rad]; None: stowed
+    push: float = 5.0  #: of the drive in flight, for each petal [N]
+    drag: float = 100.0 / 3  #: of its damper, for each petal [N s/m]
+    play: HingePlay | None = None  #: of the petal hinges; friction is then that of their pins
+    petal_modes: int = 6  #: vibration modes beside the static ones
+    strut_modes: int = 2
 
     @property
     def travel(self) -> tuple[float, float]:
         """Heights of the slider, stowed and deployed."""
         found = mechanism(self.geometry, np.array([self.stowed, self.deployed]), n_petals=self.n_petals)
         return float(found.slider[0]), float(found.slider[1])
+
+
+#: 24 narrow petals with more modes, the last 0.05 rad before the latch; `replace(FINE, play=HingePlay())`: with play
+FINE = Antenna(
+    n_petals=24, petal_width=0.15, n_along=40, petal_modes=12, strut_modes=6, begin=float(np.deg2rad(75.0) - 0.05)
+)

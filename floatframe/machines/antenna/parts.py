@@ -4,7 +4,7 @@ import numpy as np
 
 from floatframe.machines.antenna.description import Antenna
 
-__all__ = ["PETAL", "STRUT", "petal_mesh", "strut_files"]
+__all__ = ["petal_job", "petal_mesh", "strut_files", "strut_job"]
 
 
 def petal_mesh(antenna: Antenna) -> str:
@@ -31,7 +31,7 @@ def petal_mesh(antenna: Antenna) -> str:
     return "\n".join(lines) + "\n"
 
 
-PETAL = """\
+PETAL_JOB = """\
 # A petal of the antenna: a skin of aluminium with a box rib on its middle line, from its hinge along x.
 [body]
 name = "petal"
@@ -69,7 +69,7 @@ nodes = "ELBOW"
 
 [reduction]
 set = "craig-bampton"
-n_modes = 6
+n_modes = PETAL_MODES
 frame = "nodal"
 at = "root"
 
@@ -77,7 +77,7 @@ at = "root"
 ratio = 0.005
 """
 
-STRUT = """\
+STRUT_JOB = """\
 # A strut of the antenna: an aluminium tube from its foot at the slider along x to the elbow of a petal.
 [body]
 name = "strut"
@@ -106,13 +106,23 @@ nodes = "head"
 
 [reduction]
 set = "craig-bampton"
-n_modes = 2
+n_modes = STRUT_MODES
 frame = "nodal"
 at = "foot"
 
 [damping]
 ratio = 0.005
 """
+
+
+def petal_job(antenna: Antenna) -> str:
+    """Return the job of a petal."""
+    return PETAL_JOB.replace("PETAL_MODES", str(antenna.petal_modes))
+
+
+def strut_job(antenna: Antenna) -> str:
+    """Return the job of a strut."""
+    return STRUT_JOB.replace("STRUT_MODES", str(antenna.strut_modes))
 
 
 def strut_files(antenna: Antenna) -> dict[str, str]:

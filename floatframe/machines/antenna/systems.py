@@ -1,15 +1,16 @@
 """The antenna as systems of as many petals as wanted, and all its files."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from floatframe.machines.antenna.closed_forms import mechanism
-from floatframe.machines.antenna.description import Antenna
-from floatframe.machines.antenna.parts import PETAL, STRUT, petal_mesh, strut_files
+from floatframe.machines.antenna.description import FINE, Antenna, HingePlay
+from floatframe.machines.antenna.parts import petal_job, petal_mesh, strut_files, strut_job
 
-__all__ = ["antenna_files"]
+__all__ = ["antenna_files", "fine_files"]
 
 STAND = """
 [joints.stand]
@@ -61,14 +62,7 @@ file = "petal.h5"
 [bodies.strut_{k}]
 file = "strut.h5"
 {place_text(foot, strut)}
-[joints.hinge_{k}]
-type = "revolute"
-body_a = "bus"
-marker_a = {numbers(*hinge)}
-body_b = "petal_{k}"
-marker_b = "root"
-axis = {axis}
-
+{hinge_text(antenna, k, hinge, axis, theta)}
 [joints.foot_{k}]
 type = "universal"
 body_a = "slider"
@@ -84,6 +78,19 @@ body_a = "petal_{k}"
 marker_a = "elbow"
 body_b = "strut_{k}"
 marker_b = "head"
+"""
+
+
+def hinge_text(antenna: Antenna, k: int, hinge: np.ndarray, axis: str, theta: float) -> str:
+    """Return the hinge of petal k with its harness: a joint, or an element with play."""
+    if antenna.play is None:
+        return f"""[joints.hinge_{k}]
+type = "revolute"
+body_a = "bus"
+marker_a = {numbers(*hinge)}
+body_b = "petal_{k}"
+marker_b = "root"
+axis = {axis}
 
 [forces.harness_{k}]
 type = "joint-force"
@@ -94,6 +101,24 @@ free = {antenna.stowed - theta:.15g}
 damping = {antenna.hinge_damping:.6g}
 friction = {antenna.hinge_friction:.6g}
 friction_speed = {antenna.friction_speed:.6g}
+"""
+    play = antenna.play
+    return f"""[elements.hinge_{k}]
+type = "clearances.hinge"
+marker_a = {{ body = "bus", marker = {numbers(*hinge)} }}
+marker_b = {{ body = "petal_{k}", marker = "root" }}
+axis = {axis}
+radial_play = {play.radial:.6g}
+axial_play = {play.axial:.6g}
+length = {play.length:.6g}
+radius = {play.pin_radius:.6g}
+stiffness = {play.stiffness:.6g}
+damping = {play.damping:.6g}
+friction = {play.friction:.6g}
+friction_speed = {play.friction_speed:.6g}
+turn_stiffness = {antenna.hinge_stiffness:.6g}
+turn_damping = {antenna.hinge_damping:.6g}
+turn_free = {antenna.stowed - theta:.15g}
 """
 
 
@@ -171,25 +196,26 @@ t_start = 0.0
 t_end = {antenna.duration:.6g}
 first = {first:.15g}
 last = {last:.15g}
-{sensors()}
+{sensors(antenna)}
 [run]
 t_end = {antenna.duration:.6g}
 h = {antenna.duration / 60:.6g}
 """
 
 
-def sensors() -> str:
+def sensors(antenna: Antenna) -> str:
     """Return the sensors that all systems of the antenna have."""
-    return """
+    hinge = 'type = "coordinate"\njoint = "hinge_1"\ncoordinate = "angle"'
+    if antenna.play is not None:
+        hinge = 'type = "element"\nof = "hinge_1"'
+    return f"""
 [sensors.drive]
 type = "coordinate"
 joint = "mast"
 coordinate = "distance"
 
 [sensors.hinge]
-type = "coordinate"
-joint = "hinge_1"
-coordinate = "angle"
+{hinge}
 
 [sensors.strut]
 type = "reaction"
@@ -202,21 +228,21 @@ set = "TIP"
 """
 
 
-def released_tail(antenna: Antenna, *, push: float, rate: float) -> str:
+def released_tail(antenna: Antenna) -> str:
     """Return the push of the drive spring with its rate limiter, and the latch at the end of the travel."""
     return f"""
 [forces.drive]
 type = "joint-force"
 joint = "mast"
 coordinate = "distance"
-damping = {rate:.6g}
+damping = {antenna.n_petals * antenna.drag:.6g}
 
 [forces.drive.motor]
 type = "smooth-step"
 t_start = 0.0
 t_end = 2.0
 first = 0.0
-last = {-push:.6g}
+last = {-antenna.n_petals * antenna.push:.6g}
 
 [couplers.latch]
 engaged = false
@@ -229,16 +255,16 @@ direction = "falling"
 switch_on = ["latch"]
 switch_off = ["drive"]
 record = true
-{sensors()}
+{sensors(antenna)}
 [sensors.bus]
 type = "acceleration"
 body = "bus"
 marker = [0, 0, 0]
 
 [run]
-t_end = 30.0
-h = 4e-3
-output_every = 5
+t_end = {30.0 if antenna.begin is None else 6.0}
+h = {"4e-3" if antenna.play is None else "1e-3"}
+output_every = {5 if antenna.play is None else 10}
 """
 
 
@@ -258,8 +284,8 @@ def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, s
     tail = driven_tail(antenna)
     return {
         "petal.inp": petal_mesh(antenna),
-        "petal.toml": PETAL,
-        "strut.toml": STRUT,
+        "petal.toml": petal_job(antenna),
+        "strut.toml": strut_job(antenna),
         **strut_files(antenna),
         "space.toml": system_text(
             antenna, "The antenna held, without gravity, driven open slowly: floatframe kinematics space.toml",
@@ -272,9 +298,26 @@ def antenna_files(antenna: Antenna, *, petal_moment: float = 0.0) -> dict[str, s
         "bare.toml": system_text(
             antenna, "The antenna under gravity without compensation", gravity=True, offload=0.0, tail=tail, **options
         ),
-        "latching.toml": system_text(
-            antenna, "The antenna on its free spacecraft, opened by a motor against a damper, then latched",
-            theta=antenna.stowed, fixed=False, gravity=False, offload=0.0,
-            tail=released_tail(antenna, push=60.0, rate=400.0),
-        ),
+        "latching.toml": latching_text(antenna),
     }  # fmt: skip
+
+
+def latching_text(antenna: Antenna) -> str:
+    """Return the system that opens in flight and is latched."""
+    title = "The antenna on its free spacecraft, opened by a motor against a damper, then latched"
+    title += "" if antenna.play is None else "; its petal hinges have play"
+    theta = antenna.stowed if antenna.begin is None else antenna.begin
+    tail = released_tail(antenna)
+    return system_text(antenna, title, theta=theta, fixed=False, gravity=False, offload=0.0, tail=tail)
+
+
+def fine_files() -> dict[str, str]:
+    """Return the files of the fine antenna by name: parts, and its latching without and with play in the hinges."""
+    return {
+        "petal.inp": petal_mesh(FINE),
+        "petal.toml": petal_job(FINE),
+        "strut.toml": strut_job(FINE),
+        **strut_files(FINE),
+        "latching.toml": latching_text(FINE),
+        "play.toml": latching_text(replace(FINE, play=HingePlay())),
+    }

@@ -141,6 +141,7 @@ def test_tangent_is_exact_and_the_law_is_right(kind):
     ends = Marker(GROUND), Marker("block", position=(0.01, 0, 0))
     numbers = NUMBERS | {"stiffness": 50.0, "exponent": 1.5}
     if kind == "hinge":
+        numbers |= {"turn_stiffness": 3.0, "turn_damping": 0.7, "turn_free": 0.2}
         element = HingeWithPlay("gap", *ends, radial_play=1.0, length=0.5, axial_play=1.0, axis=(0, 1, 1), **numbers)
     elif kind == "ball":
         element = BallWithPlay("gap", *ends, play=1.0, **numbers)

@@ -1,0 +1,96 @@
+"""An element that is switched off by an event: it is there with all its rows, and does nothing.
+
+Its wrenches and the rates of its states are zero, unless its law says by `off` what it does then (a valve that is shut,
+a clutch that drags); what its multipliers hold is let go, they are zero.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Marker
+from floatframe.elements.element import NOTHING, Element, ElementLaw, Placed, markers_of
+
+__all__ = ["SwitchedOff", "law_switched_off", "off_at_start", "times_off"]
+
+
+@dataclass(frozen=True, eq=False)
+class SwitchedOff(Element):
+    """An element in the place of another, with the same markers and unknowns, that does nothing."""
+
+    element: Element
+
+    if not TYPE_CHECKING:
+
+        @property
+        def name(self) -> str:
+            """Its name."""
+            return self.element.name
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        """Its markers."""
+        return markers_of(self.element)
+
+    def law(self, placed: Placed) -> ElementLaw:
+        """Return its law while it is off."""
+        return law_switched_off(self.element.law(placed))
+
+    def events(self) -> Any:
+        """Return its events, which may switch it on."""
+        return self.element.events()
+
+    def drawn(self) -> Any:
+        """Return what is seen of it."""
+        return self.element.drawn()
+
+
+def law_switched_off(law: ElementLaw) -> ElementLaw:
+    """Return the law of an element while it is off, with rows in the same places."""
+    if law.off is not None:
+        tangent = "differences" if callable(law.tangent) else law.tangent
+        return replace(law, function=law.off, tangent=tangent, rest=None)
+    let_go = (NOTHING,) * len(law.multipliers)
+    return replace(law, function=still, tangent=slopes_of_still, rest=None, stops={}, holds=let_go, held_units=())
+
+
+def off_at_start(events: Sequence[Any]) -> frozenset[str]:
+    """Return the forces, couplers and elements that the first event which names them switches on."""
+    first: dict[str, bool] = {}
+    for event in events:
+        for name in event.switch_on:
+            first.setdefault(name, True)
+        for name in event.switch_off:
+            first.setdefault(name, False)
+    return frozenset(name for name, is_off in first.items() if is_off)
+
+
+def times_off(
+    events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: Array, name: str
+) -> NDArray[np.bool_]:
+    """Return at which times t, (n_t,), the events of a system that have happened have an element switched off."""
+    is_off = np.full(len(t), name in off_at_start(events))
+    for event in happened:
+        if name in (*event["switch_on"], *event["switch_off"]):
+            is_off[t >= event["t"]] = name in event["switch_off"]
+    return is_off
+
+
+@njit
+def still(t, x, z, lam, data, wrench, z_dot, g, seen):
+    """Write what an element does that does nothing."""
+    for k in range(lam.shape[0]):
+        g[k] = lam[k]
+
+
+@njit
+def slopes_of_still(t, x, z, lam, data, slopes):
+    """Write the derivatives of `still`."""
+    n_lam = lam.shape[0]
+    for k in range(n_lam):
+        slopes[slopes.shape[0] - n_lam + k, slopes.shape[1] - n_lam + k] = 1.0
