@@ -13,7 +13,7 @@ from floatframe.compiling.public_elements import PlacedLaw
 from floatframe.compiling.system import compiled_system
 from floatframe.elements.element import ACTS
 from floatframe.errors import ModelError
-from floatframe.joints.rows import POSITION
+from floatframe.joints.rows import POSITION, VELOCITY
 from floatframe.kernels.work import new_work
 from floatframe.results.element_motion import placed_law
 from floatframe.rotations import rotation_exp
@@ -100,7 +100,7 @@ def placed_inputs(system: System, placed: PlacedLaw) -> Array:
     parts = [np.zeros(1)]
     for marker in placed.markers:
         r, A = marker_pose(marker, compiled.placed, n_q)
-        parts += [r, A.ravel(), np.zeros(6)]
+        parts += [r, A.ravel(), np.zeros(placed.head[1] - 12)]
     return np.concatenate([*parts, placed.law.start, np.zeros(len(placed.multipliers))])
 
 
@@ -126,6 +126,8 @@ def sample_inputs(system: System, placed: PlacedLaw, state: State | None) -> lis
                 r + moves * near * length * rng.normal(size=3), (turn @ A).ravel(),
                 v + moves * moving * length * rng.normal(size=3), omega + moves * moving * rng.normal(size=3),
             ]  # fmt: skip
+            if placed.law.accelerations:
+                parts += [moves * moving * length * rng.normal(size=3), moves * moving * rng.normal(size=3)]
         parts.append(made.w[own] * (1 + near * rng.normal(size=len(own))))
         samples.append(np.concatenate(parts))
     return samples
@@ -138,8 +140,9 @@ def told_in_python(placed: PlacedLaw, inputs: Array, where: str) -> list[str]:
     results = []
     for _ in range(2):
         wrench, z_dot, g = np.zeros((n, 6)), np.zeros(len(law.states)), np.zeros(len(law.multipliers))
-        seen, x = np.zeros(len(law.outputs)), inputs[1 : 1 + 18 * n].reshape(n, 18).copy()
-        z, lam = np.split(inputs[1 + 18 * n :].copy(), [len(law.states)])
+        width = placed.head[1]
+        seen, x = np.zeros(len(law.outputs)), inputs[1 : 1 + width * n].reshape(n, width).copy()
+        z, lam = np.split(inputs[1 + width * n :].copy(), [len(law.states)])
         given = (x, z, lam, np.array(law.data))
         before = [each.copy() for each in given]
         try:
@@ -184,7 +187,7 @@ def balance(placed: PlacedLaw, values: Array, where: str) -> list[str]:
 
 def own_slopes(placed: PlacedLaw, inputs: Array) -> Array:
     """Return the derivatives that the engine takes, (n_out, n_columns)."""
-    n_columns = 12 * len(placed.markers) + len(placed.states) + len(placed.multipliers)
+    n_columns = placed.columns_of_marker * len(placed.markers) + len(placed.states) + len(placed.multipliers)
     address = placed.slopes.address
     slopes = called_law(address, placed.head, np.asarray(placed.law.data), inputs[None], placed.n_out * n_columns)
     raise_errors_of([placed.slopes])
@@ -201,7 +204,7 @@ def without_ground(placed: PlacedLaw, slopes: Array) -> Array:
     """Return derivatives without those by markers on the ground, for which nobody asks."""
     for m, marker in enumerate(placed.markers):
         if marker.body < 0:
-            slopes[:, 12 * m : 12 * m + 12] = 0.0
+            slopes[:, placed.columns_of_marker * m : placed.columns_of_marker * (m + 1)] = 0.0
     return slopes
 
 
@@ -234,14 +237,14 @@ def wrong_slopes(placed: PlacedLaw, own: Array, other: Array, where: str) -> lis
 def wrong_dependence(placed: PlacedLaw, slopes: Array, where: str) -> list[str]:
     """(5): return what is held but depends on what it may not."""
     found = []
-    n, n_z = len(placed.markers), len(placed.states)
+    n, n_z, per = len(placed.markers), len(placed.states), placed.columns_of_marker
     for j, holds in enumerate(placed.law.holds):
         row = slopes[6 * n + n_z + j]
         allowed = np.zeros(len(row), dtype=bool)
         for m in range(n):
-            allowed[12 * m : 12 * m + (6 if holds == POSITION else 12)] = True
+            allowed[per * m : per * m + {POSITION: 6, VELOCITY: 12}.get(holds, per)] = True
         if holds != POSITION:
-            allowed[12 * n : 12 * n + n_z] = True
+            allowed[per * n : per * n + n_z] = True
         if not holds or not (np.abs(row[~allowed]) > DERIVATIVE * np.abs(row).max()).any():
             continue
         column = int(np.abs(np.where(allowed, 0.0, row)).argmax())
@@ -263,8 +266,8 @@ def row_name(placed: PlacedLaw, k: int) -> str:
 
 def column_name(placed: PlacedLaw, k: int) -> str:
     """Return a variation in words."""
-    n, law = len(placed.markers), placed.law
-    if k < 12 * n:
-        kind = ("position", "rotation", "velocity", "angular velocity")[k % 12 // 3]
-        return f"{kind} {AXES[k % 3]} of marker {k // 12 + 1}"
-    return [*law.states, *law.multipliers][k - 12 * n]
+    n, law, per = len(placed.markers), placed.law, placed.columns_of_marker
+    if k < per * n:
+        kinds = ("position", "rotation", "velocity", "angular velocity", "acceleration", "angular acceleration")
+        return f"{kinds[k % per // 3]} {AXES[k % 3]} of marker {k // per + 1}"
+    return [*law.states, *law.multipliers][k - per * n]

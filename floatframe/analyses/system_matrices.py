@@ -72,6 +72,7 @@ class Tangents:
     J: Array  #: from wrenches to the forces on bodies, (n_w, n_u)
     G_x: Array  #: all rows by positions, (n_w, n_u)
     G_v: Array  #: by velocities, (n_w, n_u)
+    G_a: Array  #: of rows that say what a wrench is, by accelerations, zero for all others, (n_w, n_u)
     V: Array  #: by wrenches, (n_w, n_w)
     holds: NDArray[np.bool_]  #: which rows hold a position, (n_w,) bool
     rolls: NDArray[np.bool_]  #: which rows hold a velocity, (n_w,) bool
@@ -129,15 +130,17 @@ class Tangents:
         force, force_rate = self.body_forces(inputs)
         Z, back = self.open_wrenches()
         Q = Z @ back
-        G_x, G_v = self.G_x[free], self.G_v[free]
+        G_x, G_v, G_a = self.G_x[free], self.G_v[free], self.G_a[free]
         E, E_rate = inputs.E[free], inputs.E_rate[free]
         of_states = np.zeros((len(self.V), E.shape[1]))
         if len(self.states):  # the last inputs
             of_states[self.states, E.shape[1] - len(self.states) + np.arange(len(self.states))] = 1.0
         return Wrenches(
-            x=sum_of_products((Q, D[0]), (-self.by_rows, G_x), (-self.by_rows, G_v @ Omega)),
-            v=sum_of_products((Q, D[1]), (-self.by_rows, G_v)),
-            a=sum_of_products((Q, D[2])),
+            x=sum_of_products(
+                (Q, D[0]), (-self.by_rows, G_x), (-self.by_rows, G_v @ Omega), (-self.by_rows, G_a @ Omega_t @ Omega)
+            ),
+            v=sum_of_products((Q, D[1]), (-self.by_rows, G_v), (-self.by_rows, G_a @ (Omega + Omega_t))),
+            a=sum_of_products((Q, D[2]), (-self.by_rows, G_a)),
             s=of_states + sum_of_products((-Q, force), (-self.by_rows, E)),
             s_rate=sum_of_products((-Q, force_rate), (-self.by_rows, E_rate)),
         )
@@ -197,7 +200,8 @@ def tangents(model: Model, work: Work) -> Tangents:
     """Return M, C, K, G at the iterate in `work`; its wrenches give the geometric part of K."""
     by_position = linearized(model, work, 0.0, 0.0, 1.0)
     by_both = linearized(model, work, 0.0, 1.0, 1.0)
-    M = la.block_diag(*linearized(model, work, 1.0, 0.0, 0.0).H)
+    by_acceleration = linearized(model, work, 1.0, 0.0, 0.0)
+    M = la.block_diag(*by_acceleration.H)
     K = la.block_diag(*by_position.H)
     C = la.block_diag(*by_both.H) - K
     G, G_v = by_position.G.toarray(), by_both.G.toarray() - by_position.G.toarray()
@@ -206,6 +210,7 @@ def tangents(model: Model, work: Work) -> Tangents:
     states = np.asarray(model.states.row)
     of_states = rows_of_states(states, len(V))
     free = ~holds & ~rolls & ~of_states
+    G_a = np.where(free[:, None], by_acceleration.G.toarray(), 0.0)
     by_rows = np.zeros((len(V), int(free.sum())))
     if free.any():
         by_rows[~of_states] = np.linalg.pinv(V[np.ix_(free, ~of_states)])
@@ -213,7 +218,9 @@ def tangents(model: Model, work: Work) -> Tangents:
         to_bodies = J.T @ by_rows
         K += to_bodies @ G[free]
         C += to_bodies @ G_v[free]
-    return Tangents(M, C, K, G[holds], J, G, G_v, V, holds, rolls, free, states, np.asarray(model.rows.soft), by_rows)
+        M += to_bodies @ G_a[free]
+    soft = np.asarray(model.rows.soft)
+    return Tangents(M, C, K, G[holds], J, G, G_v, G_a, V, holds, rolls, free, states, soft, by_rows)
 
 
 def rows_of_states(states: IntArray, n_w: int) -> NDArray[np.bool_]:

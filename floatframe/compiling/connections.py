@@ -46,6 +46,7 @@ class Connections:
     b_of: list[int] = field(default_factory=list)
     law: list[int] = field(default_factory=list)
     item: list[int] = field(default_factory=list)
+    accelerated: list[int] = field(default_factory=list)  #: markers whose acceleration is an input of a law
     rates: list[int] = field(default_factory=list)  #: whether rows depend on velocities
     rows: list[Row] = field(default_factory=list)
     owner: list[str] = field(default_factory=list)  #: of each row

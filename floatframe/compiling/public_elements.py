@@ -22,7 +22,8 @@ from floatframe.system import System
 __all__ = ["PlacedLaw", "PublicElements", "add_public_elements"]
 
 ANGLES = ("rad", "1", "")  #: units of what is held that are not lengths
-WIDTH = 18  #: numbers of the motion of a marker
+WIDTH = 18  #: numbers of the motion of a marker,
+ACCELERATED = 24  #: and with its accelerations
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,11 @@ class PlacedLaw:
         """What its functions are, whatever their addresses."""
         functions = (self.law.function, self.law.tangent, self.law.rest)
         return tuple(digest_of(each) or words_of(each) if callable(each) else each for each in functions)
+
+    @property
+    def columns_of_marker(self) -> int:
+        """Number of the variations of a marker in derivatives: 12, or 18 with accelerations."""
+        return self.head[1] - 6
 
     @property
     def n_out(self) -> int:
@@ -128,7 +134,9 @@ def add_element(system: System, made: Connections, elements: PublicElements, ele
     law = law_of(element, Placed(r, A, on_ground, system.units))
     ends, sources = acting_ends(where, markers, law)
     rows = [Row(PART)] * (len(sources) + 3 * len(law.states)) + [held_row(*each) for each in held(law)]
-    _, w0 = made.add(element.name, ELEMENT, ends, rows, has_rates=True)
+    first_marker, w0 = made.add(element.name, ELEMENT, ends, rows, has_rates=True)
+    if law.accelerations:
+        made.accelerated += range(first_marker, first_marker + len(markers))
     states = [w0 + len(sources) + 3 * k for k in range(len(law.states))]
     first = w0 + len(sources) + 3 * len(law.states)
     elements.sources.append(sources)
@@ -137,7 +145,7 @@ def add_element(system: System, made: Connections, elements: PublicElements, ele
     elements.state0.append(elements.state0[-1] + len(states))
     moving = sum(1 << k for k, is_on_ground in enumerate(on_ground) if not is_on_ground)
     sizes = (len(law.states), len(law.multipliers), len(law.outputs), len(law.data))
-    elements.heads.append((len(markers), WIDTH, *sizes, moving, 0))
+    elements.heads.append((len(markers), ACCELERATED if law.accelerations else WIDTH, *sizes, moving, 0))
     head = elements.heads[-1]
     value, slopes = law_callbacks(where, law, head)
     rest = (value, slopes)
@@ -168,8 +176,6 @@ def law_of(element: Element, placed: Placed) -> ElementLaw:
     if not isinstance(law, ElementLaw):
         raise ModelError(f"{where}: law: expected an ElementLaw, got {law!r}")
     n = len(placed.on_ground)
-    if law.accelerations:
-        raise ModelError(f"{where}: accelerations: not among the inputs yet; take velocities")
     if n > 62:
         raise ModelError(f"{where}: expected 62 markers at most, got {n}")
     if all(placed.on_ground):

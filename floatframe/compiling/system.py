@@ -238,6 +238,10 @@ def marker_record(
     x0[ends] = np.cumsum([0] + [6 + int(made.n_q[markers[m].body]) for m in ends])[:-1]
     turns = np.zeros(len(markers), np.int64)
     turns[load_marker] = is_follower
+    accelerated, a0 = np.full(len(markers), -1, np.int64), np.zeros(len(markers), np.int64)
+    accelerated[made.accelerated] = np.arange(len(made.accelerated))
+    moving = [m for m in made.accelerated if markers[m].body >= 0]
+    a0[moving] = np.cumsum([0] + [6 + int(made.n_q[markers[m].body]) for m in moving])[:-1]
     psi0, psi = marker_shapes(shapes)
     bend0, bend = marker_bending(shapes)
     return filled(
@@ -256,6 +260,8 @@ def marker_record(
         is_follower=turns,
         x0=x0,
         line=lines.of_markers(len(markers)),
+        accelerated=accelerated,
+        a0=a0,
     )
 
 

@@ -425,8 +425,8 @@ def open_equations(system: System) -> Equations:
     Raises
     ------
     ModelError
-        If a force has states of its own, or friction follows the force in its joint: neither is a function of
-        t, x and v.
+        If a force has states of its own, an element asks for accelerations, or friction follows the force in its joint:
+        none is a function of t, x and v.
     """
     compiled = compiled_system(system)
     model = compiled.model
@@ -435,6 +435,12 @@ def open_equations(system: System) -> Equations:
         raise ModelError(
             f"open_equations: {compiled.connection_names[int(users[0])]!r} has states of its own, which are no part of "
             "x and v; give its forces without states, and integrate the states beside"
+        )
+    felt = [each.element.name for each in compiled.laws if each.law.accelerations]
+    if felt:
+        raise ModelError(
+            f"open_equations: element {felt[0]!r} asks for accelerations, which are no part of x and v; give its "
+            "masses as bodies"
         )
     if has_normal_friction(model):
         raise ModelError(

@@ -202,6 +202,11 @@ def require_no_memory(system: System) -> None:
                 "forces without states"
             )
     for each in compiled_system(system).laws:
+        if each.law.accelerations:
+            raise ModelError(
+                f"sensitivities: element {each.element.name!r} asks for accelerations, which are not differentiated; "
+                "give its masses as bodies"
+            )
         if each.law.states or each.law.multipliers:
             what = "states" if each.law.states else "multipliers"
             raise ModelError(

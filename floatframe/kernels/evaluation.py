@@ -4,7 +4,13 @@ from floatframe.kernels.body import body_forces, body_tangent
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.connection import connection_derivatives, connection_rows
 from floatframe.kernels.joints.deformed_line import slide_marker
-from floatframe.kernels.marker import marker_columns, marker_motion, marker_stiffness, wrench_to_body
+from floatframe.kernels.marker import (
+    acceleration_columns,
+    marker_columns,
+    marker_motion,
+    marker_stiffness,
+    wrench_to_body,
+)
 from floatframe.kernels.rotation import right_jacobian
 from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import put, put_matrix, put_sum, scaled, turned, turned_back, vector
@@ -92,5 +98,9 @@ def linearize(model, work, c_m, c_d, c_k):
             column = work.solver.J_column[6 * o : 6 * (o + n)].reshape((6, n))
             row = work.solver.J_row[12 * o : 12 * (o + n)].reshape((12, n))
             marker_columns(model, work, m, rate, turning, column, row)
+            if model.markers.accelerated[m] >= 0:
+                o = model.markers.a0[m]
+                row_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape((6, n))
+                acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row_a)
     for c in range(model.connections.size.shape[0]):
         connection_derivatives(model, work, c, c_k)

@@ -30,7 +30,8 @@ from floatframe.kernels.vector import (
 )
 
 __all__ = [
-    "marker_acceleration_bias", "marker_columns", "marker_motion", "marker_stiffness", "pose_on_body", "wrench_to_body",
+    "acceleration_columns", "marker_acceleration", "marker_acceleration_bias", "marker_columns", "marker_motion",
+    "marker_stiffness", "pose_on_body", "wrench_to_body",
 ]  # fmt: skip
 
 
@@ -118,10 +119,17 @@ def bent_shapes(model, work, m, i):
 @inner
 def bent_rate(model, work, m, i, out):
     """Write K_P q_dot [6, k], minus the rate of Psi(q), into out, (6 n_q,)."""
-    n, u0, first = model.bodies.n_q[i], model.bodies.u0[i], model.markers.bend0[m]
+    n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
+    bent_by(model, m, n, work.state.u[u0 + 6 : u0 + 6 + n], out)
+
+
+@inner
+def bent_by(model, m, n, factors, out):
+    """Write Σ_l K_P,l factors_l [6, k] into out, (6 n_q,)."""
+    first = model.markers.bend0[m]
     for j in range(6 * n):
         out[j] = 0.0
-    add_products(model.markers.bend[first : first + 6 * n * n], work.state.u[u0 + 6 : u0 + 6 + n], out)
+    add_products(model.markers.bend[first : first + 6 * n * n], factors, out)
 
 
 @inner
@@ -153,6 +161,74 @@ def marker_acceleration_bias(model, work, m, out):
         slope = left_jacobian_derivative(vector(work.markers.angle[m]), th_dot, 1.0)
         own = add(turned(slope, th_dot), turned(work.markers.T_left[m], b_r))
         put(out, 3, turned(R, add(cross(omega, nu), own)))
+
+
+@inner
+def marker_acceleration(model, work, m, out):
+    """Write the acceleration (3) and angular acceleration (3) of marker m at the iterate, ground axes, into out."""
+    marker_acceleration_bias(model, work, m, out)
+    i = model.markers.body[m]
+    if i < 0:
+        return
+    n, u0, R, o = model.bodies.n_q[i], model.bodies.u0[i], work.state.R[i], model.markers.psi0[m]
+    omega_dot = vector(work.state.u_dot[u0 + 3 :])
+    a, alpha = cross(omega_dot, vector(work.markers.rho[m])), omega_dot
+    if o >= 0:
+        psi, T = work.markers.psi[o : o + 6 * n], work.markers.T_left[m]
+        for k in range(n):
+            d, th = shape(psi, n, k)
+            a = add(a, scaled(work.state.u_dot[u0 + 6 + k], d))
+            alpha = add(alpha, scaled(work.state.u_dot[u0 + 6 + k], turned(T, th)))
+    put_sum(out, 0, add(vector(work.state.u_dot[u0:]), turned(R, a)))
+    put_sum(out, 3, turned(R, alpha))
+
+
+@inner
+def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
+    """Write c_k times the derivatives of the acceleration of marker m by the unknowns of a step, body axes.
+
+    row, (6, 6 + n). In a step du_dot = c_m/c_k of the unknowns, their velocities c_d/c_k, the body turns by `turning`
+    dtheta. In body axes, but for the acceleration of the frame origin,
+
+        a = omega_dot × rho + Psi_t q_ddot + omega × (omega × rho + 2 rho_dot) - q_dotᵀ K_P,t q_dot
+        alpha = omega_dot + T' Psi_r q_ddot + omega × nu + ...
+
+    Of alpha, the derivatives by q and q_dot of T' and its rate are left out: of the size of the elastic rotations.
+    """
+    i = model.markers.body[m]
+    n, u0, omega = model.bodies.n_q[i], model.bodies.u0[i], body_omega(model.bodies, work.state, i)
+    R, rho, rho_dot = work.state.R[i], vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
+    omega_dot, nu = vector(work.state.u_dot[u0 + 3 :]), vector(work.markers.spin[m])
+    now = work.markers.acceleration[model.markers.accelerated[m]]
+    of_frame = vector(work.state.u_dot[u0:])
+    a, alpha = turned_back(R, sub(vector(now), of_frame)), turned_back(R, vector(now[3:]))
+    row[:, :] = 0.0
+    for b in range(3):
+        t, e = scaled(c_k, (turning[0, b], turning[1, b], turning[2, b])), unit(b)
+        row[b, b] = c_m
+        by_spin = add(cross(e, add(cross(omega, rho), scaled(2.0, rho_dot))), cross(omega, cross(e, rho)))
+        put_column(row, 0, 3 + b, add(add(scaled(c_m, cross(e, rho)), scaled(c_d, by_spin)), cross(t, a)))
+        put_column(row, 3, 3 + b, add(add(scaled(c_m, e), scaled(c_d, cross(e, nu))), cross(t, alpha)))
+    o = model.markers.psi0[m]
+    if o < 0:
+        return
+    psi, T, is_bent = work.markers.psi[o : o + 6 * n], work.markers.T_left[m], model.markers.bend0[m] >= 0
+    bend_dot, bend_ddot = work.markers.bend_dot[: 6 * n], work.markers.bend_ddot[: 6 * n]
+    if is_bent:
+        bent_rate(model, work, m, i, bend_dot)
+        bent_by(model, m, n, work.state.u_dot[u0 + 6 : u0 + 6 + n], bend_ddot)
+    for k in range(n):
+        d, th = shape(psi, n, k)
+        turn = turned(T, th)
+        by_rate = scaled(2.0, cross(omega, d))
+        by_place = add(cross(omega_dot, d), cross(omega, cross(omega, d)))
+        if is_bent:
+            d_dot, _ = shape(bend_dot, n, k)
+            d_ddot, _ = shape(bend_ddot, n, k)
+            by_rate = sub(by_rate, scaled(2.0, d_dot))
+            by_place = sub(by_place, add(d_ddot, scaled(2.0, cross(omega, d_dot))))
+        put_column(row, 0, 6 + k, add(add(scaled(c_m, d), scaled(c_d, by_rate)), scaled(c_k, by_place)))
+        put_column(row, 3, 6 + k, add(scaled(c_m, turn), scaled(c_d, cross(omega, turn))))
 
 
 @small

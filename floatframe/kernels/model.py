@@ -110,6 +110,8 @@ class Markers(NamedTuple):
     is_follower: IntArray = integer(n_m)  #: whether its wrench turns with it
     x0: IntArray = integer(n_m)  #: Σ (6 + n_q) over the ends before it
     line: IntArray = integer(n_m)  #: along which it slides, -1 for none
+    accelerated: IntArray = integer(n_m)  #: number among the markers whose acceleration is an input of a law, or -1
+    a0: IntArray = integer(n_m)  #: Σ (6 + n_q) over the accelerated ends before it
 
 
 class Connections(NamedTuple):

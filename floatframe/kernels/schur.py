@@ -48,7 +48,22 @@ def factorize_bodies(model, work, c_m, c_d, c_k):
                 for j in range(n):
                     total += row[r, j] * X[j, k]
                 Z[r, k] = total
+        if model.markers.accelerated[row_marker] >= 0:
+            accelerate_pair(model, work, p, X, n)
     return -1
+
+
+@inner
+def accelerate_pair(model, work, p, X, n):
+    """Write Z_a = J_a X of pair p."""
+    o, Z_a = model.markers.a0[model.elimination.pair_row[p]], work.solver.Z_a[p]
+    row = work.solver.J_a[6 * o : 6 * (o + n)].reshape((6, n))
+    for r in range(6):
+        for k in range(6):
+            total = 0.0
+            for j in range(n):
+                total += row[r, j] * X[j, k]
+            Z_a[r, k] = total
 
 
 @inner
@@ -85,6 +100,28 @@ def assemble(model, work, c_k):
                     for k in range(n_motion):
                         x = add(x, scaled(row[k], Z[k, part:]))
                     put_sum(s, o + r * columns + w_part, scaled(sign, turned(R, x)))
+            if model.markers.accelerated[a] >= 0:
+                add_accelerated(model, work, p, r, s, o + r * columns)
+
+
+@inner
+def add_accelerated(model, work, p, r, s, place):
+    """Add what row r of the first connection of pair p feels of its marker's acceleration by the wrench of the other.
+
+    place: where the row of the block begins in the store s.
+    """
+    a, b, row = model.elimination.pair_row[p], model.elimination.pair_column[p], work.solver.row
+    R, P_a = work.state.R[model.markers.body[a]], work.connections.P_a[model.markers.accelerated[a]]
+    Z_a = work.solver.Z_a[p]
+    for part in range(0, 6, 3):
+        put(row, part, turned_back(R, P_a[r, part:]))
+    for part in range(0, 6, 3):
+        w_part = model.markers.force[b] if part == 0 else model.markers.moment[b]
+        if w_part >= 0:
+            x = (0.0, 0.0, 0.0)
+            for k in range(6):
+                x = add(x, scaled(row[k], Z_a[k, part:]))
+            put_sum(s, place + w_part, scaled(model.markers.sign[b], turned(R, x)))
 
 
 @inner
@@ -151,6 +188,23 @@ def solve_connections(elimination, connections, solver):
 
 
 @inner
+def take_accelerated(model, work, m, n, y, mu):
+    """Subtract what the rows of marker m feel of its acceleration by the correction y of its body."""
+    c, o, motion = model.markers.connection[m], model.markers.a0[m], work.solver.motion
+    R, P_a = work.state.R[model.markers.body[m]], work.connections.P_a[model.markers.accelerated[m]]
+    for r in range(6):
+        total = 0.0
+        for k in range(n):
+            total += work.solver.J_a[6 * o + r * n + k] * y[k]
+        motion[r] = total
+    for part in range(0, 6, 3):
+        put(motion, part, turned(R, motion[part:]))
+    for r in range(model.connections.size[c]):
+        for k in range(6):
+            mu[model.connections.w0[c] + r] -= P_a[r, k] * motion[k]
+
+
+@inner
 def correction(model, work, c_k, is_new):
     """Write the correction (y, mu) for the residuals in `work`; reassemble the connections if is_new.
 
@@ -196,6 +250,8 @@ def correction(model, work, c_k, is_new):
                 for k in range(n_motion):
                     total += work.connections.P[m, r, k] * motion[k]
                 mu[w0 + r] -= total
+            if markers.accelerated[m] >= 0:
+                take_accelerated(model, work, m, n, y[u0 : u0 + n], mu)
     solve_connections(model.elimination, connections, solver)
     for i in range(bodies.kind.shape[0]):
         n, u0, R = 6 + bodies.n_q[i], bodies.u0[i], work.state.R[i]

@@ -35,6 +35,7 @@ __all__ = [
 
 n_q, n_u, n_x, n_most, most_rows = (Size(name) for name in ("n_q", "n_u", "n_x", "n_most", "most_rows"))
 n_inputs, n_outputs, n_gradients, n_results = (Size(name) for name in ("inputs", "outputs", "gradients", "results"))
+n_accelerated, n_a = Size("accelerated markers"), Size("n_a")
 n_law_inputs, n_law_outputs, n_law_slopes = (Size(f"{name} of a law") for name in ("inputs", "outputs", "slopes"))
 
 
@@ -89,6 +90,8 @@ class MarkerWork(NamedTuple):
     wrench: Array = real(n_m, 6, unit="N, N m")  #: force and moment on the marker
     bias: Array = real(n_m, 6, unit="m/s², rad/s²")  #: acceleration and angular acceleration at zero u_dot
     bend_dot: Array = real(6 * n_most, unit="m/s, rad/s")  #: K_P q_dot [6, k] of one marker
+    bend_ddot: Array = real(6 * n_most, unit="m/s², rad/s²")  #: K_P q_ddot [6, k] of one marker
+    acceleration: Array = real(n_accelerated, 6, unit="m/s², rad/s²")  #: of those that are inputs of a law, ground axes
 
 
 class LineWork(NamedTuple):
@@ -109,6 +112,7 @@ class ConnectionWork(NamedTuple):
 
     g: Array = real(n_w, unit="m, rad, kg m")  #: residual of the rows, scaled
     P: Array = real(n_m, most_rows, 12)  #: derivative of the rows by the motion of a marker (r, phi, v, omega)
+    P_a: Array = real(n_accelerated, most_rows, 6)  #: by the acceleration of a marker, without the weight c_k
     V: Array = real(n_c, most_rows, most_rows)  #: derivative of the rows by their own wrench
     rate: Array = real(n_w, unit="m/s, rad/s")  #: of what the rows hold
     bias: Array = real(n_w, unit="m/s², rad/s²")  #: its second rate at zero u_dot
@@ -207,6 +211,8 @@ class Solver(NamedTuple):
     J_column: Array = real(6 * n_x)  #: marker motion (6) by body velocities, at 6 x0
     X: Array = real(6 * n_x)  #: H⁻¹ J_columnᵀ [unknown, 6], at 6 x0
     Z: Array = real(n_pairs, 12, 6)  #: J_row X for each pair of ends
+    J_a: Array = real(6 * n_a)  #: acceleration (6) of accelerated markers by body unknowns, times c_k, at 6 a0
+    Z_a: Array = real(Size("accelerated pairs"), 6, 6)  #: J_a X for each pair whose row marker is accelerated
     blocks: Array = real(Size("numbers of blocks"))  #: block matrix of the connections, flat
     block_pivot: IntArray = integer(n_w)
     mu: Array = real(n_w)  #: correction of the wrenches, times c_k
@@ -275,6 +281,7 @@ def sizes_of(model: Model) -> dict[str, int]:
             "outputs": int(max(n_out, default=0)),
             "gradients": int(max(n_in, default=0) * max(n_out, default=0)),
             **law_sizes(model.laws.head),
+            **acceleration_sizes(model),
             "results": int(max(np.diff(model.tapes.operation0), default=0)),
             "numbers of H": int(bodies.h0[-1]),
             "numbers of blocks": int(model.elimination.n_store),
@@ -289,7 +296,19 @@ def law_sizes(head: IntArray) -> dict[str, int]:
     return {
         "inputs of a law": int(max(1 + n * width + n_z + n_lam, default=0)),
         "outputs of a law": int(max(n_out + n_seen, default=0)),
-        "slopes of a law": int(max(n_out * (12 * n + n_z + n_lam), default=0)),
+        "slopes of a law": int(max(n_out * ((width - 6) * n + n_z + n_lam), default=0)),
+    }
+
+
+def acceleration_sizes(model: Model) -> dict[str, int]:
+    """Return the sizes of what belongs to markers whose acceleration is an input of a law."""
+    markers = model.markers
+    accelerated = markers.accelerated >= 0
+    moving = accelerated & (markers.body >= 0)
+    return {
+        "accelerated markers": int(accelerated.sum()),
+        "n_a": int(sum(6 + model.bodies.n_q[markers.body[moving]])),
+        "accelerated pairs": len(model.elimination.pair_row) if accelerated.any() else 0,
     }
 
 

@@ -57,9 +57,9 @@ def element_motion(system: System, trajectory: Trajectory, name: str) -> Element
     placed = placed_law(system, name)
     w = unknowns(system, trajectory)
     places = [marker_place(system, trajectory, marker) for marker in placed.markers]
-    inputs = np.column_stack([trajectory.t, *(motion_row(place) for place in places), w[:, placed.states],
-                              w[:, placed.multipliers]])  # fmt: skip
     law = placed.law
+    motion = [motion_row(place, law.accelerations) for place in places]
+    inputs = np.column_stack([trajectory.t, *motion, w[:, placed.states], w[:, placed.multipliers]])
     n_all, data = placed.n_out + len(law.outputs), np.asarray(law.data)
     out = called_law(placed.value.address, placed.head, data, inputs, n_all)
     raise_errors_of([placed.value])
@@ -90,6 +90,9 @@ def marker_place(system: System, trajectory: Trajectory, marker: MarkerData) -> 
     return shape_motion(motion, marker.shape)
 
 
-def motion_row(place: PlaceMotion) -> Array:
-    """Return position, axes row by row, velocity and angular velocity, (n_t, 18)."""
-    return np.column_stack([place.position, place.axes.reshape(-1, 9), place.velocity, place.omega])
+def motion_row(place: PlaceMotion, accelerations: bool) -> Array:
+    """Return position, axes row by row, velocity and angular velocity, (n_t, 18), with their rates (n_t, 24)."""
+    parts = [place.position, place.axes.reshape(-1, 9), place.velocity, place.omega]
+    if accelerations:
+        parts += [place.acceleration, np.zeros_like(place.omega) if place.alpha is None else place.alpha]
+    return np.column_stack(parts)

@@ -13,6 +13,7 @@ W adds the stiffness, scaled, to the mass, so that (1) and (2) move bodies rathe
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from fe_models.foundation.arrays import Array
 from floatframe.bodies.rigid_body import euler_parameters_from_user
@@ -292,18 +293,24 @@ def solve_accelerations(
 
     model = compiled.model
     w = start_unknowns(model, known)
+    feels_accelerations = bool((model.markers.accelerated >= 0).any())
+    y = np.zeros(len(work.state.u))
     for _ in range(MOST_ITERATIONS):
-        set_iterate(work, state, w=w)
+        set_iterate(work, state, in_ground_axes(model, state, y) if feels_accelerations else None, w)
         parts = linearized(model, work, 1.0, 0.0, 0.0)
         _, bias = rates_of_constraints(model, work)
         raise_errors_of(compiled.callbacks)
         require_numbers(compiled, work)
-        rows = -np.where(is_held(model.rows.kind), bias, work.connections.g)
-        y, change = solve(with_mass_for_all(model, parts.H), parts, -work.bodies.residual, rows)
+        forces, known_rows = -work.bodies.residual, np.zeros(len(w))
+        if feels_accelerations:  # residuals and rows are those with the accelerations of the iterate
+            forces = forces + sp.block_diag(parts.H) @ y
+            known_rows = parts.G @ y
+        rows = np.where(is_held(model.rows.kind), -bias, known_rows - work.connections.g)
+        y, change = solve(with_mass_for_all(model, parts.H), parts, forces, rows)
         w = w + change
         raise_errors_of(compiled.callbacks)
-        # friction by the normal force is not linear in the reactions, nor are users' forces in their states
-        is_linear = not has_normal_friction(model) and not len(model.states.row)
+        # friction by the normal force is not linear in the reactions, nor are users' forces in states or accelerations
+        is_linear = not has_normal_friction(model) and not len(model.states.row) and not feels_accelerations
         if is_linear or np.abs(change).max(initial=0.0) <= 1e-10 * np.abs(w).max(initial=0.0):
             break
     return in_ground_axes(model, state, y), w

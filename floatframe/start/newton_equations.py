@@ -36,7 +36,7 @@ class Linearized:
 
     H: tuple[Array, ...]  #: of each body, (6 + n, 6 + n)
     J: sp.csr_array  #: wrenches to bodies: forces = J.T @ w, (n_w, n_u)
-    G: sp.csr_array  #: rows by unknowns, (n_w, n_u)
+    G: sp.csr_array  #: rows by unknowns, (n_w, n_u); of rows that feel accelerations with these
     V: sp.csr_array  #: rows by wrenches, (n_w, n_w)
 
 
@@ -77,6 +77,11 @@ def linearized(model: Model, work: Work, c_m: float, c_d: float, c_k: float) -> 
             if place >= 0:
                 J_parts.append((carried[part : part + 3], w0 + place, u0))
         G_parts.append((work.connections.P[m, :size] @ R4 @ row, w0, u0))
+        accelerated = int(model.markers.accelerated[m])
+        if accelerated >= 0:
+            o = int(model.markers.a0[m])
+            row_a = work.solver.J_a[6 * o : 6 * (o + n)].reshape(6, n)
+            G_parts.append((work.connections.P_a[accelerated, :size] @ R4[:6, :6] @ row_a, w0, u0))
     blocks = [work.connections.V[c, :size, :size].copy() for c, size in enumerate(model.connections.size)]
     V = sp.csr_array(sp.block_diag(blocks)) if blocks else sp.csr_array((0, 0))
     return Linearized(tuple(H), summed(J_parts, (n_w, n_u)), summed(G_parts, (n_w, n_u)), V)

@@ -151,6 +151,12 @@ def first_instant(system: System, work: Work, state: State, t: float, elasticity
             f"kinematics: element {own[0].element.name!r} has states or multipliers of its own, which need a motion in "
             "time: integrate it, or take the element out"
         )
+    felt = [each.element.name for each in compiled.laws if each.law.accelerations]
+    if felt:
+        raise ModelError(
+            f"kinematics: element {felt[0]!r} asks for accelerations, which a driven motion does not give to "
+            "elements; give its masses as bodies, or integrate the motion"
+        )
     rolling = np.flatnonzero(is_held_velocity(compiled.model.rows.kind))
     if len(rolling):
         raise ModelError(

@@ -257,6 +257,12 @@ def base_rows(small: SmallMotions, base: BaseColumn, channel: BaseMotion) -> tup
     E, E_rate = np.zeros(small.n_w), np.zeros(small.n_w)
     for m in moved_markers(small, base):
         c = int(model.markers.connection[m])
+        if model.markers.accelerated[m] >= 0:
+            name = small.compiled.connection_names[c]
+            raise ModelError(
+                f"input {channel.name!r}: element {name!r} asks for the acceleration of a marker that the base moves; "
+                "put the marker on a body that is fixed to it"
+            )
         rows, P = small.wrench(small.compiled.connection_names[c]), work.connections.P[m]
         size, motion = rows.stop - rows.start, base.at(work.markers.r[m])
         E[rows] += P[:size, :6] @ motion

@@ -354,6 +354,7 @@ def linearize(
     set_iterate(work, state, u_dot, about.w)
     shown = small_motions_of_file(compiled, state.q)
     parts = tangents(model, work)
+    require_slow_states(compiled)
     states = states_of(system, compiled, work, parts)
     n_states = len(states.names)
     now = snapshot(system, about)
@@ -431,6 +432,16 @@ class NamedStates:
         """Return them behind the ways along which held velocities let nothing slip."""
         n = len(roll.by_eta)
         return NamedStates((*(f"rolled way {k + 1}" for k in range(n)), *self.names), (*(unit,) * n, *self.units))
+
+
+def require_slow_states(compiled: CompiledSystem) -> None:
+    """Raise `ModelError` if states of an element may follow accelerations: z' would take part in the masses."""
+    for each in compiled.laws:
+        if each.law.accelerations and each.law.states:
+            raise ModelError(
+                f"linearize: element {each.element.name!r} has states beside accelerations, which a linear system does "
+                "not know; give its states to an element that asks for velocities"
+            )
 
 
 def states_of(system: System, compiled: CompiledSystem, work: Work, parts: Tangents) -> NamedStates:

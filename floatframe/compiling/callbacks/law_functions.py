@@ -121,9 +121,9 @@ def python_callback(
     where: str, function: Any, kind: str, template: Callable[[int], FunctionType], head: tuple[int, ...]
 ) -> Callback:
     """Return a Python function behind a C function; after an error it answers with what is no number."""
-    n, _, n_z, n_lam, n_seen, _, _, _ = head
+    n, width, n_z, n_lam, n_seen, _, _, _ = head
     n_out = 6 * n + n_z + n_lam
-    size = n_out + n_seen if kind == "value" else n_out * (12 * n + n_z + n_lam)
+    size = n_out + n_seen if kind == "value" else n_out * ((width - 6) * n + n_z + n_lam)
     made = filled(template, function, 1)
     made.__globals__["carray"] = array_at
     kept_callback = Callback(where, 0, None)

@@ -15,13 +15,14 @@ LEAST = 1e-3  #: size of a state or multiplier near zero
 STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))  #: of fourth order
 
 
-def varied(inputs: Array, n: int, k: int, step: float) -> Array:
+def varied(inputs: Array, n: int, width: int, k: int, step: float) -> Array:
     """Return the inputs of a law with variation k (dr, dphi, dv, domega of each marker, states, multipliers)."""
     y = inputs.copy()
-    if k >= 12 * n:
-        y[1 + 18 * n + k - 12 * n] += step
+    per = width - 6
+    if k >= per * n:
+        y[1 + width * n + k - per * n] += step
         return y
-    first, j = 1 + 18 * (k // 12), k % 12
+    first, j = 1 + width * (k // per), k % per
     if j < 3:
         y[first + j] += step
     elif j < 6:
@@ -32,26 +33,27 @@ def varied(inputs: Array, n: int, k: int, step: float) -> Array:
     return y
 
 
-def size_of(inputs: Array, n: int, k: int) -> float:
+def size_of(inputs: Array, n: int, width: int, k: int) -> float:
     """Return the size by which variation k is measured."""
-    if k >= 12 * n:
-        return max(abs(float(inputs[1 + 18 * n + k - 12 * n])), LEAST)
-    j = k % 12
+    per = width - 6
+    if k >= per * n:
+        return max(abs(float(inputs[1 + width * n + k - per * n])), LEAST)
+    j = k % per
     if 3 <= j < 6:
         return 1.0
-    return max(1.0, abs(float(inputs[1 + 18 * (k // 12) + j + (6 if j >= 6 else 0)])))
+    return max(1.0, abs(float(inputs[1 + width * (k // per) + j + (6 if j >= 6 else 0)])))
 
 
 def difference_slopes(
     address: int, head: tuple[int, ...], data: Array | Sequence[float], inputs: Array, step: float = STEP
 ) -> Array:
     """Return d(wrenches, rates, held, outputs) by all variations at inputs, (6 n + n_z + n_lam + n_seen, n_columns)."""
-    n, _, n_z, n_lam, n_seen = head[:5]
-    n_out, n_columns = 6 * n + n_z + n_lam + n_seen, 12 * n + n_z + n_lam
+    n, width, n_z, n_lam, n_seen = head[:5]
+    n_out, n_columns = 6 * n + n_z + n_lam + n_seen, (width - 6) * n + n_z + n_lam
     slopes = np.zeros((n_out, n_columns))
     for k in range(n_columns):
-        h = step * size_of(inputs, n, k)
-        rows = np.array([varied(inputs, n, k, steps * h) for steps, _ in STENCIL])
+        h = step * size_of(inputs, n, width, k)
+        rows = np.array([varied(inputs, n, width, k, steps * h) for steps, _ in STENCIL])
         values = called_law(address, head, np.asarray(data), rows, n_out)
         slopes[:, k] = np.array([factor for _, factor in STENCIL]) @ values / h
     return slopes

@@ -4,7 +4,8 @@
 
 head: numbers of markers n, of the motion of each, of states, multipliers, outputs and data, the markers that move as
 bits, 0. inputs: t, motions, states, multipliers. outputs: wrenches, rates of states, what is held, what is seen; or the
-derivatives of these but for the last, row by row, by dr, dphi, dv, domega of each marker, states, multipliers.
+derivatives of these but for the last, row by row, by dr, dphi, dv, domega of each marker, states, multipliers. Of a
+law that asks for accelerations, da and dalpha follow on domega.
 
 The templates are filled in by `law_functions`: `law` stands for the function of the user.
 """
@@ -53,7 +54,7 @@ def given_template(digest):
         n, width, n_z, n_lam, n_data = head[0], head[1], head[2], head[3], head[5]
         o = 1 + n * width
         inputs = carray(inputs_at, o + n_z + n_lam)
-        own = carray(slopes_at, (6 * n + n_z + n_lam, 12 * n + n_z + n_lam))
+        own = carray(slopes_at, (6 * n + n_z + n_lam, (width - 6) * n + n_z + n_lam))
         own[:, :] = 0.0 if digest else 1.0
         x = inputs[1:o].reshape((n, width))
         law(inputs[0], x, inputs[o : o + n_z], inputs[o + n_z :], carray(data_at, n_data), own)
@@ -69,7 +70,8 @@ def complex_template(digest):
         n, width, n_z, n_lam, n_seen, n_data, moving = head[0], head[1], head[2], head[3], head[4], head[5], head[6]
         o = 1 + n * width
         inputs = carray(inputs_at, o + n_z + n_lam)
-        n_out, n_columns = 6 * n + n_z + n_lam, 12 * n + n_z + n_lam
+        n_out, per = 6 * n + n_z + n_lam, width - 6
+        n_columns = per * n + n_z + n_lam
         own = carray(slopes_at, (n_out, n_columns))
         own[:, :] = 0.0 if digest else 1.0
         data = carray(data_at, n_data)
@@ -81,7 +83,7 @@ def complex_template(digest):
         z, lam = y[o - 1 : o - 1 + n_z], y[o - 1 + n_z :]
         wrench, z_dot, g = out[: 6 * n].reshape((n, 6)), out[6 * n : 6 * n + n_z], out[6 * n + n_z : n_out]
         for k in range(n_columns):
-            m, j = k // 12, k % 12
+            m, j = k // per, k % per
             if m < n:
                 if not (moving >> m) & 1:
                     continue
@@ -96,17 +98,17 @@ def complex_template(digest):
                 else:
                     x[m, 6 + j] += TINY * 1j
             else:
-                y[o - 1 + k - 12 * n] += TINY * 1j
+                y[o - 1 + k - per * n] += TINY * 1j
             for i in range(out.shape[0]):
                 out[i] = 0.0
             law(inputs[0], x, z, lam, data, wrench, z_dot, g, out[n_out:])
             for i in range(n_out):
                 own[i, k] = out[i].imag / TINY
             if m < n:
-                for i in range(18):
+                for i in range(width):
                     x[m, i] = inputs[1 + m * width + i]
             else:
-                y[o - 1 + k - 12 * n] = inputs[o + k - 12 * n]
+                y[o - 1 + k - per * n] = inputs[o + k - per * n]
 
     return slopes
 
@@ -119,7 +121,8 @@ def difference_template(digest):
         n, width, n_z, n_lam, n_seen, n_data, moving = head[0], head[1], head[2], head[3], head[4], head[5], head[6]
         o = 1 + n * width
         inputs = carray(inputs_at, o + n_z + n_lam)
-        n_out, n_columns = 6 * n + n_z + n_lam, 12 * n + n_z + n_lam
+        n_out, per = 6 * n + n_z + n_lam, width - 6
+        n_columns = per * n + n_z + n_lam
         own = carray(slopes_at, (n_out, n_columns))
         own[:, :] = 0.0 if digest else 1.0
         data = carray(data_at, n_data)
@@ -129,12 +132,12 @@ def difference_template(digest):
         z, lam = y[o - 1 : o - 1 + n_z], y[o - 1 + n_z :]
         wrench, z_dot, g = out[: 6 * n].reshape((n, 6)), out[6 * n : 6 * n + n_z], out[6 * n + n_z : n_out]
         for k in range(n_columns):
-            m, j = k // 12, k % 12
+            m, j = k // per, k % per
             if m < n and not (moving >> m) & 1:
                 continue
             first = 1 + m * width
             if m >= n:
-                h = STEP * abs(y[o - 1 + k - 12 * n]) + LEAST
+                h = STEP * abs(y[o - 1 + k - per * n]) + LEAST
             elif 3 <= j < 6:
                 h = STEP
             else:
@@ -143,7 +146,7 @@ def difference_template(digest):
             for side in range(2):
                 s = h if side == 0 else -h
                 if m >= n:
-                    y[o - 1 + k - 12 * n] = inputs[o + k - 12 * n] + s
+                    y[o - 1 + k - per * n] = inputs[o + k - per * n] + s
                 elif j < 3:
                     x[m, j] = inputs[first + j] + s
                 elif j >= 6:
@@ -160,9 +163,9 @@ def difference_template(digest):
                 for i in range(n_out):
                     own[i, k] += out[i] / (2 * s)
             if m < n:
-                for i in range(18):
+                for i in range(width):
                     x[m, i] = inputs[first + i]
             else:
-                y[o - 1 + k - 12 * n] = inputs[o + k - 12 * n]
+                y[o - 1 + k - per * n] = inputs[o + k - per * n]
 
     return slopes

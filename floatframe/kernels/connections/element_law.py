@@ -12,7 +12,8 @@ rate (`user_force`), the multipliers:
 A multiplier holds a position (h of places and time alone), a velocity, or nothing: then h = 0 is an equation like those
 of wrenches. Two ends whose forces are opposite share one unknown, with the factor -1 at the second.
 
-The derivatives come from one call, d(wrench, g, h)/d(dr, dphi, dv, domega of each marker, z, lam), row by row.
+The derivatives come from one call, d(wrench, g, h)/d(dr, dphi, dv, domega [, da, dalpha] of each marker, z, lam), row
+by row. A law that asks for accelerations gets 24 numbers of each marker in place of 18.
 """
 
 import math
@@ -20,6 +21,7 @@ import math
 from floatframe.joints.rows.kinds import NOTHING, POSITION, VELOCITY
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.compiler.user_call import call_law
+from floatframe.kernels.marker import marker_acceleration
 from floatframe.kernels.rotation import exp_matrix
 from floatframe.kernels.vector import add, dot, matrix, norm, product, put, put_sum, scaled, vector
 
@@ -46,6 +48,11 @@ def law_inputs(model, work, c):
                 x[o + 3 + 3 * r + k] = markers.A[first + m, r, k]
         put(x, o + 12, vector(markers.v[first + m]))
         put(x, o + 15, vector(markers.omega[first + m]))
+        a = model.markers.accelerated[first + m]
+        if a >= 0:
+            marker_acceleration(model, work, first + m, markers.acceleration[a])
+            put(x, o + 18, vector(markers.acceleration[a]))
+            put(x, o + 21, vector(markers.acceleration[a, 3:]))
     o = 1 + n * width
     k = model.connections.w0[c] + model.laws.row0[i + 1] - model.laws.row0[i]
     for s in range(model.laws.head[i, 2]):
@@ -133,12 +140,18 @@ def law_derivatives(model, work, c, c_k):
     law_inputs(model, work, c)
     data = laws.data[laws.data0[i] : laws.data0[i + 1]]
     call_law(laws.tangent[i], laws.head[i], work.laws.inputs, data, slopes)
-    n_columns = 12 * n + n_z + n_lam
+    per = laws.head[i, 1] - 6  # columns of a marker
+    n_columns = per * n + n_z + n_lam
+    for m in range(a, a + n):
+        if model.markers.accelerated[m] >= 0:
+            for r in range(size):
+                for j in range(6):
+                    work.connections.P_a[model.markers.accelerated[m], r, j] = 0.0
     r, states = 0, laws.row0[i + 1] - laws.row0[i]
     for j in range(laws.row0[i], laws.row0[i + 1]):
         own = slopes[laws.source[j] * n_columns : (laws.source[j] + 1) * n_columns]
         V[r, r] = 1.0
-        add_slopes(work, V, a, n, n_z, n_lam, states, r, -c_k * laws.factor[j], -laws.factor[j], own)
+        add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, -c_k * laws.factor[j], -laws.factor[j], own)
         r += 1
     o = 6 * n
     for s in range(laws.state0[i], laws.state0[i] + n_z):
@@ -146,7 +159,7 @@ def law_derivatives(model, work, c, c_k):
         V[r, r], V[r, r + 1] = 1.0, -work.states.kappa[s]
         V[r + 1, r + 1] = 1.0
         V[r + 2, r + 2], V[r + 2, r + 1] = 1.0, -work.states.rho
-        add_slopes(work, V, a, n, n_z, n_lam, states, r + 1, -c_k, -1.0, own)
+        add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r + 1, -c_k, -1.0, own)
         for m in range(a, a + n):
             for j in range(12):
                 work.connections.P[m, r, j], work.connections.P[m, r + 2, j] = 0.0, 0.0
@@ -155,41 +168,45 @@ def law_derivatives(model, work, c, c_k):
         own = slopes[o * n_columns : (o + 1) * n_columns]
         holds = model.rows.holds[w0 + r]
         if holds == NOTHING:
-            add_slopes(work, V, a, n, n_z, n_lam, states, r, c_k, 1.0, own)
+            add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, c_k, 1.0, own)
         else:
-            held_slopes(work, V, a, n, n_z, n_lam, states, r, holds, c_k, own)
+            held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own)
         o, r = o + 1, r + 1
 
 
 @inner
-def add_slopes(work, V, a, n, n_z, n_lam, states, r, by_motion, by_unknown, own):
-    """Add derivatives of one output to row r of P and V, multiplied by a factor each."""
+def add_slopes(model, work, V, a, n, n_z, n_lam, per, states, r, by_motion, by_unknown, own):
+    """Add derivatives of one output to row r of P, P_a and V, multiplied by a factor each."""
     for m in range(n):
         for j in range(12):
-            work.connections.P[a + m, r, j] = by_motion * own[12 * m + j]
+            work.connections.P[a + m, r, j] = by_motion * own[per * m + j]
+        accelerated = model.markers.accelerated[a + m]
+        if accelerated >= 0:
+            for j in range(6):
+                work.connections.P_a[accelerated, r, j] = by_unknown * own[per * m + 12 + j]
     for s in range(n_z):
-        V[r, states + 3 * s] += by_unknown * own[12 * n + s]
+        V[r, states + 3 * s] += by_unknown * own[per * n + s]
     for j in range(n_lam):
-        V[r, states + 3 * n_z + j] += by_unknown * own[12 * n + n_z + j]
+        V[r, states + 3 * n_z + j] += by_unknown * own[per * n + n_z + j]
 
 
 @inner
-def held_slopes(work, V, a, n, n_z, n_lam, states, r, holds, c_k, own):
+def held_slopes(work, V, a, n, n_z, n_lam, per, states, r, holds, c_k, own):
     """Write the derivatives of what is held into row r of P and V."""
     for m in range(n):
         for j in range(12):
             if holds == POSITION:
-                slope = own[12 * m + j] if j < 6 else 0.0
+                slope = own[per * m + j] if j < 6 else 0.0
             elif c_k > 0.0:
-                slope = own[12 * m + j]
+                slope = own[per * m + j]
             else:
-                slope = own[12 * m + 6 + j] if j < 6 else 0.0
+                slope = own[per * m + 6 + j] if j < 6 else 0.0
             work.connections.P[a + m, r, j] = slope
     if c_k > 0.0:
         for s in range(n_z):
-            V[r, states + 3 * s] = own[12 * n + s] / c_k
+            V[r, states + 3 * s] = own[per * n + s] / c_k
         for j in range(n_lam):
-            V[r, states + 3 * n_z + j] = own[12 * n + n_z + j] / c_k
+            V[r, states + 3 * n_z + j] = own[per * n + n_z + j] / c_k
 
 
 @inner

@@ -20,7 +20,7 @@ class HingePlay:
     stiffness: float = 2e6  #: of the contact in one plane, with the fitting around it [N/m]
     damping: float = 5.0  #: loss by the speed of the approach [s/m]
     friction: float = 0.15
-    friction_speed: float = 2e-3  #: [m/s]
+    friction_speed: float = 0.01  #: [m/s]; a lower one asks for shorter steps at the latching
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class Antenna:
     play: HingePlay | None = None  #: of the petal hinges; friction is then that of their pins
     petal_modes: int = 6  #: vibration modes beside the static ones
     strut_modes: int = 2
+    stiff_struts: bool = True  #: whether geometric stiffness of the struts counts
 
     @property
     def travel(self) -> tuple[float, float]:
@@ -60,5 +61,6 @@ class Antenna:
 
 #: 24 narrow petals with more modes, the last 0.05 rad before the latch; `replace(FINE, play=HingePlay())`: with play
 FINE = Antenna(
-    n_petals=24, petal_width=0.15, n_along=40, petal_modes=12, strut_modes=6, begin=float(np.deg2rad(75.0) - 0.05)
+    n_petals=24, petal_width=0.15, n_along=40, petal_modes=12, strut_modes=6, stiff_struts=False,
+    begin=float(np.deg2rad(75.0) - 0.05),
 )

@@ -61,7 +61,7 @@ file = "petal.h5"
 {place_text(hinge, petal)}
 [bodies.strut_{k}]
 file = "strut.h5"
-{place_text(foot, strut)}
+{"" if antenna.stiff_struts else "stiffening = false" + chr(10)}{place_text(foot, strut)}
 {hinge_text(antenna, k, hinge, axis, theta)}
 [joints.foot_{k}]
 type = "universal"

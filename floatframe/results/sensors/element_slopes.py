@@ -17,10 +17,11 @@ def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
     c, n = placed.connection, len(placed.markers)
     first = int(model.connections.a[c])
     markers = work.markers
-    motion = [
-        np.concatenate([markers.r[m], markers.A[m].ravel(), markers.v[m], markers.omega[m]])
-        for m in range(first, first + n)
-    ]
+    motion = []
+    for m in range(first, first + n):
+        motion += [markers.r[m], markers.A[m].ravel(), markers.v[m], markers.omega[m]]
+        if placed.law.accelerations:
+            motion.append(markers.acceleration[model.markers.accelerated[m]])
     unknown = [*placed.states, *placed.multipliers]
     inputs = np.concatenate([[float(work.state.time)], *motion, work.state.w[unknown]])
     slopes = difference_slopes(placed.value.address, placed.head, placed.law.data, inputs)[placed.n_out :]
@@ -29,6 +30,8 @@ def output_rows(placed: PlacedLaw, small: SmallMotions) -> Rows:
     for marker in placed.markers:
         place = small.place(marker, placed.element.name)
         parts += [place.moved, place.turned, small.velocity(place.moved), small.velocity(place.turned)]
+        if placed.law.accelerations:
+            parts += [small.acceleration(place.moved), small.acceleration(place.turned)]
     if unknown:
         parts.append(small.by_wrench(unknown))
     return joined(parts).turned(slopes)

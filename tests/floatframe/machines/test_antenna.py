@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 import cms
 import floatframe as ff
 from floatframe.machines import machine_files
-from floatframe.machines.antenna import Antenna, antenna_files, mechanism
+from floatframe.machines.antenna import Antenna, antenna_files, fine_files, mechanism
 
 G = 9.81
 SLOW = Antenna(n_petals=3, duration=1e5)
@@ -111,5 +111,8 @@ def test_shipped_files_are_those_of_the_description(parts):
     _, petal, _ = parts
     moment = petal.gram[0, 0] * petal.center_of_mass[0]
     made = antenna_files(Antenna(), petal_moment=moment)
-    shipped = {path.name: path.read_text() for path in machine_files("antenna") if path.name != "README.md"}
+    made |= {f"fine/{name}": text for name, text in fine_files().items()}
+    paths = machine_files("antenna")
+    (folder,) = (path.parent for path in paths if path.name == "README.md")
+    shipped = {path.relative_to(folder).as_posix(): path.read_text() for path in paths if path.name != "README.md"}
     assert shipped == made
