@@ -192,7 +192,6 @@ REFUSED = {
     "stops": (Law(square, stops={"off": "it left"}), "stops: expected names of its outputs, got 'off'"),
     "acts": (Law(square, acts=("force",)), "acts: expected one of wrench, force, moment, none for each of 2 markers"),
     "opposite": (Law(square, markers=ENDS[1:], is_opposite=True), "is_opposite: expected two markers with a force"),
-    "accelerations": (Law(square, accelerations=True), "accelerations: not among the inputs yet"),
     "the ground alone": (Law(square, markers=ENDS[:1]), "all its markers are on the ground, where nothing moves"),
     "no markers": (Law(square, markers=()), "markers: expected one Marker at least"),
     "no body": (Law(square, markers=[Marker("c")]), "element 'e': marker 1: no body 'c'"),
