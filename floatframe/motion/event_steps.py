@@ -46,6 +46,7 @@ from floatframe.system import System
 __all__ = ["EventWatch"]
 
 BLOCK = 32  #: most steps between which what is watched is not measured; blocks end where a multiple of it does
+STANDS = 1e-9  #: change of what is watched in a step, relative to its level or 1, below which it is held or at rest
 SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
 MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
 
@@ -133,6 +134,18 @@ class EventWatch:
         assert self.row is not None
         return np.asarray(self.measured(self.row, row)[1])
 
+    def happens(self, event: Event, before: float, after: float) -> bool:
+        """Whether an event happens from one value to the next.
+
+        One that only switches, and finds all as it wants it, does not where rounding alone passes its level: what a
+        latch holds stays there.
+        """
+        if not event.happens(before, after):
+            return False
+        only_switches = bool(event.switch_on or event.switch_off) and not event.stop
+        changes = bool(self.off.intersection(event.switch_on)) or not self.off.issuperset(event.switch_off)
+        return changes or not only_switches or abs(after - before) > STANDS * max(1.0, abs(event.level_passed))
+
     def steps(
         self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int
     ) -> tuple[Carry, Rows, Work, int, Failure | None]:
@@ -161,7 +174,7 @@ class EventWatch:
             k
             for k in range(n_good)
             for event, before, after in zip(self.events, values[k], values[k + 1], strict=True)
-            if event.happens(float(before), float(after))
+            if self.happens(event, float(before), float(after))
         )
         n_free = next(passed, n_good)
         if n_free < n_good:
@@ -194,7 +207,7 @@ class EventWatch:
                 return begin, row, work, failure
             values = self.values_after(row)
             events = self.events
-            passed = [j for j, e in enumerate(events) if e.happens(float(self.values[j]), float(values[j]))]
+            passed = [j for j, e in enumerate(events) if self.happens(e, float(self.values[j]), float(values[j]))]
             trial = new_work(compiled_system(self.system).model) if passed else work  # leaves the factors of the run
             found = sorted(
                 (self.locate(integrator, begin, work if events[j].is_active else trial, t, size, j, values[j]), j)

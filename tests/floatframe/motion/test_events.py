@@ -1,5 +1,7 @@
 """Events: times against closed forms, stop and switch, restart, and mistakes in them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -9,10 +11,12 @@ import floatframe.motion.integration as integration
 from floatframe import (
     GROUND,
     Bushing,
+    CoordinateCoupler,
     EnergyMomentum,
     Event,
     GeneralizedAlpha,
     Gravity,
+    JointCoordinate,
     JointForce,
     Marker,
     ModelError,
@@ -23,9 +27,11 @@ from floatframe import (
     SpringDamper,
     System,
     integrate,
+    joint_coordinate,
     resume,
     trapezoidal,
 )
+from floatframe.motion.event_steps import EventWatch
 from floatframe.results.sensors import PlaceSensor
 from tests.floatframe.motion import test_restart
 
@@ -161,7 +167,7 @@ def test_a_run_with_events_that_do_not_happen_is_the_one_without():
     ("event", "words"),
     [
         (lambda: Event("e", "guide.distanse", stop=True), "no sensor or joint coordinate 'guide.distanse'"),
-        (lambda: Event("e", "guide.distance", switch_off=("gravty",)), "no force or coupler 'gravty'"),
+        (lambda: Event("e", "guide.distance", switch_off=("gravty",)), "no force, coupler or element 'gravty'"),
         (lambda: Event("e", "guide.distance"), "an event without consequence"),
         (lambda: Event("e", "guide.distance", direction="up", stop=True), "expected one of rising, falling, both"),
         (lambda: Event("e", "place", column="w", stop=True), "column: expected one of x, y, z"),
@@ -201,21 +207,42 @@ def test_an_event_that_records_keeps_the_results_there_and_leaves_the_motion_as_
         assert_array_equal(motion.source.read(name)[~is_extra], plain.source.read(name))
 
 
-def test_blocks_of_steps_change_neither_the_motion_nor_its_events(monkeypatch):
-    """A double pendulum that is pushed and let go at each passage, with records between."""
+def double_pendulum(*events, forces=()):
+    """Return two bars in a row, let go horizontally."""
     bodies = [RigidBody("upper", 1.0, 0.1 * np.eye(3), position=(0.5, 0, 0)),
               RigidBody("lower", 2.0, 0.2 * np.eye(3), position=(1.5, 0, 0))]  # fmt: skip
     hinge = RevoluteJoint("hinge", Marker(GROUND), Marker("upper", position=(-0.5, 0, 0)), axis=(0, 1, 0))
     knee = RevoluteJoint("knee", Marker("upper", position=(0.5, 0, 0)), Marker("lower", position=(-0.5, 0, 0)),
                          axis=(0, 1, 0))  # fmt: skip
+    sensors = [PlaceSensor("place", Marker("lower"), "position")]
+    return System(bodies, [hinge, knee], [Gravity((0, 0, -G)), *forces], sensors=sensors, events=events)
+
+
+def test_what_a_latch_holds_does_not_happen_again():
+    """Engaged, its value stays at the level of the event, which rounding passes; a true passage still counts."""
+    latch = CoordinateCoupler("latch", [(JointCoordinate("hinge", "angle"), 1.0)], engaged=False)
+    event = Event("latched", "hinge.angle", 1.2, "rising", switch_on=("latch",), record=True)
+    system = replace(double_pendulum(event), couplers=[latch])
+    watch = EventWatch(system, integration.head_of(system, GeneralizedAlpha(), 0.0, 1.0, 1e-3, 1))
+    assert watch.happens(event, 1.2 - 1e-13, 1.2 + 1e-13)
+    watch.switch(frozenset())
+    assert not watch.happens(event, 1.2 - 1e-13, 1.2 + 1e-13)
+    assert watch.happens(event, 1.1, 1.3)
+    motion = integrate(system, GeneralizedAlpha(), 1.5, 5e-3)
+    assert len(motion.head.summary["events"]) == 1
+    late = motion.t > motion.head.summary["events"][0]["t"] + 0.01
+    assert_allclose(joint_coordinate(system, motion, "hinge", "angle").value[late], 1.2, rtol=0, atol=1e-9)
+
+
+def test_blocks_of_steps_change_neither_the_motion_nor_its_events(monkeypatch):
+    """A double pendulum that is pushed and let go at each passage, with records between."""
     push = PointForce("push", Marker("lower"), (30.0, 0, 10.0))
     events = [
         Event("push", "hinge.angle", 1.2, "rising", switch_on=("push",)),
         Event("rest", "knee.angle", 0.1, switch_off=("push",)),
         Event("height", "place", column="z", level=-0.9, record=True),
     ]
-    sensors = [PlaceSensor("place", Marker("lower"), "position")]
-    system = System(bodies, [hinge, knee], [Gravity((0, 0, -G)), push], sensors=sensors, events=events)
+    system = double_pendulum(*events, forces=[push])
     motions = []
     for size in (1, 32):
         monkeypatch.setattr(event_steps, "BLOCK", size)

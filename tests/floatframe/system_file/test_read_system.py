@@ -351,7 +351,7 @@ def test_file_holds_events(write):
     system, _ = read_system(write(("[run]", text)))
     assert system.events == (Event("low", "pin.angle", -0.5, "falling", switch_off=("spring",)),)
     for old, new, words in (("pin.angle", "pin.angel", "no sensor or joint coordinate 'pin.angel'"),
-                            ('"spring"]', '"sprnig"]', "no force or coupler 'sprnig'; did you mean 'spring'"),
+                            ('"spring"]', '"sprnig"]', "no force, coupler or element 'sprnig'; did you mean 'spring'"),
                             ("falling", "fallling", "events.low.direction")):  # fmt: skip
         with pytest.raises(SystemFileError, match=words):
             read_system(write(("[run]", text.replace(old, new))))
