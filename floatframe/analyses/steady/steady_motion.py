@@ -58,6 +58,7 @@ __all__ = ["SteadyMotion", "steady_motion"]
 SPINS = 1e-9  #: speed of a spin, in turns of a body per time in which it moves by the size of the system
 SETTLED = 1e-7  #: last change of all unknowns, relative to their sizes
 STUCK = 1e-4  #: the same, below which forces that do not fall will not
+SHORTEST = 1e-4  #: part of a step
 SINGULAR = 1e-12  #: singular value of the scaled equations below which a motion costs nothing
 DIFFERENCE = 1e-4  #: step of open numbers, of their size, at least one
 
@@ -101,7 +102,7 @@ def steady_motion(
         The system, its bodies placed near the motion and with their velocities, or a function that returns it from
         the numbers of `unknown`, by name.
     body
-        The body of reference: its frame passes the point where it is placed, in the direction of its velocity there.
+        The body of reference: its frame passes the point where it is placed (or `state` has it), in the direction of its velocity.
     speed
         Of it; default: as placed. 0: the system stands, but for what spins in it [m/s].
     curvature
@@ -220,7 +221,7 @@ def path_of(
     """
     i = compiled.body_names.index(name)
     u0 = int(compiled.model.bodies.u0[i])
-    v = compiled.placed.u[u0 : u0 + 3]
+    v = start.u[u0 : u0 + 3]
     v = v - (v @ axis) * axis
     placed_speed, point = float(np.linalg.norm(v)), start.r[i].copy()
     speed = placed_speed if speed is None else float(speed)
@@ -316,7 +317,7 @@ class Evaluated:
         return size / self.scale if self.scale > 0 else size
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class Trial:
     """Unknowns."""
 
@@ -340,37 +341,20 @@ class Search:
 
     def run(self, state: State, w: Array, s: Array, carrier: Carrier, max_iterations: int) -> SteadyMotion:
         """Return the steady motion next to a trial."""
-        trial = Trial(state, w, s, carrier, np.array(list(self.family.start.values()), dtype=float))
-        error, change, words, errors, is_stuck = np.inf, np.inf, "nothing known", [np.inf], False
+        here = self.at(Trial(state, w, s, carrier, np.array(list(self.family.start.values()), dtype=float)))
+        errors, is_stuck = [np.inf], False
         for iteration in range(max_iterations + 1):
-            system = self.family.at(trial.p)
-            compiled, work = compiled_system(system), timed(new_work(compiled_system(system).model), self.t)
-            if len(trial.w) != int(compiled.model.connections.w0[-1]):
-                raise ModelError("steady_motion: the function returns systems with different connections")
-            require_off_stops(system, trial.w)
-            # closed, or joints would see by how much a wheel is turned
-            trial.state = assembled(compiled, work, trial.state, trial.w)
-            now = self.evaluated(compiled, work, trial)
-            error = now.error
-            if not np.isfinite(error):
-                break
-            y, dw, ds, d_curvature, dp, change = self.step(compiled, work, trial, now)
-            if error <= self.tolerance and change <= SETTLED and self.is_closed(compiled, now):
-                return self.result(system, compiled, work, trial, error, iteration)
+            step = self.step(here)
+            change = self.change(here, step.x)
+            error = here.now.error
+            if error <= self.tolerance and change <= SETTLED and self.is_closed(here):
+                return self.result(here, iteration)
             errors.append(error)
             is_stuck = change <= STUCK and len(errors) > 5 and error > 0.5 * errors[-5]
-            words = f"{error:.2g} of those at work, most at body {worst_body(compiled, now.W, now.f)!r}"
-            if is_stuck or not np.isfinite(y).all():
+            following = None if is_stuck or not np.isfinite(step.x).all() else self.followed(here, step)
+            if following is None:
                 break
-            part = min(1.0, LARGEST_TURN / max(largest_motion(compiled, y), 1e-300))
-            omega = trial.carrier.omega + part * d_curvature * self.path.speed * self.path.axis
-            trial = Trial(
-                displaced(compiled.model, trial.state, part * in_ground_axes(compiled.model, trial.state, y)),
-                trial.w + part * dw,
-                trial.s + part * ds,
-                replace(trial.carrier, omega=omega),
-                trial.p + part * dp,
-            )
+            here = following
         why = (
             "the system cannot run steadily like this: leave a number of it unknown (a drive torque, a steer angle), "
             "or the curvature (None)"
@@ -378,10 +362,76 @@ class Search:
             else "start nearer: place it closer to its steady state, or begin with the end of a motion (state)"
         )
         raise ConvergenceError(
-            f"no steady motion of body {self.path.name!r} at {self.path.speed:g} found in {iteration} steps: "
-            f"forces are out of balance by {words}; {why}",
+            f"no steady motion of body {self.path.name!r} at {self.path.speed:g} found in {iteration} steps: forces are "
+            f"out of balance by {error:.2g} of those at work, most at body "
+            f"{worst_body(here.compiled, here.now.W, here.now.f)!r}; {why}",
             t=self.t, h=0.0, residual=error,
         )  # fmt: skip
+
+    def at(self, trial: Trial) -> "Place":
+        """Return a trial with its joints closed and its equations."""
+        system = self.family.at(trial.p)
+        compiled, work = compiled_system(system), timed(new_work(compiled_system(system).model), self.t)
+        if len(trial.w) != int(compiled.model.connections.w0[-1]):
+            raise ModelError("steady_motion: the function returns systems with different connections")
+        require_off_stops(system, trial.w)
+        # open, joints would see by how much a wheel is turned
+        trial = replace(trial, state=assembled(compiled, work, trial.state, trial.w))
+        return Place(system, compiled, work, trial, self.evaluated(compiled, work, trial))
+
+    def followed(self, here: "Place", step: "Step") -> "Place | None":
+        """Return what lies along a step: so far that the next one by the same matrix is shorter (natural monotony)."""
+        y = step.x[: len(here.now.f)]
+        part, length = min(1.0, LARGEST_TURN / max(largest_motion(here.compiled, y), 1e-300)), step.length(step.x)
+        there = None
+        while part >= SHORTEST:
+            try:
+                there = self.at(self.moved(here, part * step.x))
+            except ModelError:  # joints that do not close there, a law that gives no number
+                part /= 2
+                continue
+            following = step.length(step.inverse @ self.residual(there))
+            if following <= (1 - part / 4) * length or length <= SETTLED:
+                return there
+            part /= 2 if following < 4 * length else 4
+        return there
+
+    def moved(self, here: "Place", x: Array) -> Trial:
+        """Return a trial after the changes x of its unknowns."""
+        trial, model = here.trial, here.compiled.model
+        _, unknowns, _ = self.used_rows(here.compiled)
+        n_u, n_s = len(here.now.f), len(self.spins)
+        y, dw, rest = x[:n_u], np.zeros(len(trial.w)), x[n_u + len(unknowns) :]
+        dw[unknowns] = x[n_u : n_u + len(unknowns)]
+        omega = trial.carrier.omega
+        if self.path.is_open:
+            omega = omega + rest[n_s] * self.path.speed * self.path.axis
+        return Trial(
+            displaced(model, trial.state, in_ground_axes(model, trial.state, y)),
+            trial.w + dw,
+            trial.s + rest[:n_s],
+            replace(trial.carrier, omega=omega),
+            trial.p + rest[len(rest) - len(trial.p) :],
+        )
+
+    def change(self, here: "Place", x: Array) -> float:
+        """Return the size of the changes x, relative to those of the unknowns."""
+        trial, model, length = here.trial, here.compiled.model, here.compiled.length
+        after = self.moved(here, x)
+        dw, of_states = after.w - trial.w, np.concatenate([model.states.row, model.laws.equation]).astype(int)
+        sizes = np.maximum(np.concatenate([model.states.size, model.laws.equation_size]), np.abs(trial.w[of_states]))
+        own = np.zeros(len(dw), dtype=bool)
+        own[of_states] = True
+        turning = float(np.linalg.norm(after.carrier.omega - trial.carrier.omega))
+        changes = [
+            largest_motion(here.compiled, x[: len(here.now.f)]),
+            largest(dw[~own]) / max(largest(trial.w[~own]), 1e-300),
+            largest(dw[of_states] / sizes),
+            largest(after.s - trial.s) / max(largest(trial.s), 1e-300),
+            turning * length / max(self.path.speed, 1e-300),
+            largest((after.p - trial.p) / np.maximum(np.abs(trial.p), 1.0)),
+        ]
+        return float(max(changes))
 
     def evaluated(self, compiled: CompiledSystem, work: Work, trial: Trial) -> Evaluated:
         """Return (2) with its derivatives by motions."""
@@ -434,14 +484,19 @@ class Search:
         rows[:, u0 : u0 + 3] = toward @ rotation_matrix(trial.state.p[i])
         return toward @ (trial.state.r[i] - self.path.point), rows
 
-    def step(
-        self, compiled: CompiledSystem, work: Work, trial: Trial, now: Evaluated
-    ) -> tuple[Array, Array, Array, float, Array, float]:
-        """Return the changes (3) of xi, w, s, curvature and p, and their size."""
+    def residual(self, here: "Place") -> Array:
+        """Return (2), negative."""
+        rows, _, held = self.used_rows(here.compiled)
+        gap, _ = self.gauges(here.compiled, here.trial)
+        return -np.concatenate([here.now.f, here.now.g[rows], here.now.rate[held], gap])
+
+    def step(self, here: "Place") -> "Step":
+        """Return the step (3) of xi, w, s, curvature and p."""
+        compiled, work, trial, now = here.compiled, here.work, here.trial, here.now
         model = compiled.model
         rows, unknowns, held = self.used_rows(compiled)
         gap, by_gap = self.gauges(compiled, trial)
-        n_u, n_w = len(now.f), len(now.g)
+        n_u = len(now.f)
         others = [by_spin(model, work, trial.carrier.omega, spin) for spin in self.spins]
         if self.path.is_open:
             others.append(by_carrier(model, work, trial.carrier, self.path.speed * self.path.axis))
@@ -459,32 +514,13 @@ class Search:
         A[n_u : n_u + len(rows), n_u : n_u + len(unknowns)] = V[np.ix_(rows, unknowns)]
         if columns:
             A[:, n_u + len(unknowns) :] = np.stack(columns, axis=1)
-        b = -np.concatenate([now.f, now.g[rows], now.rate[held], gap])
         sizes = self.sizes(compiled, trial, now, unknowns)
         of_rows = np.zeros(len(A))  # rates that no spin changes are rounding
         of_rows[n_u + len(rows) : len(A) - len(gap)] = (
             np.abs(G_x[held]) @ sizes[:n_u] * self.fastest(trial) / compiled.length
         )
-        x = smallest_solution(A, b, of_rows, sizes)
-        y, dw = x[:n_u], np.zeros(n_w)
-        dw[unknowns] = x[n_u : n_u + len(unknowns)]
-        rest = x[n_u + len(unknowns) :]
-        n_s = len(self.spins)
-        ds, dp = rest[:n_s], rest[len(rest) - len(trial.p) :]
-        d_curvature = float(rest[n_s]) if self.path.is_open else 0.0
-        of_states = np.concatenate([model.states.row, model.laws.equation]).astype(int)
-        sizes = np.concatenate([model.states.size, model.laws.equation_size])
-        own = np.zeros(n_w, dtype=bool)
-        own[of_states] = True
-        changes = [
-            largest_motion(compiled, y),
-            np.abs(dw[~own]).max(initial=0.0) / max(np.abs(trial.w[~own]).max(initial=0.0), 1e-300),
-            float((np.abs(dw[of_states]) / np.maximum(sizes, np.abs(trial.w[of_states]))).max(initial=0.0)),
-            np.abs(ds).max(initial=0.0) / max(np.abs(trial.s).max(initial=0.0), 1e-300) if len(ds) else 0.0,
-            abs(d_curvature) * compiled.length,
-            float((np.abs(dp) / np.maximum(np.abs(trial.p), 1.0)).max(initial=0.0)),
-        ]
-        return y, dw, ds, d_curvature, dp, float(max(changes))
+        inverse, sizes = smallest_inverse(A, of_rows, sizes, len(trial.p))
+        return Step(inverse @ self.residual(here), inverse, sizes)
 
     def sizes(self, compiled: CompiledSystem, trial: Trial, now: Evaluated, unknowns: IntArray) -> Array:
         """Return typical sizes of the unknowns of a step."""
@@ -511,35 +547,62 @@ class Search:
             p[k] += h
             compiled = compiled_system(self.family.at(p))
             work = timed(new_work(compiled.model), self.t)
-            after = self.evaluated(compiled, work, replace_numbers(trial, p))
+            after = self.evaluated(compiled, work, replace(trial, p=p))
             # rates follow where the joints are closed again, as they do for motions
             parts = [after.f - now.f, (after.g - now.g)[rows], np.zeros(len(held) + n_gaps)]
             columns.append(np.concatenate(parts) / h)
         return columns
 
-    def is_closed(self, compiled: CompiledSystem, now: Evaluated) -> bool:
+    def is_closed(self, here: "Place") -> bool:
         """Whether what is held is, at its place and its rate."""
-        holds = is_held(compiled.model.rows.kind)
-        speed = self.path.speed / compiled.length
-        gap = np.abs(now.g[holds]).max(initial=0.0) / max(compiled.length, 1.0)
-        return bool(max(gap, np.abs(now.rate).max(initial=0.0) / max(self.path.speed, speed, 1.0)) <= CLOSED)
+        holds, length, now = is_held(here.compiled.model.rows.kind), here.compiled.length, here.now
+        gap = largest(now.g[holds]) / max(length, 1.0)
+        return max(gap, largest(now.rate) / max(self.path.speed, self.path.speed / length, 1.0)) <= CLOSED
 
-    def result(
-        self, system: System, compiled: CompiledSystem, work: Work, trial: Trial, error: float, iteration: int
-    ) -> SteadyMotion:
+    def result(self, here: "Place", iteration: int) -> SteadyMotion:
         """Return what was found."""
+        compiled, trial = here.compiled, here.trial
         state, u_dot = carried(compiled.model, trial.state, trial.carrier, self.spins, trial.s)
-        notes = notes_at(system, work, state, u_dot, trial.w)
+        notes = notes_at(here.system, here.work, state, u_dot, trial.w)
         told, told_u_dot = motion_of_file(compiled, state, u_dot)
         about = Equilibrium(
-            replace(told, w=trial.w), told_u_dot, trial.w, trial.carrier.omega, error, iteration, notes, self.t
+            replace(told, w=trial.w), told_u_dot, trial.w, trial.carrier.omega, here.now.error, iteration, notes, self.t
         )
         names = [compiled.body_names[spin.body] for spin in self.spins]
         return SteadyMotion(
-            system, about, self.path.speed, float(trial.carrier.omega @ self.path.axis) / (self.path.speed or 1.0),
+            here.system, about, self.path.speed, float(trial.carrier.omega @ self.path.axis) / (self.path.speed or 1.0),
             dict(zip(self.family.start, trial.p.tolist(), strict=True)),
             dict(zip(names, trial.s.tolist(), strict=True)),
         )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A trial and the equations there."""
+
+    system: System
+    compiled: CompiledSystem
+    work: Work
+    trial: Trial
+    now: Evaluated
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A step of Newton's method."""
+
+    x: Array  #: changes of all unknowns, (n_x,)
+    inverse: Array  #: by which they follow from the residual, (n_x, n_rows)
+    sizes: Array  #: of the unknowns, (n_x,)
+
+    def length(self, x: Array) -> float:
+        """Return the length of a change by the sizes of its parts."""
+        return float(np.linalg.norm(x / self.sizes))
+
+
+def largest(values: Array) -> float:
+    """Return the largest size of values, 0 of none."""
+    return float(np.abs(values).max(initial=0.0))
 
 
 def weight_of(now: Evaluated) -> float:
@@ -556,13 +619,16 @@ def turned_forces(compiled: CompiledSystem, f: Array) -> Array:
     return by_turn
 
 
-def replace_numbers(trial: Trial, p: Array) -> Trial:
-    """Return a trial with other open numbers."""
-    return Trial(trial.state, trial.w, trial.s, trial.carrier, p)
+def smallest_inverse(A: Array, rows: Array, columns: Array, n_p: int) -> tuple[Array, Array]:
+    """Return the matrix by which the x of least |A x - b| that is smallest follows from b, and the sizes of x.
 
-
-def smallest_solution(A: Array, b: Array, rows: Array, columns: Array) -> Array:
-    """Return the x of least |A x - b| that is smallest by the sizes of its parts; sizes of rows at least as given."""
-    scaled = A * columns
-    by = 1 / np.maximum(np.maximum(np.abs(scaled).max(axis=1, initial=0.0), rows), 1e-300)
-    return columns * la.lstsq(by[:, None] * scaled, by * b, cond=SINGULAR, lapack_driver="gelsd")[0]
+    rows: least sizes of rows, which are scaled to one. columns: sizes of unknowns; of the last n_p they follow from A.
+    """
+    others = slice(None, A.shape[1] - n_p)
+    size = np.maximum(np.abs(A[:, others] * columns[others]).max(axis=1, initial=0.0), rows)
+    by = 1 / np.where(size > 0, size, np.maximum(np.abs(A).max(axis=1, initial=0.0), 1e-300))
+    of_numbers = np.abs(by[:, None] * A[:, len(columns) - n_p :]).max(axis=0, initial=0.0)
+    columns = columns.copy()
+    columns[len(columns) - n_p :] = 1 / np.where(of_numbers > 0, of_numbers, 1.0)
+    inverse = la.pinv(by[:, None] * A * columns, rtol=SINGULAR)
+    return columns[:, None] * inverse * by, columns

@@ -1,8 +1,17 @@
 """A four-axle passenger vehicle on bogies: stability over speed, limit cycles, independent wheels, curves."""
 
+from floatframe.machines.bogie.circle import circle, in_circle
 from floatframe.machines.bogie.comfort import weighted_rms
 from floatframe.machines.bogie.frame import frame_files
-from floatframe.machines.bogie.running import Falling, Hunting, critical_speed, falling_speed, hunting, steady_running
+from floatframe.machines.bogie.running import (
+    Falling,
+    Hunting,
+    critical_speed,
+    falling_speed,
+    hunting,
+    steady_motion_of,
+    steady_running,
+)
 from floatframe.machines.bogie.vehicle import RailVehicle, flexible_frames, vehicle
 from floatframe.machines.bogie.write_files import bogie_files
 
@@ -11,11 +20,14 @@ __all__ = [
     "Hunting",
     "RailVehicle",
     "bogie_files",
+    "circle",
     "critical_speed",
     "falling_speed",
     "flexible_frames",
     "frame_files",
     "hunting",
+    "in_circle",
+    "steady_motion_of",
     "steady_running",
     "vehicle",
     "weighted_rms",

@@ -7,35 +7,61 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from floatframe.analyses.equilibrium import Equilibrium
 from floatframe.analyses.linear.linearization import LinearSystem, linearize
 from floatframe.analyses.linear.system_modes import SystemModes, system_modes
-from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.analyses.steady.steady_motion import SteadyMotion, steady_motion
 from floatframe.bodies.markers import Marker
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
 from floatframe.forces import PointForce
 from floatframe.integrators import GeneralizedAlpha
 from floatframe.motion.integration import integrate
-from floatframe.results.coordinate_elements import unknowns
 from floatframe.system import System
 
-__all__ = ["Falling", "Hunting", "critical_speed", "falling_speed", "hunting", "lateral_modes", "steady_running"]
+__all__ = [
+    "Falling",
+    "Hunting",
+    "critical_speed",
+    "falling_speed",
+    "hunting",
+    "lateral_modes",
+    "steady_motion_of",
+    "steady_running",
+]
 
 
-def steady_running(system: System, *, seconds: float | None = None, h: float = 2e-3) -> LinearSystem:
-    """Return a vehicle on straight track linearised about the motion it settles to.
+def steady_motion_of(system: System, radius: float | None = None) -> SteadyMotion:
+    """Return a vehicle in steady running, pushed ahead at its body against what creep takes.
 
-    Bodies that do not turn with the wheels (`spin_inertia` of the wheelsets) go straight on, so that the coefficients
-    of small motions about steady running are constant. The state is found by a short motion of a method that takes all
-    high frequencies out; without a disturbance to the side an unstable vehicle settles too.
+    Bodies that do not turn with the wheels (`spin_inertia` of the wheelsets) go along, and nothing depends on where it
+    is along the track.
+
+    Parameters
+    ----------
+    system
+        As `vehicle` places it on straight track, or `in_circle` on a circle.
+    radius
+        Of the circle [m]; None: straight on.
+
+    Raises
+    ------
+    ConvergenceError
+        If it does not run steadily near there.
     """
-    if seconds is None:  # flexible frames sag under their load first
-        seconds = 3.0 if any(isinstance(each, FlexibleBody) for each in system.bodies) else 0.3
-    motion = integrate(system, GeneralizedAlpha(0.0, 1e-9), seconds, h)
-    state = motion.state(len(motion.t) - 1)
-    w = unknowns(system, motion)[-1]
-    return linearize(system, Equilibrium(state, np.zeros(len(state.u)), w, np.zeros(3), 0.0, 0), inputs=(), outputs=())
+    way = {} if radius is None else {"curvature": 1 / radius, "center": np.array([0.0, radius, 0.0])}
+    return steady_motion(lambda push: pushed(system, push), "body", unknown={"push": 0.0}, guided=True, **way)
+
+
+def pushed(system: System, push: float) -> System:
+    """Return the vehicle with a force ahead on its body [N]."""
+    force = PointForce("push", Marker("body"), force=np.array([push, 0.0, 0.0]), is_follower=True)
+    return replace(system, forces=[*system.forces, force])
+
+
+def steady_running(system: System, radius: float | None = None) -> LinearSystem:
+    """Return a vehicle linearised about its steady running, see `steady_motion_of`."""
+    motion = steady_motion_of(system, radius)
+    return linearize(motion.system, motion.equilibrium, inputs=(), outputs=())
 
 
 def lateral_modes(linear: LinearSystem, *, lowest: float = 0.1, highest: float = 15.0) -> tuple[Array, SystemModes]:
@@ -66,9 +92,9 @@ class Hunting(NamedTuple):
     frequency: float  #: [Hz]
 
 
-def hunting(system: System) -> Hunting:
-    """Return the least damped lateral oscillation of a vehicle in steady running."""
-    roots, _ = lateral_modes(steady_running(system))
+def hunting(system: System, radius: float | None = None) -> Hunting:
+    """Return the least damped lateral oscillation of a vehicle in steady running, straight on or in a circle."""
+    roots, _ = lateral_modes(steady_running(system, radius))
     if not len(roots):
         raise ModelError("hunting: no oscillation to the side between 0.1 and 15 Hz")
     damping = -roots.real / np.abs(roots)
@@ -107,6 +133,17 @@ def critical_speed(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if hunting(build(middle)).damping > damping else (low, middle)
     return 0.5 * (low + high)
+
+
+def blown(system: System, kick: float) -> System:
+    """Return a vehicle on straight track whose axles all have a lateral velocity [m/s]."""
+    bodies = [
+        replace(each, velocity=np.array([float(np.asarray(each.velocity)[0]), kick, 0.0]))
+        if each.name.startswith("axle")
+        else each
+        for each in system.bodies
+    ]
+    return replace(system, bodies=bodies)
 
 
 class Falling(NamedTuple):
@@ -149,11 +186,7 @@ def falling_speed(
     kick
         Lateral velocity of all axles at the start [m/s].
     """
-    begin = float(np.asarray(system.bodies[0].velocity)[0])
-    bodies = [
-        replace(each, velocity=np.array([begin, kick, 0.0])) if each.name.startswith("axle") else each
-        for each in system.bodies
-    ]
+    begin, bodies = float(np.asarray(system.bodies[0].velocity)[0]), blown(system, kick).bodies
     brakes = [
         PointForce(f"brake_{each.name}", Marker(each.name), force=np.array([-deceleration * each.mass, 0.0, 0.0]))
         for each in system.bodies

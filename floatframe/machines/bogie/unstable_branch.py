@@ -1,0 +1,136 @@
+"""The unstable limit cycle of a vehicle that hunts: oscillations below it die out, those above it grow.
+
+A vehicle in steady running is put into its least damped hunting mode with an amplitude a of one axle, x + a Re(phi),
+u + a Re(lambda phi), and left to itself. Between an a from which the oscillation dies out and one from which it grows
+lies, by bisection, the cycle that no motion follows by itself.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.analyses.linear.linearization import linearize
+from floatframe.analyses.steady.steady_motion import SteadyMotion
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.errors import ConvergenceError, ModelError
+from floatframe.integrators import GeneralizedAlpha
+from floatframe.machines.bogie.running import lateral_modes, steady_motion_of
+from floatframe.motion.integration import integrate
+from floatframe.rotations import euler_parameter_product, euler_parameters_of_rotation_vector, rotation_matrix
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["Bracket", "Hunted", "Run", "bracket_of_unstable_cycle", "hunted"]
+
+SETTLING = 1.0  #: before an oscillation that starts as a mode is that of its amplitude [s]
+
+
+class Run(NamedTuple):
+    """The lateral shift of an axle, half its range in two windows of a second."""
+
+    start: float  #: amplitude of the mode at the start [m]
+    early: float  #: after the first second [m]
+    late: float  #: in the last second [m]
+
+    @property
+    def grows(self) -> bool:
+        """Whether the oscillation grows."""
+        return self.late > self.early
+
+
+class Bracket(NamedTuple):
+    """Two runs on either side of an unstable limit cycle."""
+
+    decaying: Run | None  #: None: the smallest oscillation grows
+    growing: Run | None  #: None: the largest dies out
+
+
+@dataclass(frozen=True, eq=False)
+class Hunted:
+    """A vehicle in steady running and its least damped hunting mode."""
+
+    motion: SteadyMotion
+    axle: str
+    eigenvalue: complex  #: [1/s]
+    shape: Array  #: motions of the bodies, the lateral one of the axle 1, (n_u,) complex
+
+    def state(self, amplitude: float) -> State:
+        """Return the state with an amplitude of the mode [m]."""
+        steady = self.motion.equilibrium.state
+        x, v = amplitude * self.shape.real, amplitude * (self.eigenvalue * self.shape).real
+        r, p, q, u = steady.r.copy(), steady.p.copy(), steady.q.copy(), steady.u.copy()
+        first, q0 = 0, 0
+        for i, body in enumerate(self.motion.system.bodies):
+            n_q = body.reduced.n_q if isinstance(body, FlexibleBody) else 0
+            R, own = rotation_matrix(p[i]), slice(first, first + 6 + n_q)
+            r[i] = r[i] + R @ x[first : first + 3]
+            p[i] = euler_parameter_product(p[i], euler_parameters_of_rotation_vector(x[first + 3 : first + 6]))
+            q[q0 : q0 + n_q] += x[first + 6 : own.stop]
+            u[first : first + 3] += R @ v[first : first + 3]
+            u[first + 3 : own.stop] += v[first + 3 : own.stop]
+            first, q0 = own.stop, q0 + n_q
+        return State(r, p, q, u, steady.w)
+
+    def run(self, amplitude: float, *, seconds: float = 5.0, h: float = 2e-3) -> Run:
+        """Return how an oscillation of an amplitude goes on; one whose wheel climbs grows without end."""
+        try:
+            motion = integrate(
+                self.motion.system, GeneralizedAlpha(0.8, 1e-6), seconds, h, output_every=5, state=self.state(amplitude)
+            )
+        except ConvergenceError:
+            return Run(amplitude, amplitude, np.inf)
+        t, y = motion.t, motion.body(self.axle).r[:, 1]
+        windows = (t >= SETTLING) & (t <= SETTLING + 1.0), t >= seconds - 1.0
+        early, late = (0.5 * float(np.ptp(y[window])) for window in windows)
+        return Run(amplitude, early, late)
+
+
+def hunted(system: System, axle: str) -> Hunted:
+    """Return a vehicle on straight track in steady running with its least damped lateral oscillation."""
+    motion = steady_motion_of(system)
+    roots, modes = lateral_modes(linearize(motion.system, motion.equilibrium, inputs=(), outputs=()))
+    if not len(roots):
+        raise ModelError("hunted: no oscillation to the side between 0.1 and 15 Hz")
+    root = roots[np.argmax(roots.real / np.abs(roots))]
+    shape = modes.shapes[:, np.argmin(np.abs(modes.eigenvalues - root))]
+    first = 0
+    for body in system.bodies:
+        if body.name == axle:
+            return Hunted(motion, axle, complex(root), shape / shape[first + 1])
+        first += 6 + (body.reduced.n_q if isinstance(body, FlexibleBody) else 0)
+    raise ModelError(f"hunted: no body {axle!r}; choose among {', '.join(body.name for body in system.bodies)}")
+
+
+def bracket_of_unstable_cycle(
+    vehicle: Hunted, *, low: float = 2e-4, high: float = 6e-3, n_runs: int = 5, seconds: float = 5.0
+) -> Bracket:
+    """Return the largest amplitude that dies out and the smallest that grows, by bisection on a geometric scale.
+
+    Parameters
+    ----------
+    vehicle
+        Of `hunted`.
+    low, high
+        Amplitudes to begin with [m].
+    n_runs
+        Runs of the bisection between.
+    seconds
+        Of each run [s].
+    """
+    if not (0 < low < high and seconds > SETTLING + 2.0):
+        raise ModelError(
+            f"bracket_of_unstable_cycle: expected 0 < low < high and more than {SETTLING + 2.0:g} s, got low = {low:g}, "
+            f"high = {high:g}, seconds = {seconds:g}"
+        )
+    decaying = vehicle.run(low, seconds=seconds)
+    if decaying.grows:
+        return Bracket(None, decaying)
+    growing = vehicle.run(high, seconds=seconds)
+    if growing.late < 0.5 * growing.early:
+        return Bracket(growing, None)
+    for _ in range(n_runs):
+        run = vehicle.run(float(np.sqrt(decaying.start * growing.start)), seconds=seconds)
+        decaying, growing = (decaying, run) if run.grows else (run, growing)
+    return Bracket(decaying, growing)
