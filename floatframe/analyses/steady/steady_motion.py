@@ -102,7 +102,8 @@ def steady_motion(
         The system, its bodies placed near the motion and with their velocities, or a function that returns it from
         the numbers of `unknown`, by name.
     body
-        The body of reference: its frame passes the point where it is placed (or `state` has it), in the direction of its velocity.
+        The body of reference: its frame passes the point where it is placed, or `state` has it, in the direction of
+        its velocity.
     speed
         Of it; default: as placed. 0: the system stands, but for what spins in it [m/s].
     curvature
@@ -362,8 +363,8 @@ class Search:
             else "start nearer: place it closer to its steady state, or begin with the end of a motion (state)"
         )
         raise ConvergenceError(
-            f"no steady motion of body {self.path.name!r} at {self.path.speed:g} found in {iteration} steps: forces are "
-            f"out of balance by {error:.2g} of those at work, most at body "
+            f"no steady motion of body {self.path.name!r} at {self.path.speed:g} found in {iteration} steps: forces "
+            f"are out of balance by {error:.2g} of those at work, most at body "
             f"{worst_body(here.compiled, here.now.W, here.now.f)!r}; {why}",
             t=self.t, h=0.0, residual=error,
         )  # fmt: skip

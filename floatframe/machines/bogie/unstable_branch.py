@@ -24,6 +24,8 @@ from floatframe.system import System
 
 __all__ = ["Bracket", "Hunted", "Run", "bracket_of_unstable_cycle", "hunted"]
 
+SMALLER = 0.93  #: next amplitude after one from which a wheel climbs
+LASTING = 0.7  #: of the amplitude of a cycle, above which an oscillation ends on it
 SETTLING = 1.0  #: before an oscillation that starts as a mode is that of its amplitude [s]
 
 
@@ -32,19 +34,15 @@ class Run(NamedTuple):
 
     start: float  #: amplitude of the mode at the start [m]
     early: float  #: after the first second [m]
-    late: float  #: in the last second [m]
-
-    @property
-    def grows(self) -> bool:
-        """Whether the oscillation grows."""
-        return self.late > self.early
+    late: float  #: in the last second [m]; not a number: a wheel has climbed the rail
 
 
 class Bracket(NamedTuple):
-    """Two runs on either side of an unstable limit cycle."""
+    """Two runs on either side of an unstable limit cycle, and the stable one."""
 
-    decaying: Run | None  #: None: the smallest oscillation grows
-    growing: Run | None  #: None: the largest dies out
+    decaying: Run | None  #: None: every oscillation goes on
+    lasting: Run | None  #: None: every oscillation dies out
+    cycle: float  #: amplitude of the stable limit cycle, not a number if there is none [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +72,13 @@ class Hunted:
         return State(r, p, q, u, steady.w)
 
     def run(self, amplitude: float, *, seconds: float = 5.0, h: float = 2e-3) -> Run:
-        """Return how an oscillation of an amplitude goes on; one whose wheel climbs grows without end."""
+        """Return how an oscillation of an amplitude goes on."""
         try:
             motion = integrate(
                 self.motion.system, GeneralizedAlpha(0.8, 1e-6), seconds, h, output_every=5, state=self.state(amplitude)
             )
         except ConvergenceError:
-            return Run(amplitude, amplitude, np.inf)
+            return Run(amplitude, np.nan, np.nan)
         t, y = motion.t, motion.body(self.axle).r[:, 1]
         windows = (t >= SETTLING) & (t <= SETTLING + 1.0), t >= seconds - 1.0
         early, late = (0.5 * float(np.ptp(y[window])) for window in windows)
@@ -104,16 +102,16 @@ def hunted(system: System, axle: str) -> Hunted:
 
 
 def bracket_of_unstable_cycle(
-    vehicle: Hunted, *, low: float = 2e-4, high: float = 6e-3, n_runs: int = 5, seconds: float = 5.0
+    vehicle: Hunted, *, low: float = 1e-3, high: float = 6e-3, n_runs: int = 5, seconds: float = 5.0
 ) -> Bracket:
-    """Return the largest amplitude that dies out and the smallest that grows, by bisection on a geometric scale.
+    """Return the largest amplitude that dies out and the smallest that ends on the stable cycle, by bisection.
 
     Parameters
     ----------
     vehicle
         Of `hunted`.
     low, high
-        Amplitudes to begin with [m].
+        Amplitudes to begin with [m]. Where a wheel climbs after `high`, it is taken smaller.
     n_runs
         Runs of the bisection between.
     seconds
@@ -121,16 +119,19 @@ def bracket_of_unstable_cycle(
     """
     if not (0 < low < high and seconds > SETTLING + 2.0):
         raise ModelError(
-            f"bracket_of_unstable_cycle: expected 0 < low < high and more than {SETTLING + 2.0:g} s, got low = {low:g}, "
-            f"high = {high:g}, seconds = {seconds:g}"
+            f"bracket_of_unstable_cycle: expected 0 < low < high and more than {SETTLING + 2.0:g} s, got low = "
+            f"{low:g}, high = {high:g}, seconds = {seconds:g}"
         )
+    lasting = vehicle.run(high, seconds=seconds)
+    while not np.isfinite(lasting.late) and lasting.start > low:
+        lasting = vehicle.run(SMALLER * lasting.start, seconds=seconds)
+    cycle = lasting.late
+    if not cycle > LASTING * lasting.early:
+        return Bracket(lasting, None, np.nan)
     decaying = vehicle.run(low, seconds=seconds)
-    if decaying.grows:
-        return Bracket(None, decaying)
-    growing = vehicle.run(high, seconds=seconds)
-    if growing.late < 0.5 * growing.early:
-        return Bracket(growing, None)
+    if decaying.late > LASTING * cycle:
+        return Bracket(None, decaying, cycle)
     for _ in range(n_runs):
-        run = vehicle.run(float(np.sqrt(decaying.start * growing.start)), seconds=seconds)
-        decaying, growing = (decaying, run) if run.grows else (run, growing)
-    return Bracket(decaying, growing)
+        run = vehicle.run(0.5 * (decaying.start + lasting.start), seconds=seconds)
+        decaying, lasting = (decaying, run) if run.late > LASTING * cycle else (run, lasting)
+    return Bracket(decaying, lasting, cycle)
