@@ -48,8 +48,15 @@ def steady_motion_of(system: System, radius: float | None = None) -> SteadyMotio
     ConvergenceError
         If it does not run steadily near there.
     """
-    way = {} if radius is None else {"curvature": 1 / radius, "center": np.array([0.0, radius, 0.0])}
-    return steady_motion(lambda push: pushed(system, push), "body", unknown={"push": 0.0}, guided=True, **way)
+    center = None if radius is None else np.array([0.0, radius, 0.0])
+    return steady_motion(
+        lambda push: pushed(system, push),
+        "body",
+        curvature=0.0 if radius is None else 1 / radius,
+        center=center,
+        unknown={"push": 0.0},
+        guided=True,
+    )
 
 
 def pushed(system: System, push: float) -> System:
