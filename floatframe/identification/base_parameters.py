@@ -175,10 +175,10 @@ def preference(form: LinearForm) -> list[int]:
 def formula(row: Array, names: Sequence[str], lead: int) -> str:
     """Return a combination as a formula, its leading parameter first."""
     words = names[lead]
-    for j in np.flatnonzero(row):
-        if j == lead:
+    for j, name in enumerate(names):
+        if j == lead or row[j] == 0.0:
             continue
         factor = abs(row[j])
         number = "" if abs(factor - 1) < SHOWN else f"{factor:.6g} "
-        words += f" {'-' if row[j] < 0 else '+'} {number}{names[j]}"
+        words += f" {'-' if row[j] < 0 else '+'} {number}{name}"
     return words

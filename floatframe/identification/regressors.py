@@ -77,7 +77,9 @@ def linear_form(system: System, terms: Sequence[str] = ()) -> LinearForm:
     """
     tree = rigid_tree(system, f"system {system.name!r}: inertial parameters")
     if not tree.columns:
-        raise ModelError(f"system {system.name!r}: inertial parameters: no joint has a coordinate, so that nothing moves")
+        raise ModelError(
+            f"system {system.name!r}: inertial parameters: no joint has a coordinate, so that nothing moves"
+        )
     for term in terms:
         if term not in DRIVE_TERMS:
             raise ModelError(f"linear_form: terms: no term {quoted(term)}{nearest(term, list(DRIVE_TERMS))}")

@@ -3,9 +3,9 @@
 Three kinds of changes of the parameters leave all torques as they are. With everything in ground axes at the placed
 configuration (a: direction of a rotation through p, d: direction of a translation):
 
-(1) Transfers: what sits at body i so that it may as well sit at its parent, because the joint between them does not move
-    it. A rotation lets through the masses along its axis (a mass at p, and two changes of it along a), a translation
-    every inertia tensor without mass; a joint of several coordinates what passes all of them, one after the other.
+(1) Transfers: what sits at body i so that it may as well sit at its parent, because the joint between them does not
+    move it. A rotation lets through the masses along its axis (a mass at p, and two changes of it along a), a
+    translation every inertia tensor without mass; a joint of several coordinates what passes all of them.
     What passes to the ground does nothing.
 (2) Parameters without effect on their own body, because it cannot move so that they count.
     No rotation on the way to the ground: S and J; m too, if there is no translation either.
@@ -14,8 +14,8 @@ configuration (a: direction of a rotation through p, d: direction of a translati
     rest of S if gravity is along e or there is none.
     Rotations in several directions through one point that stays: a mass there; S about it if there is no gravity.
 (3) Inertia of a drive that is also one of its body: about the first rotation, and rotations that stay square to all
-    before them, the rotor's J and e·J e of the body; along a translation that nothing before it moves along, turns out of
-    its direction or weighs, the rotor's and the mass.
+    before them, the rotor's J and e·J e of the body; along a translation along which nothing before it moves or
+    weighs, and which nothing turns away, the rotor's and the mass.
 
 That these are all is not proven here but for the kinds of joints named; `base_parameters` finds the same by the rank of
 sampled regressors, and tests hold them against each other over trees of all kinds. The rules for chains of single

@@ -1,0 +1,87 @@
+"""Robots and random trees, for the identification."""
+
+import numpy as np
+
+from floatframe import (
+    CylindricalJoint,
+    FixedJoint,
+    Gravity,
+    Marker,
+    PlanarJoint,
+    PrismaticJoint,
+    RevoluteJoint,
+    RigidBody,
+    SphericalJoint,
+    System,
+    UniversalJoint,
+)
+from floatframe.rotations import euler_parameters, rotation_matrix
+
+DOWN = (0.0, 0.0, -9.81)
+#: angles between axes [degrees] and distances [m] of a PUMA 560 in the convention of Khalil and Kleinfinger, as they
+#: are commonly given; only what is zero or square counts for the number of base parameters
+PUMA_ANGLES = (0, -90, 0, -90, 90, -90)
+PUMA_ALONG_X = (0, 0, 0.4318, 0.0203, 0, 0)
+PUMA_ALONG_Z = (0, 0.2435, -0.0934, 0.4331, 0, 0)
+
+
+def some_body(name, rng, position=(0, 0, 0), R=np.eye(3)):
+    """A body of eight point masses."""
+    c, m = rng.normal(size=(8, 3)) * 0.3, rng.uniform(0.1, 1, 8)
+    center = m @ c / m.sum()
+    d = c - center
+    J = sum(mass * (x @ x * np.eye(3) - np.outer(x, x)) for mass, x in zip(m, d, strict=True))
+    return RigidBody(name, m.sum(), J, center_of_mass=center, position=position, orientation=euler_parameters(R))
+
+
+def six_axes(angles=PUMA_ANGLES, along_x=PUMA_ALONG_X, along_z=PUMA_ALONG_Z, gravity=DOWN, seed=0, base="ground"):
+    """A robot of six rotations; base "body": on a free body."""
+    rng = np.random.default_rng(seed)
+    T, bodies, joints = np.eye(4), [], []
+    if base != "ground":
+        bodies.append(some_body("base", rng))
+    for i in range(6):
+        c, s = np.cos(np.deg2rad(angles[i])), np.sin(np.deg2rad(angles[i]))
+        here = np.array([[1, 0, 0, along_x[i]], [0, c, -s, -s * along_z[i]], [0, s, c, c * along_z[i]], [0, 0, 0, 1.0]])
+        T = T @ here
+        bodies.append(some_body(f"link{i + 1}", rng, T[:3, 3], T[:3, :3]))
+        below = ("ground" if base == "ground" else "base") if i == 0 else f"link{i}"
+        ends = Marker(below, position=here[:3, 3], triad=here[:3, :3]), Marker(f"link{i + 1}")
+        joints.append(RevoluteJoint(f"joint{i + 1}", *ends, axis=(0, 0, 1)))
+    return System(bodies, joints, [Gravity(gravity)] if np.any(gravity) else [])
+
+
+def random_tree(seed, n, kinds):
+    """A tree of n bodies by joints of given kinds, with gravity along z, y, anywhere or without; many axes parallel."""
+    rng = np.random.default_rng(seed)
+    bodies, joints, poses = [], [], []
+    for i in range(n):
+        parent = int(rng.integers(-1, i)) if rng.random() < 0.3 else i - 1
+        place, axes = (np.zeros(3), np.eye(3)) if parent < 0 else poses[parent]
+        p = rng.normal(size=4)
+        turned = np.eye(3) if rng.random() < 0.7 else rotation_matrix(p / np.linalg.norm(p))
+        off = rng.normal(size=3) * rng.choice([0.0, 1.0], p=[0.3, 0.7])
+        off *= np.array([0, 0, 1]) if rng.random() < 0.3 else 1.0
+        R, r = axes @ turned, place + axes @ off
+        poses.append((r, R))
+        bodies.append(some_body(f"body{i}", rng, r, R))
+        A = Marker("ground" if parent < 0 else f"body{parent}", position=off, triad=turned)
+        ends = (A, Marker(f"body{i}"))[:: rng.choice([1, -1])]
+        axis = np.eye(3)[rng.integers(3)] if rng.random() < 0.8 else rng.normal(size=3)
+        axis = axis / np.linalg.norm(axis)
+        other = np.cross(axis, rng.normal(size=3))
+        name = f"joint{i}"
+        make = {
+            "R": lambda: RevoluteJoint(name, *ends, axis=axis),  # noqa: B023
+            "P": lambda: PrismaticJoint(name, *ends, axis=axis),  # noqa: B023
+            "C": lambda: CylindricalJoint(name, *ends, axis=axis),  # noqa: B023
+            "U": lambda: UniversalJoint(name, *ends, axis=axis, axis_b=other / np.linalg.norm(other)),  # noqa: B023
+            "S": lambda: SphericalJoint(name, *ends),  # noqa: B023
+            "L": lambda: PlanarJoint(name, *ends, axis=axis),  # noqa: B023
+            "F": lambda: FixedJoint(name, *ends),  # noqa: B023
+        }
+        kind = kinds[rng.integers(len(kinds))] if i else "R"
+        if kind != "free":
+            joints.append(make[kind]())
+    gravity = [np.zeros(3), np.array(DOWN), np.array((0, -9.81, 0)), rng.normal(size=3) * 5][rng.integers(4)]
+    return System(bodies, joints, [Gravity(gravity)] if gravity.any() else [])
