@@ -91,6 +91,15 @@ from .forces import UserForce as UserForce
 from .functions.time_functions import TimeFunction as TimeFunction
 from .gradients import Sensitivities as Sensitivities
 from .gradients import sensitivities as sensitivities
+from .identification.barycentric import barycentric_parameters as barycentric_parameters
+from .identification.base_parameters import base_parameters as base_parameters
+from .identification.estimation import Measured as Measured
+from .identification.estimation import estimate as estimate
+from .identification.excitation import ExcitingMotion as ExcitingMotion
+from .identification.excitation import MotionLimits as MotionLimits
+from .identification.excitation import exciting_motion as exciting_motion
+from .identification.physical import real_parameters as real_parameters
+from .identification.regressors import linear_form as linear_form
 from .integrators import EnergyDecaying as EnergyDecaying
 from .integrators import EnergyMomentum as EnergyMomentum
 from .integrators import GeneralizedAlpha as GeneralizedAlpha

@@ -17,19 +17,19 @@ from floatframe.errors import ModelError
 from floatframe.kernels.model import Model
 from floatframe.kernels.work import new_work
 from floatframe.relative.kernels.entry import motion_of_joints, moved
-from floatframe.relative.kernels.tree import new_joint_work
+from floatframe.relative.kernels.tree import JointWork, new_joint_work
 from floatframe.relative.topology import SystemTree, tree_of
 from floatframe.start.newton_equations import set_iterate
 from floatframe.system import System
 
-__all__ = ["TreeSamples", "gravity_of", "rigid_tree", "sampled"]
+__all__ = ["TreeSamples", "as_placed", "gravity_of", "rigid_tree", "sampled"]
 
 
 @dataclass(frozen=True, eq=False)
 class TreeSamples:
     """n instants of a motion of n_b bodies by n_c columns of joints; ground axes but where said."""
 
-    x: Array  #: coordinates, zero as placed, (n, n_c) [m or rad]
+    x: Array  #: coordinates, (n, n_c) [m or rad]
     rate: Array  #: (n, n_c)
     acceleration: Array  #: (n, n_c)
     r: Array  #: origins of the bodies, (n, n_b, 3) [m]
@@ -72,16 +72,14 @@ def sampled(system: System, x: Array, rate: Array, acceleration: Array) -> TreeS
     Parameters
     ----------
     x, rate, acceleration
-        Of each coordinate of `tree_of(system).columns` at each instant, (n, n_c); zero is as the system is placed.
-        Coordinates of a spherical joint or a free body are the rotation vector from there, its rates angular
-        velocities about the axes of the moved marker.
+        Of each coordinate of `tree_of(system).columns` at each instant, (n, n_c). As in results, angles are zero as
+        the system is placed, distances where the points of the markers coincide. The rotation of a spherical joint or
+        a free body is the rotation vector from where it is placed, its rates are angular velocities about the axes of
+        the moved marker.
     """
     tree = rigid_tree(system, f"system {system.name!r}: samples").tree
     compiled = compiled_system(system)
-    model, work, joints = compiled.model, new_work(compiled.model), new_joint_work(compiled.model, tree)
-    set_iterate(work, compiled.placed, None, None)
-    motion_of_joints(model, work, tree, joints)
-    joints.d_start[:], joints.Q_start[:] = joints.d, joints.Q
+    model, work, joints = compiled.model, new_work(compiled.model), joints_as_placed(system)
     n, n_c, n_b = len(x), len(tree.side), len(tree.parent)
     if not x.shape == rate.shape == acceleration.shape == (n, n_c):
         raise ModelError(
@@ -91,12 +89,13 @@ def sampled(system: System, x: Array, rate: Array, acceleration: Array) -> TreeS
         )
     r, R = np.empty((n, n_b, 3)), np.empty((n, n_b, 3, 3))
     u, u_dot = np.empty((n, n_b, 6)), np.empty((n, n_b, 6))
+    start = as_placed(system)
     t, turn, point = np.empty((n, n_c, 3)), np.empty((n, n_c, 3)), np.empty((n, n_c, 3))
     markers = [int(tree.near[i] if tree.is_reversed[i] else tree.far[i]) for i in range(n_b)]
     owner = np.repeat(np.arange(n_b), np.diff(tree.column0))
     for s in range(n):
         joints.rate[:], joints.acceleration[:] = rate[s], acceleration[s]
-        moved(model, work, tree, joints, x[s])
+        moved(model, work, tree, joints, x[s] - start)
         r[s], R[s], t[s], turn[s] = work.state.r, work.state.R, joints.t, joints.a
         u[s], u_dot[s] = work.state.u.reshape(n_b, 6), work.state.u_dot.reshape(n_b, 6)
     for k, i in enumerate(owner):
@@ -110,3 +109,21 @@ def marker_places(model: Model, m: int, r: Array, R: Array) -> Array:
     """Return the places of a marker of a rigid body or the ground, (n, 3)."""
     i, position = int(model.markers.body[m]), model.markers.position[m]
     return np.broadcast_to(position, r[:, 0].shape) if i < 0 else r[:, i] + R[:, i] @ position
+
+
+def joints_as_placed(system: System) -> JointWork:
+    """Return the working arrays of the joints of a tree that begin as the system is placed."""
+    tree, compiled = tree_of(system).tree, compiled_system(system)
+    model, work, joints = compiled.model, new_work(compiled.model), new_joint_work(compiled.model, tree)
+    set_iterate(work, compiled.placed, None, None)
+    motion_of_joints(model, work, tree, joints)
+    joints.d_start[:], joints.Q_start[:] = joints.d, joints.Q
+    return joints
+
+
+def as_placed(system: System) -> Array:
+    """Return the coordinates of a tree as its system is placed, (n_c,): distances of markers, angles zero."""
+    tree, joints = tree_of(system).tree, joints_as_placed(system)
+    owner = np.repeat(np.arange(len(tree.parent)), np.diff(tree.column0))
+    is_distance = ~tree.alpha.any(axis=1)
+    return np.einsum("ka,ka->k", tree.tau, joints.d[owner]) * is_distance
