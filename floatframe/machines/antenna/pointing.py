@@ -1,0 +1,43 @@
+"""Where the petals of the antenna point, seen from the spacecraft."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.markers import Marker
+from floatframe.machines.antenna.description import Antenna
+from floatframe.results.place_motion import PlaceMotion
+from floatframe.results.sensors.places import place_motion
+from floatframe.results.trajectory import Trajectory
+from floatframe.system import System
+
+__all__ = ["Pointing", "pointing"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pointing:
+    """Direction from the middle of each hinge to the tip of its petal, in axes of the spacecraft, (n_t, n_petals)."""
+
+    t: Array  #: (n_t,) [s]
+    theta: Array  #: from the mast [rad]
+    lateral: Array  #: out of the plane of the petal and the mast [rad]
+
+
+def pointing(system: System, motion: Trajectory, antenna: Antenna) -> Pointing:
+    """Return where the petals of a system of an antenna point over a motion."""
+
+    def place(body: str, position: tuple[float, float, float]) -> PlaceMotion:
+        return place_motion(system, motion, "pointing", Marker(body, position=np.array(position)))
+
+    bus = place("bus", (0.0, 0.0, 0.0))
+    theta, lateral = [], []
+    for k in range(1, antenna.n_petals + 1):
+        turn = 2 * np.pi * k / antenna.n_petals
+        tip = place(f"petal_{k}", (antenna.petal_length, 0.0, 0.0)).position - bus.position
+        seen = np.einsum("tij,ti->tj", bus.axes, tip)
+        out = np.cos(turn) * seen[:, 0] + np.sin(turn) * seen[:, 1] - antenna.geometry.hinge_radius
+        theta.append(np.arctan2(out, seen[:, 2]))
+        across = np.cos(turn) * seen[:, 1] - np.sin(turn) * seen[:, 0]
+        lateral.append(np.arctan2(across, np.hypot(out, seen[:, 2])))
+    return Pointing(motion.t, np.transpose(theta), np.transpose(lateral))
