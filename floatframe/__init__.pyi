@@ -105,6 +105,7 @@ from .integrators import EnergyMomentum as EnergyMomentum
 from .integrators import GeneralizedAlpha as GeneralizedAlpha
 from .integrators import Ida as Ida
 from .integrators import RelativeGeneralizedAlpha as RelativeGeneralizedAlpha
+from .integrators import RelativeOde as RelativeOde
 from .integrators import Variational as Variational
 from .integrators import hht as hht
 from .integrators import newmark as newmark

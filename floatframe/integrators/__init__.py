@@ -7,6 +7,7 @@ from floatframe.integrators.energy_momentum import EnergyDecaying, EnergyMomentu
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
 from floatframe.integrators.ida import Ida
 from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
+from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.integrators.variational import Variational
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "GeneralizedAlpha",
     "Ida",
     "RelativeGeneralizedAlpha",
+    "RelativeOde",
     "Variational",
     "hht",
     "in_formulation",

@@ -10,6 +10,7 @@ from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
 from floatframe.integrators.carry import Carry, Failure, Integrator, memory_of, one_step_of, with_angles
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, squared_frequencies
+from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.joints.rows import is_held_position
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import Model
@@ -169,7 +170,7 @@ def in_formulation(integrator: Integrator, formulation: str | None) -> Integrato
         raise ModelError(f"formulation: expected one of {', '.join(FORMULATIONS)}, got {formulation!r}")
     if formulation == "absolute":
         return integrator.absolute if isinstance(integrator, RelativeGeneralizedAlpha) else integrator
-    if isinstance(integrator, RelativeGeneralizedAlpha):
+    if isinstance(integrator, RelativeGeneralizedAlpha | RelativeOde):
         return integrator
     if not isinstance(integrator, GeneralizedAlpha):
         raise ModelError(

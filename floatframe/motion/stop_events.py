@@ -73,9 +73,7 @@ def coupled_sum(compiled: CompiledSystem, name: str, w: Array) -> float:
     return float(factors @ w[rows])
 
 
-def stop_values(
-    compiled: CompiledSystem, event: StopEvent, resting: Mapping[str, str], rows: Sequence[Rows]
-) -> Array:
+def stop_values(compiled: CompiledSystem, event: StopEvent, resting: Mapping[str, str], rows: Sequence[Rows]) -> Array:
     """Return what the event of a stop watches, at the times of rows of results, (n_times,).
 
     A limit on which the sum rests is not reached again; one on which it does not rest cannot let go.

@@ -7,7 +7,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.kernels.compiler.choice import is_lean
 from floatframe.kernels.compiler.compilation import entry
 from floatframe.kernels.compiler.sources import source_digest
-from floatframe.kernels.compiler.structure import converter, table_of
+from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
 from floatframe.kernels.diagnostics import power
 from floatframe.kernels.entry import NO_ROWS, Order, Outcome, no_memory
 from floatframe.kernels.generalized_alpha import DONE
@@ -15,6 +15,7 @@ from floatframe.kernels.memory import Memory, Rows, new_rows
 from floatframe.kernels.model import Model
 from floatframe.kernels.records import filled, zeros
 from floatframe.kernels.work import Work
+from floatframe.relative.kernels.accelerations import accelerate, constrain
 from floatframe.relative.kernels.evaluation import evaluate_tree
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
 from floatframe.relative.kernels.projection import put_reactions
@@ -24,7 +25,9 @@ from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree, new_t
 from floatframe.relative.kernels.tree_factors import factorize_tree, solve_newton
 
 __all__ = [
+    "accelerations",
     "advance_tree_steps",
+    "constraints",
     "motion_of_bodies",
     "motion_of_joints",
     "moved",
@@ -34,7 +37,7 @@ __all__ = [
     "projected",
 ]
 
-MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT, OBSERVE, ADVANCE, CORRECT = range(8)
+MOTION_OF_JOINTS, MOTION_OF_BODIES, MOVE, PROJECT, TANGENT, OBSERVE, ADVANCE, CORRECT, CONSTRAIN, ACCELERATE = range(10)
 
 
 as_model, as_work, as_tree = converter(Model()), converter(Work()), converter(Tree())
@@ -69,6 +72,11 @@ def make_entry(digest):
         elif what == PROJECT:
             evaluate_tree(model, work, tree, joints, order.c_k)
             put_reactions(model, work, tree, joints)
+        elif what == CONSTRAIN:
+            constrain(model, work, tree, joints, tangent, order.n_steps == 1)
+        elif what == ACCELERATE:
+            if not accelerate(model, work, tree, joints, tangent):
+                return SINGULAR, 0, 0, -1, 0.0
         elif what == CORRECT:
             c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
             evaluate_tree(model, work, tree, joints, c_k)
@@ -113,8 +121,9 @@ def call(
     if not run.signatures:
         run.compile(SIGNATURE)
     ordered = filled(Order(), **(NOTHING._asdict() | order))
-    records = (model, work, tree, joints, tangent, no_memory() if memory is None else memory, rows, ordered)
-    return Outcome(*run(*(table_of(record) for record in records)))
+    kept = (kept_table_of(record) for record in (model, work, tree, joints))
+    others = (tangent, no_memory() if memory is None else memory, rows, ordered)
+    return Outcome(*run(*kept, *(table_of(record) for record in others)))
 
 
 def motion_of_joints(model: Model, work: Work, tree: Tree, joints: JointWork) -> None:
@@ -153,6 +162,21 @@ def newton_step(
     tangent = new_tangent_work(model, tree)
     call(model, work, tree, joints, tangent, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k)
     return tangent.step, tangent.mu
+
+
+def constraints(
+    model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork, *, by_increments: bool
+) -> None:
+    """Write what kept rows hold, its rates and C, by increments x or by rates, with joints moved by `joints.x`."""
+    call(model, work, tree, joints, tangent, what=CONSTRAIN, n_steps=int(by_increments))
+
+
+def accelerations(model: Model, work: Work, tree: Tree, joints: JointWork, tangent: TangentWork) -> bool:
+    """Write accelerations of joints and bodies, and kept wrenches; whether positions and rates have them.
+
+    Joints are moved by `joints.x`, which is zero after it.
+    """
+    return call(model, work, tree, joints, tangent, what=ACCELERATE).status == DONE
 
 
 def observe_tree(model: Model, work: Work, tree: Tree, joints: JointWork, memory: Memory, t: float) -> Rows:

@@ -19,7 +19,7 @@ from floatframe.relative.kernels.projection import force_slopes
 from floatframe.relative.kernels.tangent import add_second_order, inner_product, product_of, turned_power, unit_of
 from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
 
-__all__ = ["factorize_tree", "solve_newton"]
+__all__ = ["factorize_tree", "solve_bordered", "solve_newton"]
 
 
 @inner
@@ -230,18 +230,24 @@ def solve_tree(tree, tangent, x):
 @inner
 def solve_newton(work, tree, joints, tangent, c_k):
     """Write the corrections of unknowns and of kept wrenches, these times c_k, into tangent.step and tangent.mu."""
+    for s in range(tree.slot.shape[0]):
+        tangent.step[s] = -c_k * joints.residual[s]
+    for k in range(tree.kept_row.shape[0]):
+        if tree.kept_row[k] >= 0:
+            tangent.mu[tree.kept_row[k]] = -work.connections.g[k]
+    solve_bordered(tree, tangent)
+
+
+@inner
+def solve_bordered(tree, tangent):
+    """Overwrite tangent.step and tangent.mu, right sides of unknowns and of rows that are kept, by the solution."""
     step, mu, n_s, n_rows = tangent.step, tangent.mu, tree.slot.shape[0], tangent.V.shape[0]
-    for s in range(n_s):
-        step[s] = -c_k * joints.residual[s]
     solve_tree(tree, tangent, step)
     if n_rows == 0:
         return
-    for k in range(tree.kept_row.shape[0]):
-        r = tree.kept_row[k]
-        if r >= 0:
-            mu[r] = -work.connections.g[k]
-            for s in range(n_s):
-                mu[r] -= tangent.C[r, s] * step[s]
+    for r in range(n_rows):
+        for s in range(n_s):
+            mu[r] -= tangent.C[r, s] * step[s]
     lu_solve(tangent.V, tangent.V_pivot, mu)
     for r in range(n_rows):
         for s in range(n_s):

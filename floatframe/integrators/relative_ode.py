@@ -1,0 +1,298 @@
+"""SciPy's stiff solvers on the independent coordinates of joints and modes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest
+from floatframe.compiling.callbacks import raise_errors_of
+from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.errors import FloatframeError, ModelError
+from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
+from floatframe.joints.rows import is_held, is_held_length, is_held_position
+from floatframe.kernels.memory import Rows, new_rows
+from floatframe.kernels.model import COUPLER, USER_FORCE
+from floatframe.kernels.work import Work, new_work
+from floatframe.relative.kernels.tree import new_joint_work, new_tangent_work
+from floatframe.relative.partition import partition_of
+from floatframe.relative.topology import SystemTree, tree_of
+from floatframe.rotations import euler_parameters, right_jacobian
+from floatframe.start.initial import consistent_motion
+from floatframe.start.newton_equations import set_iterate
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["METHODS", "RelativeOde"]
+
+METHODS = ("BDF", "Radau", "LSODA", "DOP853", "RK45")  #: of SciPy
+TURN = 2.0  #: rad: a rotation vector further from its beginning is counted from anew
+CLOSED = 1e-13  #: of lengths and angles, of loops at each evaluation
+MOST = 20  #: iterations
+
+
+@dataclass(frozen=True)
+class RelativeOde:
+    """SciPy's `solve_ivp` on the ordinary differential equation of the independent coordinates (docs/relative.md §7).
+
+    (1) coordinates that close the loops are chosen by pivoted LU, and anew where the choice wears out
+    (2) at each evaluation loops are closed exactly, in positions by Newton's method and in rates
+    (3) accelerations and reactions follow from the recursive equations
+
+    so that constraints hold to rounding at any tolerance. Steps and orders are the solver's; `h` of `integrate` is the
+    distance of outputs. Rotations are counted from the beginning of a batch of steps, anew after two radians. Work and
+    dissipation are summed by the trapezoidal rule over the outputs. Friction of the kind that sticks, couplers and
+    user forces, which have a memory of their own, are for `RelativeGeneralizedAlpha`.
+    """
+
+    method: str = "BDF"  #: "BDF", "Radau" or "LSODA" for stiff systems; "DOP853", "RK45" for others
+    rtol: float = 1e-8  #: relative tolerance of a step
+    atol: float = 1e-10  #: absolute tolerance of a step, in the units of the system
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise ModelError(f"RelativeOde: method {self.method!r}{nearest(self.method, METHODS)}")
+        for name in ("rtol", "atol"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ModelError(f"RelativeOde: {name}: expected a number between 0 and 1, got {getattr(self, name)}")
+
+    def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
+        """Return the memory at the beginning, from a state made consistent."""
+        compiled = compiled_system(system)
+        for c, name in enumerate(compiled.connection_names):
+            if compiled.model.connections.law[c] in (COUPLER, USER_FORCE):
+                raise ModelError(
+                    f"RelativeOde: {name!r} has a memory of its own, which this scheme does not know; use "
+                    "GeneralizedAlpha"
+                )
+        for each in compiled.laws:
+            if each.law.states or each.law.multipliers:
+                raise ModelError(
+                    f"RelativeOde: element {each.element.name!r} has states or multipliers of its own, which this "
+                    "scheme does not know; use GeneralizedAlpha"
+                )
+        made = consistent_motion(system, state, t=t)
+        carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
+        return with_angles(system, t, carry, before)
+
+    def step(self, system: System, t: float, h: float, carry: Carry) -> Carry:
+        """Return the memory a time h later; `ConvergenceError` if it fails."""
+        return one_step_of(self, system, t, h, carry)
+
+    def observe(self, system: System, t: float, carry: Carry, work: Work) -> tuple[Carry, Rows]:
+        """Return the results at the carried state; the carry learns the power at it."""
+        power, rows = observed(system, t, carry, work)
+        return replace(carry, power=power), rows
+
+    def advance(
+        self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
+    ) -> tuple[Carry, Rows, int, Failure | None]:
+        """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
+        times = t0 + h * np.arange(first, first + n_steps + 1)
+        rows, n_good, failure, n_before = [new_rows(compiled_system(system).model, 0)], 0, None, 0
+        motion = Motion(system, carry.state, float(times[0]))
+        try:
+            for t, state, u_dot, w in motion.outputs(self, times):
+                carry = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
+                carry = turned_on(system, carry, h)
+                power, row = observed(system, t, carry, work)
+                carry = replace(carry, power=power, work=carry.work + 0.5 * h * (carry.power + power))
+                row.diagnostics[0, 10:12] = carry.work
+                n_good += 1
+                if (first + n_good) % every == 0:
+                    rows.append(row)
+        except (FloatframeError, np.linalg.LinAlgError) as error:
+            failure = Failure(f"{self.method}: {error}", np.inf)
+        carry = replace(carry, n_iterations=carry.n_iterations + motion.n_evaluations - n_before)
+        joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
+        return carry, joined, n_good, failure
+
+
+class Motion:
+    """A system along a motion: y = (independent increments x, independent rates) to their derivatives."""
+
+    def __init__(self, system: System, state: State, t: float) -> None:
+        self.compiled: CompiledSystem = compiled_system(system)
+        self.parts: SystemTree = tree_of(system)
+        self.model, self.tree = self.compiled.model, self.parts.tree
+        self.work, self.joints = new_work(self.model), new_joint_work(self.model, self.tree)
+        self.tangent = new_tangent_work(self.model, self.tree)
+        self.is_mode = self.tree.mode >= 0
+        kept = self.tree.kept_row >= 0
+        kinds = self.model.rows.kind[kept]
+        self.held, self.closed = np.flatnonzero(is_held(kinds)), np.flatnonzero(is_held_position(kinds))
+        self.rows = np.flatnonzero(kept)
+        self.names = [self.compiled.owners[k] for k in self.rows]
+        self.row_size = np.where(is_held_length(kinds), self.compiled.length, 1.0)
+        self.groups = groups_of(self.parts)
+        self.n_evaluations = 0
+        self.p = state.p
+        self.begin(state, t)
+
+    def begin(self, state: State, t: float) -> None:
+        """Count increments from a state, and choose the independent coordinates there."""
+        from floatframe.relative.kernels.entry import motion_of_joints
+
+        set_iterate(self.work, state)
+        motion_of_joints(self.model, self.work, self.tree, self.joints)
+        self.joints.d_start[:], self.joints.Q_start[:] = self.joints.d, self.joints.Q
+        self.t_start, self.q_start = t, state.q.copy()
+        self.x = np.zeros(len(self.tree.slot))
+        self.rates = self.values(state.u, self.joints.rate)
+        self.constrain(t, self.x, self.rates, by_increments=False)
+        C, sizes = self.tangent.C, np.where(self.is_mode, 1e-3, self.sizes())
+        self.of_places = partition_of(C[self.closed], tuple(self.names[k] for k in self.closed), sizes)
+        self.of_rates = partition_of(C[self.held], tuple(self.names[k] for k in self.held), sizes)
+
+    def sizes(self) -> Array:
+        """Return typical sizes of coordinates: the length of the system, or a radian."""
+        units = np.array([self.compiled.length if each.unit == "m" else 1.0 for each in self.parts.columns] or [1.0])
+        return np.where(self.is_mode, 1.0, units[np.maximum(self.tree.column, 0)])
+
+    def values(self, of_bodies: Array, of_columns: Array) -> Array:
+        """Return values of all unknowns, (n_s,)."""
+        columns = np.append(of_columns, 0.0)[self.tree.column]
+        return np.where(self.is_mode, of_bodies[self.tree.slot], columns)
+
+    def put(self, t: float, x: Array, rates: Array) -> None:
+        """Write increments and rates, prescribed ones as their functions say."""
+        tree, joints, state = self.tree, self.joints, self.work.state
+        state.time[...] = t
+        state.w[:] = 0.0
+        joints.x[tree.column[~self.is_mode]] = x[~self.is_mode]
+        joints.rate[tree.column[~self.is_mode]] = rates[~self.is_mode]
+        joints.acceleration[:] = 0.0
+        for k, motion in enumerate(self.parts.motions):
+            if motion is not None:
+                joints.x[k] = tree.factor[k] * (motion(t) - motion(self.t_start))
+                joints.rate[k], joints.acceleration[k] = (tree.factor[k] * motion(t, order) for order in (1, 2))
+        modes = self.is_mode
+        state.q[tree.mode[modes]] = self.q_start[tree.mode[modes]] + x[modes]
+        state.u[tree.slot[modes]] = rates[modes]
+        state.u_dot[tree.slot[modes]] = 0.0
+
+    def constrain(self, t: float, x: Array, rates: Array, *, by_increments: bool) -> None:
+        """Write what is held, its rates and C."""
+        from floatframe.relative.kernels.entry import constraints
+
+        self.put(t, x, rates)
+        constraints(self.model, self.work, self.tree, self.joints, self.tangent, by_increments=by_increments)
+        raise_errors_of(self.compiled.callbacks)
+
+    def closed_at(self, t: float, y: Array) -> tuple[Array, Array]:
+        """(2): return increments and rates of all unknowns that belong to the independent ones."""
+        places, speeds = self.of_places, self.of_rates
+        n = len(places.independent)
+        x, rates = self.x.copy(), np.zeros_like(self.x)
+        x[places.independent], rates[speeds.independent] = y[:n], y[n:]
+        for _ in range(MOST if len(places.dependent) else 0):
+            self.constrain(t, x, rates, by_increments=True)
+            g = self.work.connections.g[self.rows[self.closed]]
+            if np.abs(g / self.row_size[self.closed]).max() <= CLOSED:
+                break
+            step = places.solved(self.tangent.C[self.closed], -g)
+            x[places.dependent] += step
+            if np.abs(step).max() <= CLOSED:
+                break
+        else:
+            if len(places.dependent):
+                raise ModelError(
+                    f"the loops of {', '.join(dict.fromkeys(self.names[k] for k in self.closed))} cannot be closed at "
+                    f"t = {t:.9g}; look for a singular position or a drive out of reach"
+                )
+        if len(speeds.dependent):
+            self.constrain(t, x, rates, by_increments=False)
+            rates[speeds.dependent] = speeds.solved(
+                self.tangent.C[self.held], -self.work.connections.rate[self.rows[self.held]]
+            )
+        self.x = x
+        return x, rates
+
+    def derivative(self, t: float, y: Array) -> Array:
+        """Return y'."""
+        x, rates = self.closed_at(t, y)
+        accelerations = self.accelerations(t, x, rates)
+        x_dot = rates.copy()
+        for columns in self.groups:
+            x_dot[columns] = np.linalg.solve(right_jacobian(x[columns]), rates[columns])
+        return np.concatenate([x_dot[self.of_places.independent], accelerations[self.of_rates.independent]])
+
+    def accelerations(self, t: float, x: Array, rates: Array) -> Array:
+        """(3): return accelerations of all unknowns; bodies and wrenches are written."""
+        from floatframe.relative.kernels.entry import accelerations
+
+        self.n_evaluations += 1
+        self.put(t, x, rates)
+        if not accelerations(self.model, self.work, self.tree, self.joints, self.tangent):
+            raise ModelError(
+                f"the equations of motion are singular at t = {t:.9g}: a mode or a coordinate without mass, or "
+                "constraints that depend on each other; use GeneralizedAlpha for modes without mass"
+            )
+        return self.tangent.step.copy()
+
+    def outputs(self, method: RelativeOde, times: Array):
+        """Yield time, state, u_dot and w at each time but the first."""
+        from scipy.integrate import solve_ivp
+
+        k = 1
+        while k < len(times):
+            y = np.concatenate([self.x[self.of_places.independent], self.rates[self.of_rates.independent]])
+            solution = solve_ivp(
+                self.derivative, (self.t_start, times[-1]), y, method=method.method, rtol=method.rtol,
+                atol=method.atol, t_eval=times[k:], events=self.events(),
+            )  # fmt: skip
+            if solution.status < 0:
+                raise ModelError(solution.message)
+            for t, y_at in zip(solution.t, np.transpose(solution.y), strict=True) if len(solution.t) else ():
+                yield (float(t), *self.state_at(float(t), y_at))
+                k += 1
+            if solution.status == 1:  # rotations went far, or the choice of coordinates is worn out
+                t = float(max(events[-1] for events in solution.t_events if len(events)))
+                y_at = next(found[-1] for found in solution.y_events if len(found))
+                state, _, _ = self.state_at(t, y_at)
+                self.begin(state, t)
+
+    def events(self):
+        """Return functions of (t, y) that end a stretch where they pass zero."""
+
+        def far(t: float, y: Array) -> float:
+            x, _ = self.closed_at(t, y)
+            return max(float(np.linalg.norm(x[columns])) for columns in self.groups) - TURN
+
+        def worn(t: float, y: Array) -> float:
+            x, rates = self.closed_at(t, y)
+            self.constrain(t, x, rates, by_increments=False)
+            return 1.0 if self.of_rates.is_worn(self.tangent.C[self.held]) else -1.0
+
+        chosen = ([far] if self.groups else []) + ([worn] if len(self.held) else [])
+        for each in chosen:
+            each.terminal, each.direction = True, 1.0  # type: ignore[attr-defined]
+        return chosen
+
+    def state_at(self, t: float, y: Array) -> tuple[State, Array, Array]:
+        """Return state, accelerations and wrenches at a solution, reactions of the tree included."""
+        from floatframe.relative.kernels.entry import projected
+
+        x, rates = self.closed_at(t, y)
+        self.accelerations(t, x, rates)
+        projected(self.model, self.work, self.tree, self.joints)
+        state = self.work.state
+        p = np.array([euler_parameters(R) for R in state.R])
+        p *= np.where((p * self.p).sum(axis=1) < 0.0, -1.0, 1.0)[:, None]  # of the two signs the nearer one
+        self.p = p
+        return State(state.r, p, state.q, state.u), state.u_dot.copy(), state.w.copy()
+
+
+def groups_of(parts: SystemTree) -> list[Array]:
+    """Return the unknowns of each rotation that is a group, three numbers each."""
+    tree = parts.tree
+    groups = []
+    for i in range(len(tree.parent)):
+        turning = [
+            int(tree.unknown[k])
+            for k in range(tree.column0[i], tree.column0[i + 1])
+            if tree.side[k] and tree.alpha[k].any()
+        ]
+        if len(turning) == 3:
+            groups.append(np.array(turning))
+    return groups
