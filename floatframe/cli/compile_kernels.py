@@ -1,7 +1,8 @@
 """Compile the kernels of the motion before they are needed: `python -m floatframe.cli.compile_kernels`.
 
-Numba compiles them once on a machine and keeps them; it takes about a minute, on one core. A process beside can do that
-while another core works on something else. The kernels have one signature, so that any system makes all of them.
+Numba compiles them once on a machine and keeps them; it takes about a minute, on one core, and as long again for those
+of joint coordinates. A process beside can do that while another core works on something else. The kernels have one
+signature, so that any system makes all of them.
 """
 
 import numpy as np
@@ -12,9 +13,10 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Move one free rigid body by one step."""
-    block = RigidBody("block", 1.0, np.eye(3))
-    integrate(System([block]), GeneralizedAlpha(), 1e-3, 1e-3)
+    """Move one free rigid body by one step, in both formulations."""
+    system = System([RigidBody("block", 1.0, np.eye(3))])
+    for formulation in ("absolute", "relative"):
+        integrate(system, GeneralizedAlpha(), 1e-3, 1e-3, formulation=formulation)
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from floatframe.kernels.work import Work, new_work
 from floatframe.start.constraint_words import conflict_of_drives, drive_name, open_joints
 from floatframe.start.far_drives import driven_angles, led_by, stages, way_of_drives
 from floatframe.start.freedoms import Mobility, constraint_mobility, scaled_constraints
+from floatframe.start.half_turns import require_no_half_turns
 from floatframe.start.newton_equations import (
     displaced,
     highest_frequency,
@@ -113,6 +114,7 @@ def consistent_motion(
     work.state.time[...] = t
     state = assembled(compiled, work, given, known)
     require_placed_near(compiled, given, state)
+    require_no_half_turns(compiled, work, state)
     require_independent_constraints(compiled, work, state)
     state = with_compatible_velocities(compiled, work, state, known)
     return ConsistentState(state, *solve_accelerations(compiled, work, state, known))
