@@ -1,5 +1,6 @@
 """SciPy's stiff solvers on the independent coordinates of joints and modes."""
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,8 +89,8 @@ class RelativeOde:
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
-        times = t0 + h * np.arange(first, first + n_steps + 1)
-        rows, n_good, failure, n_before = [new_rows(compiled_system(system).model, 0)], 0, None, 0
+        times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
+        rows, n_good, failure = [new_rows(compiled_system(system).model, 0)], 0, None
         motion = Motion(system, carry.state, float(times[0]))
         try:
             for t, state, u_dot, w in motion.outputs(self, times):
@@ -103,7 +104,7 @@ class RelativeOde:
                     rows.append(row)
         except (FloatframeError, np.linalg.LinAlgError) as error:
             failure = Failure(f"{self.method}: {error}", np.inf)
-        carry = replace(carry, n_iterations=carry.n_iterations + motion.n_evaluations - n_before)
+        carry = replace(carry, n_iterations=carry.n_iterations + motion.n_evaluations)
         joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
         return carry, joined, n_good, failure
 
@@ -230,7 +231,7 @@ class Motion:
             )
         return self.tangent.step.copy()
 
-    def outputs(self, method: RelativeOde, times: Array):
+    def outputs(self, method: RelativeOde, times: Array) -> Iterator[tuple[float, State, Array, Array]]:
         """Yield time, state, u_dot and w at each time but the first."""
         from scipy.integrate import solve_ivp
 
@@ -252,7 +253,7 @@ class Motion:
                 state, _, _ = self.state_at(t, y_at)
                 self.begin(state, t)
 
-    def events(self):
+    def events(self) -> Sequence[Callable[[float, Array], float]]:
         """Return functions of (t, y) that end a stretch where they pass zero."""
 
         def far(t: float, y: Array) -> float:

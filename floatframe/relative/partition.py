@@ -75,7 +75,7 @@ def partition_of(C: Array, names: tuple[str, ...], sizes: Array) -> Partition:
     dependent: list[int] = []
     for k in range(n_c):  # rows in turn, the largest of all numbers that are left as pivot
         rest = np.abs(left[k:])
-        row, column = np.unravel_index(int(np.argmax(rest)), rest.shape)
+        row, column = divmod(int(np.argmax(rest)), n)
         if rest[row, column] <= RANK:
             named = ", ".join(repr(name) for name in dict.fromkeys(names))
             raise ModelError(
@@ -83,7 +83,7 @@ def partition_of(C: Array, names: tuple[str, ...], sizes: Array) -> Partition:
                 "that are redundant; begin in another position, or replace a joint by one that holds less"
             )
         left[[k, k + row]] = left[[k + row, k]]
-        dependent.append(int(column))
+        dependent.append(column)
         factors = left[k + 1 :, column] / left[k, column]
         left[k + 1 :] -= np.outer(factors, left[k])
     free = np.setdiff1d(np.arange(n), dependent)
