@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["register"]
 
-KINDS = ("csv", "json", "png", "svg", "pdf")
+KINDS = ("csv", "json", "png", "svg", "pdf", "toml")
 
 
 def register(app: typer.Typer) -> None:
@@ -26,7 +26,11 @@ def optimize_command(
     design: Annotated[Path, typer.Argument(help="Design file (TOML), see docs/optimization.md.")],
     outputs: Annotated[
         list[Path],
-        typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable."),
+        typer.Option(
+            "--output",
+            "-o",
+            help="A .csv, .json, .png, .svg or .pdf file, or .toml, the system with the best values.",
+        ),
     ] = [],  # noqa: B006
     journal: Annotated[
         Path | None,
@@ -43,7 +47,7 @@ def optimize_command(
     An evaluation that fails is a row with its reason. Without -o the history stands beside the design file as a
     table and a picture: study.csv and study.png.
 
-    Example: floatframe optimize study.toml -o history.csv -o history.png
+    Example: floatframe optimize study.toml -o history.csv -o history.png -o best.toml
     """
     import io
 
@@ -62,8 +66,12 @@ def optimize_command(
     for path in paths:
         if path.suffix.lower().removeprefix(".") not in KINDS:
             raise ModelError(f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in KINDS)}")
+        if path.suffix.lower() == ".toml" and path.resolve().parent != Path(described.study.system).resolve().parent:
+            raise ModelError(
+                f"--output {path}: expected a place beside {described.study.system}, which names files relative to it"
+            )
     with stages() as clock:
-        if described.study.analysis == "run":
+        if "run" in described.analyses:
             from floatframe.kernels.entry import prepare
 
             with clock("compiled code (made at first use)"):
@@ -79,6 +87,8 @@ def optimize_command(
         kind = path.suffix.lower().removeprefix(".")
         if kind == "csv":
             replace_file(path, csv_of(result).encode())
+        elif kind == "toml":
+            replace_file(path, best_system(result).encode())
         elif kind == "json":
             replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
         else:
@@ -144,6 +154,24 @@ def optimization_record(result: "OptimizationResult") -> dict[str, Any]:
         "computed": result.n_computed,
         "history": [row_record(result, row) for row in result.history],
     }
+
+
+def best_system(result: "OptimizationResult") -> str:
+    """Return the system file with the best values of the parameters, its comments and order kept."""
+    import tomlkit
+
+    from fe_models.foundation.toml_file import holder_of
+    from floatframe.errors import SystemFileError
+
+    design = result.design
+    text = Path(design.study.system).read_text(encoding="utf-8-sig")
+    document = tomlkit.parse(text)
+    point = design.point(result.best.evaluation.values)
+    paths = [path for p in design.parameters for path in p.paths]
+    for path, value in zip(paths, point, strict=True):
+        holder, key = holder_of(document, path, design.study.system, SystemFileError)
+        holder[key] = value
+    return str(tomlkit.dumps(document))
 
 
 def csv_of(result: "OptimizationResult") -> str:

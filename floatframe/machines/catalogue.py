@@ -46,6 +46,15 @@ MACHINES: dict[str, Machine] = {
     "kart": Machine(
         "a kart", "kart", "steering step with a flexible and a rigid chassis: radius, wheel loads, yaw-rate gain"
     ),
+    "steering-linkage": Machine(
+        "a six-bar steering linkage", "steering_linkage", "optimised for Ackermann's condition over its range"
+    ),
+    "straight-line": Machine(
+        "a four-bar linkage with a straight path", "straight_line", "optimised for the least deviation from a line"
+    ),
+    "absorber": Machine(
+        "an absorber on an oscillator", "absorber", "optimised by its frequency response and by eigenvalues"
+    ),
 }
 
 

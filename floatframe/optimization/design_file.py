@@ -2,7 +2,6 @@
 
 import csv
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,25 +10,42 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import near_file
-from fe_models.foundation.toml_file import Table, choice, read_toml, validated, value_of
+from fe_models.foundation.toml_file import Table, choice, interval, read_toml, validated, value_of
 from floatframe.errors import SystemFileError
+from floatframe.optimization.design import Design, DesignParameter, Quantity
 from floatframe.studies.study_file import ANALYSES, TAKES, Output, Parameter, Study, list_as_tuple
 
-__all__ = [
-    "DIFFERENCES", "GOALS", "METHODS", "SMALLEST_TOLERANCE", "Design", "DesignParameter", "Quantity", "read_design",
-]  # fmt: skip
+__all__ = ["COMBINATIONS", "DIFFERENCES", "GOALS", "METHODS", "SMALLEST_TOLERANCE", "read_design"]
 
 METHODS = ("least-squares", "slsqp", "trust-constr", "differential-evolution")
 DIFFERENCES = ("central", "forward")
+COMBINATIONS = ("sum", "largest")
+RESPONSE = "response"  #: the analysis that studies do not know
+RESPONSE_TAKES = ("greatest", "least", "mean", "rms")
 GOALS = ("smallest", "greatest")
 SMALLEST_TOLERANCE = 1e-15  #: above the rounding of numbers, which SciPy's methods ask for
+
+
+class PathSection(Table):
+    """One of several key paths of a parameter."""
+
+    path: str = Field(description="the key path in the system file, text")
+    factor: float = Field(1.0, description="a number other than 0 that the value is multiplied with")
+
+    @field_validator("factor")
+    @classmethod
+    def _not_zero(cls, value: float) -> float:
+        if value == 0:
+            raise ValueError("expected a number other than 0")
+        return value
 
 
 class ParameterSection(Table):
     """[parameters.NAME]: numbers of the system file that are free between bounds."""
 
-    path: Annotated[str | tuple[str, ...], BeforeValidator(list_as_tuple)] = Field(
-        description="the key path in the system file, text, such as bodies.rod.mass, or a list of those with one value"
+    path: Annotated[str | tuple[str | PathSection, ...], BeforeValidator(list_as_tuple)] = Field(
+        description="the key path in the system file, text, such as bodies.rod.mass, or a list of those that take one "
+        "value: text or tables {path = ..., factor = ...}"
     )
     lower: float = Field(description="a number, the lower bound")
     upper: float = Field(description="a number, the upper bound")
@@ -45,18 +61,53 @@ class ParameterSection(Table):
             raise ValueError("path: expected one key path at least")
         return self
 
-    def paths(self) -> tuple[str, ...]:
-        """Return all key paths."""
-        return (self.path,) if isinstance(self.path, str) else self.path
+    def places(self) -> tuple[PathSection, ...]:
+        """Return all key paths with their factors."""
+        given = (self.path,) if isinstance(self.path, str) else self.path
+        return tuple(PathSection(path=each, factor=1.0) if isinstance(each, str) else each for each in given)
 
 
 class QuantitySection(Table):
     """A number taken from the result of an evaluation."""
 
-    of: str = Field(description='a sensor and its column ("tip size"), or of eig "frequency 1", "damping least"')
+    of: str = Field(
+        description='a sensor and its column ("tip size"), of eig "frequency 1", "damping least", of response '
+        '"OUTPUT / INPUT"'
+    )
+    analysis: choice("analysis", lambda: (*ANALYSES, RESPONSE)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"one of {', '.join((*ANALYSES, RESPONSE))}; default: that of the design"
+    )
+    band: tuple[float, float] | None = Field(None, description="of response: a list of two frequencies in Hz, rising")
+    at: Annotated[float, Field(ge=0)] | None = Field(None, description="of response: one frequency in Hz instead")
     take: choice("way to take a number", lambda: tuple(TAKES)) = Field(  # type: ignore[valid-type]
         "last", description=f"one of {', '.join(TAKES)}"
     )
+
+    @field_validator("band", mode="before")
+    @classmethod
+    def _band(cls, value: Any) -> Any:
+        return interval(value)
+
+    def output(self, name: str, analysis: str) -> Output:
+        """Return what is taken, of a frequency response by default the greatest; `ValueError` if it does not fit."""
+        analysis = self.analysis or analysis
+        if analysis != RESPONSE:
+            if self.band is not None or self.at is not None:
+                raise ValueError(f'{name}: band and at are of analysis = "response", this is taken from {analysis!r}')
+            return Output(name, self.of, self.take)
+        if (self.band is None) == (self.at is None):
+            raise ValueError(
+                f"{name}: expected band or at, of a frequency response, got {'both' if self.at else 'neither'}"
+            )
+        take = self.take if "take" in self.model_fields_set else "greatest"
+        if take not in RESPONSE_TAKES or (self.at is not None and "take" in self.model_fields_set):
+            words = (
+                f"expected one of {', '.join(RESPONSE_TAKES)}, with band" if self.at is None else "leave it out with at"
+            )
+            raise ValueError(f"{name}: take = {take!r}: {words}")
+        if self.band is not None and not 0 < self.band[0] < self.band[1]:
+            raise ValueError(f"{name}: band: expected two rising frequencies above 0, got {list(self.band)}")
+        return Output(name, self.of, take)
 
 
 class ObjectiveSection(QuantitySection):
@@ -103,8 +154,11 @@ class DesignFile(Table):
     """An optimisation of a system."""
 
     system: Path = Field(description="the path of a system file, relative to this file")
-    analysis: choice("analysis", lambda: ANALYSES) = Field(  # type: ignore[valid-type]
-        "run", description=f"one of {', '.join(ANALYSES)}"
+    analysis: choice("analysis", lambda: (*ANALYSES, RESPONSE)) = Field(  # type: ignore[valid-type]
+        "run", description=f"one of {', '.join((*ANALYSES, RESPONSE))}"
+    )
+    combine: choice("combination", lambda: COMBINATIONS) = Field(  # type: ignore[valid-type]
+        "sum", description=f"one of {', '.join(COMBINATIONS)}: what is made small of all objectives"
     )
     method: choice("method", lambda: METHODS) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(METHODS)}"
@@ -146,19 +200,25 @@ class DesignFile(Table):
         twice = sorted(set(self.objectives) & set(self.constraints))
         if twice:
             raise ValueError(f"constraints.{twice[0]}: an objective has this name; give it another")
-        paths = [path for section in self.parameters.values() for path in section.paths()]
+        paths = [place.path for section in self.parameters.values() for place in section.places()]
         repeated = sorted({path for path in paths if paths.count(path) > 1})
         if repeated:
             raise ValueError(f"parameters: the key path {repeated[0]} stands twice")
         if self.method == "least-squares":
+            if self.combine != "sum":
+                raise ValueError('combine: method = "least-squares" makes a sum of squares small; take slsqp')
             if self.constraints:
                 raise ValueError('constraints: method = "least-squares" takes none; take slsqp or trust-constr')
             plain = [name for name, o in self.objectives.items() if o.target is None and o.table is None]
             if plain:
                 raise ValueError(f'objectives.{plain[0]}: method = "least-squares" expects a target or a table')
-        tables = [name for name, o in self.objectives.items() if o.table is not None]
-        if tables and self.analysis in ("eig", "static"):
-            raise ValueError(f"objectives.{tables[0]}: table: analysis = {self.analysis!r} has no times; take a target")
+        for name, o in self.objectives.items():
+            analysis = o.analysis or self.analysis
+            if o.table is not None and analysis in ("eig", "static", RESPONSE):
+                raise ValueError(f"objectives.{name}: table: analysis = {analysis!r} has no times; take a target")
+        for kind, sections in (("objectives", self.objectives), ("constraints", self.constraints)):
+            for name, section in sections.items():
+                section.output(f"{kind}.{name}", self.analysis)
         return self
 
 
@@ -170,65 +230,6 @@ def existing(value: Any, info: ValidationInfo, what: str) -> Path:
     if not path.is_file():
         raise ValueError(f"no such file: {path}{near_file(path)}")
     return path
-
-
-@dataclass(frozen=True)
-class DesignParameter:
-    """Numbers of the system file that take one value between bounds."""
-
-    name: str
-    paths: tuple[str, ...]
-    lower: float
-    upper: float
-    start: float
-
-
-@dataclass(frozen=True, eq=False)
-class Quantity:
-    """What is taken from an evaluation, and what is wanted of it."""
-
-    output: Output
-    weight: float = 1.0
-    sign: float = 1.0  #: of an objective that is to be small (1) or great (-1)
-    target: float | None = None
-    times: Array | None = None  #: of a table, (n_t,) [s]
-    values: Array | None = None  #: of a table, (n_t,)
-    least: float | None = None  #: of a constraint
-    most: float | None = None  #: of a constraint
-
-    @property
-    def is_fit(self) -> bool:
-        """Its deviation counts, not its size."""
-        return self.target is not None or self.values is not None
-
-
-@dataclass(frozen=True, eq=False)
-class Design:
-    """A system, its free parameters, objectives and constraints, and how to find the best."""
-
-    source: str  #: path of the design file
-    study: Study  #: the system and the analysis; its only point is the start
-    method: str
-    processes: int | None
-    iterations: int
-    tolerance: float
-    differences: str
-    step: float  #: of differences, as a part of upper - lower
-    population: int
-    seed: int
-    parameters: tuple[DesignParameter, ...]
-    objectives: tuple[Quantity, ...]
-    constraints: tuple[Quantity, ...]
-    tables: tuple[Path, ...]  #: files of the objectives
-
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """Objectives and constraints."""
-        return (*self.objectives, *self.constraints)
-
-    def point(self, values: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the values for all key paths of the parameters."""
-        return tuple(v for p, v in zip(self.parameters, values, strict=True) for _ in p.paths)
 
 
 def read_design(path: str | os.PathLike[str]) -> Design:
@@ -248,21 +249,31 @@ def read_design(path: str | os.PathLike[str]) -> Design:
     for name, o in data.objectives.items():
         times, values = (None, None) if o.table is None else read_table(o.table)
         sign = -1.0 if o.goal == "greatest" else 1.0
-        objectives.append(Quantity(Output(name, o.of, o.take), o.weight, sign, o.target, times, values))
+        objectives.append(
+            Quantity(
+                o.output(name, data.analysis), o.analysis or data.analysis, o.band, o.at, o.weight, sign, o.target,
+                times, values,
+            )
+        )  # fmt: skip
     constraints = tuple(
-        Quantity(Output(name, c.of, c.take), least=c.least, most=c.most) for name, c in data.constraints.items()
+        Quantity(c.output(name, data.analysis), c.analysis or data.analysis, c.band, c.at, least=c.least, most=c.most)
+        for name, c in data.constraints.items()
     )
     study = Study(
         system=str(data.system),
         analysis=data.analysis,
         is_grid=False,
         processes=data.processes,
-        parameters=tuple(Parameter(p.name, key, (p.start,)) for p in parameters for key in p.paths),
+        parameters=tuple(
+            Parameter(p.name, key, (p.start * factor,))
+            for p in parameters
+            for key, factor in zip(p.paths, p.factors, strict=True)
+        ),
         outputs=tuple(q.output for q in (*objectives, *constraints)),
     )
     return Design(
-        str(path), study, data.method, data.processes, data.iterations, data.tolerance, data.differences, data.step,
-        data.population or 15 * len(parameters), data.seed, parameters, tuple(objectives), constraints,
+        str(path), study, data.method, data.processes, data.iterations, data.tolerance, data.combine, data.differences,
+        data.step, data.population or 15 * len(parameters), data.seed, parameters, tuple(objectives), constraints,
         tuple(o.table for o in data.objectives.values() if o.table is not None),
     )  # fmt: skip
 
@@ -271,18 +282,21 @@ def parameter_of(name: str, section: ParameterSection, content: dict[str, Any], 
     """Return a parameter; `SystemFileError` if a key path leads to no number, or the start is outside of its bounds."""
     where = f"{path}: parameters.{name}"
     found = []
-    for key in section.paths():
-        value = value_of(content, key, where, SystemFileError)
+    places = section.places()
+    for place in places:
+        value = value_of(content, place.path, where, SystemFileError)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise SystemFileError(f"{where}: path = {key!r}: expected the place of a number, got {value!r:.60}")
-        found.append(float(value))
+            raise SystemFileError(f"{where}: path = {place.path!r}: expected the place of a number, got {value!r:.60}")
+        found.append(float(value) / place.factor)
     start = found[0] if section.start is None else section.start
     if not section.lower <= start <= section.upper:
         raise SystemFileError(
-            f"{where}: the system file has {start:g} at {section.paths()[0]}, outside of the bounds {section.lower:g} "
+            f"{where}: the system file has {start:g} at {places[0].path}, outside of the bounds {section.lower:g} "
             f"to {section.upper:g}; give start, or other bounds"
         )
-    return DesignParameter(name, section.paths(), section.lower, section.upper, start)
+    return DesignParameter(
+        name, tuple(p.path for p in places), tuple(p.factor for p in places), section.lower, section.upper, start
+    )
 
 
 def read_table(path: Path) -> tuple[Array, Array]:

@@ -1,6 +1,7 @@
 """One evaluation of a design: the numbers that objectives and constraints are made of, or why there are none."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -11,12 +12,13 @@ from fe_models.foundation.processes import ProcessError
 from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.errors import ModelError
-from floatframe.optimization.design_file import Design, Quantity
+from floatframe.optimization.design import Design, Quantity
+from floatframe.optimization.responses import response_number
 from floatframe.results.trajectory import Trajectory
 from floatframe.studies.study import StudyPoint, column_of, taken, taken_of_modes
 from floatframe.system import System
 
-__all__ = ["Evaluation", "EvaluationFunction", "residuals", "scalar", "violations"]
+__all__ = ["Evaluation", "EvaluationFunction", "residuals", "scalar", "terms", "violations"]
 
 
 @dataclass(frozen=True)
@@ -39,18 +41,26 @@ class EvaluationFunction:
         """Return the numbers at these values of the parameters."""
         from floatframe.system_file.read_system import read_system
 
-        study, quantities = self.design.study, self.design.quantities
-        system, given = read_system(study.system, study.changes(self.design.point(values)))
-        if study.analysis == "eig":
-            modes = system_modes(linearize(system))
-            per_second = 1 / system.units.time
-            numbers: list[tuple[float, ...]] = [(taken_of_modes(q.output, modes, per_second)[0],) for q in quantities]
-        else:
-            motion = StudyPoint(study).motion(system, given)
-            numbers = [numbers_of(q, system, motion) for q in quantities]
-        for q, found in zip(quantities, numbers, strict=True):
-            if not np.isfinite(found).all():
-                raise ModelError(f"{q.output.name}: {q.output.of} is {found[int(np.argmin(np.isfinite(found)))]}")
+        design = self.design
+        system, given = read_system(design.study.system, design.study.changes(design.point(values)))
+        found: dict[str, Any] = {}
+        if {"eig", "response"} & set(design.analyses):
+            found["response"] = linear = linearize(system)
+            found["eig"] = system_modes(linear) if "eig" in design.analyses else None
+        for analysis in set(design.analyses) - set(found):
+            found[analysis] = StudyPoint(design.study_of(analysis)).motion(system, given)
+        per_second = 1 / system.units.time
+        numbers: list[tuple[float, ...]] = []
+        for q in design.quantities:
+            if q.analysis == "eig":
+                numbers.append((taken_of_modes(q.output, found["eig"], per_second)[0],))
+            elif q.analysis == "response":
+                numbers.append((response_number(q, found["response"], per_second),))
+            else:
+                numbers.append(numbers_of(q, system, found[q.analysis]))
+        for q, each in zip(design.quantities, numbers, strict=True):
+            if not np.isfinite(each).all():
+                raise ModelError(f"{q.output.name}: {q.output.of} is {each[int(np.argmin(np.isfinite(each)))]}")
         return Evaluation(values, tuple(numbers))
 
     def failed(self, values: tuple[float, ...], error: Exception) -> Evaluation:
@@ -86,8 +96,22 @@ def residuals(design: Design, evaluation: Evaluation) -> Array:
     return np.concatenate(parts)
 
 
+def terms(design: Design, evaluation: Evaluation) -> Array:
+    """Return what the largest is made small of, (n,): +-weight times number, and weight times deviation either way."""
+    found: list[Array] = []
+    for q, numbers in zip(design.objectives, evaluation.numbers, strict=False):
+        if not q.is_fit:
+            found.append(np.array([q.sign * q.weight * numbers[0]]))
+            continue
+        deviation = q.weight * (np.array(numbers) - (q.values if q.values is not None else np.array([q.target])))
+        found += [deviation, -deviation]
+    return np.concatenate(found)
+
+
 def scalar(design: Design, evaluation: Evaluation) -> float:
-    """Return F = sum of +-weight times number, and of the squares of `residuals`."""
+    """Return F = sum of +-weight times number, and of the squares of `residuals`; or the largest of `terms`."""
+    if design.combine == "largest":
+        return float(terms(design, evaluation).max())
     plain = sum(
         q.sign * q.weight * numbers[0]
         for q, numbers in zip(design.objectives, evaluation.numbers, strict=False)

@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 
 from floatframe.errors import ResultsError
-from floatframe.optimization.design_file import Design
+from floatframe.optimization.design import Design
 from floatframe.optimization.evaluation import Evaluation
 
 __all__ = ["Journal", "design_digest", "open_journal"]
@@ -84,9 +84,12 @@ def open_journal(path: Path, design: Design, files: tuple[str, ...]) -> Journal:
 
 
 def design_digest(design: Design, files: tuple[str, ...]) -> str:
-    """Return the SHA-256 of what the numbers depend on: files of the system, key paths, analysis, quantities."""
-    asked = [(q.output.of, q.output.take, None if q.times is None else q.times.tolist()) for q in design.quantities]
-    text = repr((design.study.analysis, [p.paths for p in design.parameters], asked))
+    """Return the SHA-256 of what the numbers depend on: files of the system, key paths, quantities."""
+    asked = [
+        (q.analysis, q.output.of, q.output.take, q.band, q.at, None if q.times is None else q.times.tolist())
+        for q in design.quantities
+    ]
+    text = repr(([(p.paths, p.factors) for p in design.parameters], asked))
     digest = hashlib.sha256(text.encode())
     for name in files:
         data = Path(name).read_bytes()

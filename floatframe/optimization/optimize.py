@@ -6,7 +6,7 @@ best = optimize(design)                # best.values, best.numbers, best.history
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,8 +15,9 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.processes import WorkerPool
 from floatframe.errors import ModelError
-from floatframe.optimization.design_file import SMALLEST_TOLERANCE, Design
-from floatframe.optimization.evaluation import Evaluation, EvaluationFunction, residuals, scalar, violations
+from floatframe.optimization.design import Design
+from floatframe.optimization.design_file import SMALLEST_TOLERANCE
+from floatframe.optimization.evaluation import Evaluation, EvaluationFunction, residuals, scalar, terms, violations
 from floatframe.optimization.journal import Journal, open_journal
 from floatframe.studies.study import check
 
@@ -106,7 +107,10 @@ def optimize(
     """
     from floatframe.system_file.read_system import read_system
 
-    check(design.study, design.point(tuple(p.start for p in design.parameters)))
+    start_point = design.point(tuple(p.start for p in design.parameters))
+    for analysis in design.analyses:
+        study = design.study_of(analysis)
+        check(replace(study, analysis="eig", outputs=()) if analysis == "response" else study, start_point)
     files = read_system(design.study.system)[0].files
     kept = None if journal is None else open_journal(Path(journal), design, files)
     n = processes or design.processes or os.cpu_count() or 1
@@ -266,10 +270,18 @@ def inside(z: Array) -> Array:
 
 
 def minimum_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
-    """Make F small within limits by gradients; a failed trial is worse than all seen so far and breaks every limit."""
+    """Make F small within limits by gradients; a failed trial is worse than all seen so far and breaks every limit.
+
+    The largest of several terms has kinks: there s is made small with all terms of the objectives at or below it, s a
+    further unknown behind z, both in units of F at the start.
+    """
     from scipy.optimize import NonlinearConstraint, minimize
 
     design = evaluator.design
+    n = len(start)
+    is_largest = design.combine == "largest"
+    first = evaluator.at([start])[0]
+    size = abs(first.objective) or 1.0
 
     def objective(z: Array) -> float:
         row = evaluator.at([z])[0]
@@ -281,29 +293,43 @@ def minimum_of(evaluator: Evaluator, start: Array) -> tuple[bool, str]:
     def gradient(z: Array) -> Array:
         return evaluator.derivatives(z, lambda e: np.array([scalar(design, e)]))[0]
 
-    def excess(z: Array) -> Array:
-        found = evaluator.at([z])[0].evaluation
-        return np.full(n_limits, 10.0) if found.error else violations(design, found)
+    def limited(e: Evaluation) -> Array:
+        limits = violations(design, e)
+        return np.concatenate([terms(design, e) / size, limits]) if is_largest else limits
 
-    def excess_rates(z: Array) -> Array:
-        return evaluator.derivatives(z, lambda e: violations(design, e))
+    n_limits = len(limited(first.evaluation))
+    n_terms = n_limits - len(violations(design, first.evaluation))
+    by_s = np.where(np.arange(n_limits) < n_terms, -1.0, 0.0)
 
-    n_limits = len(violations(design, evaluator.at([start])[0].evaluation))
+    def excess(x: Array) -> Array:
+        found = evaluator.at([x[:n]])[0].evaluation
+        if found.error:
+            return np.full(n_limits, 10.0)
+        return limited(found) + (by_s * x[n] if is_largest else 0.0)
+
+    def excess_rates(x: Array) -> Array:
+        rates = evaluator.derivatives(x[:n], limited)
+        return np.column_stack([rates, by_s]) if is_largest else rates
+
+    bounds: list[tuple[float | None, float | None]] = [(0.0, 1.0)] * n
+    x = start
+    goal: Callable[[Array], float] = objective
+    goal_rates: Callable[[Array], Array] = gradient
+    if is_largest:
+        bounds, x = [*bounds, (None, None)], np.append(start, first.objective / size)
+        goal, goal_rates = (lambda x: float(x[n])), (lambda x: np.append(np.zeros(n), 1.0))
     limits: list[Any] = []
     options: dict[str, Any] = {"maxiter": design.iterations}
     if design.method == "slsqp":
         options["ftol"] = design.tolerance
         if n_limits:
-            limits = [{"type": "ineq", "fun": lambda z: -excess(z), "jac": lambda z: -excess_rates(z)}]
+            limits = [{"type": "ineq", "fun": lambda x: -excess(x), "jac": lambda x: -excess_rates(x)}]
     else:
         options |= {"gtol": design.tolerance, "xtol": design.tolerance}
         if n_limits:
             limits = [NonlinearConstraint(excess, -np.inf, 0.0, jac=excess_rates)]
             options |= {"gtol": 0.0, "barrier_tol": design.tolerance}  # gtol looks at no complementarity: too early
-    found = minimize(
-        objective, start, jac=gradient, method=design.method, bounds=[(0.0, 1.0)] * len(start), constraints=limits,
-        options=options,
-    )  # fmt: skip
+    found = minimize(goal, x, jac=goal_rates, method=design.method, bounds=bounds, constraints=limits, options=options)
     return bool(found.success), str(found.message)
 
 

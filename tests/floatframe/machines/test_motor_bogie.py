@@ -208,7 +208,7 @@ def folder(tmp_path_factory):
 
 def test_the_mounts_carry_the_ripple_that_closed_form_and_frequency_response_say(folder):
     """At 2 m/s 6 f is 41.5 Hz, among modes of motors and frame; the motor answers the swing of its rotor."""
-    data = MotorBogie(speed=2.0, h=5e-4, t_end=0.4)
+    data = MotorBogie(speed=2.0, h=5e-4, t_end=0.35)
     (folder / "even.toml").write_text(motor_bogie_file(data, "runs evenly"))
     system, _ = read_system(folder / "even.toml")
     f = data.running_frequency

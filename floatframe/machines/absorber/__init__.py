@@ -1,0 +1,1 @@
+"""An absorber on an oscillator and its designs, as files."""

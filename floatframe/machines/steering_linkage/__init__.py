@@ -1,0 +1,1 @@
+"""A six-bar steering linkage and its designs, as files."""

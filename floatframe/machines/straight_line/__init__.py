@@ -1,0 +1,1 @@
+"""A four-bar linkage with a straight path and its design, as files."""
