@@ -58,6 +58,7 @@ from .errors import ModelError as ModelError
 from .errors import ResultsError as ResultsError
 from .errors import SignalError as SignalError
 from .errors import SystemFileError as SystemFileError
+from .errors import UrdfError as UrdfError
 from .fatigue.assessment import Assessment as Assessment
 from .fatigue.assessment import assess as assess
 from .fatigue.assessment import equivalent_repeats as equivalent_repeats

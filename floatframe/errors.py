@@ -13,6 +13,7 @@ __all__ = [
     "ResultsError",
     "SignalError",
     "SystemFileError",
+    "UrdfError",
 ]
 
 
@@ -38,6 +39,10 @@ class SignalError(FloatframeError, ValueError):
 
 class FatigueError(FloatframeError, ValueError):
     """An S-N curve, a load block or a fatigue file is not valid, or stresses lie beyond what they are known for."""
+
+
+class UrdfError(FloatframeError, ValueError):
+    """A description of a robot is not valid, or cannot be written; the text names file, line, link or joint."""
 
 
 class ConvergenceError(FloatframeError, RuntimeError):
