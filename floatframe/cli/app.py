@@ -16,6 +16,7 @@ from floatframe.cli import (
     linear,
     machine,
     optimize,
+    robot,
     shake,
     spectra,
     study,
@@ -264,10 +265,12 @@ def integrator_words(run: dict[str, Any]) -> str:
 @app.command("info")
 @guarded
 def info_command(
-    file: Annotated[Path, typer.Argument(help="A results file (.h5), or a system file (.toml).")],
+    file: Annotated[Path, typer.Argument(help="A results file (.h5), a system file (.toml) or a robot (.urdf).")],
     json: Annotated[bool, typer.Option("--json", help="Write the same record as JSON, for other programs.")] = False,
 ) -> None:
-    """Show what is in a results file: system, run, energy balance, drift of the joints; mobility of a system file.
+    """Show what is in a results file: system, run, energy balance, drift of the joints.
+
+    Of a system file it tells the mobility, of a robot its links and joints.
 
     Example: floatframe info swing.h5 --json
     """
@@ -275,6 +278,9 @@ def info_command(
 
     if file.suffix == ".toml":
         print_mobility(file, as_json=json)
+        return
+    if file.suffix == ".urdf":
+        robot.print_robot(file, as_json=json)
         return
     trajectory = read_results(file)
     if json:
@@ -510,4 +516,5 @@ gradient.register(app)
 fatigue.register(app)
 cosimulation.register(app)
 machine.register(app)
+robot.register(app)
 view.register(app)

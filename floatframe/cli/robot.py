@@ -1,0 +1,206 @@
+"""The commands import and urdf: robots in and out, and what info says of one."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import guarded, print_table, say
+
+if TYPE_CHECKING:
+    from floatframe.importers.robot import Robot
+
+__all__ = ["print_robot", "register"]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an application."""
+    app.command("import")(import_command)
+    app.command("urdf")(urdf_command)
+
+
+@guarded
+def import_command(
+    robot: Annotated[Path, typer.Argument(help="A description of a robot (.urdf).")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; default: its name.")] = None,
+    at: Annotated[list[str], typer.Option(help="JOINT=VALUE where it begins, rad or m; may be repeated.")] = [],  # noqa: B006
+    free: Annotated[bool, typer.Option("--free", help="The root link moves freely; else it is the ground.")] = False,
+    keep_fixed: Annotated[
+        bool, typer.Option("--keep-fixed", help="Links fixed to each other stay bodies of their own.")
+    ] = False,
+    no_stops: Annotated[bool, typer.Option("--no-stops", help="Limits of joints do not act.")] = False,
+    gravity: Annotated[float, typer.Option(help="Acceleration of free fall along -z, m/s².")] = 9.81,
+    pictures: Annotated[str, typer.Option(help="What bodies look like: visual, collision or none.")] = "visual",
+    package: Annotated[list[str], typer.Option(help="NAME=FOLDER of a package of meshes; may be repeated.")] = [],  # noqa: B006
+    flexible: Annotated[
+        list[str], typer.Option(help="LINK=FILE, a modal file in the place of a link; may be repeated.")
+    ] = [],  # noqa: B006
+    interface: Annotated[
+        list[str], typer.Option(help="LINK.JOINT=NAME, the interface of a flexible link at a joint; may be repeated.")
+    ] = [],  # noqa: B006
+) -> None:
+    """Write the system file of a robot, with its surfaces and modal files beside it.
+
+    Example: floatframe import arm.urdf -o arm --at elbow=0.5
+    """
+    from floatframe.errors import UrdfError
+    from floatframe.importers.read_urdf import read_urdf
+    from floatframe.importers.robot_system import FlexibleLink, robot_system
+    from floatframe.importers.system_tables import write_system
+
+    found = read_urdf(robot)
+    placed = {}
+    for name, text in pairs("--at", at).items():
+        try:
+            placed[name] = float(text)
+        except ValueError:
+            raise UrdfError(f"--at {name}={text}: expected a number") from None
+    interfaces: dict[str, dict[str, str]] = {}
+    for words, name in pairs("--interface", interface).items():
+        link, _, joint = words.partition(".")
+        interfaces.setdefault(link, {})[joint] = name
+    links = {
+        link: FlexibleLink(Path(file), interfaces.pop(link, {})) for link, file in pairs("--flexible", flexible).items()
+    }
+    if interfaces:
+        raise UrdfError(f"--interface: {', '.join(interfaces)}: not flexible; name its modal file by --flexible")
+    made = robot_system(
+        found, configuration=placed, is_free=free, gravity=(0.0, 0.0, -gravity), flexible=links,
+        merge_fixed=not keep_fixed, stops=not no_stops, pictures=pictures,
+        packages={name: Path(path) for name, path in pairs("--package", package).items()},
+    )  # fmt: skip
+    for note in found.notes:
+        typer.echo(f"note: {note}", err=True)
+    folder = output or Path(found.name)
+    for path in write_system(made, folder):
+        say(f"wrote {path}")
+
+
+def pairs(option: str, given: list[str]) -> dict[str, str]:
+    """Return NAME=VALUE options by name."""
+    from floatframe.errors import UrdfError
+
+    found = {}
+    for words in given:
+        name, sign, value = words.partition("=")
+        if not (name and sign and value):
+            raise UrdfError(f"{option} {words}: expected NAME=VALUE")
+        found[name] = value
+    return found
+
+
+@guarded
+def urdf_command(
+    system: Annotated[Path, typer.Argument(help="System file (TOML) of rigid bodies in a tree.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="URDF file to write.")] = None,
+    effort: Annotated[float | None, typer.Option(help="Largest force or torque of joints with limits.")] = None,
+    velocity: Annotated[float | None, typer.Option(help="Largest speed of joints with limits.")] = None,
+) -> None:
+    """Write a system as a robot, its surfaces beside it; what URDF cannot say is listed.
+
+    Stops become limits, of which URDF asks for effort and velocity too.
+
+    Example: floatframe urdf arm.toml -o arm.urdf --effort 100 --velocity 2
+    """
+    from fe_models.foundation.paths import replace_files
+    from floatframe.errors import UrdfError
+    from floatframe.importers.robot import JointLimits
+    from floatframe.importers.system_robot import robot_of_system
+    from floatframe.importers.write_urdf import urdf_text
+    from floatframe.system_file.read_system import read_system
+
+    model, _ = read_system(system)
+    path = output or system.with_suffix(".urdf")
+    limits = {joint.name: JointLimits(effort=effort, velocity=velocity) for joint in model.joints}
+    made = robot_of_system(model, limits=limits)
+    files = {path: urdf_text(made.robot).encode(), **{path.parent / name: data for name, data in made.meshes.items()}}
+    try:
+        for each in files:
+            each.parent.mkdir(parents=True, exist_ok=True)
+        replace_files(files)
+    except OSError as error:
+        raise UrdfError(f"{path}: cannot be written: {error.strerror}") from error
+    for note in made.notes:
+        typer.echo(f"note: left out: {note}", err=True)
+    for each in files:
+        say(f"wrote {each}")
+
+
+def print_robot(path: Path, *, as_json: bool) -> None:
+    """Print links and joints of a robot."""
+    from floatframe.importers.read_urdf import read_urdf
+
+    robot = read_urdf(path)
+    record = robot_record(robot)
+    if as_json:
+        import json as json_module
+
+        typer.echo(json_module.dumps(record, indent=2, ensure_ascii=True))
+        return
+    print_table(
+        "Robot",
+        ("", ""),
+        [
+            ("name", robot.name),
+            ("links", f"{len(robot.links)}, root {robot.root}"),
+            ("joints", f"{len(robot.joints)}, {record['freedoms']} ways to move"),
+            ("mass", f"{record['mass']:.6g} kg"),
+            *(("note", note) for note in robot.notes),
+        ],
+    )
+    print_table(
+        "Links",
+        ("link", "mass [kg]>", "principal moments [kg m²]", "pictures"),
+        [
+            (each["name"], f"{each['mass']:.6g}", ", ".join(f"{x:.4g}" for x in each["moments"]) or "none",
+             ", ".join(each["pictures"]) or "none")
+            for each in record["links"]
+        ],
+    )  # fmt: skip
+    print_table(
+        "Joints",
+        ("joint", "type", "from", "to", "limits", "effort>", "velocity>", "follows"),
+        [
+            (
+                each["name"], each["type"], each["parent"], each["child"],
+                "" if each["lower"] is None else f"{each['lower']:.4g} to {each['upper']:.4g}",
+                "" if each["effort"] is None else f"{each['effort']:.4g}",
+                "" if each["velocity"] is None else f"{each['velocity']:.4g}", each["follows"] or "",
+            )
+            for each in record["joints"]
+        ],
+    )  # fmt: skip
+
+
+def robot_record(robot: "Robot") -> dict[str, Any]:
+    """Return what `info` says of a robot; moments that no body can have are marked by a note."""
+    import numpy as np
+
+    from floatframe.importers.robot import MeshFile
+
+    freedoms = {"fixed": 0, "planar": 3, "floating": 6}
+    links = []
+    for link in robot.links:
+        tensor = None if link.inertial is None else link.inertial.tensor
+        moments = [] if tensor is None else np.linalg.eigvalsh(tensor).tolist()
+        pictures = [
+            each.geometry.file if isinstance(each.geometry, MeshFile) else type(each.geometry).__name__.lower()
+            for each in link.visuals
+        ]
+        links.append({"name": link.name, "mass": link.mass, "moments": moments, "pictures": pictures})
+    return {
+        "name": robot.name,
+        "root": robot.root,
+        "mass": sum(link.mass for link in robot.links),
+        "freedoms": sum(freedoms.get(joint.type, 1) for joint in robot.joints if joint.mimic is None),
+        "links": links,
+        "joints": [
+            {
+                "name": joint.name, "type": joint.type, "parent": joint.parent, "child": joint.child,
+                "lower": joint.limits.lower, "upper": joint.limits.upper, "effort": joint.limits.effort,
+                "velocity": joint.limits.velocity, "follows": joint.mimic.joint if joint.mimic else None,
+            }
+            for joint in robot.joints
+        ],
+        "notes": list(robot.notes),
+    }  # fmt: skip
