@@ -101,6 +101,13 @@ from .identification.excitation import MotionLimits as MotionLimits
 from .identification.excitation import exciting_motion as exciting_motion
 from .identification.physical import real_parameters as real_parameters
 from .identification.regressors import linear_form as linear_form
+from .importers.read_urdf import read_urdf as read_urdf
+from .importers.robot import Robot as Robot
+from .importers.robot_system import FlexibleLink as FlexibleLink
+from .importers.robot_system import RobotSystem as RobotSystem
+from .importers.robot_system import robot_system as robot_system
+from .importers.system_robot import robot_of_system as robot_of_system
+from .importers.write_urdf import write_urdf as write_urdf
 from .integrators import EnergyDecaying as EnergyDecaying
 from .integrators import EnergyMomentum as EnergyMomentum
 from .integrators import GeneralizedAlpha as GeneralizedAlpha

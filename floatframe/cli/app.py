@@ -16,13 +16,13 @@ from floatframe.cli import (
     linear,
     machine,
     optimize,
-    robot,
     shake,
     spectra,
     study,
     sweep,
     view,
 )
+from floatframe.cli.exchange import robot
 
 if TYPE_CHECKING:
     from collections.abc import Callable

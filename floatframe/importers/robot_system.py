@@ -34,6 +34,7 @@ from floatframe.bodies.rigid_body import RigidBody
 from floatframe.checked_values import array_of_shape, number
 from floatframe.errors import ModelError, UrdfError
 from floatframe.forces import Force, Gravity, JointForce
+from floatframe.functions.time_functions import TimeFunction
 from floatframe.importers.frames import Frame
 from floatframe.importers.mesh_files import mesh_of, mesh_path
 from floatframe.importers.robot import MeshFile, Picture, Robot, RobotJoint
@@ -117,6 +118,7 @@ def robot_system(
     *,
     configuration: Mapping[str, float] | None = None,
     rates: Mapping[str, float] | None = None,
+    motions: Mapping[str, TimeFunction] | None = None,
     is_free: bool = False,
     position: Array | Sequence[float] = (0.0, 0.0, 0.0),
     rotation_vector: Array | Sequence[float] = (0.0, 0.0, 0.0),
@@ -137,6 +139,9 @@ def robot_system(
         Values of joints as placed, by name [rad or m]; default: zero, and what joints that follow others have then.
     rates
         Speeds of joints at the start, by name [rad/s or m/s]; default: zero, and what joints that follow others have.
+    motions
+        Drives of joints, by name, in values of the robot; joints that follow others cannot be driven. Where neither
+        value nor rate at the start is given, those of the motion at t = 0 hold. A driven joint has no stop and no drag.
     is_free
         Whether the root link moves freely; else it stands on the ground, and its mass does not count.
     position, rotation_vector
@@ -162,10 +167,12 @@ def robot_system(
     """
     if pictures not in ("visual", "collision", "none"):
         raise UrdfError(f"pictures: expected visual, collision or none, got {quoted(pictures)}")
+    drives = dict(motions or {})
     return Builder(
         robot,
-        values_of(robot, configuration or {}),
-        values_of(robot, rates or {}, what="rates"),
+        values_of(robot, {name: drive(0.0) for name, drive in drives.items()} | dict(configuration or {})),
+        values_of(robot, {name: drive(0.0, 1) for name, drive in drives.items()} | dict(rates or {}), what="rates"),
+        drives,
         dict(flexible or {}),
         is_free=is_free,
         base=Frame(
@@ -177,6 +184,13 @@ def robot_system(
         pictures=pictures,
         packages=dict(packages or {}),
     ).robot_system(array_of_shape("gravity", gravity, (3,)))
+
+
+def shifted(function: TimeFunction, by: float) -> TimeFunction:
+    """Return a function with a number added."""
+    pieces = function.pieces.copy()
+    pieces[:, 0] += by
+    return TimeFunction(function.begins, pieces)
 
 
 def values_of(robot: Robot, given: Mapping[str, float], what: str = "configuration") -> dict[str, float]:
@@ -224,6 +238,7 @@ class Builder:
         robot: Robot,
         values: dict[str, float],
         rates: dict[str, float],
+        drives: dict[str, TimeFunction],
         flexible: dict[str, FlexibleLink],
         *,
         is_free: bool,
@@ -233,7 +248,7 @@ class Builder:
         pictures: str,
         packages: dict[str, str | os.PathLike[str]],
     ) -> None:
-        self.robot, self.values, self.rates, self.flexible = robot, values, rates, flexible
+        self.robot, self.values, self.rates, self.drives, self.flexible = robot, values, rates, drives, flexible
         self.is_free, self.base, self.merges, self.stops = is_free, base, merges, stops
         self.pictures, self.packages = pictures, packages
         for name in flexible:
@@ -438,15 +453,20 @@ class Builder:
         b = self.marker(joint.child, joint, Frame())
         if joint.type == "fixed":
             return FixedJoint(joint.name, a, b, rotation=np.eye(3))
-        if joint.type == "prismatic":
-            return PrismaticJoint(joint.name, a, b, axis=joint.axis)
         if joint.type == "planar":
             return PlanarJoint(joint.name, a, b, axis=joint.axis, axis_b=joint.axis)
-        return RevoluteJoint(joint.name, a, b, axis=joint.axis, axis_b=joint.axis)
+        drive = {}
+        if joint.name in self.drives:
+            given = self.drives[joint.name]
+            offset = offset_of(self.robot, self.values, joint.name)
+            drive = {coordinate_of(self.robot, joint.name): shifted(given, -offset)}
+        if joint.type == "prismatic":
+            return PrismaticJoint(joint.name, a, b, axis=joint.axis, motions=drive)
+        return RevoluteJoint(joint.name, a, b, axis=joint.axis, axis_b=joint.axis, motions=drive)
 
     def force(self, joint: RobotJoint) -> Force | None:
         """(5): return damping and friction of a joint, None if it has none."""
-        if not joint.has_value or not (joint.damping or joint.friction):
+        if not joint.has_value or joint.name in self.drives or not (joint.damping or joint.friction):
             return None
         coordinate = coordinate_of(self.robot, joint.name)
         return JointForce(
@@ -455,7 +475,7 @@ class Builder:
 
     def couplers(self, joint: RobotJoint) -> list[CoordinateCoupler]:
         """(5): return what couples a joint to the one that it follows, or stops it at its limits."""
-        if not joint.has_value:
+        if not joint.has_value or joint.name in self.drives:
             return []
         own = JointCoordinate(joint.name, coordinate_of(self.robot, joint.name))
         if joint.mimic is not None:

@@ -10,6 +10,8 @@ from pydantic import Field, model_validator
 from fe_models.foundation.toml_file import Table, choice
 from fe_models.foundation.words import nearest
 from floatframe.errors import ModelError, SignalError
+from floatframe.functions.path_motions import rest_to_rest_spline
+from floatframe.functions.point_to_point import quintic, trapezoid
 from floatframe.functions.tables import INTERPOLATIONS, acceleration_table, interpolated
 from floatframe.functions.time_functions import (
     TimeFunction,
@@ -38,6 +40,9 @@ TIME_FUNCTIONS: dict[str, Callable[..., TimeFunction]] = {
     "polynomial": polynomial_of_time,
     "harmonic": harmonic,
     "smooth-step": smooth_step,
+    "quintic": quintic,
+    "trapezoid": trapezoid,
+    "spline": rest_to_rest_spline,
     "cycloidal-spin-up": cycloidal_spin_up,
     "table": interpolated,
     "acceleration-table": acceleration_table,
@@ -62,7 +67,15 @@ class MotionSection(Table):
     t_end: Number | None = Field(None, description="a number, the time where the step ends")
     first: Number | None = Field(None, description="a number, the value before the step")
     last: Number | None = Field(None, description="a number, the value after the step")
-    duration: Number | None = Field(None, description="a number above 0, the duration of the spin-up")
+    first_velocity: Number | None = Field(None, description="a number, the velocity at the beginning; default 0")
+    last_velocity: Number | None = Field(None, description="a number, the velocity at the end; default 0")
+    first_acceleration: Number | None = Field(None, description="a number, the acceleration at the start; default 0")
+    last_acceleration: Number | None = Field(None, description="a number, the acceleration at the end; default 0")
+    speed: Number | None = Field(None, description="a number above 0, the largest speed")
+    acceleration: Number | None = Field(None, description="a number above 0, the largest acceleration")
+    deceleration: Number | None = Field(None, description="a number above 0; default: as the acceleration")
+    degree: int | None = Field(None, description="3 or 5, of the spline; default 3")
+    duration: Number | None = Field(None, description="a number above 0, the duration of the motion")
     t: Numbers | None = Field(None, description="a list of rising times; piecewise: where each piece begins")
     values: Numbers | None = Field(None, description="a list of values, one for each time")
     interpolation: choice("interpolation", lambda: tuple(INTERPOLATIONS)) | None = Field(  # type: ignore[valid-type]

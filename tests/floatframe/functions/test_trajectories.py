@@ -128,3 +128,16 @@ def test_the_largest_rates_are_found_between_samples():
 def test_impossible_motions_are_refused(make, words):
     with pytest.raises(ModelError, match=words):
         make()
+
+
+def test_system_files_know_them():
+    from floatframe.system_file.motion_section import MotionSection
+
+    table = MotionSection(type="trapezoid", first=0.0, last=1.5, speed=SPEED, acceleration=ACCELERATION, t_start=0.5)
+    assert table.function()(0.5 + 1.5 / SPEED + SPEED / ACCELERATION) == pytest.approx(1.5, abs=1e-12)
+    table = MotionSection(type="quintic", t_start=0.0, t_end=1.0, first=0.0, last=1.0, last_velocity=2.0)
+    assert table.function()(1.0, 1) == pytest.approx(2.0, abs=1e-12)
+    table = MotionSection(type="spline", t=[0.0, 1.0, 3.0], values=[0.0, 1.0, 0.5], degree=5)
+    assert table.function()(1.0) == pytest.approx(1.0, abs=1e-12)
+    with pytest.raises(ValueError, match="takes 2 at least"):
+        MotionSection(type="trapezoid", first=0.0, last=1.0, speed=1.0, acceleration=1.0, duration=0.5)

@@ -1,4 +1,4 @@
-"""An arm of two links along z, the first a beam of known mass properties: rigid in the description, or a reduced body."""
+"""An arm of two links along z, the first a beam: rigid in the description, or a reduced body."""
 
 import cms
 from cms.reduced_basis.frames import NodalFrame

@@ -18,7 +18,7 @@ from floatframe.importers.system_robot import robot_of_system
 from floatframe.importers.system_tables import write_system
 from floatframe.rotations import rotation_exp, rotation_matrix
 from tests.floatframe.importers.flexible_arm import ARM, EI, GRAVITY, LENGTH, RHO_A, TIP_MASS, beam_body
-from tests.floatframe.importers.test_urdf_files import GRIPPER, UrdfError, gripper
+from tests.floatframe.importers.test_urdf_files import UrdfError, gripper
 
 assert gripper  # a fixture
 
@@ -141,7 +141,7 @@ def test_a_folder_with_a_flexible_link_is_the_same_system(beam, tmp_path):
     assert_allclose(consistent_state(system).u_dot, consistent_state(found.system).u_dot, rtol=0, atol=1e-9)
     with pytest.raises(UrdfError, match="a system file needs its modal file"):
         write_system(robot_system(robot, flexible=arm(beam, tmp_path)[1]), tmp_path / "no")
-    with pytest.raises(UrdfError, match="link 'upper' is flexible, so that its frame is no place.*: root, tip"):
+    with pytest.raises(UrdfError, match=r"link 'upper' is flexible, so that its frame is no place.*: root, tip"):
         found.place("upper")
     with pytest.raises(UrdfError, match="URDF has no flexible bodies; put rigid ones in the place of upper"):
         robot_of_system(found.system)
@@ -150,7 +150,7 @@ def test_a_folder_with_a_flexible_link_is_the_same_system(beam, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"rotation_vector": (0, 0, 0)}, r"interface 'tip' is 1\.131 m from joint 'elbow', at \[0\.8, .*check position"),
+        ({"rotation_vector": (0, 0, 0)}, r"'tip' is 1\.131 m from joint 'elbow', at \[0\.8, .*check position"),
         ({"interfaces": {"shoulder": "root"}}, "at which interface is joint 'elbow'"),
         ({"interfaces": {"shoulder": "root", "elbow": "top"}}, "no interface 'top'; did you mean 'tip'"),
     ],

@@ -1,4 +1,4 @@
-"""URDF files: what is read is what is there, what is written reads the same, and what is wrong is told with its line."""
+"""URDF files: what is there is read, what is written reads the same, and what is wrong is told with its line."""
 
 import numpy as np
 import pytest
@@ -298,7 +298,7 @@ BAD = {
     "no parent": (GRIPPER.replace('<parent link="world"/>', ""), "line 21: <joint>: expected <parent> in it"),
     "unknown link": (GRIPPER.replace('child link="thumb"', 'child link="thump"'), "did you mean 'thumb'"),
     "two of a name": (GRIPPER.replace('link name="tip"', 'link name="thumb"'), "two links 'thumb'"),
-    "two parents": (GRIPPER.replace('child link="tip"', 'child link="thumb"'), "child of two joints, 'other' and 'end'"),
+    "two parents": (GRIPPER.replace('child link="tip"', 'child link="thumb"'), "of two joints, 'other' and 'end'"),
     "two roots": (GRIPPER.replace('<link name="tip"/>', '<link name="tip"/><link name="x"/>'), "got 'world', 'x'"),
     "ring": (GRIPPER.replace('parent link="world"', 'parent link="tip"').replace('<link name="world"/>', ""), "ring"),
     "numbers": (GRIPPER.replace('xyz="0 0 1"', 'xyz="0 0"'), "line 22: <origin>: xyz: expected 3 finite numbers"),
@@ -390,3 +390,22 @@ def test_what_urdf_does_not_have_is_refused_or_listed(gripper):
     wheel = RigidBody("w", 1.0, np.eye(3), shapes=[Mesh(np.eye(3), [[0, 1, 2]])])
     assert list(robot_of_system(System([wheel])).meshes) == ["meshes/w_0.stl"]
     assert Frame().inverse.R.tolist() == np.eye(3).tolist()
+
+
+def test_drives_count_in_values_of_the_robot(gripper):
+    """The joint of which the system has an angle, and the one of which it has the value itself."""
+    from floatframe.analyses.driven.kinematics import kinematics
+    from floatframe.functions.path_motions import path_motion
+
+    robot = read_urdf(gripper)
+    path = path_motion({"slide": [0.1, 0.4, 0.2], "knuckle": [0.3, -0.1, 0.1]}, speed=1.0, acceleration=5.0)
+    found = robot_system(robot, motions=path.motions)
+    assert found.values == pytest.approx({"slide": 0.1, "knuckle": 0.3, "other": -0.3}, abs=1e-12)
+    assert [coupler.name for coupler in found.system.couplers] == ["other mimic"]
+    motion = kinematics(found.system, path.t)
+    for k, (slide, knuckle) in enumerate(((0.1, 0.3), (0.4, -0.1), (0.2, 0.1))):
+        at = robot_system(robot, configuration={"slide": slide, "knuckle": knuckle}).system
+        for name in ("rail", "finger", "thumb"):
+            assert_allclose(motion.body(name).r[k], at.body(name).position, rtol=0, atol=1e-11)
+    with pytest.raises(UrdfError, match="joint 'other' follows 'knuckle'; give that one"):
+        robot_system(robot, motions={"other": path.motions["slide"]})

@@ -1,0 +1,1 @@
+"""Commands that exchange systems with other programs."""
