@@ -55,6 +55,9 @@ MACHINES: dict[str, Machine] = {
     "absorber": Machine(
         "an absorber on an oscillator", "absorber", "optimised by its frequency response and by eigenvalues"
     ),
+    "road-car": Machine(
+        "a road car", "road_car", "hydraulic roll control, roll and warp, sine steer, lane change, suspension optimised"
+    ),
 }
 
 

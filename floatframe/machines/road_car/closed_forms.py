@@ -1,0 +1,125 @@
+"""Forces at the wheels of the car from volumes, gas and the lengths of the linkage: an independent second road.
+
+The oil of a line keeps its content (1) (V_chambers + V_0 - V_gas(p))/v(p), with v(p) = exp(-(p - p_a)/K) and the gas
+at p V^n = const (2). Forces at the wheels follow by virtual work (3): F_i = sum over springs, cylinders and bars of
+their force times the slope of their length, or angle, over the height of the wheel.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fe_models.foundation.arrays import Array
+from floatframe.machines.road_car.description import CORNERS, RoadCar, RollControl
+from floatframe.machines.road_car.linkage import Linkage, spring_preload
+
+__all__ = ["MODES", "CarOnPosts", "line_pressure", "roll_control_stiffness"]
+
+#: heights of the wheels, front left, front right, rear left, rear right, in the four motions of the wheels
+MODES = {
+    "heave": np.array([1.0, 1.0, 1.0, 1.0]),
+    "pitch": np.array([1.0, 1.0, -1.0, -1.0]),
+    "roll": np.array([1.0, -1.0, 1.0, -1.0]),
+    "warp": np.array([1.0, -1.0, -1.0, 1.0]),
+}
+STEP = 1e-5  #: of differences of the linkage [m]
+
+
+def gas(control: RollControl, p: float) -> float:
+    """Return the volume of the gas at a pressure, (2) [m³]."""
+    return float(control.gas_volume * (control.charge / p) ** (1 / control.exponent))
+
+
+def chambers_at_design(control: RollControl) -> float:
+    """Return the volume of a line beside its gas at design height: two heads, two rod sides, dead volumes [m³]."""
+    c = control
+    swept = c.head_area * c.at_design + c.rod_area * (c.stroke - c.at_design)
+    return 2 * (swept + 2 * c.dead_volume) + c.dead_volume
+
+
+def line_pressure(control: RollControl, growth: float) -> float:
+    """Return the pressure of a line whose chambers have grown by a volume since the design height, by (1) [Pa].
+
+    At design height the chambers of two heads and two rod sides stand at `at_design`.
+    """
+    c, chambers = control, chambers_at_design(control)
+
+    def content(p: float, volume: float) -> float:
+        oil = volume + c.gas_volume - gas(c, p)
+        return float(oil * np.exp((p - c.ambient) / c.bulk_modulus))
+
+    kept = content(c.pressure, chambers)
+    low, high = 0.5 * c.charge, 50 * c.pressure
+    return float(brentq(lambda p: content(p, chambers + growth) - kept, low, high, xtol=1e-3, rtol=1e-14))
+
+
+def roll_control_stiffness(car: RoadCar) -> float:
+    """Return what both lines add to the roll stiffness at design height, in small motions [N m/rad].
+
+    A line takes up (A_h + A_r) times the strokes of two cylinders, and rises by n p/V_gas beside the oil's K/V_oil:
+    k = 2 (dV/dphi)²/(V_gas/(n p) + V_oil/K), less what the forces of the cylinders do over their curved ways.
+    """
+    c = car.control
+    oil = chambers_at_design(c) + c.gas_volume - gas(c, c.pressure)
+    yielding = gas(c, c.pressure) / (c.exponent * c.pressure) + oil / c.bulk_modulus
+    swept, curved = 0.0, 0.0
+    push = (c.pressure - c.ambient) * (c.head_area - c.rod_area)
+    for name in ("front", "rear"):
+        corner, y = Linkage(car.axle(name), 1), car.axle(name).centre[1]
+        low, mid, high = (corner.lifted(z).cylinder for z in (-1e-4, 0.0, 1e-4))
+        swept += -(c.head_area + c.rod_area) * (high - low) / 2e-4 * y
+        curved += -2 * push * (high - 2 * mid + low) / 1e-8 * y * y
+    return 2 * swept**2 / yielding + curved
+
+
+@dataclass(frozen=True, eq=False)
+class CarOnPosts:
+    """The car with its body held and its wheels on posts."""
+
+    car: RoadCar
+    support: str = "hydraulic"
+
+    def forces(self, heights: Array) -> Array:
+        """Return the upward forces of the posts at wheel heights over design height, without weight, (4,) [N]."""
+        car, c = self.car, self.car.control
+        places, slopes = [], []
+        for (name, side), z in zip(CORNERS.values(), heights, strict=True):
+            linkage = Linkage(car.axle(name), side)
+            low, here, high = (linkage.lifted(z + step) for step in (-STEP, 0.0, STEP))
+            places.append((here, linkage.at(0.0)))
+            slopes.append(
+                [(getattr(high, of) - getattr(low, of)) / (2 * STEP) for of in ("spring", "cylinder", "lower_angle")]
+            )
+        pressures = self.pressures(heights)
+        found = []
+        for k, (name, side) in enumerate(CORNERS.values()):
+            axle, (here, design) = car.axle(name), places[k]
+            tension = axle.spring * (here.spring - design.spring) - spring_preload(car, name, self.support)  # (3)
+            force = tension * slopes[k][0]
+            if self.support == "hydraulic":
+                head, rod = pressures if side > 0 else pressures[::-1]
+                push = (head - c.ambient) * c.head_area - (rod - c.ambient) * c.rod_area
+                force -= push * slopes[k][1]
+            if self.support == "bars":
+                other = places[k ^ 1][0]
+                force += axle.bar * (here.lower_angle + other.lower_angle) * slopes[k][2]
+            found.append(force)
+        return np.array(found)
+
+    def pressures(self, heights: Array) -> tuple[float, float]:
+        """Return the pressures of the left and of the right line at wheel heights [Pa]."""
+        c = self.car.control
+        left = right = 0.0
+        for (name, side), z in zip(CORNERS.values(), heights, strict=True):
+            linkage = Linkage(self.car.axle(name), side)
+            longer = linkage.lifted(z).cylinder - linkage.at(0.0).cylinder
+            head, rod = c.head_area * longer, -c.rod_area * longer
+            left, right = (left + head, right + rod) if side > 0 else (left + rod, right + head)
+        return line_pressure(c, left), line_pressure(c, right)
+
+    def stiffness(self, mode: str, height: float = 0.0, step: float = 1e-4) -> float:
+        """Return the stiffness of a motion of the wheels, force of a wheel along it over its height [N/m]."""
+        way = MODES[mode]
+        high, low = (self.forces((height + s) * way) @ way / 4 for s in (step, -step))
+        return float((high - low) / (2 * step))

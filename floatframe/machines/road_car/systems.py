@@ -1,0 +1,291 @@
+"""Systems of the road car as files: on its wheels in a manoeuvre, and with its wheels on the posts of a rig."""
+
+from typing import Any
+
+import numpy as np
+
+from cms.decks.job_text import toml_text
+from floatframe.machines.road_car.description import CORNERS, RoadCar
+from floatframe.machines.road_car.linkage import spring_preload
+from floatframe.machines.road_car.suspension import Tables, axle_tables, rounded
+
+__all__ = ["SUPPORTS", "car_file", "lane_change", "rig_file", "sine_steer", "steady_circle", "twisted_road"]
+
+#: what holds the body against roll beside its springs
+SUPPORTS = ("hydraulic", "bars", "none")
+ROLLING = 0.3103  #: of a loaded wheel, speed over spin at the start [m]
+
+Manoeuvre = dict[str, Any]
+
+
+def lane_change(car: RoadCar, *, offset: float = 3.5, way: float = 36.0, stay: float = 20.0) -> Manoeuvre:
+    """Return a double lane change by a driver who looks ahead; lengths in m."""
+    places = np.cumsum([0.0, 8.0, way, stay, way])
+    there = {"type": "smooth-step", "t_start": 0.0, "t_end": way, "first": 0.0, "last": offset}
+    pieces = [
+        {"type": "constant", "value": 0.0}, there, {"type": "constant", "value": offset},
+        there | {"first": offset, "last": 0.0}, {"type": "constant", "value": 0.0},
+    ]  # fmt: skip
+    t_end = round(float(places[-1] + 20.0) / car.speed, 1)
+    return {"driver": {"type": "piecewise", "t": rounded(places), "pieces": pieces}, "t_end": t_end}
+
+
+def sine_steer(car: RoadCar, *, rack: float = 0.006, frequency: float = 0.5) -> Manoeuvre:
+    """Return one period of a sine of the rack [m, Hz] after half a second: ISO 7401, open loop."""
+    period = 1 / frequency
+    wave = {"type": "harmonic", "amplitude": rack, "omega": 2 * np.pi * frequency}
+    rest = {"type": "constant", "value": 0.0}
+    hand = {"type": "piecewise", "t": [0.0, 0.5, 0.5 + period], "pieces": [rest, wave, rest]}
+    return {"hand": hand, "t_end": 0.5 + period + 1.5}
+
+
+def steady_circle(car: RoadCar, *, rack: float, settled: float = 4.0) -> Manoeuvre:
+    """Return a turn in, in a second, to a rack that stays [m], at constant speed: ISO 4138."""
+    turn = {"type": "smooth-step", "t_start": 0.2, "t_end": 1.2, "first": 0.0, "last": -rack}
+    return {"rack": turn, "t_end": settled}
+
+
+def twisted_road(car: RoadCar, *, wave: float, height: float = 0.03, speed: float = 5.0) -> Manoeuvre:
+    """Return straight running over a road whose sides go up and down against each other, waves of a length [m].
+
+    A wave as long as twice the wheelbase twists the car, one as long as the wheelbase rolls it.
+    """
+    x = np.arange(-4.0, 40.0, 0.2)
+    rise = np.clip((x - 3.0) / wave, 0.0, 1.0)
+    z = height * rise**2 * (3 - 2 * rise) * np.sin(2 * np.pi * (x - 3.0) / wave)
+    sides = {side: [float(f"{side * v:.4g}") + 0.0 for v in z] for side in (1, -1)}
+    roads = {side: {"type": "profile", "x": rounded(x), "z": sides[side]} for side in sides}
+    return {"roads": roads, "rack": {"type": "constant", "value": 0.0}, "t_end": 5.0, "speed": speed}
+
+
+def roll_control(car: RoadCar) -> dict[str, Any]:
+    """Return the circuit: heads of one side and rods of the other on a line, each line with gas behind an orifice."""
+    c = car.control
+    rows: list[dict[str, Any]] = []
+    for corner, (name, side) in CORNERS.items():
+        axle = car.axle(name)
+        design = float(np.linalg.norm(np.subtract(axle.tower, axle.jack)))
+        rows.append(
+            {
+                "type": "cylinder",
+                "name": corner,
+                "marker_a": {"body": "chassis", "marker": f"{name}_tower_{corner.split('_')[1]}"},
+                "marker_b": {"body": f"lower_{corner}", "marker": rounded(axle.point("jack", side))},
+                "head_area": c.head_area,
+                "rod_area": c.rod_area,
+                "head": "line_left" if side > 0 else "line_right",
+                "rod": "line_right" if side > 0 else "line_left",
+                "stroke": c.stroke,
+                "retracted_length": float(f"{design - c.at_design:.10g}"),
+                "head_dead_volume": c.dead_volume,
+                "rod_dead_volume": c.dead_volume,
+            }
+        )
+    nodes: dict[str, dict[str, float]] = {}
+    for line in ("left", "right"):
+        valve: dict[str, Any] = {"type": "orifice", "name": f"valve_{line}", "a": f"line_{line}", "b": f"gas_{line}"}
+        rows.append(valve | {"area": c.orifice, "transition": c.transition})
+        rows.append(
+            {
+                "type": "accumulator",
+                "name": f"ball_{line}",
+                "node": f"gas_{line}",
+                "gas_volume": c.gas_volume,
+                "charge": c.charge,
+                "exponent": c.exponent,
+            }
+        )
+        nodes[f"line_{line}"] = {"pressure": c.pressure}
+        nodes[f"gas_{line}"] = {"pressure": c.pressure, "volume": c.dead_volume}
+    return {
+        "type": "hydraulics.circuit",
+        "fluid": {"density": c.density, "bulk_modulus": c.bulk_modulus, "ambient": c.ambient},
+        "nodes": nodes,
+        "components": rows,
+    }
+
+
+def base(car: RoadCar, support: str, *, is_rigid: bool, has_wheels: bool) -> Tables:
+    """Return body and axles."""
+    tables: Tables = {
+        "bodies": {"chassis": {"file": "body.h5", "is_rigid": is_rigid}}, "joints": {}, "forces": {}, "couplers": {},
+        "elements": {}, "sensors": {},
+    }  # fmt: skip
+    for name in ("front", "rear"):
+        for kind, rows in axle_tables(car, name, has_bar=support == "bars", has_wheels=has_wheels).items():
+            tables[kind] |= rows
+    for corner, (name, _) in CORNERS.items():
+        tables["forces"][f"spring_{corner}"]["preload"] = float(f"{-spring_preload(car, name, support):.6g}")
+    if support == "hydraulic":
+        tables["elements"]["roll_control"] = roll_control(car)
+    return tables
+
+
+def car_file(
+    car: RoadCar,
+    manoeuvre: Manoeuvre,
+    words: str,
+    *,
+    support: str = "hydraulic",
+    is_rigid: bool = False,
+    h: float = 4e-3,
+) -> str:
+    """Return the system file of the car in a manoeuvre, with one of SUPPORTS."""
+    tables = base(car, support, is_rigid=is_rigid, has_wheels=True)
+    speed = manoeuvre.get("speed", car.speed)
+    for body in tables["bodies"].values():
+        body["velocity"] = [float(f"{speed:.10g}"), 0, 0]
+    spin = float(f"{speed / ROLLING:.10g}")
+    for corner in CORNERS:
+        tables["bodies"][f"wheel_{corner}"]["omega_B"] = [0, spin, 0]
+        if "roads" in manoeuvre:
+            tables["elements"][f"tyre_{corner}"]["road"] = manoeuvre["roads"][CORNERS[corner][1]]
+    tables["forces"]["engine"] = {
+        "type": "user-force",
+        "coordinates": {side: {"joint": f"hub_rear_{side}", "coordinate": "angle"} for side in ("left", "right")},
+        "forces": dict.fromkeys(("left", "right"), TORQUE),
+        "states": {"slow": spin},
+        "rates": {"slow": f"({SPIN} - slow)/filter"},
+        "parameters": {"w": spin, "gain": 200.0, "rate_time": 0.02, "filter": 0.01},
+    }
+    if "rack" in manoeuvre:
+        tables["joints"]["rack"]["motions"] = {"distance": manoeuvre["rack"]}
+    if "driver" in manoeuvre:
+        tables["elements"]["driver"] = driver(manoeuvre["driver"], speed)
+    if "hand" in manoeuvre:
+        tables["elements"]["hand"] = hand(manoeuvre["hand"])
+    tables["elements"]["seen"] = {
+        "type": "elements.expressions",
+        "places": {"ground": {"body": "ground"}, "car": {"body": "chassis", "marker": "cockpit"}},
+        "outputs": {
+            "x": "car_x",
+            "y": "car_y",
+            "yaw": YAW,
+            "yaw_rate": "car_wz",
+            "roll": f"asin({R_ZY})",
+            "side_slip": f"atan2(car_vy, car_vx + 1e-9) - {YAW}",
+            "speed": "sqrt(car_vx^2 + car_vy^2 + 1e-12)",
+        },
+        "output_units": {
+            "x": "m", "y": "m", "yaw": "rad", "yaw_rate": "rad/s", "roll": "rad", "side_slip": "rad", "speed": "m/s"
+        },
+    }  # fmt: skip
+    for output in ("y", "roll", "side_slip", "yaw_rate"):
+        tables["sensors"][output.replace("_", " ")] = {"type": "element", "of": "seen", "output": output}
+    tables["sensors"]["acceleration"] = {"type": "acceleration", "body": "chassis", "marker": "cockpit"}
+    for corner, (name, side) in CORNERS.items():
+        words_of = corner.replace("_", " ")
+        tables["sensors"][f"load {words_of}"] = {"type": "element", "of": f"tyre_{corner}", "output": "Fz"}
+        tables["sensors"][f"turn {words_of}"] = {
+            "type": "rotation-vector", "body": f"upright_{corner}",
+            "marker": rounded(car.axle(name).point("centre", side)),
+            "relative_to": "chassis", "relative_marker": "cockpit",
+        }  # fmt: skip
+    if "driver" in manoeuvre:
+        for output in ("error", "hand"):
+            tables["sensors"][output] = {"type": "element", "of": "driver", "output": output}
+    if support == "hydraulic":
+        for line in ("left", "right"):
+            pressure = {"type": "element", "of": "roll_control", "output": f"pressure line_{line}"}
+            tables["sensors"][f"pressure {line}"] = pressure
+    run = {"t_end": manoeuvre["t_end"], "h": h, "rho_inf": 0.8, "tolerance": 1e-7, "output_every": 5}
+    tail = '[[scene]]\ntype = "plane"\n'
+    if "driver" in manoeuvre:
+        tail = scene(manoeuvre["driver"])
+    return written(words, tables, run) + tail
+
+
+# the rotation matrix of the cockpit from its rotation vector: R = cos 1 + sin/angle [r]x + (1 - cos)/angle² r rT
+ANGLE = "sqrt(car_rx^2 + car_ry^2 + car_rz^2 + 1e-12)"
+R_XX = f"(cos({ANGLE}) + (1 - cos({ANGLE}))/({ANGLE})^2*car_rx^2)"
+R_YX = f"((1 - cos({ANGLE}))/({ANGLE})^2*car_rx*car_ry + sin({ANGLE})/({ANGLE})*car_rz)"
+R_ZY = f"((1 - cos({ANGLE}))/({ANGLE})^2*car_ry*car_rz + sin({ANGLE})/({ANGLE})*car_rx)"
+YAW = f"atan2({R_YX}, {R_XX})"
+SPIN = "0.5*(left_dot + right_dot)"
+#: half of C = K ((w_target - w) - lambda dw/dt) on each rear wheel, w their mean: a differential
+TORQUE = f"0.5*gain*(w - {SPIN} - rate_time*({SPIN} - slow)/filter)"
+
+
+def driver(path: dict[str, Any], speed: float) -> dict[str, Any]:
+    """Return a driver who steers by the distance of the path from a point ahead, with a lag, and holds the rack."""
+    return {
+        "type": "elements.expressions",
+        "places": {
+            "car": {"body": "subframe_front"}, "rack": {"body": "rack"}, "road": {"body": "ground"},
+        },
+        "states": {"hand": 0.0},
+        "rates": {"hand": f"(gain*(path({AHEAD_X}) - {AHEAD_Y}) - hand)/lag"},
+        "forces": {"rack_Fy": "-k*(rack_y + hand) - c*rack_vy"},
+        "outputs": {"error": f"path({X}) - {Y}", "hand": "hand", "force": "-k*(rack_y + hand) - c*rack_vy"},
+        "output_units": {"error": "m", "hand": "m", "force": "N"},
+        "parameters": {"ahead": float(f"{0.6 * speed:.6g}"), "gain": 0.0085, "lag": 0.10} | COLUMN,
+        "functions": {"path": path},
+    }  # fmt: skip
+
+
+def hand(turn: dict[str, Any]) -> dict[str, Any]:
+    """Return a steering column that pulls the rack to where a function of time wants it, to the right side up."""
+    return {
+        "type": "elements.expressions",
+        "places": {"car": {"body": "subframe_front"}, "rack": {"body": "rack"}},
+        "forces": {"rack_Fy": "-k*(rack_y + hand(t)) - c*rack_vy"},
+        "outputs": {"hand": "hand(t)", "force": "-k*(rack_y + hand(t)) - c*rack_vy"},
+        "output_units": {"hand": "m", "force": "N"},
+        "parameters": COLUMN,
+        "functions": {"hand": turn},
+    }
+
+
+COLUMN = {"k": 3e6, "c": 1e4}  #: of the steering column as the rack feels it [N/m, N s/m]
+# the car in the ground, from the ground as the car sees it; road_rz is less its yaw
+X = "(-sin(road_rz)*road_y - cos(road_rz)*road_x)"
+Y = "(sin(road_rz)*road_x - cos(road_rz)*road_y)"
+AHEAD_X = f"({X} + ahead*cos(road_rz))"
+AHEAD_Y = f"({Y} - ahead*sin(road_rz))"
+
+
+def scene(path: dict[str, Any]) -> str:
+    """Return the road, and cones beside the path."""
+    out = ['[[scene]]\ntype = "road"\npoints = [[-10, 1.75, 0], [180, 1.75, 0]]\nwidth = 8\n']
+    _, a, b, c, d = path["t"]
+    offset = path["pieces"][2]["value"]
+    for x, y in [(0.0, 0.0), (a, 0.0), (b, offset), (c, offset), (d, 0.0), (d + 15.0, 0.0)]:
+        for s in (-1.2, 1.2):
+            out.append(
+                f'[[scene]]\ntype = "cylinder"\nradius = 0.14\nend_radius = 0.03\nlength = 0.5\n'
+                f'position = [{x:g}, {y + s:g}, 0.25]\ncolor = "orange"\n'
+            )
+    return "\n".join(out)
+
+
+def rig_file(
+    car: RoadCar, words: str, *, support: str = "hydraulic", heights: dict[str, dict[str, Any]] | None = None
+) -> str:
+    """Return the car on four posts: its body stands, each wheel centre has its height [m] as a function of time."""
+    tables = base(car, support, is_rigid=True, has_wheels=False)
+    tables["joints"]["stand"] = {
+        "type": "fixed", "body_a": "ground", "marker_a": rounded(car.cockpit),
+        "body_b": "chassis", "marker_b": "cockpit",
+    }  # fmt: skip
+    for corner, (name, side) in CORNERS.items():
+        centre = car.axle(name).point("centre", side)
+        tables["couplers"][f"post_{corner}"] = {
+            "constant": (heights or {}).get(corner, {"type": "constant", "value": 0.0}),
+            "terms": [
+                {
+                    "type": "axial-distance", "body_a": "ground", "marker_a": rounded(centre), "axis": [0, 0, 1],
+                    "body_b": f"upright_{corner}", "marker_b": rounded(centre), "factor": 1.0,
+                }
+            ],
+        }  # fmt: skip
+        tables["sensors"][f"post {corner.replace('_', ' ')}"] = {"type": "coupler", "of": f"post_{corner}"}
+    tables["joints"]["rack"]["motions"] = {"distance": {"type": "constant", "value": 0.0}}
+    run = {"t_end": 2.0, "h": 4e-3, "output_every": 5}
+    return written(words, tables, run, gravity=0.0)
+
+
+def written(words: str, tables: Tables, run: dict[str, Any], gravity: float = -9.81) -> str:
+    """Return a system file."""
+    head = {"system": {"units": "m-kg-s", "gravity": [0, 0, gravity]}}
+    filled = {key: rows for key, rows in tables.items() if rows}
+    return f"# {words}\n" + toml_text(head | filled | {"run": run})

@@ -1,0 +1,123 @@
+"""The road car: linkage against circles and spheres, posts against volumes and gas, a turn against four wheels."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cms
+import floatframe as ff
+from floatframe.machines import machine_files
+from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files, road_car_files
+from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness
+from floatframe.machines.road_car.description import CORNERS
+from floatframe.machines.road_car.figures import car_mass, driven
+from floatframe.machines.road_car.steady_turn import steady_turn
+from floatframe.machines.road_car.systems import car_file, lane_change, rig_file, steady_circle
+from floatframe.rotations import rotation_matrix
+from floatframe.wheels import read_tyre_file, shipped_tyre
+from tests.floatframe.wheels.magic_formula_oracle import version_61
+
+CAR = RoadCar()
+STIFF = replace(CAR, mount_stiffness=None)  # subframes fixed to the body
+TYRE = read_tyre_file(shipped_tyre("passenger_car_61"))
+
+
+def tyre(load, alpha, gamma, is_left):
+    """F_y, M_x, M_y, M_z of the tyre by the second writing of its formula; that of the right side is the mirror."""
+    side = 1.0 if is_left else -1.0
+    found, _ = version_61(
+        TYRE.coefficients, 220e3, 220e3, load, 0.0, side * alpha, side * gamma, 18.0, 16.7, 0.32, 4000.0
+    )
+    return side * found[1], side * found[2], -found[3], side * found[4]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("car")
+    for name, text in body_files(CAR).items():
+        (place / name).write_text(text)
+    cms.write(cms.reduce_job(place / "body.toml"), place / "body.h5")
+    return place
+
+
+def read(folder, text, name="car.toml"):
+    (folder / name).write_text(text)
+    return ff.read_system(folder / name)
+
+
+def test_shipped_files_are_those_of_the_description():
+    own = ("README.md", "suspension_study.toml")
+    assert {
+        path.name: path.read_text() for path in machine_files("road-car") if path.name not in own
+    } == road_car_files()
+
+
+def test_wheels_move_as_circles_and_spheres_say(folder):
+    """Steer, inclination and place of the four wheels over 80 mm up and down, against the linkage by itself."""
+    travel = {"type": "smooth-step", "t_start": 0.0, "t_end": 1.0, "first": -0.08, "last": 0.08}
+    text = rig_file(STIFF, "rig", support="none", heights=dict.fromkeys(CORNERS, travel))
+    system, _ = read(folder, text)
+    motion = ff.kinematics(system, np.linspace(0.0, 1.0, 7))
+    for corner, (name, side) in CORNERS.items():
+        own, linkage = motion.body(f"upright_{corner}"), Linkage(CAR.axle(name), side)
+        for r, p in zip(own.r, own.p, strict=True):
+            w, x, y, z = p
+            axle = np.array([2 * (x * y - w * z), w * w - x * x + y * y - z * z, 2 * (y * z + w * x)])
+            R_centre = rotation_matrix(p) @ CAR.axle(name).point("centre", side)
+            place = linkage.lifted(r[2] + R_centre[2] - 0.302)
+            assert_allclose(r + R_centre, place.centre, rtol=0, atol=1e-9)
+            assert_allclose(axle, place.axle, rtol=0, atol=1e-8)
+
+
+def posts(folder, support, heights):
+    """Return the forces of the posts at rest, (4,) [N]."""
+    values = {c: {"type": "constant", "value": float(z)} for c, z in zip(CORNERS, heights, strict=True)}
+    system, _ = read(folder, rig_file(STIFF, "rig", support=support, heights=values), f"rig_{support}.toml")
+    rest = ff.snapshot(system, ff.static_equilibrium(system))
+    return np.array([ff.coupler_motion(system, rest, f"post_{corner}").force[0, 0] for corner in CORNERS])
+
+
+@pytest.mark.parametrize("support", ["hydraulic", "bars"])
+def test_posts_carry_what_springs_bars_gas_and_oil_press(folder, support):
+    heights = np.array([0.031, -0.024, -0.012, 0.027])
+    expected = CarOnPosts(STIFF, support).forces(heights)
+    assert_allclose(posts(folder, support, heights), expected, rtol=2e-6)
+
+
+def test_crossed_lines_stiffen_roll_by_the_gas_and_leave_warp_alone(folder):
+    """Against the closed form of two gas volumes, in motions so small that it is linear."""
+    small, track = 2e-3, 2 * CAR.front.centre[1]
+    stiffness = {}
+    for mode in ("roll", "warp"):
+        up, down = (posts(folder, "hydraulic", s * small * MODES[mode]) for s in (1, -1))
+        stiffness[mode] = float((up - down) @ MODES[mode] / (2 * small)) * track**2 / 4
+        stiffness[mode] -= 4 * CarOnPosts(STIFF, "none").stiffness(mode) * track**2 / 4
+    assert_allclose(stiffness["roll"], roll_control_stiffness(CAR), rtol=2e-3)
+    assert abs(stiffness["warp"]) < 0.01 * stiffness["roll"]
+
+
+def test_a_steady_turn_is_that_of_four_wheels_and_the_linkage(folder):
+    """Yaw rate, roll and wheel loads at 3 m/s² of the rigid car against equations of their own."""
+    rack = 0.0035
+    text = car_file(CAR, steady_circle(CAR, rack=rack, settled=2.6), "circle", is_rigid=True, h=8e-3)
+    system, run = read(folder, text)
+    turn = driven(system, ff.integrate(system, run.integrator, run.t_end, run.h))
+    expected = steady_turn(CAR, car_mass(CAR, system), tyre, float(turn.speed[-1]), rack, "hydraulic")
+    assert_allclose(turn.yaw_rate[-1], expected.yaw_rate, rtol=0.01)
+    assert_allclose(turn.roll[-1], expected.roll, rtol=0.01)
+    assert_allclose(turn.loads[-1], expected.loads, rtol=0.005)
+
+
+def test_the_flexible_car_follows_its_driver(folder):
+    """Half a second of the lane change: the body bends, the car turns as the rigid one within a tenth."""
+    found = {}
+    for is_rigid in (True, False):
+        system, run = read(folder, car_file(CAR, lane_change(CAR), "lanes", is_rigid=is_rigid, h=5e-3))
+        motion = ff.integrate(system, run.integrator, 0.5, run.h)
+        found[is_rigid] = driven(system, motion).yaw_rate[-1]
+        if not is_rigid:
+            assert 1e-5 < np.abs(motion.body("chassis").q[-1]).max() < 1e-1
+    assert_allclose(found[False], found[True], rtol=0.1)
+    assert found[True] > 0.05
