@@ -26,6 +26,7 @@ RUNS = (
     ("landing-gear", ("piston", "wing"), "drop", 0.2),
     ("landing-gear", ("piston", "wing"), "aircraft", 0.5),
     ("antenna", ("petal", "strut"), "latching", 0.4),
+    ("road-car", ("body",), "lane_change", 1.0),
 )
 KART_MODES = (0, 10, 20, 40, 80)  #: vibration modes of the chassis beside its static ones
 

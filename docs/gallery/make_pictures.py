@@ -156,12 +156,125 @@ def kart() -> None:
     save_film(frames, HERE / "kart.gif", fps=10)
 
 
+def road_car() -> None:
+    """The road car on four posts: a wave of roll, then of warp, half as fast, what bends drawn 50 times larger."""
+    from floatframe.machines import copy_machine
+    from floatframe.machines.road_car import RoadCar
+    from floatframe.machines.road_car.description import CORNERS
+    from floatframe.machines.road_car.systems import rig_file
+    from floatframe.machines.road_car.write_files import post_motion
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copy_machine("road-car", folder)
+        cms.write(cms.reduce_job(folder / "body.toml"), folder / "body.h5")
+        text = rig_file(RoadCar(), "rig", heights=post_motion(0.035)).replace("is_rigid = true", "is_rigid = false")
+        for corner, (axle, side) in CORNERS.items():  # wheels to look at, without tyres
+            place = RoadCar().axle(axle).point("centre", side).tolist()
+            wheel = f'{{type = "wheel", radius = 0.32, width = 0.205, position = {place}}}, '
+            at = text.index(f"[bodies.upright_{corner}]")
+            begin = text.index("shapes = [", at) + len("shapes = [")
+            text = text[:begin] + wheel + text[begin:]
+        (folder / "rig.toml").write_text(text)
+        system, run = read_system(folder / "rig.toml")
+        motion = ff.integrate(system, run.integrator, run.t_end, h=run.h, output_every=5)
+        film = folder / "film.gif"
+        animate(motion, drawn(system), film, speed=0.5, fps=10, magnification=50.0, system=system)
+        frames = [cut(frame) for frame in iio.imread(film)]
+    size = min(len(frame) for frame in frames)
+    save_film([frame[:size] for frame in frames], HERE / "road_car.gif", fps=10)
+
+
+def road_car_plots() -> None:
+    """Two plots of the page of the road car: the lane change, and what wheels do over their travel."""
+    import matplotlib.pyplot as plt
+
+    from floatframe.machines import copy_machine
+    from floatframe.machines.road_car import Linkage, RoadCar
+    from floatframe.machines.road_car.figures import driven
+
+    car = RoadCar()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copy_machine("road-car", folder)
+        cms.write(cms.reduce_job(folder / "body.toml"), folder / "body.h5")
+        figure, axes = plt.subplots(3, 2, figsize=(9, 7.5), sharex=True, layout="constrained")
+        for file, words, style in (
+            ("lane_change", "hydraulics, flexible", "-"), ("lane_change_rigid", "hydraulics, rigid", ":"),
+            ("lane_change_bars", "bars, rigid", "--"),
+        ):  # fmt: skip
+            system, run = read_system(folder / f"{file}.toml")
+            seen = driven(system, ff.integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every))
+            for ax, values, label in (
+                (axes[0, 0], seen.place[:, 1], "across the road [m]"),
+                (axes[0, 1], seen.lateral_acceleration, "lateral acceleration [m/s²]"),
+                (axes[1, 0], np.degrees(seen.roll), "roll [degrees]"),
+                (axes[1, 1], np.degrees(seen.side_slip), "side-slip [degrees]"),
+                (axes[2, 0], seen.loads / 1e3, "loads of the wheels [kN]"),
+                (axes[2, 1], seen.pressures / 1e5, "pressures of the lines [bar]"),
+            ):
+                if values.ndim == 1:
+                    ax.plot(seen.t, values, style, label=words)
+                for k in range(values.shape[1] if values.ndim == 2 else 0):
+                    ax.plot(seen.t, values[:, k], style, color=f"C{k}")
+                ax.set_ylabel(label)
+        axes[0, 0].legend(fontsize=8)
+        for ax in axes[2]:
+            ax.set_xlabel("t [s]")
+        figure.savefig(HERE.parent / "road_car_lane_change.png", dpi=80)
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
+    travel = np.linspace(-0.08, 0.08, 41)
+    for k, name in enumerate(("front", "rear")):
+        places = [Linkage(car.axle(name), 1).lifted(z) for z in travel]
+        axes[0].plot(1e3 * travel, [np.degrees(place.inclination) for place in places], f"C{k}", label=name)
+        axes[1].plot(1e3 * travel, [np.degrees(place.steer) for place in places], f"C{k}")
+    for ax, words in zip(axes, ("inclination of the left wheel [degrees]", "its steer [degrees]"), strict=True):
+        ax.set(xlabel="travel [mm]", ylabel=words)
+        ax.grid(alpha=0.3)
+    axes[0].legend()
+    figure.savefig(HERE.parent / "road_car_wheels.png", dpi=80)
+
+
+def road_car_study(journal: Path | None = None) -> None:
+    """The study of the road car's suspension: its history, and the lane change before and after; minutes."""
+    import matplotlib.pyplot as plt
+
+    from floatframe.machines import copy_machine
+    from floatframe.machines.road_car.figures import driven
+    from floatframe.optimization.history_plots import plot_history
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copy_machine("road-car", folder)
+        cms.write(cms.reduce_job(folder / "body.toml"), folder / "body.h5")
+        design = ff.read_design(folder / "suspension_study.toml")
+        best = ff.optimize(design, journal=journal)
+        plot_history(best).savefig(HERE.parent / "road_car_study.png", dpi=70)
+        after = {path: best.values[p.name] for p in design.parameters for path in p.paths}
+        figure, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
+        for changes, words in (({}, "before"), (after, "after")):
+            system, run = read_system(folder / "lane_change_bars.toml", changes)
+            seen = driven(system, ff.integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every))
+            for ax, values, label in zip(
+                axes, (100 * seen.error, np.degrees(seen.side_slip), np.degrees(seen.roll)),
+                ("off the path [cm]", "side-slip [degrees]", "roll [degrees]"), strict=True,
+            ):  # fmt: skip
+                ax.plot(seen.t, values, label=words)
+                ax.set(xlabel="t [s]", ylabel=label)
+                ax.grid(alpha=0.3)
+        axes[0].legend()
+        figure.savefig(HERE.parent / "road_car_before_after.png", dpi=80)
+
+
 MECHANISMS: dict[str, Callable[[], None]] = {
     "slider_crank": slider_crank,
     "antenna": antenna,
     "railway_engine_film": railway_engine,
     "kart_film": kart,
     "landing_gear": landing_gear,
+    "road_car": road_car,
+    "road_car_plots": road_car_plots,
+    "road_car_study": road_car_study,
     **{maker.__name__: partial(still, maker.__name__, maker) for maker in (four_bar, satellite, chain)},
 }
 

@@ -25,7 +25,7 @@ class BodyColor:
 
 def displacements(body: ReducedBody, q: Array) -> Array:
     """Return the size of the elastic displacement, (n, n_kept) [m]."""
-    moved = (q @ body.Phi.reshape(-1, body.n_q).T).reshape(len(q), -1, 3)
+    moved = (q @ body.Phi.reshape(3 * len(body.Phi), body.n_q).T).reshape(len(q), len(body.Phi), 3)
     return np.asarray(np.linalg.norm(moved, axis=2))
 
 

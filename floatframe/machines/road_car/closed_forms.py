@@ -14,7 +14,7 @@ from fe_models.foundation.arrays import Array
 from floatframe.machines.road_car.description import CORNERS, RoadCar, RollControl
 from floatframe.machines.road_car.linkage import Linkage, spring_preload
 
-__all__ = ["MODES", "CarOnPosts", "line_pressure", "roll_control_stiffness"]
+__all__ = ["MODES", "CarOnPosts", "line_pressure", "roll_centre", "roll_control_stiffness", "transfer_shares"]
 
 #: heights of the wheels, front left, front right, rear left, rear right, in the four motions of the wheels
 MODES = {
@@ -123,3 +123,50 @@ class CarOnPosts:
         way = MODES[mode]
         high, low = (self.forces((height + s) * way) @ way / 4 for s in (step, -step))
         return float((high - low) / (2 * step))
+
+
+def roll_centre(car: RoadCar, name: str) -> float:
+    """Return the height of the roll centre of an axle at design height, y times the slope of its contact [m].
+
+    The contact moves across by dy where the wheel moves up by dz; a side force there lifts the wheel by F dy/dz.
+    """
+    linkage = Linkage(car.axle(name), 1)
+    low, high = (linkage.lifted(z) for z in (-1e-4, 1e-4))
+    feet = [place.centre[1] + place.centre[2] * place.axle[2] for place in (low, high)]
+    return float(car.axle(name).centre[1] * (feet[1] - feet[0]) / 2e-4)
+
+
+def transfer_shares(
+    car: RoadCar, support: str, *, mass: float, x: float, height: float, tyre_stiffness: float
+) -> tuple[float, float]:
+    """Return load that moves from the inner to the outer wheel of the front and rear axle over m a_y h/t [-].
+
+    The classic closed form of small roll: each axle takes its part of the sprung mass at its roll centre, its unsprung
+    mass at wheel height, and the rest by its share of the roll stiffness, springs and tyres in series.
+    """
+    unsprung = 2 * (car.wheel + car.upright + 0.5 * (car.lower_arm + car.upper_arm))
+    axles = {name: car.axle(name) for name in ("front", "rear")}
+    wheel_height, track = car.front.centre[2], 2 * car.front.centre[1]
+    sprung = mass - 2 * unsprung
+    sprung_x = (mass * x - unsprung * sum(axle.centre[0] for axle in axles.values())) / sprung
+    sprung_height = (mass * height - 2 * unsprung * wheel_height) / sprung
+    part = {
+        "front": (sprung_x - car.rear.centre[0]) / car.wheelbase,
+        "rear": (car.front.centre[0] - sprung_x) / car.wheelbase,
+    }
+    centre = {name: roll_centre(car, name) for name in axles}
+    step, way = 1e-4, MODES["roll"]
+    rate = (
+        (CarOnPosts(car, support).forces(step * way) - CarOnPosts(car, support).forces(-step * way)) * way / (2 * step)
+    )
+    stiffness = {}
+    for name, k in (("front", rate[:2].mean()), ("rear", rate[2:].mean())):
+        stiffness[name] = 0.5 * track**2 / (1 / k + 1 / tyre_stiffness)
+    lever = sprung_height - sum(part[name] * centre[name] for name in axles)
+    rolling = sum(stiffness.values()) / (sum(stiffness.values()) - sprung * 9.81 * lever)  # its weight leans out too
+    found = [
+        sprung * (part[name] * centre[name] + rolling * lever * stiffness[name] / sum(stiffness.values()))
+        + unsprung * wheel_height
+        for name in axles
+    ]
+    return found[0] / (mass * height), found[1] / (mass * height)

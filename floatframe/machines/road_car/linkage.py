@@ -21,6 +21,9 @@ from floatframe.machines.road_car.description import Axle, RoadCar
 __all__ = ["CornerPlace", "Linkage", "spring_preload"]
 
 
+MOST = 0.45  #: turn of a lower wishbone that is looked at [rad]
+
+
 @dataclass(frozen=True, eq=False)
 class CornerPlace:
     """A corner in one position, axes of the body."""
@@ -91,7 +94,7 @@ class Linkage:
     def lifted(self, z: float) -> CornerPlace:
         """Return the corner with its wheel centre z [m] above the design height."""
         height = self.p["centre"][2] + z
-        return self.at(brentq(lambda phi: self.at(phi).centre[2] - height, -0.7, 0.7, xtol=1e-14, rtol=1e-14))
+        return self.at(brentq(lambda phi: self.at(phi).centre[2] - height, -MOST, MOST, xtol=1e-14, rtol=1e-14))
 
     def _upper_ball(self, low: Array) -> Array:
         """(2): on its circle, on the side where it is at design height."""

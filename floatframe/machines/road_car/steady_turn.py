@@ -132,7 +132,9 @@ def steady_turn(car: RoadCar, mass: CarMass, tyre: Tyre, speed: float, rack: flo
             ]
         )
 
-    start = np.concatenate([[0.0, speed * 7.7 * rack / 3.0], np.zeros(7)])
+    rate = speed * 7.7 * rack / 3.0  # near it the equations are nearly linear
+    moved = -0.5 * m * speed * rate * h / (2 * y)
+    start = np.concatenate([[0.0, rate, 0.011 * speed * rate, 0.0, 0.0], moved])
     answer, _, found, words = fsolve(defects, start, full_output=True, xtol=1e-10)
     if found != 1:
         raise ArithmeticError(f"steady_turn: speed {speed:g}, rack {rack:g}: {words}")
