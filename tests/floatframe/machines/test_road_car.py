@@ -15,7 +15,7 @@ from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffn
 from floatframe.machines.road_car.description import CORNERS
 from floatframe.machines.road_car.figures import car_mass, driven
 from floatframe.machines.road_car.steady_turn import steady_turn
-from floatframe.machines.road_car.systems import car_file, lane_change, rig_file, steady_circle
+from floatframe.machines.road_car.systems import car_file, lane_change, rig_file
 from floatframe.rotations import rotation_matrix
 from floatframe.wheels import read_tyre_file, shipped_tyre
 from tests.floatframe.wheels.magic_formula_oracle import version_61
@@ -102,7 +102,8 @@ def test_crossed_lines_stiffen_roll_by_the_gas_and_leave_warp_alone(folder):
 def test_a_steady_turn_is_that_of_four_wheels_and_the_linkage(folder):
     """Yaw rate, roll and wheel loads at 3 m/s² of the rigid car against equations of their own."""
     rack = 0.0035
-    text = car_file(CAR, steady_circle(CAR, rack=rack, settled=2.4), "circle", is_rigid=True, h=8e-3)
+    turn_in = {"type": "smooth-step", "t_start": 0.05, "t_end": 0.6, "first": 0.0, "last": -rack}
+    text = car_file(CAR, {"rack": turn_in, "t_end": 1.8}, "circle", is_rigid=True, h=8e-3)
     system, run = read(folder, text)
     turn = driven(system, ff.integrate(system, run.integrator, run.t_end, run.h))
     expected = steady_turn(CAR, car_mass(CAR, system), tyre, float(turn.speed[-1]), rack, "hydraulic")
