@@ -7,15 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import quoted
 from floatframe.bodies.markers import Marker
 from floatframe.compiling.file_frames import state_of_engine, state_of_file
 from floatframe.compiling.markers import find_marker
 from floatframe.errors import ModelError
 from floatframe.forces import Gravity
+from floatframe.kernels.compiler.structure import table_of
 from floatframe.kernels.work import Work, new_work
-from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, PLACE, SOLVE, TANGENTS, run_task
+from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, PLACE, SOLVE, TANGENTS, Prepared, prepared
 from floatframe.relative.recursion.expansion import Expansion, expansion_of
 from floatframe.relative.recursion.nodes import ROTATION, Dense, NodeWork, new_dense, new_node_work
 from floatframe.relative.recursion.positions import positions_of_state
@@ -63,6 +64,7 @@ class RelativeModel:
     expansion: Expansion
     work: NodeWork = field(repr=False)
     marker_work: Work = field(repr=False)
+    ready: Prepared = field(repr=False)
 
     @property
     def n_z(self) -> int:
@@ -207,7 +209,7 @@ class RelativeModel:
             raise ModelError(f"solve: right: expected {n} finite rows, got shape {columns.shape}")
         rows = np.ascontiguousarray(columns.reshape(n, -1).T)
         dense = self.none._replace(columns=rows.copy())
-        self.run(SOLVE, dense=dense)
+        self.require(self.ready.run(SOLVE, table_of(dense)))
         return np.asarray(dense.columns.T.reshape(columns.shape))
 
     def derivatives(self, z: Array, z_dot: Array, z_ddot: Array) -> "ForceDerivatives":
@@ -330,8 +332,7 @@ class RelativeModel:
         """Write positions, rates and accelerations (None: zero) into the working arrays."""
         n, work = self.n_rates, self.work
         x = checked("z", z, self.n_z)
-        for k in np.flatnonzero(self.expansion.nodes.kind == ROTATION):
-            first = self.expansion.nodes.x0[k]
+        for first in self.rotations:
             length = float(np.linalg.norm(x[first : first + 4]))
             if abs(length - 1) > UNIT_DEFECT:
                 raise ModelError(
@@ -343,6 +344,12 @@ class RelativeModel:
         work.a[:] = 0.0 if z_ddot is None else checked("z_ddot", z_ddot, n)
 
     @cached_property
+    def rotations(self) -> tuple[int, ...]:
+        """First positions of all rotations."""
+        nodes = self.expansion.nodes
+        return tuple(int(first) for first in nodes.x0[nodes.kind == ROTATION])
+
+    @cached_property
     def none(self) -> Dense:
         """Matrices without entries, for what needs none."""
         return new_dense(self.expansion.nodes, self.n_rates, 0, is_whole=False)
@@ -352,13 +359,25 @@ class RelativeModel:
         """Matrices over the rates."""
         return new_dense(self.expansion.nodes, self.n_rates, 0, is_whole=True)
 
-    def run(self, what: int, times: int = 1, dense: Dense | None = None) -> None:
+    @cached_property
+    def none_table(self) -> IntArray:
+        """Table of `none`."""
+        return table_of(self.none)
+
+    @cached_property
+    def dense_table(self) -> IntArray:
+        """Table of `dense`."""
+        return table_of(self.dense)
+
+    def run(self, what: int, times: int = 1) -> None:
         """Run the kernels; `ModelError` where there is no inertia along a coordinate."""
-        e = self.expansion
-        matrices = dense or (self.dense if what in (MASS, TANGENTS) else self.none)
-        node = run_task(e.nodes, self.work, matrices, e.compiled.model, self.marker_work, what, times)
+        table = self.dense_table if what in (MASS, TANGENTS) else self.none_table
+        self.require(self.ready.run(what, table, times))
+
+    def require(self, node: int) -> None:
+        """Raise `ModelError` if a node has no inertia along its rates."""
         if node >= 0:
-            first = int(e.nodes.v0[node])
+            first = int(self.expansion.nodes.v0[node])
             raise ModelError(
                 f"forward_dynamics: what hangs at {quoted(self.rate_names[first])} has no inertia along it in this "
                 "position"
@@ -410,4 +429,4 @@ def relative_model(system: System) -> RelativeModel:
     work, marker_work = new_node_work(expansion.nodes, expansion.n_x, expansion.n_v), new_work(model)
     work.gravity[:] = model.gravity
     marker_work.state.R[:] = np.eye(3)
-    return RelativeModel(expansion, work, marker_work)
+    return RelativeModel(expansion, work, marker_work, prepared(expansion.nodes, work, model, marker_work))

@@ -1,14 +1,15 @@
 """The compiled entry of the recursive equations, and a plain function for each thing it does."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from fe_models.foundation.arrays import IntArray
 from floatframe.kernels.compiler.choice import is_lean
 from floatframe.kernels.compiler.compilation import entry
 from floatframe.kernels.compiler.sources import source_digest
-from floatframe.kernels.compiler.structure import converter, kept_table_of, table_of
+from floatframe.kernels.compiler.structure import converter, table_of
 from floatframe.kernels.model import Model
-from floatframe.kernels.records import filled, integer, zeros
+from floatframe.kernels.records import integer, zeros
 from floatframe.kernels.work import Work
 from floatframe.relative.recursion.articulated import articulate, solve_articulated, solve_columns
 from floatframe.relative.recursion.columns import motion_in_ground, rate_columns
@@ -18,7 +19,7 @@ from floatframe.relative.recursion.nodes import Dense, Nodes, NodeWork
 from floatframe.relative.recursion.poses import place_in_ground, place_in_parent, set_modes
 from floatframe.relative.recursion.tangents import force_tangents
 
-__all__ = ["FORWARD", "INVERSE", "MASS", "PLACE", "SOLVE", "TANGENTS", "Task", "run_task"]
+__all__ = ["FORWARD", "INVERSE", "MASS", "PLACE", "SOLVE", "TANGENTS", "Prepared", "Task", "prepared"]
 
 PLACE, INVERSE, MASS, FORWARD, SOLVE, TANGENTS = range(6)  #: values of `Task.what`
 
@@ -85,14 +86,26 @@ def make_entry(digest):
 
 
 run = make_entry(source_digest(__name__, "lean" if is_lean else "plain"))
-NOTHING = zeros(Task(), {})
 
 
-def run_task(
-    nodes: Nodes, work: NodeWork, dense: Dense, model: Model, marker_work: Work, what: int, times: int = 1
-) -> int:
-    """Do what is asked for with the numbers in `work`; return -1, or the node whose matrix is singular."""
-    task = filled(Task(), **(NOTHING._asdict() | {"what": what, "times": times}))
-    tables = (kept_table_of(each) for each in (nodes, work, model, marker_work))
-    of_nodes, of_work, of_model, of_markers = tables
-    return int(run(of_nodes, of_work, table_of(dense), of_model, of_markers, table_of(task)))
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """The records of a tree with their tables, which take longer to make than a short chain to evaluate."""
+
+    records: tuple[Nodes, NodeWork, Model, Work]  #: kept alive
+    tables: tuple[IntArray, ...]
+    task: Task
+    task_table: IntArray
+
+    def run(self, what: int, dense_table: IntArray, times: int = 1) -> int:
+        """Do what is asked for with the numbers in the records; return -1, or the node whose matrix is singular."""
+        self.task.what[...] = what
+        self.task.times[...] = times
+        nodes, work, model, marker_work = self.tables
+        return int(run(nodes, work, dense_table, model, marker_work, self.task_table))
+
+
+def prepared(nodes: Nodes, work: NodeWork, model: Model, marker_work: Work) -> Prepared:
+    """Return the records of a tree, ready to run."""
+    records, task = (nodes, work, model, marker_work), zeros(Task(), {})
+    return Prepared(records, tuple(table_of(each) for each in records), task, table_of(task))
