@@ -30,11 +30,13 @@ from floatframe.state import State
 __all__ = ["require_steady"]
 
 BALANCED = 1e-5  #: forces out of balance, relative to those at work
+BALANCED_LATER = 1e-4  #: the same later, where tables of roads and rails are read at another place
 LEAST = 1e-3  #: of the forces that turn velocities round: what counts as forces at work
 ALONG = 1e-6  #: velocities against the common motion, relative to the largest
-SAME = 1e-6  #: change of a matrix, relative to its largest entry
+SAME = 1e-4  #: change of a matrix, relative to its largest entry
+ROUND = 1e-6  #: change of a mass
 TURN = 1.234  #: angle by which the fastest body has turned later, no part of a circle [rad]
-AHEAD = 0.1  #: way of a system in which nothing turns, by its size
+AHEAD = 0.1  #: way of a system in which nothing spins, by its size
 MOST_ITERATIONS = 10
 NOT = "linearize: this state is not steady:"
 
@@ -73,11 +75,12 @@ def require_steady(
         return
     carrier = carrier_of(compiled, state, about.omega)
     now = balance(compiled, work, about.w)
-    require_balance(now, about.residual, "forces are out of balance")
+    require_balance(now, max(BALANCED, 10 * about.residual), "forces are out of balance")
     model, spins = compiled.model, spins_in(compiled, state, about.omega)
     fastest = max((float(np.linalg.norm(spin)) for spin in spins), default=0.0)
-    fastest = fastest or float(np.linalg.norm(about.omega))
-    speed = float(np.abs(carrier.velocity).max())
+    speed, turning = float(np.abs(carrier.velocity).max()), float(np.linalg.norm(about.omega))
+    if not fastest and speed <= turning * compiled.length:  # the axis is in the system
+        fastest = turning
     later = TURN / fastest if fastest else AHEAD * compiled.length / speed
     moved, moved_u_dot = moved_on(model, state, carrier, spins, later)
     turned = turned_axes(model, spins, later)
@@ -87,7 +90,9 @@ def require_steady(
     set_iterate(other, moved, moved_u_dot, about.w)
     require_round(compiled, work, other, turned)
     after = balance(compiled, other, about.w)
-    require_balance(after, about.residual, f"moved on by {later:.3g}, forces are out of balance")
+    require_balance(
+        after, max(BALANCED_LATER, 10 * about.residual), f"moved on by {later:.3g}, forces are out of balance"
+    )
     set_iterate(other, moved, moved_u_dot, after.w)
     others = tangents(model, other)
     N_later = turned.T @ N
@@ -204,9 +209,9 @@ def next_wrenches(parts: Linearized, f: Array, g: Array, free: NDArray[np.bool_]
     return np.asarray(la.lstsq(A, b, cond=1e-12)[0])
 
 
-def require_balance(found: Balance, residual: float, words: str) -> None:
-    """Raise `ModelError` if forces are out of balance, by more than those of an equilibrium that was given."""
-    if not found.error <= max(BALANCED, 10 * residual):
+def require_balance(found: Balance, most: float, words: str) -> None:
+    """Raise `ModelError` if forces are out of balance by more than `most` of those at work."""
+    if not found.error <= most:
         raise ModelError(
             f"{NOT} {words} by {found.error:.2g} of those at work, most at body {found.body!r}; take the state of "
             "steady_motion or steady_rotation"
@@ -220,7 +225,7 @@ def require_round(compiled: CompiledSystem, work: Work, later: Work, turned: Arr
         u = slice(int(compiled.model.bodies.u0[i]), int(compiled.model.bodies.u0[i + 1]))
         change = np.abs(turned[u, u] @ two @ turned[u, u].T - one)[:6, :6]
         m, J = one[0, 0], np.abs(one[3:6, 3:6]).max()
-        allowed = SAME * np.kron([[m, np.sqrt(m * J)], [np.sqrt(m * J), J]], np.ones((3, 3)))
+        allowed = ROUND * np.kron([[m, np.sqrt(m * J)], [np.sqrt(m * J), J]], np.ones((3, 3)))
         if (change > allowed).any():
             raise ModelError(
                 f"{NOT} body {compiled.body_names[i]!r} spins about an axis about which its mass is not round: its "

@@ -61,6 +61,11 @@ class Antenna:
 
 #: 24 narrow petals with more modes, the last 0.05 rad before the latch; `replace(FINE, play=HingePlay())`: with play
 FINE = Antenna(
-    n_petals=24, petal_width=0.15, n_along=40, petal_modes=12, strut_modes=6, stiff_struts=False,
+    n_petals=24,
+    petal_width=0.15,
+    n_along=40,
+    petal_modes=12,
+    strut_modes=6,
+    stiff_struts=False,
     begin=float(np.deg2rad(75.0) - 0.05),
 )

@@ -24,7 +24,7 @@ from floatframe.system import System
 
 __all__ = ["Bracket", "Hunted", "Run", "bracket_of_unstable_cycle", "hunted"]
 
-SMALLER = 0.93  #: next amplitude after one from which a wheel climbs
+SMALLER = 0.96  #: next amplitude after one from which a wheel climbs
 LASTING = 0.7  #: of the amplitude of a cycle, above which an oscillation ends on it
 SETTLING = 1.0  #: before an oscillation that starts as a mode is that of its amplitude [s]
 
@@ -87,18 +87,17 @@ class Hunted:
 
 def hunted(system: System, axle: str) -> Hunted:
     """Return a vehicle on straight track in steady running with its least damped lateral oscillation."""
+    names = [body.name for body in system.bodies]
+    if axle not in names:
+        raise ModelError(f"hunted: no body {axle!r}; choose among {', '.join(names)}")
     motion = steady_motion_of(system)
     roots, modes = lateral_modes(linearize(motion.system, motion.equilibrium, inputs=(), outputs=()))
     if not len(roots):
         raise ModelError("hunted: no oscillation to the side between 0.1 and 15 Hz")
     root = roots[np.argmax(roots.real / np.abs(roots))]
     shape = modes.shapes[:, np.argmin(np.abs(modes.eigenvalues - root))]
-    first = 0
-    for body in system.bodies:
-        if body.name == axle:
-            return Hunted(motion, axle, complex(root), shape / shape[first + 1])
-        first += 6 + (body.reduced.n_q if isinstance(body, FlexibleBody) else 0)
-    raise ModelError(f"hunted: no body {axle!r}; choose among {', '.join(body.name for body in system.bodies)}")
+    sizes = [6 + (body.reduced.n_q if isinstance(body, FlexibleBody) else 0) for body in system.bodies]
+    return Hunted(motion, axle, complex(root), shape / shape[sum(sizes[: names.index(axle)]) + 1])
 
 
 def bracket_of_unstable_cycle(
@@ -122,16 +121,24 @@ def bracket_of_unstable_cycle(
             f"bracket_of_unstable_cycle: expected 0 < low < high and more than {SETTLING + 2.0:g} s, got low = "
             f"{low:g}, high = {high:g}, seconds = {seconds:g}"
         )
-    lasting = vehicle.run(high, seconds=seconds)
-    while not np.isfinite(lasting.late) and lasting.start > low:
-        lasting = vehicle.run(SMALLER * lasting.start, seconds=seconds)
+    lasting = run_on_rails(vehicle, high, low, seconds)
     cycle = lasting.late
-    if not cycle > LASTING * lasting.early:
+    if not cycle > LASTING * lasting.start:
         return Bracket(lasting, None, np.nan)
     decaying = vehicle.run(low, seconds=seconds)
     if decaying.late > LASTING * cycle:
         return Bracket(None, decaying, cycle)
     for _ in range(n_runs):
-        run = vehicle.run(0.5 * (decaying.start + lasting.start), seconds=seconds)
+        run = run_on_rails(vehicle, 0.5 * (decaying.start + lasting.start), decaying.start, seconds)
+        if run.start <= decaying.start:
+            break
         decaying, lasting = (decaying, run) if run.late > LASTING * cycle else (run, lasting)
     return Bracket(decaying, lasting, cycle)
+
+
+def run_on_rails(vehicle: Hunted, amplitude: float, least: float, seconds: float) -> Run:
+    """Return the run from an amplitude, or the next smaller one, down to the least, after which no wheel climbs."""
+    run = vehicle.run(amplitude, seconds=seconds)
+    while not np.isfinite(run.late) and run.start > least:
+        run = vehicle.run(SMALLER * run.start, seconds=seconds)
+    return run

@@ -14,6 +14,7 @@ from cms.jobs.job import read_job
 from floatframe.machines import machine_files
 from floatframe.machines.kart import Kart, chassis_files, kart_files
 from floatframe.machines.kart.figures import torsion_stiffness, turn_of
+from floatframe.machines.kart.steady_turn import steady_turn, turn_eigenvalues
 
 G = 9.81
 KART = Kart()
@@ -109,3 +110,19 @@ def test_in_the_turn_loads_move_by_the_lateral_acceleration_times_the_height_of_
     before = turn.loads[(turn.t > 0.4) & (turn.t < 0.69)].mean(axis=0)
     height = -(turn.loads[-1] - before) @ y * G / (weight(parts[1]) * turn.lateral_acceleration[-1])
     assert 0.17 < height < 0.26  # pilot at 0.28, chassis and wheels near 0.1
+
+
+@pytest.mark.parametrize("is_rigid", [True, False])
+def test_the_steady_turn_is_where_the_run_ends_and_it_is_stable(turns, parts, is_rigid):
+    """Second road: 1.1 s after the step the run turns within 1 % as the state without a time does."""
+    (name, text), *_ = kart_files(KART, is_rigid=is_rigid).items()
+    (parts[0] / name).write_text(text)
+    motion = steady_turn(ff.read_system(parts[0] / name)[0], float(turns[is_rigid].speed[-1]))
+    assert_allclose(1 / motion.curvature, turns[is_rigid].radius, rtol=0.01)
+    loads = [
+        ff.element_motion(motion.system, ff.snapshot(motion.system, motion.equilibrium, t=100.0), f"tyre_{wheel}")
+        for wheel in ("front_left", "front_right", "rear_left", "rear_right")
+    ]
+    found = [float(each.outputs["Fz"][0]) for each in loads]
+    assert_allclose(found, turns[is_rigid].loads[-1], rtol=0.03)
+    assert turn_eigenvalues(motion).real.max() < -5 * is_rigid
