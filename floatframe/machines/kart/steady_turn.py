@@ -73,7 +73,6 @@ def critical_speed_in_turn(
     tolerance
         Of the speed [m/s].
     """
-
     last: list[SteadyMotion] = []
 
     def is_stable(speed: float) -> bool:
