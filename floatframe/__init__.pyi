@@ -32,6 +32,9 @@ from .analyses import sweep as sweep
 from .analyses import system_modes as system_modes
 from .analyses import with_motors as with_motors
 from .analyses import write_state_space as write_state_space
+from .analyses.inverse_kinematics import ReachedPose as ReachedPose
+from .analyses.inverse_kinematics import Target as Target
+from .analyses.inverse_kinematics import inverse_kinematics as inverse_kinematics
 from .bodies.added_mass import AddedMass as AddedMass
 from .bodies.added_mass import with_masses as with_masses
 from .bodies.coordinates import AxialAngle as AxialAngle
