@@ -132,7 +132,7 @@ def test_the_flexible_car_follows_its_driver(folder):
 
 
 def test_the_study_of_the_suspension_runs(folder, tmp_path):
-    """Its first step, over the first 0.16 s and by one of its parameters: better than the start, within its limits."""
+    """Two evaluations, over the first 0.16 s and by one of its parameters: the stiffer bar rolls less."""
     shipped = {path.name: path.read_text() for path in machine_files("road-car")}
     (tmp_path / "body.h5").write_bytes((folder / "body.h5").read_bytes())
     lanes = shipped["lane_change_bars.toml"]
@@ -144,6 +144,7 @@ def test_the_study_of_the_suspension_runs(folder, tmp_path):
     text = "processes = 1\n" + text[:begin] + text[end:]
     (tmp_path / "study.toml").write_text(re.sub("iterations = .*", "iterations = 1", text))
     best = ff.optimize(ff.read_design(tmp_path / "study.toml"))
-    assert len(best.history) >= 2
-    assert all(not row.evaluation.error for row in best.history)
-    assert min(row.objective for row in best.history) <= best.history[0].objective
+    start, changed = (row.evaluation for row in best.history[:2])
+    assert (start.values, changed.values) == ((800.0,), (836.0,))
+    roll, stiffer = start.numbers[2][0], changed.numbers[2][0]
+    assert 0.998 * roll < stiffer < 0.9995 * roll  # a stiffer bar rolls less, a little: 36 of 800 N m/rad in 0.16 s
