@@ -55,6 +55,11 @@ class SystemTree:
     constrained: tuple[str, ...]  #: joints without a chart, or with a law that keeps them constraints
 
     @property
+    def is_tree(self) -> bool:
+        """Whether every joint is one of the tree, and no coupler or element is beside it: nothing closes a loop."""
+        return not len(self.tree.kept)
+
+    @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates that are unknown, in their order."""
         return tuple(each.name for each in self.columns if not each.is_driven)

@@ -104,9 +104,17 @@ def consistent_state(
 
 
 def consistent_motion(
-    system: System, state: State | None = None, *, t: float = 0.0, known: Array | None = None
+    system: System,
+    state: State | None = None,
+    *,
+    t: float = 0.0,
+    known: Array | None = None,
+    is_tree: bool = False,
 ) -> ConsistentState:
-    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files."""
+    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files.
+
+    is_tree: joints close no loop, so that no constraint repeats others, and none is looked for.
+    """
     compiled = compiled_system(system)
     given = compiled.placed if state is None else checked(compiled, state)
     known = known_of(compiled, state) if known is None else known
@@ -115,7 +123,8 @@ def consistent_motion(
     state = assembled(compiled, work, given, known)
     require_placed_near(compiled, given, state)
     require_no_half_turns(compiled, work, state)
-    require_independent_constraints(compiled, work, state)
+    if not is_tree:
+        require_independent_constraints(compiled, work, state)
     state = with_compatible_velocities(compiled, work, state, known)
     return ConsistentState(state, *solve_accelerations(compiled, work, state, known))
 
