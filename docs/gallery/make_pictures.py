@@ -24,6 +24,7 @@ import floatframe as ff
 from floatframe import mechanisms
 from floatframe.functions.time_functions import cycloidal_spin_up
 from floatframe.pictures.animation import animate
+from floatframe.results.results_file import MemorySource
 from floatframe.system_file.read_system import read_system
 
 HERE = Path(__file__).resolve().parent
@@ -78,6 +79,28 @@ def landing_gear() -> None:
         frames = [cut(frame) for frame in iio.imread(film)]
     size = min(len(frame) for frame in frames)
     save_film([frame[:size] for frame in frames], HERE / "landing_gear.gif", fps=10)
+
+
+def landing_gear_running(case: str, t_begin: float, t_end: float, *, magnification: float, speed: float) -> None:
+    """A gear as one sees it who runs along: braking with anti-skid on the wet patch, or the limit cycle of shimmy."""
+    from floatframe.machines import copy_machine
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copy_machine("landing-gear", folder)
+        for part in ("piston", "nose_leg"):
+            cms.write(cms.reduce_job(folder / f"{part}.toml"), folder / f"{part}.h5")
+        system, run = read_system(folder / f"{case}.toml")
+        motion = ff.integrate(replace(system, scene=()), run.integrator, t_end, h=run.h, output_every=5)
+        rows = motion.t >= t_begin
+        arrays = {key: values[rows] for key, values in motion.source.arrays.items() if len(values) == len(rows)}
+        arrays["position"] = arrays["position"] - motion.body("carriage").r[rows, None] * [1, 0, 0]
+        motion = replace(motion, source=MemorySource(arrays))
+        film = folder / "film.gif"
+        animate(motion, drawn(system), film, speed=speed, fps=12, magnification=magnification)
+        frames = [cut(frame) for frame in iio.imread(film)]
+    size = min(len(frame) for frame in frames)
+    save_film([frame[:size] for frame in frames], HERE / f"landing_gear_{case}.gif", fps=12)
 
 
 def still(name: str, make: Callable[[], tuple[ff.System, float, float]]) -> None:
@@ -275,6 +298,8 @@ MECHANISMS: dict[str, Callable[[], None]] = {
     "road_car": road_car,
     "road_car_plots": road_car_plots,
     "road_car_study": road_car_study,
+    "landing_gear_braking": partial(landing_gear_running, "braking", 1.9, 2.4, magnification=5.0, speed=0.1),
+    "landing_gear_shimmy": partial(landing_gear_running, "shimmy", 2.8, 3.0, magnification=1.0, speed=0.04),
     **{maker.__name__: partial(still, maker.__name__, maker) for maker in (four_bar, satellite, chain)},
 }
 
