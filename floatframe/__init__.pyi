@@ -104,6 +104,7 @@ from .identification.excitation import MotionLimits as MotionLimits
 from .identification.excitation import exciting_motion as exciting_motion
 from .identification.physical import real_parameters as real_parameters
 from .identification.regressors import linear_form as linear_form
+from .identification.tree_samples import tree_samples as tree_samples
 from .importers.read_urdf import read_urdf as read_urdf
 from .importers.robot import Robot as Robot
 from .importers.robot_system import FlexibleLink as FlexibleLink

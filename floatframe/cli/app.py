@@ -13,6 +13,7 @@ from floatframe.cli import (
     driven,
     fatigue,
     gradient,
+    identify,
     linear,
     machine,
     optimize,
@@ -510,6 +511,7 @@ spectra.register(app)
 driven.register(app)
 sweep.register(app)
 optimize.register(app)
+identify.register(app)
 study.register(app)
 shake.register(app)
 gradient.register(app)

@@ -21,7 +21,7 @@ import scipy.linalg as la
 from fe_models.foundation.arrays import Array
 from floatframe.identification.inertial_parameters import INERTIAL, parameters_in, point_mass
 from floatframe.identification.regressors import LinearForm
-from floatframe.identification.tree_samples import as_placed, rigid_tree, sampled
+from floatframe.identification.tree_samples import as_placed, rigid_tree, tree_samples
 
 __all__ = ["BarycentricParameters", "barycentric_parameters"]
 
@@ -47,7 +47,7 @@ def barycentric_parameters(form: LinearForm) -> BarycentricParameters:
     tree = rigid_tree(form.system, f"system {form.system.name!r}: barycentric parameters").tree
     n_b, n_c = len(tree.parent), len(tree.side)
     zero = np.zeros((1, n_c))
-    placed = sampled(form.system, as_placed(form.system)[None], zero, zero)
+    placed = tree_samples(form.system, as_placed(form.system)[None], zero, zero)
     own = [parameters_in(placed.r[0, i], placed.R[0, i]) for i in range(n_b)]
     p = 10 * n_b
     passed = np.eye(p)  # parameters of augmented bodies by those of the bodies

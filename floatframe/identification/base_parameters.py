@@ -19,7 +19,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.identification.regressors import LinearForm
 from floatframe.identification.transfer_rules import silent_directions
-from floatframe.identification.tree_samples import TreeSamples, sampled
+from floatframe.identification.tree_samples import TreeSamples, tree_samples
 
 __all__ = ["SOURCES", "BaseParameters", "base_parameters", "form_rows", "random_samples", "sampled_silence"]
 
@@ -99,7 +99,7 @@ def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:
     size = np.where(units, compiled_system(form.system).length, 1.0)
     n = N_SAMPLES * len(form.system.bodies)
     x = rng.uniform(-np.pi, np.pi, (n, zero.shape[1])) * size
-    return sampled(form.system, x, rng.normal(size=x.shape) * size, rng.normal(size=x.shape) * size)
+    return tree_samples(form.system, x, rng.normal(size=x.shape) * size, rng.normal(size=x.shape) * size)
 
 
 def form_columns(form: LinearForm) -> Sequence:

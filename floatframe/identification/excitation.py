@@ -24,7 +24,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.identification.base_parameters import BaseParameters, form_rows, typical
-from floatframe.identification.tree_samples import TreeSamples, sampled
+from floatframe.identification.tree_samples import TreeSamples, tree_samples
 from floatframe.relative.topology import tree_of
 
 __all__ = ["ExcitingMotion", "MotionLimits", "exciting_motion"]
@@ -119,7 +119,7 @@ def exciting_motion(
 
     def motion(x: Array) -> TreeSamples:
         C = x.reshape(n_c, width)
-        return sampled(form.system, *(block @ C.T for block in blocks))
+        return tree_samples(form.system, *(block @ C.T for block in blocks))
 
     def condition(x: Array) -> float:
         s = la.svdvals(base.rows(form_rows(form, motion(x), base.source)) / size)

@@ -36,7 +36,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.identification.inertial_parameters import PAIRS, parameters_in, point_mass
 from floatframe.identification.regressors import LinearForm
-from floatframe.identification.tree_samples import as_placed, gravity_of, rigid_tree, sampled
+from floatframe.identification.tree_samples import as_placed, gravity_of, rigid_tree, tree_samples
 
 __all__ = ["silent_directions"]
 
@@ -64,7 +64,7 @@ def silent_directions(form: LinearForm) -> Array:
     tree = rigid_tree(system, f"system {system.name!r}: rules of base parameters").tree
     n_c, n_b = len(tree.side), len(tree.parent)
     zero = np.zeros((1, n_c))
-    placed = sampled(system, as_placed(system)[None], zero, zero)
+    placed = tree_samples(system, as_placed(system)[None], zero, zero)
     moves = [moves_of(form, placed, tree, i) for i in range(n_b)]
     gravity = gravity_of(system)
     size = compiled_system(system).length

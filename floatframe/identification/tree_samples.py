@@ -22,7 +22,7 @@ from floatframe.relative.topology import SystemTree, tree_of
 from floatframe.start.newton_equations import set_iterate
 from floatframe.system import System
 
-__all__ = ["TreeSamples", "as_placed", "gravity_of", "rigid_tree", "sampled"]
+__all__ = ["TreeSamples", "as_placed", "gravity_of", "rigid_tree", "tree_samples"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def gravity_of(system: System) -> Array:
     return np.array(compiled_system(system).model.gravity)
 
 
-def sampled(system: System, x: Array, rate: Array, acceleration: Array) -> TreeSamples:
+def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> TreeSamples:
     """Return the motion of a rigid tree at given coordinates.
 
     Parameters

@@ -11,7 +11,7 @@ from floatframe.identification.excitation import ExcitingMotion, MotionLimits, e
 from floatframe.identification.inertial_parameters import pseudo_inertia
 from floatframe.identification.physical import log_cholesky, parameters_of_cholesky, real_parameters
 from floatframe.identification.regressors import linear_form
-from floatframe.identification.tree_samples import sampled
+from floatframe.identification.tree_samples import tree_samples
 from tests.floatframe.identification.robots import six_axes
 
 #: offsets and lengths of the order of a KUKA IR 361, three parallel and three meeting axes: chosen, not measured
@@ -28,7 +28,7 @@ def robot():
     motion = ExcitingMotion(
         tuple(f"joint{k + 1}/angle" for k in range(n_c)), 6.0, rng.normal(size=(n_c, 11)) * 0.8, np.nan
     )
-    samples = sampled(form.system, *motion.at(np.arange(100) * 0.06))
+    samples = tree_samples(form.system, *motion.at(np.arange(100) * 0.06))
     phi = form.values
     phi[60:66], phi[66:] = 5.0, 3.0
     return form, samples, phi
@@ -97,7 +97,7 @@ def test_another_motion_is_predicted(robot, truth):
     form, samples, phi = robot
     made = estimate(form, Measured(samples, noisy(truth, np.random.default_rng(3))[0]))
     rng = np.random.default_rng(9)
-    other = sampled(form.system, *(rng.normal(size=(30, 6)) for _ in range(3)))
+    other = tree_samples(form.system, *(rng.normal(size=(30, 6)) for _ in range(3)))
     right = Measured(other, form.torques(other) @ phi)
     W = made.base.rows(form.torques(other))
     doubt = np.sqrt(np.einsum("skp,pq,skq->sk", W, made.covariance, W))
@@ -128,10 +128,10 @@ def test_unknowns_of_a_pseudo_inertia_come_back():
 
 def test_what_a_motion_does_not_tell_is_named(robot):
     form, samples, phi = robot
-    still = sampled(form.system, samples.x, 0 * samples.rate, 0 * samples.acceleration)
+    still = tree_samples(form.system, samples.x, 0 * samples.rate, 0 * samples.acceleration)
     with pytest.raises(ModelError, match=r"does not tell .* J_zz\(link1\)"):
         estimate(form, Measured(still, form.torques(still) @ phi))
-    few = sampled(form.system, samples.x[:5], samples.rate[:5], samples.acceleration[:5])
+    few = tree_samples(form.system, samples.x[:5], samples.rate[:5], samples.acceleration[:5])
     with pytest.raises(ModelError, match="measure longer"):
         estimate(form, Measured(few, form.torques(few) @ phi))
     with pytest.raises(ModelError, match="expected 100 rows of 6 columns"):
@@ -153,7 +153,7 @@ def test_an_exciting_motion_keeps_its_limits_and_beats_random_ones():
     assert np.abs(x).max() <= 1.5 + 1e-6
     assert np.abs(rate).max() <= 2.0 + 1e-6
     assert np.abs(acceleration).max() <= 8.0 + 1e-6
-    tau = small.torques(sampled(small.system, x, rate, acceleration)) @ small.values
+    tau = small.torques(tree_samples(small.system, x, rate, acceleration)) @ small.values
     assert np.abs(tau).max() <= 90.0 * (1 + 1e-6)
     assert best.condition < 0.8 * plain.condition
     before, now, after = best.at(np.array([1.0 - 1e-5, 1.0, 1.0 + 1e-5]))[0]

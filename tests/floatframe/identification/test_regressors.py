@@ -14,7 +14,7 @@ from floatframe.identification.inertial_parameters import (
     pseudo_inertia,
 )
 from floatframe.identification.regressors import linear_form
-from floatframe.identification.tree_samples import sampled
+from floatframe.identification.tree_samples import tree_samples
 from floatframe.relative.recursive import relative_model
 from floatframe.start.initial import consistent_motion
 from tests.floatframe.identification.robots import DOWN, random_tree, six_axes, some_body
@@ -47,7 +47,7 @@ def test_reactions_are_those_that_the_absolute_equations_find():
     z_ddot = model.forward_dynamics(np.zeros(2), np.zeros(2), np.zeros(2))
     form = linear_form(system)
     zero = np.zeros((1, 2))
-    samples = sampled(system, zero, zero, np.asarray(z_ddot).reshape(1, 2))
+    samples = tree_samples(system, zero, zero, np.asarray(z_ddot).reshape(1, 2))
     reaction = (form.reactions(samples) @ form.values)[0]
     assert_allclose(reaction[:3], -made.w[:3], rtol=0, atol=1e-10 * np.abs(made.w).max())
     assert_allclose(form.torques(samples) @ form.values, 0, rtol=0, atol=1e-10 * np.abs(made.w).max())
@@ -100,4 +100,4 @@ def test_what_is_no_tree_of_rigid_bodies_is_refused_by_name():
     with pytest.raises(ModelError, match="no term 'viscos'"):
         linear_form(system, ["viscos"])
     with pytest.raises(ModelError, match="one column for each of"):
-        sampled(system, np.zeros((2, 5)), np.zeros((2, 5)), np.zeros((2, 5)))
+        tree_samples(system, np.zeros((2, 5)), np.zeros((2, 5)), np.zeros((2, 5)))

@@ -1,0 +1,114 @@
+"""The command identify: inertial parameters of a tree from a measured motion."""
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cms.cli.console import guarded, output_path, print_table, say, stages
+
+if TYPE_CHECKING:
+    from floatframe.identification.estimation import Estimate
+
+__all__ = ["register"]
+
+KINDS = ("html", "json")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command("identify")(identify_command)
+
+
+@guarded
+def identify_command(
+    system: Annotated[Path, typer.Argument(help="System file (TOML) of a tree of rigid bodies.")],
+    data: Annotated[Path, typer.Argument(help="Measured motion (.csv, .mat, ...), see docs/identification.md.")],
+    outputs: Annotated[
+        list[Path],
+        typer.Option("--output", "-o", help="A .html or .json file; repeatable."),
+    ] = [],  # noqa: B006
+    terms: Annotated[
+        str,
+        typer.Option("--terms", help="Of each drive, with commas: motor-inertia, viscous, coulomb, offset; none."),
+    ] = "viscous,coulomb",
+    method: Annotated[str, typer.Option("--method", help="ordinary, weighted or robust.")] = "weighted",
+    cutoff: Annotated[float | None, typer.Option("--cutoff", help="Filter all channels above this [Hz].")] = None,
+    thin: Annotated[int | None, typer.Option("--thin", min=1, help="Take every so many rows.")] = None,
+    check: Annotated[
+        Path | None, typer.Option("--check", help="Another measured motion, on which the estimate is tried.")
+    ] = None,
+    real: Annotated[
+        bool, typer.Option("--real/--no-real", help="Find real bodies (positive masses and inertias) too.")
+    ] = True,
+    json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
+) -> None:
+    """Find the inertial parameters of a robot from a measured motion: base parameters with their deviations.
+
+    Columns of the data are the positions of all coordinates by their names in results (joint1/angle), their torques
+    (joint1/angle torque) or the reactions at the base (base F_x to base M_z), or both; rates and accelerations
+    (joint1/angle rate, joint1/angle acceleration) if they were measured.
+
+    Example: floatframe identify robot.toml measured.csv --cutoff 10 -o report.html
+    """
+    from fe_models.foundation.paths import replace_file
+    from floatframe.errors import ModelError
+    from floatframe.identification.estimation import estimate
+    from floatframe.identification.identify_report import identification_html, identification_record
+    from floatframe.identification.measured_file import read_measured
+    from floatframe.identification.physical import real_parameters
+    from floatframe.identification.regressors import linear_form
+    from floatframe.system_file.read_system import read_system
+
+    described = read_system(system)[0]
+    inputs = tuple(path for path in (system, data, check) if path is not None)
+    wanted = outputs or ([] if json else [data.with_suffix(".html")])
+    paths = [output_path(path, None, ModelError, overwrite_of=inputs) for path in wanted]
+    for path in paths:
+        if path.suffix.lower().removeprefix(".") not in KINDS:
+            raise ModelError(f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in KINDS)}")
+    named = [term.strip() for term in terms.split(",") if term.strip() not in ("", "none")]
+    with stages() as clock:
+        with clock("measured motion"):
+            form = linear_form(described, named)
+            read = read_measured(data, described, cutoff=cutoff, thin=thin)
+            other = None if check is None else read_measured(check, described, cutoff=cutoff, thin=thin).measured
+        with clock("base parameters"):
+            made = estimate(form, read.measured, method=method)
+        bodies = None
+        if real:
+            with clock("real bodies"):
+                bodies = real_parameters(made)
+        with clock("record"):
+            record = identification_record(made, bodies, other, read.notes)
+    if json:
+        typer.echo(json_module.dumps(record, indent=2))
+    else:
+        print_estimate(made, record)
+    for path in paths:
+        if path.suffix.lower() == ".json":
+            replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
+        else:
+            replace_file(path, identification_html(made, record, other).encode())
+        if not json:
+            say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+
+
+def print_estimate(made: "Estimate", record: dict[str, Any]) -> None:
+    """Print combinations, channels, and what is doubtful."""
+    rows = [
+        (each["name"], f"{each['value']:.5g}", f"{each['deviation']:.2g}", f"{each['relative']:.1%}")
+        for each in record["parameters"]
+    ]
+    print_table("Base parameters", ("combination", "value>", "deviation>", "relative>"), rows)
+    channels = [(each["name"], f"{each['noise']:.4g}", f"{each['misfit']:.2%}") for each in record["channels"]]
+    print_table("Channels", ("channel", "noise>", "misfit>"), channels)
+    if record["validation"] is not None:
+        print_table(
+            "Another motion", ("channel", "misfit>"), [(k, f"{v:.2%}") for k, v in record["validation"].items()]
+        )
+    if record["without_effect"]:
+        say(f"without effect on what was measured: {', '.join(record['without_effect'])}")
+    for words in (*record["notes"], *made.warnings):
+        say(words)

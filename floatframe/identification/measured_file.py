@@ -1,0 +1,171 @@
+"""A measured motion from a file: positions, torques, and reactions at the base, by the names of their channels.
+
+    joint1/angle                 position of a coordinate, by its name in results
+    joint1/angle rate            its rate, joint1/angle acceleration: its acceleration; else derived from positions
+    joint1/angle torque          torque or force of its drive; joint1/angle force is the same
+    base F_x ... base M_z        force and moment of the ground on the tree, about the origin of the ground
+
+Rates that were not measured are central differences. A cut-off filters all channels alike, forwards and backwards
+(Butterworth of fourth order, no phase), so that both sides of the equations stay equal; rows are then thinned to what
+the band still holds.
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.words import nearest, quoted
+from floatframe.errors import ModelError
+from floatframe.identification.estimation import BASE, Measured
+from floatframe.identification.tree_samples import rigid_tree, tree_samples
+from floatframe.signals.read_signals import read_signals
+from floatframe.signals.signals import Signals
+from floatframe.system import System
+
+__all__ = ["MeasuredFile", "read_measured"]
+
+LEAST_ROWS = 20  #: instants below which nothing is estimated
+ENDS = 3  #: periods of the cut-off that are left out at both ends, where filters and differences are not sure
+KINDS = {"": "position", " rate": "rate", " acceleration": "acceleration", " torque": "torque", " force": "torque"}
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredFile:
+    """A measured motion, and what was done with it."""
+
+    measured: Measured
+    notes: tuple[str, ...]
+
+
+def read_measured(
+    path: str | os.PathLike[str], system: System, *, cutoff: float | None = None, thin: int | None = None
+) -> MeasuredFile:
+    """Read a measured motion of a tree of rigid bodies.
+
+    Parameters
+    ----------
+    path
+        A table of channels, see `floatframe.signals.read_signals`.
+    system
+        The tree; angles in rad, deg, lengths in any unit that the file states are turned into its units.
+    cutoff
+        Of the filter [Hz]; None: channels as they are.
+    thin
+        Every how many rows one is taken; by default all, or with a cut-off as many as it leaves independent.
+
+    Raises
+    ------
+    ModelError
+        If channels are missing, not known or in wrong units, the file is too short, or the cut-off too high.
+    SignalError
+        If the file cannot be read.
+    """
+    where = str(path)
+    columns = rigid_tree(system, f"system {system.name!r}: identification").columns
+    names = [column.name for column in columns]
+    signals = read_signals(path)
+    known = [name + suffix for name in names for suffix in KINDS] + list(BASE)
+    unknown = [name for name in signals.names if name not in known]
+    if unknown:
+        raise ModelError(
+            f"{where}: channel {quoted(unknown[0])}: expected the name of a coordinate, alone or with "
+            f"' rate', ' acceleration', ' torque', or 'base F_x' to 'base M_z'{nearest(unknown[0], known)}"
+        )
+    missing = [name for name in names if name not in signals.names]
+    if missing:
+        raise ModelError(
+            f"{where}: no position of {', '.join(quoted(name) for name in missing)}; every coordinate needs one "
+            f"(channels: {', '.join(signals.names)})"
+        )
+    has_torque = [name + " torque" in signals.names or name + " force" in signals.names for name in names]
+    has_base = [name in signals.names for name in BASE]
+    for has, what, all_names in ((has_torque, "torques", names), (has_base, "reactions", list(BASE))):
+        if any(has) and not all(has):
+            lacking = [name for name, is_there in zip(all_names, has, strict=True) if not is_there]
+            raise ModelError(f"{where}: {what}: expected all of them or none, missing {', '.join(lacking)}")
+    if not any(has_torque) and not any(has_base):
+        raise ModelError(
+            f"{where}: neither torques ('{names[0]} torque') nor reactions ('base F_x', ...) were measured"
+        )
+    steps = np.diff(signals.time)
+    if len(signals.time) < LEAST_ROWS or steps.max() > 1.01 * steps.min():
+        raise ModelError(
+            f"{where}: expected at least {LEAST_ROWS} rows at one rate, got {len(signals.time)} with steps of "
+            f"{steps.min(initial=np.inf):.6g} to {steps.max(initial=0):.6g} s; resample it first (docs/signals.md)"
+        )
+    return assembled(where, system, signals, columns, cutoff, thin, any(has_torque), any(has_base))
+
+
+def assembled(
+    where: str, system: System, signals: Signals, columns: tuple, cutoff: float | None, thin: int | None,
+    has_torque: bool, has_base: bool,
+) -> MeasuredFile:  # fmt: skip
+    """Return the motion of channels that are known to be there."""
+    t = np.asarray(signals.time)
+    h, notes = float(t[-1] - t[0]) / (len(t) - 1), list(signals.notes)
+    smooth = filter_of(where, cutoff, 1.0 / h)
+    length, force, moment = units_of(system)
+
+    def channel(name: str, unit: str) -> Array:
+        signal = signals[name]
+        if not signal.unit:
+            return np.asarray(signal.values)
+        return np.asarray(signal.to(unit).values)
+
+    x, rate, acceleration, torque = (np.empty((len(t), len(columns))) for _ in range(4))
+    derived = []
+    for k, column in enumerate(columns):
+        unit = length if column.unit == "m" else "rad"
+        x[:, k] = smooth(channel(column.name, unit))
+        for out, suffix, source, of_unit in (
+            (rate, " rate", x, f"{unit}/s"), (acceleration, " acceleration", rate, f"{unit}/s^2"),
+        ):  # fmt: skip
+            if column.name + suffix in signals.names:
+                out[:, k] = smooth(channel(column.name + suffix, of_unit))
+            else:
+                out[:, k] = np.gradient(source[:, k], h, edge_order=2)
+                derived.append(column.name + suffix)
+        if has_torque:
+            own = " torque" if column.name + " torque" in signals.names else " force"
+            torque[:, k] = smooth(channel(column.name + own, force if column.unit == "m" else moment))
+    base = np.stack([smooth(channel(name, force if "F" in name else moment)) for name in BASE], 1) if has_base else None
+    if derived:
+        notes.append(f"derived by central differences: {', '.join(derived[:4])}{', ...' if len(derived) > 4 else ''}")
+    if cutoff is not None:
+        notes.append(f"all channels filtered at {cutoff:g} Hz, forwards and backwards")
+    ends = 2 if cutoff is None else int(np.ceil(ENDS / (cutoff * h)))
+    step = thin or (1 if cutoff is None else max(1, int(0.4 / (cutoff * h))))
+    rows = slice(ends, len(t) - ends, step)
+    if len(t[rows]) < LEAST_ROWS:
+        raise ModelError(
+            f"{where}: {len(t)} rows over {t[-1] - t[0]:.3g} s leave {len(t[rows])} instants, expected at least "
+            f"{LEAST_ROWS}; measure longer, or raise the cut-off"
+        )
+    notes.append(f"{len(t[rows])} of {len(t)} rows used")
+    samples = tree_samples(system, x[rows], rate[rows], acceleration[rows])
+    measured = Measured(
+        samples, torque[rows] if has_torque else None, None if base is None else base[rows], time=t[rows]
+    )
+    return MeasuredFile(measured, tuple(notes))
+
+
+def units_of(system: System) -> tuple[str, str, str]:
+    """Return the units of length, force and moment of a system."""
+    units = system.units
+    return units.length_symbol, units.force_symbol, f"{units.force_symbol} {units.length_symbol}"
+
+
+def filter_of(where: str, cutoff: float | None, rate: float) -> Callable[[Array], Array]:
+    """Return what filters a channel."""
+    if cutoff is None:
+        return lambda values: values
+    if not 0 < cutoff < 0.45 * rate:
+        raise ModelError(
+            f"{where}: cut-off: expected above 0 and below {0.45 * rate:.4g} Hz (rate {rate:.4g} Hz), got {cutoff:g}"
+        )
+    sos = butter(4, cutoff, fs=rate, output="sos")
+    return lambda values: sosfiltfilt(sos, values)
