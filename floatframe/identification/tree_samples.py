@@ -16,7 +16,7 @@ from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.kernels.model import Model
 from floatframe.kernels.work import new_work
-from floatframe.relative.kernels.entry import motion_of_joints, moved
+from floatframe.relative.kernels.entry import motion_of_joints, mover
 from floatframe.relative.kernels.tree import JointWork, new_joint_work
 from floatframe.relative.topology import SystemTree, tree_of
 from floatframe.start.newton_equations import set_iterate
@@ -89,13 +89,14 @@ def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> 
         )
     r, R = np.empty((n, n_b, 3)), np.empty((n, n_b, 3, 3))
     u, u_dot = np.empty((n, n_b, 6)), np.empty((n, n_b, 6))
-    start = as_placed(system)
+    start, move = as_placed(system), mover(model, work, tree, joints)
     t, turn, point = np.empty((n, n_c, 3)), np.empty((n, n_c, 3)), np.empty((n, n_c, 3))
     markers = [int(tree.near[i] if tree.is_reversed[i] else tree.far[i]) for i in range(n_b)]
     owner = np.repeat(np.arange(n_b), np.diff(tree.column0))
     for s in range(n):
         joints.rate[:], joints.acceleration[:] = rate[s], acceleration[s]
-        moved(model, work, tree, joints, x[s] - start)
+        joints.x[:] = x[s] - start
+        move()
         r[s], R[s], t[s], turn[s] = work.state.r, work.state.R, joints.t, joints.a
         u[s], u_dot[s] = work.state.u.reshape(n_b, 6), work.state.u_dot.reshape(n_b, 6)
     for k, i in enumerate(owner):

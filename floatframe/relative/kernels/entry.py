@@ -1,5 +1,7 @@
 """The compiled entry of relative coordinates, and a plain function for each thing it does."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numba import types
 
@@ -31,6 +33,7 @@ __all__ = [
     "motion_of_bodies",
     "motion_of_joints",
     "moved",
+    "mover",
     "newton_matrix",
     "newton_step",
     "observe_tree",
@@ -140,6 +143,24 @@ def moved(model: Model, work: Work, tree: Tree, joints: JointWork, x: Array) -> 
     """Write the absolute iterate with joints moved by x, (n_columns,), from d_start, Q_start."""
     joints.x[:] = np.asarray(x)
     call(model, work, tree, joints, what=MOVE)
+
+
+def mover(model: Model, work: Work, tree: Tree, joints: JointWork) -> Callable[[], None]:
+    """Return a function that does what `moved` does by the increments in `joints.x`, for motions at many instants.
+
+    Addresses of the arrays are found once, which takes longer than a motion.
+    """
+    if not run.signatures:
+        run.compile(SIGNATURE)
+    ordered = filled(Order(), **(NOTHING._asdict() | {"what": MOVE}))
+    records = (model, work, tree, joints, NO_TANGENT, no_memory(), NO_ROWS, ordered)
+    tables = tuple(table_of(record) for record in records)
+
+    def move() -> None:
+        assert len(records) == len(tables)  # keeps the arrays alive
+        run(*tables)
+
+    return move
 
 
 def projected(model: Model, work: Work, tree: Tree, joints: JointWork, c_k: float = 1.0) -> Array:
