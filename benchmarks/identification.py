@@ -34,7 +34,7 @@ def main() -> None:
     print(f"base parameters with friction: torques {len(base.kept)}")
     tau, wrench = form.torques(samples) @ phi, form.reactions(samples) @ phi
     print(f"condition number: best of random motions {plain.condition:.1f}, improved {motion.condition:.1f}")
-    heads = (("known", 7), ("bias/se, largest", 18), ("found/predicted", 17), ("median rel. dev.", 18), ("doubtful", 13))
+    heads = (("known", 7), ("bias/se, largest", 18), ("found/predicted", 17), ("median dev.", 13), ("doubtful", 13))
     print("measured".ljust(12) + "".join(word.rjust(width) for word, width in heads))
     shared = {}
     for source in ("torques", "reactions", "both"):
@@ -54,7 +54,7 @@ def main() -> None:
         ratio = np.sqrt(((error.std(axis=0) / deviation) ** 2).mean())
         relative = deviation / np.maximum(np.abs(own.values(phi)), 1e-9)
         print(
-            f"{source:12}{len(own.kept):7d}{bias:18.2f}{ratio:17.3f}{np.median(relative):18.2%}"
+            f"{source:12}{len(own.kept):7d}{bias:18.2f}{ratio:17.3f}{np.median(relative):13.2%}"
             f"{(relative > 0.3).sum():6d} > 30 %"
         )
         lead = base.B[:, own.kept]
