@@ -12,18 +12,14 @@ from floatframe.cli import (
     cosimulation,
     driven,
     fatigue,
-    gradient,
-    identify,
     linear,
     machine,
-    optimize,
     shake,
     spectra,
-    study,
-    sweep,
     view,
 )
 from floatframe.cli.exchange import robot
+from floatframe.cli.parameters import gradient, identify, optimize, study, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from floatframe import SystemFileError, linearize, optimize, read_design, read_system
 from floatframe.cli.app import app
-from floatframe.cli.optimize import best_system
+from floatframe.cli.parameters.optimize import best_system
 from floatframe.machines import copy_machine
 from floatframe.optimization.design import Quantity
 from floatframe.optimization.evaluation import EvaluationFunction

@@ -1,0 +1,1 @@
+"""Commands that vary or find parameters: sweeps, studies, optimisation, gradients, identification."""
