@@ -17,13 +17,16 @@ from pathlib import Path
 import imageio.v3 as iio
 import numpy as np
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 import cms
 import fe_models as fm
 import floatframe as ff
+from cms.rendering import Lines, Surface, render_animation
 from floatframe import mechanisms
 from floatframe.functions.time_functions import cycloidal_spin_up
-from floatframe.pictures.animation import animate
+from floatframe.pictures.animation import animate, motion_scene
+from floatframe.pictures.film_times import film_times
 from floatframe.results.results_file import MemorySource
 from floatframe.system_file.read_system import read_system
 
@@ -140,6 +143,53 @@ def chain() -> tuple[ff.System, float, float]:
     """A chain of five flexible bars that was let go level."""
     bar = rod_of(0.5, height=0.002, width=0.02, young=70e9, rho=2700.0)
     return mechanisms.chain(5, rod=bar, angles=(0.0,) * 5), 0.6, 5e-4
+
+
+def bogie() -> None:
+    """The railway vehicle hunts at 80 m/s, seen by one who runs along: what moves sideways drawn 20 times larger."""
+    from floatframe import rails
+    from floatframe.machines import copy_machine
+    from floatframe.machines.bogie import RailVehicle, flexible_frames, vehicle
+    from floatframe.machines.bogie.running import blown
+
+    speed, larger = 80.0, 20.0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        copy_machine("bogie", folder)
+        data, frame = RailVehicle(), cms.reduce_job(folder / "frame.toml")
+        laws = rails.ContactLaws(creep="fastsim", friction=0.4, strips=8)
+        system = vehicle(data, speed, laws=laws, frames=flexible_frames(data, frame, speed))
+        system = replace(blown(system, 0.1), scene=())
+        motion = ff.integrate(system, ff.GeneralizedAlpha(0.8, 1e-6), 2.0, 2e-3, output_every=2)
+        rows = motion.t >= 1.0
+        arrays = {key: values[rows] for key, values in motion.source.arrays.items() if len(values) == len(rows)}
+        arrays["position"] = (arrays["position"] - motion.body("body").r[rows, None] * [1, 0, 0]) * [1, larger, 1]
+        arrays["euler_parameters"] = turned_more(arrays["euler_parameters"], larger)
+        motion = replace(motion, source=MemorySource(arrays))
+        film = folder / "film.gif"
+        times = film_times(motion.t, fps=10, speed=0.2)
+        scene = motion_scene(motion, drawn(system), times, magnification=larger, system=system)
+        here = {name: tuple(each for each in getattr(scene, name) if is_front(each)) for name in ("surfaces", "lines")}
+        words = (f"front bogie at {speed:g} m/s, 5 times slower; sideways motion and bending {larger:g} times larger",)
+        render_animation(replace(scene, **here, captions=words), film, fps=times.fps)
+        frames = [cut(each) for each in iio.imread(film)]
+    size = min(len(each) for each in frames)
+    save_film([each[:size] for each in frames], HERE / "bogie.gif", fps=10)
+
+
+def is_front(drawn: Surface | Lines) -> bool:
+    """Return whether what is drawn belongs to the front bogie: ahead of the middle, and shorter than the body."""
+    x = (drawn.nodes if isinstance(drawn, Surface) else drawn.points)[..., 0]
+    return float(x.min()) > 4.0 and float(np.ptp(x)) < 6.0
+
+
+def turned_more(p: np.ndarray, larger: float) -> np.ndarray:
+    """Return rotations, (..., 4), whose lateral axes lean and yaw more; what turns about them stays."""
+    R = Rotation.from_quat(p.reshape(-1, 4), scalar_first=True)
+    axis = R.apply([0, 1, 0])
+    lean = np.column_stack([np.arcsin(axis[:, 2]), np.zeros(len(axis)), -np.arcsin(axis[:, 0])])
+    more = Rotation.from_rotvec(larger * lean) * Rotation.from_rotvec(-lean) * R
+    return more.as_quat(scalar_first=True).reshape(p.shape)
 
 
 def railway_engine() -> None:
@@ -294,6 +344,7 @@ MECHANISMS: dict[str, Callable[[], None]] = {
     "antenna": antenna,
     "railway_engine_film": railway_engine,
     "kart_film": kart,
+    "bogie_film": bogie,
     "landing_gear": landing_gear,
     "road_car": road_car,
     "road_car_plots": road_car_plots,
