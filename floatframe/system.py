@@ -59,7 +59,7 @@ class System:
     fmus: Sequence[Named] = field(default=(), kw_only=True)  #: units of other programs, see `co_simulate`
     scene: Sequence[Shape | Geometry] = field(default=(), kw_only=True)  #: what stands around: ground, road, track
     source: str = field(default="", kw_only=True)  #: path of the system file, for the record; "": made in Python
-    data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of the signals it was made with
+    data_files: Sequence[str] = field(default=(), kw_only=True)  #: paths of signals, tyres, roads it was made with
 
     def __post_init__(self) -> None:
         for part in (
@@ -97,7 +97,7 @@ class System:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files it was read from: the system file, the modal files of its bodies, measured signals."""
+        """The files it was read from: the system file, modal files of bodies, signals, files of elements."""
         sources = [body.source for body in self.bodies if isinstance(body, FlexibleBody)]
         return tuple(source for source in (self.source, *sources, *self.data_files) if source)
 

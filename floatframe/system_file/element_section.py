@@ -2,7 +2,7 @@
 
 import types
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
@@ -41,6 +41,7 @@ class TableReader:
     where: str  #: key path of the table
     folder: Path  #: of the system file
     signals: Mapping[str, SignalFunction] | None = None  #: of the file, by name
+    files: list[str] = field(default_factory=list)  #: those that were read, to which each path is added
 
     def marker(self, value: Any, key: str = "marker") -> Marker:
         """Return the marker of {body = "wheel", marker = "hub", triad = [...]}."""
@@ -59,6 +60,7 @@ class TableReader:
         path = self.folder / value
         if not path.exists():
             raise ModelError(f"{self.where}.{key}: no such file: {path}{near_file(path)}")
+        self.files.append(str(path))
         return path
 
     def table(self, model: Any, value: Any, key: str, expected: str) -> Any:
@@ -105,7 +107,7 @@ class TableReader:
         if isinstance(kind, type) and is_dataclass(kind):
             if not isinstance(value, dict):
                 raise ModelError(f"{self.where}.{key}: expected a table, got {quoted(value)}")
-            return TableReader(f"{self.where}.{key}", self.folder, self.signals).fields_of(kind, value)
+            return TableReader(f"{self.where}.{key}", self.folder, self.signals, self.files).fields_of(kind, value)
         return value
 
     def value_of_union(self, kinds: Sequence[Any], value: Any, key: str) -> Any:
@@ -180,9 +182,13 @@ def words_of(kind: Any) -> str:
 
 
 def element_of(
-    name: str, table: Mapping[str, Any], folder: Path, signals: Mapping[str, SignalFunction] | None = None
+    name: str,
+    table: Mapping[str, Any],
+    folder: Path,
+    signals: Mapping[str, SignalFunction] | None = None,
+    files: list[str] | None = None,
 ) -> Element:
-    """Return the element of a table [elements.NAME].
+    """Return the element of a table [elements.NAME]; the paths of files it reads are added to `files`.
 
     A class with `from_table(name, table, read)` reads its table itself, `read` being a `TableReader`.
 
@@ -200,7 +206,7 @@ def element_of(
     except ModelError as error:
         raise ModelError(f"{where}.type: {error}") from error
     content = {key: value for key, value in table.items() if key != "type"}
-    read = TableReader(where, folder, signals)
+    read = TableReader(where, folder, signals, [] if files is None else files)
     own = getattr(found, "from_table", None)
     if own is not None:
         made = own(name, content, read)

@@ -133,7 +133,10 @@ def read_system(
         joints = [joint_of(name, section, signals) for name, section in data.joints.items()]
         couplers = [coupler_of(name, section, signals) for name, section in data.couplers.items()]
         forces: list[Force] = [force_of(name, section, signals) for name, section in data.forces.items()]
-        elements = [element_of(name, table, path.parent, signals) for name, table in data.elements.items()]
+        element_files: list[str] = []
+        elements = [
+            element_of(name, table, path.parent, signals, element_files) for name, table in data.elements.items()
+        ]
         if any(data.system.gravity):
             forces.insert(0, Gravity(np.array(data.system.gravity)))
         name = data.system.name or path.stem
@@ -146,7 +149,7 @@ def read_system(
             fmus=[section.unit(key, path.parent) for key, section in data.fmus.items()],
             scene=[section.shape for section in data.scene],
             source=str(path.resolve()),
-            data_files=tuple(dict.fromkeys(str(section.file) for section in data.signals.values())),
+            data_files=tuple(dict.fromkeys([*(str(each.file) for each in data.signals.values()), *element_files])),
         )  # fmt: skip
         _ = compiled_system(system)  # markers and interfaces are looked up here
         require_events(system)

@@ -185,7 +185,9 @@ def test_a_road_that_is_none_is_refused_by_its_key(tmp_path, road, message):
 )
 def test_roads_of_a_system_file_are_read(tmp_path, road):
     (tmp_path / "road.csv").write_text("# x, z\n0.0, 0.0\n1.0, 0.02\n2.0, 0.0\n")
-    assert read(tmp_path, road) is not None
+    system, _ = read(tmp_path, road)
+    files = [str(tmp_path / name) for name in ("wheel.toml", "road.csv")]
+    assert list(system.files) == files[: 2 if "road.csv" in road else 1]
 
 
 @pytest.mark.parametrize("version", [52, 61])
