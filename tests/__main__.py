@@ -30,7 +30,7 @@ SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
 
 LINT = ("lint", "ruff", "check", ".")
 TYPES = ("types", "mypy")
-KERNELS = ("kernels", "floatframe.cli.compile_kernels")  # each worker would compile them otherwise
+KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative")  # each worker would compile them otherwise
 TESTS = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external and not alone", "tests")
 ALONE = ("tests that run alone", "pytest", "-q", "-m", "alone and not long and not external", "tests")
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")

@@ -47,7 +47,9 @@ def test_the_compiling_process_compiles(monkeypatch, tmp_path):
     from floatframe.cli import compile_kernels
 
     steps = []
-    monkeypatch.setattr(compile_kernels, "integrate", lambda *a: steps.append(a))
+    monkeypatch.setattr(compile_kernels, "integrate", lambda *a, formulation: steps.append(formulation))
     compile_kernels.main()
-    assert len(steps) == 1
+    assert steps == ["absolute"]  # the demo needs no more
+    compile_kernels.main(["relative"])
+    assert steps[1:] == ["absolute", "relative"]
     assert Path(compile_kernels.__file__).name == "compile_kernels.py"
