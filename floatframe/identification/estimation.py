@@ -12,7 +12,8 @@ References
 .. [1] Huber (1964), Annals of Mathematical Statistics 35, 73-101.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg as la
@@ -42,6 +43,9 @@ class Measured:
     reactions: Array | None = None  #: force and moment of the ground on the tree about `point`, ground axes, (n, 6)
     point: Array | None = None  #: (3,) [m]; None: the origin
     time: Array | None = None  #: (n,) [s]
+    #: filter over the instants, axis 0, of what was measured and of the linear form alike; None: neither
+    smooth: Callable[[Array], Array] | None = None
+    used: slice = field(default_factory=lambda: slice(None))  #: instants that count, after it
 
     def __post_init__(self) -> None:
         n, n_c = self.samples.x.shape
@@ -63,8 +67,13 @@ class Measured:
             return "reactions"
         return "torques" if self.reactions is None else "both"
 
+    @property
+    def times(self) -> Array:
+        """Times of the instants that count, or their numbers, (n_used,)."""
+        return (np.arange(float(len(self.samples.x))) if self.time is None else np.asarray(self.time))[self.used]
+
     def rows(self, form: LinearForm) -> tuple[Array, Array]:
-        """Return the linear form, (n, channels, p), and the measured values, (n, channels)."""
+        """Return the linear form, (n_used, channels, p), and the measured values, (n_used, channels)."""
         W, y = [], []
         if self.torques is not None:
             W.append(form.torques(self.samples))
@@ -72,7 +81,10 @@ class Measured:
         if self.reactions is not None:
             W.append(form.reactions(self.samples, self.point))
             y.append(np.asarray(self.reactions, dtype=float))
-        return np.concatenate(W, axis=1), np.concatenate(y, axis=1)
+        made, measured = np.concatenate(W, axis=1), np.concatenate(y, axis=1)
+        if self.smooth is not None:
+            made, measured = self.smooth(made), self.smooth(measured)
+        return made[self.used], measured[self.used]
 
 
 @dataclass(frozen=True, eq=False)

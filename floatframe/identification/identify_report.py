@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from cms.report.charts import base_layout, line
 from cms.report.html import Cell, Section, figure, page, table, text
 from floatframe.identification.base_parameters import base_parameters
@@ -206,9 +204,8 @@ def prediction_chart(made: Estimate, check: Measured) -> dict[str, Any]:
 
 def stacked(made: Estimate, measured: Measured, y: Any, modelled: Any) -> dict[str, Any]:
     """Return a chart with a row for each channel."""
-    t = np.arange(float(len(y))) if measured.time is None else measured.time
     traces, layout = [], base_layout("time [s]", "")
-    n = y.shape[1]
+    t, n = measured.times, y.shape[1]
     for k, name in enumerate(made.channels):
         for values, label, color in (
             (y[:, k], "measured", MEASURED), (modelled[:, k], "modelled", MODELLED),

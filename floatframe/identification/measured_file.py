@@ -5,9 +5,10 @@
     joint1/angle torque          torque or force of its drive; joint1/angle force is the same
     base F_x ... base M_z        force and moment of the ground on the tree, about the origin of the ground
 
-Rates that were not measured are central differences. A cut-off filters all channels alike, forwards and backwards
-(Butterworth of fourth order, no phase), so that both sides of the equations stay equal; rows are then thinned to what
-the band still holds.
+Rates that were not measured are central differences. A cut-off (Butterworth of fourth order, forwards and backwards, no
+phase) takes the noise off positions and rates; torques and reactions are filtered with the rows of the linear form made
+of them, so that both sides of the equations stay equal where they jump (friction); rows are then thinned to what the
+band still holds.
 """
 
 import os
@@ -131,12 +132,12 @@ def assembled(
                 derived.append(column.name + suffix)
         if has_torque:
             own = " torque" if column.name + " torque" in signals.names else " force"
-            torque[:, k] = smooth(channel(column.name + own, force if column.unit == "m" else moment))
-    base = np.stack([smooth(channel(name, force if "F" in name else moment)) for name in BASE], 1) if has_base else None
+            torque[:, k] = channel(column.name + own, force if column.unit == "m" else moment)
+    base = np.stack([channel(name, force if "F" in name else moment) for name in BASE], 1) if has_base else None
     if derived:
         notes.append(f"derived by central differences: {', '.join(derived[:4])}{', ...' if len(derived) > 4 else ''}")
     if cutoff is not None:
-        notes.append(f"all channels filtered at {cutoff:g} Hz, forwards and backwards")
+        notes.append(f"filtered at {cutoff:g} Hz, forwards and backwards: positions, torques with their linear form")
     ends = 2 if cutoff is None else int(np.ceil(ENDS / (cutoff * h)))
     step = thin or (1 if cutoff is None else max(1, int(0.4 / (cutoff * h))))
     rows = slice(ends, len(t) - ends, step)
@@ -146,9 +147,9 @@ def assembled(
             f"{LEAST_ROWS}; measure longer, or raise the cut-off"
         )
     notes.append(f"{len(t[rows])} of {len(t)} rows used")
-    samples = tree_samples(system, x[rows], rate[rows], acceleration[rows])
+    samples = tree_samples(system, x, rate, acceleration)
     measured = Measured(
-        samples, torque[rows] if has_torque else None, None if base is None else base[rows], time=t[rows]
+        samples, torque if has_torque else None, base, time=t, smooth=None if cutoff is None else smooth, used=rows
     )
     return MeasuredFile(measured, tuple(notes))
 
@@ -168,4 +169,4 @@ def filter_of(where: str, cutoff: float | None, rate: float) -> Callable[[Array]
             f"{where}: cut-off: expected above 0 and below {0.45 * rate:.4g} Hz (rate {rate:.4g} Hz), got {cutoff:g}"
         )
     sos = butter(4, cutoff, fs=rate, output="sos")
-    return lambda values: sosfiltfilt(sos, values)
+    return lambda values: sosfiltfilt(sos, values, axis=0)

@@ -86,8 +86,9 @@ def test_the_command_finds_the_parameters_and_writes_page_and_json(robot):
     lead = named["J_zz(upper) + 0.25 m(lower)"]
     expected = phi[9] + 0.25 * phi[10]
     assert abs(lead["value"] - expected) < 4 * lead["deviation"] < 0.1 * expected
-    viscous = named["viscous(shoulder/angle)"]
-    assert abs(viscous["value"] - FRICTION[0]) < 5 * viscous["deviation"]
+    terms = [f"{term}({name})" for term in ("viscous", "coulomb") for name in NAMES]
+    for term, friction in zip(terms, FRICTION, strict=True):
+        assert abs(named[term]["value"] - friction) < 4 * named[term]["deviation"] < 0.2 * friction
     assert max(found["validation"].values()) < 0.1
     assert found["real_bodies"]["least"][0] > 0
     assert "m(upper)" in found["without_effect"]
