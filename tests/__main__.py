@@ -31,8 +31,7 @@ SPREAD = ("-n", str(min(n_processors, MOST_WORKERS)), "--dist", "loadfile")
 LINT = ("lint", "ruff", "check", ".")
 TYPES = ("types", "mypy")
 KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative")  # each worker would compile them otherwise
-TESTS = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external and not alone", "tests")
-ALONE = ("tests that run alone", "pytest", "-q", "-m", "alone and not long and not external", "tests")
+TESTS = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external", "tests")
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
 EXTERNAL = ("tests beside other programs", "pytest", "-q", "-rs", "-m", "external", "tests")
 NOTEBOOKS = (
@@ -52,7 +51,7 @@ class Group:
 
 
 GROUPS = {
-    "ci": Group(((LINT,), (TYPES, KERNELS, DOCUMENTATION), (TESTS,), (NOTEBOOKS,), (ALONE,)), 20),
+    "ci": Group(((LINT,), (TYPES, KERNELS, DOCUMENTATION), (TESTS,), (NOTEBOOKS,)), 20),
     "long": Group(((LONG,),), 90),
     "external": Group(((EXTERNAL,),), 10),
 }
