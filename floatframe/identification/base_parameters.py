@@ -94,19 +94,10 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
 def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:
     """Return random instants: angles over a full turn, lengths and rates of the order of the system."""
     rng = np.random.default_rng(seed)
-    zero = np.zeros((1, len(form_columns(form))))
-    units = np.array([column.unit == "m" for column in form_columns(form)])
-    size = np.where(units, compiled_system(form.system).length, 1.0)
-    n = N_SAMPLES * len(form.system.bodies)
-    x = rng.uniform(-np.pi, np.pi, (n, zero.shape[1])) * size
+    is_length = np.array([column.unit == "m" for column in form.columns])
+    size = np.where(is_length, compiled_system(form.system).length, 1.0)
+    x = rng.uniform(-np.pi, np.pi, (N_SAMPLES * len(form.system.bodies), len(size))) * size
     return tree_samples(form.system, x, rng.normal(size=x.shape) * size, rng.normal(size=x.shape) * size)
-
-
-def form_columns(form: LinearForm) -> Sequence:
-    """Return the columns of the tree of a form."""
-    from floatframe.relative.topology import tree_of
-
-    return tree_of(form.system).columns
 
 
 def form_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:

@@ -114,9 +114,7 @@ class Estimate:
     @property
     def channels(self) -> tuple[str, ...]:
         """Names of the measured channels."""
-        from floatframe.relative.topology import tree_of
-
-        names = [column.name for column in tree_of(self.base.form.system).columns]
+        names = [column.name for column in self.base.form.columns]
         return (
             *(names if self.measured.torques is not None else ()),
             *(BASE if self.measured.reactions is not None else ()),

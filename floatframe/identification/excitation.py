@@ -24,10 +24,12 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.identification.base_parameters import BaseParameters, form_rows, typical
-from floatframe.identification.tree_samples import TreeSamples, tree_samples
-from floatframe.relative.topology import tree_of
+from floatframe.identification.tree_samples import tree_samples
 
 __all__ = ["ExcitingMotion", "MotionLimits", "exciting_motion"]
+
+SINGULAR = 1e-14  #: ratio of singular values that is zero
+SMALLER = 9  #: motions of falling size that are tried for the limits of torque
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def exciting_motion(
     period: float,
     n_harmonics: int = 5,
     n_instants: int = 60,
-    n_starts: int = 4,
+    n_starts: int = 40,
     max_iterations: int = 40,
     seed: int = 0,
 ) -> ExcitingMotion:
@@ -103,7 +105,7 @@ def exciting_motion(
         If a coordinate has no limits or impossible ones, or no motion keeps them.
     """
     form = base.form
-    names = tuple(column.name for column in tree_of(form.system).columns)
+    names = tuple(column.name for column in form.columns)
     bounds = [checked(name, limits, names) for name in names]
     if not period > 0 or n_harmonics < 1 or n_instants < 2 * n_harmonics + 1:
         raise ModelError(
@@ -114,21 +116,24 @@ def exciting_motion(
     blocks = series(t, period, n_harmonics)
     n_c, width = len(names), 1 + 2 * n_harmonics
     size = typical(form)[base.kept]
-    has_torque_limits = any(np.isfinite(each.torque) for each in bounds)
     largest = np.array([each.torque for each in bounds])
+    is_limited = np.isfinite(largest)
 
-    def motion(x: Array) -> TreeSamples:
-        C = x.reshape(n_c, width)
-        return tree_samples(form.system, *(block @ C.T for block in blocks))
+    known: dict[bytes, tuple[float, float]] = {}  # the objective and its limit ask for the same motions
 
-    def condition(x: Array) -> float:
-        s = la.svdvals(base.rows(form_rows(form, motion(x), base.source)) / size)
-        return float(np.log(s[0] / max(s[-1], s[0] * 1e-14)))
-
-    def torque_room(x: Array) -> Array:
-        tau = form.torques(motion(x)) @ form.values
-        finite = np.isfinite(largest)
-        return 1.0 - np.abs(tau[:, finite]).max(axis=0) / largest[finite]
+    def judged(x: Array) -> tuple[float, float]:
+        """Log of the condition number, and what the torques leave of their limits, the least share."""
+        key = x.tobytes()
+        if key not in known:
+            C = x.reshape(n_c, width)
+            samples = tree_samples(form.system, *(block @ C.T for block in blocks))
+            s = la.svdvals(base.rows(form_rows(form, samples, base.source)) * size)
+            room = np.inf
+            if is_limited.any():
+                tau = form.torques(samples)[:, is_limited] @ form.values
+                room = float((1.0 - np.abs(tau).max(axis=0) / largest[is_limited]).min())
+            known[key] = float(np.log(s[0] / max(s[-1], s[0] * SINGULAR))), room
+        return known[key]
 
     rows, low, high = [], [], []
     for k, each in enumerate(bounds):
@@ -146,34 +151,29 @@ def exciting_motion(
     inside = LinearConstraint(np.vstack(rows), low, high)
     rng = np.random.default_rng(seed)
     starts = []
-    for _ in range(n_starts * 10):
-        x = shrunk(rng.normal(size=n_c * width), bounds, blocks, width)
-        for _ in range(8 if has_torque_limits else 0):
-            if torque_room(x).min() > 0:
+    for _ in range(n_starts):
+        x = scaled_into(rng.normal(size=n_c * width), bounds, blocks, 0.95)
+        for _ in range(SMALLER):
+            if judged(x)[1] > 0:
+                starts.append(x)
                 break
-            x = shrunk(x, bounds, blocks, width, factor=0.7)
-        if not has_torque_limits or torque_room(x).min() > 0:
-            starts.append((condition(x), x))
+            x = scaled_into(x, bounds, blocks, 0.7)
     if not starts:
         raise ModelError(
-            "exciting_motion: no motion keeps the limits of torque, at rest neither, it seems; allow larger torques"
+            "exciting_motion: no random motion keeps the limits of torque, however small; allow larger ones"
         )
-    starts.sort(key=lambda each: each[0])
+    start = min(starts, key=lambda x: judged(x)[0])
     constraints: list = [inside]
-    if has_torque_limits:
-        constraints.append({"type": "ineq", "fun": torque_room})
+    if is_limited.any():
+        constraints.append({"type": "ineq", "fun": lambda x: judged(x)[1]})
     found = minimize(
-        condition,
-        starts[0][1],
-        method="SLSQP",
-        constraints=constraints,
+        lambda x: judged(x)[0], start, method="SLSQP", constraints=constraints,
         options={"maxiter": max_iterations, "ftol": 1e-3},
-    )
-    best = shrunk(found.x, bounds, blocks, width, factor=1.0)
-    is_within = not has_torque_limits or torque_room(best).min() >= -1e-6
-    if not is_within or condition(best) > starts[0][0]:
-        best = starts[0][1]
-    return ExcitingMotion(names, period, best.reshape(n_c, width), float(np.exp(condition(best))))
+    )  # fmt: skip
+    best = kept_within(found.x, bounds, blocks)
+    if judged(best)[1] < -1e-6 or judged(best)[0] > judged(start)[0]:
+        best = start
+    return ExcitingMotion(names, period, best.reshape(n_c, width), float(np.exp(judged(best)[0])))
 
 
 def checked(name: str, limits: Mapping[str, MotionLimits], names: tuple[str, ...]) -> MotionLimits:
@@ -192,25 +192,29 @@ def checked(name: str, limits: Mapping[str, MotionLimits], names: tuple[str, ...
     return each
 
 
-def shrunk(
-    x: Array, bounds: list[MotionLimits], blocks: tuple[Array, Array, Array], width: int, factor: float = 0.95
-) -> Array:
-    """Return coefficients within the limits of position, rate and acceleration, scaled about the middle."""
-    C = x.reshape(len(bounds), width).copy()
+def ratios_of(c: Array, each: MotionLimits, blocks: tuple[Array, Array, Array]) -> float:
+    """Return the largest share of its limits that a coordinate takes, about its offset c[0]."""
+    room = min(each.high - c[0], c[0] - each.low)
+    swing = np.abs(blocks[0][:, 1:] @ c[1:]).max() / max(room, 1e-12)
+    return float(
+        max(swing, np.abs(blocks[1] @ c).max() / each.rate, np.abs(blocks[2] @ c).max() / each.acceleration, 1e-300)
+    )
+
+
+def scaled_into(x: Array, bounds: list[MotionLimits], blocks: tuple[Array, Array, Array], share: float) -> Array:
+    """Return coefficients that take a share of their limits, about an offset in the inner third of the range."""
+    C = x.reshape(len(bounds), -1).copy()
     for c, each in zip(C, bounds, strict=True):
-        if not np.isfinite(each.high - each.low):
-            middle, half = 0.0, np.inf
-        else:
+        if np.isfinite(each.high - each.low):
             middle, half = 0.5 * (each.high + each.low), 0.5 * (each.high - each.low)
-        swing = blocks[0][:, 1:] @ c[1:]
-        offset = np.clip(c[0], middle - 0.3 * half, middle + 0.3 * half) if factor < 1.0 else c[0]
-        room = half - abs(offset - middle) if np.isfinite(half) else np.inf
-        ratios = [
-            np.abs(swing).max() / max(room, 1e-12),
-            np.abs(blocks[1] @ c).max() / each.rate,
-            np.abs(blocks[2] @ c).max() / each.acceleration,
-        ]
-        most = max(ratios)
-        c[0] = offset
-        c[1:] *= factor / most if factor < 1.0 else min(1.0, 1.0 / max(most, 1e-300))
+            c[0] = np.clip(c[0], middle - 0.3 * half, middle + 0.3 * half)
+        c[1:] *= share / ratios_of(c, each, blocks)
+    return C.ravel()
+
+
+def kept_within(x: Array, bounds: list[MotionLimits], blocks: tuple[Array, Array, Array]) -> Array:
+    """Return coefficients as they are where they keep their limits, else reduced to them."""
+    C = x.reshape(len(bounds), -1).copy()
+    for c, each in zip(C, bounds, strict=True):
+        c[1:] *= min(1.0, 1.0 / ratios_of(c, each, blocks))
     return C.ravel()

@@ -19,6 +19,7 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.identification.inertial_parameters import INERTIAL, inertia_columns, parameters_of
 from floatframe.identification.tree_samples import TreeSamples, rigid_tree
+from floatframe.relative.topology import CoordinateName, tree_of
 from floatframe.system import System
 
 __all__ = ["DRIVE_TERMS", "LinearForm", "linear_form", "reaction_rows", "torque_rows"]
@@ -39,6 +40,11 @@ class LinearForm:
     system: System
     names: tuple[str, ...]  #: "m(link1)", ..., "viscous(hinge/angle)", (p,)
     terms: tuple[str, ...]  #: of `DRIVE_TERMS`, of each coordinate
+
+    @property
+    def columns(self) -> tuple[CoordinateName, ...]:
+        """The coordinates of the tree, in the order of torques."""
+        return tree_of(self.system).columns
 
     @property
     def n_inertial(self) -> int:

@@ -36,7 +36,8 @@ from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
 from floatframe.identification.inertial_parameters import PAIRS, parameters_in, point_mass
 from floatframe.identification.regressors import LinearForm
-from floatframe.identification.tree_samples import as_placed, gravity_of, rigid_tree, tree_samples
+from floatframe.identification.tree_samples import TreeSamples, as_placed, gravity_of, rigid_tree, tree_samples
+from floatframe.relative.kernels.tree import Tree
 
 __all__ = ["silent_directions"]
 
@@ -105,28 +106,28 @@ def silent_directions(form: LinearForm) -> Array:
     return U[:, s > 1e-9 * s[0]]
 
 
-def moves_of(form: LinearForm, placed: object, tree: object, i: int) -> list[Move]:
+def moves_of(form: LinearForm, placed: TreeSamples, tree: Tree, i: int) -> list[Move]:
     """Return the moves of the joint of body i, from its parent on."""
     made = []
-    first, end = int(tree.column0[i]), int(tree.column0[i + 1])  # type: ignore[attr-defined]
+    first, end = int(tree.column0[i]), int(tree.column0[i + 1])
     for k in range(first, end):
-        turn, shift = placed.turn[0, k], placed.t[0, k]  # type: ignore[attr-defined]
+        turn, shift = placed.turn[0, k], placed.t[0, k]
         if np.linalg.norm(turn) > 0 and np.linalg.norm(shift) > 0:
-            name = rigid_tree(form.system, "").columns[k].joint
+            name = form.columns[k].joint
             raise ModelError(
                 f"system {form.system.name!r}: joint {name!r} is a screw, for which there is no closed rule; find the "
                 "base parameters by samples"
             )
-        made.append(Move(turn, shift, placed.point[0, k]))  # type: ignore[attr-defined]
+        made.append(Move(turn, shift, placed.point[0, k]))
     return made
 
 
-def chain(tree: object, i: int) -> list[int]:
+def chain(tree: Tree, i: int) -> list[int]:
     """Return the bodies from the ground to body i."""
     way: list[int] = []
     while i >= 0:
         way.append(i)
-        i = int(tree.parent[i])  # type: ignore[attr-defined]
+        i = int(tree.parent[i])
     return way[::-1]
 
 

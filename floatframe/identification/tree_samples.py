@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import quoted
 from floatframe.bodies.flexible_body import FlexibleBody
 from floatframe.compiling.system import compiled_system
@@ -17,7 +17,7 @@ from floatframe.errors import ModelError
 from floatframe.kernels.model import Model
 from floatframe.kernels.work import new_work
 from floatframe.relative.kernels.entry import motion_of_joints, mover
-from floatframe.relative.kernels.tree import JointWork, new_joint_work
+from floatframe.relative.kernels.tree import JointWork, Tree, new_joint_work
 from floatframe.relative.topology import SystemTree, tree_of
 from floatframe.start.newton_equations import set_iterate
 from floatframe.system import System
@@ -80,6 +80,7 @@ def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> 
     tree = rigid_tree(system, f"system {system.name!r}: samples").tree
     compiled = compiled_system(system)
     model, work, joints = compiled.model, new_work(compiled.model), joints_as_placed(system)
+    move, start = mover(model, work, tree, joints), distances(tree, joints)
     n, n_c, n_b = len(x), len(tree.side), len(tree.parent)
     if not x.shape == rate.shape == acceleration.shape == (n, n_c):
         raise ModelError(
@@ -89,17 +90,15 @@ def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> 
         )
     r, R = np.empty((n, n_b, 3)), np.empty((n, n_b, 3, 3))
     u, u_dot = np.empty((n, n_b, 6)), np.empty((n, n_b, 6))
-    start, move = as_placed(system), mover(model, work, tree, joints)
     t, turn, point = np.empty((n, n_c, 3)), np.empty((n, n_c, 3)), np.empty((n, n_c, 3))
     markers = [int(tree.near[i] if tree.is_reversed[i] else tree.far[i]) for i in range(n_b)]
-    owner = np.repeat(np.arange(n_b), np.diff(tree.column0))
     for s in range(n):
         joints.rate[:], joints.acceleration[:] = rate[s], acceleration[s]
         joints.x[:] = x[s] - start
         move()
         r[s], R[s], t[s], turn[s] = work.state.r, work.state.R, joints.t, joints.a
         u[s], u_dot[s] = work.state.u.reshape(n_b, 6), work.state.u_dot.reshape(n_b, 6)
-    for k, i in enumerate(owner):
+    for k, i in enumerate(owners(tree)):
         m = markers[i]
         point[:, k] = r[:, i] if m < 0 else marker_places(model, m, r, R)
     a = np.einsum("sbij,sbi->sbj", R, u_dot[:, :, :3] - gravity_of(system))
@@ -124,7 +123,15 @@ def joints_as_placed(system: System) -> JointWork:
 
 def as_placed(system: System) -> Array:
     """Return the coordinates of a tree as its system is placed, (n_c,): distances of markers, angles zero."""
-    tree, joints = tree_of(system).tree, joints_as_placed(system)
-    owner = np.repeat(np.arange(len(tree.parent)), np.diff(tree.column0))
+    return distances(tree_of(system).tree, joints_as_placed(system))
+
+
+def distances(tree: Tree, joints: JointWork) -> Array:
+    """Return the distances of the markers of joints along their columns, zero for those that turn, (n_c,)."""
     is_distance = ~tree.alpha.any(axis=1)
-    return np.einsum("ka,ka->k", tree.tau, joints.d[owner]) * is_distance
+    return np.einsum("ka,ka->k", tree.tau, joints.d[owners(tree)]) * is_distance
+
+
+def owners(tree: Tree) -> IntArray:
+    """Return the body that each column moves, (n_c,)."""
+    return np.repeat(np.arange(len(tree.parent)), np.diff(tree.column0))

@@ -146,7 +146,7 @@ def test_an_exciting_motion_keeps_its_limits_and_beats_random_ones():
     base = base_parameters(small)
     names = [f"joint{k}/angle" for k in (1, 2, 3)]
     limits = dict.fromkeys(names, MotionLimits(-1.5, 1.5, 2.0, 8.0, 90.0))
-    options = {"period": 5.0, "n_harmonics": 2, "n_instants": 15, "n_starts": 1}
+    options = {"period": 5.0, "n_harmonics": 2, "n_instants": 15, "n_starts": 10}
     plain = exciting_motion(base, limits, **options, max_iterations=0)
     best = exciting_motion(base, limits, **options, max_iterations=8)
     x, rate, acceleration = best.at(np.arange(15) * 5.0 / 15)
