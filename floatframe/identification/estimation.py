@@ -29,7 +29,8 @@ __all__ = ["METHODS", "Estimate", "Measured", "estimate"]
 METHODS = ("ordinary", "weighted", "robust")
 HUBER = 1.345  #: sigma from which a residual counts less; 95 % efficient where there are no outliers
 POOR = 1e4  #: condition number of the weighted rows, columns scaled, above which a motion does not excite
-WHITE = 2.6  #: times 1/sqrt(n) that neighbouring residuals of white noise correlate at most, 99 %
+#: times 1/sqrt(n) that neighbouring residuals of white noise correlate at most, 99.5 %; the fit itself makes it less
+WHITE = 2.6
 ROUNDS = 30  #: of weights, at most
 BASE = ("base F_x", "base F_y", "base F_z", "base M_x", "base M_y", "base M_z")
 
@@ -131,7 +132,7 @@ class Estimate:
                 "another motion (exciting_motion finds one)"
             )
         n = len(self.residuals)
-        coloured = [name for name, r in zip(self.channels, self.whiteness, strict=True) if abs(r) > WHITE / np.sqrt(n)]
+        coloured = [name for name, r in zip(self.channels, self.whiteness, strict=True) if r > WHITE / np.sqrt(n)]
         if coloured:
             said.append(
                 f"residuals of {', '.join(coloured)} are not white: the model lacks something there, or rows follow "

@@ -163,3 +163,13 @@ def test_an_exciting_motion_keeps_its_limits_and_beats_random_ones():
         exciting_motion(base, dict.fromkeys(names[:2], limits[names[0]]), period=5.0)
     with pytest.raises(ModelError, match="no coordinate 'joint9/angle'"):
         exciting_motion(base, {**limits, "joint9/angle": limits[names[0]]}, period=5.0)
+
+
+def test_friction_that_the_model_lacks_is_told_by_residuals_that_correlate(robot, truth):
+    form, samples, _ = robot
+    measured = Measured(samples, noisy(truth, np.random.default_rng(6))[0])
+    whole, lacking = estimate(form, measured), estimate(linear_form(form.system), measured)
+    assert not whole.warnings
+    (words,) = lacking.warnings
+    assert "joint1/angle" in words
+    assert "are not white: the model lacks something there" in words
