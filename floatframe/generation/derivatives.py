@@ -1,0 +1,77 @@
+"""Derivatives of terms, as terms of the same graph."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array
+from floatframe.generation.graph import ADD, COS, DIV, MUL, NEG, SIN, SUB, Graph, Scalar, reachable
+from floatframe.generation.links import TreeTerms
+from floatframe.relative.recursion.nodes import ROTATION
+
+__all__ = ["derivative", "jacobian", "position_seeds", "seeds_of"]
+
+
+def derivative(graph: Graph, terms: Sequence[Scalar], seed: Mapping[Scalar, Scalar]) -> dict[int, Scalar]:
+    """Return the derivatives that do not vanish, by the index of their term; terms stand after their arguments.
+
+    seed: those of symbols.
+    """
+    dot: dict[int, Scalar] = {symbol.index: change for symbol, change in seed.items()}
+    for term in terms:
+        moved = [dot.get(arg.index) for arg in term.args]
+        if term.index in dot or not any(moved):
+            continue
+        changes = [graph.zero if each is None else each for each in moved]
+        a, da = term.args[0], changes[0]
+        b, db = (term.args[1], changes[1]) if len(changes) > 1 else (graph.zero, graph.zero)
+        if term.kind == ADD:
+            change = da + db
+        elif term.kind == SUB:
+            change = da - db
+        elif term.kind == MUL:
+            change = da * b + a * db
+        elif term.kind == DIV:
+            change = (da - term * db) / b
+        elif term.kind == NEG:
+            change = -da
+        elif term.kind == SIN:
+            change = graph.cos(a) * da
+        else:
+            assert term.kind == COS
+            change = -(graph.sin(a) * da)
+        if not change.is_constant(0.0):
+            dot[term.index] = change
+    return dot
+
+
+def jacobian(graph: Graph, outputs: Array, seeds: Sequence[Mapping[Scalar, Scalar]]) -> Array:
+    """Return the derivatives of outputs, (m,), along seeds, (m, n)."""
+    order = reachable(outputs)
+    out = np.full((len(outputs), len(seeds)), graph.zero, dtype=object)
+    for j, seed in enumerate(seeds):
+        dot = derivative(graph, order, seed)
+        for i, term in enumerate(outputs):
+            out[i, j] = dot.get(term.index, graph.zero)
+    return out
+
+
+def seeds_of(graph: Graph, symbols: Sequence[Scalar]) -> list[dict[Scalar, Scalar]]:
+    """Return the seeds of derivatives by symbols."""
+    return [{symbol: graph.one} for symbol in symbols]
+
+
+def position_seeds(tree: TreeTerms) -> list[dict[Scalar, Scalar]]:
+    """Return the seeds of derivatives by positions along the rates: rotations turn by R exp(dz), p' = p (0, e) / 2."""
+    graph = tree.graph
+    seeds: list[dict[Scalar, Scalar]] = [{} for _ in tree.v]
+    for link in tree.links:
+        x = tree.x[link.x0 :]
+        if link.kind == ROTATION:
+            w, p_x, p_y, p_z = x[:4]
+            for j, row in enumerate(((-p_x, w, p_z, -p_y), (-p_y, -p_z, w, p_x), (-p_z, p_y, -p_x, w))):
+                seeds[link.v0 + j] = {x[i]: 0.5 * change for i, change in enumerate(row)}
+        else:
+            for j in range(link.n_z):
+                seeds[link.v0 + j] = {x[j]: graph.one}
+    return seeds

@@ -1,0 +1,1 @@
+"""Routines written out, a module for each language."""
