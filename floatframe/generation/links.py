@@ -18,7 +18,7 @@ from floatframe.generation.graph import Graph, Scalar
 from floatframe.identification.inertial_parameters import INERTIAL, parameters_of
 from floatframe.relative.recursion.expansion import Expansion
 
-__all__ = ["GRAVITY", "Link", "TreeTerms", "parameter_names", "terms", "tree_terms"]
+__all__ = ["GRAVITY", "Link", "TreeTerms", "parameter_names", "terms", "tree_terms", "without_rounding"]
 
 GRAVITY = ("gravity/x", "gravity/y", "gravity/z")
 ROUNDING = 4 * np.finfo(float).eps
@@ -42,6 +42,11 @@ class Link:
     mass: Scalar
     s: Array  #: first moment, (3,) [kg m]
     P: Array  #: second moment, integral of c cᵀ over mass, (3, 3) [kg m²]
+
+    @property
+    def has_moments(self) -> bool:
+        """Whether it carries anything: a body, or what was counted to a node without one."""
+        return not all(value.is_constant(0.0) for value in (self.mass, *self.s, *self.P.ravel()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -130,7 +130,7 @@ def inverse_dynamics(tree: TreeTerms, v: Array, a: Array, joints: Sequence[Joint
         omega, alpha, acc = motion_through(link, joint, v, a, *inner)
         U = spin_terms(omega, alpha)
         motions.append((omega, alpha, acc, U))
-        if link.body >= 0:
+        if link.has_moments:
             f[k] = link.mass * acc + U @ link.s
             t[k] = cross(link.s, acc) + axial_of_product(U, link.P)
     force = np.full(len(v), tree.graph.zero, dtype=object)

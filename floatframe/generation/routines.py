@@ -8,6 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.generation.derivatives import jacobian, position_seeds, seeds_of
 from floatframe.generation.graph import Graph, Operations, Scalar, operations
+from floatframe.generation.grouping import carried_inwards
 from floatframe.generation.links import TreeTerms, symbols_of, terms
 from floatframe.generation.recursions import (
     cross,
@@ -133,6 +134,7 @@ class Kind:
     make: Callable[[TreeTerms], list[Output]]
     inputs: tuple[str, ...]
     meaning: str
+    is_force: bool = True  #: follows from the forces along the rates alone
 
 
 MOTION = ("z", "z_dot", "z_ddot")
@@ -141,7 +143,7 @@ ROUTINES = {
     "residual": Kind(residual, (*MOTION, "force"), "Residual of the equations of motion"),
     "mass": Kind(mass, ("z",), "Mass matrix"),
     "forward": Kind(forward, ("z", "z_dot", "force"), "Forward dynamics: accelerations under forces"),
-    "kinematics": Kind(kinematics, ("z", "z_dot"), "Places and velocities of all bodies"),
+    "kinematics": Kind(kinematics, ("z", "z_dot"), "Places and velocities of all bodies", is_force=False),
     "jacobian": Kind(derivatives, MOTION, "Derivatives of the forces of a motion"),
     "sensitivity": Kind(sensitivity, MOTION, "Derivatives of the forces of a motion by parameters"),
 }
@@ -157,6 +159,8 @@ INPUTS = {
 def routine_of(tree: TreeTerms, what: str, name: str) -> Routine:
     """Return a routine by one of the names in `ROUTINES`."""
     kind = ROUTINES[what]
+    if kind.is_force:
+        tree = carried_inwards(tree)
     before = tuple(tree.graph.asked)
     outputs = tuple(kind.make(tree))
     asked = (tree.graph.asked[0] - before[0], tree.graph.asked[1] - before[1])

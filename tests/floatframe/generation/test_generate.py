@@ -10,6 +10,8 @@ from numpy.testing import assert_allclose
 import floatframe as ff
 from floatframe.errors import ModelError
 from floatframe.generation.generate import generate
+from floatframe.generation.grouping import carried_inwards
+from floatframe.generation.links import tree_terms
 from tests.floatframe.identification.robots import random_tree, six_axes
 from tests.floatframe.relative.random_trees import KINDS
 from tests.floatframe.relative.random_trees import random_tree as random_links
@@ -156,6 +158,13 @@ def test_a_casadi_function_has_the_numbers_of_the_model():
     exec(generate(case.system, language="casadi", name="puma").files["puma.py"], space)
     got = np.array(space["puma"]()(case.z, case.z_dot, case.z_ddot)).ravel()
     near(got, case.model.inverse_dynamics(case.z, case.z_dot, case.z_ddot))
+
+
+def test_no_link_on_a_hinge_keeps_more_than_seven_numbers():
+    """Those of a body on a hinge that can be told from a motion of its parent; the third moves with that."""
+    tree = carried_inwards(tree_terms(ff.relative_model(puma()).expansion))
+    kept = [[*link.s, *link.P[np.triu_indices(3)], link.mass] for link in tree.links]
+    assert [sum(not value.is_constant(0.0) for value in each) for each in kept] == [7] * 6
 
 
 def test_specialised_code_needs_far_fewer_operations_than_the_general_recursion():

@@ -1,0 +1,77 @@
+"""Masses carried inwards: other moments of the bodies of a tree, the same forces along all its rates.
+
+What moves with the inner frame of a joint as it does with the outer one can be counted to the parent. Of mass, first
+and second moment m, s, P = ∫ c cᵀ dm of a node these are
+
+    hinge        all that lies on its axis: m, s_z, P_zz
+    screw        P_zz alone: a direction along the axis, that no place belongs to
+    slider       P: directions that do not turn against the parent
+    rotation     m, in its centre
+    nothing      all
+
+and what comes to the ground vanishes. Seven numbers are left of the ten of a body on a hinge. Reactions in joints are
+others than before: only the forces along the rates are the same, and all that follows from them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from floatframe.generation.graph import CONSTANT, Graph
+from floatframe.generation.links import Link, TreeTerms, terms, without_rounding
+from floatframe.generation.recursions import shifted_moments, turned_moment
+from floatframe.relative.recursion.nodes import FIXED, ROTATION, SCREW
+
+__all__ = ["carried_inwards"]
+
+
+def carried_inwards(tree: TreeTerms) -> TreeTerms:
+    """Return a tree with as few moments as its joints allow; unchanged where moments are symbols."""
+    links = list(tree.links)
+    moments = [value for link in links for value in (link.mass, *link.s, *link.P.ravel())]
+    if any(value.kind != CONSTANT for value in moments):
+        return tree
+    for k in range(len(links) - 1, -1, -1):
+        link = links[k]
+        moved = with_moments(link, taken_along(tree.graph, link))
+        links[k] = cleaned(tree.graph, less(link, moved))
+        if link.parent >= 0:
+            s, P = shifted_moments(moved.mass, link.A @ moved.s, turned_moment(link.A, moved.P), link.r)
+            above = links[link.parent]
+            links[link.parent] = with_moments(above, (above.mass + moved.mass, above.s + s, above.P + P))
+    return replace(tree, links=tuple(links))
+
+
+def with_moments(link: Link, moments: tuple) -> Link:
+    """Return a node that carries other moments."""
+    return replace(link, mass=moments[0], s=moments[1], P=moments[2])
+
+
+def less(link: Link, moved: Link) -> Link:
+    """Return a node without what was moved."""
+    return with_moments(link, (link.mass - moved.mass, link.s - moved.s, link.P - moved.P))
+
+
+def taken_along(graph: Graph, link: Link) -> tuple:
+    """Return m, s, P that move with the inner frame as well, its axes where the joint is at zero."""
+    s, P = terms(graph, np.zeros(3)), terms(graph, np.zeros((3, 3)))
+    if link.kind == FIXED:
+        return link.mass, link.s, link.P
+    if link.kind == ROTATION:
+        return link.mass, s, P
+    if link.kind == SCREW and not link.turn.is_constant(0.0):
+        P[2, 2] = link.P[2, 2]
+        if not link.slide.is_constant(0.0):
+            return graph.zero, s, P
+        s[2] = link.s[2]
+        return link.mass, s, P
+    return graph.zero, s, link.P
+
+
+def cleaned(graph: Graph, link: Link) -> Link:
+    """Return a node whose moments that vanish but for rounding are zero."""
+    s, P = (np.array([value.value for value in each.ravel()]).reshape(each.shape) for each in (link.s, link.P))
+    return with_moments(link, (
+        link.mass, terms(graph, without_rounding(s, np.abs(s).max())),
+        terms(graph, without_rounding(P, np.abs(P).max())),
+    ))  # fmt: skip
