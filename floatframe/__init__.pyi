@@ -93,6 +93,8 @@ from .forces import SphereContact as SphereContact
 from .forces import SpringDamper as SpringDamper
 from .forces import UserForce as UserForce
 from .functions.time_functions import TimeFunction as TimeFunction
+from .generation.generate import GeneratedCode as GeneratedCode
+from .generation.generate import generate as generate
 from .gradients import Sensitivities as Sensitivities
 from .gradients import sensitivities as sensitivities
 from .identification.barycentric import barycentric_parameters as barycentric_parameters

@@ -18,7 +18,7 @@ from floatframe.cli import (
     spectra,
     view,
 )
-from floatframe.cli.exchange import robot
+from floatframe.cli.exchange import generate, robot
 from floatframe.cli.parameters import gradient, identify, optimize, study, sweep
 
 if TYPE_CHECKING:
@@ -515,4 +515,5 @@ fatigue.register(app)
 cosimulation.register(app)
 machine.register(app)
 robot.register(app)
+generate.register(app)
 view.register(app)

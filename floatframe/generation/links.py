@@ -74,7 +74,7 @@ def terms(graph: Graph, numbers: Array) -> Array:
 
 
 def whole(R: Array) -> Array:
-    """Return a rotation matrix with entries that are whole but for rounding made whole."""
+    """Return an array of 0, 1, -1 and other numbers with those that are whole but for rounding made whole."""
     near = np.round(R)
     return np.asarray(np.where(np.abs(R - near) < ROUNDING, near, R) + 0.0)
 
@@ -157,7 +157,8 @@ def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerm
         links.append(
             Link(
                 int(nodes.parent[k]), int(nodes.kind[k]), bool(nodes.is_near[k]), int(nodes.x0[k]), int(nodes.v0[k]),
-                int(nodes.n_z[k]), graph.constant(nodes.slide[k]), graph.constant(nodes.turn[k]),
+                int(nodes.n_z[k]), graph.constant(whole(nodes.slide[k])),
+                graph.constant(whole(nodes.turn[k])),
                 terms(graph, whole(nodes.A[k])), terms(graph, without_rounding(nodes.r[k], length)), body,
                 graph.scalar(mass), terms(graph, s), terms(graph, P),
             )

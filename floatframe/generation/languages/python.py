@@ -37,7 +37,8 @@ def python_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
     for k, (name, n, _) in enumerate(routine.inputs):
         body += [
             f"    if arrays[{k}].shape[:1] != ({n},):",
-            f'        raise ValueError(f"{routine.name}: {name}: expected {n} numbers, got shape {{arrays[{k}].shape}}")',
+            f"        got = arrays[{k}].shape",
+            f'        raise ValueError(f"{routine.name}: {name}: expected {n} numbers, got shape {{got}}")',
         ]
     body += [
         "    many = np.broadcast_shapes(*(each.shape[1:] for each in arrays))",

@@ -13,9 +13,8 @@ from floatframe.generation.generate import generate
 from floatframe.generation.grouping import carried_inwards
 from floatframe.generation.links import tree_terms
 from tests.floatframe.identification.robots import random_tree, six_axes
-from tests.floatframe.relative.random_trees import KINDS
+from tests.floatframe.relative.random_trees import KINDS, system_of
 from tests.floatframe.relative.random_trees import random_tree as random_links
-from tests.floatframe.relative.random_trees import system_of
 
 ROUNDOFF = 1e-12
 

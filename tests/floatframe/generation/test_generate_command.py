@@ -1,0 +1,67 @@
+"""The command generate: the files that the function makes, and messages."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+import floatframe as ff
+from floatframe.cli.app import app
+from floatframe.system_file.read_system import read_system
+
+PENDULUM = """
+[system]
+units = "m-kg-s"
+gravity = [0, 0, -9.81]
+
+[bodies.stick]
+mass = 2.0
+inertia = [[0.01, 0, 0], [0, 0.2, 0], [0, 0, 0.2]]
+position = [0.5, 0, 0]
+
+[joints.pin]
+type = "revolute"
+body_a = "ground"
+body_b = "stick"
+marker_b = [-0.5, 0, 0]
+axis = [0, 1, 0]
+"""
+
+
+@pytest.fixture
+def pendulum(tmp_path):
+    path = tmp_path / "pendulum.toml"
+    path.write_text(PENDULUM)
+    return path
+
+
+def called(*words):
+    return CliRunner().invoke(app, ["generate", *map(str, words)])
+
+
+def test_the_command_writes_what_the_function_returns(pendulum, tmp_path):
+    folder = tmp_path / "code"
+    made = called(pendulum, "--what", "inverse", "--what", "mass", "--name", "stick", "-o", folder, "--json")
+    assert made.exit_code == 0, made.output
+    record = json.loads(made.stdout)
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "stick_inverse.c", "stick_inverse.h", "stick_mass.c", "stick_mass.h",
+    ]  # fmt: skip
+    code = ff.generate(read_system(pendulum)[0], name="stick_inverse")
+    assert (folder / "stick_inverse.c").read_text() == code.files["stick_inverse.c"]
+    # torque = (J + m l²) z_ddot - m g l cos z: two products, a difference, a cosine; M is a number
+    counted = record["functions"]["stick_inverse"]
+    assert (counted["additions"], counted["multiplications"], counted["functions"]) == (1, 2, 1)
+    assert record["functions"]["stick_mass"]["multiplications"] == 0
+
+
+def test_what_cannot_be_is_told_and_nothing_is_written(pendulum, tmp_path):
+    folder = tmp_path / "code"
+    made = called(pendulum, "--language", "ada", "-o", folder)
+    assert made.exit_code != 0
+    assert "language: expected one of c, python, casadi, matlab, got 'ada'" in " ".join(made.output.split())
+    assert not folder.exists()
+    (tmp_path / "file").write_text("")
+    made = called(pendulum, "-o", tmp_path / "file")
+    assert made.exit_code != 0
+    assert "cannot be written" in made.output
