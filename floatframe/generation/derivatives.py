@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
-from floatframe.generation.graph import ADD, COS, DIV, MUL, NEG, SIN, SUB, Graph, Scalar, reachable
+from floatframe.generation.graph import ADD, COS, DIV, MUL, NEG, SIN, SUB, Graph, Scalar, Terms, reachable
 from floatframe.generation.links import TreeTerms
 from floatframe.relative.recursion.nodes import ROTATION
 
@@ -45,7 +44,7 @@ def derivative(graph: Graph, terms: Sequence[Scalar], seed: Mapping[Scalar, Scal
     return dot
 
 
-def jacobian(graph: Graph, outputs: Array, seeds: Sequence[Mapping[Scalar, Scalar]]) -> Array:
+def jacobian(graph: Graph, outputs: Terms, seeds: Sequence[Mapping[Scalar, Scalar]]) -> Terms:
     """Return the derivatives of outputs, (m,), along seeds, (m, n)."""
     order = reachable(outputs)
     out = np.full((len(outputs), len(seeds)), graph.zero, dtype=object)

@@ -13,7 +13,7 @@ is what a routine does that knows nothing of its numbers.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Union
+from typing import Any, TypeAlias, Union
 
 import numpy as np
 
@@ -21,12 +21,13 @@ from floatframe.errors import ModelError
 
 __all__ = [
     "ADD", "CONSTANT", "COS", "DIV", "MUL", "NEG", "SIN", "SUB", "SYMBOL",
-    "Graph", "Number", "Operations", "Scalar", "operations", "reachable",
+    "Graph", "Number", "Operations", "Scalar", "Terms", "operations", "reachable",
 ]  # fmt: skip
 
 CONSTANT, SYMBOL, ADD, SUB, MUL, DIV, NEG, SIN, COS = range(9)  #: kinds of terms
 
 Number = Union["Scalar", float]
+Terms: TypeAlias = np.ndarray[tuple[Any, ...], np.dtype[np.object_]]  #: arrays of terms
 
 
 @dataclass(frozen=True)
@@ -54,28 +55,28 @@ class Scalar:
         self.graph, self.kind, self.args, self.name, self.value = graph, kind, args, name, value
         self.index = len(graph.terms)
 
-    def __add__(self, other: Number) -> "Scalar":
+    def __add__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.add(self, self.graph.scalar(other))
 
-    def __radd__(self, other: Number) -> "Scalar":
+    def __radd__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.add(self.graph.scalar(other), self)
 
-    def __sub__(self, other: Number) -> "Scalar":
+    def __sub__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.sub(self, self.graph.scalar(other))
 
-    def __rsub__(self, other: Number) -> "Scalar":
+    def __rsub__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.sub(self.graph.scalar(other), self)
 
-    def __mul__(self, other: Number) -> "Scalar":
+    def __mul__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.mul(self, self.graph.scalar(other))
 
-    def __rmul__(self, other: Number) -> "Scalar":
+    def __rmul__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.mul(self.graph.scalar(other), self)
 
-    def __truediv__(self, other: Number) -> "Scalar":
+    def __truediv__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.div(self, self.graph.scalar(other))
 
-    def __rtruediv__(self, other: Number) -> "Scalar":
+    def __rtruediv__(self, other: Any) -> Any:
         return NotImplemented if isinstance(other, np.ndarray) else self.graph.div(self.graph.scalar(other), self)
 
     def __neg__(self) -> "Scalar":

@@ -7,6 +7,7 @@ Numbers that vanish but for rounding (cos 90°, products with it) are zero here:
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import quoted
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
-from floatframe.generation.graph import Graph, Scalar
+from floatframe.generation.graph import Graph, Scalar, Terms
 from floatframe.identification.inertial_parameters import INERTIAL, parameters_of
 from floatframe.relative.recursion.expansion import Expansion
 
@@ -36,12 +37,12 @@ class Link:
     n_z: int
     slide: Scalar
     turn: Scalar
-    A: Array  #: inner frame of the joint in the parent, (3, 3)
-    r: Array  #: its origin, (3,) [m]
+    A: Terms  #: inner frame of the joint in the parent, (3, 3)
+    r: Terms  #: its origin, (3,) [m]
     body: int  #: -1 for none
     mass: Scalar
-    s: Array  #: first moment, (3,) [kg m]
-    P: Array  #: second moment, integral of c cᵀ over mass, (3, 3) [kg m²]
+    s: Terms  #: first moment, (3,) [kg m]
+    P: Terms  #: second moment, integral of c cᵀ over mass, (3, 3) [kg m²]
 
     @property
     def has_moments(self) -> bool:
@@ -55,20 +56,20 @@ class TreeTerms:
 
     graph: Graph
     links: tuple[Link, ...]
-    gravity: Array  #: (3,) [m/s²]
-    x: Array  #: symbols of the positions, (n_z,)
-    v: Array  #: of the rates, (n,)
-    a: Array  #: of the accelerations, (n,)
+    gravity: Terms  #: (3,) [m/s²]
+    x: Terms  #: symbols of the positions, (n_z,)
+    v: Terms  #: of the rates, (n,)
+    a: Terms  #: of the accelerations, (n,)
     parameters: tuple[Scalar, ...]  #: symbols in the place of numbers
     parameter_names: tuple[str, ...]
     parameter_values: tuple[float, ...]
-    frames: tuple[tuple[int, Array, Array], ...]  #: of each body: its node, and its frame in that, axes and origin
+    frames: tuple[tuple[int, Terms, Terms], ...]  #: of each body: its node, and its frame in that, axes and origin
 
 
-def terms(graph: Graph, numbers: Array) -> Array:
+def terms(graph: Graph, numbers: Any) -> Terms:
     """Return an array of terms of numbers and terms."""
-    out = np.empty(np.shape(numbers), dtype=object)
-    for place, value in np.ndenumerate(np.asarray(numbers, dtype=object)):
+    out: Terms = np.array(numbers, dtype=object)
+    for place, value in np.ndenumerate(out):
         out[place] = graph.scalar(value)
     return out
 
@@ -86,7 +87,7 @@ def without_rounding(x: Array, size: float) -> Array:
 
 def parameter_names(expansion: Expansion) -> dict[str, float]:
     """Return names and values of all numbers that can be symbols: inertial parameters of bodies, gravity."""
-    found = {}
+    found: dict[str, float] = {}
     for body in expansion.system.bodies:
         if isinstance(body, RigidBody):
             names = (f"{body.name}/{each}" for each in INERTIAL)
@@ -109,7 +110,7 @@ def chosen(patterns: Sequence[str], values: dict[str, float]) -> tuple[str, ...]
     return tuple(name for name in values if name in wanted)
 
 
-def second_moment(J: Array) -> Array:
+def second_moment(J: Any) -> Any:
     """Return the integral of c cᵀ from an inertia tensor, (3, 3), of numbers or terms."""
     half = 0.5 * (J[0, 0] + J[1, 1] + J[2, 2])
     P = -J
@@ -126,70 +127,92 @@ def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerm
     ModelError
         If a body is flexible, or a pattern of `parameters` matches nothing.
     """
-    graph, nodes, system = Graph(), expansion.nodes, expansion.system
-    for body in system.bodies:
-        if not isinstance(body, RigidBody):
+    graph, nodes = Graph(), expansion.nodes
+    for each in expansion.system.bodies:
+        if not isinstance(each, RigidBody):
             raise ModelError(
-                f"generate: body {body.name!r}: expected rigid bodies, got a flexible one; freeze its modes "
+                f"generate: body {each.name!r}: expected rigid bodies, got a flexible one; freeze its modes "
                 "(frozen_bodies), or take relative_model"
             )
     values = parameter_names(expansion)
     names = chosen(parameters, values)
     symbols = {name: graph.symbol(f"parameters[{k}]") for k, name in enumerate(names)}
     length = float(np.abs(nodes.r).max(initial=0.0))
-    links = []
-    frames: list[tuple[int, Array, Array]] = [(-1, np.eye(3), np.zeros(3))] * len(system.bodies)
-    for k in range(len(nodes.parent)):
-        body = int(nodes.body[k])
-        mass, s, P = 0.0, np.zeros(3), np.zeros((3, 3))
-        if body >= 0:
-            F, origin = expansion.frame_of[body]
-            F, origin = whole(F), without_rounding(origin, length)
-            frames[body] = (k, terms(graph, F.T), terms(graph, without_rounding(-F.T @ origin, length)))
-            own = [f"{system.bodies[body].name}/{each}" for each in INERTIAL]
-            if any(name in symbols for name in own):
-                phi = terms(graph, [symbols.get(name, values[name]) for name in own])
-                mass, s, P = moments_in_node(graph, phi, F, origin)
-            else:
-                mass, s, J = float(nodes.mass[k]), nodes.s[k], nodes.J[k]
-                P = without_rounding(second_moment(J), np.abs(J).max(initial=0.0))
-                s = without_rounding(s, max(np.abs(s).max(), mass * length))
-        links.append(
-            Link(
-                int(nodes.parent[k]), int(nodes.kind[k]), bool(nodes.is_near[k]), int(nodes.x0[k]), int(nodes.v0[k]),
-                int(nodes.n_z[k]), graph.constant(whole(nodes.slide[k])),
-                graph.constant(whole(nodes.turn[k])),
-                terms(graph, whole(nodes.A[k])), terms(graph, without_rounding(nodes.r[k], length)), body,
-                graph.scalar(mass), terms(graph, s), terms(graph, P),
-            )
-        )  # fmt: skip
-    gravity = [symbols.get(name, values[name]) for name in GRAVITY]
+    links = tuple(link_of(graph, expansion, k, symbols, values, length) for k in range(len(nodes.parent)))
+    frames = []
+    for i, k in enumerate(expansion.node_of):
+        F, origin = frame_in_body(expansion, i, length)
+        frames.append((k, terms(graph, F.T), terms(graph, without_rounding(-F.T @ origin, length))))
     return TreeTerms(
-        graph, tuple(links), terms(graph, gravity),
-        *(symbols_of(graph, name, n) for name, n in (
-            ("z", expansion.n_x), ("z_dot", expansion.n_v), ("z_ddot", expansion.n_v))),
-        tuple(symbols.values()), names, tuple(values[name] for name in names), tuple(frames),
-    )  # fmt: skip
+        graph=graph,
+        links=links,
+        gravity=terms(graph, [symbols.get(name, values[name]) for name in GRAVITY]),
+        x=symbols_of(graph, "z", expansion.n_x),
+        v=symbols_of(graph, "z_dot", expansion.n_v),
+        a=symbols_of(graph, "z_ddot", expansion.n_v),
+        parameters=tuple(symbols.values()),
+        parameter_names=names,
+        parameter_values=tuple(values[name] for name in names),
+        frames=tuple(frames),
+    )
 
 
-def symbols_of(graph: Graph, name: str, n: int) -> Array:
+def frame_in_body(expansion: Expansion, i: int, length: float) -> tuple[Array, Array]:
+    """Return axes, (3, 3), and origin, (3,), of the node of body i in the frame of the body."""
+    F, origin = expansion.frame_of[i]
+    return whole(F), without_rounding(origin, length)
+
+
+def link_of(
+    graph: Graph, expansion: Expansion, k: int, symbols: dict[str, Scalar], values: dict[str, float], length: float
+) -> Link:
+    """Return node k as terms; symbols, values: of parameters by name, length: the largest of the tree."""
+    nodes, body = expansion.nodes, int(expansion.nodes.body[k])
+    mass, s, P = graph.zero, terms(graph, np.zeros(3)), terms(graph, np.zeros((3, 3)))
+    if body >= 0:
+        own = [f"{expansion.system.bodies[body].name}/{each}" for each in INERTIAL]
+        if any(name in symbols for name in own):
+            phi = terms(graph, [symbols.get(name, values[name]) for name in own])
+            mass, s, P = moments_in_node(phi, *(terms(graph, each) for each in frame_in_body(expansion, body, length)))
+        else:
+            J, size = nodes.J[k], max(float(np.abs(nodes.s[k]).max()), float(nodes.mass[k]) * length)
+            mass, s = graph.constant(float(nodes.mass[k])), terms(graph, without_rounding(nodes.s[k], size))
+            P = terms(graph, without_rounding(second_moment(J), float(np.abs(J).max())))
+    return Link(
+        parent=int(nodes.parent[k]),
+        kind=int(nodes.kind[k]),
+        is_near=bool(nodes.is_near[k]),
+        x0=int(nodes.x0[k]),
+        v0=int(nodes.v0[k]),
+        n_z=int(nodes.n_z[k]),
+        slide=graph.constant(float(whole(nodes.slide[k]))),
+        turn=graph.constant(float(whole(nodes.turn[k]))),
+        A=terms(graph, whole(nodes.A[k])),
+        r=terms(graph, without_rounding(nodes.r[k], length)),
+        body=body,
+        mass=mass,
+        s=s,
+        P=P,
+    )
+
+
+def symbols_of(graph: Graph, name: str, n: int) -> Terms:
     """Return the symbols name[0] to name[n - 1]."""
     return np.array([graph.symbol(f"{name}[{k}]") for k in range(n)], dtype=object)
 
 
-def moments_in_node(graph: Graph, phi: Array, F: Array, origin: Array) -> tuple[Scalar, Array, Array]:
-    """Return mass, first and second moment in the frame F, origin of a node, of parameters of the body, (10,)."""
+def moments_in_node(phi: Terms, F: Terms, c: Terms) -> tuple[Scalar, Terms, Terms]:
+    """Return mass, first and second moment in the frame of a node, axes F at c, of parameters of the body, (10,)."""
     m, S = phi[0], phi[1:4]
     xx, xy, xz, yy, yz, zz = phi[4:]
     P = second_moment(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=object))
-    c, Ft = terms(graph, origin), terms(graph, F.T)
     s = S - m * c
     moved = np.empty((3, 3), dtype=object)
     for i in range(3):
         for j in range(i, 3):
             moved[i, j] = moved[j, i] = P[i, j] - S[i] * c[j] - c[i] * s[j]
-    turned = Ft @ moved @ Ft.T
+    turned = F.T @ moved @ F
     for i in range(3):
         for j in range(i):
             turned[i, j] = turned[j, i]
-    return m, Ft @ s, turned
+    return m, F.T @ s, turned

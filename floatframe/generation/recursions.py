@@ -15,15 +15,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
-from floatframe.generation.graph import Graph, Scalar
+from floatframe.generation.graph import Graph, Scalar, Terms
 from floatframe.generation.links import Link, TreeTerms, terms
 from floatframe.relative.recursion.nodes import ROTATION, SCREW, TRANSLATION
 
 __all__ = ["Joint", "cross", "forward_dynamics", "inverse_dynamics", "joints_of", "mass_matrix", "solved"]
 
 
-def cross(a: Array, b: Array) -> Array:
+def cross(a: Terms, b: Terms) -> Terms:
     """Return a × b of terms."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], dtype=object)
 
@@ -49,7 +48,7 @@ class Joint:
         self.columns = joint_columns(graph, link, self.E)
 
 
-def rotation_of(graph: Graph, p: Array) -> Array:
+def rotation_of(graph: Graph, p: Terms) -> Terms:
     """Return the rotation matrix of Euler parameters of length one."""
     w, x, y, z = p
     X, Y, Z = 2.0 * x, 2.0 * y, 2.0 * z
@@ -60,7 +59,7 @@ def rotation_of(graph: Graph, p: Array) -> Array:
     ])  # fmt: skip
 
 
-def joint_columns(graph: Graph, link: Link, E: Array) -> Array:
+def joint_columns(graph: Graph, link: Link, E: Terms) -> Terms:
     """Return the motion (translation, rotation) of the outer frame by each rate, its axes, (n_z, 6)."""
     columns = terms(graph, np.zeros((link.n_z, 6)))
     if link.kind == SCREW:
@@ -77,7 +76,7 @@ def joints_of(tree: TreeTerms) -> list[Joint]:
     return [Joint(tree, link) for link in tree.links]
 
 
-def spin_terms(omega: Array, alpha: Array) -> Array:
+def spin_terms(omega: Terms, alpha: Terms) -> Terms:
     """Return U = alpha~ + omega~ omega~, (3, 3)."""
     x, y, z = omega
     xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
@@ -88,7 +87,7 @@ def spin_terms(omega: Array, alpha: Array) -> Array:
     ], dtype=object)  # fmt: skip
 
 
-def axial_of_product(U: Array, P: Array) -> Array:
+def axial_of_product(U: Terms, P: Terms) -> Terms:
     """Return the axial vector of U P - (U P)ᵀ, P symmetric, (3,)."""
     t = []
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -97,7 +96,7 @@ def axial_of_product(U: Array, P: Array) -> Array:
     return np.array(t, dtype=object)
 
 
-def motion_through(link: Link, joint: Joint, v: Array, a: Array, omega: Array, alpha: Array, acc: Array) -> tuple:
+def motion_through(link: Link, joint: Joint, v: Terms, a: Terms, omega: Terms, alpha: Terms, acc: Terms) -> tuple:
     """Return omega, alpha, a of the outer frame of a joint from those of its inner one at the same point."""
     E = joint.E.T
     acc = acc + spin_terms(omega, alpha) @ joint.d
@@ -112,7 +111,7 @@ def motion_through(link: Link, joint: Joint, v: Array, a: Array, omega: Array, a
     return omega + turned, alpha, acc
 
 
-def inverse_dynamics(tree: TreeTerms, v: Array, a: Array, joints: Sequence[Joint]) -> Array:
+def inverse_dynamics(tree: TreeTerms, v: Terms, a: Terms, joints: Sequence[Joint]) -> Terms:
     """Return the forces along all rates that a motion needs, (n,): recursive Newton-Euler (docs/recursive.md §2).
 
     (1) forward   omega, alpha and a minus gravity of each node, through A, r, d, E
@@ -144,14 +143,14 @@ def inverse_dynamics(tree: TreeTerms, v: Array, a: Array, joints: Sequence[Joint
     return force
 
 
-def to_parent(link: Link, joint: Joint, f: Array, t: Array) -> tuple[Array, Array]:
+def to_parent(link: Link, joint: Joint, f: Terms, t: Terms) -> tuple[Terms, Terms]:
     """Return a wrench of the frame of a node in that of its parent."""
     f, t = joint.E @ f, joint.E @ t
     f, t = link.A @ f, link.A @ (t + cross(joint.d, f))
     return f, t + cross(link.r, f)
 
 
-def turned_moment(R: Array, P: Array) -> Array:
+def turned_moment(R: Terms, P: Terms) -> Terms:
     """Return R P Rᵀ of a symmetric P, the entries below the diagonal those above."""
     half = R @ P
     out = np.empty((3, 3), dtype=object)
@@ -161,7 +160,7 @@ def turned_moment(R: Array, P: Array) -> Array:
     return out
 
 
-def shifted_moments(m: Scalar, s: Array, P: Array, r: Array) -> tuple[Array, Array]:
+def shifted_moments(m: Scalar, s: Terms, P: Terms, r: Terms) -> tuple[Terms, Terms]:
     """Return first and second moment about a point from which r leads to the one before."""
     s_r = s + m * r
     out = np.empty((3, 3), dtype=object)
@@ -171,7 +170,7 @@ def shifted_moments(m: Scalar, s: Array, P: Array, r: Array) -> tuple[Array, Arr
     return s_r, out
 
 
-def mass_matrix(tree: TreeTerms, joints: Sequence[Joint]) -> Array:
+def mass_matrix(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
     """Return the mass matrix, (n, n), by composite bodies (docs/recursive.md §3), in the frames of the nodes.
 
     (1) m, s, P of each subtree
@@ -206,7 +205,7 @@ def mass_matrix(tree: TreeTerms, joints: Sequence[Joint]) -> Array:
     return M
 
 
-def solved(tree: TreeTerms, M: Array, right: Array) -> Array:
+def solved(tree: TreeTerms, M: Terms, right: Terms) -> Terms:
     """Return M⁻¹ right, (n,), by M = Lᵀ D L from the tips inwards, which fills nothing in."""
     order = [link.v0 + j for link in tree.links for j in range(link.n_z)]
     H, y, graph = M.copy(), right.copy(), tree.graph
@@ -229,7 +228,7 @@ def solved(tree: TreeTerms, M: Array, right: Array) -> Array:
     return y
 
 
-def forward_dynamics(tree: TreeTerms, force: Array, joints: Sequence[Joint]) -> Array:
+def forward_dynamics(tree: TreeTerms, force: Terms, joints: Sequence[Joint]) -> Terms:
     """Return the accelerations under forces along the rates, (n,)."""
     rest = np.full(len(tree.v), tree.graph.zero, dtype=object)
     h = inverse_dynamics(tree, tree.v, rest, joints)

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
 from floatframe.generation.derivatives import jacobian, position_seeds, seeds_of
-from floatframe.generation.graph import Graph, Operations, Scalar, operations
+from floatframe.generation.graph import Graph, Operations, Scalar, Terms, operations
 from floatframe.generation.grouping import carried_inwards
 from floatframe.generation.links import TreeTerms, symbols_of, terms
 from floatframe.generation.recursions import (
@@ -26,7 +25,7 @@ class Output:
     """One array of results."""
 
     name: str
-    values: Array  #: terms, of the shape that the array has
+    values: Terms  #: terms, of the shape that the array has
     meaning: str
 
 
@@ -52,7 +51,7 @@ class Routine:
         return operations(self.values)
 
 
-def force_output(name: str, values: Array) -> Output:
+def force_output(name: str, values: Terms) -> Output:
     """Return forces along rates as an output."""
     return Output(name, values, "forces along the rates [N, N m]")
 
@@ -86,7 +85,7 @@ def derivatives(tree: TreeTerms) -> list[Output]:
     force = inverse_dynamics(tree, tree.v, tree.a, joints)
     return [
         Output("by_z", jacobian(tree.graph, force, position_seeds(tree)), "force by z along the rates"),
-        Output("by_z_dot", jacobian(tree.graph, force, seeds_of(tree.graph, tree.v)), "force by z_dot"),
+        Output("by_z_dot", jacobian(tree.graph, force, seeds_of(tree.graph, list(tree.v))), "force by z_dot"),
         Output("by_z_ddot", mass_matrix(tree, joints), "force by z_ddot: the mass matrix"),
     ]
 
@@ -101,7 +100,7 @@ def sensitivity(tree: TreeTerms) -> list[Output]:
 def kinematics(tree: TreeTerms) -> list[Output]:
     """Return place, axes and velocity of the frames of all bodies, ground axes."""
     graph, zero = tree.graph, terms(tree.graph, np.zeros(3))
-    placed: list[tuple[Array, Array, Array, Array]] = []
+    placed: list[tuple[Terms, Terms, Terms, Terms]] = []
     for link, joint in zip(tree.links, joints_of(tree), strict=True):
         r, R, v, omega = (zero, terms(graph, np.eye(3)), zero, zero) if link.parent < 0 else placed[link.parent]
         R_in = R @ link.A

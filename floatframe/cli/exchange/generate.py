@@ -50,15 +50,9 @@ def generate_command(
     from floatframe.system_file.read_system import read_system
 
     described = read_system(system)[0]
+    names = {each: None if name is None else f"{name}_{each}" for each in what}
     codes = [
-        generate(
-            described,
-            what=each,
-            language=language,
-            parameters=parameters,
-            name=None if name is None else f"{name}_{each}",
-        )
-        for each in dict.fromkeys(what)
+        generate(described, what=each, language=language, parameters=parameters, name=names[each]) for each in names
     ]
     files = {output / file: text.encode() for code in codes for file, text in code.files.items()}
     if any(path.resolve() == system.resolve() for path in files):
