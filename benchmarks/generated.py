@@ -50,7 +50,9 @@ void clocked(long times, double *in, double *out, double *took)
 
 def library(code: GeneratedCode, n_in: list[int], n_out: list[int], folder: Path) -> ctypes.CDLL:
     """Return the code compiled with loops around it; inputs and outputs one after the other."""
-    starts = [[f"{name} + {sum(sizes[:k])}" for k in range(len(sizes))] for name, sizes in (("in", n_in), ("out", n_out))]
+    starts = [
+        [f"{name} + {sum(sizes[:k])}" for k in range(len(sizes))] for name, sizes in (("in", n_in), ("out", n_out))
+    ]
     text = LOOP % {"name": code.name, "arguments": ", ".join([*starts[0], *starts[1]])}
     path = code.write(folder)[0]
     (folder / f"{code.name}_loop.c").write_text(text)
