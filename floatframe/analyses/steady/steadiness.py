@@ -189,13 +189,12 @@ def balance(compiled: CompiledSystem, work: Work, w: Array) -> Balance:
 
 def speed_changes(compiled: CompiledSystem, work: Work, mass: Sequence[Array]) -> float:
     """Return the size of the forces that would turn all velocities round while bodies move by their size."""
-    u, total, u0 = work.state.u, 0.0, compiled.model.bodies.u0
-    for block, (first, last) in zip(mass, pairwise(u0.tolist()), strict=True):
-        own = u[first:last].copy()
-        own[:3] = work.state.R[list(u0).index(first)].T @ own[:3]
+    u, total, speed, turning = work.state.u, 0.0, 0.0, 0.0
+    for R, block, (first, last) in zip(work.state.R, mass, pairwise(compiled.model.bodies.u0.tolist()), strict=True):
+        own = np.concatenate([R.T @ u[first : first + 3], u[first + 3 : last]])
         total += float(own @ block @ own)
-    speed = max(float(np.abs(u[u0[i] : u0[i] + 3]).max()) for i in range(len(u0) - 1)) / compiled.length
-    turning = max(float(np.abs(u[u0[i] + 3 : u0[i] + 6]).max()) for i in range(len(u0) - 1))
+        speed = max(speed, float(np.abs(u[first : first + 3]).max()) / compiled.length)
+        turning = max(turning, float(np.abs(u[first + 3 : first + 6]).max()))
     return float(np.sqrt(total)) * max(speed, turning)
 
 

@@ -1,66 +1,32 @@
 """Steady running: the state in which a vehicle goes straight on or round a curve and nothing in it changes.
 
-Unknowns are the motions xi of the bodies, the wrenches, multipliers and states w of connections, the speeds s of the
-spins, the curvature where it is not given, and numbers p of the system that the user leaves open (a steer angle, a
-torque). With the carrier of `carrier.py`:
-
-    (1) velocities and accelerations of the steady motion belong to every trial (xi, s, curvature)
-    (2) residuals: forces f of the bodies, rows g of connections, rates of what joints hold, rates z' of states, and
-        where the body of reference passes: neither ahead of its point nor beside it
-    (3) least squares of smallest size for the linear equations, scaled by rows and columns: motions that cost nothing
-        (a wheel on its axle, the place along the road) stay where they are
-    (4) the tangent is exact in xi, w, s and the curvature, and a difference in p.
+Found by damped Newton steps for the equations of `equations.py`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg as la
 
-from fe_models.foundation.arrays import Array, IntArray
-from fe_models.foundation.words import nearest, quoted
-from floatframe.analyses.equilibrium import (
-    CLOSED,
-    LARGEST_TURN,
-    Equilibrium,
-    forces_at_work,
-    largest_motion,
-    notes_at,
-    size_of,
-    worst_body,
-)
-from floatframe.analyses.steady.carrier import Carrier, Spin, by_carrier, by_spin, carried
-from floatframe.analyses.system_matrices import turning_matrices
-from floatframe.checked_values import array_of_shape, unit_vector
-from floatframe.compiling.callbacks import raise_errors_of
+from fe_models.foundation.arrays import Array
+from floatframe.analyses.equilibrium import LARGEST_TURN, Equilibrium, largest_motion, notes_at, worst_body
+from floatframe.analyses.steady.carrier import Carrier, carried
+from floatframe.analyses.steady.equations import Equations, Family, Place, Step, Trial, timed
+from floatframe.analyses.steady.path import path_of, require_body, spins_of
+from floatframe.checked_values import unit_vector
 from floatframe.compiling.file_frames import motion_of_file
-from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.compiling.system import compiled_system
 from floatframe.errors import ConvergenceError, ModelError
-from floatframe.joints.rows import is_held, is_held_position
-from floatframe.kernels.work import Work, new_work
-from floatframe.motion.stop_events import require_off_stops
-from floatframe.rotations import rotation_matrix, tilde
-from floatframe.start.initial import assembled, checked, known_of, require_numbers, start_unknowns
-from floatframe.start.newton_equations import (
-    Linearized,
-    displaced,
-    in_ground_axes,
-    linearized,
-    set_iterate,
-    with_modal_weight,
-)
+from floatframe.kernels.work import new_work
+from floatframe.start.initial import assembled, checked, known_of, start_unknowns
 from floatframe.state import State
 from floatframe.system import System
 
 __all__ = ["SteadyMotion", "steady_motion"]
 
-SPINS = 1e-9  #: speed of a spin, in turns of a body per time in which it moves by the size of the system
 SETTLED = 1e-7  #: last change of all unknowns, relative to their sizes
 STUCK = 1e-4  #: the same, below which forces that do not fall will not
 SHORTEST = 1e-4  #: part of a step
-SINGULAR = 1e-12  #: singular value of the scaled equations below which a motion costs nothing
-DIFFERENCE = 1e-4  #: step of open numbers, of their size, at least one
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,211 +110,27 @@ def steady_motion(
     start = assembled(compiled, timed(new_work(compiled.model), t), given, known_of(compiled, state))
     carrier, path = path_of(compiled, start, body, speed, curvature, center, unit_vector("steady_motion: axis", axis))
     spins, s = spins_of(trial, compiled, start, path, spinning or {})
-    search = Search(family, spins, path, guided, t, tolerance)
+    search = Search(Equations(family, spins, path, guided, t), tolerance)
     return search.run(start, start_unknowns(compiled.model, known_of(compiled, state)), s, carrier, max_iterations)
-
-
-@dataclass(frozen=True, eq=False)
-class Family:
-    """A system by its open numbers."""
-
-    system: System | Callable[..., System]
-    start: dict[str, float]
-
-    @property
-    def first(self) -> System:
-        """The system to begin with."""
-        return self.at(np.array(list(self.start.values()), dtype=float))
-
-    def at(self, p: Array) -> System:
-        """Return the system for open numbers p, (n_p,)."""
-        if isinstance(self.system, System):
-            if self.start:
-                raise ModelError(
-                    f"steady_motion: unknown {sorted(self.start)}: expected a function that returns the system from "
-                    "these numbers, got a system"
-                )
-            return self.system
-        return self.system(**dict(zip(self.start, (float(value) for value in p), strict=True)))
-
-
-@dataclass(frozen=True, eq=False)
-class Path:
-    """Where the body of reference goes."""
-
-    body: int
-    name: str
-    point: Array  #: it passes, ground axes, (3,) [m]
-    ahead: Array  #: direction of its motion there, ground axes, (3,)
-    axis: Array  #: of the circle, ground axes, (3,)
-    speed: float
-    placed_speed: float
-    is_open: bool  #: the curvature is to be found
-
-    @property
-    def aside(self) -> Array:
-        """The direction to the left of the motion, (3,)."""
-        return np.cross(self.axis, self.ahead)
-
-
-def require_body(system: System, name: str) -> None:
-    """Raise `ModelError` with the nearest name if a body is not there."""
-    names = [each.name for each in system.bodies]
-    if name not in names:
-        raise ModelError(f"steady_motion: no body {quoted(name)}{nearest(name, names)}")
-
-
-def timed(work: Work, t: float) -> Work:
-    """Return working arrays at a time."""
-    work.state.time[...] = t
-    return work
-
-
-def path_of(
-    compiled: CompiledSystem,
-    start: State,
-    name: str,
-    speed: float | None,
-    curvature: float | None,
-    center: Array | Sequence[float] | None,
-    axis: Array,
-) -> tuple[Carrier, Path]:
-    """Return the carrier to begin with and the path of the body of reference.
-
-    Raises
-    ------
-    ModelError
-        If the body has no velocity across the axis, or center and curvature do not go together.
-    """
-    i = compiled.body_names.index(name)
-    u0 = int(compiled.model.bodies.u0[i])
-    v = start.u[u0 : u0 + 3]
-    v = v - (v @ axis) * axis
-    placed_speed, point = float(np.linalg.norm(v)), start.r[i].copy()
-    speed = placed_speed if speed is None else float(speed)
-    if not (np.isfinite(speed) and speed >= 0):
-        raise ModelError(f"steady_motion: speed: expected a number of at least 0, got {speed}")
-    if speed > 0 and placed_speed == 0:
-        raise ModelError(
-            f"steady_motion: body {name!r} is placed without a velocity across the axis {axis.tolist()}; give it the "
-            "velocity with which it runs, which says the direction"
-        )
-    ahead = v / (placed_speed or 1.0)
-    path = Path(i, name, point, ahead, axis, speed, placed_speed, curvature is None)
-    if center is not None:
-        center = array_of_shape("steady_motion: center", center, (3,))
-        if not curvature:
-            raise ModelError("steady_motion: center: expected a curvature too, whose sign says to which side it turns")
-        arm = point - center
-        arm = arm - (arm @ axis) * axis
-        distance = float(np.linalg.norm(arm))
-        if distance == 0 or abs(distance * abs(curvature) - 1) > 0.1:
-            raise ModelError(
-                f"steady_motion: center: {distance:g} from body {name!r}, but the curvature is {curvature:g}; expected "
-                "its distance to be one over the curvature, within a tenth"
-            )
-        omega = np.sign(curvature) * speed / distance * axis
-        return Carrier(center, np.zeros(3), omega), replace(path, ahead=np.cross(omega, arm) / speed)
-    if speed == 0 and curvature != 0:
-        raise ModelError("steady_motion: a system that stands has no curvature; give curvature = 0")
-    if curvature is not None and not np.isfinite(curvature):
-        raise ModelError(f"steady_motion: curvature: expected a number or None, got {curvature}")
-    return Carrier(point, speed * ahead, speed * (curvature or 0.0) * axis), path
-
-
-def spins_of(
-    system: System,
-    compiled: CompiledSystem,
-    start: State,
-    path: Path,
-    more: Mapping[str, Sequence[float]],
-) -> tuple[tuple[Spin, ...], Array]:
-    """Return the bodies that spin and their speeds to begin with: as placed, times `faster`.
-
-    Raises
-    ------
-    ModelError
-        If a body that is named is not there, or a flexible one spins.
-    """
-    for name in more:
-        require_body(system, name)
-    u0 = [int(first) for first in compiled.model.bodies.u0[:-1]]
-    i, axis, faster = path.body, path.axis, path.speed / path.placed_speed if path.speed else 1.0
-    omega = (axis @ rotation_matrix(start.p[i]) @ start.u[u0[i] + 3 : u0[i] + 6]) * axis
-    least = SPINS * float(np.abs(start.u[u0[i] : u0[i] + 3]).max()) / compiled.length
-    spins: list[Spin] = []
-    s: list[float] = []
-    for k, name in enumerate(compiled.body_names):
-        own = start.u[u0[k] + 3 : u0[k] + 6] - rotation_matrix(start.p[k]).T @ omega
-        size = float(np.linalg.norm(own))
-        if name in more:
-            e = unit_vector(f"steady_motion: spinning: {name}", more[name])
-            spins, s = [*spins, Spin(k, e)], [*s, faster * float(own @ e)]
-        elif size > least:
-            spins, s = [*spins, Spin(k, own / size)], [*s, faster * size]
-    for spin in spins:
-        if compiled.model.bodies.n_q[spin.body]:
-            raise ModelError(
-                f"steady_motion: body {compiled.body_names[spin.body]!r} is flexible and spins beside body "
-                f"{path.name!r}: its modes would turn with it; make it rigid (is_rigid), or take steady_rotation"
-            )
-    return tuple(spins), np.array(s, dtype=float)
-
-
-@dataclass(frozen=True, eq=False)
-class Evaluated:
-    """The equations at a trial."""
-
-    parts: Linearized
-    D: Array  #: of the forces by xi, (n_u, n_u)
-    G: Array  #: of the rows by xi, (n_w, n_u)
-    C: Array  #: of the forces by nu
-    M: Array
-    G_v: Array
-    f: Array  #: forces out of balance, (n_u,)
-    g: Array  #: rows, (n_w,)
-    rate: Array  #: of what joints hold, (n_w,)
-    W: tuple[Array, ...]  #: masses with modal stiffness
-    scale: float  #: of the forces at work
-
-    @property
-    def error(self) -> float:
-        """Forces out of balance, relative to those at work."""
-        size = size_of(self.W, self.f)
-        return size / self.scale if self.scale > 0 else size
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """Unknowns."""
-
-    state: State
-    w: Array
-    s: Array
-    carrier: Carrier
-    p: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
     """Newton's method for a steady motion."""
 
-    family: Family
-    spins: tuple[Spin, ...]
-    path: Path
-    guided: bool
-    t: float
+    equations: Equations
     tolerance: float
 
     def run(self, state: State, w: Array, s: Array, carrier: Carrier, max_iterations: int) -> SteadyMotion:
         """Return the steady motion next to a trial."""
-        here = self.at(Trial(state, w, s, carrier, np.array(list(self.family.start.values()), dtype=float)))
+        equations, path = self.equations, self.equations.path
+        here = equations.at(Trial(state, w, s, carrier, np.array(list(equations.family.start.values()), dtype=float)))
         errors, is_stuck = [np.inf], False
         for iteration in range(max_iterations + 1):
-            step = self.step(here)
-            change = self.change(here, step.x)
+            step = equations.step(here)
+            change = equations.change(here, step.x)
             error = here.now.error
-            if error <= self.tolerance and change <= SETTLED and self.is_closed(here):
+            if error <= self.tolerance and change <= SETTLED and equations.is_closed(here):
                 return self.result(here, iteration)
             errors.append(error)
             is_stuck = change <= STUCK and len(errors) > 5 and error > 0.5 * errors[-5]
@@ -363,273 +145,43 @@ class Search:
             else "start nearer: place it closer to its steady state, or begin with the end of a motion (state)"
         )
         raise ConvergenceError(
-            f"no steady motion of body {self.path.name!r} at {self.path.speed:g} found in {iteration} steps: forces "
+            f"no steady motion of body {path.name!r} at {path.speed:g} found in {iteration} steps: forces "
             f"are out of balance by {error:.2g} of those at work, most at body "
             f"{worst_body(here.compiled, here.now.W, here.now.f)!r}; {why}",
-            t=self.t, h=0.0, residual=error,
+            t=equations.t, h=0.0, residual=error,
         )  # fmt: skip
 
-    def at(self, trial: Trial) -> "Place":
-        """Return a trial with its joints closed and its equations."""
-        system = self.family.at(trial.p)
-        compiled, work = compiled_system(system), timed(new_work(compiled_system(system).model), self.t)
-        if len(trial.w) != int(compiled.model.connections.w0[-1]):
-            raise ModelError("steady_motion: the function returns systems with different connections")
-        require_off_stops(system, trial.w)
-        # open, joints would see by how much a wheel is turned
-        trial = replace(trial, state=assembled(compiled, work, trial.state, trial.w))
-        return Place(system, compiled, work, trial, self.evaluated(compiled, work, trial))
-
-    def followed(self, here: "Place", step: "Step") -> "Place | None":
+    def followed(self, here: Place, step: Step) -> Place | None:
         """Return what lies along a step: so far that the next one by the same matrix is shorter (natural monotony)."""
+        equations = self.equations
         y = step.x[: len(here.now.f)]
         part, length = min(1.0, LARGEST_TURN / max(largest_motion(here.compiled, y), 1e-300)), step.length(step.x)
         there = None
         while part >= SHORTEST:
             try:
-                there = self.at(self.moved(here, part * step.x))
+                there = equations.at(equations.moved(here, part * step.x))
             except ModelError:  # joints that do not close there, a law that gives no number
                 part /= 2
                 continue
-            following = step.length(step.inverse @ self.residual(there))
+            following = step.length(step.inverse @ equations.residual(there))
             if following <= (1 - part / 4) * length or length <= SETTLED:
                 return there
             part /= 2 if following < 4 * length else 4
         return there
 
-    def moved(self, here: "Place", x: Array) -> Trial:
-        """Return a trial after the changes x of its unknowns."""
-        trial, model = here.trial, here.compiled.model
-        _, unknowns, _ = self.used_rows(here.compiled)
-        n_u, n_s = len(here.now.f), len(self.spins)
-        y, dw, rest = x[:n_u], np.zeros(len(trial.w)), x[n_u + len(unknowns) :]
-        dw[unknowns] = x[n_u : n_u + len(unknowns)]
-        omega = trial.carrier.omega
-        if self.path.is_open:
-            omega = omega + rest[n_s] * self.path.speed * self.path.axis
-        return Trial(
-            displaced(model, trial.state, in_ground_axes(model, trial.state, y)),
-            trial.w + dw,
-            trial.s + rest[:n_s],
-            replace(trial.carrier, omega=omega),
-            trial.p + rest[len(rest) - len(trial.p) :],
-        )
-
-    def change(self, here: "Place", x: Array) -> float:
-        """Return the size of the changes x, relative to those of the unknowns."""
-        trial, model, length = here.trial, here.compiled.model, here.compiled.length
-        after = self.moved(here, x)
-        dw, of_states = after.w - trial.w, np.concatenate([model.states.row, model.laws.equation]).astype(int)
-        sizes = np.maximum(np.concatenate([model.states.size, model.laws.equation_size]), np.abs(trial.w[of_states]))
-        own = np.zeros(len(dw), dtype=bool)
-        own[of_states] = True
-        turning = float(np.linalg.norm(after.carrier.omega - trial.carrier.omega))
-        changes = [
-            largest_motion(here.compiled, x[: len(here.now.f)]),
-            largest(dw[~own]) / max(largest(trial.w[~own]), 1e-300),
-            largest(dw[of_states] / sizes),
-            largest(after.s - trial.s) / max(largest(trial.s), 1e-300),
-            turning * length / max(self.path.speed, 1e-300),
-            largest((after.p - trial.p) / np.maximum(np.abs(trial.p), 1.0)),
-        ]
-        return float(max(changes))
-
-    def evaluated(self, compiled: CompiledSystem, work: Work, trial: Trial) -> Evaluated:
-        """Return (2) with its derivatives by motions."""
-        from floatframe.kernels.entry import rates_of_constraints
-
-        model = compiled.model
-        state, u_dot = carried(model, trial.state, trial.carrier, self.spins, trial.s)
-        set_iterate(work, state, u_dot, trial.w)
-        rate, _ = rates_of_constraints(model, work)
-        mass = linearized(model, work, 1.0, 0.0, 0.0).H
-        by_both = linearized(model, work, 0.0, 1.0, 1.0)
-        parts = linearized(model, work, 0.0, 0.0, 1.0)
-        raise_errors_of(compiled.callbacks)
-        require_numbers(compiled, work)
-        K, M = la.block_diag(*parts.H), la.block_diag(*mass)
-        C = la.block_diag(*by_both.H) - K
-        G_x = parts.G.toarray()
-        G_v = by_both.G.toarray() - G_x
-        Omega, Omega_t = turning_matrices(model, work, trial.carrier.omega)
-        W = with_modal_weight(model, mass)
-        f = work.bodies.residual.copy()
-        # forces in axes of the carrier: turned with a body, they stay what they are
-        D = K + C @ Omega + M @ Omega_t @ Omega - turned_forces(compiled, f)
-        return Evaluated(
-            parts, D, G_x + G_v @ Omega, C, M, G_v, f, work.connections.g.copy(), rate, W,
-            forces_at_work(compiled, work, parts, W),
-        )  # fmt: skip
-
-    def fastest(self, trial: Trial) -> float:
-        """Return the speed of the system, or that of its spins where it stands, in units of length one."""
-        return self.path.speed or float(np.abs(trial.s).max(initial=0.0)) or 1.0
-
-    def used_rows(self, compiled: CompiledSystem) -> tuple[IntArray, IntArray, IntArray]:
-        """Return which rows are equations, which unknowns of connections are such, and which rows hold positions."""
-        model = compiled.model
-        n_w = int(model.connections.w0[-1])
-        steps, rates = np.zeros(n_w, dtype=bool), np.zeros(n_w, dtype=bool)
-        steps[model.states.row] = steps[model.states.row + 2] = True  # equations of steps in time
-        rates[model.states.row + 1] = rates[model.states.row + 2] = True  # zero
-        return np.flatnonzero(~steps), np.flatnonzero(~rates), np.flatnonzero(is_held_position(model.rows.kind))
-
-    def gauges(self, compiled: CompiledSystem, trial: Trial) -> tuple[Array, Array]:
-        """Return where the body of reference is from its point, ahead and aside, and the derivative by xi."""
-        i, n_u = self.path.body, int(compiled.model.bodies.u0[-1])
-        u0 = int(compiled.model.bodies.u0[i])
-        directions = [] if not self.path.speed else [self.path.ahead]
-        if directions and not self.guided:
-            directions.append(self.path.aside)
-        rows, toward = np.zeros((len(directions), n_u)), np.array(directions).reshape(-1, 3)
-        rows[:, u0 : u0 + 3] = toward @ rotation_matrix(trial.state.p[i])
-        return toward @ (trial.state.r[i] - self.path.point), rows
-
-    def residual(self, here: "Place") -> Array:
-        """Return (2), negative."""
-        rows, _, held = self.used_rows(here.compiled)
-        gap, _ = self.gauges(here.compiled, here.trial)
-        return -np.concatenate([here.now.f, here.now.g[rows], here.now.rate[held], gap])
-
-    def step(self, here: "Place") -> "Step":
-        """Return the step (3) of xi, w, s, curvature and p."""
-        compiled, work, trial, now = here.compiled, here.work, here.trial, here.now
-        model = compiled.model
-        rows, unknowns, held = self.used_rows(compiled)
-        gap, by_gap = self.gauges(compiled, trial)
-        n_u = len(now.f)
-        others = [by_spin(model, work, trial.carrier.omega, spin) for spin in self.spins]
-        if self.path.is_open:
-            others.append(by_carrier(model, work, trial.carrier, self.path.speed * self.path.axis))
-        G_x = now.parts.G.toarray()
-        columns = [
-            np.concatenate([now.C @ nu + now.M @ eta, (now.G_v @ nu)[rows], (G_x @ nu)[held], np.zeros(len(gap))])
-            for nu, eta in others
-        ]
-        columns += self.by_numbers(trial, now, rows, held, len(gap))
-        J, V = now.parts.J.toarray(), now.parts.V.toarray()
-        A = np.zeros((n_u + len(rows) + len(held) + len(gap), n_u + len(unknowns) + len(columns)))
-        A[:n_u, :n_u], A[n_u : n_u + len(rows), :n_u] = now.D, now.G[rows]
-        A[len(A) - len(gap) :, :n_u] = by_gap
-        A[:n_u, n_u : n_u + len(unknowns)] = -J.T[:, unknowns]
-        A[n_u : n_u + len(rows), n_u : n_u + len(unknowns)] = V[np.ix_(rows, unknowns)]
-        if columns:
-            A[:, n_u + len(unknowns) :] = np.stack(columns, axis=1)
-        sizes = self.sizes(compiled, trial, now, unknowns)
-        of_rows = np.zeros(len(A))  # rates that no spin changes are rounding
-        of_rows[n_u + len(rows) : len(A) - len(gap)] = (
-            np.abs(G_x[held]) @ sizes[:n_u] * self.fastest(trial) / compiled.length
-        )
-        inverse, sizes = smallest_inverse(A, of_rows, sizes, len(trial.p))
-        return Step(inverse @ self.residual(here), inverse, sizes)
-
-    def sizes(self, compiled: CompiledSystem, trial: Trial, now: Evaluated, unknowns: IntArray) -> Array:
-        """Return typical sizes of the unknowns of a step."""
-        model = compiled.model
-        motions = np.ones(len(now.f))
-        force = max(float(np.abs(trial.w).max(initial=0.0)), weight_of(now), 1e-300)
-        for i, u0 in enumerate(model.bodies.u0[:-1]):
-            motions[u0 : u0 + 3] = compiled.length
-            modal = np.diag(now.W[i])[6:]
-            motions[u0 + 6 : u0 + 6 + len(modal)] = np.sqrt(now.W[i][0, 0] / modal) * compiled.length
-        w = np.full(len(now.g), force)
-        w[model.states.row] = np.maximum(model.states.size, np.abs(trial.w[model.states.row]))
-        w[model.laws.equation] = model.laws.equation_size
-        speed = self.fastest(trial) / compiled.length
-        others = [*(speed,) * len(self.spins), *(1 / compiled.length,) * self.path.is_open]
-        return np.concatenate([motions, w[unknowns], others, np.maximum(np.abs(trial.p), 1.0)])
-
-    def by_numbers(self, trial: Trial, now: Evaluated, rows: IntArray, held: IntArray, n_gaps: int) -> list[Array]:
-        """Return the derivatives (4) by the open numbers."""
-        columns = []
-        for k, value in enumerate(trial.p):
-            h = DIFFERENCE * max(abs(value), 1.0)
-            p = trial.p.copy()
-            p[k] += h
-            compiled = compiled_system(self.family.at(p))
-            work = timed(new_work(compiled.model), self.t)
-            after = self.evaluated(compiled, work, replace(trial, p=p))
-            # rates follow where the joints are closed again, as they do for motions
-            parts = [after.f - now.f, (after.g - now.g)[rows], np.zeros(len(held) + n_gaps)]
-            columns.append(np.concatenate(parts) / h)
-        return columns
-
-    def is_closed(self, here: "Place") -> bool:
-        """Whether what is held is, at its place and its rate."""
-        holds, length, now = is_held(here.compiled.model.rows.kind), here.compiled.length, here.now
-        gap = largest(now.g[holds]) / max(length, 1.0)
-        return max(gap, largest(now.rate) / max(self.path.speed, self.path.speed / length, 1.0)) <= CLOSED
-
-    def result(self, here: "Place", iteration: int) -> SteadyMotion:
+    def result(self, here: Place, iteration: int) -> SteadyMotion:
         """Return what was found."""
-        compiled, trial = here.compiled, here.trial
-        state, u_dot = carried(compiled.model, trial.state, trial.carrier, self.spins, trial.s)
+        equations, path, compiled, trial = self.equations, self.equations.path, here.compiled, here.trial
+        state, u_dot = carried(compiled.model, trial.state, trial.carrier, equations.spins, trial.s)
         notes = notes_at(here.system, here.work, state, u_dot, trial.w)
         told, told_u_dot = motion_of_file(compiled, state, u_dot)
         about = Equilibrium(
-            replace(told, w=trial.w), told_u_dot, trial.w, trial.carrier.omega, here.now.error, iteration, notes, self.t
-        )
-        names = [compiled.body_names[spin.body] for spin in self.spins]
+            replace(told, w=trial.w), told_u_dot, trial.w, trial.carrier.omega, here.now.error, iteration, notes,
+            equations.t,
+        )  # fmt: skip
+        names = [compiled.body_names[spin.body] for spin in equations.spins]
         return SteadyMotion(
-            here.system, about, self.path.speed, float(trial.carrier.omega @ self.path.axis) / (self.path.speed or 1.0),
-            dict(zip(self.family.start, trial.p.tolist(), strict=True)),
+            here.system, about, path.speed, float(trial.carrier.omega @ path.axis) / (path.speed or 1.0),
+            dict(zip(equations.family.start, trial.p.tolist(), strict=True)),
             dict(zip(names, trial.s.tolist(), strict=True)),
         )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """A trial and the equations there."""
-
-    system: System
-    compiled: CompiledSystem
-    work: Work
-    trial: Trial
-    now: Evaluated
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """A step of Newton's method."""
-
-    x: Array  #: changes of all unknowns, (n_x,)
-    inverse: Array  #: by which they follow from the residual, (n_x, n_rows)
-    sizes: Array  #: of the unknowns, (n_x,)
-
-    def length(self, x: Array) -> float:
-        """Return the length of a change by the sizes of its parts."""
-        return float(np.linalg.norm(x / self.sizes))
-
-
-def largest(values: Array) -> float:
-    """Return the largest size of values, 0 of none."""
-    return float(np.abs(values).max(initial=0.0))
-
-
-def weight_of(now: Evaluated) -> float:
-    """Return a force such as there are in the system."""
-    return now.scale * np.sqrt(float(sum(block[0, 0] for block in now.W)))
-
-
-def turned_forces(compiled: CompiledSystem, f: Array) -> Array:
-    """Return the derivative of forces f on the bodies, body axes, by rotations with them, (n_u, n_u)."""
-    by_turn = np.zeros((len(f), len(f)))
-    for u0 in compiled.model.bodies.u0[:-1]:
-        for k in (u0, u0 + 3):
-            by_turn[k : k + 3, u0 + 3 : u0 + 6] = tilde(f[k : k + 3])
-    return by_turn
-
-
-def smallest_inverse(A: Array, rows: Array, columns: Array, n_p: int) -> tuple[Array, Array]:
-    """Return the matrix by which the x of least |A x - b| that is smallest follows from b, and the sizes of x.
-
-    rows: least sizes of rows, which are scaled to one. columns: sizes of unknowns; of the last n_p they follow from A.
-    """
-    others = slice(None, A.shape[1] - n_p)
-    size = np.maximum(np.abs(A[:, others] * columns[others]).max(axis=1, initial=0.0), rows)
-    by = 1 / np.where(size > 0, size, np.maximum(np.abs(A).max(axis=1, initial=0.0), 1e-300))
-    of_numbers = np.abs(by[:, None] * A[:, len(columns) - n_p :]).max(axis=0, initial=0.0)
-    columns = columns.copy()
-    columns[len(columns) - n_p :] = 1 / np.where(of_numbers > 0, of_numbers, 1.0)
-    inverse = la.pinv(by[:, None] * A * columns, rtol=SINGULAR)
-    return columns[:, None] * inverse * by, columns
