@@ -13,7 +13,17 @@ from floatframe.kernels.work import Work, new_work
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["Carry", "Failure", "Integrator", "memory_of", "observed", "one_step_of", "turned_on", "with_angles"]
+__all__ = [
+    "Carry",
+    "Failure",
+    "Integrator",
+    "carry_of",
+    "memory_of",
+    "observed",
+    "one_step_of",
+    "turned_on",
+    "with_angles",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +101,25 @@ def memory_of(carry: Carry) -> Memory:
     memory.h[...], memory.h_wanted[...] = carry.h, carry.h_next
     memory.n_accepted[...], memory.n_rejected[...] = carry.n_steps, carry.n_rejected
     return memory
+
+
+def carry_of(memory: Memory, n_iterations: int) -> Carry:
+    """Return what the kernels have left in a memory, after so many iterations of Newton's method."""
+    return Carry(
+        State(memory.r, memory.p, memory.q, memory.u),
+        memory.u_dot,
+        memory.a,
+        float(memory.h),
+        memory.w,
+        np.array([memory.work_given, memory.work_taken]),
+        np.array([memory.power_given, memory.power_taken]),
+        n_iterations,
+        float(memory.h_wanted),
+        int(memory.n_accepted),
+        int(memory.n_rejected),
+        memory.angle,
+        memory.angle_rate,
+    )
 
 
 def with_angles(system: System, t: float, carry: Carry, before: Carry | None = None) -> Carry:

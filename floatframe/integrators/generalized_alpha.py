@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, memory_of, observed, one_step_of, with_angles
+from floatframe.integrators.carry import Carry, Failure, carry_of, memory_of, observed, one_step_of, with_angles
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import MASS, STIFFNESS, Model
 from floatframe.kernels.work import Work
@@ -153,21 +153,7 @@ class GeneralizedAlpha:
             most_error=self.error_tolerance or 0.0,
             h_min=self.least_step(h),
         )
-        after = Carry(
-            State(memory.r, memory.p, memory.q, memory.u),
-            memory.u_dot,
-            memory.a,
-            float(memory.h),
-            memory.w,
-            np.array([memory.work_given, memory.work_taken]),
-            np.array([memory.power_given, memory.power_taken]),
-            carry.n_iterations + int(work.counted.iterations) - iterations,
-            float(memory.h_wanted),
-            int(memory.n_accepted),
-            int(memory.n_rejected),
-            memory.angle,
-            memory.angle_rate,
-        )
+        after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
         failure = None if outcome.status == 0 else self.explain(system, work, outcome, self.least_step(h))
         return after, rows, outcome.n_steps, failure

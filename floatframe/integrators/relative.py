@@ -8,7 +8,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, Integrator, memory_of, one_step_of, with_angles
+from floatframe.integrators.carry import Carry, Failure, Integrator, carry_of, memory_of, one_step_of, with_angles
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, squared_frequencies
 from floatframe.integrators.relative_ode import RelativeOde
 from floatframe.joints.rows import is_held_position
@@ -101,21 +101,7 @@ class RelativeGeneralizedAlpha:
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=compiled.length,
             most_error=self.error_tolerance or 0.0, h_min=self.absolute.least_step(h),
         )  # fmt: skip
-        after = Carry(
-            State(memory.r, memory.p, memory.q, memory.u),
-            memory.u_dot,
-            memory.a,
-            float(memory.h),
-            memory.w,
-            np.array([memory.work_given, memory.work_taken]),
-            np.array([memory.power_given, memory.power_taken]),
-            carry.n_iterations + int(work.counted.iterations) - iterations,
-            float(memory.h_wanted),
-            int(memory.n_accepted),
-            int(memory.n_rejected),
-            memory.angle,
-            memory.angle_rate,
-        )
+        after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
         return after, rows, outcome.n_steps, self.explain(system, work, outcome, h)
 

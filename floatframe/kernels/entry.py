@@ -97,7 +97,7 @@ def make_entry(digest):
         memory, rows, order = as_memory(memory_table), as_rows(rows_table), as_order(order_table)
         what = order.what
         if what == ADVANCE:
-            return advance(model, work, memory, rows, order)
+            return advance(model, work, memory, rows, (), order)
         if what == COUNT:
             load_state(work.state, memory)
             count_turns(model, work, memory, order.h)

@@ -15,20 +15,32 @@ from floatframe.kernels.rotation import right_jacobian
 from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import put, put_matrix, put_sum, scaled, turned, turned_back, vector
 
-__all__ = ["evaluate", "linearize", "tangent_of_body"]
+__all__ = ["evaluate", "evaluate_bodies", "evaluate_markers", "linearize", "tangent_of_body"]
 
 
 @inner
 def evaluate(model, work, c_k):
     """Write the residuals of bodies and rows for the iterate in `work`; rows of wrenches weighted by c_k."""
+    evaluate_markers(model, work)
+    for c in range(model.connections.size.shape[0]):
+        connection_rows(model, work, c, c_k)
+    evaluate_bodies(model, work)
+
+
+@inner
+def evaluate_markers(model, work):
+    """Write the motion of all markers; their wrenches are zero."""
     for m in range(model.markers.body.shape[0]):
         marker_motion(model, work, m)
         for k in range(6):
             work.markers.wrench[m, k] = 0.0
     for k in range(model.lines.marker.shape[0]):
         slide_marker(model, work, k)
-    for c in range(model.connections.size.shape[0]):
-        connection_rows(model, work, c, c_k)
+
+
+@inner
+def evaluate_bodies(model, work):
+    """Write the residuals of bodies with loads and the wrenches that connections put on markers."""
     for k in range(model.loads.marker.shape[0]):
         load_wrench(model, work, k)
     for i in range(model.bodies.kind.shape[0]):

@@ -22,7 +22,10 @@ __all__ = [
     "SINGULAR_CONNECTION",
     "STOPPED",
     "advance",
+    "is_resized",
+    "keep_iterate",
     "load_state",
+    "time_loop",
     "write_row",
 ]
 
@@ -272,14 +275,20 @@ def accept(model, work, memory, h, alpha_m, alpha_f):
     for k in range(memory.a.shape[0]):
         mean = (1 - alpha_f) * work.state.u_dot[k] + alpha_f * memory.u_dot[k]
         memory.a[k] = (mean - alpha_m * memory.a[k]) / (1 - alpha_m)
+    for i in range(model.bodies.kind.shape[0]):
+        p = memory.p[i]
+        p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, vector(work.state.theta[i]))
+    keep_iterate(model, work, memory, h)
+
+
+@inner
+def keep_iterate(model, work, memory, h):
+    """Write the iterate, but for rotations, into the memory; count turns and sum work on by a step of size h."""
     copy(work.state.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
     copy(work.state.q, memory.q)
     copy(work.state.u, memory.u)
     copy(work.state.u_dot, memory.u_dot)
     copy(work.state.w, memory.w)
-    for i in range(model.bodies.kind.shape[0]):
-        p = memory.p[i]
-        p[0], p[1], p[2], p[3] = rotate_euler_parameters(p, vector(work.state.theta[i]))
     count_turns(model, work, memory, h)
     loads, dissipated = power(model, work)
     memory.work_given += 0.5 * h * (memory.power_given + loads)
@@ -330,51 +339,89 @@ def step_after(h, error, most_error, has_failed):
     return min(max(fitting, LEAST * h), MOST * h)
 
 
-@inner
-def advance(model, work, memory, rows, order):
-    """Advance by n_steps of size h, the first of them number `first` from t0; write a row after every `every`-th.
+def time_loop(try_step, write):
+    """Return the compiled loop over the steps of a formulation.
 
-    The order is an `entry.Order`. With h_min above 0 each of these is divided into equal parts of at most the size that
-    is wanted: one that fails, or whose error is above `most_error` (if above 0), is tried again, shorter, down to
-    h_min; then parts grow again.
-
-    Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
+    Parameters
+    ----------
+    try_step
+        (model, work, memory, others, order, t, h): advance the memory to t by a step of size h, unless it fails or its
+        error is too large; return (status, index of what is singular, last correction by the allowed one, error).
+    write
+        (model, work, memory, others, t, rows): write the next row of the results. others: further records of the
+        formulation.
     """
-    h, first, h_min, most_error = order.h, order.first, order.h_min, order.most_error
-    put_weights(model, work, order.beta * memory.h**2)
-    work.counted.rows = 0
-    excess = 0.0
-    for k in range(order.n_steps):
-        end = order.t0 + (first + k + 1) * h
-        left = h
-        has_failed = False
-        while left > 0.0:
-            n_parts = 1.0
-            if h_min > 0.0:
-                n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
-            part = left / n_parts
-            if abs(part - memory.h) > SAME * part:
-                resize(model, memory, part)
-                put_weights(model, work, order.beta * part * part)
-            work.state.time = end - (left - part)
-            status, index, excess, error = one_step(model, work, memory, order, memory.h)
-            if status == DONE:
-                memory.n_accepted += 1
-                if work.counted.stopped > 0:
-                    return STOPPED, k, work.counted.rows, work.counted.stopped - 1, excess
-                left = left - part if n_parts > 1.0 else 0.0
+
+    @inner
+    def advance(model, work, memory, rows, others, order):
+        """Advance by n_steps of size h, the first of them number `first` from t0; write a row after every `every`-th.
+
+        The order is an `entry.Order`. With h_min above 0 each of these is divided into equal parts of at most the size
+        that is wanted: one that fails, or whose error is above `most_error` (if above 0), is tried again, shorter, down
+        to h_min; then parts grow again.
+
+        Return (status, steps done, rows written, index of what is singular, last correction by the allowed one).
+        """
+        h, first, h_min, most_error = order.h, order.first, order.h_min, order.most_error
+        put_weights(model, work, order.beta * memory.h**2)
+        work.counted.rows = 0
+        excess = 0.0
+        for k in range(order.n_steps):
+            end = order.t0 + (first + k + 1) * h
+            left = h
+            has_failed = False
+            while left > 0.0:
+                n_parts = 1.0
                 if h_min > 0.0:
-                    memory.h_wanted = min(step_after(part, error, most_error, has_failed), h)
-                has_failed = False
-                continue
-            if h_min <= 0.0 or part <= h_min:
-                return status, k, work.counted.rows, index, excess
-            memory.n_rejected += 1
-            shorter = 0.5 * part
-            if status == INACCURATE:
-                shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
-            memory.h_wanted = max(shorter, h_min)
-            has_failed = True
-        if (first + k + 1) % order.every == 0:
-            write_row(model, work, memory, end, rows)
-    return DONE, order.n_steps, work.counted.rows, -1, excess
+                    n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
+                part = left / n_parts
+                status, index, excess, error = try_step(model, work, memory, others, order, end - (left - part), part)
+                if status == DONE:
+                    memory.n_accepted += 1
+                    if work.counted.stopped > 0:
+                        return STOPPED, k, work.counted.rows, work.counted.stopped - 1, excess
+                    left = left - part if n_parts > 1.0 else 0.0
+                    if h_min > 0.0:
+                        memory.h_wanted = min(step_after(part, error, most_error, has_failed), h)
+                    has_failed = False
+                    continue
+                if h_min <= 0.0 or part <= h_min:
+                    return status, k, work.counted.rows, index, excess
+                memory.n_rejected += 1
+                shorter = 0.5 * part
+                if status == INACCURATE:
+                    shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
+                memory.h_wanted = max(shorter, h_min)
+                has_failed = True
+            if (first + k + 1) % order.every == 0:
+                write(model, work, memory, others, end, rows)
+        return DONE, order.n_steps, work.counted.rows, -1, excess
+
+    return advance
+
+
+@inner
+def is_resized(model, work, memory, order, h):
+    """Whether steps of size h differ from those before; the weights of the norm are then those of h."""
+    if abs(h - memory.h) <= SAME * h:
+        return False
+    put_weights(model, work, order.beta * h * h)
+    return True
+
+
+@inner
+def try_absolute_step(model, work, memory, others, order, t, h):
+    """Advance the memory to t by a step of size h, see `time_loop`."""
+    if is_resized(model, work, memory, order, h):
+        resize(model, memory, h)
+    work.state.time = t
+    return one_step(model, work, memory, order, memory.h)
+
+
+@inner
+def write_absolute_row(model, work, memory, others, t, rows):
+    """Write the next row of the results."""
+    write_row(model, work, memory, t, rows)
+
+
+advance = time_loop(try_absolute_step, write_absolute_row)

@@ -133,6 +133,18 @@ def bent_by(model, m, n, factors, out):
 
 
 @inner
+def bent_bias(model, work, m, i):
+    """Return -q_dotᵀ K_P q_dot of marker m, its parts of displacement and rotation."""
+    if model.markers.bend0[m] < 0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    n, u0 = model.bodies.n_q[i], model.bodies.u0[i] + 6
+    bend_dot = work.markers.bend_dot[: 6 * n]
+    bent_rate(model, work, m, i, bend_dot)
+    d, th = shape_sum(bend_dot, n, work.state.u[u0 : u0 + n])
+    return scaled(-1.0, d), scaled(-1.0, th)
+
+
+@inner
 def marker_acceleration_bias(model, work, m, out):
     """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot, ground axes, into out.
 
@@ -143,17 +155,9 @@ def marker_acceleration_bias(model, work, m, out):
     i = model.markers.body[m]
     if i < 0:
         return
-    R, u0, omega = work.state.R[i], model.bodies.u0[i], body_omega(model.bodies, work.state, i)
+    R, omega = work.state.R[i], body_omega(model.bodies, work.state, i)
     rho, rho_dot = vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
-    n = model.bodies.n_q[i]
-    b_t, b_r = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if model.markers.bend0[m] >= 0:
-        bend_dot = work.markers.bend_dot[: 6 * n]
-        bent_rate(model, work, m, i, bend_dot)
-        for k in range(n):
-            q_dot = work.state.u[u0 + 6 + k]
-            d_dot, th_dot = shape(bend_dot, n, k)
-            b_t, b_r = sub(b_t, scaled(q_dot, d_dot)), sub(b_r, scaled(q_dot, th_dot))
+    b_t, b_r = bent_bias(model, work, m, i)
     spun = cross(omega, add(cross(omega, rho), scaled(2.0, rho_dot)))
     put(out, 0, turned(R, add(spun, b_t)))
     if model.markers.psi0[m] >= 0:
@@ -170,17 +174,22 @@ def marker_acceleration(model, work, m, out):
     i = model.markers.body[m]
     if i < 0:
         return
-    n, u0, R, o = model.bodies.n_q[i], model.bodies.u0[i], work.state.R[i], model.markers.psi0[m]
-    omega_dot = vector(work.state.u_dot[u0 + 3 :])
-    a, alpha = cross(omega_dot, vector(work.markers.rho[m])), omega_dot
-    if o >= 0:
-        psi, T = work.markers.psi[o : o + 6 * n], work.markers.T_left[m]
-        for k in range(n):
-            d, th = shape(psi, n, k)
-            a = add(a, scaled(work.state.u_dot[u0 + 6 + k], d))
-            alpha = add(alpha, scaled(work.state.u_dot[u0 + 6 + k], turned(T, th)))
-    put_sum(out, 0, add(vector(work.state.u_dot[u0:]), turned(R, a)))
-    put_sum(out, 3, turned(R, alpha))
+    R, u_dot = work.state.R[i], work.state.u_dot[model.bodies.u0[i] :]
+    omega_dot = vector(u_dot[3:])
+    d, turn = elastic_acceleration(model, work, m, i)
+    put_sum(out, 0, add(vector(u_dot), turned(R, add(cross(omega_dot, vector(work.markers.rho[m])), d))))
+    put_sum(out, 3, turned(R, add(omega_dot, turn)))
+
+
+@inner
+def elastic_acceleration(model, work, m, i):
+    """Return what q_ddot adds to acceleration and angular acceleration of marker m of body i, body axes."""
+    o = model.markers.psi0[m]
+    if o < 0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    n, first = model.bodies.n_q[i], model.bodies.u0[i] + 6
+    d, th = shape_sum(work.markers.psi[o : o + 6 * n], n, work.state.u_dot[first : first + n])
+    return d, turned(work.markers.T_left[m], th)
 
 
 @inner
@@ -235,6 +244,16 @@ def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
 def shape(psi, n, k):
     """Return displacement and rotation by coordinate k of shapes [6, n]."""
     return (psi[k], psi[n + k], psi[2 * n + k]), (psi[3 * n + k], psi[4 * n + k], psi[5 * n + k])
+
+
+@inner
+def shape_sum(psi, n, factors):
+    """Return Σ_k factors_k of displacement and rotation of shape k, (6 n,)."""
+    d, th = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(n):
+        d_k, th_k = shape(psi, n, k)
+        d, th = add(d, scaled(factors[k], d_k)), add(th, scaled(factors[k], th_k))
+    return d, th
 
 
 @small

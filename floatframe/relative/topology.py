@@ -25,7 +25,6 @@ from floatframe.system import System
 __all__ = ["CoordinateName", "SystemTree", "tree_of"]
 
 KEPT = "_tree"  #: attribute of a system that keeps its tree
-FREE_FREEDOMS = len(FREE)
 
 
 @dataclass(frozen=True)
@@ -201,23 +200,18 @@ def own_row(compiled: CompiledSystem, joint: int, column: Column) -> int:
     return -1
 
 
-def depth_first(branches: list[Branch]) -> tuple[list[int], list[int]]:
-    """Return the bodies depth first, children in the order of their numbers, and the end of each one's subtree."""
+def depth_first(branches: list[Branch]) -> list[int]:
+    """Return the bodies depth first, children in the order of their numbers."""
     children: dict[int, list[int]] = {}
     for each in branches:
         children.setdefault(each.parent, []).append(each.body)
     order: list[int] = []
-    last: dict[int, int] = {}
-    stack = [(body, False) for body in sorted(children.get(-1, []), reverse=True)]
+    stack = [-1]
     while stack:
-        body, is_done = stack.pop()
-        if is_done:
-            last[body] = len(order)
-            continue
+        body = stack.pop()
         order.append(body)
-        stack.append((body, True))
-        stack += [(child, False) for child in sorted(children.get(body, []), reverse=True)]
-    return order, [last[body] for body in order]
+        stack += sorted(children.get(body, []), reverse=True)
+    return order[1:]
 
 
 def jets_of(
@@ -244,12 +238,9 @@ def jets_of(
 def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
     """Return the tree as the kernels see it."""
     model = compiled.model
-    order, last = depth_first(branches)
     ordered = sorted(branches, key=lambda branch: branch.body)
     near, far, is_reversed = [], [], []
-    lists: dict[str, list] = {
-        name: [] for name in ("tau", "alpha", "side", "unknown", "motion", "factor", "row", "is_loaded")
-    }
+    lists: dict[str, list] = {name: [] for name in ("tau", "alpha", "side", "unknown", "motion", "factor", "row")}
     column0, s0, m0 = [0], [0], []
     unknowns: list[tuple[int, int, int]] = []  # column, mode, slot
     for each in ordered:
@@ -275,7 +266,6 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
             lists["motion"].append(-1 if driver < 0 else int(model.rows.motion[driver]))
             lists["factor"].append(factor)
             lists["row"].append(row)
-            lists["is_loaded"].append(int(row >= 0))
             n_free += int(driver < 0)
         column0.append(column0[-1] + len(each.columns))
         m0.append(s0[-1] + n_free)
@@ -294,8 +284,7 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
     alpha: Array = np.array(lists.pop("alpha")).reshape(-1, 3)
     return filled(
         Tree(),
-        order=order,
-        last=last,
+        order=depth_first(branches),
         parent=[each.parent for each in ordered],
         joint=[each.joint for each in ordered],
         near=near,

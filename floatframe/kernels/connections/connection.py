@@ -153,16 +153,22 @@ def constraint_rates(model, work):
 
     `evaluate` has been called for the iterate.
     """
-    rate, bias = work.connections.rate, work.connections.bias
     for m in range(model.markers.body.shape[0]):
         marker_acceleration_bias(model, work, m, work.markers.bias[m])
     for c in range(model.connections.size.shape[0]):
-        a, b = model.connections.a[c], model.connections.b[c]
-        for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
-            rate[k], bias[k] = 0.0, 0.0
-            if model.connections.law[c] == JOINT:
-                rate[k], bias[k] = row_rates(model, work, k, a, b)
-        if model.connections.law[c] == COUPLER:
-            coupler_rates(model, work, c, rate, bias)
-        elif model.connections.law[c] == ELEMENT:
-            law_rates(model, work, c, rate, bias)
+        connection_rates(model, work, c)
+
+
+@inner
+def connection_rates(model, work, c):
+    """Write what `constraint_rates` does for the rows of connection c, from accelerations in `work.markers.bias`."""
+    rate, bias = work.connections.rate, work.connections.bias
+    a, b = model.connections.a[c], model.connections.b[c]
+    for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
+        rate[k], bias[k] = 0.0, 0.0
+        if model.connections.law[c] == JOINT:
+            rate[k], bias[k] = row_rates(model, work, k, a, b)
+    if model.connections.law[c] == COUPLER:
+        coupler_rates(model, work, c, rate, bias)
+    elif model.connections.law[c] == ELEMENT:
+        law_rates(model, work, c, rate, bias)

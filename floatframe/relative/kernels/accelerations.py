@@ -7,13 +7,10 @@ with the matrices of `kernels.tangent` for the weights (1, 0, 0); rows that say 
 
 from floatframe.joints.rows.kinds import NOTHING
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.connections.connection import row_rates
-from floatframe.kernels.connections.coupler import coupler_rates
-from floatframe.kernels.connections.element_law import law_rates
-from floatframe.kernels.model import COUPLER, ELEMENT, JOINT
-from floatframe.kernels.vector import put
+from floatframe.kernels.connections.connection import connection_rates
+from floatframe.kernels.marker import marker_acceleration
 from floatframe.relative.kernels.evaluation import evaluate_tree
-from floatframe.relative.kernels.kinematics import marker_acceleration, move_joints, place_bodies
+from floatframe.relative.kernels.kinematics import move_joints, place_bodies
 from floatframe.relative.kernels.tangent import write_tangent
 from floatframe.relative.kernels.tree_factors import factorize_tree, solve_bordered
 
@@ -36,22 +33,10 @@ def constrain(model, work, tree, joints, tangent, is_group):
 @inner
 def kept_rates(model, work, tree):
     """Write the rates of what is held and its second rates, with the accelerations of the iterate."""
-    rate, bias = work.connections.rate, work.connections.bias
     for m in range(model.markers.body.shape[0]):
-        a, alpha = marker_acceleration(model, work, m)
-        put(work.markers.bias[m], 0, a)
-        put(work.markers.bias[m], 3, alpha)
+        marker_acceleration(model, work, m, work.markers.bias[m])
     for e in range(tree.kept.shape[0]):
-        c = tree.kept[e]
-        a, b = model.connections.a[c], model.connections.b[c]
-        for k in range(model.connections.w0[c], model.connections.w0[c + 1]):
-            rate[k], bias[k] = 0.0, 0.0
-            if model.connections.law[c] == JOINT:
-                rate[k], bias[k] = row_rates(model, work, k, a, b)
-        if model.connections.law[c] == COUPLER:
-            coupler_rates(model, work, c, rate, bias)
-        elif model.connections.law[c] == ELEMENT:
-            law_rates(model, work, c, rate, bias)
+        connection_rates(model, work, tree.kept[e])
 
 
 @inner

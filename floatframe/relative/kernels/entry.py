@@ -1,11 +1,12 @@
 """The compiled entry of relative coordinates, and a plain function for each thing it does."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.kernels.compiler.choice import is_lean
 from floatframe.kernels.compiler.compilation import entry
 from floatframe.kernels.compiler.sources import source_digest
@@ -60,7 +61,7 @@ def make_entry(digest):
         memory, rows = as_memory(memory_table), as_rows(rows_table)
         what = order.what
         if what == ADVANCE:
-            return advance_tree(model, work, memory, rows, tree, joints, tangent, order)
+            return advance_tree(model, work, memory, rows, (tree, joints, tangent), order)
         if what == OBSERVE:
             work.counted.rows = 0
             write_tree_row(model, work, memory, tree, joints, order.t0, rows)
@@ -145,22 +146,25 @@ def moved(model: Model, work: Work, tree: Tree, joints: JointWork, x: Array) -> 
     call(model, work, tree, joints, what=MOVE)
 
 
-def mover(model: Model, work: Work, tree: Tree, joints: JointWork) -> Callable[[], None]:
-    """Return a function that does what `moved` does by the increments in `joints.x`, for motions at many instants.
+@dataclass(frozen=True, eq=False)
+class Mover:
+    """What `moved` does by the increments in `joints.x`, for motions at many instants."""
 
-    Addresses of the arrays are found once, which takes longer than a motion.
-    """
+    records: tuple[NamedTuple, ...]  #: of the entry, kept alive
+    tables: tuple[IntArray, ...]  #: of them, found once, which takes longer than a motion
+
+    def __call__(self) -> None:
+        """Write the absolute iterate."""
+        run(*self.tables)
+
+
+def mover(model: Model, work: Work, tree: Tree, joints: JointWork) -> Mover:
+    """Return a function that does what `moved` does by the increments in `joints.x`."""
     if not run.signatures:
         run.compile(SIGNATURE)
     ordered = filled(Order(), **(NOTHING._asdict() | {"what": MOVE}))
     records = (model, work, tree, joints, NO_TANGENT, no_memory(), NO_ROWS, ordered)
-    tables = tuple(table_of(record) for record in records)
-
-    def move() -> None:
-        assert len(records) == len(tables)  # keeps the arrays alive
-        run(*tables)
-
-    return move
+    return Mover(records, tuple(table_of(record) for record in records))
 
 
 def projected(model: Model, work: Work, tree: Tree, joints: JointWork, c_k: float = 1.0) -> Array:

@@ -13,50 +13,23 @@ correction of the unknown. For the group of rotations, of which the unknown is t
 theta = T(x) dx, and the rates z_dot, z_ddot, in axes of B, change by d(z_dot) = theta_dot + z_dot × theta.
 """
 
-from floatframe.kernels.compiler.compilation import inner, small
-from floatframe.kernels.marker import bent_rate, shape
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.marker import bent_by, bent_rate, shape
 from floatframe.kernels.rotation import left_jacobian_derivative, right_jacobian
-from floatframe.kernels.vector import (
-    add,
-    cross,
-    norm,
-    put,
-    scaled,
-    sub,
-    turned,
-    vector,
-)
+from floatframe.kernels.vector import add, cross, put, scaled, sub, turned, vector
+from floatframe.relative.kernels.elastic_turning import deformation_accelerations, second_turning
 from floatframe.relative.kernels.kinematics import end_acceleration, end_motion
+from floatframe.relative.kernels.spatial import (
+    pair_sum,
+    put_pair_of,
+    scaled_pair,
+    spatial_cross,
+    spatial_motion,
+    world_screw,
+)
 from floatframe.relative.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
-__all__ = ["mode_screw", "mode_screws", "put_jets", "spatial_cross", "world_screw", "write_jets"]
-
-SMALL_TURN = 1e-4  #: rad, of the difference that stands for the second derivative of the left Jacobian
-
-
-@small
-def spatial_cross(V, S):
-    """Return V × S of spatial motions ((3,), (3,))."""
-    return add(cross(V[1], S[0]), cross(V[0], S[1])), cross(V[1], S[1])
-
-
-@small
-def pair_sum(S, U):
-    """Return S + U."""
-    return add(S[0], U[0]), add(S[1], U[1])
-
-
-@small
-def scaled_pair(f, S):
-    """Return f S."""
-    return scaled(f, S[0]), scaled(f, S[1])
-
-
-@small
-def put_pair_of(out, first, S):
-    """Write a spatial vector into an array."""
-    put(out, first, S[0])
-    put(out, first + 3, S[1])
+__all__ = ["mode_rate", "put_jets", "write_jets"]
 
 
 @inner
@@ -77,79 +50,42 @@ def put_reach(out, S_0, S_1, V):
 
 
 @inner
-def spatial_motion(r, v, omega, a, alpha, origin):
-    """Return spatial velocity and its rate about the origin of a frame that moves as given."""
-    p = sub(r, origin)
-    V = (sub(v, cross(omega, p)), omega)
-    return V, (sub(sub(a, cross(alpha, p)), cross(omega, v)), alpha)
+def mode_rate(model, work, m, i, k):
+    """Return the screw of mode k at marker m about the frame origin of body i, and its rate as the body sees them.
 
-
-@small
-def world_screw(R, p, S):
-    """Return a spatial vector of a frame with axes R at p from the origin, given about its own point and axes."""
-    ang = turned(R, S[1])
-    return add(turned(R, S[0]), cross(p, ang)), ang
-
-
-@inner
-def mode_screw(model, work, m, i, k):
-    """Return by which screw mode k moves marker m in body i, about the frame origin, body axes."""
-    d, th = shape(work.markers.psi[model.markers.psi0[m] :], model.bodies.n_q[i], k)
-    b = turned(work.markers.T_left[m], th)
-    return add(d, cross(vector(work.markers.rho[m]), b)), b
-
-
-@inner
-def deformation_accelerations(model, work, m, i):
-    """Return the second rates of place and elastic angle of marker m as body i sees them."""
-    n, o, first = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
-    u0, psi = model.bodies.u0[i] + 6, work.markers.psi[o : o + 6 * n]
-    rho_2, angle_2 = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for j in range(n):
-        q_ddot = work.state.u_dot[u0 + j]
-        d, th = shape(psi, n, j)
-        rho_2, angle_2 = add(rho_2, scaled(q_ddot, d)), add(angle_2, scaled(q_ddot, th))
-    if first >= 0:
-        bend_dot = work.markers.bend_dot[: 6 * n]
-        bent_rate(model, work, m, i, bend_dot)
-        for j in range(n):
-            q_dot = work.state.u[u0 + j]
-            d, th = shape(bend_dot, n, j)
-            rho_2, angle_2 = sub(rho_2, scaled(q_dot, d)), sub(angle_2, scaled(q_dot, th))
-    return rho_2, angle_2
-
-
-@inner
-def mode_screws(model, work, m, i, k, rho_2, angle_2):
-    """Return the screw of `mode_screw`, its rate and its second rate as the body sees them.
-
-    (Psi_t + rho × b, b), b = T' Psi_r; rho_2, angle_2 as of `deformation_accelerations`; the second derivative of T'
-    along th_dot is a difference.
+    (Psi_t + rho × b, b), b = T' Psi_r; `work.markers.bend_dot` has been written for the marker.
     """
-    markers, n, o, first = work.markers, model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m]
-    u0, T, angle, zero = model.bodies.u0[i] + 6, work.markers.T_left[m], vector(work.markers.angle[m]), (0.0, 0.0, 0.0)
+    markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
+    T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
     d, th = shape(markers.psi[o : o + 6 * n], n, k)
-    d_1, th_1, d_2, th_2 = zero, zero, zero, zero  # rates of Psi(q)
-    if first >= 0:
-        for j in range(n):
-            q_dot, q_ddot = work.state.u[u0 + j], work.state.u_dot[u0 + j]
-            d_j, th_j = shape(model.markers.bend[first + 6 * n * j : first + 6 * n * (j + 1)], n, k)
-            d_1, th_1 = sub(d_1, scaled(q_dot, d_j)), sub(th_1, scaled(q_dot, th_j))
-            d_2, th_2 = sub(d_2, scaled(q_ddot, d_j)), sub(th_2, scaled(q_ddot, th_j))
-    rho, rho_1, angle_1 = vector(markers.rho[m]), vector(markers.rho_dot[m]), vector(markers.angle_dot[m])
+    slope = left_jacobian_derivative(vector(markers.angle[m]), th, 1.0)
+    b, b_1 = turned(T, th), turned(slope, vector(markers.angle_dot[m]))
+    s_1 = (0.0, 0.0, 0.0)
+    if model.markers.bend0[m] >= 0:  # the rate of Psi(q)
+        d_1, th_1 = shape(markers.bend_dot, n, k)
+        s_1, b_1 = sub(s_1, d_1), sub(b_1, turned(T, th_1))
+    return (add(d, cross(rho, b)), b), (add(s_1, add(cross(rho_1, b), cross(rho, b_1))), b_1)
+
+
+@inner
+def mode_second_rate(model, work, m, i, k, screw, screw_1, rho_2, angle_2):
+    """Return the second rate of the screw of `mode_rate`; rho_2, angle_2 as of `deformation_accelerations`.
+
+    `work.markers.bend_ddot` has been written for the marker too.
+    """
+    markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
+    T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
+    angle, angle_1, b, b_1 = vector(markers.angle[m]), vector(markers.angle_dot[m]), screw[1], screw_1[1]
+    _, th = shape(markers.psi[o : o + 6 * n], n, k)
     slope = left_jacobian_derivative(angle, th, 1.0)
-    b, b_1 = turned(T, th), add(turned(slope, angle_1), turned(T, th_1))
-    b_2 = add(turned(slope, angle_2), turned(T, th_2))
-    b_2 = add(b_2, scaled(2.0, turned(left_jacobian_derivative(angle, th_1, 1.0), angle_1)))
-    speed = norm(angle_1)
-    if speed > 0.0:
-        s = SMALL_TURN / speed
-        ahead = turned(left_jacobian_derivative(add(angle, scaled(s, angle_1)), th, 1.0), angle_1)
-        behind = turned(left_jacobian_derivative(sub(angle, scaled(s, angle_1)), th, 1.0), angle_1)
-        b_2 = add(b_2, scaled(0.5 / s, sub(ahead, behind)))
-    s_1 = add(d_1, add(cross(rho_1, b), cross(rho, b_1)))
-    s_2 = add(d_2, add(cross(rho_2, b), add(scaled(2.0, cross(rho_1, b_1)), cross(rho, b_2))))
-    return (add(d, cross(rho, b)), b), (s_1, b_1), (s_2, b_2)
+    b_2 = second_turning(angle, angle_1, vector(markers.spin[m]), th, b, turned(slope, angle_1))
+    b_2, s_2 = add(b_2, turned(slope, angle_2)), (0.0, 0.0, 0.0)
+    if model.markers.bend0[m] >= 0:
+        _, th_1 = shape(markers.bend_dot, n, k)
+        d_2, th_2 = shape(markers.bend_ddot, n, k)
+        by_bending = turned(left_jacobian_derivative(angle, th_1, 1.0), angle_1)
+        s_2, b_2 = sub(s_2, d_2), sub(b_2, add(scaled(2.0, by_bending), turned(T, th_2)))
+    return add(s_2, add(cross(rho_2, b), add(scaled(2.0, cross(rho_1, b_1)), cross(rho, b_2)))), b_2
 
 
 @inner
@@ -170,13 +106,19 @@ def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate)
     body, origin = model.markers.body[m], vector(tangent.origin)
     r, R, v, omega = end_motion(model, work, -1, body)
     a, alpha = end_acceleration(model, work, -1, body)
-    V, V_dot = spatial_motion(r, v, omega, a, alpha, origin)
     p = sub(r, origin)
+    V, V_dot = spatial_motion(p, v, omega, a, alpha)
     rho_2, angle_2 = deformation_accelerations(model, work, m, body)
+    if model.markers.bend0[m] >= 0:
+        n, u0 = model.bodies.n_q[body], model.bodies.u0[body] + 6
+        bent_rate(model, work, m, body, work.markers.bend_dot[: 6 * n])
+        bent_by(model, m, n, work.state.u_dot[u0 : u0 + n], work.markers.bend_ddot[: 6 * n])
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[j] != kind:
             continue
-        s, s_1, s_2 = mode_screws(model, work, m, body, tree.jet_item[j], rho_2, angle_2)
+        k = tree.jet_item[j]
+        s, s_1 = mode_rate(model, work, m, body, k)
+        s_2 = mode_second_rate(model, work, m, body, k, s, s_1, rho_2, angle_2)
         S = scaled_pair(sign, world_screw(R, p, s))
         S_1 = scaled_pair(sign, world_screw(R, p, s_1))
         S_2 = scaled_pair(sign, world_screw(R, p, s_2))
@@ -200,8 +142,9 @@ def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
     if tree.is_reversed[i] != 0:
         r_a, A_a, v_a, omega_a, r_b, A_b, v_b, omega_b = r_b, A_b, v_b, omega_b, r_a, A_a, v_a, omega_a
         a_a, alpha_a, a_b, alpha_b = a_b, alpha_b, a_a, alpha_a
-    V_a, V_a_dot = spatial_motion(r_a, v_a, omega_a, a_a, alpha_a, origin)
-    V_b, V_b_dot = spatial_motion(r_b, v_b, omega_b, a_b, alpha_b, origin)
+    p_a, p_b = sub(r_a, origin), sub(r_b, origin)
+    V_a, V_a_dot = spatial_motion(p_a, v_a, omega_a, a_a, alpha_a)
+    V_b, V_b_dot = spatial_motion(p_b, v_b, omega_b, a_b, alpha_b)
     x, spin, spin_dot = zero, zero, zero  # of the rotations fixed in B, axes of B
     for k in range(tree.column0[i], tree.column0[i + 1]):
         if tree.side[k] != 0:
@@ -218,18 +161,17 @@ def column_jets(model, work, tree, joints, tangent, i, c_m, c_d, c_k, rate):
         alpha = scaled(sense, vector(tree.alpha[k]))
         screw, jet, reach = tangent.screw[j], tangent.jet[j], tangent.reach[j]
         if tree.side[k] == 0:
-            S = world_screw(A_a, sub(r_a, origin), (scaled(sense, vector(tree.tau[k])), alpha))
+            S = world_screw(A_a, p_a, (scaled(sense, vector(tree.tau[k])), alpha))
             put_pair_of(screw, 0, S)
             put_jets(jet, scaled_pair(c_k, S), scaled_pair(c_d, S), scaled_pair(c_m, S), V_a, V_a_dot)
             put_reach(reach, S, scaled_pair(rate, S), V_a)
         else:
-            p = sub(r_b, origin)
             theta = turned(T, alpha)
-            put_pair_of(screw, 0, world_screw(A_b, p, (zero, alpha)))
+            put_pair_of(screw, 0, world_screw(A_b, p_b, (zero, alpha)))
             th_1 = sub(scaled(c_d, alpha), scaled(c_k, cross(spin, theta)))
             th_2 = sub(sub(scaled(c_m, alpha), scaled(c_k, cross(spin_dot, theta))), cross(spin, th_1))
-            S_0 = world_screw(A_b, p, (zero, scaled(c_k, theta)))
-            S_1, S_2 = world_screw(A_b, p, (zero, th_1)), world_screw(A_b, p, (zero, th_2))
+            S_0 = world_screw(A_b, p_b, (zero, scaled(c_k, theta)))
+            S_1, S_2 = world_screw(A_b, p_b, (zero, th_1)), world_screw(A_b, p_b, (zero, th_2))
             put_jets(jet, S_0, S_1, S_2, V_b, V_b_dot)
             th_1 = sub(scaled(rate, alpha), cross(spin, theta))
-            put_reach(reach, world_screw(A_b, p, (zero, theta)), world_screw(A_b, p, (zero, th_1)), V_b)
+            put_reach(reach, world_screw(A_b, p_b, (zero, theta)), world_screw(A_b, p_b, (zero, th_1)), V_b)

@@ -12,7 +12,13 @@ at A. Deformations of both bodies, their rates and accelerations are those of `s
 """
 
 from floatframe.kernels.compiler.compilation import inner
-from floatframe.kernels.marker import elastic_motion, marker_acceleration_bias, marker_motion, shape
+from floatframe.kernels.marker import (
+    elastic_acceleration,
+    elastic_motion,
+    marker_acceleration,
+    marker_acceleration_bias,
+    marker_motion,
+)
 from floatframe.kernels.rotation import exp_matrix
 from floatframe.kernels.vector import (
     add,
@@ -31,38 +37,7 @@ from floatframe.kernels.vector import (
     vector,
 )
 
-__all__ = ["end_acceleration", "end_motion", "joint_motion", "marker_acceleration", "move_joints", "place_bodies"]
-
-
-@inner
-def marker_acceleration(model, work, m):
-    """Return acceleration and angular acceleration of marker m, ground axes; its motion has been written."""
-    i = model.markers.body[m]
-    if i < 0:
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    u0, R, u_dot, out = model.bodies.u0[i], work.state.R[i], work.state.u_dot, work.markers.bias[m]
-    marker_acceleration_bias(model, work, m, out)
-    alpha = vector(u_dot[u0 + 3 :])
-    own, turn = elastic_part(model, work, m, i)
-    own = add(own, cross(alpha, vector(work.markers.rho[m])))
-    a = add(add(vector(u_dot[u0:]), vector(out)), turned(R, own))
-    return a, add(vector(out[3:]), turned(R, add(alpha, turn)))
-
-
-@inner
-def elastic_part(model, work, m, i):
-    """Return what q_ddot adds to acceleration and angular acceleration of marker m, body axes."""
-    own, turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    o = model.markers.psi0[m]
-    if o >= 0:
-        n, first = model.bodies.n_q[i], model.bodies.u0[i] + 6
-        psi = work.markers.psi[o : o + 6 * n]
-        for k in range(n):
-            d, th = shape(psi, n, k)
-            own = add(own, scaled(work.state.u_dot[first + k], d))
-            turn = add(turn, scaled(work.state.u_dot[first + k], th))
-        turn = turned(work.markers.T_left[m], turn)
-    return own, turn
+__all__ = ["end_acceleration", "end_motion", "joint_motion", "move_joints", "place_bodies"]
 
 
 @inner
@@ -84,7 +59,9 @@ def end_acceleration(model, work, m, i):
     """Return acceleration and angular acceleration as `end_motion` does."""
     zero = (0.0, 0.0, 0.0)
     if m >= 0:
-        return marker_acceleration(model, work, m)
+        out = work.markers.bias[m]
+        marker_acceleration(model, work, m, out)
+        return vector(out), vector(out[3:])
     if i < 0:
         return zero, zero
     u_dot = work.state.u_dot[model.bodies.u0[i] :]
@@ -195,7 +172,7 @@ def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
     put(u, 3, own)
     bias = work.markers.bias[m]
     marker_acceleration_bias(model, work, m, bias)
-    by_modes, turn = elastic_part(model, work, m, i)
+    by_modes, turn = elastic_acceleration(model, work, m, i)
     own_dot = sub(turned_back(R, sub(alpha, vector(bias[3:]))), turn)
     put(u_dot, 3, own_dot)
     put(u_dot, 0, sub(sub(a, vector(bias)), turned(R, add(cross(own_dot, rho), by_modes))))

@@ -8,28 +8,23 @@ import math
 
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.user_force import resize_states
-from floatframe.kernels.diagnostics import power
 from floatframe.kernels.generalized_alpha import (
     DIVERGED,
     DONE,
     INACCURATE,
-    LEAST,
     MANY,
-    SAFETY,
-    SAME,
     SLOW,
-    STOPPED,
     copy,
     correction_of_states,
+    is_resized,
+    keep_iterate,
     load_state,
-    put_weights,
     roundoff_floor,
-    step_after,
+    time_loop,
     write_row,
 )
 from floatframe.kernels.step_start import begin_step
 from floatframe.kernels.time_function import time_function
-from floatframe.kernels.turns import count_turns
 from floatframe.kernels.vector import dot
 from floatframe.relative.kernels.evaluation import evaluate_tree
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
@@ -288,19 +283,9 @@ def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
         now, before = accelerations(work, tree, joints, memory, s)
         slot = tree.slot[s]
         memory.a[slot] = ((1 - alpha_f) * now + alpha_f * before - alpha_m * memory.a[slot]) / (1 - alpha_m)
-    copy(work.state.r.reshape(memory.r.size), memory.r.reshape(memory.r.size))
-    copy(work.state.q, memory.q)
-    copy(work.state.u, memory.u)
-    copy(work.state.u_dot, memory.u_dot)
-    copy(work.state.w, memory.w)
     for i in range(model.bodies.kind.shape[0]):
         put_euler_parameters(work.state.R[i], memory.p[i])
-    count_turns(model, work, memory, h)
-    loads, dissipated = power(model, work)
-    memory.work_given += 0.5 * h * (memory.power_given + loads)
-    memory.work_taken += 0.5 * h * (memory.power_taken + dissipated)
-    memory.power_given = loads
-    memory.power_taken = dissipated
+    keep_iterate(model, work, memory, h)
 
 
 @inner
@@ -337,44 +322,22 @@ def write_tree_row(model, work, memory, tree, joints, t, rows):
 
 
 @inner
-def advance_tree(model, work, memory, rows, tree, joints, tangent, order):
-    """Advance by n_steps of size h, as `kernels.generalized_alpha.advance`; return what it returns."""
-    h, first, h_min, most_error = order.h, order.first, order.h_min, order.most_error
-    put_weights(model, work, order.beta * memory.h**2)
-    work.counted.rows = 0
-    excess = 0.0
-    for k in range(order.n_steps):
-        end = order.t0 + (first + k + 1) * h
-        left = h
-        has_failed = False
-        while left > 0.0:
-            n_parts = 1.0
-            if h_min > 0.0:
-                n_parts = max(1.0, math.ceil(left / memory.h_wanted * (1.0 - 1e-9)))
-            part = left / n_parts
-            begin(model, work, tree, joints, memory)
-            if abs(part - memory.h) > SAME * part:
-                resize(model, tree, joints, memory, part)
-                put_weights(model, work, order.beta * part * part)
-            work.state.time = end - (left - part)
-            status, excess, error = one_step(model, work, memory, tree, joints, tangent, order, memory.h)
-            if status == DONE:
-                memory.n_accepted += 1
-                if work.counted.stopped > 0:
-                    return STOPPED, k, work.counted.rows, work.counted.stopped - 1, excess
-                left = left - part if n_parts > 1.0 else 0.0
-                if h_min > 0.0:
-                    memory.h_wanted = min(step_after(part, error, most_error, has_failed), h)
-                has_failed = False
-                continue
-            if h_min <= 0.0 or part <= h_min:
-                return status, k, work.counted.rows, -1, excess
-            memory.n_rejected += 1
-            shorter = 0.5 * part
-            if status == INACCURATE:
-                shorter = min(max(SAFETY * (most_error / error) ** (1.0 / 3.0), LEAST), SAFETY) * part
-            memory.h_wanted = max(shorter, h_min)
-            has_failed = True
-        if (first + k + 1) % order.every == 0:
-            write_tree_row(model, work, memory, tree, joints, end, rows)
-    return DONE, order.n_steps, work.counted.rows, -1, excess
+def try_tree_step(model, work, memory, others, order, t, h):
+    """Advance the memory to t by a step of size h, see `kernels.generalized_alpha.time_loop`."""
+    tree, joints, tangent = others
+    begin(model, work, tree, joints, memory)
+    if is_resized(model, work, memory, order, h):
+        resize(model, tree, joints, memory, h)
+    work.state.time = t
+    status, excess, error = one_step(model, work, memory, tree, joints, tangent, order, memory.h)
+    return status, -1, excess, error
+
+
+@inner
+def write_next_row(model, work, memory, others, t, rows):
+    """Write the next row of the results."""
+    tree, joints, _ = others
+    write_tree_row(model, work, memory, tree, joints, t, rows)
+
+
+advance_tree = time_loop(try_tree_step, write_next_row)

@@ -13,7 +13,7 @@ from floatframe.kernels.body import axial, block, column, column_sum, put_block,
 from floatframe.kernels.compiler.compilation import inner, loops, small
 from floatframe.kernels.connections.connection import connection_derivatives
 from floatframe.kernels.evaluation import tangent_of_body
-from floatframe.kernels.marker import shape
+from floatframe.kernels.marker import bent_rate, shape
 from floatframe.kernels.model import C2, C3
 from floatframe.kernels.rotation import left_jacobian_derivative
 from floatframe.kernels.vector import (
@@ -35,8 +35,9 @@ from floatframe.kernels.vector import (
     unit_matrix,
     vector,
 )
-from floatframe.relative.kernels.jets import mode_screw, spatial_cross, world_screw, write_jets
+from floatframe.relative.kernels.jets import mode_rate, write_jets
 from floatframe.relative.kernels.projection import force_slopes
+from floatframe.relative.kernels.spatial import pair, pair_sum, scaled_pair, spatial_cross, turned_power, world_screw
 from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
 
 __all__ = [
@@ -45,7 +46,6 @@ __all__ = [
     "inner_product",
     "product_of",
     "rigid_columns",
-    "turned_power",
     "unit_of",
     "write_tangent",
 ]
@@ -86,7 +86,7 @@ def rigid_columns(model, work, i, A):
 def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
     """Write jets, derivatives of the bodies, and P, V of the connections that are kept.
 
-    `evaluate_bodies` has been called for the iterate; wrenches of joints of the tree are taken away.
+    `evaluate_tree` has been called for the iterate; wrenches of joints of the tree are taken away.
     """
     rate = c_d / c_k if c_k > 0.0 else 0.0
     write_jets(model, work, tree, joints, tangent, c_m, c_d, c_k, rate)
@@ -179,13 +179,6 @@ def inner_product(x, y):
     return dot(x, y) + dot(x[3:], y[3:])
 
 
-@small
-def turned_power(xi, screw, F):
-    """Return (xi × J) · F of arrays of six."""
-    S = spatial_cross((vector(xi), vector(xi[3:])), (vector(screw), vector(screw[3:])))
-    return dot(S[0], F) + dot(S[1], F[3:])
-
-
 @inner
 def assemble(model, work, tree, tangent, c_d, c_k):
     """Write the matrix K of the unknowns and of the wrenches that are kept; sums over subtrees overwrite D and F."""
@@ -273,7 +266,7 @@ def turning_columns(model, tree, tangent, i):
             for k in range(tree.jet0[b], tree.jet0[b + 1]):
                 of_marker = b != i or tree.jet_kind[k] == NEAR_MODE or (is_far and tree.jet_kind[k] == COLUMN)
                 if of_marker:
-                    K[s, tree.jet_s[k]] += turned_power(tangent.jet[k], screw, F)
+                    K[s, tree.jet_s[k]] += turned_power(pair(tangent.jet[k]), screw, F)
             b = tree.parent[b]
 
 
@@ -290,7 +283,7 @@ def turning_modes(model, work, tree, tangent, i, c_k):
         b = body
         while b >= 0:
             for e in range(tree.jet0[b], tree.jet0[b + 1]):
-                K[s, tree.jet_s[e]] += turned_power(tangent.jet[e], screw, F)
+                K[s, tree.jet_s[e]] += turned_power(pair(tangent.jet[e]), screw, F)
             b = tree.parent[b]
         m, sign = (tree.near[i], 1.0) if is_near else (tree.far[i], -1.0)
         add_second_order(model, work, tangent, body, m, k, sign * c_k, F, K[s, tree.m0[body] :])
@@ -340,10 +333,8 @@ def kept_marker(model, work, tree, tangent, m, first, rate):
     while b >= 0:
         for j in range(tree.jet0[b], tree.jet0[b + 1]):
             reach, screw = tangent.reach[j], tangent.screw[j]
-            xi = vector(reach), vector(reach[3:])
-            xi_dot = vector(reach[6:]), vector(reach[9:])
-            unit = vector(screw), vector(screw[3:])
-            kept_pair(model, work, tangent, m, c, first, tree.jet_s[j], xi, xi_dot, unit, p, v, omega)
+            xi, xi_dot = pair(reach), pair(reach[6:])
+            kept_pair(model, work, tangent, m, c, first, tree.jet_s[j], xi, xi_dot, pair(screw), p, v, omega)
         b = tree.parent[b]
     if model.markers.psi0[m] < 0:
         return
@@ -351,34 +342,14 @@ def kept_marker(model, work, tree, tangent, m, first, rate):
     R, origin = state.R[i], sub(vector(state.r[i]), vector(tangent.origin))
     spin = turned(R, state.u[u0 + 3 :])
     V = sub(vector(state.u[u0:]), cross(spin, origin)), spin
+    if model.markers.bend0[m] >= 0:
+        bent_rate(model, work, m, i, work.markers.bend_dot[: 6 * model.bodies.n_q[i]])
     for k in range(model.bodies.n_q[i]):
         s, s_1 = mode_rate(model, work, m, i, k)
         unit = world_screw(R, origin, s)
         own = world_screw(R, origin, s_1)
-        turn = spatial_cross(V, unit)
-        xi_dot = (
-            add(add(scaled(rate, unit[0]), own[0]), turn[0]),
-            add(add(scaled(rate, unit[1]), own[1]), turn[1]),
-        )
+        xi_dot = pair_sum(pair_sum(scaled_pair(rate, unit), own), spatial_cross(V, unit))
         kept_pair(model, work, tangent, m, c, first, tree.m0[i] + k, unit, xi_dot, unit, p, v, omega)
-
-
-@inner
-def mode_rate(model, work, m, i, k):
-    """Return the screw of mode k at marker m and its rate, as the body sees them."""
-    n, o, first, u0 = model.bodies.n_q[i], model.markers.psi0[m], model.markers.bend0[m], model.bodies.u0[i] + 6
-    s = mode_screw(model, work, m, i, k)
-    _, th = shape(work.markers.psi[o : o + 6 * n], n, k)
-    d_1, th_1 = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if first >= 0:
-        for j in range(n):
-            d_j, th_j = shape(model.markers.bend[first + 6 * n * j :], n, k)
-            q_dot = work.state.u[u0 + j]
-            d_1, th_1 = sub(d_1, scaled(q_dot, d_j)), sub(th_1, scaled(q_dot, th_j))
-    slope = left_jacobian_derivative(vector(work.markers.angle[m]), th, 1.0)
-    b_1 = add(turned(slope, vector(work.markers.angle_dot[m])), turned(work.markers.T_left[m], th_1))
-    rho, rho_dot = vector(work.markers.rho[m]), vector(work.markers.rho_dot[m])
-    return s, (add(d_1, add(cross(rho_dot, s[1]), cross(rho, b_1))), b_1)
 
 
 @inner

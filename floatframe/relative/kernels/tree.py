@@ -31,7 +31,6 @@ class Tree(NamedTuple):
     """Bodies and the joints between them that are coordinates."""
 
     order: IntArray = integer(n_b)  #: bodies, depth first, each after its parent
-    last: IntArray = integer(n_b)  #: end in `order` of what hangs at order[k], itself included
     parent: IntArray = integer(n_b)  #: of each body, -1 for the ground
     joint: IntArray = integer(n_b)  #: connection that carries the body, -1 for a free body
     near: IntArray = integer(n_b)  #: marker on the parent, -1 for the ground frame of a free body
@@ -50,7 +49,6 @@ class Tree(NamedTuple):
     motion: IntArray = integer(n_k)  #: function of time of a prescribed coordinate, -1 for none
     factor: Array = real(n_k)  #: of the coordinate by what the function prescribes
     row: IntArray = integer(n_k)  #: row of the joint that belongs to it, -1 for none
-    is_loaded: IntArray = integer(n_k)  #: whether forces act along it
     kept: IntArray = integer(n_kept)  #: connections that are no joints of the tree
     is_kept: IntArray = integer(n_c)  #: whether a connection is among them
     kept_row: IntArray = integer(n_w)  #: number of a row among those of connections that are kept, -1 for others

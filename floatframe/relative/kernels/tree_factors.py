@@ -16,7 +16,8 @@ from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.vector import add, cross, put, sub, turned, vector
 from floatframe.relative.kernels.projection import force_slopes
-from floatframe.relative.kernels.tangent import add_second_order, inner_product, product_of, turned_power, unit_of
+from floatframe.relative.kernels.spatial import pair, turned_power
+from floatframe.relative.kernels.tangent import add_second_order, inner_product, product_of, unit_of
 from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
 
 __all__ = ["factorize_tree", "solve_bordered", "solve_newton"]
@@ -63,16 +64,7 @@ def modal_forces(model, work, tangent, i):
 def add_turning(row, screw, F):
     """Add (xi × J) · F to a row over jets, xi their first part."""
     for e in range(6):
-        row[e] += turned_power_of(e, screw, F)
-
-
-@inner
-def turned_power_of(e, screw, F):
-    """Return (xi × J) · F of the unit vector e."""
-    xi, xi_w = unit_of(e, 0), unit_of(e, 3)
-    lin = add(cross(xi_w, vector(screw)), cross(xi, vector(screw[3:])))
-    ang = cross(xi_w, vector(screw[3:]))
-    return lin[0] * F[0] + lin[1] * F[1] + lin[2] * F[2] + ang[0] * F[3] + ang[1] * F[4] + ang[2] * F[5]
+        row[e] += turned_power((unit_of(e, 0), unit_of(e, 3)), screw, F)
 
 
 @inner
@@ -151,7 +143,7 @@ def turning_far(tree, tangent, i, j, k, L, F):
         return
     for o in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[o] == COLUMN:
-            L[k, tree.jet_s[o] - tree.s0[i]] += turned_power(tangent.jet[o], tangent.screw[j], F)
+            L[k, tree.jet_s[o] - tree.s0[i]] += turned_power(pair(tangent.jet[o]), tangent.screw[j], F)
 
 
 @inner

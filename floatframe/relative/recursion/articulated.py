@@ -31,7 +31,14 @@ from floatframe.kernels.vector import (
     turned,
     vector,
 )
-from floatframe.relative.recursion.composite import add_carried, along, moments_in_ground, shifted_blocks
+from floatframe.relative.recursion.composite import (
+    add_carried,
+    along,
+    along_rate,
+    flexible_column,
+    moments_in_ground,
+    shifted_blocks,
+)
 
 __all__ = ["articulate", "solve_articulated", "solve_columns"]
 
@@ -91,24 +98,13 @@ def three_rates(work, k, v, A, B, C):
 @loops
 def flexible(nodes, work, k):
     """Eliminate rates and modes of a flexible body; return the blocks left, and whether it could be done."""
-    n, n_z, v0, vq = nodes.n_q[k], nodes.n_z[k], nodes.v0[k], nodes.vq[k]
-    size = n_z + n
+    n, v0, size = nodes.n_q[k], nodes.v0[k], nodes.n_z[k] + nodes.n_q[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
     G = work.G[nodes.g0[k] : nodes.g0[k + 1]].reshape((size, size))
-    column_j = work.local
     for j in range(size):
-        v = v0 + j if j < n_z else vq + j - n_z
-        for a in range(6 + n):
-            total = H[a, 6 + j - n_z] if j >= n_z else 0.0
-            for b in range(6):
-                total += H[a, b] * work.S[v, b]
-            column_j[a] = total
-        f, t = vector(column_j), vector(column_j[3:])
-        put(work.U[v], 0, f)
-        put(work.U[v], 3, t)
+        flexible_column(nodes, work, H, k, j)
         for i in range(size):
-            row = v0 + i if i < n_z else vq + i - n_z
-            G[i, j] = along(work.S[row], f, t) + (column_j[6 + i - n_z] if i >= n_z else 0.0)
+            G[i, j] = along_rate(nodes, work, k, i)
     pivot = work.pivot[v0 : v0 + size]  # rates of joint and modes stand one after the other
     fine = lu_factor(G, pivot)
     X = work.V[v0 : v0 + size]

@@ -31,7 +31,18 @@ from floatframe.kernels.vector import (
     vector,
 )
 
-__all__ = ["add_carried", "flexible_mass", "mass_matrix", "moments_in_ground"]
+__all__ = [
+    "add_carried",
+    "along",
+    "along_rate",
+    "congruent",
+    "evaluate_flexible",
+    "flexible_column",
+    "mass_matrix",
+    "moments_in_ground",
+    "moved_inertia",
+    "shifted_blocks",
+]
 
 
 @small
@@ -134,6 +145,19 @@ def add_carried(H, A, B, C, p, above):
             H[3 + a, 6 + j] += t[a]
 
 
+@small
+def moved_inertia(m, s, J, p):
+    """Return first moment and inertia about a point from which p leads to the one before."""
+    y = add(s, scaled(0.5 * m, p))
+    d = 2.0 * dot(p, y)
+    rows = (
+        sub(J[0], add(scaled(y[0], p), scaled(p[0], y))),
+        sub(J[1], add(scaled(y[1], p), scaled(p[1], y))),
+        sub(J[2], add(scaled(y[2], p), scaled(p[2], y))),
+    )
+    return add(s, scaled(m, p)), matrix_sum(rows, ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d)))
+
+
 @loops
 def add_to_parent(nodes, work, k):
     """Add the composite of node k to its parent (1), (2)."""
@@ -145,14 +169,10 @@ def add_to_parent(nodes, work, k):
         H = work.H[nodes.h0[above] : nodes.h0[above + 1]].reshape((n, n))
         A, B, C = rigid_blocks(m, s, J)
         add_carried(H, A, B, C, p, work.above[nodes.c0[k] : nodes.c0[k + 1]])
-    y = add(s, scaled(0.5 * m, p))
-    d = 2.0 * dot(p, y)
+    s_p, J_p = moved_inertia(m, s, J, p)
     work.mass[above] += m
-    put_sum(work.s[above], 0, add(s, scaled(m, p)))
-    for a in range(3):
-        row = sub(J[a], add(scaled(y[a], p), scaled(p[a], y)))
-        put_sum(work.J[above, a], 0, row)
-        work.J[above, a, a] += d
+    put_sum(work.s[above], 0, s_p)
+    put_matrix(work.J[above], matrix_sum(matrix(work.J[above]), J_p))
 
 
 @small
@@ -187,24 +207,46 @@ def go_up(nodes, work, M, k, v, f, t):
 
 
 @loops
+def flexible_column(nodes, work, H, k, j):
+    """Write F = H [S; e] of rate j of a flexible body, joint first, then modes, into `local`, and its wrench into U.
+
+    Return the number of the rate.
+    """
+    n, n_z, F = nodes.n_q[k], nodes.n_z[k], work.local
+    v = rate_of(nodes, k, j)
+    for a in range(6 + n):
+        total = H[a, 6 + j - n_z] if j >= n_z else 0.0
+        for b in range(6):
+            total += H[a, b] * work.S[v, b]
+        F[a] = total
+    put(work.U[v], 0, vector(F))
+    put(work.U[v], 3, vector(F[3:]))
+    return v
+
+
+@small
+def rate_of(nodes, k, j):
+    """Return the number of rate j of a flexible body, joint first, then modes."""
+    return nodes.v0[k] + j if j < nodes.n_z[k] else nodes.vq[k] + j - nodes.n_z[k]
+
+
+@loops
+def along_rate(nodes, work, k, i):
+    """Return F, which `flexible_column` has written, along rate i of the same body."""
+    n_z, F = nodes.n_z[k], work.local
+    total = along(work.S[rate_of(nodes, k, i)], vector(F), vector(F[3:]))
+    return total + F[6 + i - n_z] if i >= n_z else total
+
+
+@loops
 def flexible_columns(nodes, work, M, k):
     """Write U of the rates of a flexible body and their part of M (3)."""
-    n, n_z, v0, vq = nodes.n_q[k], nodes.n_z[k], nodes.v0[k], nodes.vq[k]
+    n, size = nodes.n_q[k], nodes.n_z[k] + nodes.n_q[k]
     H = work.H[nodes.h0[k] : nodes.h0[k + 1]].reshape((6 + n, 6 + n))
-    column_j = work.local
-    for j in range(n_z + n):
-        v = v0 + j if j < n_z else vq + j - n_z
-        for a in range(6 + n):
-            total = H[a, 6 + j - n_z] if j >= n_z else 0.0
-            for b in range(6):
-                total += H[a, b] * work.S[v, b]
-            column_j[a] = total
-        f, t = vector(column_j), vector(column_j[3:])
-        put(work.U[v], 0, f)
-        put(work.U[v], 3, t)
-        for i in range(n_z + n):
-            row = v0 + i if i < n_z else vq + i - n_z
-            M[row, v] = along(work.S[row], f, t) + (column_j[6 + i - n_z] if i >= n_z else 0.0)
+    for j in range(size):
+        v = flexible_column(nodes, work, H, k, j)
+        for i in range(size):
+            M[rate_of(nodes, k, i), v] = along_rate(nodes, work, k, i)
 
 
 @loops

@@ -7,9 +7,9 @@ With Psi(q) = Psi - K_P q, th_dot = Psi_r q_dot, T the left Jacobian at th, all 
 """
 
 from floatframe.kernels.compiler.compilation import loops, small
-from floatframe.kernels.marker import bent_rate, shape
-from floatframe.kernels.rotation import left_jacobian_derivative
-from floatframe.kernels.vector import add, cross, dot, scaled, sub, turned, turned_back, vector
+from floatframe.kernels.marker import shape
+from floatframe.kernels.vector import add, cross, dot, scaled, turned, turned_back, vector
+from floatframe.relative.kernels.elastic_turning import deformation_accelerations, turning_bias
 
 __all__ = ["add_modal_forces", "marker_acceleration", "relative_acceleration"]
 
@@ -17,25 +17,11 @@ __all__ = ["add_modal_forces", "marker_acceleration", "relative_acceleration"]
 @loops
 def marker_acceleration(model, marker_work, m):
     """Return rho_ddot and nu_dot of marker m, whose motion in its body is written."""
-    i, o, markers = model.markers.body[m], model.markers.psi0[m], marker_work.markers
-    zero = (0.0, 0.0, 0.0)
-    if o < 0:
+    markers, zero = marker_work.markers, (0.0, 0.0, 0.0)
+    if model.markers.psi0[m] < 0:
         return zero, zero
-    n, u0 = model.bodies.n_q[i], model.bodies.u0[i] + 6
-    q_dot, q_ddot = marker_work.state.u[u0 : u0 + n], marker_work.state.u_dot[u0 : u0 + n]
-    psi = markers.psi[o : o + 6 * n]
-    rho_ddot, th_ddot = zero, zero
-    for k in range(n):
-        d, th = shape(psi, n, k)
-        rho_ddot, th_ddot = add(rho_ddot, scaled(q_ddot[k], d)), add(th_ddot, scaled(q_ddot[k], th))
-    if model.markers.bend0[m] >= 0:
-        bend_dot = markers.bend_dot[: 6 * n]
-        bent_rate(model, marker_work, m, i, bend_dot)
-        for k in range(n):
-            d, th = shape(bend_dot, n, k)
-            rho_ddot, th_ddot = sub(rho_ddot, scaled(q_dot[k], d)), sub(th_ddot, scaled(q_dot[k], th))
-    th_dot = vector(markers.angle_dot[m])
-    c = turned(left_jacobian_derivative(vector(markers.angle[m]), th_dot, 1.0), th_dot)
+    rho_ddot, th_ddot = deformation_accelerations(model, marker_work, m, model.markers.body[m])
+    c = turning_bias(vector(markers.angle[m]), vector(markers.angle_dot[m]))
     return rho_ddot, add(turned(markers.T_left[m], th_ddot), c)
 
 

@@ -8,89 +8,20 @@ With th_dot = Psi_r(q) q_dot, nu = T(th) th_dot, nu_dot = T th_ddot + c(th, th_d
               d nu_dot = L(th, th_ddot) Psi_r + T d th_ddot + c_th Psi_r + c_w d th_dot
     by q_dot  Psi_t; -2 (K_P q_dot)_t;  phi;  -2 T (K_P q_dot)_r + c_w Psi_r
 
-L(th, v) = d(T v)/dth. With a = a(|th|), b = b(|th|) of kernels/rotation.py, p = th·w, x = th × w, y = th × x
-
-    c = a' p x + b' p y + b w × x,   a' = (da/dt)/t, b' = (db/dt)/t, and a'', b'' the same of these.
+L(th, v) = d(T v)/dth; c and its derivatives as in relative/kernels/elastic_turning.py.
 
 What is seen from the marker, which turns by phi: d_P x = dx - phi × x. Then Y = (d_P v, d_P omega) and
 X = (d_P a - 2 d_P omega × v, d_P alpha + omega × d_P omega), which hold for all that hangs at the marker.
 """
 
-import math
-
-from floatframe.kernels.compiler.compilation import inner, loops, small
+from floatframe.kernels.compiler.compilation import loops, small
 from floatframe.kernels.dense import add_products
 from floatframe.kernels.marker import shape
-from floatframe.kernels.rotation import (
-    left_jacobian_derivative,
-    quotient_b,
-    quotient_da,
-    quotient_db,
-)
+from floatframe.kernels.rotation import left_jacobian_derivative
 from floatframe.kernels.vector import add, cross, dot, put, scaled, sub, turned, vector
+from floatframe.relative.kernels.elastic_turning import turning_bias_by_angle, turning_bias_by_rate
 
 __all__ = ["carried_change", "put_marker_changes"]
-
-SERIES_UP_TO = 4.0  #: t² at the switch: nearer to zero the closed forms lose digits
-
-
-@inner
-def quotient_dda(x):
-    """Return (d a'/dt)/t of x = t², a' = (t sin t - 2 (1 - cos t))/t⁴; its series below t = 2."""
-    if x > SERIES_UP_TO:
-        t = math.sqrt(x)
-        c = math.cos(t)
-        return (x * c - 5 * t * math.sin(t) + 8 * (1 - c)) / (x * x * x)
-    y = 1 / 763809585467056128000000
-    y = 1 / 3122224243826688000 + x * (-1 / 1410110003939180544000 + x * y)
-    y = 1 / 28582025472000 + x * (-1 / 8447576417280000 + x * y)
-    y = 1 / 726485760 + x * (-1 / 124540416000 + x * y)
-    y = 1 / 75600 + x * (-1 / 5987520 + x * y)
-    y = 1 / 90 + x * (-1 / 1680 + x * y)
-    return y
-
-
-@inner
-def quotient_ddb(x):
-    """Return (d b'/dt)/t of x = t², b' = ((1 - cos t) - 3 (t - sin t)/t)/t⁴; its series below t = 2."""
-    if x > SERIES_UP_TO:
-        t = math.sqrt(x)
-        s = math.sin(t)
-        return (t * s + 8 + 7 * math.cos(t) - 15 * s / t) / (x * x * x)
-    y = 1 / 20622858807610515456000000
-    y = 1 / 71811157608013824000 + x * (-1 / 35252750098479513600000 + x * y)
-    y = 1 / 543058483968000 + x * (-1 / 177399104762880000 + x * y)
-    y = 1 / 10897286400 + x * (-1 / 2117187072000 + x * y)
-    y = 1 / 831600 + x * (-1 / 77837760 + x * y)
-    y = 1 / 630 + x * (-1 / 15120 + x * y)
-    return y
-
-
-@inner
-def turning_bias_by_angle(th, w, d):
-    """Return the change of c by a change d of th."""
-    x = dot(th, th)
-    p, m, b = dot(th, w), cross(th, w), quotient_b(x)
-    y = cross(th, m)
-    da, db = quotient_da(x), quotient_db(x)
-    dp, dm, along = dot(d, w), cross(d, w), dot(th, d)
-    dy = add(cross(d, m), cross(th, dm))
-    first = scaled(quotient_dda(x) * along * p + da * dp, m)
-    second = scaled(quotient_ddb(x) * along * p + db * dp, y)
-    third = add(scaled(da * p, dm), scaled(db * p, dy))
-    return add(add(first, second), add(third, add(scaled(db * along, cross(w, m)), scaled(b, cross(w, dm)))))
-
-
-@inner
-def turning_bias_by_rate(th, w, d):
-    """Return the change of c by a change d of w."""
-    x = dot(th, th)
-    p, m, b = dot(th, w), cross(th, w), quotient_b(x)
-    da, db = quotient_da(x), quotient_db(x)
-    dp, dm = dot(th, d), cross(th, d)
-    first = add(scaled(da * dp, m), scaled(da * p, dm))
-    second = add(scaled(db * dp, cross(th, m)), scaled(db * p, cross(th, dm)))
-    return add(add(first, second), scaled(b, add(cross(d, m), cross(w, dm))))
 
 
 @loops

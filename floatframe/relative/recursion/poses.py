@@ -23,7 +23,6 @@ from floatframe.kernels.vector import (
     sub,
     transposed,
     turned,
-    turned_back,
     unit_matrix,
     vector,
 )
@@ -120,9 +119,3 @@ def place_in_ground(nodes, work):
             R = matrix(work.R_G[above])
             put_matrix(work.R_G[k], product(R, work.R[k]))
             put(work.r_G[k], 0, add(vector(work.r_G[above]), turned(R, vector(work.p[k]))))
-
-
-@small
-def into_node(work, k, x):
-    """Return a vector of the ground in the frame of node k."""
-    return turned_back(work.R_G[k], x)

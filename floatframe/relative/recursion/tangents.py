@@ -42,24 +42,13 @@ from floatframe.kernels.vector import (
     turned_back,
     vector,
 )
+from floatframe.relative.kernels.spatial import pair_sum, put_pair_of, spatial_cross, spatial_motion
 from floatframe.relative.recursion.columns import marker_columns_in_ground
-from floatframe.relative.recursion.composite import along, congruent
+from floatframe.relative.recursion.composite import along, congruent, moved_inertia
 from floatframe.relative.recursion.elastic_tangents import carried_change, put_marker_changes
 from floatframe.relative.recursion.newton_euler import elastic_carrier
 
 __all__ = ["force_tangents"]
-
-
-@small
-def motion_cross(v, w, x, y):
-    """Return (v, w) × (x, y) of two motions."""
-    return add(cross(w, x), cross(v, y)), cross(w, y)
-
-
-@small
-def spatial(r, v, omega, alpha, a):
-    """Return V and A about the origin of what moves so at r; a: acceleration of the point."""
-    return (sub(v, cross(omega, r)), omega), (sub(sub(a, cross(omega, v)), cross(alpha, r)), alpha)
 
 
 @loops
@@ -67,7 +56,7 @@ def node_motion(work, k):
     """Return V, A of node k."""
     R, r = work.R_G[k], vector(work.r_G[k])
     alpha, a = turned(R, vector(work.alpha[k])), turned(R, vector(work.acc[k]))
-    return spatial(r, vector(work.motion[k]), vector(work.motion[k, 3:]), alpha, a)
+    return spatial_motion(r, vector(work.motion[k]), vector(work.motion[k, 3:]), a, alpha)
 
 
 @loops
@@ -87,7 +76,7 @@ def marker_motion(model, marker_work, m, work, k):
     R = work.R_G[k]
     v, omega, a, alpha, _, _ = marker_in_body(model, marker_work, m, work, k)
     r = add(vector(work.r_G[k]), turned(R, vector(marker_work.markers.rho[m])))
-    return spatial(r, turned(R, v), turned(R, omega), turned(R, alpha), turned(R, a))
+    return spatial_motion(r, turned(R, v), turned(R, omega), turned(R, a), turned(R, alpha))
 
 
 @loops
@@ -115,20 +104,12 @@ def joint_changes(nodes, work, dense, model, marker_work, k):
         V, A = outer_V, outer_A
     for j in range(nodes.v0[k], nodes.v0[k] + nodes.n_z[k]):
         w = vector(work.S[j, 3:])
-        v = sub(vector(work.S[j]), cross(w, r))
-        y, y_w = motion_cross(V[0], V[1], v, w)
-        x, x_w = motion_cross(A[0], A[1], v, w)
-        more, more_w = motion_cross(V[0], V[1], y, y_w)
-        put(dense.S[j], 0, v)
-        put(dense.S[j], 3, w)
-        change = dense.change[j]
-        put(change, 0, y)
-        put(change, 3, y_w)
-        put(change, 6, add(x, more))
-        put(change, 9, add(x_w, more_w))
-        x, x_w = motion_cross(add(inner_V[0], outer_V[0]), add(inner_V[1], outer_V[1]), v, w)
-        put(change, 12, x)
-        put(change, 15, x_w)
+        S = sub(vector(work.S[j]), cross(w, r)), w
+        Y = spatial_cross(V, S)
+        put_pair_of(dense.S[j], 0, S)
+        put_pair_of(dense.change[j], 0, Y)
+        put_pair_of(dense.change[j], 6, pair_sum(spatial_cross(A, S), spatial_cross(V, Y)))
+        put_pair_of(dense.change[j], 12, spatial_cross(pair_sum(inner_V, outer_V), S))
 
 
 @loops
@@ -153,19 +134,6 @@ def mode_changes(nodes, work, dense, model, marker_work, k):
         body = marker_in_body(model, marker_work, m, work, above)
         marker_columns_in_ground(model, marker_work, m, R, arm, 1.0, S)
         put_marker_changes(model, marker_work, m, body, R, arm, 1.0, change, dense.scratch)
-
-
-@small
-def moved_inertia(m, s, J, p):
-    """Return first moment and inertia about a point from which p leads to the one before."""
-    y = add(s, scaled(0.5 * m, p))
-    d = 2.0 * dot(p, y)
-    rows = (
-        sub(J[0], add(scaled(y[0], p), scaled(p[0], y))),
-        sub(J[1], add(scaled(y[1], p), scaled(p[1], y))),
-        sub(J[2], add(scaled(y[2], p), scaled(p[2], y))),
-    )
-    return add(s, scaled(m, p)), matrix_sum(rows, ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d)))
 
 
 @loops

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from floatframe.kernels.rotation import quotient_da, quotient_db
-from floatframe.relative.recursion.elastic_tangents import SERIES_UP_TO, quotient_dda, quotient_ddb
+from floatframe.relative.kernels.elastic_turning import SERIES_UP_TO, quotient_dda, quotient_ddb
 
 PAIRS = [(quotient_da.py_func, quotient_dda.py_func), (quotient_db.py_func, quotient_ddb.py_func)]
 
