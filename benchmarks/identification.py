@@ -10,9 +10,8 @@ import sys
 import numpy as np
 
 import floatframe as ff
-from tests.floatframe.identification.robots import six_axes
+from tests.floatframe.identification.robots import KUKA_LIKE, six_axes
 
-GEOMETRY = {"angles": (0, -90, 0, -90, 90, -90), "along_x": (0, 0, 0.48, 0, 0, 0), "along_z": (0, 0, 0, 0.51, 0, 0)}
 TORQUE_NOISE = np.array([8.0, 12.0, 6.0, 2.0, 1.5, 1.0])  #: [N m]
 BASE_NOISE = np.array([20.0, 20.0, 30.0, 15.0, 15.0, 10.0])  #: [N, N m]
 PERIOD, ROWS = 10.0, 200
@@ -21,7 +20,7 @@ PERIOD, ROWS = 10.0, 200
 def main() -> None:
     """Print a table."""
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    form = ff.linear_form(six_axes(**GEOMETRY, seed=4), ("viscous", "coulomb"))
+    form = ff.linear_form(six_axes(**KUKA_LIKE, seed=4), ("viscous", "coulomb"))
     phi = form.values
     phi[60:66], phi[66:] = 5.0, 3.0
     names = [f"joint{k + 1}/angle" for k in range(6)]
@@ -38,7 +37,7 @@ def main() -> None:
     print("measured".ljust(12) + "".join(word.rjust(width) for word, width in heads))
     shared = {}
     for source in ("torques", "reactions", "both"):
-        own = ff.base_parameters(form, source=source, by="samples")
+        own = ff.base_parameters(form, source=source)
         rng = np.random.default_rng(1)
         found, predicted = [], []
         for _ in range(n):

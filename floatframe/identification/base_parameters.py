@@ -17,8 +17,9 @@ from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
+from floatframe.identification.reaction_rules import silent_at_base
 from floatframe.identification.regressors import LinearForm
-from floatframe.identification.transfer_rules import silent_directions
+from floatframe.identification.transfer_rules import common, silent_directions
 from floatframe.identification.tree_samples import TreeSamples, tree_samples
 
 __all__ = ["SOURCES", "BaseParameters", "base_parameters", "form_rows", "random_samples", "sampled_silence"]
@@ -69,7 +70,7 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
     source
         What is measured: "torques" of all coordinates, "reactions" of the ground, or "both".
     by
-        "rules" (torques alone) or "samples": the rank of the form over random motions.
+        "rules" over the joints, or "samples": the rank of the form over random motions.
     seed
         Of these.
 
@@ -83,12 +84,21 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
     if by not in ("rules", "samples"):
         raise ModelError(f"base_parameters: by: no road {quoted(by)}{nearest(by, ['rules', 'samples'])}")
     if by == "rules":
-        if source != "torques":
-            raise ModelError(f"base_parameters: rules are those of torques; take by='samples' for {source!r}")
-        silent = silent_directions(form)
+        silent = silent_by_rules(form, source)
     else:
         silent = sampled_silence(form_rows(form, random_samples(form, seed), source), form)
     return combined(form, source, silent)
+
+
+def silent_by_rules(form: LinearForm, source: str) -> Array:
+    """Return the directions of the parameters, (p, k), that rules find without effect on what is measured."""
+    if source == "torques":
+        return silent_directions(form)
+    if source == "reactions":
+        return silent_at_base(form)
+    size = typical(form)[:, None]
+    spaces = [(silent / size).T for silent in (silent_directions(form), silent_at_base(form))]
+    return common(spaces).T * size
 
 
 def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:

@@ -39,7 +39,10 @@ from floatframe.identification.regressors import LinearForm
 from floatframe.identification.tree_samples import TreeSamples, as_placed, gravity_of, rigid_tree, tree_samples
 from floatframe.relative.kernels.tree import Tree
 
-__all__ = ["silent_directions"]
+__all__ = [
+    "SAME", "Move", "chain", "common", "dipole", "line_masses", "moves_of", "rotations",
+    "silent_directions", "square_to", "tensor_row", "tensors",
+]  # fmt: skip
 
 SAME = 1e-9  #: sine of an angle, or distance over the size of the system, that is none
 

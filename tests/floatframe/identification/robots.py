@@ -23,6 +23,8 @@ DOWN = (0.0, 0.0, -9.81)
 PUMA_ANGLES = (0, -90, 0, -90, 90, -90)
 PUMA_ALONG_X = (0, 0, 0.4318, 0.0203, 0, 0)
 PUMA_ALONG_Z = (0, 0.2435, -0.0934, 0.4331, 0, 0)
+#: offsets and lengths of the order of a KUKA IR 361, three parallel and three meeting axes: chosen, not measured
+KUKA_LIKE = {"angles": (0, -90, 0, -90, 90, -90), "along_x": (0, 0, 0.48, 0, 0, 0), "along_z": (0.0, 0, 0, 0.51, 0, 0)}
 
 
 def some_body(name, rng, position=(0, 0, 0), R=np.eye(3)):
@@ -49,6 +51,29 @@ def six_axes(angles=PUMA_ANGLES, along_x=PUMA_ALONG_X, along_z=PUMA_ALONG_Z, gra
         ends = Marker(below, position=here[:3, 3], triad=here[:3, :3]), Marker(f"link{i + 1}")
         joints.append(RevoluteJoint(f"joint{i + 1}", *ends, axis=(0, 0, 1)))
     return System(bodies, joints, [Gravity(gravity)] if np.any(gravity) else [])
+
+
+def human(gravity=DOWN):
+    """A free trunk with head, arms of two bodies and legs of three: 12 bodies, spherical joints and hinges."""
+    rng = np.random.default_rng(12)
+    bodies, joints, places = [some_body("trunk", rng)], [], {"trunk": np.zeros(3)}
+
+    def hang(name, parent, off, kind):
+        places[name] = places[parent] + off
+        bodies.append(some_body(name, rng, places[name]))
+        ends = Marker(parent, position=off), Marker(name)
+        joint = f"{name} joint"
+        joints.append(SphericalJoint(joint, *ends) if kind == "S" else RevoluteJoint(joint, *ends, axis=(0, 1, 0)))
+
+    hang("head", "trunk", (0, 0, 0.55), "S")
+    for side, y in (("left", 1), ("right", -1)):
+        hang(f"{side} upper arm", "trunk", (0, 0.2 * y, 0.45), "S")
+        hang(f"{side} forearm", f"{side} upper arm", (0, 0, -0.3), "R")
+        hang(f"{side} thigh", "trunk", (0, 0.1 * y, 0), "S")
+        hang(f"{side} shank", f"{side} thigh", (0, 0, -0.43), "R")
+    for side in ("left", "right"):
+        hang(f"{side} foot", f"{side} shank", (0, 0, -0.43), "R")
+    return System(bodies, joints, [Gravity(gravity)])
 
 
 def random_tree(seed, n, kinds):

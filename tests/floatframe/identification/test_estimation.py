@@ -12,10 +12,8 @@ from floatframe.identification.inertial_parameters import pseudo_inertia
 from floatframe.identification.physical import log_cholesky, parameters_of_cholesky, real_parameters
 from floatframe.identification.regressors import linear_form
 from floatframe.identification.tree_samples import tree_samples
-from tests.floatframe.identification.robots import six_axes
+from tests.floatframe.identification.robots import KUKA_LIKE, six_axes
 
-#: offsets and lengths of the order of a KUKA IR 361, three parallel and three meeting axes: chosen, not measured
-KUKA_LIKE = {"angles": (0, -90, 0, -90, 90, -90), "along_x": (0, 0, 0.48, 0, 0, 0), "along_z": (0.0, 0, 0, 0.51, 0, 0)}
 NOISE = np.array([8.0, 12.0, 6.0, 2.0, 1.5, 1.0])
 BASE_NOISE = np.array([20.0, 20.0, 30.0, 15.0, 15.0, 10.0])
 
