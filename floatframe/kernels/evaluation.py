@@ -15,7 +15,7 @@ from floatframe.kernels.rotation import right_jacobian
 from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import put, put_matrix, put_sum, scaled, turned, turned_back, vector
 
-__all__ = ["evaluate", "evaluate_bodies", "evaluate_markers", "linearize", "tangent_of_body"]
+__all__ = ["evaluate", "evaluate_bodies", "evaluate_markers", "linearize", "slide_markers", "tangent_of_body"]
 
 
 @inner
@@ -32,6 +32,13 @@ def evaluate_markers(model, work):
     """Write the motion of all markers; their wrenches are zero."""
     for m in range(model.markers.body.shape[0]):
         marker_motion(model, work, m)
+    slide_markers(model, work)
+
+
+@inner
+def slide_markers(model, work):
+    """Move markers that slide to where they are by now; wrenches of all markers are zero."""
+    for m in range(model.markers.body.shape[0]):
         for k in range(6):
             work.markers.wrench[m, k] = 0.0
     for k in range(model.lines.marker.shape[0]):

@@ -21,11 +21,11 @@ from floatframe.kernels.work import Work
 from floatframe.relative.kernels.accelerations import accelerate, constrain
 from floatframe.relative.kernels.evaluation import evaluate_tree
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
+from floatframe.relative.kernels.predictor import forget
 from floatframe.relative.kernels.projection import put_reactions
-from floatframe.relative.kernels.steps import SINGULAR, advance_tree, write_tree_row
+from floatframe.relative.kernels.steps import SINGULAR, advance_tree, correct, renew, write_tree_row
 from floatframe.relative.kernels.tangent import assemble, write_tangent
 from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree, new_tangent_work
-from floatframe.relative.kernels.tree_factors import factorize_tree, solve_newton
 
 __all__ = [
     "accelerations",
@@ -61,6 +61,7 @@ def make_entry(digest):
         memory, rows = as_memory(memory_table), as_rows(rows_table)
         what = order.what
         if what == ADVANCE:
+            forget(tree, tangent, memory)
             return advance_tree(model, work, memory, rows, (tree, joints, tangent), order)
         if what == OBSERVE:
             work.counted.rows = 0
@@ -84,10 +85,10 @@ def make_entry(digest):
         elif what == CORRECT:
             c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
             evaluate_tree(model, work, tree, joints, c_k)
-            write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
-            if not factorize_tree(model, work, tree, tangent, c_d, c_k):
+            tangent.is_kept, tangent.exactly = 0, 1 - order.n_steps
+            if not renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
                 return SINGULAR, 0, 0, -1, 0.0
-            solve_newton(work, tree, joints, tangent, c_k)
+            correct(model, work, tree, joints, tangent, c_k)
         else:
             c_m, c_d, c_k = order.c_m, order.c_d, order.c_k
             evaluate_tree(model, work, tree, joints, c_k if c_k > 0.0 else 1.0)
@@ -107,7 +108,8 @@ NOTHING = zeros(Order(), {})
 
 
 NO_TANGENT = zeros(
-    TangentWork(), dict.fromkeys((("n_b", "n_s", "jets", "n_q", "n_most", "kept rows", "numbers of L", "n_dense")), 0)
+    TangentWork(),
+    dict.fromkeys(("n_b", "n_s", "jets", "n_q", "n_most", "kept rows", "numbers of L", "numbers of H", "n_dense"), 0),
 )
 
 
@@ -181,11 +183,14 @@ def newton_matrix(model: Model, work: Work, tree: Tree, joints: JointWork, c_m: 
 
 
 def newton_step(
-    model: Model, work: Work, tree: Tree, joints: JointWork, c_m: float, c_d: float, c_k: float
+    model: Model, work: Work, tree: Tree, joints: JointWork, c_m: float, c_d: float, c_k: float, *, is_exact: bool = True
 ) -> tuple[Array, Array]:
-    """Return Newton's correction of unknowns, (n_s,), and of kept wrenches times c_k, (n_rows,), at the iterate."""
+    """Return Newton's correction of unknowns, (n_s,), and of kept wrenches times c_k, (n_rows,), at the iterate.
+
+    is_exact: with the exact matrix, else with that of `kernels.kept_factors`.
+    """
     tangent = new_tangent_work(model, tree)
-    call(model, work, tree, joints, tangent, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k)
+    call(model, work, tree, joints, tangent, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k, n_steps=int(not is_exact))
     return tangent.step, tangent.mu
 
 

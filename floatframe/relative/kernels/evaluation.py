@@ -2,10 +2,11 @@
 
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.connection import connection_rows
-from floatframe.kernels.evaluation import evaluate_bodies, evaluate_markers
+from floatframe.kernels.evaluation import evaluate_bodies, evaluate_markers, slide_markers
+from floatframe.kernels.marker import marker_motion, pose_on_body
 from floatframe.relative.kernels.projection import project
 
-__all__ = ["evaluate_tree"]
+__all__ = ["evaluate_placed", "evaluate_tree"]
 
 
 @inner
@@ -16,6 +17,25 @@ def evaluate_tree(model, work, tree, joints, c_k):
     bodies without these joints.
     """
     evaluate_markers(model, work)
+    project_residuals(model, work, tree, joints, c_k)
+
+
+@inner
+def evaluate_placed(model, work, tree, joints, c_k):
+    """Do the same right after `place_bodies`, which knows how the ends of the joints of the tree have moved."""
+    for m in range(model.markers.body.shape[0]):
+        c, i = model.markers.connection[m], model.markers.body[m]
+        if c < 0 or tree.is_kept[c] != 0 or i < 0:
+            marker_motion(model, work, m)
+        elif tree.far[i] == m:
+            pose_on_body(model, work, m)
+    slide_markers(model, work)
+    project_residuals(model, work, tree, joints, c_k)
+
+
+@inner
+def project_residuals(model, work, tree, joints, c_k):
+    """Write what `evaluate_tree` does with the motion of all markers in `work`."""
     for c in range(model.connections.size.shape[0]):
         if tree.is_kept[c] != 0:
             connection_rows(model, work, c, c_k)

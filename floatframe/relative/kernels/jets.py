@@ -29,7 +29,7 @@ from floatframe.relative.kernels.spatial import (
 )
 from floatframe.relative.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
-__all__ = ["mode_rate", "put_jets", "write_jets"]
+__all__ = ["mode_rate", "mode_screw", "put_jets", "write_jets"]
 
 
 @inner
@@ -50,21 +50,30 @@ def put_reach(out, S_0, S_1, V):
 
 
 @inner
-def mode_rate(model, work, m, i, k):
-    """Return the screw of mode k at marker m about the frame origin of body i, and its rate as the body sees them.
+def mode_screw(model, work, m, i, k):
+    """Return the screw of mode k at marker m about the frame origin of body i: (Psi_t + rho × b, b), b = T' Psi_r."""
+    d, th = shape(work.markers.psi[model.markers.psi0[m] :], model.bodies.n_q[i], k)
+    b = turned(work.markers.T_left[m], th)
+    return add(d, cross(vector(work.markers.rho[m]), b)), b
 
-    (Psi_t + rho × b, b), b = T' Psi_r; `work.markers.bend_dot` has been written for the marker.
+
+@inner
+def mode_rate(model, work, m, i, k):
+    """Return the screw of `mode_screw` and its rate as the body sees them.
+
+    `work.markers.bend_dot` has been written for the marker.
     """
     markers, n, o = work.markers, model.bodies.n_q[i], model.markers.psi0[m]
     T, rho, rho_1 = markers.T_left[m], vector(markers.rho[m]), vector(markers.rho_dot[m])
-    d, th = shape(markers.psi[o : o + 6 * n], n, k)
+    s, b = mode_screw(model, work, m, i, k)
+    _, th = shape(markers.psi[o : o + 6 * n], n, k)
     slope = left_jacobian_derivative(vector(markers.angle[m]), th, 1.0)
-    b, b_1 = turned(T, th), turned(slope, vector(markers.angle_dot[m]))
+    b_1 = turned(slope, vector(markers.angle_dot[m]))
     s_1 = (0.0, 0.0, 0.0)
     if model.markers.bend0[m] >= 0:  # the rate of Psi(q)
         d_1, th_1 = shape(markers.bend_dot, n, k)
         s_1, b_1 = sub(s_1, d_1), sub(b_1, turned(T, th_1))
-    return (add(d, cross(rho, b)), b), (add(s_1, add(cross(rho_1, b), cross(rho, b_1))), b_1)
+    return (s, b), (add(s_1, add(cross(rho_1, b), cross(rho, b_1))), b_1)
 
 
 @inner

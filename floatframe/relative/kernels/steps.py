@@ -23,18 +23,20 @@ from floatframe.kernels.generalized_alpha import (
     time_loop,
     write_row,
 )
-from floatframe.kernels.step_start import begin_step
-from floatframe.kernels.time_function import time_function
 from floatframe.kernels.vector import dot
-from floatframe.relative.kernels.evaluation import evaluate_tree
+from floatframe.relative.kernels.evaluation import evaluate_placed, evaluate_tree
+from floatframe.relative.kernels.kept_factors import factorize_poses, keep_bodies, solve_kept
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
+from floatframe.relative.kernels.predictor import learn, predict
 from floatframe.relative.kernels.projection import put_reactions
 from floatframe.relative.kernels.tangent import write_tangent
 from floatframe.relative.kernels.tree_factors import factorize_tree, solve_newton
+from floatframe.relative.kernels.weights import weigh
 
-__all__ = ["SINGULAR", "advance_tree", "write_tree_row"]
+__all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
 
 SINGULAR = 6  #: status: the Newton matrix is
+FAST = 0.1  # corrections that shrink this fast end where the next one would be as much below the one that is allowed
 MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
 
 
@@ -67,63 +69,35 @@ def resize(model, tree, joints, memory, h):
 
 
 @inner
-def predict(model, work, tree, joints, memory, h, alpha_f):
-    """(1): a_new = a, in every unknown; prescribed coordinates are where their functions lead."""
-    begin_step(model, work, memory, h, alpha_f)
-    state = work.state
-    for s in range(tree.slot.shape[0]):
-        slot, k = tree.slot[s], tree.column[s]
-        a = memory.a[slot]
-        if k >= 0:
-            u = joints.rate_start[k]
-            joints.x[k] = h * (u + 0.5 * h * a)
-            joints.rate[k] = u + h * a
-            joints.acceleration[k] = (a - alpha_f * joints.acceleration_start[k]) / (1 - alpha_f)
-            joints.increment[s] = joints.x[k]
-        else:
-            u = memory.u[slot]
-            joints.increment[s] = h * (u + 0.5 * h * a)
-            state.q[tree.mode[s]] = memory.q[tree.mode[s]] + joints.increment[s]
-            state.u[slot] = u + h * a
-            state.u_dot[slot] = (a - alpha_f * memory.u_dot[slot]) / (1 - alpha_f)
-    for k in range(tree.motion.shape[0]):
-        if tree.motion[k] >= 0:
-            factor = tree.factor[k]
-            before, _, _ = time_function(model.functions, tree.motion[k], state.time - h)
-            value, rate, second = time_function(model.functions, tree.motion[k], state.time)
-            joints.x[k] = factor * (value - before)
-            joints.rate[k] = factor * rate
-            joints.acceleration[k] = factor * second
-    move_joints(tree, joints)
-    place_bodies(model, work, tree, joints)
+def renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
+    """Make the factors of the Newton matrix anew; whether all unknowns have their equation.
+
+    Exact ones where wrenches are kept or `tangent.exactly` asks for them, else those of `kernels.kept_factors`.
+    """
+    weigh(model, work, tree, joints, tangent)
+    if tangent.V.shape[0] > 0 or tangent.exactly > 0:
+        tangent.is_exact, tangent.is_kept = 1, 0
+        write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+        return factorize_tree(model, work, tree, tangent, c_d, c_k)
+    tangent.is_exact = 0
+    if tangent.is_kept == 0:
+        keep_bodies(model, work, tree, c_m, c_d, c_k)
+        tangent.is_kept = 1
+    if factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
+        return True
+    tangent.exactly = MOST_PATIENCE
+    tangent.is_exact, tangent.is_kept = 1, 0
+    write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
+    return factorize_tree(model, work, tree, tangent, c_d, c_k)
 
 
 @inner
-def weigh(model, work, tree, tangent):
-    """Write the weights of the norm of unknowns: what of the mass a unit of a coordinate moves, M + c_k K of a mode.
-
-    The mass of a subtree is the derivative of its force by xi_ddot.
-    """
-    mass = tangent.mass
-    for i in range(tree.parent.shape[0]):
-        for r in range(6):
-            for e in range(6):
-                mass[i, r, e] = tangent.D[i, r, 12 + e]
-    for place in range(tree.order.shape[0] - 1, -1, -1):
-        i = tree.order[place]
-        for j in range(tree.jet0[i], tree.jet0[i + 1]):
-            total = 0.0
-            for r in range(6):
-                for e in range(6):
-                    total += tangent.screw[j, r] * mass[i, r, e] * tangent.screw[j, e]
-            tangent.weight[tree.jet_s[j]] = abs(total)
-        if tree.parent[i] >= 0:
-            for r in range(6):
-                for e in range(6):
-                    mass[tree.parent[i], r, e] += mass[i, r, e]
-    for i in range(tree.parent.shape[0]):
-        for k in range(model.bodies.n_q[i]):
-            tangent.weight[tree.m0[i] + k] = work.solver.weight[model.bodies.u0[i] + 6 + k]
+def correct(model, work, tree, joints, tangent, c_k):
+    """Write the corrections for the residual of the iterate with the factors that `renew` has made."""
+    if tangent.is_exact != 0:
+        solve_newton(work, tree, joints, tangent, c_k)
+    else:
+        solve_kept(model, tree, joints, tangent, c_k)
 
 
 @inner
@@ -202,32 +176,36 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     c_k = beta * h * h
     c_d = gamma * h
     c_m = (1 - alpha_m) / (1 - alpha_f)
-    predict(model, work, tree, joints, memory, h, alpha_f)
     work.counted.no_number = 0
     work.counted.stopped = 0
     last, last_of_states, excess, allowed = math.inf, math.inf, math.inf, 0.0
     solver, iteration = work.solver, 0
     if solver.c_m != c_m or solver.c_d != c_d or solver.c_k != c_k:
         work.solver.is_due = 1
-        tangent.patience, tangent.left = 0, 0
+        tangent.patience, tangent.left, tangent.is_kept, tangent.exactly = 0, 0, 0, 0
+        tangent.n_known = 0
     elif tangent.left > 0:
         work.solver.is_due = 1
         tangent.left -= 1
-    is_old = work.solver.is_due == 0
+    if tangent.exactly > 0:
+        tangent.exactly -= 1
+    is_old, is_of_step = work.solver.is_due == 0, False
+    predict(model, work, tree, joints, tangent, memory, order, h)
     factorisations = work.counted.factorisations
+    is_open = tangent.V.shape[0] == 0  # wrenches that are kept are not in the norm
     has_states = model.states.row.shape[0] + model.laws.equation.shape[0] > 0
     while iteration < order.max_iterations:
-        evaluate_tree(model, work, tree, joints, c_k)
+        evaluate_placed(model, work, tree, joints, c_k)
         if work.solver.is_due == 1:
-            write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
-            weigh(model, work, tree, tangent)
+            if tangent.is_exact == 0 and tangent.is_kept == 0:
+                is_of_step = True
             work.counted.factorisations += 1
             work.solver.is_due = 0
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
-            if not factorize_tree(model, work, tree, tangent, c_d, c_k):
+            if not renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
                 work.solver.is_due = 1
                 return SINGULAR, excess, -1.0
-        solve_newton(work, tree, joints, tangent, c_k)
+        correct(model, work, tree, joints, tangent, c_k)
         if iteration == 0:
             size, size_x = sizes(model, work, tree, joints, tangent, model.gravity)
             allowed = order.tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
@@ -241,7 +219,15 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             is_old = False
             tangent.patience = min(2 * tangent.patience + 1, MOST_PATIENCE)
             tangent.left = tangent.patience
-            predict(model, work, tree, joints, memory, h, alpha_f)
+            predict(model, work, tree, joints, tangent, memory, order, h)
+            last, last_of_states = math.inf, math.inf
+            iteration += 1
+            continue
+        if tangent.is_exact == 0 and not norm <= last:
+            work.solver.is_due = 1
+            tangent.exactly = MOST_PATIENCE
+            tangent.n_known = 0
+            predict(model, work, tree, joints, tangent, memory, order, h)
             last, last_of_states = math.inf, math.inf
             iteration += 1
             continue
@@ -255,7 +241,10 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             if not math.isfinite(of_states):
                 work.solver.is_due = 1
                 return DIVERGED, math.inf, -1.0
-        is_small = norm <= allowed or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
+        is_enough = norm <= allowed or (
+            is_open and norm <= FAST * last and last < math.inf and norm * norm <= FAST * last * allowed
+        )
+        is_small = is_enough or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
             if iteration >= MANY:
                 work.solver.is_due = 1
@@ -266,7 +255,13 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                     return INACCURATE, excess, error
             accept(model, work, memory, tree, joints, h, alpha_m, alpha_f)
             return DONE, excess, error
-        if (norm > SLOW * last and not is_small) or of_states > max(1.0, SLOW * last_of_states) or iteration >= MANY:
+        if norm > SLOW * last and not is_small:
+            work.solver.is_due = 1
+            if is_of_step:  # matrices of this step are not good enough either
+                tangent.exactly = MOST_PATIENCE
+            elif tangent.is_exact == 0:
+                tangent.is_kept = 0
+        if of_states > max(1.0, SLOW * last_of_states) or iteration >= MANY:
             work.solver.is_due = 1
         last, last_of_states = norm, of_states
         excess = max(excess, of_states)
@@ -328,8 +323,11 @@ def try_tree_step(model, work, memory, others, order, t, h):
     begin(model, work, tree, joints, memory)
     if is_resized(model, work, memory, order, h):
         resize(model, tree, joints, memory, h)
+        tangent.n_known = 0
     work.state.time = t
     status, excess, error = one_step(model, work, memory, tree, joints, tangent, order, memory.h)
+    if status == DONE:
+        learn(tree, tangent, memory)
     return status, -1, excess, error
 
 

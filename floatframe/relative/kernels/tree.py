@@ -108,6 +108,24 @@ class TangentWork(NamedTuple):
     G: Array = real(n_s, 18)  #: unknowns of a body by the jet of its near marker
     W: Array = real(n_s, 6)  #: force of a subtree by the unknowns of its first body
     b: Array = real(n_b, 6, unit="N, N m")  #: force of subtrees in a solution
+    #: of kernels/kept_factors.py, in axes of each body about its origin
+    N: Array = real(Size("numbers of H"))  #: matrices of bodies with what hangs at them, flat as work.solver.H
+    S: Array = real(n_b, Size("n_most"), 6)  #: screws of the modes at the far marker
+    T: Array = real(n_b, Size("n_most"), 6)  #: those of the parent's modes at the near, less those at its far marker
+    Z: Array = real(6, Size("n_most"))
+    J: Array = real(n_s, 6)  #: screws of columns
+    U: Array = real(n_s, 6)  #: unknowns of a body by the motion of what holds it
+    P: Array = real(n_b, 6, 6)  #: force of a subtree by it
+    turn: Array = real(n_b, 3, 3)  #: axes of a body in those of its parent
+    shift: Array = real(n_b, 3, unit="m")  #: its origin
+    is_exact: IntArray = integer()  #: whether the factors are those of the exact matrix
+    is_kept: IntArray = integer()  #: whether the matrices of bodies are there
+    exactly: IntArray = integer()  #: steps still to be made with exact matrices
+    #: algorithmic accelerations of the unknowns after the last steps, of one size each after the other
+    a_last: Array = real(n_s)
+    a_before: Array = real(n_s)
+    a_first: Array = real(n_s)
+    n_known: IntArray = integer()  #: how many of the three are there
     X: Array = real(n_b, 18)  #: jets of bodies in a solution
     Y: Array = real(18)
     patience: IntArray = integer()  #: steps that make their own factors after the next that finds old ones too old
@@ -144,6 +162,7 @@ def new_tangent_work(model: Model, tree: Tree, *, is_dense: bool = False) -> Tan
         "n_s": n_s,
         "kept rows": n_rows,
         "numbers of L": int(tree.l0[-1]),
+        "numbers of H": int(model.bodies.h0[-1]),
         "n_dense": n_s + n_rows if is_dense else 0,
     }
     return zeros(TangentWork(), sizes)

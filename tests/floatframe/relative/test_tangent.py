@@ -99,3 +99,16 @@ def assert_step_is_exact(point):
     exact = np.linalg.solve(newton_matrix(it.model, it.work, it.tree, it.joints, C_M, C_D, C_K), -residual)
     step = np.concatenate(newton_step(it.model, it.work, it.tree, it.joints, C_M, C_D, C_K))
     assert_allclose(step, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("case", ["revolute", "cylindrical swapped", "universal", "spherical", "planar swapped"])
+def test_kept_matrices_leave_out_nothing_of_the_mass(case):
+    """With c_d = 0 and c_k next to nothing the correction is that of the exact matrix; with those of a step nearly."""
+    make, is_apart, n_free, swap = next(each.values for each in CASES if each.id == case)
+    point = Point(pair(make, is_apart=is_apart, swap=swap), True)
+    it = point.iterate
+    point.residual(np.zeros(int(it.tree.s0[-1])))
+    for weights, allowed in (((1.0, 0.0, 1e-12), 1e-9), ((C_M, 1e-4, 1e-8), 2e-3)):
+        exact, _ = newton_step(it.model, it.work, it.tree, it.joints, *weights)
+        kept, _ = newton_step(it.model, it.work, it.tree, it.joints, *weights, is_exact=False)
+        assert_allclose(kept, exact, rtol=0, atol=allowed * np.abs(exact).max())

@@ -1,0 +1,65 @@
+"""Weights of the norm of unknowns in relative coordinates: the mass that a unit of each moves."""
+
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.vector import (
+    add,
+    cross,
+    dot,
+    matrix,
+    matrix_sum,
+    product,
+    put,
+    put_sum,
+    scaled,
+    scaled_matrix,
+    sub,
+    tilde,
+    transposed,
+    turned,
+    vector,
+)
+
+__all__ = ["weigh"]
+
+
+@inner
+def weigh(model, work, tree, joints, tangent):
+    """Write the weights of the norm of unknowns: what of the mass a unit of a coordinate moves, M + c_k K of a mode.
+
+    Mass m, first moment S and inertia J of subtrees about tangent.origin, ground axes: rows 0, 1 and 3 to 5 of mass.
+    """
+    mass, origin = tangent.mass, vector(work.state.r[tree.order[0]])
+    for i in range(tree.parent.shape[0]):
+        R, p, m = matrix(work.state.R[i]), sub(work.state.r[i], origin), model.body_types.mass[model.bodies.kind[i]]
+        s, arm = turned(R, work.bodies.s[i]), tilde(p)
+        J = product(product(R, matrix(work.bodies.J[i])), transposed(R))
+        cross_terms = matrix_sum(product(arm, tilde(s)), product(tilde(s), arm))
+        J = matrix_sum(J, scaled_matrix(-1.0, matrix_sum(cross_terms, scaled_matrix(m, product(arm, arm)))))
+        mass[i, 0, 0] = m
+        put(mass[i, 1], 0, add(scaled(m, p), s))
+        for a in range(3):
+            put(mass[i, 3 + a], 0, J[a])
+    for place in range(tree.order.shape[0] - 1, -1, -1):
+        i = tree.order[place]
+        near, far, parent = tree.near[i], tree.far[i], tree.parent[i]
+        m, S, J = mass[i, 0, 0], vector(mass[i, 1]), mass[i, 3:]
+        for k in range(tree.column0[i], tree.column0[i + 1]):
+            if tree.unknown[k] < 0:
+                continue
+            point = vector(work.state.r[i]) if far < 0 else vector(work.markers.r[far])
+            if tree.side[k] == tree.is_reversed[i]:
+                point = (0.0, 0.0, 0.0) if near < 0 else vector(work.markers.r[near])
+            a = vector(joints.a[k])
+            v = cross(a, sub(origin, point))
+            if tree.side[k] == 0:
+                v = add(v, joints.t[k])
+            total = m * dot(v, v) + 2.0 * dot(v, cross(a, S)) + dot(a, turned(J, a))
+            tangent.weight[tree.unknown[k]] = abs(total)
+        if parent >= 0:
+            mass[parent, 0, 0] += m
+            put_sum(mass[parent, 1], 0, S)
+            for a in range(3):
+                put_sum(mass[parent, 3 + a], 0, J[a])
+    for i in range(tree.parent.shape[0]):
+        for k in range(model.bodies.n_q[i]):
+            tangent.weight[tree.m0[i] + k] = work.solver.weight[model.bodies.u0[i] + 6 + k]
