@@ -183,7 +183,15 @@ def newton_matrix(model: Model, work: Work, tree: Tree, joints: JointWork, c_m: 
 
 
 def newton_step(
-    model: Model, work: Work, tree: Tree, joints: JointWork, c_m: float, c_d: float, c_k: float, *, is_exact: bool = True
+    model: Model,
+    work: Work,
+    tree: Tree,
+    joints: JointWork,
+    c_m: float,
+    c_d: float,
+    c_k: float,
+    *,
+    is_exact: bool = True,
 ) -> tuple[Array, Array]:
     """Return Newton's correction of unknowns, (n_s,), and of kept wrenches times c_k, (n_rows,), at the iterate.
 

@@ -2,10 +2,11 @@
 
 An approximation of `kernels.tree_factors`, six wide instead of eighteen: a body turns and moves as a whole, so that its
 own matrix H, mass, damping and stiffness weighted, is constant in its axes but for its deformation; it is made once and
-kept for many steps. The screws of modes at the joints and the poses of bodies are renewed with the factors. Left out are the terms
-that come from the rates and accelerations of the screws and from the turning of forces: they are weighted with h and h²
-and cost an iteration where they count, never accuracy. With X the motion of a body, Y that of what holds it, u its
-columns, q its modes, S those of its far, S_c those of its near marker for child c, all in its axes about its origin,
+kept for many steps. The screws of modes at the joints and the poses of bodies are renewed with the factors. Left out
+are the terms that come from the rates and accelerations of the screws and from the turning of forces: they are weighted
+with h and h² and cost an iteration where they count, never accuracy. With X the motion of a body, Y that of what holds
+it, u its columns, q its modes, S those of its far, S_c those of its near marker for child c, all in its axes about its
+origin,
 
     X = Y + J u - S q             X_c = Ad_c (Y + J u + T_c q)         T_c = S_c - S
     [f, r_q] = [A B; C E] [X, q]  becomes by (Y + J u, q)  [A  B - A S; C - Sᵀ A  E - C S - Sᵀ B + Sᵀ A S]

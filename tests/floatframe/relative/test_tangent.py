@@ -104,7 +104,7 @@ def assert_step_is_exact(point):
 @pytest.mark.parametrize("case", ["revolute", "cylindrical swapped", "universal", "spherical", "planar swapped"])
 def test_kept_matrices_leave_out_nothing_of_the_mass(case):
     """With c_d = 0 and c_k next to nothing the correction is that of the exact matrix; with those of a step nearly."""
-    make, is_apart, n_free, swap = next(each.values for each in CASES if each.id == case)
+    make, is_apart, _, swap = next(each.values for each in CASES if each.id == case)
     point = Point(pair(make, is_apart=is_apart, swap=swap), True)
     it = point.iterate
     point.residual(np.zeros(int(it.tree.s0[-1])))
