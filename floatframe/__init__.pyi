@@ -95,6 +95,7 @@ from .forces import UserForce as UserForce
 from .functions.time_functions import TimeFunction as TimeFunction
 from .generation.generate import GeneratedCode as GeneratedCode
 from .generation.generate import generate as generate
+from .generation.units.generated_unit import generate_fmu as generate_fmu
 from .gradients import Sensitivities as Sensitivities
 from .gradients import sensitivities as sensitivities
 from .identification.barycentric import barycentric_parameters as barycentric_parameters

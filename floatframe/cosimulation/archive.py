@@ -103,6 +103,7 @@ def write_fmu(
     about = Description(
         unit.system.name, identifier_of(unit.system.name), f"{{{token.hexdigest()[:32]}}}", f"floatframe {release()}",
         unit.system.units, run.t_end * seconds, run.h * seconds,
+        f"Flexible multibody system {unit.system.name}. {NEEDS}",
     )  # fmt: skip
     package_folder = Path(str(package.__file__)).parent
     for each in sorted(package_folder.glob("*.py")):

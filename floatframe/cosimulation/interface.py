@@ -40,13 +40,17 @@ class Variable:
     """A real variable of a unit."""
 
     name: str
-    causality: str  #: parameter, input, output or independent
+    causality: str  #: parameter, input, output, local or independent
     unit: str = ""  #: in the symbols of the system; "": none
     words: str = ""  #: what it is
     start: float = 0.0
     path: str = ""  #: key path in the system file, of a parameter
     feeds_through: bool = False  #: of an output: whether it follows force inputs at once
     is_drive: bool = False  #: of an input: of a prescribed motion
+    is_tunable: bool = False  #: of a parameter: whether it may change in a motion
+    is_state: bool = False  #: whether it is a continuous state, which begins at its start
+    derivative_of: str = ""  #: name of the state whose derivative it is
+    depends_on: tuple[str, ...] | None = None  #: names of states and inputs; None: force inputs if it feeds through
 
 
 def value_at(content: Mapping[str, Any], path: str, where: str) -> float:

@@ -33,6 +33,7 @@ def base_unit(units: Units, words: str) -> BaseUnit | None:
         units.force_symbol: force,
         units.stress_symbol: BaseUnit(units.to_si(mass=1, length=-1, time=-2), 1, -1, -2),
         "rad": BaseUnit(1.0, rad=1),
+        "s": BaseUnit(1.0, s=1),
         "1": BaseUnit(1.0),
     }
     if words in symbols:

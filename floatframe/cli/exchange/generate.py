@@ -10,6 +10,8 @@ from cms.cli.console import guarded, print_table, say
 
 __all__ = ["register"]
 
+MOST_ROWS = 60  #: printed
+
 
 def register(app: typer.Typer) -> None:
     """Add the command to an application."""
@@ -37,10 +39,21 @@ def generate_command(
     name: Annotated[str | None, typer.Option("--name", help="What functions begin with; default: the system.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")] = Path(),
     json: Annotated[bool, typer.Option("--json", help="Say what was written as JSON, for other programs.")] = False,
+    fmu: Annotated[
+        Path | None,
+        typer.Option("--fmu", help="Write an FMU of compiled C instead, which needs nothing where it runs."),
+    ] = None,
+    fmi: Annotated[int, typer.Option("--fmi", help="With --fmu: version of FMI, 2 or 3.")] = 2,
+    step: Annotated[float, typer.Option("--step", help="With --fmu: longest step in co-simulation [s].")] = 1e-3,
 ) -> None:
     """Write the equations of one system as code, its numbers in it: forces, mass matrix, accelerations, derivatives.
 
+    With --fmu they become a unit for other programs, for model exchange and co-simulation: forces along the joints in,
+    positions and rates out. It is compiled by cc, or by what CC names.
+
     Example: floatframe generate robot.toml --what inverse --what mass --language c -o robot_code
+
+    Example: floatframe generate robot.toml --fmu robot.fmu --fmi 3
     """
     from dataclasses import asdict
 
@@ -49,6 +62,11 @@ def generate_command(
     from floatframe.generation.generate import generate
     from floatframe.system_file.read_system import read_system
 
+    if fmu is not None:
+        if (what, language, name, output, json) != (["inverse"], "c", None, Path(), False):
+            raise ModelError("--fmu: writes forward dynamics in C; leave out --what, --language, --name, -o and --json")
+        write_unit(system, fmu, fmi, step, parameters)
+        return
     described = read_system(system)[0]
     names = {each: None if name is None else f"{name}_{each}" for each in what}
     codes = [
@@ -88,3 +106,20 @@ def generate_command(
     )  # fmt: skip
     for path in files:
         say(f"wrote {path}")
+
+
+def write_unit(system: Path, fmu: Path, fmi: int, step: float, parameters: list[str]) -> None:
+    """Write a system as an FMU of generated C, and say what is in it."""
+    from floatframe.generation.units.generated_unit import generate_fmu
+    from floatframe.system_file.read_system import read_system
+
+    described, run = read_system(system)
+    stop = 1.0 if run is None else run.t_end * described.units.time
+    made = generate_fmu(described, fmu, fmi=fmi, step=step, parameters=parameters, stop_time=stop)
+    shown = [each for each in made.variables if each.causality in ("input", "output", "parameter")]
+    rows = [(each.name, each.causality, each.unit, f"{each.start:g}") for each in shown]
+    print_table("Variables", ("", "", "unit", "start>"), rows[:MOST_ROWS])
+    if len(rows) > MOST_ROWS:
+        say(f"and {len(rows) - MOST_ROWS} more")
+    say(f"FMI {fmi}.0 for {made.platform}, model exchange and co-simulation; its sources are in it")
+    say(f"wrote {fmu} ({fmu.stat().st_size / 1e6:.2f} MB)")
