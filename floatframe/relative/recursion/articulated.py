@@ -218,11 +218,11 @@ def solve_articulated(nodes, work):
                 x = b[vq + j]
                 a = add(a, scaled(x, vector(work.above[c0 + j])))
                 alpha = add(alpha, scaled(x, vector(work.above[c0 + j, 3:])))
-            if size == 1:
-                b[first] -= work.D[k, 0, 0] * along(work.U[first], a, alpha)
-            elif nodes.n_q[k] > 0:
+            if nodes.n_q[k] > 0:
                 for v in range(first, first + size):
                     b[v] -= along(work.V[v], a, alpha)
+            elif size == 1:
+                b[first] -= work.D[k, 0, 0] * along(work.U[first], a, alpha)
             elif size == 3:
                 y = (
                     along(work.U[first], a, alpha),

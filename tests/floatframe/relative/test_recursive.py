@@ -145,6 +145,16 @@ def test_derivatives_of_flexible_trees_are_those_of_differences(flexible):
     assert_allclose(got.by_z_dot, by_z_dot, rtol=0, atol=1e-10 * np.abs(by_z_dot).max())
 
 
+def test_a_body_with_one_mode_on_a_joint_without_rates_is_no_hinge():
+    """Rates of the joint and modes of a body are one number there, which is its mode."""
+    system = flexible_tree(n=2)
+    model = ff.relative_model(system)
+    z, z_dot, z_ddot = random_motion(PlainTree(system, model), 1)
+    M = model.mass_matrix(z)
+    got = model.forward_dynamics(z, z_dot, model.inverse_dynamics(z, z_dot, z_ddot))
+    assert_allclose(got, z_ddot, rtol=0, atol=100 * ROUNDOFF * np.linalg.cond(M))
+
+
 def test_the_state_of_the_bodies_is_that_of_plain_kinematics_and_back(flexible):
     model = flexible.model
     state = model.engine_state(flexible.z, flexible.z_dot)
