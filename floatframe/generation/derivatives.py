@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from floatframe.generation.graph import ADD, COS, DIV, MUL, NEG, SIN, SUB, Graph, Scalar, Terms, reachable
+from floatframe.generation.graph import ADD, COS, DIV, MUL, NEG, SIN, STUMPFF, SUB, Graph, Scalar, Terms, reachable
 from floatframe.generation.links import TreeTerms
 from floatframe.relative.recursion.nodes import ROTATION
 
@@ -36,6 +36,9 @@ def derivative(graph: Graph, terms: Sequence[Scalar], seed: Mapping[Scalar, Scal
             change = -da
         elif term.kind == SIN:
             change = graph.cos(a) * da
+        elif term.kind == STUMPFF:  # dc_k/dx = (k c_k+2 - c_k+1) / 2
+            k = int(term.value)
+            change = 0.5 * (k * graph.stumpff(k + 2, a) - graph.stumpff(k + 1, a)) * da
         else:
             assert term.kind == COS
             change = -(graph.sin(a) * da)
@@ -73,4 +76,7 @@ def position_seeds(tree: TreeTerms) -> list[dict[Scalar, Scalar]]:
         else:
             for j in range(link.n_z):
                 seeds[link.v0 + j] = {x[j]: graph.one}
+        if link.modes is not None:
+            for j in range(link.modes.n):
+                seeds[link.modes.v0 + j] = {tree.x[link.modes.x0 + j]: graph.one}
     return seeds

@@ -67,7 +67,7 @@ def generate(
     Parameters
     ----------
     system
-        A tree of rigid bodies; of forces, gravity counts.
+        A tree of rigid and flexible bodies; of forces, gravity counts.
     what
         "inverse" (forces of a motion), "residual" (those less given forces), "mass" (matrix), "forward"
         (accelerations), "kinematics" (places and velocities of all bodies), "jacobian" (derivatives of the forces of a
@@ -83,7 +83,7 @@ def generate(
     Raises
     ------
     ModelError
-        If there is no such routine, language or parameter, the system is no tree of rigid bodies, or the name is none.
+        If there is no such routine, language or parameter, the system is no tree, or the name is none.
     """
     for role, value, choices in (("what", what, ROUTINES), ("language", language, LANGUAGES)):
         if value not in choices:

@@ -20,11 +20,11 @@ import numpy as np
 from floatframe.errors import ModelError
 
 __all__ = [
-    "ADD", "CONSTANT", "COS", "DIV", "MUL", "NEG", "SIN", "SUB", "SYMBOL",
-    "Graph", "Number", "Operations", "Scalar", "Terms", "operations", "reachable",
+    "ADD", "CONSTANT", "COS", "DIV", "MUL", "NEG", "SIN", "STUMPFF", "SUB", "SYMBOL",
+    "Graph", "Number", "Operations", "Scalar", "Terms", "operations", "reachable", "terms",
 ]  # fmt: skip
 
-CONSTANT, SYMBOL, ADD, SUB, MUL, DIV, NEG, SIN, COS = range(9)  #: kinds of terms
+CONSTANT, SYMBOL, ADD, SUB, MUL, DIV, NEG, SIN, COS, STUMPFF = range(10)  #: kinds of terms
 
 Number = Union["Scalar", float]
 Terms: TypeAlias = np.ndarray[tuple[Any, ...], np.dtype[np.object_]]  #: arrays of terms
@@ -231,6 +231,20 @@ class Graph:
             return self.constant(math.cos(a.value))
         return self.cos(a.args[0]) if a.kind == NEG else self.made(COS, (a,))
 
+    def stumpff(self, k: int, x: Scalar) -> Scalar:
+        """Return c_k(x) = Σ (-x)^j / (2 j + k)!, which is written out in the end (`rotation_series`)."""
+        if x.is_constant(0.0):
+            return self.constant(1.0 / math.factorial(k))
+        return self.made(STUMPFF, (x,), "", float(k))
+
+
+def terms(graph: Graph, numbers: Any) -> Terms:
+    """Return an array of terms of numbers and terms."""
+    out: Terms = np.array(numbers, dtype=object)
+    for place, value in np.ndenumerate(out):
+        out[place] = graph.scalar(value)
+    return out
+
 
 def multiple(a: Scalar) -> tuple[float, Scalar]:
     """Return n, x with a = n x, n a number (3)."""
@@ -259,7 +273,7 @@ def reachable(outputs: Iterable[Scalar]) -> list[Scalar]:
 def operations(outputs: Iterable[Scalar]) -> Operations:
     """Return the operations that outputs need."""
     terms = reachable(outputs)
-    count = [0] * 9
+    count = [0] * (STUMPFF + 1)
     for term in terms:
         count[term.kind] += 1
     only_negative = {term.args[0].index for term in terms if term.kind == NEG and term.args[0].kind == SUB}

@@ -8,6 +8,7 @@ and second moment m, s, P = ∫ c cᵀ dm of a node these are
     slider       P: directions that do not turn against the parent
     rotation     m, in its centre
     nothing      all
+    marker that moves with modes   nothing
 
 and what comes to the ground vanishes. Seven numbers are left of the ten of a body on a hinge. Reactions in joints are
 others than before: only the forces along the rates are the same, and all that follows from them.
@@ -17,8 +18,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from floatframe.generation.graph import CONSTANT, Graph
-from floatframe.generation.links import Link, TreeTerms, terms, without_rounding
+from floatframe.generation.graph import CONSTANT, Graph, terms
+from floatframe.generation.links import Link, TreeTerms, without_rounding
 from floatframe.generation.recursions import shifted_moments, turned_moment
 from floatframe.relative.recursion.nodes import FIXED, ROTATION, SCREW
 
@@ -55,6 +56,8 @@ def less(link: Link, moved: Link) -> Link:
 def taken_along(graph: Graph, link: Link) -> tuple:
     """Return m, s, P that move with the inner frame as well, its axes where the joint is at zero."""
     s, P = terms(graph, np.zeros(3)), terms(graph, np.zeros((3, 3)))
+    if link.above is not None or link.own is not None:
+        return graph.zero, s, P
     if link.kind == FIXED:
         return link.mass, link.s, link.P
     if link.kind == ROTATION:

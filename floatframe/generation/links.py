@@ -1,11 +1,13 @@
 """The tree of a system for expressions: nodes of docs/recursive.md §1 with numbers and symbols for what they hold.
 
+The frame of a node is the outer frame of its joint, that of a flexible body (`modes.py`) while undeformed.
+
 Numbers that vanish but for rounding (cos 90°, products with it) are zero here: entries of rotation matrices within
 4 ulp of a whole number, lengths and moments below 4 ulp of the largest of their kind.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -13,13 +15,16 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import quoted
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.marker_shape import MarkerShape, interface_shape
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.errors import ModelError
-from floatframe.generation.graph import Graph, Scalar, Terms
+from floatframe.generation.graph import Graph, Scalar, Terms, terms
+from floatframe.generation.modes import ElasticMarker, Modes, elastic_marker, modes_of
 from floatframe.identification.inertial_parameters import INERTIAL, parameters_of
-from floatframe.relative.recursion.expansion import Expansion
+from floatframe.relative.recursion.expansion import Expansion, marker_shape
 
-__all__ = ["GRAVITY", "Link", "TreeTerms", "parameter_names", "terms", "tree_terms", "without_rounding"]
+__all__ = ["GRAVITY", "Frame", "Link", "TreeTerms", "parameter_names", "tree_terms", "without_rounding"]
 
 GRAVITY = ("gravity/x", "gravity/y", "gravity/z")
 ROUNDING = 4 * np.finfo(float).eps
@@ -43,11 +48,25 @@ class Link:
     mass: Scalar
     s: Terms  #: first moment, (3,) [kg m]
     P: Terms  #: second moment, integral of c cᵀ over mass, (3, 3) [kg m²]
+    modes: Modes | None = None  #: of a flexible body; mass, s, P are those of its undeformed shape
+    above: ElasticMarker | None = None  #: that carries the joint on a flexible parent, where it moves in that
+    own: ElasticMarker | None = None  #: of a flexible body at its joint, where it moves in the body
 
     @property
     def has_moments(self) -> bool:
         """Whether it carries anything: a body, or what was counted to a node without one."""
         return not all(value.is_constant(0.0) for value in (self.mass, *self.s, *self.P.ravel()))
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A frame on a body."""
+
+    name: str
+    node: int
+    marker: ElasticMarker | None  #: that carries it where it moves with modes
+    axes: Terms  #: in those of the node, or of the marker, (3, 3)
+    origin: Terms  #: (3,) [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +82,8 @@ class TreeTerms:
     parameters: tuple[Scalar, ...]  #: symbols in the place of numbers
     parameter_names: tuple[str, ...]
     parameter_values: tuple[float, ...]
-    frames: tuple[tuple[int, Terms, Terms], ...]  #: of each body: its node, and its frame in that, axes and origin
-
-
-def terms(graph: Graph, numbers: Any) -> Terms:
-    """Return an array of terms of numbers and terms."""
-    out: Terms = np.array(numbers, dtype=object)
-    for place, value in np.ndenumerate(out):
-        out[place] = graph.scalar(value)
-    return out
+    frames: tuple["Frame", ...]  #: of the files of all bodies
+    interfaces: tuple["Frame", ...]  #: of all flexible bodies
 
 
 def whole(R: Array) -> Array:
@@ -120,29 +132,19 @@ def second_moment(J: Any) -> Any:
 
 
 def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerms:
-    """Return a tree of rigid bodies as terms, parameters of some names as symbols.
+    """Return a tree of bodies as terms, parameters of some names as symbols.
 
     Raises
     ------
     ModelError
-        If a body is flexible, or a pattern of `parameters` matches nothing.
+        If a pattern of `parameters` matches nothing.
     """
     graph, nodes = Graph(), expansion.nodes
-    for each in expansion.system.bodies:
-        if not isinstance(each, RigidBody):
-            raise ModelError(
-                f"generate: body {each.name!r}: expected rigid bodies, got a flexible one; freeze its modes "
-                "(frozen_bodies), or take relative_model"
-            )
     values = parameter_names(expansion)
     names = chosen(parameters, values)
     symbols = {name: graph.symbol(f"parameters[{k}]") for k, name in enumerate(names)}
     length = float(np.abs(nodes.r).max(initial=0.0))
     links = tuple(link_of(graph, expansion, k, symbols, values, length) for k in range(len(nodes.parent)))
-    frames = []
-    for i, k in enumerate(expansion.node_of):
-        F, origin = frame_in_body(expansion, i, length)
-        frames.append((k, terms(graph, F.T), terms(graph, without_rounding(-F.T @ origin, length))))
     return TreeTerms(
         graph=graph,
         links=links,
@@ -153,8 +155,42 @@ def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerm
         parameters=tuple(symbols.values()),
         parameter_names=names,
         parameter_values=tuple(values[name] for name in names),
-        frames=tuple(frames),
+        frames=tuple(body_frame(graph, expansion, i, length) for i in range(len(expansion.node_of))),
+        interfaces=tuple(interface_frames(graph, expansion, length)),
     )
+
+
+def body_frame(graph: Graph, expansion: Expansion, i: int, length: float) -> Frame:
+    """Return the frame of the file of body i; the engine may move the body in mean axes."""
+    name, node, mean = expansion.system.bodies[i].name, expansion.node_of[i], expansion.compiled.mean_axes[i]
+    if mean is not None:
+        frame = moving_frame(graph, expansion, i, name, mean.frame, length)
+        return replace(frame, origin=frame.origin - frame.axes @ mean.point)
+    F, origin = frame_in_body(expansion, i, length)
+    return Frame(name, node, None, terms(graph, F.T), terms(graph, without_rounding(-F.T @ origin, length)))
+
+
+def interface_frames(graph: Graph, expansion: Expansion, length: float) -> list[Frame]:
+    """Return all interfaces of all flexible bodies."""
+    found = []
+    for i, body in enumerate(expansion.system.bodies):
+        if isinstance(body, FlexibleBody):
+            for interface in body.moved.interfaces:
+                shape = interface_shape(body.moved, interface.name, is_stiffened=body.is_stiffened)
+                name = f"{body.name}/{interface.name}"
+                found.append(moving_frame(graph, expansion, i, name, shape, length))
+    return found
+
+
+def moving_frame(
+    graph: Graph, expansion: Expansion, i: int, name: str, shape: MarkerShape, length: float
+) -> Frame:  # fmt: skip
+    """Return a frame that moves with the modes of body i."""
+    marker = elastic_marker(graph, expansion, i, shape, frame_in_body(expansion, i, length), length)
+    node, zero = expansion.node_of[i], terms(graph, np.zeros(3))
+    if marker.moves:
+        return Frame(name, node, marker, marker.axes, zero)
+    return Frame(name, node, None, marker.axes, marker.place)
 
 
 def frame_in_body(expansion: Expansion, i: int, length: float) -> tuple[Array, Array]:
@@ -169,7 +205,9 @@ def link_of(
     """Return node k as terms; symbols, values: of parameters by name, length: the largest of the tree."""
     nodes, body = expansion.nodes, int(expansion.nodes.body[k])
     mass, s, P = graph.zero, terms(graph, np.zeros(3)), terms(graph, np.zeros((3, 3)))
-    if body >= 0:
+    if body >= 0 and nodes.n_q[k]:
+        mass, s, P = undeformed_moments(graph, expansion, body, length)
+    elif body >= 0:
         own = [f"{expansion.system.bodies[body].name}/{each}" for each in INERTIAL]
         if any(name in symbols for name in own):
             phi = terms(graph, [symbols.get(name, values[name]) for name in own])
@@ -179,6 +217,7 @@ def link_of(
             mass, s = graph.constant(float(nodes.mass[k])), terms(graph, without_rounding(nodes.s[k], size))
             P = terms(graph, without_rounding(second_moment(J), float(np.abs(J).max())))
     return Link(
+        **elastic_parts(graph, expansion, k, length),
         parent=int(nodes.parent[k]),
         kind=int(nodes.kind[k]),
         is_near=bool(nodes.is_near[k]),
@@ -187,13 +226,48 @@ def link_of(
         n_z=int(nodes.n_z[k]),
         slide=graph.constant(float(whole(nodes.slide[k]))),
         turn=graph.constant(float(whole(nodes.turn[k]))),
-        A=terms(graph, whole(nodes.A[k])),
-        r=terms(graph, without_rounding(nodes.r[k], length)),
         body=body,
         mass=mass,
         s=s,
         P=P,
     )
+
+
+def undeformed_moments(graph: Graph, expansion: Expansion, i: int, length: float) -> tuple[Scalar, Terms, Terms]:
+    """Return mass, first and second moment of the flexible body i, undeformed, in the frame of its node."""
+    types, t = expansion.compiled.model.body_types, int(expansion.compiled.model.bodies.kind[i])
+    F, c = frame_in_body(expansion, i, length)
+    m, S, P = float(types.mass[t]), types.S[t], second_moment(types.J0[t])
+    s = S - m * c
+    P = F.T @ (P - np.outer(S, c) - np.outer(c, s)) @ F
+    size = max(float(np.abs(S).max()), m * length)
+    return (
+        graph.constant(m), terms(graph, without_rounding(F.T @ s, size)),
+        terms(graph, without_rounding(0.5 * (P + P.T), float(np.abs(P).max()))),
+    )  # fmt: skip
+
+
+def elastic_parts(graph: Graph, expansion: Expansion, k: int, length: float) -> dict[str, Any]:
+    """Return modes and moving markers of node k, and the inner frame of its joint in the frame of its parent."""
+    nodes, compiled = expansion.nodes, expansion.compiled
+    A, r = nodes.A[k], nodes.r[k]
+    parts: dict[str, Any] = {}
+
+    def marker(i: int, m: int) -> ElasticMarker | None:
+        frame = frame_in_body(expansion, i, length)
+        made = elastic_marker(graph, expansion, i, marker_shape(compiled, m), frame, length)
+        return made if made.moves else None
+
+    if nodes.n_q[k]:
+        i = int(nodes.body[k])
+        parts["modes"] = modes_of(graph, expansion, i, frame_in_body(expansion, i, length))
+        parts["own"] = marker(i, int(nodes.own[k])) if nodes.own[k] >= 0 else None
+    if nodes.above[k] >= 0:
+        i = int(nodes.body[nodes.parent[k]])
+        F, origin = frame_in_body(expansion, i, length)
+        A, r = F.T @ A, F.T @ (r - origin)
+        parts["above"] = marker(i, int(nodes.above[k]))
+    return parts | {"A": terms(graph, whole(A)), "r": terms(graph, without_rounding(r, length))}
 
 
 def symbols_of(graph: Graph, name: str, n: int) -> Terms:

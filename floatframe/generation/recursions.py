@@ -1,4 +1,4 @@
-"""The recursions of a tree of rigid bodies over terms: every sum and product is simplified as it is written.
+"""The recursions of a tree over terms: every sum and product is simplified as it is written.
 
 Frames as in docs/recursive.md: A, r the inner frame of a joint in the parent, E, d its outer frame in the inner one.
 A vector goes through both one after the other, since A mostly only exchanges axes.
@@ -15,16 +15,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from floatframe.generation.graph import Graph, Scalar, Terms
-from floatframe.generation.links import Link, TreeTerms, terms
+from floatframe.generation.elastic import MarkerPlace, MarkerRates, ModalForces, ModalMoments, cross
+from floatframe.generation.graph import Graph, Scalar, Terms, terms
+from floatframe.generation.links import Link, TreeTerms
 from floatframe.relative.recursion.nodes import ROTATION, SCREW, TRANSLATION
 
-__all__ = ["Joint", "cross", "forward_dynamics", "inverse_dynamics", "joints_of", "mass_matrix", "solved"]
-
-
-def cross(a: Terms, b: Terms) -> Terms:
-    """Return a × b of terms."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], dtype=object)
+__all__ = ["Joint", "forward_dynamics", "inverse_dynamics", "joints_of", "mass_matrix", "solved"]
 
 
 class Joint:
@@ -46,6 +42,13 @@ class Joint:
         elif link.kind == TRANSLATION:
             self.d = link.slide * x[:3]
         self.columns = joint_columns(graph, link, self.E)
+        #: where the markers at the joint stand in the parent and in the body, moments of that as it is deformed
+        self.above = None if link.above is None else MarkerPlace(graph, link.above, tree.x)
+        self.own = None if link.own is None else MarkerPlace(graph, link.own, tree.x)
+        self.moments = None if link.modes is None else ModalMoments.of(graph, link.modes, tree.x)
+        self.s, self.P = link.s, link.P
+        if self.moments is not None:
+            self.s, self.P = link.s + self.moments.s, link.P + self.moments.second
 
 
 def rotation_of(graph: Graph, p: Terms) -> Terms:
@@ -122,32 +125,79 @@ def inverse_dynamics(tree: TreeTerms, v: Terms, a: Terms, joints: Sequence[Joint
     base = (zero, zero, -tree.gravity, spin_terms(zero, zero))
     motions: list[tuple] = []
     f, t = [zero] * n, [zero] * n
+    force = np.full(len(v), tree.graph.zero, dtype=object)
     for k, (link, joint) in enumerate(zip(tree.links, joints, strict=True)):
-        omega, alpha, acc, U = base if link.parent < 0 else motions[link.parent]
-        A = link.A.T
-        inner = (A @ omega, A @ alpha, A @ (acc + U @ link.r))
-        omega, alpha, acc = motion_through(link, joint, v, a, *inner)
+        motion = inner_motion(link, joint, v, a, base if link.parent < 0 else motions[link.parent])
+        motion = motion_through(link, joint, v, a, *motion)
+        if joint.own is not None:
+            motion = motion_of_body(joint.own, MarkerRates(joint.own, v, a), *motion)
+        omega, alpha, acc = motion
         U = spin_terms(omega, alpha)
         motions.append((omega, alpha, acc, U))
-        if link.has_moments:
-            f[k] = link.mass * acc + U @ link.s
-            t[k] = cross(link.s, acc) + axial_of_product(U, link.P)
-    force = np.full(len(v), tree.graph.zero, dtype=object)
+        if link.has_moments or link.modes is not None:
+            f[k] = link.mass * acc + U @ joint.s
+            t[k] = cross(joint.s, acc) + axial_of_product(U, joint.P)
+        if link.modes is not None and joint.moments is not None:
+            forces = ModalForces(link.modes, joint.moments, tree.x, v, a)
+            f_q, t_q = forces.wrench(omega)
+            f[k], t[k] = f[k] + f_q, t[k] + t_q
+            force[link.modes.rates] = forces.modal(acc, omega, alpha, U)
     for k in range(n - 1, -1, -1):
         link, joint = tree.links[k], joints[k]
-        for j in range(link.n_z):
-            force[link.v0 + j] = joint.columns[j, :3] @ f[k] + joint.columns[j, 3:] @ t[k]
+        f_Q, t_Q = along_joint(link, joint, f[k], t[k], force)
         if link.parent >= 0:
-            f_P, t_P = to_parent(link, joint, f[k], t[k])
+            f_P, t_P = to_parent(link, joint, f_Q, t_Q, force)
             f[link.parent], t[link.parent] = f[link.parent] + f_P, t[link.parent] + t_P
     return force
 
 
-def to_parent(link: Link, joint: Joint, f: Terms, t: Terms) -> tuple[Terms, Terms]:
-    """Return a wrench of the frame of a node in that of its parent."""
+def inner_motion(link: Link, joint: Joint, v: Terms, a: Terms, above: tuple) -> tuple[Terms, Terms, Terms]:
+    """Return omega, alpha, a of the inner frame of a joint from those of the parent, and its U."""
+    (omega, alpha, acc, U), A = above, link.A.T
+    if joint.above is None:
+        return A @ omega, A @ alpha, A @ (acc + U @ link.r)
+    place, rates = joint.above, MarkerRates(joint.above, v, a)
+    acc = acc + U @ place.rho + 2.0 * cross(omega, rates.d_dot) + rates.d_ddot
+    alpha = alpha + cross(omega, rates.nu) + rates.nu_dot
+    E = place.E.T
+    return A @ (E @ (omega + rates.nu)), A @ (E @ alpha), A @ (E @ acc)
+
+
+def motion_of_body(
+    place: MarkerPlace, rates: MarkerRates, omega: Terms, alpha: Terms, acc: Terms
+) -> tuple[Terms, Terms, Terms]:
+    """Return omega, alpha, a of a flexible body from those of its marker at the joint, axes of that."""
+    omega, alpha, acc = place.E @ omega - rates.nu, place.E @ alpha - rates.nu_dot, place.E @ acc
+    alpha = alpha - cross(omega, rates.nu)
+    acc = acc - (spin_terms(omega, alpha) @ place.d + 2.0 * cross(omega, rates.d_dot) + rates.d_ddot)
+    return omega, alpha, acc
+
+
+def along_joint(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> tuple[Terms, Terms]:
+    """Write what a wrench of the frame of a node does along the rates of its joint; return it in the outer frame.
+
+    It does work on the modes of the body too, by the marker at the joint.
+    """
+    if joint.own is not None:
+        own = joint.own
+        t = t - cross(own.d, f)
+        force[own.rates] = force[own.rates] - own.modal_forces(f, t)
+        f, t = own.E.T @ f, own.E.T @ t
+    for j in range(link.n_z):
+        force[link.v0 + j] = joint.columns[j, :3] @ f + joint.columns[j, 3:] @ t
+    return f, t
+
+
+def to_parent(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> tuple[Terms, Terms]:
+    """Return a wrench of the outer frame of a joint in the parent, and add its work on the modes of that."""
     f, t = joint.E @ f, joint.E @ t
     f, t = link.A @ f, link.A @ (t + cross(joint.d, f))
-    return f, t + cross(link.r, f)
+    if joint.above is None:
+        return f, t + cross(link.r, f)
+    above = joint.above
+    f, t = above.E @ f, above.E @ t
+    force[above.rates] = force[above.rates] + above.modal_forces(f, t)
+    return f, t + cross(above.rho, f)
 
 
 def turned_moment(R: Terms, P: Terms) -> Terms:
@@ -173,41 +223,112 @@ def shifted_moments(m: Scalar, s: Terms, P: Terms, r: Terms) -> tuple[Terms, Ter
 def mass_matrix(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
     """Return the mass matrix, (n, n), by composite bodies (docs/recursive.md §3), in the frames of the nodes.
 
-    (1) m, s, P of each subtree
+    (1) m, s, P of each subtree; of a flexible body the wrenches by its modes and their block, with all it carries
     (2) the wrench of each rate, f = m v + w × s, t = s × v + (tr P) w - P w, along the rates of its node
     (3) the same along the rates of all nodes above
     """
     links, n = tree.links, len(tree.v)
-    m, s, P = ([getattr(link, name) for link in links] for name in ("mass", "s", "P"))
+    bodies = [Composite(link, joint) for link, joint in zip(links, joints, strict=True)]
     M = np.full((n, n), tree.graph.zero, dtype=object)
     for k in range(len(links) - 1, -1, -1):
-        link, joint = links[k], joints[k]
-        trace = P[k][0, 0] + P[k][1, 1] + P[k][2, 2]
-        for j in range(link.n_z):
-            v, w = joint.columns[j, :3], joint.columns[j, 3:]
-            f = m[k] * v + cross(w, s[k])
-            t = cross(s[k], v) + trace * w - P[k] @ w
-            row, at = link.v0 + j, k
+        link, joint, body = links[k], joints[k], bodies[k]
+        rows = [(link.v0 + j, body.wrench(*motion_of_rate(joint, j))) for j in range(link.n_z)]
+        held = range(0)
+        if link.modes is not None:
+            held = range(link.modes.v0, link.modes.v0 + link.modes.n)
+            M[link.modes.rates, link.modes.rates], wrenches = body.modal_block(joint)
+            rows += zip(held, wrenches, strict=True)
+        for row, (f, t) in rows:
+            force, at = np.full(n, tree.graph.zero, dtype=object), k
             while at >= 0:
-                above = links[at]
-                for i in range(above.n_z):
-                    column = above.v0 + i
-                    if at != k or i >= j:
-                        S = joints[at].columns[i]
-                        M[row, column] = M[column, row] = S[:3] @ f + S[3:] @ t
-                f, t = to_parent(above, joints[at], f, t)
-                at = above.parent
+                f, t = along_joint(links[at], joints[at], f, t, force)
+                if links[at].parent >= 0:
+                    f, t = to_parent(links[at], joints[at], f, t, force)
+                at = links[at].parent
+            for column in range(n):
+                if column not in held and M[row, column].is_constant(0.0):
+                    M[row, column] = M[column, row] = force[column]
         if link.parent >= 0:
-            s_in, P_in = shifted_moments(m[k], joint.E @ s[k], turned_moment(joint.E, P[k]), joint.d)
-            s_P, P_P = shifted_moments(m[k], link.A @ s_in, turned_moment(link.A, P_in), link.r)
-            up = link.parent
-            m[up], s[up], P[up] = m[up] + m[k], s[up] + s_P, P[up] + P_P
+            bodies[link.parent].carry(link, joint, body)
     return M
+
+
+def motion_of_rate(joint: Joint, j: int) -> tuple[Terms, Terms]:
+    """Return translation and rotation of the frame of a node by rate j of its joint."""
+    v, w = joint.columns[j, :3], joint.columns[j, 3:]
+    if joint.own is None:
+        return v, w
+    w = joint.own.E @ w
+    return joint.own.E @ v - cross(w, joint.own.d), w
+
+
+class Composite:
+    """Mass, first and second moment of a subtree in the frame of its node; of a flexible body those of its modes."""
+
+    def __init__(self, link: Link, joint: Joint) -> None:
+        self.m, self.s, self.P = link.mass, joint.s, joint.P
+        if link.modes is not None and joint.moments is not None:
+            self.H = link.modes.M  #: by modes, the frame held, (n, n)
+            self.f, self.t = joint.moments.first, joint.moments.B  #: wrench by each, (n, 3)
+
+    def wrench(self, v: Terms, w: Terms) -> tuple[Terms, Terms]:
+        """Return the wrench of an acceleration."""
+        P = self.P
+        t = cross(self.s, v) + (P[0, 0] + P[1, 1] + P[2, 2]) * w - P @ w
+        return self.m * v + cross(w, self.s), t
+
+    def modal_block(self, joint: Joint) -> tuple[Terms, list[tuple[Terms, Terms]]]:
+        """Return the block of the modes, the joint held, and the wrench of each of them."""
+        if joint.own is None:
+            return self.H, list(zip(self.f, self.t, strict=True))
+        shift, turn = joint.own.columns()
+        back = [(cross(w, joint.own.d) - v, -w) for v, w in zip(shift, turn, strict=True)]
+        wrenches = []
+        for (v, w), f, t in zip(back, self.f, self.t, strict=True):
+            f_own, t_own = self.wrench(v, w)
+            wrenches.append((f + f_own, t + t_own))
+        H = self.H.copy()
+        for i, (f, t) in enumerate(wrenches):
+            for j, (v, w) in enumerate(back[: i + 1]):
+                H[i, j] = H[j, i] = H[i, j] + v @ f + w @ t + back[i][0] @ self.f[j] + back[i][1] @ self.t[j]
+        return H, wrenches
+
+    def carry(self, link: Link, joint: Joint, body: "Composite") -> None:
+        """Add a subtree below."""
+        m, s, P = body.m, body.s, body.P
+        if joint.own is not None:
+            s, P = shifted_moments(m, s, P, -joint.own.d)
+            s, P = joint.own.E.T @ s, turned_moment(joint.own.E.T, P)
+        s, P = shifted_moments(m, joint.E @ s, turned_moment(joint.E, P), joint.d)
+        s, P, r = link.A @ s, turned_moment(link.A, P), link.r
+        if joint.above is not None:
+            s, P, r = joint.above.E @ s, turned_moment(joint.above.E, P), joint.above.rho
+            self.carry_on_modes(joint.above, m, s, P)
+        s, P = shifted_moments(m, s, P, r)
+        self.m, self.s, self.P = self.m + m, self.s + s, self.P + P
+
+    def carry_on_modes(self, place: MarkerPlace, m: Scalar, s: Terms, P: Terms) -> None:
+        """Add to the modes what a subtree at a marker says, moments about that."""
+        columns = list(zip(*place.columns(), strict=True))
+        trace = P[0, 0] + P[1, 1] + P[2, 2]
+        H, f_modes, t_modes = self.H.copy(), self.f.copy(), self.t.copy()
+        for i, (v, w) in enumerate(columns):
+            f, t = m * v + cross(w, s), cross(s, v) + trace * w - P @ w
+            f_modes[i], t_modes[i] = f_modes[i] + f, t_modes[i] + t + cross(place.rho, f)
+            for j, (v_j, w_j) in enumerate(columns[: i + 1]):
+                H[i, j] = H[j, i] = H[i, j] + v_j @ f + w_j @ t
+        self.H, self.f, self.t = H, f_modes, t_modes
+
+
+def rates_of(link: Link) -> list[int]:
+    """Return the rates of the joint of a node, then those of the modes of its body."""
+    modes = [] if link.modes is None else list(range(link.modes.v0, link.modes.v0 + link.modes.n))
+    return [*range(link.v0, link.v0 + link.n_z), *modes]
 
 
 def solved(tree: TreeTerms, M: Terms, right: Terms) -> Terms:
     """Return M⁻¹ right, (n,), by M = Lᵀ D L from the tips inwards, which fills nothing in."""
-    order = [link.v0 + j for link in tree.links for j in range(link.n_z)]
+    order = [rate for link in tree.links for rate in rates_of(link)]
     H, y, graph = M.copy(), right.copy(), tree.graph
     inverse: dict[int, Scalar] = {}
     L = np.full(M.shape, graph.zero, dtype=object)

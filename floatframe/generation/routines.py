@@ -1,21 +1,24 @@
 """What can be generated: inputs and outputs of a routine, and its outputs as terms."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from floatframe.generation.derivatives import jacobian, position_seeds, seeds_of
-from floatframe.generation.graph import Graph, Operations, Scalar, Terms, operations
+from floatframe.generation.elastic import MarkerPlace, MarkerRates, cross
+from floatframe.generation.graph import Graph, Operations, Scalar, Terms, operations, terms
 from floatframe.generation.grouping import carried_inwards
-from floatframe.generation.links import TreeTerms, symbols_of, terms
+from floatframe.generation.links import Frame, TreeTerms, symbols_of
+from floatframe.generation.modes import ElasticMarker
 from floatframe.generation.recursions import (
-    cross,
+    Joint,
     forward_dynamics,
     inverse_dynamics,
     joints_of,
     mass_matrix,
 )
+from floatframe.generation.rotation_series import expanded
 
 __all__ = ["ROUTINES", "Output", "Routine", "routine_of"]
 
@@ -97,33 +100,79 @@ def sensitivity(tree: TreeTerms) -> list[Output]:
     return [Output("by_parameters", by, "force by parameters, (rates, parameters)")]
 
 
-def kinematics(tree: TreeTerms) -> list[Output]:
-    """Return place, axes and velocity of the frames of all bodies, ground axes."""
+Motion = tuple[Terms, Terms, Terms, Terms]  #: r, R_GN, v, omega of a frame, ground axes
+
+
+def carried(graph: Graph, tree: TreeTerms, motion: Motion, marker: ElasticMarker) -> Motion:
+    """Return the motion of a marker on a flexible body from that of the body."""
+    (r, R, v, omega), place = motion, MarkerPlace(graph, marker, tree.x)
+    rates = MarkerRates(place, tree.v, np.full(len(tree.v), graph.zero, dtype=object))
+    p = R @ place.rho
+    return r + p, R @ place.E, v + cross(omega, p) + R @ rates.d_dot, omega + R @ rates.nu
+
+
+def taken_back(motion: Motion, place: MarkerPlace, rates: MarkerRates) -> Motion:
+    """Return the motion of a flexible body from that of its marker at the joint."""
+    r, R, v, omega = motion
+    R = R @ place.E.T
+    p, omega = R @ place.d, omega - R @ rates.nu
+    return r - p, R, v - cross(omega, p) - R @ rates.d_dot, omega
+
+
+def placed_nodes(tree: TreeTerms, joints: Sequence[Joint]) -> list[Motion]:
+    """Return the motion of the frames of all nodes."""
     graph, zero = tree.graph, terms(tree.graph, np.zeros(3))
-    placed: list[tuple[Terms, Terms, Terms, Terms]] = []
-    for link, joint in zip(tree.links, joints_of(tree), strict=True):
-        r, R, v, omega = (zero, terms(graph, np.eye(3)), zero, zero) if link.parent < 0 else placed[link.parent]
+    placed: list[Motion] = []
+    for link, joint in zip(tree.links, joints, strict=True):
+        motion = (zero, terms(graph, np.eye(3)), zero, zero) if link.parent < 0 else placed[link.parent]
+        place = link.r
+        if link.above is not None:
+            motion, place = carried(graph, tree, motion, link.above), zero
+        r, R, v, omega = motion
         R_in = R @ link.A
-        p = R @ link.r + R_in @ joint.d
+        p = R @ place + R_in @ joint.d
         R = R_in @ joint.E
         v = v + cross(omega, p)
         if link.n_z:
             rate = tree.v[link.v0 : link.v0 + link.n_z]
             v, omega = v + R @ (rate @ joint.columns[:, :3]), omega + R @ (rate @ joint.columns[:, 3:])
-        placed.append((r + p, R, v, omega))
-    results = []
-    for k, axes, origin in tree.frames:
-        r, R, v, omega = placed[k]
-        arm = R @ origin
-        results.append((r + arm, R @ axes, v + cross(omega, arm), omega))
+        motion = r + p, R, v, omega
+        if joint.own is not None:
+            rest = np.full(len(tree.v), graph.zero, dtype=object)
+            motion = taken_back(motion, joint.own, MarkerRates(joint.own, tree.v, rest))
+        placed.append(motion)
+    return placed
+
+
+def placed_frame(tree: TreeTerms, frame: Frame, placed: Sequence[Motion]) -> Motion:
+    """Return the motion of a frame on a body."""
+    motion = placed[frame.node]
+    if frame.marker is not None:
+        motion = carried(tree.graph, tree, motion, frame.marker)
+    r, R, v, omega = motion
+    arm = R @ frame.origin
+    return r + arm, R @ frame.axes, v + cross(omega, arm), omega
+
+
+def kinematics(tree: TreeTerms) -> list[Output]:
+    """Return place, axes and velocity of the frames of all bodies, ground axes."""
+    placed = placed_nodes(tree, joints_of(tree))
     meanings = {
         "position": "origins of the body frames, (bodies, 3) [m]",
         "axes": "R_GB of the bodies, (bodies, 3, 3)",
         "velocity": "of the origins, (bodies, 3) [m/s]",
         "angular_velocity": "ground axes, (bodies, 3) [rad/s]",
     }
-    columns = zip(*results, strict=True)
-    return [Output(name, np.stack(each), text) for (name, text), each in zip(meanings.items(), columns, strict=True)]
+    columns = zip(*(placed_frame(tree, frame, placed) for frame in tree.frames), strict=True)
+    outputs = [Output(name, np.stack(each), text) for (name, text), each in zip(meanings.items(), columns, strict=True)]
+    if tree.interfaces:
+        names = ", ".join(frame.name for frame in tree.interfaces)
+        columns = zip(*(placed_frame(tree, frame, placed) for frame in tree.interfaces), strict=True)
+        outputs += [
+            Output(f"interface_{name}", np.stack(each), f"the same of the interfaces {names}")
+            for name, each in zip(meanings, columns, strict=True)
+        ]
+    return outputs
 
 
 @dataclass(frozen=True)
@@ -155,14 +204,26 @@ INPUTS = {
 }
 
 
+def written_out(graph: Graph, outputs: Sequence[Output]) -> tuple[Output, ...]:
+    """Return outputs without functions of rotations that languages do not have."""
+    values = expanded(graph, [value for output in outputs for value in output.values.ravel()])
+    results, first = [], 0
+    for output in outputs:
+        part = np.array(values[first : first + output.values.size], dtype=object)
+        results.append(replace(output, values=part.reshape(output.values.shape)))
+        first += output.values.size
+    return tuple(results)
+
+
 def routine_of(tree: TreeTerms, what: str, name: str) -> Routine:
     """Return a routine by one of the names in `ROUTINES`."""
     kind = ROUTINES[what]
     if kind.is_force:
         tree = carried_inwards(tree)
     before = tuple(tree.graph.asked)
-    outputs = tuple(kind.make(tree))
+    made = kind.make(tree)
     asked = (tree.graph.asked[0] - before[0], tree.graph.asked[1] - before[1])
+    outputs = written_out(tree.graph, made)
     sizes = dict.fromkeys(INPUTS, len(tree.v)) | {"z": len(tree.x), "parameters": len(tree.parameters)}
     wanted = (*kind.inputs, *(("parameters",) if tree.parameters else ()))
     inputs = tuple((each, sizes[each], INPUTS[each]) for each in wanted)

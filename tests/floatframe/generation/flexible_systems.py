@@ -1,0 +1,77 @@
+"""Trees with flexible bodies for the tests of generated code, and motions in which these are bent a good deal."""
+
+import numpy as np
+
+import cms
+import floatframe as ff
+from cms.reduced_basis.frames import NodalFrame
+from floatframe.mechanisms import chain
+from floatframe.relative.recursion.expansion import marker_shape
+from tests.floatframe.relative.plain_kinematics import flexible_tree
+
+SLENDER = cms.BeamLine(1.0, 4.7, 1.26e8, 4.2e3, 9.5e3, 3.8e3, rho_Iy=1.6e-4, rho_Iz=3.5e-4)
+METRES = cms.unit_system("m-kg-s")
+
+
+def beam(*, is_clamped, n_axial=0, n_bending=2, n_torsion=0):
+    """Return a beam in mean axes with geometric stiffness, or clamped at its start without."""
+    return cms.beam_from_assumed_modes(
+        SLENDER, name="beam", units=METRES, n_axial=n_axial, n_bending=n_bending, n_torsion=n_torsion, n_shear=0,
+        stations={"start": 0.0, "end": 1.0}, frame=NodalFrame("start") if is_clamped else None,
+        geometric=not is_clamped, damping=cms.ModalDamping(0.02),
+    )  # fmt: skip
+
+
+def pendulum():
+    """Return a beam in space on a hinge, in mean axes, with geometric stiffness."""
+    return chain(1, rod=beam(is_clamped=False, n_axial=1, n_torsion=1))
+
+
+def two_link_arm():
+    """Return two beams clamped to their hinges, in the plane and out of it."""
+    return chain(2, rod=beam(is_clamped=True))
+
+
+def flexible_in_the_middle():
+    """Return a rigid link, a beam in mean axes between two interfaces, and a rigid tool; axes in space."""
+    rigid = ff.RigidBody("base link", 3.0, np.diag([0.2, 0.3, 0.25]), (0.1, 0.05, -0.02))
+    middle = ff.FlexibleBody("middle", beam(is_clamped=False), position=(0.9, 0.0, 0.1))
+    tool = ff.RigidBody("tool", 0.7, np.diag([0.02, 0.03, 0.01]), (0.05, 0.0, 0.1), position=(1.4, 0.0, 0.1))
+    at = ff.Marker("base link", position=(0.4, 0.0, 0.1))
+    joints = [
+        ff.RevoluteJoint("waist", ff.GROUND, ff.Marker("base link"), axis=(0, 0, 1)),
+        ff.RevoluteJoint("elbow", at, ff.Marker("middle", "start"), axis=(0, 1, 0)),
+        ff.UniversalJoint("wrist", ff.Marker("middle", "end"), ff.Marker("tool"), axis=(0, 1, 0), axis_b=(0, 0, 1)),
+    ]
+    return ff.System([rigid, middle, tool], joints, [ff.Gravity((0.3, -0.2, -9.81))], name="middle")
+
+
+SYSTEMS = {
+    "pendulum": pendulum,
+    "two-link arm": two_link_arm,
+    "flexible in the middle": flexible_in_the_middle,
+    "mixed tree": lambda: flexible_tree(n=2, seed=4, is_free=True),
+}
+
+
+def bent_motion(model, seed, angle=1.0):
+    """Return z, z_dot, z_ddot; the largest elastic rotation of a marker at a joint is nearly that angle [rad]."""
+    rng, n = np.random.default_rng(seed), model.n_rates
+    expansion = model.expansion
+    z = model.moved(model.positions()[0], rng.normal(size=n))
+    for xq in expansion.xq_of:
+        z[xq] = rng.normal(size=xq.stop - xq.start)
+    z_dot, z_ddot = rng.normal(size=(2, n))
+    markers = expansion.compiled.model.markers
+    shapes = [
+        (marker_shape(expansion.compiled, int(m)), z[expansion.xq_of[int(markers.body[m])]])
+        for m in np.flatnonzero(markers.psi0 >= 0)
+    ]
+    scale = 10.0
+    while max(np.linalg.norm(shape.deformation(scale * q)[3:]) for shape, q in shapes) > angle:
+        scale *= 0.9
+    for xq, vq in zip(expansion.xq_of, expansion.vq_of, strict=True):
+        z[xq] *= scale
+        z_dot[vq] *= scale
+        z_ddot[vq] *= scale
+    return z, z_dot, z_ddot
