@@ -23,6 +23,7 @@ class Lines:
     """A routine as text: named terms in their order, and its results, output by output, rows first."""
 
     named: tuple[tuple[str, str], ...]
+    turns: tuple[tuple[str, str, str], ...]  #: text of an angle, names of its sine and cosine, where both are needed
     results: tuple[tuple[str, ...], ...]
 
 
@@ -46,6 +47,7 @@ def lines_of(routine: Routine, *, symbol: Callable[[str], str]) -> Lines:
         term.args[0].index for term in order
         if term.kind == NEG and term.args[0].kind == SUB and used[term.args[0].index] == 1
     }  # fmt: skip
+    angles = Counter(term.args[0].index for term in order if term.kind in (SIN, COS))
     written: dict[int, tuple[str, int]] = {}
     named: list[tuple[str, str]] = []
 
@@ -76,12 +78,21 @@ def lines_of(routine: Routine, *, symbol: Callable[[str], str]) -> Lines:
             continue
         out, level = expression(term)
         is_free = term.kind in (CONSTANT, SYMBOL) or (term.kind == NEG and len(out) < 8)
-        if not is_free and (used[term.index] > 1 or len(out) > LONGEST):
+        is_turn = term.kind in (SIN, COS) and angles[term.args[0].index] == 2
+        if not is_free and (used[term.index] > 1 or len(out) > LONGEST or is_turn):
             name = f"t{len(named)}"
             named.append((name, out))
             out, level = name, ATOM
         written[term.index] = out, level
+    pairs: dict[int, list[Scalar]] = {}
+    for term in order:
+        if term.kind in (SIN, COS) and angles[term.args[0].index] == 2:
+            pairs.setdefault(term.args[0].index, []).append(term)
+    turns = []
+    for both in pairs.values():
+        sine, cosine = sorted(both, key=lambda term: term.kind)
+        turns.append((written[sine.args[0].index][0], written[sine.index][0], written[cosine.index][0]))
     results = tuple(
         tuple(written[value.index][0] for value in output.values.ravel()) for output in routine.outputs
     )  # fmt: skip
-    return Lines(tuple(named), results)
+    return Lines(tuple(named), tuple(turns), results)
