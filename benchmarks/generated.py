@@ -1,14 +1,19 @@
 """What generated code costs: `python -m benchmarks.generated` (a C compiler as `cc`; SymPy from the extra `test`).
 
-Operations of a robot of six axes with the geometry of a PUMA 560 and general links; processor time of an evaluation of
-the C code, compiled by `cc -O2`, beside the compiled general routine, each in a loop of its own; and the times of
-single calls of inverse dynamics by the clock, one after the other, among all else that the machine does.
+Two trees: a robot of six axes with the geometry of a PUMA 560 and general links, and the road car with rigid bodies,
+its mounts fixed, its rods left out and its loops cut where the relative formulation cuts them. Operations; processor
+time of an evaluation of the C code, compiled by `cc -O2` and by `cc -O2 -march=native`, beside the general routine,
+which is compiled for this processor, each in a loop of its own; single calls of inverse dynamics one after the other
+by the clock, among all else that the machine does. Operations of the robot beside those of SymPy's common
+subexpressions, and of a robot with the geometry of a Staubli RX 90 whose moments stay symbols, without gravity, beside
+those of the equations that OpenSYMORO printed for it.
 """
 
 import argparse
 import ctypes
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +21,12 @@ import numpy as np
 import floatframe as ff
 from benchmarks.recursive import compiled, moving, shortest
 from floatframe.generation.generate import GeneratedCode
+from floatframe.machines.road_car import RoadCar
+from floatframe.machines.road_car.systems import base, written
 from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
+from floatframe.relative.topology import tree_of
+from floatframe.system_file.read_system import read_system
+from tests.floatframe.generation.sympy_count import sympy_operations
 from tests.floatframe.identification.robots import six_axes
 
 TASKS = {"inverse": INVERSE, "mass": MASS, "forward": FORWARD, "jacobian": TANGENTS}
@@ -48,7 +58,28 @@ void clocked(long times, double *in, double *out, double *took)
 """
 
 
-def library(code: GeneratedCode, n_in: list[int], n_out: list[int], folder: Path) -> ctypes.CDLL:
+SWITCHES = (("-O2",), ("-O2", "-march=native"))
+RX_90 = {"angles": (0, 90, 0, -90, 90, -90), "along_x": (0, 0, 0.45, 0, 0, 0), "along_z": (0, 0, 0, 0.45, 0, 0)}
+
+
+def road_car() -> ff.System:
+    """Return the rigid tree of the road car: 20 bodies, 31 rates."""
+    tables = base(RoadCar(), "bars", is_rigid=True, has_wheels=True)
+    J = np.diag([450.0, 1500.0, 1650.0]).tolist()
+    tables["bodies"]["chassis"] = {"mass": 1100.0, "inertia": J, "center_of_mass": [0, 0, 0.5]}
+    joints = {name: each for name, each in tables["joints"].items() if each["type"] != "distance"}
+    for axle in ("front", "rear"):
+        ends = {"body_a": "chassis", "marker_a": [0, 0, 0], "body_b": f"subframe_{axle}", "marker_b": [0, 0, 0]}
+        joints[f"mount_{axle}"] = {"type": "fixed"} | ends
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "car.toml"
+        path.write_text(written("road car", {"bodies": tables["bodies"], "joints": joints}, {"t_end": 1.0, "h": 1e-3}))
+        system = read_system(path)[0]
+    cut = tree_of(system).cut
+    return replace(system, joints=[each for each in system.joints if each.name not in cut])
+
+
+def library(code: GeneratedCode, n_in: list[int], n_out: list[int], folder: Path, *switches: str) -> ctypes.CDLL:
     """Return the code compiled with loops around it; inputs and outputs one after the other."""
     starts = [
         [f"{name} + {sum(sizes[:k])}" for k in range(len(sizes))] for name, sizes in (("in", n_in), ("out", n_out))
@@ -56,9 +87,9 @@ def library(code: GeneratedCode, n_in: list[int], n_out: list[int], folder: Path
     text = LOOP % {"name": code.name, "arguments": ", ".join([*starts[0], *starts[1]])}
     path = code.write(folder)[0]
     (folder / f"{code.name}_loop.c").write_text(text)
-    made = folder / f"{code.name}.so"
+    made = folder / f"{code.name}{''.join(switches)}.so"
     sources = [str(path), str(folder / f"{code.name}_loop.c")]
-    subprocess.run(["cc", "-O2", "-Wall", "-Werror", "-shared", "-fPIC", *sources, "-o", str(made), "-lm"], check=True)
+    subprocess.run(["cc", *switches, "-Wall", "-Werror", "-shared", "-fPIC", *sources, "-o", str(made), "-lm"], check=True)
     return ctypes.CDLL(str(made))
 
 
@@ -67,36 +98,57 @@ def pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-def main() -> None:
-    """Print all tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--calls", type=int, default=1_000_000, help="of which quantiles are taken")
-    calls = parser.parse_args().calls
-    system = six_axes()
+def costs(system: ff.System, calls: int, folder: Path) -> None:
+    """Print operations and times of one system."""
     model = moving(ff.relative_model(system))
     n = model.n_rates
     z, v, a = model.work.x.copy(), model.work.v.copy(), model.work.a.copy()
     inputs = {"inverse": (z, v, a), "mass": (z,), "forward": (z, v, a), "jacobian": (z, v, a)}
     outputs = {"inverse": [n], "mass": [n * n], "forward": [n], "jacobian": [n * n] * 3}
-    print("            operations          general recursion    µs of a call         ratio")
-    print("            +        *          +        *           generated  compiled")
-    with tempfile.TemporaryDirectory() as name:
-        for what, task in TASKS.items():
-            code = ff.generate(system, what=what, name=f"robot_{what}")
-            given, out = np.concatenate(inputs[what]), np.zeros(sum(outputs[what]))
-            made = library(code, [len(each) for each in inputs[what]], outputs[what], Path(name))
-            ours = shortest(lambda times: made.loop(ctypes.c_long(times), pointer(given), pointer(out)))  # noqa: B023
-            general = compiled(model, task)
-            count = code.operations
-            print(
-                f"{what:11s} {count.additions:<8d} {count.multiplications:<10d} {code.general[0]:<8d} "
-                f"{code.general[1]:<11d} {ours:<10.3f} {general:<9.3f} {general / ours:.1f}"
-            )
-            if what == "inverse":
+    print("            operations          general recursion    µs of a call                     ratio")
+    print("            +        *          +        *           -O2      native   compiled       -O2   native")
+    for what, task in TASKS.items():
+        code = ff.generate(system, what=what, name=f"tree_{what}")
+        out = np.zeros(sum(outputs[what]))
+        sizes = [len(each) for each in inputs[what]], outputs[what]
+        times = []
+        for switches in SWITCHES:
+            made, given = library(code, *sizes, folder, *switches), np.concatenate(inputs[what])
+            times.append(shortest(lambda n: made.loop(ctypes.c_long(n), pointer(given), pointer(out))))  # noqa: B023
+            if what == "inverse" and switches == ("-O2",):
                 took = np.zeros(calls)
                 made.clocked(ctypes.c_long(calls), pointer(given), pointer(out), pointer(took))
-                quantiles = np.median(took), np.quantile(took, 0.999), took.max()
-        print(f"inverse, {calls} calls by the clock: median, 99.9 %, worst [ns]:", *(f"{q:.0f}" for q in quantiles))
+        general = compiled(model, task)
+        count = code.operations
+        print(
+            f"{what:11s} {count.additions:<8d} {count.multiplications:<10d} {code.general[0]:<8d} "
+            f"{code.general[1]:<11d} {times[0]:<8.3f} {times[1]:<8.3f} {general:<14.3f} {general / times[0]:<5.1f} "
+            f"{general / times[1]:.1f}"
+        )
+    quantiles = np.median(took), np.quantile(took, 0.999), took.max()
+    print(f"inverse, {calls} calls by the clock: median, 99.9 %, worst [ns]:", *(f"{q:.0f}" for q in quantiles))
+
+
+def beside_others() -> None:
+    """Print operations of inverse dynamics beside those of other programs."""
+    print("\noperations of inverse dynamics     ours: +    *      theirs: +    *")
+    ours, theirs = ff.generate(six_axes(), language="python", name="f"), sympy_operations(six_axes())
+    row = f"{ours.operations.additions:<4d} {ours.operations.multiplications:<12d} {theirs[0]:<4d} {theirs[1]}"
+    print(f"PUMA 560, SymPy's cse              {row}")
+    rx_90 = ff.generate(six_axes(**RX_90, gravity=(0, 0, 0)), parameters=["link*"]).operations
+    print(f"RX 90, moments symbols, OpenSYMORO {rx_90.additions:<4d} {rx_90.multiplications:<12d} {276:<4d} {325}")
+
+
+def main() -> None:
+    """Print all tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--calls", type=int, default=1_000_000, help="of which quantiles are taken")
+    calls = parser.parse_args().calls
+    for title, system in (("robot of six axes", six_axes()), ("road car, 20 bodies, 31 rates", road_car())):
+        print(f"\n{title}")
+        with tempfile.TemporaryDirectory() as folder:
+            costs(system, calls, Path(folder))
+    beside_others()
 
 
 if __name__ == "__main__":

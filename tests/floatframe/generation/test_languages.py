@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import floatframe as ff
+from tests.floatframe.generation.sympy_count import sympy_operations
 from tests.floatframe.generation.test_generate import SYSTEMS, Case, near, puma
 
 
@@ -50,23 +51,7 @@ def test_matlab_text_has_the_numbers_of_the_model(system):
 
 def test_no_more_operations_than_common_subexpressions_of_sympy():
     """Of the same recursion by SymPy's cse, which takes sums and products apart before it looks for common ones."""
-    sympy = pytest.importorskip("sympy")
-    code = ff.generate(puma(), language="python", name="f")
-    lines = code.files["f.py"].splitlines()
-    start = next(k for k, line in enumerate(lines) if line.startswith("    t0 = "))
-    end = next(k for k, line in enumerate(lines) if line.startswith("    return stacked(force"))
-    space = {name: sympy.symbols(f"{name}:6") for name in ("z", "z_dot", "z_ddot")}
-    space |= {"sin": sympy.sin, "cos": sympy.cos}
-    exec("\n".join(line[4:] for line in lines[start:end]), space)
-    named, results = sympy.cse(space["force"])
-    additions = multiplications = 0
-    for expression in (*(each for _, each in named), *results):
-        for node in sympy.preorder_traversal(expression):
-            if node.is_Add:
-                additions += len(node.args) - 1
-            elif node.is_Mul:
-                multiplications += len([each for each in node.args if each != -1]) - 1
-            elif node.is_Pow:
-                multiplications += abs(int(node.exp)) - 1
-    assert code.operations.additions <= additions
-    assert code.operations.multiplications <= multiplications
+    count = ff.generate(puma()).operations
+    additions, multiplications = sympy_operations(puma())
+    assert count.additions <= additions
+    assert count.multiplications <= multiplications
