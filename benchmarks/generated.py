@@ -89,7 +89,8 @@ def library(code: GeneratedCode, n_in: list[int], n_out: list[int], folder: Path
     (folder / f"{code.name}_loop.c").write_text(text)
     made = folder / f"{code.name}{''.join(switches)}.so"
     sources = [str(path), str(folder / f"{code.name}_loop.c")]
-    subprocess.run(["cc", *switches, "-Wall", "-Werror", "-shared", "-fPIC", *sources, "-o", str(made), "-lm"], check=True)
+    command = ["cc", *switches, "-Wall", "-Werror", "-shared", "-fPIC", *sources, "-o", str(made), "-lm"]
+    subprocess.run(command, check=True)
     return ctypes.CDLL(str(made))
 
 
