@@ -1,0 +1,163 @@
+"""A body with many interfaces from the mesh file to the modal file, by the command itself, against the bare solver.
+
+    python -m benchmarks.interface_rich                    # 40 rigid interfaces and one of 601 nodes, all variants
+    python -m benchmarks.interface_rich small              # 10 and one of 153 nodes
+    python -m benchmarks.interface_rich plain reduced      # some variants
+
+A steel block of hex20 cells. Its end x = 0 is an interface of kind "nodes", single faces of its top are rigid interfaces; Craig-
+Bampton with 20 fixed-interface modes. Variants: "plain" all constraint modes without stress and geometric stiffness, "stress" with
+stress, "whole" with both; "reduced" is "whole" with 20 characteristic modes of the nodes interface, "rigid" is "whole" without that
+interface. "bare": one PARDISO factorisation of K_II and one solve of as many columns as the body has boundary dofs, nothing else
+counted. Every run is a process of its own, so processor time (user + system) and peak of memory are its own; the ratio is of
+processor times.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+OUT = Path(__file__).parent / "out"
+SIZES = {  # cells along x, y, z and where single top faces are interfaces: numbers of cells along x and y
+    "full": ((22, 13, 14), range(2, 22, 2), (1, 4, 7, 10)),
+    "small": ((12, 6, 7), range(2, 12, 2), (1, 4)),
+}
+CELL = 0.02  #: edge of a cell [m]
+ALL = ""  #: all constraint modes of the nodes interface
+FEW = "interface_modes = 20\n"
+VARIANTS = {  # further lines of [reduction], and whether there is the nodes interface
+    "plain": (ALL + "stress = false\ngeometric_stiffness = false\n", True),
+    "stress": (ALL + "geometric_stiffness = false\n", True),
+    "whole": (ALL + "geometric_stiffness = true\n", True),
+    "reduced plain": (FEW + "stress = false\ngeometric_stiffness = false\n", True),
+    "reduced": (FEW + "geometric_stiffness = true\n", True),
+    "rigid": (ALL + "geometric_stiffness = true\n", False),
+}
+
+
+def mesh_file(size):
+    """Write the block once, as VTK."""
+    import meshio
+
+    from tests.bodies import box_mesh
+
+    path = OUT / f"interface_rich_{size}.vtu"
+    if not path.is_file():
+        OUT.mkdir(exist_ok=True)
+        n = SIZES[size][0]
+        mesh = box_mesh(*n, *(CELL * k for k in n), kind="hexahedron20")
+        cells = {kind: np.asarray(rows) for kind, rows in mesh.cells.items()}
+        meshio.Mesh(np.asarray(mesh.nodes), cells).write(path)
+    return path
+
+
+def job_file(size, variant, folder):
+    """Write the job of a variant."""
+    (nx, ny, nz), along, across = SIZES[size]
+    lines, has_nodes = VARIANTS[variant]
+    text = (
+        f'[body]\nname = "block"\nunits = "m-kg-s"\nmesh = "{mesh_file(size).resolve()}"\n'
+        "[materials.steel]\nyoung = 2.1e11\npoisson = 0.3\ndensity = 7850.0\n"
+    )
+    if has_nodes:
+        hi = [0.0, CELL * ny, CELL * nz]
+        text += f'[interfaces.end]\nkind = "nodes"\nbox = {{lo = [0.0, 0.0, 0.0], hi = {hi}}}\n'
+    for i in along:
+        for j in across:
+            lo, hi = [CELL * i, CELL * j, CELL * nz], [CELL * (i + 1), CELL * (j + 1), CELL * nz]
+            text += f'[interfaces.top_{i}_{j}]\nkind = "rigid"\nbox = {{lo = {lo}, hi = {hi}}}\n'
+    path = Path(folder) / "job.toml"
+    path.write_text(text + f'[reduction]\nset = "craig-bampton"\nn_modes = 20\n{lines}')
+    return path
+
+
+def command(size, variant):
+    """Run `cms reduce` on a variant; returns seconds, processor seconds, peak in GB, size of the file in MB, stages."""
+    with tempfile.TemporaryDirectory(dir=OUT) as folder:
+        job, modal = job_file(size, variant, folder), Path(folder) / "job.h5"
+        made = measured(["-m", "cms.cli", "reduce", str(job), "-o", str(modal)])
+        if made["code"]:
+            print(made["output"][-2000:])
+        made["MB"] = modal.stat().st_size / 1e6 if modal.is_file() else 0.0
+    lines = made["output"].splitlines()
+    begin = next((k for k, line in enumerate(lines) if line.strip() == "Time"), len(lines))
+    words = [line.split() for line in lines[begin + 3 :]]
+    made["stages"] = {" ".join(each[:-1]): each[-1] for each in words if len(each) > 1 and each[-1][:1].isdigit()}
+    return made
+
+
+def measured(arguments):
+    """Run Python in a process of its own; what it took and printed."""
+    start = time.perf_counter()
+    with tempfile.TemporaryFile("w+") as output:
+        child = subprocess.Popen([sys.executable, *arguments], stdout=output, stderr=subprocess.STDOUT)
+        _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        output.seek(0)
+        text = output.read()
+    return {
+        "s": time.perf_counter() - start,
+        "cpu": usage.ru_utime + usage.ru_stime,
+        "GB": usage.ru_maxrss / 1e6,
+        "output": text,
+        "code": child.returncode,
+    }
+
+
+def bare(size):
+    """One factorisation of K_II, one solve of as many columns as there are boundary dofs, in blocks of 60."""
+    from cms.jobs.body_of_job import job_body
+    from cms.jobs.job import read_job
+    from cms.solvers.factorization import lower_triangle
+    from cms.solvers.pardiso import PardisoFactor
+    from fe_models.body.submatrix import principal_block
+    from fe_models.foundation.stages import Stages
+
+    with tempfile.TemporaryDirectory(dir=OUT) as folder:
+        body = job_body(read_job(job_file(size, "plain", folder)), Stages())
+    lower = lower_triangle(principal_block(body.K, body.i))
+    columns = np.asfortranarray(np.random.default_rng(0).standard_normal((lower.shape[0], 60)))
+    start = time.process_time()
+    factor = PardisoFactor(lower, definite=True)
+    factored = time.process_time()
+    for _ in range(-(-len(body.b) // 60)):
+        factor.solve(columns)
+    solved = time.process_time()
+    return {
+        "cpu": solved - start, "factor": factored - start, "solve": solved - factored, "n_dof": body.n_dof,
+        "n_b": len(body.b),
+    }  # fmt: skip
+
+
+def main():
+    size = "small" if "small" in sys.argv else "full"
+    chosen = [name for name in VARIANTS if name in sys.argv[1:]] or list(VARIANTS)
+    mesh_file(size)
+    made = measured(["-m", "benchmarks.interface_rich", "bare", size])
+    if made["code"]:
+        sys.exit(made["output"])
+    solver = json.loads(made["output"].partition("RECORD ")[2])
+    print(
+        f"{solver['n_dof']} dofs, {solver['n_b']} of them on interfaces; bare: cpu {solver['cpu']:.1f} s (factor "
+        f"{solver['factor']:.1f}, {solver['n_b']} columns {solver['solve']:.1f})",
+        flush=True,
+    )
+    for name in chosen:
+        made = command(size, name)
+        print(
+            f"{name:14} {made['s']:6.1f} s, cpu {made['cpu']:6.1f} s, ratio {made['cpu'] / solver['cpu']:5.2f}, peak "
+            f"{made['GB']:5.2f} GB, file {made['MB']:7.1f} MB{'' if made['code'] == 0 else ' FAILED'}"
+        )
+        print("  ", ", ".join(f"{stage} {s}" for stage, s in made["stages"].items()), flush=True)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["bare"]:
+        print("RECORD " + json.dumps(bare(sys.argv[2])))
+    else:
+        main()
