@@ -9,12 +9,11 @@ from cms.errors import BodyError, ModeSetError
 from cms.families.fixed_interface import moving_nodes
 from cms.mode_set import ModeSet
 from cms.reduced_basis.frames import FrameCondition
-from cms.reduced_basis.independent import Columns, gram, independent_columns
+from cms.reduced_basis.independent import Basis, Products, gram_in_blocks, independent_basis, orthonormal_basis
 from cms.reduced_basis.rigid_content import elastic_directions, orthonormal_motions
 from cms.reduced_body.source_columns import SourceColumns, source_columns
 from cms.solvers.orientation import orientation
-from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combine
+from cms.solvers.tall import combined, inner, subtract
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array
 
@@ -23,6 +22,7 @@ __all__ = ["FinishedBasis", "finish"]
 MASSLESS = 1e-12  #: modal mass times omega_1² of a shape of unit W-length, below which it is static
 ZERO_ENERGY = 1e3  #: strain energy of a shape in units of the rounding of its terms, below which it costs none
 INDEPENDENT = 1e-14  #: least eigenvalue of a pencil's norm, scaled to a unit diagonal
+TRUSTED_ROUNDING = 1e-11  #: in PhiᵀMPhi, below which shapes are formed of the columns of the set themselves
 ORTHONORMAL_DEFECT = 1e-9  #: largest defect of Phi.T M Phi - 1 that is accepted
 
 
@@ -55,77 +55,127 @@ def finish(body: FEBody, modes: ModeSet, condition: FrameCondition) -> FinishedB
         If a shape other than a rigid-body motion costs no energy: the body is a mechanism.
     """
     where = f"mode set {modes.name!r} of body {body.name!r}"
-    V = modes.columns
-    columns = Columns(V, SymmetricProduct(body.K) @ V, SymmetricProduct(body.M) @ V, np.eye(V.shape[1]))
-    K_V = gram(V, columns.KX)
-    omega2_1 = first_elastic(where, columns, condition)
-    Q, redundant = independent_columns(columns, body, omega2_1)  # (1)
-    del columns
-    G_K = gram(Q.X, Q.KX)
-
-    C = condition.rigid_part(Q.X)  # (2)
-    Q_frame = Q.X - condition.Psi_R @ C
-    G_M = gram(Q_frame, Q.MX - condition.M_Psi_R @ C)
-
-    elastic = elastic_part(body, Q, condition, omega2_1)  # (3)
-    if elastic.shape[1] == 0:
-        raise ModeSetError(f"{where}: its {V.shape[1]} columns hold only rigid-body motion; add modes or interfaces")
-    free_omega2 = free_elastic(Q, G_K, elastic, condition, omega2_1)
+    V, products = modes.columns, Products.of_body(body)
+    V_K, V_M = products.grams(V)
+    omega2_1 = first_elastic(where, V, V_K, V_M, condition)
+    Q, redundant = independent_basis(V, V_K, V_M, products, body, omega2_1)  # (1)
     try:
-        Y, is_massive = elastic_eigenvectors(within(G_K, elastic), within(G_M, elastic), omega2_1)  # (4)
-    except np.linalg.LinAlgError as error:
-        raise ModeSetError(f"{where}: its columns are too ill-conditioned in this frame: {error}") from error
-    Z = elastic @ Y
-    omega2 = np.einsum("kq,kl,lq->q", Z, G_K, Z)
-    is_free = is_massive & (omega2 < ZERO_ENERGY * rounding_of_energy(body, Q_frame @ Z))
+        found = elastic_pencil(where, body, Q, products, condition, omega2_1)
+    except ModeSetError:
+        if Q.is_formed:
+            raise
+        found = None
+    if found is None or (not Q.is_formed and found.rounding > TRUSTED_ROUNDING):
+        Q = orthonormal_basis(Q.combine(np.eye(Q.Z.shape[1])), Q.T, products, omega2_1)
+        found = elastic_pencil(where, body, Q, products, condition, omega2_1)
+    X, Z, is_massive, omega2 = found.X, found.Z, found.is_massive, diagonal_within(Q.G_K, found.Z)
+    Phi = combined(X, Q.Z @ Z)
+    is_free = is_massive & (omega2 < ZERO_ENERGY * rounding_of_energy(body, Phi))
     if is_free.any():
-        moving = moving_nodes(body, np.arange(body.n_dof), Q_frame @ Z[:, is_free])
+        moving = moving_nodes(body, np.arange(body.n_dof), Phi[:, is_free])
         raise BodyError(
             f"body {body.name!r}: {int(is_free.sum())} motions besides the rigid ones cost no energy: a "
             f"mechanism, largest at {moving}; join the parts or add what holds them"
         )
-    defect = np.abs(Z.T @ G_M @ Z - np.diag(is_massive.astype(float))).max()
-    if defect > ORTHONORMAL_DEFECT:
+    if found.defect > ORTHONORMAL_DEFECT:
         raise ModeSetError(
-            f"{where}: shapes are M-orthonormal to {defect:.1e} only, expected {ORTHONORMAL_DEFECT:.0e}; "
+            f"{where}: shapes are M-orthonormal to {found.defect:.1e} only, expected {ORTHONORMAL_DEFECT:.0e}; "
             "its columns are too ill-conditioned"
         )
-    Phi = combine(Q_frame, Z)
     turn = orientation(Phi, omega2)
-    Z, Phi = Z @ turn, combine(Phi, turn)
-    A = Q.T @ Z
+    turn_in_place(Phi, turn)
+    A = Q.T @ (Z @ turn)
     return FinishedBasis(
         Phi=Phi,
         M=np.diag(is_massive.astype(float)),
         K=np.diag(omega2),
-        columns=source_columns(modes.labels, modes.groups, A, K_V @ A),
+        columns=source_columns(modes.labels, modes.groups, A, V_K @ A),
         dropped=tuple(modes.labels[k] for k in redundant),
-        n_rigid=elastic.shape[0] - elastic.shape[1],
-        free_omega2=free_omega2,
+        n_rigid=found.elastic.shape[0] - found.elastic.shape[1],
+        free_omega2=found.free_omega2,
     )
 
 
-def first_elastic(where: str, columns: Columns, condition: FrameCondition) -> float:
+@dataclass(frozen=True, eq=False)
+class ElasticPencil:
+    """Shapes of a basis seen from the frame, by small matrices: (2) to (4) of `finish`."""
+
+    X: Array  #: columns of the basis without their rigid part, (n_dof, l), those of a formed one; the shapes: X Q.Z Z
+    Z: Array  #: shapes in the basis, (k, n_q)
+    elastic: Array  #: directions of the basis without rigid-body motion, (k, n_q)
+    is_massive: np.ndarray  #: (n_q,) bool
+    free_omega2: Array  #: squared elastic frequencies of the unsupported reduced body, ascending
+    defect: float  #: largest entry of Zᵀ G_M Z - 1
+    rounding: float  #: estimate of what rounding of G_M makes of PhiᵀMPhi - 1
+
+
+def elastic_pencil(
+    where: str, body: FEBody, Q: Basis, products: Products, condition: FrameCondition, omega2_1: float
+) -> ElasticPencil:
+    """Return the shapes of a W-orthonormal basis.
+
+    Raises
+    ------
+    ModeSetError
+        If nothing elastic is left, or the columns are too ill-conditioned.
+    """
+    elastic = elastic_part(body, Q, condition, omega2_1)  # (3)
+    if elastic.shape[1] == 0:
+        raise ModeSetError(f"{where}: its columns hold only rigid-body motion; add modes or interfaces")
+    try:
+        free_omega2 = free_elastic(Q, elastic, condition, omega2_1)
+    except np.linalg.LinAlgError as error:
+        raise ModeSetError(f"{where}: its columns are too ill-conditioned: {error}") from error
+    X = Q.X if Q.is_formed else Q.X.copy()  # (2)
+    subtract(X, condition.Psi_R, condition.rigid_part(Q.X))
+    X_M = gram_in_blocks(X, products.M)
+    G_M = within(X_M, Q.Z)
+    try:
+        Y, is_massive = elastic_eigenvectors(within(Q.G_K, elastic), within(G_M, elastic), omega2_1)  # (4)
+    except np.linalg.LinAlgError as error:
+        raise ModeSetError(f"{where}: its columns are too ill-conditioned in this frame: {error}") from error
+    Z = elastic @ Y
+    defect = np.abs(Z.T @ G_M @ Z - np.diag(is_massive.astype(float))).max()
+    lengths = np.sqrt(np.maximum(np.diag(X_M), 0.0)) @ np.abs(Q.Z @ Z)
+    return ElasticPencil(
+        X, Z, elastic, is_massive, free_omega2, defect, float(np.finfo(float).eps * (lengths**2).max())
+    )
+
+
+def turn_in_place(Phi: Array, turn: Array) -> None:
+    """Make Phi turn of Phi; where the turn changes only the sign of a mode, no other is touched."""
+    is_mixed = np.count_nonzero(turn, axis=0) > 1
+    mixed = np.flatnonzero(is_mixed | (np.count_nonzero(turn, axis=1) > 1))
+    turned = Phi[:, mixed] @ turn[np.ix_(mixed, mixed)]
+    Phi *= np.diag(turn)
+    Phi[:, mixed] = turned
+
+
+def first_elastic(where: str, V: Array, G_K: Array, G_M: Array, condition: FrameCondition) -> float:
     """Estimate omega_1² of the free body: the least Rayleigh quotient of a column without its rigid part [1/s²].
 
     Each is an upper bound; the smallest is near enough to set the scale of a norm.
     """
-    rigid = condition.Psi_R.T @ columns.MX
-    mass = np.einsum("nk,nk->k", columns.X, columns.MX)
+    rigid = inner(condition.M_Psi_R, V)
+    stiffness, mass = np.diag(G_K), np.diag(G_M)
     elastic_mass = mass - np.einsum("rk,rk->k", rigid, np.linalg.solve(condition.Psi_R.T @ condition.M_Psi_R, rigid))
-    stiffness = np.einsum("nk,nk->k", columns.X, columns.KX)
     is_elastic = elastic_mass > 1e-9 * mass
     if not is_elastic.any():
         raise ModeSetError(f"{where}: its columns hold only rigid-body motion; add modes or interfaces")
     return float((stiffness[is_elastic] / elastic_mass[is_elastic]).min())
 
 
-def elastic_part(body: FEBody, Q: Columns, condition: FrameCondition, omega2_1: float) -> Array:
+def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: float) -> Array:
     """Return the directions of W-orthonormal columns that hold no rigid-body motion, (k, k - n_rigid)."""
     S = orthonormal_motions(condition.Psi_R.T @ condition.M_Psi_R, omega2_1)
-    C = omega2_1 * (Q.X.T @ (condition.M_Psi_R @ S))
-    E = condition.Psi_R @ S - combine(Q.X, C)
+    C = omega2_1 * Q.inner(condition.M_Psi_R @ S)
+    E = condition.Psi_R @ S - Q.combine(C)
     return elastic_directions(C, E.T @ (body.K @ E) + omega2_1 * (E.T @ (body.M @ E)))
+
+
+def diagonal_within(G: Array, Z: Array) -> Array:
+    """Return the diagonal of Zᵀ G Z, (k,)."""
+    return np.asarray(np.einsum("kq,kq->q", Z, G @ Z))
 
 
 def within(G: Array, directions: Array) -> Array:
@@ -179,17 +229,17 @@ def elastic_eigenvectors(G_K: Array, G_M: Array, omega2_1: float) -> tuple[Array
     return Z, is_massive
 
 
-def free_elastic(Q: Columns, G_K: Array, elastic: Array, condition: FrameCondition, omega2_1: float) -> Array:
+def free_elastic(Q: Basis, elastic: Array, condition: FrameCondition, omega2_1: float) -> Array:
     """Squared elastic frequencies of the reduced body without joints, ascending [1/s²]: its pencil in mean axes.
 
     The mean-axis mass QᵀMQ - Yᵀ (Psi_RᵀMPsi_R)⁻¹ Y, Y = Psi_RᵀMQ, from Gram matrices alone.
     """
-    Y = condition.M_Psi_R.T @ Q.X
+    Y = Q.inner(condition.M_Psi_R).T
     rigid_mass = condition.Psi_R.T @ condition.M_Psi_R
     scale = np.sqrt(np.diag(rigid_mass))
     if len(scale) and (not scale.all() or np.linalg.cond(rigid_mass / np.outer(scale, scale)) > 1e12):
         return np.zeros(0)  # a body without inertia about some axis has no mean axes
-    G_M = gram(Q.X, Q.MX) - Y.T @ np.linalg.solve(rigid_mass, Y)
-    A_K = within(G_K, elastic)
+    G_M = Q.G_M - Y.T @ np.linalg.solve(rigid_mass, Y)
+    A_K = within(Q.G_K, elastic)
     Z, is_massive = elastic_eigenvectors(A_K, within(G_M, elastic), omega2_1)
-    return np.sort(np.einsum("kq,kl,lq->q", Z, A_K, Z)[is_massive])
+    return np.sort(diagonal_within(A_K, Z)[is_massive])

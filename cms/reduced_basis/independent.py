@@ -2,6 +2,10 @@
 
 A Gram matrix squares the condition of the columns, so a column whose pivot is small in its Gram matrix is not judged
 there: its remainder is formed, measured, and judged itself. This is a pivoted QR in blocks.
+
+The columns of a body with many interfaces are the largest array there is. They are read where they lie: Gram matrices
+are formed from a few products K v and M v at a time, one half of each (`Products`), and a basis is kept as columns
+times a small matrix (`Basis`) until the shapes themselves are wanted.
 """
 
 from dataclasses import dataclass
@@ -10,15 +14,21 @@ import numpy as np
 import scipy.linalg as la
 from scipy.linalg.lapack import dpstrf
 
+from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine, inner
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 
-__all__ = ["Columns", "gram", "independent_columns"]
+__all__ = [
+    "Basis", "Columns", "Products", "gram", "gram_in_blocks", "independent_basis", "independent_columns",
+    "orthonormal_basis",
+]  # fmt: skip
 
 RANK_TOLERANCE = 1e-10  #: remainder of a unit column below which it is redundant (docs/theory.md §3)
 ROUNDING_MARGIN = 30.0  #: times the rounding noise of a column in the W-norm, where that is more
 TRUSTED_PIVOT = 1e-4  #: remainder above which a pivoted Cholesky of the Gram matrix decides by itself
+TRUSTED_CONDITION = 1e4  #: of the Gram matrix of unit columns, below which one Cholesky step of it is enough
+PRODUCT_BYTES = 128e6  #: of the products with K or M that are held at once
 
 
 @dataclass(eq=False)
@@ -32,9 +42,6 @@ class Columns:
 
     def __matmul__(self, Z: Array) -> "Columns":
         return Columns(combine(self.X, Z), combine(self.KX, Z), combine(self.MX, Z), self.T @ Z)
-
-    def __sub__(self, other: "Columns") -> "Columns":
-        return Columns(self.X - other.X, self.KX - other.KX, self.MX - other.MX, self.T - other.T)
 
     def __getitem__(self, index: IntArray) -> "Columns":
         return Columns(self.X[:, index], self.KX[:, index], self.MX[:, index], self.T[:, index])
@@ -54,13 +61,79 @@ def gram(X: Array, AX: Array) -> Array:
     return (G + G.T) / 2
 
 
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Products of displacement columns with the stiffness and the mass of a body, a few columns at a time."""
+
+    K: SymmetricProduct
+    M: SymmetricProduct
+
+    @classmethod
+    def of_body(cls, body: FEBody) -> "Products":
+        """Return those with the matrices of a body."""
+        return cls(SymmetricProduct(body.K), SymmetricProduct(body.M))
+
+    def grams(self, X: Array) -> tuple[Array, Array]:
+        """Return Xᵀ K X and Xᵀ M X, (k, k)."""
+        return gram_in_blocks(X, self.K), gram_in_blocks(X, self.M)
+
+    def beside(self, X: Array) -> Columns:
+        """Return columns with their products, (n_dof, k)."""
+        return Columns(X, self.K @ X, self.M @ X, np.eye(X.shape[1]))
+
+
+def gram_in_blocks(X: Array, A: SymmetricProduct) -> Array:
+    """Return Xᵀ A X, (k, k), of a symmetric A: one half of it, of blocks of A X that are not held together."""
+    n, k = X.shape
+    width = max(16, int(PRODUCT_BYTES / (8 * max(n, 1))))
+    G = np.zeros((k, k))
+    for first in range(0, k, width):
+        last = min(first + width, k)
+        G[:last, first:last] = inner(X[:, :last], A @ X[:, first:last])
+        G[first:last, :first] = G[:first, first:last].T
+        own = G[first:last, first:last]
+        G[first:last, first:last] = (own + own.T) / 2
+    return G
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """W-orthonormal columns Q = X Z of the span of a mode set."""
+
+    X: Array  #: (n_dof, l)
+    Z: Array  #: (l, k)
+    T: Array  #: coefficients of Q over the columns of the mode set, (n_columns, k)
+    G_K: Array  #: Qᵀ K Q, (k, k)
+    G_M: Array  #: Qᵀ M Q, (k, k)
+    is_formed: bool = True  #: False: X are the columns of the set themselves, which belong to others
+
+    def inner(self, F: Array) -> Array:
+        """Return Qᵀ F, (k, n)."""
+        return self.Z.T @ inner(self.X, F)
+
+    def combine(self, C: Array) -> Array:
+        """Return Q C, (n_dof, n)."""
+        return combine(self.X, self.Z @ C)
+
+    def with_columns(self, new: Columns) -> "Basis":
+        """Return the basis with W-orthonormal columns beside it that are W-orthogonal to it."""
+        sides = []
+        for G, product in ((self.G_K, new.KX), (self.G_M, new.MX)):
+            across, own = self.inner(product), inner(new.X, product)
+            sides.append(np.block([[G, across], [across.T, (own + own.T) / 2]]))
+        k, width = new.X.shape[1], self.X.shape[1]
+        Z = np.zeros((width + k, self.Z.shape[1] + k))
+        Z[:width, :-k], Z[width:, -k:] = self.Z, np.eye(k)
+        return Basis(np.hstack([self.X, new.X]), Z, np.hstack([self.T, new.T]), *sides)
+
+
 def independent_columns(columns: Columns, body: FEBody, omega2: float) -> tuple[Columns, IntArray]:
-    """W-orthonormal columns of the same span, and the indices of the redundant columns.
+    """W-orthonormal columns of the same span with their products, and the indices of the redundant columns.
 
     Parameters
     ----------
     columns
-        The columns of a mode set with their products, T the identity.
+        The columns of a mode set with their products.
     omega2
         omega_1² of W = K + omega_1² M [1/s²].
 
@@ -71,39 +144,101 @@ def independent_columns(columns: Columns, body: FEBody, omega2: float) -> tuple[
     redundant
         Indices of columns whose remainder against the others is below the tolerance, ascending.
     """
-    length = _length(columns, omega2)
+    G_K, G_M = gram(columns.X, columns.KX), gram(columns.X, columns.MX)
+    products = Products.of_body(body)
+    basis, redundant = independent_basis(columns.X, G_K, G_M, products, body, omega2)
+    Q = products.beside(basis.combine(np.eye(basis.Z.shape[1])))
+    Q.T = columns.T @ basis.T
+    return Q, redundant
+
+
+def independent_basis(
+    V: Array, G_K: Array, G_M: Array, products: Products, body: FEBody, omega2: float
+) -> tuple[Basis, IntArray]:
+    """W-orthonormal basis of the span of columns, W = K + omega_1² M, and the indices of the redundant columns.
+
+    (1) pivoted Cholesky of the Gram matrix of unit columns: those whose remainder it can judge are taken
+    (2) where nothing is left and the Gram matrix is well conditioned, its factor is the basis: Q = V Z
+    (3) else Q is formed, and made W-orthonormal once more by its own Gram matrices
+    (4) of the columns that are left the remainder against Q is formed, measured and judged itself, and so on
+
+    Parameters
+    ----------
+    V
+        Columns, (n_dof, n_columns).
+    G_K, G_M
+        Vᵀ K V and Vᵀ M V, (n_columns, n_columns).
+    omega2
+        omega_1² [1/s²].
+    """
+    length = np.sqrt(np.maximum(np.diag(G_K) + omega2 * np.diag(G_M), 0.0))
     is_zero = length <= np.finfo(float).tiny
-    redundant = list(np.flatnonzero(is_zero))
-    index = np.flatnonzero(~is_zero)
-    rest = columns[index] if is_zero.any() else columns
-    tolerance = np.maximum(RANK_TOLERANCE, ROUNDING_MARGIN * _rounding_noise(rest, body, omega2) / length[index])
-    size, remainder = length[index], np.ones(len(index))  # remainder: W-length of what is left of each unit column
-    basis: Columns | None = None
-    while len(index):
-        # tall arrays stay as they are: lengths and the order of pivots go into the small matrices
-        G = rest.inner(rest, omega2) / np.outer(size, size)
-        factor, pivots, rank, _ = dpstrf((G + G.T) / 2, tol=TRUSTED_PIVOT**2, lower=0)
-        taken, left = pivots[:rank] - 1, pivots[rank:] - 1
-        U = np.triu(factor[:rank, :rank])
-        Z = np.zeros((len(index), rank))
-        Z[taken] = la.solve_triangular(U, np.eye(rank)) / size[taken, None]
-        new = _orthonormalized(rest @ Z, body, omega2, well_conditioned=len(left) == 0 and _is_tame(U))
-        basis = new if basis is None else basis.beside(new)
-        if not len(left):
-            break
-        rest = _unit(rest[left], size[left])
+    redundant, index = list(np.flatnonzero(is_zero)), np.flatnonzero(~is_zero)
+    if not len(index):
+        return _no_columns(V), np.asarray(redundant, dtype=np.int64)
+    size = length[index]
+    noise = _rounding_noise(V, body, omega2)[index]
+    tolerance = np.maximum(RANK_TOLERANCE, ROUNDING_MARGIN * noise / size)
+    # tall arrays stay as they are: lengths and the order of pivots go into the small matrices
+    W = (G_K + omega2 * G_M)[np.ix_(index, index)] / np.outer(size, size)
+    taken, left, factor = _pivoted(W)  # (1)
+    Z = np.zeros((V.shape[1], len(taken)))
+    Z[index[taken]] = factor / size[taken, None]
+    if not len(left) and np.linalg.cond(W) < TRUSTED_CONDITION:  # (2)
+        return Basis(V, Z, Z, _within(G_K, Z), _within(G_M, Z), is_formed=False), np.asarray(redundant, dtype=np.int64)
+    basis = orthonormal_basis(combine(V, Z), Z, products, omega2)  # (3)
+    rest = products.beside(V[:, index[left]] / size[left])
+    rest.T = np.zeros((V.shape[1], len(left)))
+    rest.T[index[left], np.arange(len(left))] = 1 / size[left]
+    index, tolerance, remainder = index[left], tolerance[left], np.ones(len(left))
+    while len(index):  # (4)
         for _ in range(2):  # twice is enough
-            rest = rest - basis @ basis.inner(rest, omega2)
-            rest.KX, rest.MX = body.K @ rest.X, body.M @ rest.X  # fresh: the difference lost their leading digits
+            C = basis.inner(rest.KX + omega2 * rest.MX)
+            T = rest.T - basis.T @ C
+            rest = products.beside(rest.X - basis.combine(C))  # fresh: the difference lost their leading digits
+            rest.T = T
         size = _length(rest, omega2)
-        remainder = remainder[left] * size
-        is_kept = remainder > tolerance[left]
-        redundant += list(index[left[~is_kept]])
-        index, tolerance, remainder = index[left[is_kept]], tolerance[left[is_kept]], remainder[is_kept]
-        rest, size = rest[np.flatnonzero(is_kept)], size[is_kept]
-    if basis is None:  # nothing but rounding: no column is longer than its own noise
-        basis = columns[np.zeros(0, np.int64)]
+        remainder = remainder * size
+        is_kept = remainder > tolerance
+        redundant += list(index[~is_kept])
+        index, tolerance, remainder, size = index[is_kept], tolerance[is_kept], remainder[is_kept], size[is_kept]
+        if not len(index):
+            break
+        rest = rest[np.flatnonzero(is_kept)]
+        taken, left, factor = _pivoted(rest.inner(rest, omega2) / np.outer(size, size))
+        Z = np.zeros((len(index), len(taken)))
+        Z[taken] = factor / size[taken, None]
+        new = rest @ Z
+        basis = basis.with_columns(_orthonormalized(products, new, omega2))
+        rest = _unit(rest[left], size[left])
+        index, tolerance, remainder = index[left], tolerance[left], remainder[left]
     return basis, np.sort(np.asarray(redundant, dtype=np.int64))
+
+
+def _no_columns(V: Array) -> Basis:
+    """Return the basis of columns that are zero or rounding."""
+    none = np.zeros((0, 0))
+    return Basis(V, np.zeros((V.shape[1], 0)), np.zeros((V.shape[1], 0)), none, none, is_formed=False)
+
+
+def _pivoted(W: Array) -> tuple[IntArray, IntArray, Array]:
+    """Return the columns that a pivoted Cholesky of a Gram matrix takes, those it leaves, and the inverse factor."""
+    factor, pivots, rank, _ = dpstrf((W + W.T) / 2, tol=TRUSTED_PIVOT**2, lower=0)
+    U = np.triu(factor[:rank, :rank])
+    return pivots[:rank] - 1, pivots[rank:] - 1, la.solve_triangular(U, np.eye(rank))
+
+
+def orthonormal_basis(Q: Array, T: Array, products: Products, omega2: float) -> Basis:
+    """Return columns that are nearly W-orthonormal as a basis that is so to rounding."""
+    G_K, G_M = products.grams(Q)
+    Z = la.solve_triangular(la.cholesky(G_K + omega2 * G_M), np.eye(len(G_K)))
+    return Basis(Q, Z, T @ Z, _within(G_K, Z), _within(G_M, Z))
+
+
+def _within(G: Array, Z: Array) -> Array:
+    """Return a Gram matrix over other columns, Zᵀ G Z, symmetric."""
+    H = Z.T @ G @ Z
+    return np.asarray((H + H.T) / 2)
 
 
 def _length(columns: Columns, omega2: float) -> Array:
@@ -116,20 +251,15 @@ def _unit(columns: Columns, size: Array) -> Columns:
     return Columns(columns.X / size, columns.KX / size, columns.MX / size, columns.T / size)
 
 
-def _is_tame(U: Array) -> bool:
-    """Whether a Cholesky step loses so few digits that its result is orthonormal to about 1e-12."""
-    return bool(np.abs(np.diag(U)).min() > 0.03)
+def _orthonormalized(products: Products, new: Columns, omega2: float) -> Columns:
+    """Return the columns made W-orthonormal once more, with fresh products: the first step lost digits."""
+    fresh = products.beside(new.X)
+    fresh.T = new.T
+    G = fresh.inner(fresh, omega2)
+    return fresh @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
 
 
-def _orthonormalized(new: Columns, body: FEBody, omega2: float, *, well_conditioned: bool) -> Columns:
-    """Return the columns made W-orthonormal once more, with fresh products where the first step lost digits."""
-    if not well_conditioned:
-        new.KX, new.MX = body.K @ new.X, body.M @ new.X
-    G = new.inner(new, omega2)
-    return new @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
-
-
-def _rounding_noise(columns: Columns, body: FEBody, omega2: float) -> Array:
+def _rounding_noise(X: Array, body: FEBody, omega2: float) -> Array:
     """W-length of independent rounding errors eps |x_k| in every column, (k,)."""
     diagonal = np.abs(body.K.diagonal()) + omega2 * body.M.diagonal()
-    return np.finfo(float).eps * np.sqrt(np.einsum("n,nk,nk->k", diagonal, columns.X, columns.X))
+    return np.finfo(float).eps * np.sqrt(np.einsum("n,nk,nk->k", diagonal, X, X))

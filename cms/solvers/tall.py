@@ -18,7 +18,7 @@ from fe_models.foundation.threads import n_threads
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-__all__ = ["combine", "inner", "ordered", "subtract"]
+__all__ = ["combine", "combined", "inner", "ordered", "subtract"]
 
 SMALL = 20_000  #: rows below which threads cost more than they bring
 SLICE = 8192  #: rows at a time; what is made of them on the way stays in the cache
@@ -43,6 +43,21 @@ def combine(X: Array, C: Array, *, order: Literal["C", "F"] | None = None) -> Ar
 
     _by_rows(len(X), multiply)
     return result
+
+
+def combined(X: Array, C: Array) -> Array:
+    """Return X C, (n, m), in the place of X, (n, k), which is lost; an array of its own where m is much less than k."""
+    k, m = C.shape
+    if not k // 2 <= m <= k:
+        return combine(X, C)
+
+    def update(rows: slice) -> None:
+        for first in range(rows.start, rows.stop, SLICE):
+            part = slice(first, min(first + SLICE, rows.stop))
+            X[part, :m] = X[part] @ C
+
+    _by_rows(len(X), update)
+    return X[:, :m]
 
 
 def subtract(Y: Array, X: Array, C: Array) -> None:
