@@ -95,7 +95,8 @@ def measured(arguments):
     """Run Python in a process of its own; what it took and printed."""
     start = time.perf_counter()
     with tempfile.TemporaryFile("w+") as output:
-        child = subprocess.Popen([sys.executable, *arguments], stdout=output, stderr=subprocess.STDOUT)
+        environment = os.environ | {"OMP_NUM_THREADS": "1"}
+        child = subprocess.Popen([sys.executable, *arguments], stdout=output, stderr=subprocess.STDOUT, env=environment)
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)

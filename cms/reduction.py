@@ -37,6 +37,8 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["assembled", "reduce"]
 
+SHAPES_AT_ONCE = 64  #: whose displacements of all nodes are held at once
+
 
 def reduce(
     source: FEBody | Families,
@@ -146,8 +148,7 @@ def assembled(
         Of the shapes in the frame of `condition`.
     """
     axes, origin = condition.frame.axes, condition.frame.origin
-    # components in B; exact zeros of aligned axes stay exact
-    Phi_kept = np.einsum("ba,nbk->nak", axes, body.translations(finished.Phi)[kept])
+    Phi_kept = kept_translations(body, finished.Phi, kept, axes)
     index_of = np.full(len(body.nodes), -1, np.int64)
     index_of[kept] = np.arange(len(kept))
     return ReducedBody(
@@ -178,6 +179,16 @@ def assembled(
     )
 
 
+def kept_translations(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array:
+    """Return the translations of the shapes at some nodes in axes of B, (n, 3, n_q), some shapes at a time."""
+    kept = np.empty((len(nodes), 3, Phi.shape[1]))
+    for first in range(0, Phi.shape[1], SHAPES_AT_ONCE):
+        some = slice(first, first + SHAPES_AT_ONCE)
+        # exact zeros of aligned axes stay exact
+        kept[:, :, some] = np.einsum("ba,nbk->nak", axes, body.translations(Phi[:, some])[nodes])
+    return kept
+
+
 def require_states_of(body: FEBody, frame: BodyFrame, states: UnitStates) -> None:
     """Raise `ModeSetError` unless the static states are those of this body in this frame."""
     other = states.condition.frame
@@ -203,14 +214,26 @@ def reduced_moments(body: FEBody, Phi: Array, frame: BodyFrame) -> Moments:
         gram = body.element_model.mass_gram(body.mesh_displacement(Phi))
     else:
         gram = gram_from_matrices(body, Phi)
-    # a_B = L a_mesh with c_B = axesᵀ (c - origin), phi_B = axesᵀ phi
-    n = Phi.shape[1]
-    L = np.zeros((4 + 3 * n, 4 + 3 * n))
-    L[0, 0] = 1.0
-    L[1:4, 0] = -frame.axes.T @ frame.origin
-    L[1:4, 1:4] = frame.axes.T
-    L[4:, 4:] = np.kron(frame.axes.T, np.eye(n))
-    return moments_from_gram(L @ gram @ L.T, is_exact=body.element_model is not None)
+    return moments_from_gram(gram_in_frame(gram, frame), is_exact=body.element_model is not None)
+
+
+def gram_in_frame(gram: Array, frame: BodyFrame) -> Array:
+    """Return the Gram matrix of a_B, c_B = axesᵀ (c - origin), phi_B = axesᵀ phi, by that of a = [1, c, phi].
+
+    Components of all shapes are grouped, (4 + 3 n_q, 4 + 3 n_q); the array given is overwritten.
+    """
+    n = (len(gram) - 4) // 3
+    L = np.eye(4)
+    L[1:, 0] = -frame.axes.T @ frame.origin
+    L[1:, 1:] = frame.axes.T
+    gram[:4] = L @ gram[:4]
+    gram[:, :4] = gram[:, :4] @ L.T
+    if not np.array_equal(frame.axes, np.eye(3)):  # exact numbers of aligned axes stay exact
+        rows = gram[4:].reshape(3, n * len(gram))
+        rows[:] = frame.axes.T @ rows
+        for part in np.array_split(gram, max(1, gram.nbytes // 2**26)):
+            part[:, 4:] = (frame.axes.T @ part[:, 4:].reshape(len(part), 3, n)).reshape(len(part), 3 * n)
+    return gram
 
 
 def reduced_nodal_sums(body: FEBody, Phi: Array, frame: BodyFrame) -> NodalSums | None:

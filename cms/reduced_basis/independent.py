@@ -124,7 +124,8 @@ class Basis:
         k, width = new.X.shape[1], self.X.shape[1]
         Z = np.zeros((width + k, self.Z.shape[1] + k))
         Z[:width, :-k], Z[width:, -k:] = self.Z, np.eye(k)
-        return Basis(np.hstack([self.X, new.X]), Z, np.hstack([self.T, new.T]), *sides)
+        G_K, G_M = sides
+        return Basis(np.hstack([self.X, new.X]), Z, np.hstack([self.T, new.T]), G_K, G_M)
 
 
 def independent_columns(columns: Columns, body: FEBody, omega2: float) -> tuple[Columns, IntArray]:

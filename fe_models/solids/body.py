@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,7 @@ from fe_models.solids.stress import nodal_stress, stiffest_at_nodes
 __all__ = ["SolidModel", "scalar_mass_gram", "solid_body"]
 
 CELLS_AT_ONCE = 8_000  #: whose Jacobians are held at once
-GRAM_BYTES = 64e6  #: of one block of rows of [1, X, u] and of M_s times it
+GRAM_BYTES = 64e6  #: of M_s times some columns, which are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,17 +214,26 @@ def scalar_mass_gram(M_s: sp.csr_array, nodes: Array, u: Array) -> Array:
         Translations of the nodes, (n_nodes, 3, k) [m].
     """
     n_nodes = len(nodes)
-    A = np.hstack([np.ones((n_nodes, 1)), nodes, u.reshape(n_nodes, -1)])
-    n_rows = max(1, int(GRAM_BYTES / (8 * A.shape[1])))
-
-    blocks = [slice(begin, begin + n_rows) for begin in range(0, n_nodes, n_rows)]
-    gram, n_parts = np.zeros(2 * (A.shape[1],)), n_threads()
+    linear = np.hstack([np.ones((n_nodes, 1)), nodes])
+    columns = u.reshape(n_nodes, -1)
+    k, n_parts = columns.shape[1], n_threads()
+    cuts = np.linspace(0, n_nodes, n_parts + 1).astype(int)
+    parts = [M_s[a:b] for a, b in pairwise(cuts)]
+    gram = np.zeros((4 + k, 4 + k))
+    first = linear.T @ (M_s @ linear)
+    gram[:4, :4] = (first + first.T) / 2
+    width = max(16, int(GRAM_BYTES / (8 * n_nodes)))
     with ThreadPoolExecutor(n_parts) as pool:
-        for begin in range(0, len(blocks), n_parts):  # sparse products in threads; the dense one has threads of its own
-            group = blocks[begin : begin + n_parts]
-            for rows, product in zip(group, pool.map(lambda rows: M_s[rows] @ A, group), strict=True):
-                gram += A[rows].T @ product
-    return np.asarray((gram + gram.T) / 2)  # symmetric by definition; the blocks round the halves apart
+        for begin in range(0, k, width):  # sparse products in threads; the dense ones have threads of their own
+            end = min(begin + width, k)
+            block = np.ascontiguousarray(columns[:, begin:end])
+            product = np.concatenate(list(pool.map(lambda part, block=block: part @ block, parts)))
+            own = slice(4 + begin, 4 + end)
+            gram[:4, own] = linear.T @ product
+            gram[4 : 4 + end, own] = columns[:, :end].T @ product
+            gram[own, : 4 + begin] = gram[: 4 + begin, own].T  # symmetric by definition: the other half is not formed
+            gram[own, own] = (gram[own, own] + gram[own, own].T) / 2
+    return gram
 
 
 def node_volumes(mesh: Mesh) -> Array:
