@@ -4,12 +4,12 @@
     python -m benchmarks.interface_rich small              # 10 and one of 153 nodes
     python -m benchmarks.interface_rich plain reduced      # some variants
 
-A steel block of hex20 cells. Its end x = 0 is an interface of kind "nodes", single faces of its top are rigid interfaces; Craig-
-Bampton with 20 fixed-interface modes. Variants: "plain" all constraint modes without stress and geometric stiffness, "stress" with
-stress, "whole" with both; "reduced" is "whole" with 20 characteristic modes of the nodes interface, "rigid" is "whole" without that
-interface. "bare": one PARDISO factorisation of K_II and one solve of as many columns as the body has boundary dofs, nothing else
-counted. Every run is a process of its own, so processor time (user + system) and peak of memory are its own; the ratio is of
-processor times.
+A steel block of hex20 cells. Its end x = 0 is an interface of kind "nodes", single faces of its top are rigid
+interfaces; Craig-Bampton with 20 fixed-interface modes. Variants: "plain" all constraint modes without stress and
+geometric stiffness, "stress" with stress, "whole" with both; "reduced" is "whole" with 20 characteristic modes of the
+nodes interface, "rigid" is "whole" without that interface. "bare": one PARDISO factorisation of K_II and a solve of as
+many columns as the body has boundary dofs, nothing else counted. Every run is a process of its own, with one thread of
+BLAS each, so that its processor time (user + system) counts no waiting threads; the ratio is of processor times.
 """
 
 import json
@@ -58,7 +58,7 @@ def mesh_file(size):
 
 def job_file(size, variant, folder):
     """Write the job of a variant."""
-    (nx, ny, nz), along, across = SIZES[size]
+    (_, ny, nz), along, across = SIZES[size]
     lines, has_nodes = VARIANTS[variant]
     text = (
         f'[body]\nname = "block"\nunits = "m-kg-s"\nmesh = "{mesh_file(size).resolve()}"\n'
