@@ -5,7 +5,8 @@ Quantities of each marker but the first, `b` say, in the axes of the first:
     b_x, b_y, b_z       its place seen from the first       b_vx, b_vy, b_vz    its velocity as the first sees it
     b_rx, b_ry, b_rz    its rotation vector                 b_wx, b_wy, b_wz    its angular velocity against it
 
-besides the time t, the states by their names, parameters and functions of one number. Forces b_Fx, b_Fy, b_Fz act at b,
+besides the time t, the states by their names, parameters and functions of one number, and terms: expressions with a name,
+each of what is known and the terms before it. Forces b_Fx, b_Fy, b_Fz act at b,
 moments b_Mx, b_My, b_Mz on it; the first marker takes the opposite, with the moment of the arm.
 """
 
@@ -80,16 +81,19 @@ def write_quantities(x, m, out, o):
 
 @njit
 def expression_law(t, x, z, lam, data, wrench, z_dot, g, seen):
-    """Evaluate all expressions; data: most operations of one, where the tape of each begins (-1: none), tapes."""
-    n, n_z = x.shape[0], z.shape[0]
-    inputs = np.empty(1 + 12 * (n - 1) + n_z, x.dtype)
+    """Evaluate all expressions; data: most operations of one, number of terms, where tapes begin (-1: none), tapes."""
+    n, n_z, n_terms = x.shape[0], z.shape[0], int(data[1])
+    n_inputs = 1 + 12 * (n - 1) + n_z
+    inputs = np.empty(n_inputs + n_terms, x.dtype)
     results = np.empty(int(data[0]), x.dtype)
     inputs[0] = t
     for m in range(1, n):
         write_quantities(x, m, inputs, 1 + 12 * (m - 1))
     for k in range(n_z):
         inputs[1 + 12 * (n - 1) + k] = z[k]
-    at = 1
+    for k in range(n_terms):
+        inputs[n_inputs + k] = tape_at(data, int(data[2 + k]), inputs, results)
+    at = 2 + n_terms
     for m in range(1, n):
         f = np.zeros(6, x.dtype)
         for k in range(6):
@@ -122,6 +126,7 @@ class ExpressionElement(Element):
     forces: Mapping[str, str] = field(default_factory=dict)  #: expressions of b_Fx, ..., b_Mz
     states: Mapping[str, float] = field(default_factory=dict)  #: values at the start
     rates: Mapping[str, str] = field(default_factory=dict)  #: expressions of the rates of the states
+    terms: Mapping[str, str] = field(default_factory=dict)  #: expressions that the others, and later terms, name
     outputs: Mapping[str, str] = field(default_factory=dict)  #: expressions of what is seen
     output_units: Mapping[str, str] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -133,7 +138,7 @@ class ExpressionElement(Element):
         where = f"element {self.name!r}"
         if len(self.places) < 2:
             raise ModelError(f"{where}: places: expected two markers at least, by name, got {len(self.places)}")
-        names = [*self.inputs, *self.parameters, *self.functions]
+        names = [*self.inputs, *self.terms, *self.parameters, *self.functions]
         for k, each in enumerate(names):
             if not each.isidentifier() or each in names[:k] or each in CONSTANTS or each in FUNCTIONS:
                 raise ModelError(f"{where}: expected names of letters, digits and _, used once, got {quoted(each)}")
@@ -164,10 +169,12 @@ class ExpressionElement(Element):
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law: tapes and functions in its data."""
         forces = [f"{place}_{each}" for place in list(self.places)[1:] for each in GIVEN]
-        texts = [("forces", key, self.forces.get(key)) for key in forces]
+        texts = [("terms", key, text) for key, text in self.terms.items()]
+        texts += [("forces", key, self.forces.get(key)) for key in forces]
         texts += [("rates", key, self.rates[key]) for key in self.states]
         texts += [("outputs", key, text) for key, text in self.outputs.items()]
-        data = [0.0] * (1 + len(texts))
+        data = [0.0, float(len(self.terms))] + [0.0] * len(texts)
+        known = self.inputs
         functions_at = []
         for function in self.functions.values():
             functions_at.append(len(data))
@@ -175,13 +182,15 @@ class ExpressionElement(Element):
         numbers = {key: k for k, key in enumerate(self.functions)}
         for k, (part, key, text) in enumerate(texts):
             if text is None:
-                data[1 + k] = -1.0
+                data[2 + k] = -1.0
                 continue
             where = f"element {self.name!r}: {part}: {key}"
-            tape = compile_expression(where, text, self.inputs, parameters=self.parameters, functions=numbers)
-            data[1 + k] = float(len(data))
+            tape = compile_expression(where, text, known, parameters=self.parameters, functions=numbers)
+            data[2 + k] = float(len(data))
             data[0] = max(data[0], float(len(tape.op)))
             data += tape_numbers(tape, functions_at)
+            if part == "terms":
+                known = [*known, key]
         turned = {key[: -len("_Mx")] for key in self.forces if key[-2] == "M"}
         return ElementLaw(
             function=expression_law,

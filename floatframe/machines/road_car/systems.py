@@ -157,13 +157,14 @@ def car_file(
     tables["elements"]["seen"] = {
         "type": "elements.expressions",
         "places": {"ground": {"body": "ground"}, "car": {"body": "chassis", "marker": "cockpit"}},
+        "terms": TURNED,
         "outputs": {
             "x": "car_x",
             "y": "car_y",
-            "yaw": YAW,
+            "yaw": "heading",
             "yaw_rate": "car_wz",
-            "roll": f"asin({R_ZY})",
-            "side_slip": f"atan2(car_vy, car_vx + 1e-9) - {YAW}",
+            "roll": "asin(versine*car_ry*car_rz + sine*car_rx)",
+            "side_slip": "atan2(car_vy, car_vx + 1e-9) - heading",
             "speed": "sqrt(car_vx^2 + car_vy^2 + 1e-12)",
         },
         "output_units": {
@@ -195,12 +196,13 @@ def car_file(
     return written(words, tables, run) + tail
 
 
-# the rotation matrix of the cockpit from its rotation vector: R = cos 1 + sin/angle [r]x + (1 - cos)/angle² r rT
-ANGLE = "sqrt(car_rx^2 + car_ry^2 + car_rz^2 + 1e-12)"
-R_XX = f"(cos({ANGLE}) + (1 - cos({ANGLE}))/({ANGLE})^2*car_rx^2)"
-R_YX = f"((1 - cos({ANGLE}))/({ANGLE})^2*car_rx*car_ry + sin({ANGLE})/({ANGLE})*car_rz)"
-R_ZY = f"((1 - cos({ANGLE}))/({ANGLE})^2*car_ry*car_rz + sin({ANGLE})/({ANGLE})*car_rx)"
-YAW = f"atan2({R_YX}, {R_XX})"
+#: the rotation matrix of the cockpit from its rotation vector r, R = cos 1 + sin/angle [r]x + (1 - cos)/angle² r rT
+TURNED = {
+    "angle": "sqrt(car_rx^2 + car_ry^2 + car_rz^2 + 1e-12)",
+    "sine": "sin(angle)/angle",
+    "versine": "(1 - cos(angle))/angle^2",
+    "heading": "atan2(versine*car_rx*car_ry + sine*car_rz, cos(angle) + versine*car_rx^2)",
+}
 SPIN = "0.5*(left_dot + right_dot)"
 #: half of C = K ((w_target - w) - lambda dw/dt) on each rear wheel, w their mean: a differential
 TORQUE = f"0.5*gain*(w - {SPIN} - rate_time*({SPIN} - slow)/filter)"
@@ -213,10 +215,11 @@ def driver(path: dict[str, Any], speed: float) -> dict[str, Any]:
         "places": {
             "car": {"body": "subframe_front"}, "rack": {"body": "rack"}, "road": {"body": "ground"},
         },
+        "terms": ON_GROUND,
         "states": {"hand": 0.0},
-        "rates": {"hand": f"(gain*(path({AHEAD_X}) - {AHEAD_Y}) - hand)/lag"},
+        "rates": {"hand": "(gain*(path(car_x + ahead*axis_x) - car_y - ahead*axis_y) - hand)/lag"},
         "forces": {"rack_Fy": "-k*(rack_y + hand) - c*rack_vy"},
-        "outputs": {"error": f"path({X}) - {Y}", "hand": "hand", "force": "-k*(rack_y + hand) - c*rack_vy"},
+        "outputs": {"error": "path(car_x) - car_y", "hand": "hand", "force": "-k*(rack_y + hand) - c*rack_vy"},
         "output_units": {"error": "m", "hand": "m", "force": "N"},
         "parameters": {"ahead": float(f"{0.6 * speed:.6g}"), "gain": 0.0085, "lag": 0.10} | COLUMN,
         "functions": {"path": path},
@@ -237,11 +240,18 @@ def hand(turn: dict[str, Any]) -> dict[str, Any]:
 
 
 COLUMN = {"k": 3e6, "c": 1e4}  #: of the steering column as the rack feels it [N/m, N s/m]
-# the car in the ground, from the ground as the car sees it; road_rz is less its yaw
-X = "(-sin(road_rz)*road_y - cos(road_rz)*road_x)"
-Y = "(sin(road_rz)*road_x - cos(road_rz)*road_y)"
-AHEAD_X = f"({X} + ahead*cos(road_rz))"
-AHEAD_Y = f"({Y} - ahead*sin(road_rz))"
+#: where the car is on the ground, from the ground as the car sees it, and its longitudinal axis: with the place d and the
+#: rotation vector r of the ground, -(cos d - sin/angle r x d + (1 - cos)/angle² (r d) r), and likewise of (1, 0, 0)
+ON_GROUND = {
+    "angle": "sqrt(road_rx^2 + road_ry^2 + road_rz^2 + 1e-12)",
+    "sine": "sin(angle)/angle",
+    "versine": "(1 - cos(angle))/angle^2",
+    "along": "road_rx*road_x + road_ry*road_y + road_rz*road_z",
+    "car_x": "sine*(road_ry*road_z - road_rz*road_y) - cos(angle)*road_x - versine*along*road_rx",
+    "car_y": "sine*(road_rz*road_x - road_rx*road_z) - cos(angle)*road_y - versine*along*road_ry",
+    "axis_x": "cos(angle) + versine*road_rx^2",
+    "axis_y": "versine*road_rx*road_ry - sine*road_rz",
+}
 
 
 def scene(path: dict[str, Any]) -> str:

@@ -26,16 +26,18 @@ from floatframe.system_file.read_system import read_system
 from tests.floatframe.elements.test_public_elements import ENDS, HELD, METHOD, built_in, places, sprung
 from tests.floatframe.finite_differences import assert_tangent_is_exact
 
-LENGTH = "sqrt(b_x^2 + b_y^2 + b_z^2)"
-RATE = f"((b_x*b_vx + b_y*b_vy + b_z*b_vz)/{LENGTH})"
+TERMS = {
+    "length": "sqrt(b_x^2 + b_y^2 + b_z^2)",
+    "rate": "(b_x*b_vx + b_y*b_vy + b_z*b_vz)/length",
+    "tension": "k*(length - free) + c*rate + preload",
+}
 
 
 def spring(name, ends, k, c, preload, free):
-    tension = f"(k*({LENGTH} - free) + c*{RATE} + preload)"
     return ExpressionElement(
-        name, dict(zip("ab", ends, strict=True)),
-        forces={f"b_F{axis}": f"-{tension}*b_{axis}/{LENGTH}" for axis in "xyz"},
-        outputs={"energy": f"k*({LENGTH} - free)^2/2 + preload*{LENGTH}", "lost": f"c*{RATE}^2"},
+        name, dict(zip("ab", ends, strict=True)), terms=TERMS,
+        forces={f"b_F{axis}": f"-tension*b_{axis}/length" for axis in "xyz"},
+        outputs={"energy": "k*(length - free)^2/2 + preload*length", "lost": "c*rate^2"},
         parameters={"k": k, "c": c, "preload": preload, "free": free}, energy="energy", power_lost="lost",
     )  # fmt: skip
 
@@ -144,8 +146,8 @@ h = 1e-3
     assert_allclose(motion.body("b").v_dot[:, 2], (-50 * seen.outputs["stretch"] - seen.states["z"]) / 2, atol=1e-9)
 
 
-def run_with(text):
-    element = ExpressionElement("e", PAIR, {"b_Fx": text})
+def run_with(text, **terms):
+    element = ExpressionElement("e", PAIR, {"b_Fx": text}, terms=terms)
     return integrate(System([RigidBody("b", 1.0, np.eye(3))], elements=[element]), METHOD, 0.1, 0.1)
 
 
@@ -156,6 +158,8 @@ BAD = {
     "one place": (lambda: ExpressionElement("e", {"a": Marker("b")}), "places: expected two markers at least"),
     "rates": (lambda: ExpressionElement("e", PAIR, states={"z": 0.0}), "expected a rate and a value at the start"),
     "name": (lambda: ExpressionElement("e", PAIR, parameters={"t": 1.0}), "used once, got 't'"),
+    "term": (lambda: ExpressionElement("e", PAIR, terms={"b_x": "1"}), "used once, got 'b_x'"),
+    "later term": (lambda: run_with("late", early="late", late="1"), "element 'e': terms: early: unknown name 'late'"),
     "expression": (lambda: run_with("c"), "element 'e': forces: b_Fx: unknown name 'c'"),
 }  # fmt: skip
 

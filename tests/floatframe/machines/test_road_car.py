@@ -9,13 +9,14 @@ from numpy.testing import assert_allclose
 
 import cms
 import floatframe as ff
+from floatframe.elements.expressions import ExpressionElement
 from floatframe.machines import machine_files
 from floatframe.machines.road_car import CarOnPosts, Linkage, RoadCar, body_files, road_car_files
 from floatframe.machines.road_car.closed_forms import MODES, roll_control_stiffness, transfer_shares
 from floatframe.machines.road_car.description import CORNERS
 from floatframe.machines.road_car.figures import car_mass, driven
 from floatframe.machines.road_car.steady_turn import steady_turn
-from floatframe.machines.road_car.systems import car_file, lane_change, rig_file
+from floatframe.machines.road_car.systems import ON_GROUND, car_file, lane_change, rig_file
 from floatframe.rotations import rotation_matrix
 from floatframe.wheels import read_tyre_file, shipped_tyre
 from tests.floatframe.wheels.magic_formula_oracle import version_61
@@ -129,6 +130,19 @@ def test_the_flexible_car_follows_its_driver(folder):
             assert 1e-5 < np.abs(motion.body("chassis").q[-1]).max() < 1e-1
     assert_allclose(found[False], found[True], rtol=0.1)
     assert found[True] > 0.01
+
+
+def test_the_driver_knows_where_the_car_is_on_the_ground():
+    """Far down the road and turned about all axes: place and longitudinal axis are those of the body."""
+    r, p = np.array([120.0, -3.0, 0.4]), np.array([0.9, 0.15, -0.2, 0.35]) / np.linalg.norm([0.9, 0.15, -0.2, 0.35])
+    car = ff.RigidBody("car", mass=1.0, inertia=np.eye(3), position=r, orientation=p)
+    driver = ExpressionElement(
+        "driver", {"car": ff.Marker("car"), "road": ff.Marker("ground")}, terms=ON_GROUND,
+        outputs={name: name for name in ("car_x", "car_y", "axis_x", "axis_y")},
+    )  # fmt: skip
+    system = ff.System(bodies=[car], elements=[driver])
+    seen = ff.element_motion(system, ff.snapshot(system, ff.consistent_state(system).state), "driver").outputs
+    assert_allclose([seen[key][0] for key in driver.outputs], [*r[:2], *rotation_matrix(p)[:2, 0]], rtol=0, atol=1e-9)
 
 
 def test_the_study_of_the_suspension_runs(folder, tmp_path):
