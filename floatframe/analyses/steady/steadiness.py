@@ -30,10 +30,10 @@ from floatframe.state import State
 __all__ = ["require_steady"]
 
 BALANCED = 1e-5  #: forces out of balance, relative to those at work
-BALANCED_LATER = 1e-4  #: the same later, where tables of roads and rails are read at another place
+BALANCED_LATER = 1e-4  #: the same later, where tables of roads and rails are read anew: 1e-5 by flanges in a curve
 LEAST = 1e-3  #: of the forces that turn velocities round: what counts as forces at work
 ALONG = 1e-6  #: velocities against the common motion, relative to the largest
-SAME = 1e-4  #: change of a matrix, relative to its largest entry
+SAME = 1e-5  #: change of a matrix, relative to its largest entry: 3e-6 by flanges in a curve
 ROUND = 1e-6  #: change of a mass
 TURN = 1.234  #: angle by which the fastest body has turned later, no part of a circle [rad]
 AHEAD = 0.1  #: way of a system in which nothing spins, by its size
