@@ -5,9 +5,9 @@ Quantities of each marker but the first, `b` say, in the axes of the first:
     b_x, b_y, b_z       its place seen from the first       b_vx, b_vy, b_vz    its velocity as the first sees it
     b_rx, b_ry, b_rz    its rotation vector                 b_wx, b_wy, b_wz    its angular velocity against it
 
-besides the time t, the states by their names, parameters and functions of one number, and terms: expressions with a name,
-each of what is known and the terms before it. Forces b_Fx, b_Fy, b_Fz act at b,
-moments b_Mx, b_My, b_Mz on it; the first marker takes the opposite, with the moment of the arm.
+besides the time t, the states by their names, parameters, functions of one number, and terms: expressions with names,
+made of what is known and the terms before. Forces b_Fx, b_Fy, b_Fz act at b, moments b_Mx, b_My, b_Mz on it; the first
+marker takes the opposite, with the moment of the arm.
 """
 
 from collections.abc import Mapping
@@ -169,7 +169,7 @@ class ExpressionElement(Element):
     def law(self, placed: Placed) -> ElementLaw:
         """Return the law: tapes and functions in its data."""
         forces = [f"{place}_{each}" for place in list(self.places)[1:] for each in GIVEN]
-        texts = [("terms", key, text) for key, text in self.terms.items()]
+        texts: list[tuple[str, str, str | None]] = [("terms", key, text) for key, text in self.terms.items()]
         texts += [("forces", key, self.forces.get(key)) for key in forces]
         texts += [("rates", key, self.rates[key]) for key in self.states]
         texts += [("outputs", key, text) for key, text in self.outputs.items()]

@@ -240,8 +240,8 @@ def hand(turn: dict[str, Any]) -> dict[str, Any]:
 
 
 COLUMN = {"k": 3e6, "c": 1e4}  #: of the steering column as the rack feels it [N/m, N s/m]
-#: where the car is on the ground, from the ground as the car sees it, and its longitudinal axis: with the place d and the
-#: rotation vector r of the ground, -(cos d - sin/angle r x d + (1 - cos)/angle² (r d) r), and likewise of (1, 0, 0)
+#: where the car is on the ground, from the ground as the car sees it, and its longitudinal axis: with the place d and
+#: the rotation vector r of the ground, -(cos d - sin/angle r x d + (1 - cos)/angle² (r d) r), and likewise of (1, 0, 0)
 ON_GROUND = {
     "angle": "sqrt(road_rx^2 + road_ry^2 + road_rz^2 + 1e-12)",
     "sine": "sin(angle)/angle",
