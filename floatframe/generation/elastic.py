@@ -45,6 +45,15 @@ def summed(factors: Terms, parts: Terms) -> Terms:
     return np.tensordot(factors, parts, axes=1)
 
 
+def mean_summed(q: Terms, A: Terms, B: Terms) -> Terms:
+    """Return Σ q_k (A_k + B_k)/2 of vectors, (n, 3) each."""
+    out = []
+    for a, b in zip(A.T, B.T, strict=True):
+        is_same = all(x is y for x, y in zip(a, b, strict=True))
+        out.append(q @ a if is_same else 0.5 * (q @ (a + b)))
+    return np.array(out, dtype=object)
+
+
 class MarkerPlace:
     """Where a marker stands in its flexible body, frame of the node."""
 
@@ -54,8 +63,8 @@ class MarkerPlace:
         self.q = x[marker.x0 : marker.x0 + n]
         bent = summed(self.q, marker.shift_bend), summed(self.q, marker.turn_bend)
         self.shift, self.turn = marker.shift - bent[0], marker.turn - bent[1]  #: Psi(q), (n, 3) each
-        self.d = summed(self.q, marker.shift - 0.5 * bent[0])
-        self.th = summed(self.q, marker.turn - 0.5 * bent[1])
+        self.d = mean_summed(self.q, marker.shift, self.shift)
+        self.th = mean_summed(self.q, marker.turn, self.turn)
         self.rho = marker.place + self.d
         self.E = rotation_matrix(graph, self.th)
         angle = self.th @ self.th
@@ -116,15 +125,15 @@ class ModalMoments:
         """Return those of a body at positions of the tree."""
         q = x[modes.x0 : modes.x0 + modes.n]
         bent = summed(q, modes.K_t)
-        W = np.array([summed(q, each) for each in modes.S], dtype=object)
-        P = modes.X + W
-        B = np.array([axial(each) for each in P], dtype=object) + modes.axial_rest
-        half = summed(q, modes.X + 0.5 * W)
+        P = modes.X + np.array([summed(q, each) for each in modes.S], dtype=object)
+        B = np.array([axial(each) for each in P], dtype=object)
+        twice = summed(q, modes.X + P)
         second = terms(graph, np.zeros((3, 3)))
         for i in range(3):
             for j in range(i, 3):
-                second[i, j] = second[j, i] = half[i, j] + half[j, i]
-        return cls(modes.C1 + bent, P, B, summed(q, modes.C1 + 0.5 * bent), second)
+                second[i, j] = second[j, i] = 0.5 * (twice[i, j] + twice[j, i])
+        first = modes.C1 + bent
+        return cls(first, P, B, mean_summed(q, modes.C1, first), second)
 
 
 class ModalForces:
@@ -144,10 +153,10 @@ class ModalForces:
         t = summed(q_ddot, moments.B) + summed(q_dot, summed(q_dot, modes.K_r))
         return f, t + 2.0 * ((Q[0, 0] + Q[1, 1] + Q[2, 2]) * omega - Q @ omega)
 
-    def modal(self, acc: Terms, omega: Terms, alpha: Terms, U: Terms) -> Terms:
+    def modal(self, acc: Terms, omega: Terms, U: Terms) -> Terms:
         """Return the forces of the modes, (n,)."""
         modes, moments = self.modes, self.moments
         h = modes.M @ self.q_ddot + modes.D @ self.q_dot + modes.K @ self.q
         h = h + moments.first @ acc + np.array([(U * each).sum() for each in moments.P], dtype=object)
         spun = np.array([summed(self.q_dot, each) @ omega for each in modes.C4], dtype=object)
-        return h + 2.0 * spun + modes.axial_rest @ alpha
+        return h + 2.0 * spun

@@ -5,7 +5,7 @@ the body, so that a body that is clamped there needs no transformation but that 
 c = c_0 + phi q in the frame of the body, moments of a mode in that of the node are (docs/theory.md §6, §7)
 
     C1'_k = Fᵀ C1_k                          int phi_k
-    X'_k  = Fᵀ (X_k - C1_k oᵀ) F             int phi_k c_0ᵀ:  2C_k = axial(X_k), 3C_k = (tr X_k) 1 - X_k
+    X'_k  = Fᵀ (X_k - C1_k oᵀ) F             int phi_k c_0ᵀ, of which 2C_k and 3C_k = (tr X_k) 1 - X_k are made
     S'_kl = Fᵀ (S_kl - K_t,kl oᵀ) F          int phi_k phi_lᵀ, and what geometric stiffness adds to it
     K_r'  = Fᵀ (K_r - o × K_t)
 
@@ -22,7 +22,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.bodies.marker_shape import MarkerShape
 from floatframe.generation.graph import Graph, Terms, terms
-from floatframe.kernels.model import C1, C2, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
+from floatframe.kernels.model import C1, C3, C4, DAMPING, K_ROTATION, K_TRANSLATION, MASS, S_AB, STIFFNESS
 from floatframe.relative.recursion.expansion import Expansion, marker_shape
 
 __all__ = ["ElasticMarker", "Modes", "elastic_marker", "modes_of"]
@@ -39,7 +39,6 @@ class Modes:
     v0: int  #: among the rates
     C1: Terms  #: (n, 3)
     X: Terms  #: (n, 3, 3) [k, a, b]: phi_k along a, place along b
-    axial_rest: Terms  #: 2C_k - axial(X_k), (n, 3): zero unless moments are missing
     S: Terms  #: (n, n, 3, 3) [k, l, a, b]: phi_k along a, phi_l along b
     C4: Terms  #: (n, n, 3) [k, l]
     M: Terms  #: (n, n)
@@ -74,11 +73,6 @@ class ElasticMarker:
         return not all(value.is_constant(0.0) for part in parts for value in part.ravel())
 
 
-def axial(A: Array) -> Array:
-    """Return the axial vector (A_zy - A_yz, ...) of matrices, (..., 3)."""
-    return np.stack([A[..., 2, 1] - A[..., 1, 2], A[..., 0, 2] - A[..., 2, 0], A[..., 1, 0] - A[..., 0, 1]], axis=-1)
-
-
 def without_noise(x: Array, bound: Array) -> Array:
     """Return numbers with those below rounding of a bound, or of the largest beside it, made zero."""
     bound = np.broadcast_to(bound, x.shape)
@@ -87,49 +81,37 @@ def without_noise(x: Array, bound: Array) -> Array:
     return np.asarray(np.where(share < ROUNDING * max(1.0, float(share.max(initial=0.0))), 0.0, x))
 
 
-@dataclass(frozen=True, eq=False)
-class ModalNumbers:
-    """Numbers of a flexible body in the frame of the engine, as `kernels.body` reads them."""
-
-    n: int
-    blocks: tuple[Array, ...]
-
-    @classmethod
-    def of(cls, expansion: Expansion, i: int) -> "ModalNumbers":
-        """Return those of body i; geometric stiffness of a body without is zero."""
-        model = expansion.compiled.model
-        types, t, n = model.body_types, int(model.bodies.kind[i]), int(model.bodies.n_q[i])
-        shapes: dict[int, tuple[int, ...]] = {
-            C1: (3, n), C2: (3, n), C3: (3, 3, n), S_AB: (n, 3, 3, n), C4: (n, 3, n), MASS: (n, n), STIFFNESS: (n, n),
-            DAMPING: (n, n), K_TRANSLATION: (n, 3, n), K_ROTATION: (n, 3, n),
-        }  # fmt: skip
-        blocks = []
-        for which in sorted(shapes):
-            shape = shapes[which]
-            start = int(types.block0[t, which])
-            if which in (K_TRANSLATION, K_ROTATION) and not types.is_stiffened[t]:
-                blocks.append(np.zeros(shape))
-            elif which in (MASS, STIFFNESS, DAMPING) and types.is_diagonal[t, which - MASS]:
-                blocks.append(np.diag(types.blocks[start : start + n]))
-            else:
-                blocks.append(types.blocks[start : start + int(np.prod(shape))].reshape(shape))
-        return cls(n, tuple(blocks))
+def blocks_of(expansion: Expansion, i: int) -> dict[int, Array]:
+    """Return the numbers of body i by their names in `kernels.model`; geometric stiffness of a body without is zero."""
+    model = expansion.compiled.model
+    types, t, n = model.body_types, int(model.bodies.kind[i]), int(model.bodies.n_q[i])
+    shapes: dict[int, tuple[int, ...]] = {
+        C1: (3, n), C3: (3, 3, n), S_AB: (n, 3, 3, n), C4: (n, 3, n), MASS: (n, n), STIFFNESS: (n, n),
+        DAMPING: (n, n), K_TRANSLATION: (n, 3, n), K_ROTATION: (n, 3, n),
+    }  # fmt: skip
+    blocks = {}
+    for which, shape in shapes.items():
+        start = int(types.block0[t, which])
+        if which in (K_TRANSLATION, K_ROTATION) and not types.is_stiffened[t]:
+            blocks[which] = np.zeros(shape)
+        elif which in (MASS, STIFFNESS, DAMPING) and types.is_diagonal[t, which - MASS]:
+            blocks[which] = np.diag(types.blocks[start : start + n])
+        else:
+            blocks[which] = types.blocks[start : start + int(np.prod(shape))].reshape(shape)
+    return blocks
 
 
 def modes_of(graph: Graph, expansion: Expansion, i: int, frame: tuple[Array, Array]) -> Modes:
     """Return the modes of body i; frame: axes and origin of its node in the body."""
     F, origin = frame
-    numbers = ModalNumbers.of(expansion, i)
-    model, n = expansion.compiled.model, numbers.n
-    t = int(model.bodies.kind[i])
+    model, numbers = expansion.compiled.model, blocks_of(expansion, i)
+    t, n = int(model.bodies.kind[i]), int(model.bodies.n_q[i])
     mass, J = float(model.body_types.mass[t]), model.body_types.J0[t]
-    first, second, third, S, four, M, K, D, K_t, K_r = numbers.blocks
-    C1_k = first.T
-    C3_k = np.moveaxis(third, 2, 0)
+    M, K, D = (numbers[which] for which in (MASS, STIFFNESS, DAMPING))
+    C1_k, C3_k = numbers[C1].T, np.moveaxis(numbers[C3], 2, 0)
     X = 0.5 * np.trace(C3_k, axis1=1, axis2=2)[:, None, None] * np.eye(3) - C3_k
-    rest = second.T - axial(X)
-    S_kl = np.transpose(S, (3, 0, 1, 2))  # [k, l, a, b]
-    C4_kl, Kt_kl, Kr_kl = (np.transpose(each, (2, 0, 1)) for each in (four, K_t, K_r))
+    S_kl = np.transpose(numbers[S_AB], (3, 0, 1, 2))  # [k, l, a, b]
+    C4_kl, Kt_kl, Kr_kl = (np.transpose(numbers[which], (2, 0, 1)) for which in (C4, K_TRANSLATION, K_ROTATION))
     X = F.T @ (X - C1_k[:, :, None] * origin) @ F
     S_kl = F.T @ (S_kl - Kt_kl[..., None] * origin) @ F
     Kr_kl = (Kr_kl - np.cross(origin, Kt_kl)) @ F
@@ -148,7 +130,6 @@ def modes_of(graph: Graph, expansion: Expansion, i: int, frame: tuple[Array, Arr
         v0=expansion.vq_of[i].start,
         C1=kept(C1_k @ F, np.sqrt(mass) * size[:, None]),
         X=kept(X, spread * size[:, None, None]),
-        axial_rest=kept(rest @ F, spread * size[:, None]),
         S=kept(S_kl, pair[..., None, None]),
         C4=kept(C4_kl @ F, pair[..., None]),
         M=kept(M, pair),
@@ -170,7 +151,7 @@ def elastic_marker(
     n = expansion.xq_of[i].stop - expansion.xq_of[i].start
     psi = np.zeros((6, n)) if shape.psi is None else shape.psi
     bend = np.zeros((6, n, n)) if shape.bend is None else shape.bend
-    size = np.sqrt(np.maximum(np.diag(ModalNumbers.of(expansion, i).blocks[MASS]), 0.0))
+    size = np.sqrt(np.maximum(np.diag(blocks_of(expansion, i)[MASS]), 0.0))
     largest = largest_shapes(expansion, i)
     parts: list[Terms] = []
     for rows, most in zip((slice(0, 3), slice(3, 6)), largest, strict=True):

@@ -141,7 +141,7 @@ def inverse_dynamics(tree: TreeTerms, v: Terms, a: Terms, joints: Sequence[Joint
             forces = ModalForces(link.modes, joint.moments, tree.x, v, a)
             f_q, t_q = forces.wrench(omega)
             f[k], t[k] = f[k] + f_q, t[k] + t_q
-            force[link.modes.rates] = forces.modal(acc, omega, alpha, U)
+            force[link.modes.rates] = forces.modal(acc, omega, U)
     for k in range(n - 1, -1, -1):
         link, joint = tree.links[k], joints[k]
         f_Q, t_Q = along_joint(link, joint, f[k], t[k], force)
