@@ -115,6 +115,8 @@ def notes_of(
         f"{count.additions} additions, {count.multiplications} multiplications, {count.divisions} divisions, "
         f"{count.functions} sines and cosines.", "",
     ]  # fmt: skip
+    if routine.has_series:
+        notes += ["Elastic rotations of markers: to rounding up to 4 rad, meaningless beyond 5 rad.", ""]
     notes += [f"{name}, {n}: {meaning}" for name, n, meaning in routine.inputs]
     notes += [f"{out.name}, {' x '.join(map(str, out.values.shape))}: {out.meaning}" for out in routine.outputs]
     notes += ["", "z: " + ", ".join(names), "rates: " + ", ".join(rate_names)]

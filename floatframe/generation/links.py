@@ -137,10 +137,17 @@ def tree_terms(expansion: Expansion, parameters: Sequence[str] = ()) -> TreeTerm
     Raises
     ------
     ModelError
-        If a pattern of `parameters` matches nothing.
+        If a pattern of `parameters` matches nothing, or names a flexible body.
     """
     graph, nodes = Graph(), expansion.nodes
     values = parameter_names(expansion)
+    flexible = [body.name for body in expansion.system.bodies if isinstance(body, FlexibleBody)]
+    for pattern in parameters:
+        if pattern.split("/")[0] in flexible:
+            raise ModelError(
+                f"generate: parameters: {quoted(pattern)}: expected rigid bodies or gravity, got a flexible body: its "
+                "invariants are numbers in the code"
+            )
     names = chosen(parameters, values)
     symbols = {name: graph.symbol(f"parameters[{k}]") for k, name in enumerate(names)}
     length = float(np.abs(nodes.r).max(initial=0.0))

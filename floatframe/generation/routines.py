@@ -7,7 +7,7 @@ import numpy as np
 
 from floatframe.generation.derivatives import jacobian, position_seeds, seeds_of
 from floatframe.generation.elastic import MarkerPlace, MarkerRates, cross
-from floatframe.generation.graph import Graph, Operations, Scalar, Terms, operations, terms
+from floatframe.generation.graph import STUMPFF, Graph, Operations, Scalar, Terms, operations, reachable, terms
 from floatframe.generation.grouping import carried_inwards
 from floatframe.generation.links import Frame, TreeTerms, symbols_of
 from floatframe.generation.modes import ElasticMarker
@@ -42,6 +42,7 @@ class Routine:
     graph: Graph
     meaning: str
     asked: tuple[int, int]  #: additions and multiplications of the same recursion with all zeros and ones
+    has_series: bool  #: whether elastic rotations are polynomials, good up to 4 rad
 
     @property
     def values(self) -> list[Scalar]:
@@ -223,8 +224,9 @@ def routine_of(tree: TreeTerms, what: str, name: str) -> Routine:
     before = tuple(tree.graph.asked)
     made = kind.make(tree)
     asked = (tree.graph.asked[0] - before[0], tree.graph.asked[1] - before[1])
+    has_series = any(term.kind == STUMPFF for term in reachable(v for each in made for v in each.values.ravel()))
     outputs = written_out(tree.graph, made)
     sizes = dict.fromkeys(INPUTS, len(tree.v)) | {"z": len(tree.x), "parameters": len(tree.parameters)}
     wanted = (*kind.inputs, *(("parameters",) if tree.parameters else ()))
     inputs = tuple((each, sizes[each], INPUTS[each]) for each in wanted)
-    return Routine(name, inputs, outputs, tree.graph, kind.meaning, asked)
+    return Routine(name, inputs, outputs, tree.graph, kind.meaning, asked, has_series)
