@@ -105,8 +105,13 @@ from .identification.estimation import estimate as estimate
 from .identification.excitation import ExcitingMotion as ExcitingMotion
 from .identification.excitation import MotionLimits as MotionLimits
 from .identification.excitation import exciting_motion as exciting_motion
+from .identification.output_error import MeasuredOutputs as MeasuredOutputs
+from .identification.output_error import OutputFit as OutputFit
+from .identification.output_error import computed_outputs as computed_outputs
+from .identification.output_error import fit_outputs as fit_outputs
 from .identification.physical import real_parameters as real_parameters
 from .identification.regressors import linear_form as linear_form
+from .identification.scaled_link import scaled_link as scaled_link
 from .identification.tree_samples import tree_samples as tree_samples
 from .importers.read_urdf import read_urdf as read_urdf
 from .importers.robot import Robot as Robot
