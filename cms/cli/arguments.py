@@ -1,16 +1,29 @@
 """Arguments that several commands take."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["ModalFile", "Output"]
+__all__ = ["Journal", "ModalFile", "Output", "Workers"]
 
 ModalFile = Annotated[Path, typer.Argument(help="A modal file, as cms reduce writes it.")]
 
 
 Output = Annotated[Path | None, typer.Option("--output", "-o", help="Modal file to write.")]
+
+
+Workers = Annotated[
+    str | None,
+    typer.Option(
+        "--workers",
+        "-j",
+        help="Where tasks are computed: a number of processes, dask (dask:4), or dask://host:port, see "
+        "docs/cluster.md; default: one process a processor.",
+    ),
+]
+
+Journal = Annotated[
+    Path | None,
+    typer.Option("--journal", help="File that keeps every result, to go on from; default: beside the input file."),
+]

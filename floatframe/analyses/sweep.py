@@ -1,10 +1,9 @@
-"""Parameter sweeps: one function at many values, in parallel processes."""
+"""Parameter sweeps: one function at many values, in parallel processes or on a cluster."""
 
-import os
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from fe_models.foundation.processes import map_in_processes
+from fe_models.foundation.tasks.workers import Workers, tasks_of
 
 __all__ = ["sweep"]
 
@@ -16,7 +15,7 @@ def sweep(
     study: Callable[[Value], Result],
     values: Iterable[Value],
     *,
-    processes: int | None = None,
+    workers: Workers = None,
     failed: Callable[[Value, Exception], Result] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Result]:
@@ -29,8 +28,9 @@ def sweep(
         system for a value, integrates it and returns the numbers of interest.
     values
         What to call it with.
-    processes
-        How many at once; by default one per processor. 1: in this process, where `study` may be any callable.
+    workers
+        Where (docs/cluster.md): how many processes at once, by default one per processor; 1: in this process, where
+        `study` may be any callable; "dask", or "dask://host:port". Each has one thread, so that results are the same.
     failed
         What stands in the place of a value whose call failed, made from the value and the error; then no value can
         lose the others, not even one whose process is killed. None: the first error is raised.
@@ -42,20 +42,12 @@ def sweep(
     Exception
         Without `failed`: what `study` raised, for the first value in order that did.
     ProcessError
-        If `study` cannot be sent to other processes, or none can be started.
+        If `study` cannot be sent to other processes.
+    WorkerError
+        If no workers can be had.
     """
     values = list(values)
-    n = min(len(values), processes or os.cpu_count() or 1)
-    if n > 1:
-        return map_in_processes(study, values, n, failed=failed, progress=progress)
-    results: list[Result] = []
-    for value in values:
-        try:
-            results.append(study(value))
-        except Exception as error:
-            if failed is None:
-                raise
-            results.append(failed(value, error))
-        if progress is not None:
-            progress(len(results), len(values))
-    return results
+    if not values:
+        return []
+    with tasks_of(workers, len(values)) as tasks:
+        return tasks.map(study, values, failed=failed, progress=progress)

@@ -50,7 +50,7 @@ class Design:
     source: str  #: path of the design file
     study: Study  #: the system; its only point is the start
     method: str
-    processes: int | None
+    workers: int | str | None
     iterations: int
     tolerance: float
     combine: str  #: how objectives make F: sum, or largest

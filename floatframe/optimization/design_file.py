@@ -10,10 +10,11 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.paths import near_file
+from fe_models.foundation.tasks.workers import WORKERS_HELP
 from fe_models.foundation.toml_file import Table, choice, interval, read_toml, validated, value_of
 from floatframe.errors import SystemFileError
 from floatframe.optimization.design import Design, DesignParameter, Quantity
-from floatframe.studies.study_file import ANALYSES, TAKES, Output, Parameter, Study, list_as_tuple
+from floatframe.studies.study_file import ANALYSES, TAKES, Output, Parameter, Study, list_as_tuple, workers_of_file
 
 __all__ = ["COMBINATIONS", "DIFFERENCES", "GOALS", "METHODS", "SMALLEST_TOLERANCE", "read_design"]
 
@@ -163,8 +164,8 @@ class DesignFile(Table):
     method: choice("method", lambda: METHODS) = Field(  # type: ignore[valid-type]
         description=f"one of {', '.join(METHODS)}"
     )
-    processes: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="a whole number above 0, evaluations at once; default: one a processor"
+    workers: Annotated[int | str, BeforeValidator(workers_of_file)] | None = Field(
+        None, description=f"{WORKERS_HELP}; default: one process a processor"
     )
     iterations: Annotated[int, Field(ge=1, le=100_000)] = Field(
         100, description="a whole number above 0 and up to 100000, at most so many"
@@ -263,7 +264,7 @@ def read_design(path: str | os.PathLike[str]) -> Design:
         system=str(data.system),
         analysis=data.analysis,
         is_grid=False,
-        processes=data.processes,
+        workers=data.workers,
         parameters=tuple(
             Parameter(p.name, key, (p.start * factor,))
             for p in parameters
@@ -272,7 +273,7 @@ def read_design(path: str | os.PathLike[str]) -> Design:
         outputs=tuple(q.output for q in (*objectives, *constraints)),
     )
     return Design(
-        str(path), study, data.method, data.processes, data.iterations, data.tolerance, data.combine, data.differences,
+        str(path), study, data.method, data.workers, data.iterations, data.tolerance, data.combine, data.differences,
         data.step, data.population or 15 * len(parameters), data.seed, parameters, tuple(objectives), constraints,
         tuple(o.table for o in data.objectives.values() if o.table is not None),
     )  # fmt: skip

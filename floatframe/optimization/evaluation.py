@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
-from fe_models.foundation.processes import ProcessError
+from fe_models.foundation.tasks.task_map import ProcessError
 from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.linear.system_modes import system_modes
 from floatframe.errors import ModelError

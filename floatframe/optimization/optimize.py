@@ -1,4 +1,4 @@
-"""The best values of the parameters of a design, by SciPy's methods, in parallel processes, kept in a journal.
+"""The best values of the parameters of a design, by SciPy's methods, by workers, kept in a journal.
 
 design = read_design("four_bar_fit.toml")
 best = optimize(design)                # best.values, best.numbers, best.history
@@ -8,18 +8,19 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
-from fe_models.foundation.processes import WorkerPool
+from fe_models.foundation.tasks.task_map import TaskMap
+from fe_models.foundation.tasks.workers import Workers, tasks_of
 from floatframe.errors import ModelError
 from floatframe.optimization.design import Design
 from floatframe.optimization.design_file import SMALLEST_TOLERANCE
 from floatframe.optimization.evaluation import Evaluation, EvaluationFunction, residuals, scalar, terms, violations
 from floatframe.optimization.journal import Journal, open_journal
-from floatframe.studies.study import check
+from floatframe.studies.study import check, sendable_study
 
 __all__ = ["Evaluated", "OptimizationResult", "optimize"]
 
@@ -80,7 +81,7 @@ def numbers_by_name(design: Design, evaluation: Evaluation) -> dict[str, float]:
 def optimize(
     design: Design,
     *,
-    processes: int | None = None,
+    workers: Workers = None,
     journal: str | os.PathLike[str] | None = None,
     progress: Callable[[Evaluated], None] | None = None,
 ) -> OptimizationResult:
@@ -90,8 +91,8 @@ def optimize(
     ----------
     design
         As `read_design` returns it.
-    processes
-        How many evaluations at once; default: as the design says, or one a processor.
+    workers
+        Where evaluations are computed (docs/cluster.md); default: as the design says, or one process a processor.
     journal
         A file that every evaluation is appended to; what it holds is not computed again. None: nothing is written.
     progress
@@ -103,7 +104,9 @@ def optimize(
         Before any work, if the system is not valid or has no such sensor, column or mode; if the first evaluation
         fails, or both sides of a difference; if no evaluation keeps the limits.
     ResultsError
-        If the journal is one of another system or other numbers.
+        If the journal is one of another system, other numbers or another version of the program.
+    WorkerError
+        If no workers can be had.
     """
     from floatframe.system_file.read_system import read_system
 
@@ -113,8 +116,8 @@ def optimize(
         check(replace(study, analysis="eig", outputs=()) if analysis == "response" else study, start_point)
     files = read_system(design.study.system)[0].files
     kept = None if journal is None else open_journal(Path(journal), design, files)
-    n = processes or design.processes or os.cpu_count() or 1
-    with Evaluator(design, n, kept, progress) as evaluator:
+    with tasks_of(design.workers if workers is None else workers) as tasks:
+        evaluator = Evaluator(design, tasks, kept, files, progress)
         start = evaluator.scaled_start()
         first = evaluator.at([start])[0]
         if first.evaluation.error:
@@ -147,24 +150,23 @@ class Evaluator:
     """Evaluates a design at scaled points z, (n_parameters,), from 0 at the lower to 1 at the upper bounds."""
 
     def __init__(
-        self, design: Design, n: int, journal: Journal | None, progress: Callable[[Evaluated], None] | None
+        self,
+        design: Design,
+        tasks: TaskMap,
+        journal: Journal | None,
+        files: Sequence[str],
+        progress: Callable[[Evaluated], None] | None,
     ) -> None:
         self.design = design
-        self.n = n
+        self.tasks = tasks
         self.journal = journal
+        self.files = tuple(os.path.abspath(name) for name in files)
         self.progress = progress
-        self.function = EvaluationFunction(design)
-        self.pool = WorkerPool(self.function, n)
+        self.function = EvaluationFunction(replace(design, study=sendable_study(design.study)))
         self.lower = np.array([p.lower for p in design.parameters])
         self.upper = np.array([p.upper for p in design.parameters])
         self.rows: dict[tuple[float, ...], Evaluated] = {}
         self.history: list[Evaluated] = []
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.pool.end()
 
     def scaled_start(self) -> Array:
         """Return z of the start."""
@@ -174,7 +176,7 @@ class Evaluator:
     def at(self, points: Sequence[Array], *, n_trials: int | None = None) -> list[Evaluated]:
         """Return the rows of scaled points, of which the first `n_trials` (default: all) are no ends of differences.
 
-        What is not known is computed, in parallel processes.
+        What is not known is computed by the workers.
         """
         values = [tuple(float(v) for v in self.values(z)) for z in points]
         known = {} if self.journal is None else self.journal.known
@@ -197,17 +199,10 @@ class Evaluator:
     def compute(self, values: list[tuple[float, ...]]) -> list[Evaluation]:
         """Return new evaluations, each in the journal as soon as it is known."""
         keep: Callable[[Evaluation], None] = (lambda _: None) if self.journal is None else self.journal.append
-        if self.n > 1:
-            return self.pool.map(values, failed=self.function.failed, done=lambda _, evaluation: keep(evaluation))
-        found = []
-        for v in values:
-            try:
-                evaluation = self.function(v)
-            except Exception as error:
-                evaluation = self.function.failed(v, error)
-            keep(evaluation)
-            found.append(evaluation)
-        return found
+        return self.tasks.map(
+            self.function, values, failed=self.function.failed, done=lambda _, evaluation: keep(evaluation),
+            files=self.files,
+        )  # fmt: skip
 
     def row(self, evaluation: Evaluation, is_difference: bool, is_known: bool) -> Evaluated:
         """Return an evaluation as a row of the history."""

@@ -1,17 +1,21 @@
-"""Parameter studies from a file: every point in a process of its own, its failure a row like any other.
+"""Parameter studies from a file: every point is a task of its own, its failure a row like any other.
 
 study = read_study("crank_study.toml")
 table = run_study(study)                     # rows: values of the parameters, numbers asked for, or why not
 """
 
+import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.tasks.task_map import ProcessError
+from fe_models.foundation.tasks.workers import Workers, tasks_of
 from fe_models.foundation.words import nearest, quoted
 from floatframe.analyses.driven.inverse_dynamics import inverse_dynamics
 from floatframe.analyses.driven.kinematics import kinematics
@@ -19,7 +23,6 @@ from floatframe.analyses.equilibrium import static_equilibrium
 from floatframe.analyses.linear.linearization import linearize
 from floatframe.analyses.linear.system_modes import SystemModes, system_modes
 from floatframe.analyses.snapshot import snapshot
-from floatframe.analyses.sweep import sweep
 from floatframe.compiling.file_frames import state_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError
@@ -27,23 +30,15 @@ from floatframe.motion.integration import integrate
 from floatframe.results.sensors import measured, sensor_of
 from floatframe.results.trajectory import Trajectory
 from floatframe.studies.study_file import TAKES, Output, Study
+from floatframe.studies.study_journal import open_study_journal
+from floatframe.studies.study_row import StudyRow
 from floatframe.system import System
 from floatframe.system_file.run_section import RunOptions, required_run
 
-__all__ = ["StudyRow", "StudyTable", "run_study"]
+__all__ = ["StudyTable", "run_study", "sendable_study"]
 
 OF_MODES = {"frequency": "Hz", "damping": "-", "real": "1/s", "imaginary": "rad/s"}
 EXTREMES: dict[str, Callable[[Array], float]] = {"least": np.nanmin, "greatest": np.nanmax}  #: over all modes
-
-
-@dataclass(frozen=True)
-class StudyRow:
-    """One point: values of the parameters, and what came out."""
-
-    values: tuple[Any, ...]
-    outputs: tuple[float, ...]  #: NaN where the point failed
-    units: tuple[str, ...]
-    error: str = ""  #: why it failed
 
 
 @dataclass(frozen=True)
@@ -52,6 +47,7 @@ class StudyTable:
 
     study: Study
     rows: tuple[StudyRow, ...]
+    n_known: int = 0  #: rows that came from the journal
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -72,16 +68,22 @@ class StudyTable:
 
 
 def run_study(
-    study: Study, *, processes: int | None = None, progress: Callable[[int, int], None] | None = None
+    study: Study,
+    *,
+    workers: Workers = None,
+    journal: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> StudyTable:
-    """Compute all points of a study in parallel processes.
+    """Compute all points of a study; the numbers do not depend on the workers.
 
     Parameters
     ----------
     study
         As `read_study` returns it.
-    processes
-        How many at once; default: as the study says, or one a processor.
+    workers
+        Where points are computed (docs/cluster.md); default: as the study says, or one process a processor.
+    journal
+        A file that every point is appended to; what it holds is not computed again. None: nothing is written.
     progress
         Called with the numbers of points done and of all.
 
@@ -90,15 +92,42 @@ def run_study(
     ModelError, SystemFileError
         Before any work, if the system as it stands in its file is not valid, a parameter names no key of it, or an
         output nothing that it measures.
+    ResultsError
+        If the journal is one of another system, other numbers or another version of the program.
+    WorkerError
+        If no workers can be had.
     """
+    from floatframe.system_file.read_system import read_system
+
     points = list(study.points())
     check(study, points[0])
-    compute = StudyPoint(study)
-    rows = sweep(
-        compute, points, processes=processes if processes is not None else study.processes, failed=compute.failed,
-        progress=progress,
-    )  # fmt: skip
-    return StudyTable(study, tuple(rows))
+    files = read_system(study.system)[0].files
+    kept = None if journal is None else open_study_journal(Path(journal), study, files)
+    rows = {} if kept is None else {k: row for k, point in enumerate(points) if (row := kept.row(point)) is not None}
+    n_known = len(rows)
+    missing = [k for k in range(len(points)) if k not in rows]
+
+    def keep(i: int, row: StudyRow) -> None:
+        rows[missing[i]] = row
+        if kept is not None:
+            kept.append(row)
+        if progress is not None:
+            progress(len(rows), len(points))
+
+    if missing:
+        compute = StudyPoint(sendable_study(study))
+        with tasks_of(study.workers if workers is None else workers, len(missing)) as tasks:
+            tasks.map(
+                compute, [points[k] for k in missing], failed=compute.failed, done=keep,
+                files=[os.path.abspath(name) for name in files],
+            )  # fmt: skip
+    return StudyTable(study, tuple(rows[k] for k in range(len(points))), n_known)
+
+
+def sendable_study(study: Study) -> Study:
+    """Return what workers need of a study: the system by its full path, no values, of which there may be many."""
+    parameters = tuple(replace(parameter, values=()) for parameter in study.parameters)
+    return replace(study, system=os.path.abspath(study.system), parameters=parameters)
 
 
 def check(study: Study, point: tuple[Any, ...]) -> None:
@@ -135,8 +164,6 @@ def as_placed(system: System) -> Trajectory:
 
 def read_system_keys(study: Study) -> None:
     """Raise `SystemFileError` if a key path leads nowhere."""
-    from pathlib import Path
-
     from fe_models.foundation.toml_file import changed, read_toml
     from floatframe.errors import SystemFileError
 
@@ -168,7 +195,9 @@ class StudyPoint:
         """Return the row of a point that went wrong, whatever it was: its error in words."""
         words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
         n = len(self.study.outputs)
-        return StudyRow(point, (float("nan"),) * n, ("",) * n, " ".join(words.split()) or type(error).__name__)
+        told = " ".join(words.split()) or type(error).__name__
+        is_lasting = isinstance(error, ReportedError) and not isinstance(error, ProcessError)
+        return StudyRow(point, (float("nan"),) * n, ("",) * n, told, is_lasting)
 
     def motion(self, system: System, given: RunOptions | None) -> Trajectory:
         """Return the motion of the analysis; an equilibrium as one of one time."""

@@ -11,10 +11,12 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from fe_models.foundation.paths import near_file
+from fe_models.foundation.tasks.task_map import WorkerError
+from fe_models.foundation.tasks.workers import WORKERS_HELP, checked_workers
 from fe_models.foundation.toml_file import Table, choice, read_toml, validated
 from floatframe.errors import SystemFileError
 
-__all__ = ["ANALYSES", "TAKES", "Output", "Parameter", "Study", "read_study"]
+__all__ = ["ANALYSES", "TAKES", "Output", "Parameter", "Study", "read_study", "workers_of_file"]
 
 ANALYSES = ("run", "static", "eig", "kinematics", "inverse")
 COMBINATIONS = ("all", "together")
@@ -30,6 +32,16 @@ TAKES = {  # name -> of the values over time, (n_t,), one number
     "range": lambda values: np.ptp(values),
 }
 MOST_POINTS = 100_000
+
+
+def workers_of_file(value: Any) -> int | str:
+    """Return workers as a file says them."""
+    if isinstance(value, bool) or not isinstance(value, int | str):
+        raise ValueError(f"expected {WORKERS_HELP}")
+    try:
+        return checked_workers(value)
+    except WorkerError as error:
+        raise ValueError(str(error)) from None
 
 
 def list_as_tuple(value: Any) -> Any:
@@ -94,8 +106,8 @@ class StudyFile(Table):
     combine: choice("combination", lambda: COMBINATIONS) = Field(  # type: ignore[valid-type]
         "all", description="all: every value with every other; together: the first ones, the second ones and so on"
     )
-    processes: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="a whole number above 0, points at once; default: one a processor"
+    workers: Annotated[int | str, BeforeValidator(workers_of_file)] | None = Field(
+        None, description=f"{WORKERS_HELP}; default: one process a processor"
     )
     parameters: dict[str, ParameterSection] = Field(description="tables [parameters.NAME]")
     outputs: dict[str, OutputSection] = Field(description="tables [outputs.NAME]")
@@ -150,7 +162,7 @@ class Study:
     system: str  #: path of the system file
     analysis: str
     is_grid: bool  #: every value with every other
-    processes: int | None
+    workers: int | str | None
     parameters: tuple[Parameter, ...]
     outputs: tuple[Output, ...]
 
@@ -178,7 +190,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         system=str(data.system),
         analysis=data.analysis,
         is_grid=data.combine == "all",
-        processes=data.processes,
+        workers=data.workers,
         parameters=tuple(
             Parameter(name, section.path, section.all_values()) for name, section in data.parameters.items()
         ),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cms.cli.arguments import Journal, Workers
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
@@ -32,13 +33,8 @@ def optimize_command(
             help="A .csv, .json, .png, .svg or .pdf file, or .toml, the system with the best values.",
         ),
     ] = [],  # noqa: B006
-    journal: Annotated[
-        Path | None,
-        typer.Option("--journal", help="File that keeps every evaluation; default: beside the design file."),
-    ] = None,
-    processes: Annotated[
-        int | None, typer.Option("--processes", "-j", min=1, help="Evaluations at once; default: one a processor.")
-    ] = None,
+    journal: Journal = None,
+    workers: Workers = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
     """Find the best values of parameters of a system: fits to tables, peaks, frequencies, damping, within limits.
@@ -48,10 +44,13 @@ def optimize_command(
     table and a picture: study.csv and study.png.
 
     Example: floatframe optimize study.toml -o history.csv -o history.png -o best.toml
+
+    Example: floatframe optimize study.toml --workers dask://cluster:8786
     """
     import io
 
     from fe_models.foundation.paths import replace_file
+    from fe_models.foundation.tasks.workers import tasks_of
     from floatframe.errors import ModelError
     from floatframe.optimization.design_file import read_design
     from floatframe.optimization.history_plots import plot_history
@@ -70,14 +69,14 @@ def optimize_command(
             raise ModelError(
                 f"--output {path}: expected a place beside {described.study.system}, which names files relative to it"
             )
-    with stages() as clock:
+    with stages() as clock, tasks_of(described.workers if workers is None else workers) as tasks:
         if "run" in described.analyses:
             from floatframe.kernels.entry import prepare
 
             with clock("compiled code (made at first use)"):
                 prepare()  # once, before many processes want it
         with clock(f"{described.method}"):
-            result = optimize(described, processes=processes, journal=kept)
+            result = optimize(described, workers=tasks, journal=kept)
     record = optimization_record(result)
     if json:
         typer.echo(json_module.dumps(record, indent=2))

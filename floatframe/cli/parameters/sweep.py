@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cms.cli.arguments import Journal, Workers
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 
 if TYPE_CHECKING:
@@ -29,21 +30,24 @@ def sweep_command(
         list[Path],
         typer.Option("--output", "-o", help="A .csv, .json, .png, .svg or .pdf file; repeatable."),
     ] = [],  # noqa: B006
-    processes: Annotated[
-        int | None, typer.Option("--processes", "-j", min=1, help="Points at once; default: one a processor.")
-    ] = None,
+    journal: Journal = None,
+    workers: Workers = None,
     json: Annotated[bool, typer.Option("--json", help="Write the table as JSON, for other programs.")] = False,
 ) -> None:
-    """Vary parameters of a system: one run, equilibrium or set of modes for every point, in parallel processes.
+    """Vary parameters of a system: one run, equilibrium or set of modes for every point, by parallel workers.
 
-    A point that fails is a row with its reason; the others go on. Without -o a table stands beside the study:
+    A point that fails is a row with its reason; the others go on. Every point is kept in a journal (study.toml:
+    study.journal): after an interruption the same command goes on. Without -o a table stands beside the study:
     study.toml gives study.csv.
 
     Example: floatframe sweep study.toml -o study.csv -o study.png
+
+    Example: floatframe sweep study.toml --workers dask://cluster:8786
     """
     import io
 
     from fe_models.foundation.paths import replace_file
+    from fe_models.foundation.tasks.workers import tasks_of
     from floatframe.errors import ModelError
     from floatframe.studies.study import run_study
     from floatframe.studies.study_file import read_study
@@ -52,21 +56,24 @@ def sweep_command(
 
     described = read_study(study)
     inputs = (study, Path(described.system), *read_system(described.system)[0].files)
-    paths = [output_path(path, None, ModelError, overwrite_of=inputs) for path in outputs]
-    if not paths and not json:
-        paths = [output_path(None, study.with_suffix(".csv"), ModelError, overwrite_of=inputs)]
+    kept = output_path(journal, study.with_suffix(".journal"), ModelError, overwrite_of=inputs, needs_file=True)
+    wanted = outputs or ([] if json else [study.with_suffix(".csv")])
+    paths = [output_path(path, None, ModelError, overwrite_of=(*inputs, kept)) for path in wanted]
     for path in paths:
         if path.suffix.lower().removeprefix(".") not in KINDS:
             raise ModelError(f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in KINDS)}")
     n = sum(1 for _ in described.points())
-    with stages(remaining=True) as clock:
+    asked = described.workers if workers is None else workers
+    with stages(remaining=True) as clock, tasks_of(asked, n) as tasks:
         if described.analysis == "run":
             from floatframe.kernels.entry import prepare
 
             with clock("compiled code (made at first use)"):
                 prepare()  # once, before many processes want it
         with clock(f"{n} points") as advance:
-            table = run_study(described, processes=processes, progress=lambda done, all_: advance(done / all_))
+            table = run_study(
+                described, workers=tasks, journal=kept, progress=lambda done, all_: advance(done / all_)
+            )
     record = study_record(table)
     if json:
         typer.echo(json_module.dumps(record, indent=2))
@@ -115,6 +122,8 @@ def print_study(table: "StudyTable") -> None:
     for row in [row for row in table.rows if row.error][:5]:
         point = ", ".join(f"{p.name} = {shown(v)}" for p, v in zip(table.study.parameters, row.values, strict=True))
         say(f"failed at {point}: {row.error}")
+    if table.n_known:
+        say(f"{table.n_known} of {len(table.rows)} points were in the journal")
     if table.n_failed:
         say(f"{table.n_failed} of {len(table.rows)} points failed")
 

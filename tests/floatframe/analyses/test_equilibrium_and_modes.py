@@ -448,9 +448,9 @@ def square(x):
 
 def test_sweep_keeps_the_order_in_this_process_and_in_others():
     seen = []
-    assert sweep(lambda x: x + 1, [3, 1, 2], processes=1, progress=lambda *k: seen.append(k)) == [4, 2, 3]
+    assert sweep(lambda x: x + 1, [3, 1, 2], workers=1, progress=lambda *k: seen.append(k)) == [4, 2, 3]
     assert seen == [(1, 3), (2, 3), (3, 3)]
-    assert sweep(square, range(5), processes=2) == [0, 1, 4, 9, 16]
+    assert sweep(square, range(5), workers=2) == [0, 1, 4, 9, 16]
 
 
 def test_a_snapshot_of_an_equilibrium_measures_what_holds_it():

@@ -155,7 +155,7 @@ def test_the_study_of_the_suspension_runs(folder, tmp_path):
     text = shipped["suspension_study.toml"]
     assert text.count("iterations = ") == 1
     begin, end = text.index("[parameters.bar_rear]"), text.index("[objectives.side_slip]")
-    text = "processes = 1\n" + text[:begin] + text[end:]
+    text = "workers = 1\n" + text[:begin] + text[end:]
     (tmp_path / "study.toml").write_text(re.sub("iterations = .*", "iterations = 1", text))
     best = ff.optimize(ff.read_design(tmp_path / "study.toml"))
     start, changed = (row.evaluation for row in best.history[:2])

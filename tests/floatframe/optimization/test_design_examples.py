@@ -126,7 +126,7 @@ def test_the_straightest_path_is_that_of_scipy_on_its_closed_form(copied):
 def test_the_smallest_peak_is_that_of_scipy_and_nearly_den_hartogs(copied):
     """Den Hartog: k/mu = 1/(1 + mu)², zeta² = 3 mu/(8 (1 + mu)), at the fixed points sqrt(1 + 2/mu), near the peaks."""
     folder = copied("absorber")
-    found = optimize(read_design(folder / "peak.toml"), processes=1)
+    found = optimize(read_design(folder / "peak.toml"), workers=1)
     k, c = found.values["k"], found.values["c"]
     sides = ((0.1, 0.15), (0.15, 0.25))
     limits = [{"type": "ineq", "fun": lambda q, s=s: q[2] - peak(q[0] / 10, q[1] / 10, *s)} for s in sides]
@@ -170,7 +170,7 @@ def test_the_system_with_the_best_values_is_written_with_its_comments(copied):
     folder = copied("steering-linkage")
     text = (folder / "ackermann.toml").read_text().replace("step = 1e-6", "step = 1e-6\niterations = 1")
     (folder / "ackermann.toml").write_text(text)
-    found = optimize(read_design(folder / "ackermann.toml"), processes=1)
+    found = optimize(read_design(folder / "ackermann.toml"), workers=1)
     written = best_system(found)
     best = tomllib.loads(written)
     assert "# Ackermann's condition" in written

@@ -81,7 +81,7 @@ analysis = "kinematics"
 method = "least-squares"
 differences = "forward"
 step = 1e-6
-processes = 1
+workers = 1
 [parameters.crank]
 path = "joints.pin.marker_a.0"
 lower = 0.2
@@ -114,7 +114,7 @@ LONGER = """
 system = "pendulum.toml"
 analysis = "eig"
 method = "slsqp"
-processes = 1
+workers = 1
 [parameters.d]
 path = "bodies.rod.center_of_mass.0"
 lower = 0.05
@@ -166,7 +166,7 @@ ABSORB = """
 system = "absorber.toml"
 analysis = "eig"
 method = "differential-evolution"
-processes = 1
+workers = 1
 population = 12
 iterations = 40
 [parameters.k]

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import socket
 
 import numpy as np
 import pytest
@@ -57,7 +58,7 @@ def swing_of(mass, g):
 
 
 def test_frequencies_of_a_grid_are_those_of_the_textbook_in_its_order(folder):
-    table = run_study(read_study(folder / "study.toml"), processes=1)
+    table = run_study(read_study(folder / "study.toml"), workers=1)
     assert [row.values for row in table.rows] == [(g, m) for g in (-9.81, -1.62) for m in (1.0, 2.0, 4.0)]
     exact = [swing_of(m, -g) for g, m in (row.values for row in table.rows)]
     assert_allclose(table.column("swing"), exact, rtol=1e-8)
@@ -77,11 +78,42 @@ def test_points_in_other_processes_give_table_csv_json_and_picture(folder):
     assert (folder / "out.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_cluster_gives_the_table_of_processes_bit_for_bit(folder):
+    pytest.importorskip("distributed")
+    for name, workers in (("one", "1"), ("two", "2"), ("dask", "dask:2")):
+        sweep(folder / "study.toml", "--workers", workers, "-o", folder / f"{name}.csv", "--journal", folder / name)
+    assert (folder / "one.csv").read_bytes() == (folder / "two.csv").read_bytes() == (folder / "dask.csv").read_bytes()
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        words = sweep(folder / "study.toml", "-j", f"dask://127.0.0.1:{nobody.getsockname()[1]}", code=2)
+    assert "no Dask scheduler answers" in words
+    assert not (folder / "study.csv").exists()
+
+
+def test_a_second_call_takes_the_journal_and_gives_the_same_table(folder):
+    study, journal = read_study(folder / "study.toml"), folder / "study.journal"
+    whole = run_study(study, workers=1, journal=journal)
+    lines = journal.read_bytes().splitlines(keepends=True)
+    assert len(lines) == 1 + 6
+    journal.write_bytes(b"".join(lines[:3]) + lines[3][:20])  # killed while it wrote the third point
+    again = run_study(study, workers=1, journal=journal)
+    assert (again.n_known, again.rows) == (2, whole.rows)
+    text = STUDY.replace("[-9.81, -1.62]", "[-9.81, -3.72, -1.62]").replace("number = 3", "number = 2")
+    (folder / "study.toml").write_text(text)
+    assert "4 of 6 points were in the journal" in sweep(folder / "study.toml", "-j", 1)
+    (folder / "pendulum.toml").write_text(PENDULUM.replace("mass = 2.0", "mass = 2.5"))
+    words = sweep(folder / "study.toml", "-j", 1, code=2)
+    assert "this journal is of another system" in words
+    journal.write_text("notes\nof mine\n")
+    assert "expected a journal of floatframe sweep" in sweep(folder / "study.toml", "-j", 1, code=2)
+    assert journal.read_text() == "notes\nof mine\n"
+
+
 def test_runs_are_those_of_the_changed_system_and_failures_are_rows(folder):
     (folder / "study.toml").write_text("""
 system = "pendulum.toml"
 combine = "together"
-processes = 1
+workers = 1
 [parameters.mass]
 path = "bodies.rod.mass"
 values = [1.0, 0.0, 3.0]
@@ -122,7 +154,7 @@ def test_what_nobody_foresaw_is_a_row_too(folder, monkeypatch):
 
     found = study.linearize
     monkeypatch.setattr(study, "linearize", fails_once)
-    table = run_study(read_study(folder / "study.toml"), processes=1)
+    table = run_study(read_study(folder / "study.toml"), workers=1)
     assert [row.error for row in table.rows] == ["", "RuntimeError: a fault of the program", ""] * 2
     assert_allclose(table.column("swing")[[0, 2]], [swing_of(1, 9.81), swing_of(4, 9.81)], rtol=1e-6)
 
@@ -130,13 +162,13 @@ def test_what_nobody_foresaw_is_a_row_too(folder, monkeypatch):
 def test_equilibria_and_driven_motions_can_be_varied_too(folder):
     text = STUDY.replace('"eig"', '"static"').replace('"frequency 1"', '"hinge.angle value"')
     (folder / "study.toml").write_text(text)
-    table = run_study(read_study(folder / "study.toml"), processes=1)
+    table = run_study(read_study(folder / "study.toml"), workers=1)
     assert_allclose(np.abs(table.column("swing")), np.pi / 2, rtol=1e-8)
     drive = '\n[joints.hinge.motions.angle]\ntype = "harmonic"\namplitude = 1.0\nomega = 2.0\n'
     (folder / "pendulum.toml").write_text(PENDULUM.replace("\n[run]", drive + "\n[run]").replace("1e-3", "5e-2"))
     text = STUDY.replace('"eig"', '"inverse"').replace('"frequency 1"', '"hinge.angle force"\ntake = "first"')
     (folder / "study.toml").write_text(text)
-    table = run_study(read_study(folder / "study.toml"), processes=1)
+    table = run_study(read_study(folder / "study.toml"), workers=1)
     assert_allclose(table.column("swing"), [m * -g * 0.5 for g, m in (row.values for row in table.rows)], rtol=1e-9)
     assert table.units == ("N m",)
 

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from fe_models.foundation.processes import ProcessError, map_in_processes
+from fe_models.foundation.tasks.processes import map_in_processes
+from fe_models.foundation.tasks.task_map import ProcessError
 from tests.root import ROOT, heed_interrupts
 
 
@@ -93,8 +94,8 @@ SLEEPS = """
     import sys
     from functools import partial
     from pathlib import Path
-    from fe_models.foundation.processes import map_in_processes
-    from tests.fe_models.foundation.test_processes import note_and_sleep
+    from fe_models.foundation.tasks.processes import map_in_processes
+    from tests.fe_models.foundation.tasks.test_processes import note_and_sleep
     if __name__ == "__main__":
         map_in_processes(partial(note_and_sleep, Path(sys.argv[1])), [1, 2], 2)
 """

@@ -1,0 +1,74 @@
+"""Where tasks are computed, as a user says it: a number of processes, dask, dask:4, dask://host:port."""
+
+import re
+from contextlib import AbstractContextManager, nullcontext
+
+from fe_models.foundation.tasks.processes import WorkerPool
+from fe_models.foundation.tasks.task_map import TaskMap, WorkerError
+from fe_models.foundation.tasks.this_process import ThisProcess
+from fe_models.foundation.threads import n_processors, n_threads
+from fe_models.foundation.words import quoted
+
+__all__ = ["WORKERS_HELP", "Workers", "checked_workers", "tasks_of"]
+
+Workers = int | str | TaskMap | None  #: None: one process a processor
+
+WORKERS_HELP = "a number of processes, dask (a local cluster; dask:4 of 4 workers), or dask://host:port of a scheduler"
+PORT = 8786  #: where a scheduler listens unless told otherwise
+ADDRESS = re.compile(r"dask://(?P<host>\[[0-9a-fA-F:.]+\]|[\w.-]+)(?::(?P<port>\d{1,5}))?/?")
+
+
+def checked_workers(text: int | str) -> int | str:
+    """Return what a user wrote as a number, or as it stands where it is of Dask.
+
+    Raises
+    ------
+    WorkerError
+        If it is neither.
+    """
+    word = str(text).strip()
+    if re.fullmatch(r"[1-9]\d{0,3}", word):
+        return int(word)
+    if word == "dask" or re.fullmatch(r"dask:[1-9]\d{0,3}", word) or ADDRESS.fullmatch(word):
+        return word
+    hint = ""
+    if "dask" in word or "://" in word or re.fullmatch(r"[\w.-]+:\d+", word):
+        hint = f"; did you mean dask://{word.rpartition('//')[2]}?" if re.search(r":\d+$", word) else ""
+    raise WorkerError(f"workers = {quoted(text)}: expected {WORKERS_HELP}{hint}")
+
+
+def tasks_of(
+    workers: Workers, n_values: int | None = None, *, threads: int | None = 1
+) -> AbstractContextManager[TaskMap]:
+    """Return the map over tasks that is meant; one that is a map already is not ended by this context.
+
+    Parameters
+    ----------
+    workers
+        As `checked_workers` takes it, a map, or None: a process a processor.
+    n_values
+        How many values there are at most: no more workers than that are started.
+    threads
+        How many threads a task may take; None: an equal share of the processors. Workers of a cluster that runs already
+        have those that it gave them.
+
+    Raises
+    ------
+    WorkerError
+        If the words are not understood, or the cluster cannot be reached or started.
+    """
+    if workers is not None and not isinstance(workers, int | str):
+        return nullcontext(workers)
+    asked = n_processors() if workers is None else checked_workers(workers)
+    if isinstance(asked, int):
+        n = min(asked, n_values or asked)
+        each = max(1, n_threads() // n) if threads is None else threads
+        return ThisProcess(each if n_values != 1 or threads is not None else None) if n == 1 else WorkerPool(n, each)
+    from fe_models.foundation.tasks.dask_tasks import dask_at, dask_here
+
+    found = ADDRESS.fullmatch(asked)
+    if found:
+        return dask_at(found["host"], int(found["port"] or PORT))
+    n = int(asked.partition(":")[2] or n_processors())
+    n = min(n, n_values or n)
+    return dask_here(n, max(1, n_threads() // n) if threads is None else threads)
