@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.analyses.observed_state import observed_state
+from floatframe.analyses.relative.tree_flow import tree_flow
 from floatframe.analyses.system_matrices import held_rows, turning_matrices
 from floatframe.checked_values import array_of_shape
 from floatframe.compiling.callbacks import raise_errors_of
@@ -31,6 +32,7 @@ from floatframe.kernels.model import STIFFNESS, Model
 from floatframe.kernels.work import Work, new_work
 from floatframe.motion.stop_events import require_off_stops
 from floatframe.motion.validity_watch import ValidityWatch
+from floatframe.relative.formulation import is_relative
 from floatframe.results.validity import ValidityNote
 from floatframe.rotations import rotation_matrix
 from floatframe.start.initial import (
@@ -145,9 +147,16 @@ class StatesAtRest:
 
 
 def static_equilibrium(
-    system: System, state: State | None = None, *, tolerance: float = 1e-9, max_iterations: int = 200
+    system: System,
+    state: State | None = None,
+    *,
+    tolerance: float = 1e-9,
+    max_iterations: int = 200,
+    formulation: str = "absolute",
 ) -> Equilibrium:
     """Return the equilibrium at rest near a state (default: the bodies as placed), under all forces of the system.
+
+    formulation: "absolute", or "relative": along the coordinates of joints, those of the tree closed to rounding.
 
     Raises
     ------
@@ -156,7 +165,10 @@ def static_equilibrium(
     ModelError
         If the joints cannot be closed, or some constraints repeat others.
     """
-    return steady_rotation(system, (0.0, 0.0, 0.0), state=state, tolerance=tolerance, max_iterations=max_iterations)
+    return steady_rotation(
+        system, (0.0, 0.0, 0.0), state=state, tolerance=tolerance, max_iterations=max_iterations,
+        formulation=formulation,
+    )  # fmt: skip
 
 
 def steady_rotation(
@@ -167,6 +179,7 @@ def steady_rotation(
     state: State | None = None,
     tolerance: float = 1e-9,
     max_iterations: int = 200,
+    formulation: str = "absolute",
 ) -> Equilibrium:
     """Return the state in which the whole system turns like a rigid body about an axis fixed in space.
 
@@ -184,13 +197,15 @@ def steady_rotation(
         Largest force out of balance, relative to the forces at work.
     max_iterations
         Steps towards the equilibrium.
+    formulation
+        "absolute", or "relative": along the coordinates of joints, those of the tree closed to rounding.
 
     Raises
     ------
     ConvergenceError
         If no such motion is found.
     ModelError
-        If the joints cannot be closed or do not allow the rotation, or some constraints repeat others.
+        If there is no such formulation, the joints cannot be closed or do not allow the rotation, or some constraints repeat others.
     """
     omega = array_of_shape("steady_rotation: omega", omega, (3,))
     center = array_of_shape("steady_rotation: center", center, (3,))
@@ -203,6 +218,7 @@ def steady_rotation(
             "take steady_motion, also for speed 0"
         )
     resting = compiled.resting_model
+    flow = tree_flow(system, omega) if is_relative(formulation) else None
     states = StatesAtRest.of(compiled)
     work = new_work(model)
     w = start_unknowns(model, known_of(compiled, state))
@@ -216,6 +232,8 @@ def steady_rotation(
         state, u_dot = turning(compiled, state, omega, center)
         set_iterate(work, state, u_dot, w)
         states.prepare(work, w, tau)
+        if flow is not None:
+            w = flow.wrenches(work, state, u_dot, w)
         parts, K = _tangent(resting, work, omega)
         raise_errors_of(compiled.callbacks)
         require_numbers(compiled, work)
@@ -250,11 +268,19 @@ def steady_rotation(
             fall = last / max(size, np.finfo(float).tiny) if error > tolerance else np.inf  # below, it is rounding
             tau *= min(max(fall, LEAST_GROWTH), FASTEST_GROWTH) if fall > STANDING else max(fall, 0.1)
         last = size
-        y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
-        if not np.isfinite(y).all():
+        ds = None
+        if flow is not None:
+            ds, moved, dw = flow.step(work, state, u_dot, w, tau)
+        if ds is None or not np.abs(moved).max() > ROUNDING:  # so little is noise of coordinates: bodies one by one
+            y, dw = solve(tuple(k + m / tau for k, m in zip(K, W, strict=True)), parts, -forces, -gaps)
+            ds, moved = None, in_ground_axes(model, state, y)
+        if not np.isfinite(moved).all():
             break
-        part = min(1.0, LARGEST_TURN / max(largest_motion(compiled, y), 1e-300))
-        state = displaced(model, state, part * in_ground_axes(model, state, y))
+        part = min(1.0, LARGEST_TURN / max(largest_motion(compiled, moved), 1e-300))
+        if flow is not None and ds is not None:
+            state = flow.displaced(work, state, part * ds)
+        else:
+            state = displaced(model, state, part * moved)
         w = w + part * dw
         states.follow(w, dw)
     lost = indefinite_masses(system, state)

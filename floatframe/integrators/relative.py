@@ -15,6 +15,7 @@ from floatframe.joints.rows import is_held_position
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.model import Model
 from floatframe.kernels.work import Work, new_work
+from floatframe.relative.formulation import is_relative
 from floatframe.relative.kernels.tree import JointWork, TangentWork, Tree, new_joint_work, new_tangent_work
 from floatframe.relative.topology import tree_of
 from floatframe.start.initial import acceleration_rates, consistent_motion, work_from
@@ -22,9 +23,8 @@ from floatframe.start.newton_equations import displaced, set_iterate
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["FORMULATIONS", "RelativeGeneralizedAlpha", "in_formulation"]
+__all__ = ["RelativeGeneralizedAlpha", "in_formulation"]
 
-FORMULATIONS = ("absolute", "relative")  #: by their names
 NEAR_BY = 1e-3  #: of a step, of the difference that gives the rates of accelerations
 
 
@@ -154,9 +154,7 @@ def in_formulation(integrator: Integrator, formulation: str | None) -> Integrato
     """
     if formulation is None:
         return integrator
-    if formulation not in FORMULATIONS:
-        raise ModelError(f"formulation: expected one of {', '.join(FORMULATIONS)}, got {formulation!r}")
-    if formulation == "absolute":
+    if not is_relative(formulation):
         return integrator.absolute if isinstance(integrator, RelativeGeneralizedAlpha) else integrator
     if isinstance(integrator, RelativeGeneralizedAlpha | RelativeOde):
         return integrator

@@ -15,8 +15,9 @@ from floatframe.errors import SystemFileError
 from floatframe.integrators import INTEGRATORS
 from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
-from floatframe.integrators.relative import FORMULATIONS, in_formulation
+from floatframe.integrators.relative import in_formulation
 from floatframe.motion.foreign_units import Coupling
+from floatframe.relative.formulation import FORMULATIONS
 
 __all__ = ["RunOptions", "RunSection", "required_run"]
 

@@ -44,6 +44,7 @@ from floatframe.analyses.linear.inputs import (
     input_rate,
     interface_forces,
 )
+from floatframe.analyses.relative.coordinate_basis import coordinate_basis
 from floatframe.analyses.snapshot import snapshot
 from floatframe.analyses.steady.steadiness import require_steady
 from floatframe.analyses.system_matrices import Inputs, Tangents, settled, tangents, turning_matrices
@@ -53,6 +54,7 @@ from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
 from floatframe.kernels.work import Work, new_work
+from floatframe.relative.formulation import is_relative
 from floatframe.results.sensors.measurement import unit_words
 from floatframe.small_motions.joint_rates import coordinate_rows
 from floatframe.small_motions.rows import Rows, joined
@@ -124,6 +126,7 @@ class LinearSystem:
     #: matrix, of M by z'' alone
     states: tuple[str, ...] = ()
     state_units: tuple[str, ...] = ()
+    coordinates: tuple[str, ...] = ()  #: names of z, in relative coordinates without held velocities; else empty
 
     def __post_init__(self) -> None:
         n_z, n_s, n_y = self.M.shape[0], len(self.inputs), len(self.outputs)
@@ -170,7 +173,7 @@ class LinearSystem:
             self.D_acceleration + self.L @ by_input[2] + self.L_rate @ by_input[1] + self.L_acceleration @ by_input[0]
         )
         motions = None if self.motions is None else replace(self.motions, rows=self.motions.rows @ T)
-        return replace(self, **parts, Y=self.Y + self.N @ by_input[0], motions=motions), T
+        return replace(self, **parts, Y=self.Y + self.N @ by_input[0], motions=motions, coordinates=()), T
 
     def motions_with_and_without_mass(self) -> tuple[Array, Array]:
         """Return bases of z: motions with mass (orthonormal by it) and states, and motions without mass."""
@@ -321,6 +324,7 @@ def linearize(
     *,
     inputs: Sequence[AnyInput] | None = None,
     outputs: Sequence[AnyOutput] | None = None,
+    formulation: str = "absolute",
 ) -> LinearSystem:
     """Linearise a system about an equilibrium, a steady rotation or steady running.
 
@@ -335,18 +339,21 @@ def linearize(
     outputs
         Sensors (an output for each column that is linear here, see `LinearSystem.left_out`), columns of them (`Column`)
         and channels; directions turn with a steady rotation. None: those of the system.
+    formulation
+        "relative": z are the coordinates of the joints of the tree and the modes, less those that close its loops, and
+        have names, `LinearSystem.coordinates`. "absolute": z are any independent motions.
 
     Raises
     ------
     ModelError
-        If nothing can move, the state moves but is not steady, a channel is at a place that does not exist, or a column
-        asked for is not linear here.
+        If there is no such formulation, nothing can move, the state moves but is not steady, a channel is at a place
+        that does not exist, or a column asked for is not linear here.
     """
     inputs = inputs_of(system.inputs) if inputs is None else tuple(inputs)
     outputs = outputs_of(system.outputs) if outputs is None else tuple(outputs)
     for channel in inputs:
         require_input(channel)
-    about = static_equilibrium(system) if about is None else about
+    about = static_equilibrium(system, formulation=formulation) if about is None else about
     compiled = compiled_system(system)
     model, work = compiled.model, new_work(compiled.model)
     work.state.time[...] = about.t
@@ -363,7 +370,9 @@ def linearize(
     small = SmallMotions(system, compiled, work, state, about.omega, now, bases, forces)
     by_inputs = input_columns(small, inputs).beside(parts.by_states)
     Omega, Omega_t = turning_matrices(model, work, about.omega)
-    N = allowed_motions(parts.G, compiled.length, [int(u0) for u0 in model.bodies.u0[:-1]])
+    basis = coordinate_basis(system, state, parts.G, shown) if is_relative(formulation) else None
+    u0 = [int(u0) for u0 in model.bodies.u0[:-1]]
+    N = allowed_motions(parts.G, compiled.length, u0) if basis is None else basis.N
     if N.shape[1] == 0:
         raise ModelError(f"system {system.name!r}: its joints and drives allow no motion; nothing can be linearised")
     roll = rolling(parts, Omega, N, by_inputs)
@@ -396,7 +405,12 @@ def linearize(
     }
     matrices = {"M": N.T @ D_2 @ N, "C": N.T @ D_1 @ N, "K": K_z, **coefficients, "N": by_bodies}
     matrices = with_states(matrices, n_states)
-    motions = named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N, n_states)
+    if basis is None:
+        motions = named_motions(system, by_bodies, coordinate_rows(system, compiled, work, state), N, n_states)
+    else:
+        rows_of_z = np.eye(len(basis.names), len(basis.names) + n_states)
+        ranks = (0,) * len(basis.names)
+        motions = NamedMotions(basis.names, basis.units, rows_of_z, ranks, system.units.time_symbol)
     if roll is not None:
         matrices, states = rolled(matrices, roll, n_states), states.behind(roll, system.units.length_symbol)
         motions = replace(motions, rows=motions.rows @ roll.places(n_states))
@@ -418,6 +432,7 @@ def linearize(
         motions=motions,
         states=states.names,
         state_units=states.units,
+        coordinates=basis.names if basis is not None and roll is None else (),
     )
 
 

@@ -195,10 +195,13 @@ def newton_step(
 ) -> tuple[Array, Array]:
     """Return Newton's correction of unknowns, (n_s,), and of kept wrenches times c_k, (n_rows,), at the iterate.
 
-    is_exact: with the exact matrix, else with that of `kernels.kept_factors`.
+    is_exact: with the exact matrix, else with that of `kernels.kept_factors`. Not a number where the matrix is singular.
     """
     tangent = new_tangent_work(model, tree)
-    call(model, work, tree, joints, tangent, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k, n_steps=int(not is_exact))
+    weights = {"c_m": c_m, "c_d": c_d, "c_k": c_k}
+    outcome = call(model, work, tree, joints, tangent, what=CORRECT, n_steps=int(not is_exact), **weights)
+    if outcome.status == SINGULAR:
+        tangent.step[:], tangent.mu[:] = np.nan, np.nan
     return tangent.step, tangent.mu
 
 

@@ -1,0 +1,169 @@
+"""Small motions in the coordinates of joints and modes: a basis whose every motion has a name.
+
+With s the coordinates of the joints of the tree and the modes (docs/relative.md §2), a body moves by xi = N_s ds, which
+keeps the joints of the tree closed; column k is the velocity of all bodies at rate one of coordinate k. Where loops
+close, G N_s ds = 0 besides, with as many dependent coordinates as G N_s has rank:
+
+    ds_d = -(G N_s)_d⁺ (G N_s)_i ds_i,        N = N_s [1; -(G N_s)_d⁺ (G N_s)_i]
+
+Dependent are coordinates far out in the tree, before those near the ground, and joints before modes, as long as they
+move what is held by a tenth of what the best one does.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.foundation.arrays import Array, IntArray
+from floatframe.compiling.system import CompiledSystem, compiled_system
+from floatframe.joints.rows import is_held_length, is_held_position
+from floatframe.kernels.work import new_work
+from floatframe.relative.kernels.tree import Tree, new_joint_work
+from floatframe.relative.topology import tree_of
+from floatframe.results.sensors.measurement import unit_words
+from floatframe.rotations import rotation_matrix
+from floatframe.start.newton_equations import set_iterate
+from floatframe.state import State
+from floatframe.system import System
+
+__all__ = ["CoordinateBasis", "coordinate_basis", "coordinate_motions", "coordinate_names", "dependent_coordinates"]
+
+RANK = 1e-10  #: of the largest row of what coordinates move, below which what is left repeats others
+NEARLY = 0.1  #: of the largest column that is left: one of these may be dependent
+MODE = 1e-3  #: size of a modal coordinate against that of a joint, so that modes are dependent last
+FRAME = ("x", "y", "z", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True, eq=False)
+class CoordinateBasis:
+    """Independent coordinates and what they move."""
+
+    names: tuple[str, ...]  #: "joint.coordinate", "body mode k", "body x"
+    units: tuple[str, ...]
+    N: Array  #: motions of the bodies (body axes of the engine) by them, (n_u, n_z)
+
+
+def coordinate_basis(system: System, state: State, G: Array, shown: tuple[Array, ...]) -> CoordinateBasis:
+    """Return the independent coordinates at a state, and the motions of the bodies by them.
+
+    Parameters
+    ----------
+    system
+        The system.
+    state
+        In the frames of the engine, joints closed.
+    G
+        Rows of all positions that are held, over the motions of the bodies, (n_held, n_u).
+    shown
+        Of each body, its motions in the frame of its file by those in the frame of the engine, (6 + n, 6 + n): those of
+        a body that hangs at nothing are named as its file has it.
+    """
+    compiled, tree = compiled_system(system), tree_of(system).tree
+    N, units = coordinate_motions(system, state), coordinate_units(system)
+    T = free_frames(compiled, tree, N, shown)
+    if T is not None:
+        N = np.linalg.solve(T.T, N.T).T
+    model = compiled.model
+    held = is_held_position(model.rows.kind)
+    kept = (tree.kept_row >= 0)[held]
+    row_size = np.where(is_held_length(model.rows.kind[held]), compiled.length, 1.0)[kept]
+    C = G[kept] @ N / row_size[:, None]
+    size = np.where(tree.mode >= 0, MODE, [compiled.length if unit == "m" else 1.0 for unit in units])
+    dependent = dependent_coordinates(C * size, preference(tree))
+    free = np.setdiff1d(np.arange(len(size)), dependent)
+    if len(dependent):
+        by_free = np.linalg.lstsq(C[:, dependent] * size[dependent], C[:, free], rcond=None)[0]
+        N = N[:, free] - N[:, dependent] @ (size[dependent, None] * by_free)
+    names = coordinate_names(system)
+    words = {"m": system.units.length_symbol, "": unit_words(system.units, "modal")}
+    return CoordinateBasis(
+        tuple(names[k] for k in free), tuple(words.get(units[k], units[k]) for k in free), np.asarray(N)
+    )
+
+
+def coordinate_motions(system: System, state: State) -> Array:
+    """Return N_s: motions of the bodies, body axes of the engine, by all coordinates that are unknown, (n_u, n_s)."""
+    from floatframe.relative.kernels.entry import motion_of_bodies, motion_of_joints
+
+    compiled, tree = compiled_system(system), tree_of(system).tree
+    model = compiled.model
+    work, joints = new_work(model), new_joint_work(model, tree)
+    set_iterate(work, State(state.r, state.p, state.q, np.zeros_like(state.u)))
+    motion_of_joints(model, work, tree, joints)
+    joints.rate[:], joints.acceleration[:] = 0.0, 0.0
+    turns = [rotation_matrix(p).T for p in state.p]
+    N = np.zeros((len(state.u), len(tree.slot)))
+    for k, (column, slot) in enumerate(zip(tree.column, tree.slot, strict=True)):
+        work.state.u[:] = 0.0
+        rates = joints.rate if column >= 0 else work.state.u
+        place = column if column >= 0 else slot
+        rates[place] = 1.0
+        motion_of_bodies(model, work, tree, joints)
+        N[:, k] = work.state.u
+        rates[place] = 0.0
+        for u0, turn in zip(model.bodies.u0[:-1], turns, strict=True):
+            N[u0 : u0 + 3, k] = turn @ N[u0 : u0 + 3, k]
+    return N
+
+
+def coordinate_names(system: System) -> tuple[str, ...]:
+    """Return the names of all coordinates that are unknown, body by body, first those of its joint, (n_s,)."""
+    parts, body_names = tree_of(system), compiled_system(system).body_names
+    tree, names = parts.tree, []
+    for i, body in enumerate(body_names):
+        own = parts.columns[tree.column0[i] : tree.column0[i + 1]]
+        stems = [f"{body} {name}" for name in FRAME] if tree.joint[i] < 0 else [
+            f"{each.joint}.{each.coordinate}" for each in own
+        ]  # fmt: skip
+        names += [stem for stem, each in zip(stems, own, strict=True) if not each.is_driven]
+        names += [f"{body} mode {k + 1}" for k in range(int(tree.s0[i + 1] - tree.m0[i]))]
+    return tuple(names)
+
+
+def coordinate_units(system: System) -> tuple[str, ...]:
+    """Return "rad", "m" for a length, or "" for a mode, of all coordinates that are unknown, (n_s,)."""
+    parts = tree_of(system)
+    return tuple("" if column < 0 else parts.columns[column].unit for column in parts.tree.column)
+
+
+def free_frames(compiled: CompiledSystem, tree: Tree, N: Array, shown: tuple[Array, ...]) -> Array | None:
+    """Return coordinates as they are named by those of the tree, (n_s, n_s); None if no body hangs at nothing."""
+    free = np.flatnonzero(tree.joint < 0)
+    if not len(free):
+        return None
+    T = np.eye(len(tree.slot))
+    for i in free:
+        u = slice(int(compiled.model.bodies.u0[i]), int(compiled.model.bodies.u0[i + 1]))
+        T[tree.s0[i] : tree.m0[i]] = (shown[i] @ N[u])[:6]
+    return T
+
+
+def preference(tree: Tree) -> IntArray:
+    """Return how far out in the tree each coordinate is, modes nearer than any joint, (n_s,)."""
+    depth: dict[int, int] = {-1: 0}
+    for i in tree.order:
+        depth[int(i)] = depth[int(tree.parent[i])] + 1
+    body = np.repeat(np.arange(len(tree.parent)), np.diff(tree.s0))
+    return np.where(tree.mode >= 0, 0, [depth[int(i)] for i in body])
+
+
+def dependent_coordinates(C: Array, preferred: IntArray) -> IntArray:
+    """Return the columns of C that depend on the others, as many as it has rank, by elimination with chosen pivots.
+
+    Of columns whose part that is new is at least a tenth of the largest, the one most preferred, the last of these.
+    """
+    left = C.copy()
+    first = np.linalg.norm(left, axis=0).max(initial=0.0)
+    chosen: list[int] = []
+    while len(chosen) < min(C.shape):
+        size = np.linalg.norm(left, axis=0)
+        size[chosen] = 0.0
+        if size.max() <= RANK * first:
+            break
+        good = np.flatnonzero(size >= NEARLY * size.max())
+        best = good[np.lexsort((good, preferred[good]))[-1]]
+        direction = left[:, best] / size[best]
+        for _ in range(2):  # twice: what rounding left the first time
+            left -= np.outer(direction, direction @ left)
+        chosen.append(int(best))
+    return np.array(sorted(chosen), dtype=np.int64)
