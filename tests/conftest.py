@@ -11,6 +11,28 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     for name in ("COLUMNS", "LINES"):  # a worker has those of a terminal, and tables would be cut to its width
         os.environ.pop(name, None)
 
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--formulation", choices=("absolute", "relative"), default="absolute",
+        help="formulation of what a test gives none; relative: tests of the engine alone",
+    )  # fmt: skip
+
+
+def pytest_configure(config):
+    if config.getoption("formulation") == "relative":
+        from tests.floatframe.formulations import take_relative
+
+        take_relative()
+
+
+def pytest_collection_modifyitems(config, items):
+    if config.getoption("formulation") == "relative":
+        from tests.floatframe.formulations import select
+
+        select(config, items)
+
+
 REQUIRES_ALL = os.environ.get("FLOATFRAME_REQUIRE_ALL") == "1"
 
 

@@ -205,7 +205,8 @@ def steady_rotation(
     ConvergenceError
         If no such motion is found.
     ModelError
-        If there is no such formulation, the joints cannot be closed or do not allow the rotation, or some constraints repeat others.
+        If there is no such formulation, the joints cannot be closed or do not allow the rotation, or some constraints
+        repeat others.
     """
     omega = array_of_shape("steady_rotation: omega", omega, (3,))
     center = array_of_shape("steady_rotation: center", center, (3,))
@@ -218,7 +219,9 @@ def steady_rotation(
             "take steady_motion, also for speed 0"
         )
     resting = compiled.resting_model
-    flow = tree_flow(system, omega) if is_relative(formulation) else None
+    flow = None
+    if is_relative(formulation):
+        flow = tree_flow(system, lambda state: turning(compiled, state, omega, center), rests=not omega.any())
     states = StatesAtRest.of(compiled)
     work = new_work(model)
     w = start_unknowns(model, known_of(compiled, state))

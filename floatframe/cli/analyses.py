@@ -24,6 +24,10 @@ Json = Annotated[bool, typer.Option("--json", help="Write the same record as JSO
 Speed = Annotated[float, typer.Option(help="Speed of a steady rotation of the whole system [rad/time unit].")]
 Axis = Annotated[str, typer.Option(help='Axis of the rotation in ground axes: x, y, z or "0.6,0,0.8".')]
 Center = Annotated[str, typer.Option(help='A point of the axis: "x,y,z".')]
+Formulation = Annotated[
+    str | None,
+    typer.Option("--formulation", help="absolute or relative (joint) coordinates; default: as in [run], or absolute."),
+]
 Modes = Annotated[int, typer.Option("--modes", "-n", help="How many modes, by ascending frequency.")]
 
 
@@ -35,7 +39,7 @@ def register(app: typer.Typer) -> None:
 
 
 @guarded
-def static_command(system: SystemArgument, json: Json = False) -> None:
+def static_command(system: SystemArgument, formulation: Formulation = None, json: Json = False) -> None:
     """Find the equilibrium of a system at rest: where its bodies are, reactions, and whether it is stable.
 
     Example: floatframe static crane.toml
@@ -44,10 +48,10 @@ def static_command(system: SystemArgument, json: Json = False) -> None:
     from floatframe.compiling.system import compiled_system
     from floatframe.errors import ModelError
 
-    model = read(system)
-    rest = static_equilibrium(model)
+    model, form = read_in_formulation(system, formulation)
+    rest = static_equilibrium(model, formulation=form)
     try:
-        is_stable = system_modes(linearize(model, rest)).is_stable
+        is_stable = system_modes(linearize(model, rest, formulation=form)).is_stable
     except ModelError:  # nothing can move
         is_stable = True
     record = equilibrium_record(model, rest) | {"is_stable": is_stable}
@@ -109,6 +113,7 @@ def eig_command(
         Path | None, typer.Option("--output", "-o", help="Film (.gif, .mp4) or picture (.png) of the mode.")
     ] = None,
     color: Annotated[str, typer.Option(help="Colour of the film: displacement or von-mises.")] = "displacement",
+    formulation: Formulation = None,
     json: Json = False,
 ) -> None:
     """Vibration modes of a system about its equilibrium, or about a steady rotation: frequency, damping, what moves.
@@ -130,10 +135,10 @@ def eig_command(
         raise ModelError(f"--color {color}: expected one of {', '.join(BODY_COLORS)}{nearest(color, BODY_COLORS)}")
     if output is not None and len(animate) != 1:
         raise ModelError(f"--output {output}: expected --animate with the number of one mode, got {len(animate)}")
-    model = read(system)
+    model, form = read_in_formulation(system, formulation)
     films = {k: output_path(output, system.with_suffix(f".mode{k}.gif"), ModelError,
                             overwrite_of=(system, *model.files), needs_file=True) for k in animate}  # fmt: skip
-    linear = linearized(model, speed, axis, center)
+    linear = linearized(model, speed, axis, center, formulation=form)
     modes = system_modes(linear)
     per_second = 1 / model.units.time
     record: dict[str, Any] = {
@@ -260,13 +265,19 @@ def draw_mode_film(
 
 def read(path: Path) -> "System":
     """Return the system of a file."""
-    from floatframe.system_file.read_system import read_system
+    return read_in_formulation(path, None)[0]
 
-    system = read_system(path)[0]
+
+def read_in_formulation(path: Path, formulation: str | None) -> "tuple[System, str]":
+    """Return the system of a file and the formulation that is asked for, else that of its table [run], or absolute."""
+    from floatframe.system_file.read_system import read_system
+    from floatframe.system_file.run_section import formulation_of
+
+    system, run = read_system(path)
     if system.fmus:
         names = ", ".join(unit.name for unit in system.fmus)
         typer.echo(f"note: units of other programs (fmus: {names}) act in runs only; they are left out here", err=True)
-    return system
+    return system, formulation_of(run) if formulation is None else formulation
 
 
 def linearized(
@@ -277,6 +288,7 @@ def linearized(
     *,
     inputs: "tuple[AnyInput, ...]" = (),
     outputs: "tuple[AnyOutput, ...]" = (),
+    formulation: str = "absolute",
 ) -> "LinearSystem":
     """Return the system linearised about rest, or about a steady rotation."""
     import numpy as np
@@ -285,8 +297,8 @@ def linearized(
     from floatframe.checked_values import unit_vector
 
     omega = speed * np.asarray(unit_vector("--axis", vector(axis, "--axis")))
-    about = steady_rotation(system, omega, center=vector(center, "--center"))
-    return linearize(system, about, inputs=inputs, outputs=outputs)
+    about = steady_rotation(system, omega, center=vector(center, "--center"), formulation=formulation)
+    return linearize(system, about, inputs=inputs, outputs=outputs, formulation=formulation)
 
 
 def vector(text: str, where: str) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cms.cli.console import guarded, output_path, print_table, say
-from floatframe.cli.analyses import Axis, Center, Speed, SystemArgument, linearized, read
+from floatframe.cli.analyses import Axis, Center, Formulation, Speed, SystemArgument, linearized, read_in_formulation
 from floatframe.cli.channel_names import chosen
 
 if TYPE_CHECKING:
@@ -43,12 +43,14 @@ def linearize_command(
     speed: Speed = 0.0,
     axis: Axis = "z",
     center: Center = "0,0,0",
+    formulation: Formulation = None,
 ) -> None:
     """Linearise a system: the state space A, B, C, D with names, and M, C, K of its independent motions, into a file.
 
     Inputs and outputs are those of the tables [inputs] and [outputs] of the system, unless named here: sensors by their
     names, one column of them as sensor.column; a place is written body/interface:component, with x, y, z, rx, ry, rz.
-    Without -o crane.toml gives crane.npz.
+    With --formulation relative the motions are joint coordinates and modes, less those that close loops. Without -o
+    crane.toml gives crane.npz.
 
     Example: floatframe linearize crane.toml -o crane.mat
 
@@ -57,7 +59,7 @@ def linearize_command(
     from floatframe.analyses.linear.state_space import WRITERS, write_state_space
     from floatframe.errors import ModelError
 
-    model = read(system)
+    model, form = read_in_formulation(system, formulation)
     path = output_path(output, system.with_suffix(".npz"), ModelError, overwrite_of=(system, *model.files))
     if path.suffix.lower() not in WRITERS:
         raise ModelError(f"--output {path}: expected a file name that ends in {', '.join(WRITERS)}")
@@ -68,6 +70,7 @@ def linearize_command(
         center,
         inputs=chosen(model, inputs, model.inputs),
         outputs=chosen(model, outputs, model.outputs),
+        formulation=form,
     )
     space = write_state_space(linear, path)
     print_left_out(linear)
@@ -90,6 +93,7 @@ def response_command(
     speed: Speed = 0.0,
     axis: Axis = "z",
     center: Center = "0,0,0",
+    formulation: Formulation = None,
 ) -> None:
     """Frequency responses (Bode plot) of a system about its equilibrium, or about a steady rotation.
 
@@ -106,7 +110,7 @@ def response_command(
     from floatframe.analyses.linear.plots import plot_frequency_response
     from floatframe.errors import ModelError
 
-    model = read(system)
+    model, form = read_in_formulation(system, formulation)
     path = output_path(output, system.with_suffix(".response.png"), ModelError, overwrite_of=(system, *model.files))
     kind = path.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg", "pdf", "csv"):
@@ -118,6 +122,7 @@ def response_command(
         center,
         inputs=chosen(model, inputs, model.inputs),
         outputs=chosen(model, outputs, model.outputs),
+        formulation=form,
     )
     print_left_out(linear)
     seconds = model.units.time

@@ -129,7 +129,7 @@ class RelativeGeneralizedAlpha:
 
         if outcome[0] == 0:
             return None
-        if outcome[0] != SINGULAR:
+        if outcome[0] != SINGULAR or int(work.counted.no_number):
             return self.absolute.explain(system, work, outcome, self.absolute.least_step(h))
         parts = tree_of(system)
         held = [*parts.cut, *parts.constrained]

@@ -40,12 +40,13 @@ class EvaluationFunction:
     def __call__(self, values: tuple[float, ...]) -> Evaluation:
         """Return the numbers at these values of the parameters."""
         from floatframe.system_file.read_system import read_system
+        from floatframe.system_file.run_section import formulation_of
 
         design = self.design
         system, given = read_system(design.study.system, design.study.changes(design.point(values)))
         found: dict[str, Any] = {}
         if {"eig", "response"} & set(design.analyses):
-            found["response"] = linear = linearize(system)
+            found["response"] = linear = linearize(system, formulation=formulation_of(given))
             found["eig"] = system_modes(linear) if "eig" in design.analyses else None
         for analysis in set(design.analyses) - set(found):
             found[analysis] = StudyPoint(design.study_of(analysis)).motion(system, given)

@@ -33,7 +33,7 @@ from floatframe.studies.study_file import TAKES, Output, Study
 from floatframe.studies.study_journal import open_study_journal
 from floatframe.studies.study_row import StudyRow
 from floatframe.system import System
-from floatframe.system_file.run_section import RunOptions, required_run
+from floatframe.system_file.run_section import RunOptions, formulation_of, required_run
 
 __all__ = ["StudyTable", "run_study", "sendable_study"]
 
@@ -184,7 +184,7 @@ class StudyPoint:
 
         system, given = read_system(self.study.system, self.study.changes(point))
         if self.study.analysis == "eig":
-            modes = system_modes(linearize(system))
+            modes = system_modes(linearize(system, formulation=formulation_of(given)))
             found = [taken_of_modes(output, modes, 1 / system.units.time) for output in self.study.outputs]
         else:
             motion = self.motion(system, given)
@@ -202,7 +202,7 @@ class StudyPoint:
     def motion(self, system: System, given: RunOptions | None) -> Trajectory:
         """Return the motion of the analysis; an equilibrium as one of one time."""
         if self.study.analysis == "static":
-            return equilibrium_of(system)
+            return equilibrium_of(system, formulation_of(given))
         return MOTIONS[self.study.analysis](system, required_run(given, self.study.system))
 
 
@@ -211,9 +211,9 @@ def motion_of_run(system: System, run: RunOptions) -> Trajectory:
     return integrate(system, run.integrator, run.t_end, run.h, output_every=run.output_every)
 
 
-def equilibrium_of(system: System) -> Trajectory:
+def equilibrium_of(system: System, formulation: str) -> Trajectory:
     """Return the equilibrium at rest, a motion of one time."""
-    rest = static_equilibrium(system)
+    rest = static_equilibrium(system, formulation=formulation)
     return snapshot(system, rest.state, rest.u_dot, rest.w)
 
 

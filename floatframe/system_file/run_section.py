@@ -15,11 +15,11 @@ from floatframe.errors import SystemFileError
 from floatframe.integrators import INTEGRATORS
 from floatframe.integrators.carry import Integrator
 from floatframe.integrators.generalized_alpha import GeneralizedAlpha, hht, newmark, trapezoidal
-from floatframe.integrators.relative import in_formulation
+from floatframe.integrators.relative import RelativeGeneralizedAlpha, in_formulation
 from floatframe.motion.foreign_units import Coupling
 from floatframe.relative.formulation import FORMULATIONS
 
-__all__ = ["RunOptions", "RunSection", "required_run"]
+__all__ = ["RunOptions", "RunSection", "formulation_of", "required_run"]
 
 MOST_TIMES = 1e8  #: at which a driven motion is computed
 NOT_OF_A_METHOD = ("t_end", "h", "output_every", "scheme", "formulation")
@@ -114,6 +114,11 @@ class RunOptions:
                 f"{wanted:.1e} times, expected up to {MOST_TIMES:.0e}; take t_end nearer, or a greater h"
             )
         return np.linspace(0.0, self.t_end, max(1, round(wanted)) + 1)
+
+
+def formulation_of(run: RunOptions | None) -> str:
+    """Return the formulation of a run, in which its analyses are made too; "absolute" without one."""
+    return "relative" if run is not None and isinstance(run.integrator, RelativeGeneralizedAlpha) else "absolute"
 
 
 def required_run(run: RunOptions | None, path: str | os.PathLike[str]) -> RunOptions:

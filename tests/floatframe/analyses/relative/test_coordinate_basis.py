@@ -25,8 +25,8 @@ from floatframe import (
 from floatframe.analyses.relative.coordinate_basis import coordinate_motions, coordinate_names, dependent_coordinates
 from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
 from floatframe.compiling.system import compiled_system
-from floatframe.kernels.work import new_work
 from floatframe.functions.time_functions import polynomial_of_time
+from floatframe.kernels.work import new_work
 from floatframe.mechanisms import double_pendulum, four_bar, rotating_blade, satellite, slider_crank
 from floatframe.relative.kernels.entry import motion_of_joints, newton_matrix
 from floatframe.relative.kernels.tree import new_joint_work
@@ -37,7 +37,7 @@ from tests.floatframe.relative.mechanisms import beam, falling
 
 
 def held_satellite():
-    """A flexible boom on a free hub, held by springs and dampers in its plane: a free body, modes, no symmetric point."""
+    """A flexible boom on a free hub, held by springs and dampers in its plane: a free body with modes."""
     free = satellite(spin=0.0, boom_length=1.0, boom=beam())
     ends = [(2.0, 0.0, 0.0), (-1.0, 2.0, 0.3), (0.0, -2.0, 1.0), (0.0, 0.4, -2.0)]
     springs = [
