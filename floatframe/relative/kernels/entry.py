@@ -195,7 +195,7 @@ def newton_step(
 ) -> tuple[Array, Array]:
     """Return Newton's correction of unknowns, (n_s,), and of kept wrenches times c_k, (n_rows,), at the iterate.
 
-    is_exact: with the exact matrix, else with that of `kernels.kept_factors`. Not a number where the matrix is singular.
+    is_exact: with the exact matrix, else with that of `kernels.kept_factors`. Not a number where it is singular.
     """
     tangent = new_tangent_work(model, tree)
     weights = {"c_m": c_m, "c_d": c_d, "c_k": c_k}
