@@ -62,7 +62,7 @@ def coordinate_basis(system: System, state: State, G: Array, shown: tuple[Array,
     N, units = coordinate_motions(system, state), coordinate_units(system)
     T = free_frames(compiled, tree, N, shown)
     if T is not None:
-        N = np.linalg.solve(T.T, N.T).T
+        N = np.asarray(np.linalg.solve(T.T, N.T).T, dtype=float)
     model = compiled.model
     held = is_held_position(model.rows.kind)
     kept = (tree.kept_row >= 0)[held]

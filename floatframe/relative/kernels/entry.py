@@ -198,8 +198,9 @@ def newton_step(
     is_exact: with the exact matrix, else with that of `kernels.kept_factors`. Not a number where it is singular.
     """
     tangent = new_tangent_work(model, tree)
-    weights = {"c_m": c_m, "c_d": c_d, "c_k": c_k}
-    outcome = call(model, work, tree, joints, tangent, what=CORRECT, n_steps=int(not is_exact), **weights)
+    outcome = call(
+        model, work, tree, joints, tangent, what=CORRECT, c_m=c_m, c_d=c_d, c_k=c_k, n_steps=int(not is_exact)
+    )
     if outcome.status == SINGULAR:
         tangent.step[:], tangent.mu[:] = np.nan, np.nan
     return tangent.step, tangent.mu
