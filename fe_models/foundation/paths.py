@@ -49,7 +49,7 @@ def same_file(path: Path, other: Path) -> bool:
     return path.resolve() == other.resolve()
 
 
-def replace_file(path: Path, *parts: bytes) -> None:
+def replace_file(path: Path, *parts: bytes | memoryview) -> None:
     """Write the parts beside `path`, make them durable, and give them its name in one step.
 
     A device or a pipe gets the bytes instead, and stays what it is.
@@ -106,7 +106,7 @@ def part_of(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
 
 
-def write_part(part: Path, *parts: bytes) -> None:
+def write_part(part: Path, *parts: bytes | memoryview) -> None:
     """Write a new file and make it durable."""
     descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
     with open(descriptor, "wb") as file:
@@ -116,7 +116,7 @@ def write_part(part: Path, *parts: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def write_stream(path: Path, *parts: bytes) -> None:
+def write_stream(path: Path, *parts: bytes | memoryview) -> None:
     """Write the parts to a device or a pipe, or after what was written to standard output before."""
     own = own_descriptor(path)
     for stream in (sys.stdout, sys.stderr):

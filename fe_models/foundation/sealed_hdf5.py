@@ -63,9 +63,10 @@ def write_sealed(content: Content, path: str | os.PathLike[str]) -> None:
         image = hdf5_image(content)
     except ValueError as error:  # a text that no file can hold
         raise ModalFileError(str(error)) from error
-    seal = seal_of(io.BytesIO(image), Kind(content.format, content.version, ModalFileError, ""))
+    seal = seal_of(image, Kind(content.format, content.version, ModalFileError, ""))
     try:
-        replace_file(path, seal, image[SEAL_SIZE:])
+        with image.getbuffer() as data:  # in place: a copy of a large file would be memory for nothing
+            replace_file(path, seal, data[SEAL_SIZE:])
     except OSError as error:
         old = "; the file that was there is unchanged" if path.is_file() else "; nothing was written"
         raise ModalFileError(f"{path}: cannot be written: {reason(error)}{old}") from error
@@ -91,8 +92,8 @@ def read_sealed(path: str | os.PathLike[str], kind: Kind) -> Content:
         return Content(kind.format, int(stated or 0), *walk(file, path, kind))
 
 
-def hdf5_image(content: Content) -> bytes:
-    """Return the HDF5 file as bytes, with room for the seal: the 1.8 layout is read by every tool."""
+def hdf5_image(content: Content) -> io.BytesIO:
+    """Return the HDF5 file in memory, with room for the seal: the 1.8 layout is read by every tool."""
     import h5py
 
     attributes = {name: dict(group) for name, group in content.attributes.items()}
@@ -105,7 +106,7 @@ def hdf5_image(content: Content) -> bytes:
         for path, group in attributes.items():
             manifest.attributes(path, group)
         manifest.close()
-    return image.getvalue()
+    return image
 
 
 def walk(file: Any, path: Path, kind: Kind) -> tuple[dict[str, Dataset], dict[str, dict[str, Attribute]]]:
