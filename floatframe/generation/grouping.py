@@ -12,6 +12,12 @@ and second moment m, s, P = ∫ c cᵀ dm of a node these are
 
 and what comes to the ground vanishes. Seven numbers are left of the ten of a body on a hinge. Reactions in joints are
 others than before: only the forces along the rates are the same, and all that follows from them.
+
+What hangs at the tip of the tree on a hinge or screw and is the same all around its axis, as a wheel or a rotor,
+
+    s_x = s_y = 0,  P_xx = P_yy,  P_xy = P_xz = P_yz = 0,
+
+has these moments in a frame that does not turn with it as well: no force depends on its angle.
 """
 
 from dataclasses import replace
@@ -19,7 +25,7 @@ from dataclasses import replace
 import numpy as np
 
 from floatframe.generation.graph import CONSTANT, Graph, terms
-from floatframe.generation.links import Link, TreeTerms, without_rounding
+from floatframe.generation.links import ROUNDING, Link, TreeTerms, without_rounding
 from floatframe.generation.recursions import shifted_moments, turned_moment
 from floatframe.relative.recursion.nodes import FIXED, ROTATION, SCREW
 
@@ -35,12 +41,12 @@ def carried_inwards(tree: TreeTerms) -> TreeTerms:
     for k in range(len(links) - 1, -1, -1):
         link = links[k]
         moved = with_moments(link, taken_along(tree.graph, link))
-        links[k] = cleaned(tree.graph, less(link, moved))
+        links[k] = cleaned(tree.graph, less(link, moved), link)
         if link.parent >= 0:
             s, P = shifted_moments(moved.mass, link.A @ moved.s, turned_moment(link.A, moved.P), link.r)
             above = links[link.parent]
             links[link.parent] = with_moments(above, (above.mass + moved.mass, above.s + s, above.P + P))
-    return replace(tree, links=tuple(links))
+    return replace(tree, links=rounded(links))
 
 
 def with_moments(link: Link, moments: tuple) -> Link:
@@ -71,10 +77,31 @@ def taken_along(graph: Graph, link: Link) -> tuple:
     return graph.zero, s, link.P
 
 
-def cleaned(graph: Graph, link: Link) -> Link:
-    """Return a node whose moments that vanish but for rounding are zero."""
-    s, P = (np.array([value.value for value in each.ravel()]).reshape(each.shape) for each in (link.s, link.P))
-    return with_moments(link, (
-        link.mass, terms(graph, without_rounding(s, np.abs(s).max())),
-        terms(graph, without_rounding(P, np.abs(P).max())),
-    ))  # fmt: skip
+def cleaned(graph: Graph, link: Link, before: Link) -> Link:
+    """Return a node whose moments that vanish but for rounding are zero; before: what they were taken from."""
+    parts = []
+    for name in ("s", "P"):
+        now, size = (np.vectorize(lambda term: term.value, otypes=[float])(getattr(each, name)) for each in (link, before))
+        parts.append(terms(graph, without_rounding(now, float(np.abs(size).max()))))
+    return with_moments(link, (link.mass, *parts))
+
+
+def rounded(links: list[Link]) -> tuple[Link, ...]:
+    """Return nodes with those marked that are round and carry no other that moves or weighs."""
+    counts = [False] * len(links)
+    out = list(links)
+    for k in range(len(links) - 1, -1, -1):
+        link = links[k]
+        if link.kind == SCREW and not counts[k] and link.own is None and is_round(link):
+            out[k] = replace(link, is_round=True)
+        if link.parent >= 0 and (counts[k] or link.n_z or link.has_moments or link.modes is not None):
+            counts[link.parent] = True
+    return tuple(out)
+
+
+def is_round(link: Link) -> bool:
+    """Whether the moments of a node are the same all around its third axis."""
+    (x, y), P = link.s[:2], link.P
+    if not all(value.is_constant(0.0) for value in (x, y, P[0, 1], P[0, 2], P[1, 2])):
+        return False
+    return abs(P[0, 0].value - P[1, 1].value) <= ROUNDING * abs(P[0, 0].value)

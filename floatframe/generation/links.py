@@ -24,7 +24,7 @@ from floatframe.generation.modes import ElasticMarker, Modes, elastic_marker, mo
 from floatframe.identification.inertial_parameters import INERTIAL, parameters_of
 from floatframe.relative.recursion.expansion import Expansion, marker_shape
 
-__all__ = ["GRAVITY", "Frame", "Link", "TreeTerms", "parameter_names", "tree_terms", "without_rounding"]
+__all__ = ["GRAVITY", "ROUNDING", "Frame", "Link", "TreeTerms", "parameter_names", "tree_terms", "without_rounding"]
 
 GRAVITY = ("gravity/x", "gravity/y", "gravity/z")
 ROUNDING = 4 * np.finfo(float).eps
@@ -51,6 +51,7 @@ class Link:
     modes: Modes | None = None  #: of a flexible body; mass, s, P are those of its undeformed shape
     above: ElasticMarker | None = None  #: that carries the joint on a flexible parent, where it moves in that
     own: ElasticMarker | None = None  #: of a flexible body at its joint, where it moves in the body
+    is_round: bool = False  #: a hinge that nothing turns out of place: what it carries is the same all around its axis
 
     @property
     def has_moments(self) -> bool:

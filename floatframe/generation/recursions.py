@@ -1,7 +1,8 @@
 """The recursions of a tree over terms: every sum and product is simplified as it is written.
 
 Frames as in docs/recursive.md: A, r the inner frame of a joint in the parent, E, d its outer frame in the inner one.
-A vector goes through both one after the other, since A mostly only exchanges axes.
+A vector goes through both one after the other, since A mostly only exchanges axes; through their product where A has
+more than one angle.
 
 With the second moment P = ∫ c cᵀ dm and U = alpha~ + omega~ omega~, c_ddot = U c for all points of a body, its force
 and moment are
@@ -23,17 +24,35 @@ from floatframe.relative.recursion.nodes import ROTATION, SCREW, TRANSLATION
 __all__ = ["Joint", "forward_dynamics", "inverse_dynamics", "joints_of", "mass_matrix", "solved"]
 
 
-class Joint:
-    """Where the joint of a node stands: E, (3, 3), and d, (3,), and the motion S by its rates, outer frame."""
+DENSE = 6  #: products with a matrix up to which it is not made one with another
 
-    def __init__(self, tree: TreeTerms, link: Link) -> None:
+
+def is_vanishing(values: Terms) -> bool:
+    """Whether all are zero."""
+    return all(value.is_constant(0.0) for value in values.ravel())
+
+
+def n_products(R: Terms) -> int:
+    """Return how many products it takes to turn a vector by a matrix."""
+    return sum(not any(value.is_constant(whole) for whole in (0.0, 1.0, -1.0)) for value in R.ravel())
+
+
+class Joint:
+    """Where the joint of a node stands: A, E, (3, 3), and d, (3,), and the motion S by its rates, outer frame.
+
+    The frame of a round link stays with the inner one. Where asked (is_whole), A that is not sparse is one with E, and
+    an identity beside it: for many vectors that go through both.
+    """
+
+    def __init__(self, tree: TreeTerms, link: Link, is_whole: bool) -> None:
         graph = tree.graph
         self.E, self.d = terms(graph, np.eye(3)), terms(graph, np.zeros(3))
         x = tree.x[link.x0 :]
         if link.kind == SCREW:
-            angle = link.turn * x[0]
-            c, s = graph.cos(angle), graph.sin(angle)
-            self.E = terms(graph, [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+            if not link.is_round:
+                angle = link.turn * x[0]
+                c, s = graph.cos(angle), graph.sin(angle)
+                self.E = terms(graph, [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
             self.d = terms(graph, [0.0, 0.0, link.slide * x[0]])
         elif link.kind == ROTATION:
             self.E = rotation_of(graph, x[:4])
@@ -42,6 +61,9 @@ class Joint:
         elif link.kind == TRANSLATION:
             self.d = link.slide * x[:3]
         self.columns = joint_columns(graph, link, self.E)
+        self.A = link.A
+        if is_whole and link.n_z and is_vanishing(self.d) and n_products(link.A) > DENSE:
+            self.A, self.E = terms(graph, np.eye(3)), link.A @ self.E
         #: where the markers at the joint stand in the parent and in the body, moments of that as it is deformed
         self.above = None if link.above is None else MarkerPlace(graph, link.above, tree.x)
         self.own = None if link.own is None else MarkerPlace(graph, link.own, tree.x)
@@ -74,9 +96,9 @@ def joint_columns(graph: Graph, link: Link, E: Terms) -> Terms:
     return columns
 
 
-def joints_of(tree: TreeTerms) -> list[Joint]:
-    """Return where all joints stand."""
-    return [Joint(tree, link) for link in tree.links]
+def joints_of(tree: TreeTerms, *, is_whole: bool = True) -> list[Joint]:
+    """Return where all joints stand; is_whole: through which many vectors go."""
+    return [Joint(tree, link, is_whole) for link in tree.links]
 
 
 def spin_terms(omega: Terms, alpha: Terms) -> Terms:
@@ -153,7 +175,7 @@ def inverse_dynamics(tree: TreeTerms, v: Terms, a: Terms, joints: Sequence[Joint
 
 def inner_motion(link: Link, joint: Joint, v: Terms, a: Terms, above: tuple) -> tuple[Terms, Terms, Terms]:
     """Return omega, alpha, a of the inner frame of a joint from those of the parent, and its U."""
-    (omega, alpha, acc, U), A = above, link.A.T
+    (omega, alpha, acc, U), A = above, joint.A.T
     if joint.above is None:
         return A @ omega, A @ alpha, A @ (acc + U @ link.r)
     place, rates = joint.above, MarkerRates(joint.above, v, a)
@@ -191,7 +213,7 @@ def along_joint(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> t
 def to_parent(link: Link, joint: Joint, f: Terms, t: Terms, force: Terms) -> tuple[Terms, Terms]:
     """Return a wrench of the outer frame of a joint in the parent, and add its work on the modes of that."""
     f, t = joint.E @ f, joint.E @ t
-    f, t = link.A @ f, link.A @ (t + cross(joint.d, f))
+    f, t = joint.A @ f, joint.A @ (t + cross(joint.d, f))
     if joint.above is None:
         return f, t + cross(link.r, f)
     above = joint.above
@@ -300,7 +322,7 @@ class Composite:
             s, P = shifted_moments(m, s, P, -joint.own.d)
             s, P = joint.own.E.T @ s, turned_moment(joint.own.E.T, P)
         s, P = shifted_moments(m, joint.E @ s, turned_moment(joint.E, P), joint.d)
-        s, P, r = link.A @ s, turned_moment(link.A, P), link.r
+        s, P, r = joint.A @ s, turned_moment(joint.A, P), link.r
         if joint.above is not None:
             s, P, r = joint.above.E @ s, turned_moment(joint.above.E, P), joint.above.rho
             self.carry_on_modes(joint.above, m, s, P)

@@ -130,7 +130,7 @@ def placed_nodes(tree: TreeTerms, joints: Sequence[Joint]) -> list[Motion]:
         if link.above is not None:
             motion, place = carried(graph, tree, motion, link.above), zero
         r, R, v, omega = motion
-        R_in = R @ link.A
+        R_in = R @ joint.A
         p = R @ place + R_in @ joint.d
         R = R_in @ joint.E
         v = v + cross(omega, p)
@@ -157,7 +157,7 @@ def placed_frame(tree: TreeTerms, frame: Frame, placed: Sequence[Motion]) -> Mot
 
 def kinematics(tree: TreeTerms) -> list[Output]:
     """Return place, axes and velocity of the frames of all bodies, ground axes."""
-    placed = placed_nodes(tree, joints_of(tree))
+    placed = placed_nodes(tree, joints_of(tree, is_whole=False))
     meanings = {
         "position": "origins of the body frames, (bodies, 3) [m]",
         "axes": "R_GB of the bodies, (bodies, 3, 3)",
