@@ -39,6 +39,8 @@ class GeneratedCode:
     what: str
     language: str
     files: dict[str, str]  #: name of the file -> text
+    inputs: dict[str, int]  #: name -> length, in the order of the arguments
+    outputs: dict[str, tuple[int, ...]]  #: name -> shape, in their order
     operations: Operations  #: of a call
     general: tuple[int, int]  #: additions and multiplications of the same recursion with all zeros and ones
     parameter_names: tuple[str, ...]  #: of the input `parameters`, in its order
@@ -98,8 +100,10 @@ def generate(
     routine = routine_of(tree, what, function)
     notes = notes_of(system.name, routine, model.names, model.rate_names, tree.parameter_names, tree.parameter_values)
     files = LANGUAGES[language](routine, notes)
+    inputs = {each: n for each, n, _ in routine.inputs}
+    outputs = {output.name: output.values.shape for output in routine.outputs}
     return GeneratedCode(
-        function, what, language, files, routine.operations, routine.asked, tree.parameter_names,
+        function, what, language, files, inputs, outputs, routine.operations, routine.asked, tree.parameter_names,
         np.array(tree.parameter_values),
     )  # fmt: skip
 

@@ -24,7 +24,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from floatframe.generation.graph import CONSTANT, Graph, terms
+from fe_models.foundation.arrays import Array
+from floatframe.generation.graph import CONSTANT, Graph, Terms, terms
 from floatframe.generation.links import ROUNDING, Link, TreeTerms, without_rounding
 from floatframe.generation.recursions import shifted_moments, turned_moment
 from floatframe.relative.recursion.nodes import FIXED, ROTATION, SCREW
@@ -79,11 +80,14 @@ def taken_along(graph: Graph, link: Link) -> tuple:
 
 def cleaned(graph: Graph, link: Link, before: Link) -> Link:
     """Return a node whose moments that vanish but for rounding are zero; before: what they were taken from."""
-    parts = []
-    for name in ("s", "P"):
-        now, size = (np.vectorize(lambda term: term.value, otypes=[float])(getattr(each, name)) for each in (link, before))
-        parts.append(terms(graph, without_rounding(now, float(np.abs(size).max()))))
-    return with_moments(link, (link.mass, *parts))
+    s, P = (terms(graph, without_rounding(values_of(now), float(np.abs(values_of(was)).max())))
+            for now, was in ((link.s, before.s), (link.P, before.P)))  # fmt: skip
+    return with_moments(link, (link.mass, s, P))
+
+
+def values_of(numbers: Terms) -> Array:
+    """Return an array of constants as one of numbers."""
+    return np.array([each.value for each in numbers.ravel()]).reshape(numbers.shape)
 
 
 def rounded(links: list[Link]) -> tuple[Link, ...]:

@@ -108,11 +108,16 @@ def parameter_names(expansion: Expansion) -> dict[str, float]:
     return found | dict(zip(GRAVITY, map(float, expansion.compiled.model.gravity), strict=True))
 
 
+def is_meant(pattern: str, name: str) -> bool:
+    """Whether a pattern is a name or fits it."""
+    return name == pattern or fnmatchcase(name, pattern)
+
+
 def chosen(patterns: Sequence[str], values: dict[str, float]) -> tuple[str, ...]:
-    """Return the names that patterns match, in their own order; a body or "gravity" stands for all of its own."""
+    """Return the names that patterns match, in their own order; a body and "gravity" stand for all of their own."""
     wanted = set()
     for pattern in patterns:
-        matched = {name for name in values if fnmatchcase(name, pattern) or name.rsplit("/", 1)[0] == pattern}
+        matched = {name for name in values if is_meant(pattern, name) or is_meant(pattern, name.rsplit("/", 1)[0])}
         if not matched:
             some = ", ".join(list(values)[:11])
             raise ModelError(

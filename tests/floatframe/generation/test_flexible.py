@@ -13,9 +13,8 @@ from floatframe.generation.links import tree_terms
 from floatframe.mechanisms import chain
 from floatframe.relative.recursion.expansion import expansion_of
 from floatframe.rotations import rotation_matrix
+from tests.floatframe.generation.calls import ROUNDOFF, c_function, matlab_function, near, python_function
 from tests.floatframe.generation.flexible_systems import SYSTEMS, beam, bent_motion, two_link_arm
-from tests.floatframe.generation.test_generate import ROUNDOFF, c_function, near, python_function
-from tests.floatframe.generation.test_languages import matlab_function
 
 STATES = range(3)
 

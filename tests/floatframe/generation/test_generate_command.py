@@ -7,6 +7,8 @@ from typer.testing import CliRunner
 
 import floatframe as ff
 from floatframe.cli.app import app
+from floatframe.generation.generate import LANGUAGES
+from floatframe.generation.routines import ROUTINES
 from floatframe.system_file.read_system import read_system
 
 PENDULUM = """
@@ -53,6 +55,27 @@ def test_the_command_writes_what_the_function_returns(pendulum, tmp_path):
     counted = record["functions"]["stick_inverse"]
     assert (counted["additions"], counted["multiplications"], counted["functions"]) == (1, 2, 1)
     assert record["functions"]["stick_mass"]["multiplications"] == 0
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_all_routines_of_all_languages_are_written(language, pendulum, tmp_path):
+    folder = tmp_path / "code"
+    wanted = [word for what in ROUTINES for word in ("--what", what)]
+    made = called(pendulum, *wanted, "--language", language, "--name", "stick", "-o", folder, "--json")
+    assert made.exit_code == 0, made.output
+    record = json.loads(made.stdout)
+    assert set(record["functions"]) == {f"stick_{what}" for what in ROUTINES}
+    for what in ROUTINES:
+        code = ff.generate(read_system(pendulum)[0], what=what, language=language, name=f"stick_{what}")
+        for name, text in code.files.items():
+            assert (folder / name).read_text() == text
+            assert f"{code.name}" in text
+
+
+def test_help_names_all_routines_and_languages():
+    shown = " ".join(called("--help").output.replace("│", " ").split())
+    for each in (*ROUTINES, *LANGUAGES):
+        assert each in shown
 
 
 def test_what_cannot_be_is_told_and_nothing_is_written(pendulum, tmp_path):

@@ -17,7 +17,7 @@ import floatframe as ff
 from floatframe.cli.app import app
 from floatframe.errors import ModelError
 from floatframe.identification.inertial_parameters import parameters_of
-from tests.floatframe.generation.test_generate import ROUNDOFF, Case, all_charts, puma
+from tests.floatframe.generation.calls import ROUNDOFF, Case, all_charts, puma
 from tests.floatframe.generation.test_generate_command import PENDULUM
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
