@@ -26,6 +26,7 @@ from floatframe.machines.road_car.systems import base, written
 from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
 from floatframe.relative.topology import tree_of
 from floatframe.system_file.read_system import read_system
+from tests.floatframe.generation.flexible_systems import bent_motion, flexible_in_the_middle, pendulum, two_link_arm
 from tests.floatframe.generation.sympy_count import sympy_operations
 from tests.floatframe.identification.robots import six_axes
 
@@ -99,10 +100,15 @@ def pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-def costs(system: ff.System, calls: int, folder: Path) -> None:
-    """Print operations and times of one system."""
-    model = moving(ff.relative_model(system))
-    n = model.n_rates
+def bent(model: ff.RelativeModel) -> ff.RelativeModel:
+    """Return a model of flexible bodies with a motion in its working arrays, elastic rotations of half a radian."""
+    model.take(*bent_motion(model, 0, angle=0.5))
+    return model
+
+
+def costs(model: ff.RelativeModel, calls: int, folder: Path) -> None:
+    """Print operations and times of one system; a motion is in the working arrays of its model."""
+    system, n = model.expansion.system, model.n_rates
     z, v, a = model.work.x.copy(), model.work.v.copy(), model.work.a.copy()
     inputs = {"inverse": (z, v, a), "mass": (z,), "forward": (z, v, a), "jacobian": (z, v, a)}
     outputs = {"inverse": [n], "mass": [n * n], "forward": [n], "jacobian": [n * n] * 3}
@@ -145,10 +151,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--calls", type=int, default=1_000_000, help="of which quantiles are taken")
     calls = parser.parse_args().calls
-    for title, system in (("robot of six axes", six_axes()), ("road car, 20 bodies, 31 rates", road_car())):
+    models = {
+        "robot of six axes": moving(ff.relative_model(six_axes())),
+        "road car, 20 bodies, 31 rates": moving(ff.relative_model(road_car())),
+        "arm of two clamped beams, 4 modes each": bent(ff.relative_model(two_link_arm())),
+        "beam in mean axes on a hinge, 6 modes, geometric stiffness": bent(ff.relative_model(pendulum())),
+        "rigid link, such a beam with 4 modes, rigid tool": bent(ff.relative_model(flexible_in_the_middle())),
+    }
+    for title, model in models.items():
         print(f"\n{title}")
         with tempfile.TemporaryDirectory() as folder:
-            costs(system, calls, Path(folder))
+            costs(model, calls, Path(folder))
     beside_others()
 
 

@@ -77,22 +77,20 @@ def test_places_and_velocities_of_bodies_and_interfaces(case):
             assert_allclose([*found[2], *found[3]], speed, rtol=0, atol=100 * ROUNDOFF * size)
 
 
-def test_c_has_the_numbers_of_the_model(case, tmp_path):
-    if case.name == "mixed tree":
-        pytest.skip("a compiler takes ten seconds")
-    force = np.zeros(case.model.n_rates)
-    run = c_function(generate(case.system), tmp_path)
-    for motion in case.motions:
-        run([force], *motion)
-        near(force, case.model.inverse_dynamics(*motion))
-
-
-SMALL = [name for name in SYSTEMS if name != "mixed tree"]
+SMALL = [name for name in SYSTEMS if name != "mixed tree"]  # compilers take ten seconds for that
 
 
 @pytest.fixture(scope="module", params=SMALL)
 def small(request):
     return Case(request.param)
+
+
+def test_c_has_the_numbers_of_the_model(small, tmp_path):
+    force = np.zeros(small.model.n_rates)
+    run = c_function(generate(small.system), tmp_path)
+    for motion in small.motions:
+        run([force], *motion)
+        near(force, small.model.inverse_dynamics(*motion))
 
 
 def test_derivatives_of_the_forces(small):
