@@ -20,7 +20,7 @@ def register(app: typer.Typer) -> None:
 
 @guarded
 def generate_command(
-    system: Annotated[Path, typer.Argument(help="System file (TOML) of rigid bodies in a tree.")],
+    system: Annotated[Path, typer.Argument(help="System file (TOML) of bodies in a tree.")],
     what: Annotated[
         list[str],
         typer.Option(
