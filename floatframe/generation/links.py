@@ -24,7 +24,10 @@ from floatframe.generation.modes import ElasticMarker, Modes, elastic_marker, mo
 from floatframe.identification.inertial_parameters import INERTIAL, parameters_of
 from floatframe.relative.recursion.expansion import Expansion, marker_shape
 
-__all__ = ["GRAVITY", "ROUNDING", "Frame", "Link", "TreeTerms", "parameter_names", "tree_terms", "without_rounding"]
+__all__ = [
+    "GRAVITY", "ROUNDING", "Frame", "JointSpring", "Link", "TreeTerms", "parameter_names", "tree_terms",
+    "without_rounding",
+]  # fmt: skip
 
 GRAVITY = ("gravity/x", "gravity/y", "gravity/z")
 ROUNDING = 4 * np.finfo(float).eps
@@ -70,6 +73,18 @@ class Frame:
     origin: Terms  #: (3,) [m]
 
 
+@dataclass(frozen=True)
+class JointSpring:
+    """A linear force along a coordinate."""
+
+    position: int  #: of the coordinate among the positions
+    rate: int  #: among the rates
+    stiffness: float  #: [N/m, N m/rad]
+    free: float  #: [m, rad]
+    damping: float  #: [N s/m, N m s/rad]
+    preload: float  #: [N, N m]
+
+
 @dataclass(frozen=True, eq=False)
 class TreeTerms:
     """A tree with its graph: what the recursions work on."""
@@ -85,6 +100,7 @@ class TreeTerms:
     parameter_values: tuple[float, ...]
     frames: tuple["Frame", ...]  #: of the files of all bodies
     interfaces: tuple["Frame", ...]  #: of all flexible bodies
+    springs: tuple[JointSpring, ...] = ()  #: linear forces along coordinates
 
 
 def whole(R: Array) -> Array:

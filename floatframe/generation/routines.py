@@ -9,6 +9,7 @@ from floatframe.generation.derivatives import jacobian, position_seeds, seeds_of
 from floatframe.generation.elastic import MarkerPlace, MarkerRates, cross
 from floatframe.generation.graph import STUMPFF, Graph, Operations, Scalar, Terms, operations, reachable, terms
 from floatframe.generation.grouping import carried_inwards
+from floatframe.generation.joint_forces import spring_forces
 from floatframe.generation.links import Frame, TreeTerms, symbols_of
 from floatframe.generation.modes import ElasticMarker
 from floatframe.generation.recursions import (
@@ -60,15 +61,20 @@ def force_output(name: str, values: Terms) -> Output:
     return Output(name, values, "forces along the rates [N, N m]")
 
 
+def needed_forces(tree: TreeTerms, joints: Sequence[Joint]) -> Terms:
+    """Return the forces along the rates that a motion needs beside those of springs and dampers, (n,)."""
+    return np.asarray(inverse_dynamics(tree, tree.v, tree.a, joints) - spring_forces(tree))
+
+
 def inverse(tree: TreeTerms) -> list[Output]:
     """Return the forces that a motion needs."""
-    return [force_output("force", inverse_dynamics(tree, tree.v, tree.a, joints_of(tree)))]
+    return [force_output("force", needed_forces(tree, joints_of(tree)))]
 
 
 def residual(tree: TreeTerms) -> list[Output]:
     """Return what is left of the equations of motion."""
     given = symbols_of(tree.graph, "force", len(tree.v))
-    force = inverse_dynamics(tree, tree.v, tree.a, joints_of(tree))
+    force = needed_forces(tree, joints_of(tree))
     return [Output("residual", force - given, "M z_ddot + h - force [N, N m]")]
 
 
@@ -80,13 +86,14 @@ def mass(tree: TreeTerms) -> list[Output]:
 def forward(tree: TreeTerms) -> list[Output]:
     """Return the accelerations under forces."""
     given = symbols_of(tree.graph, "force", len(tree.v))
-    return [Output("acceleration", forward_dynamics(tree, given, joints_of(tree)), "z_ddot [m/s2, rad/s2]")]
+    acceleration = forward_dynamics(tree, given + spring_forces(tree), joints_of(tree))
+    return [Output("acceleration", acceleration, "z_ddot [m/s2, rad/s2]")]
 
 
 def derivatives(tree: TreeTerms) -> list[Output]:
     """Return the derivatives of the forces of a motion."""
     joints = joints_of(tree)
-    force = inverse_dynamics(tree, tree.v, tree.a, joints)
+    force = needed_forces(tree, joints)
     return [
         Output("by_z", jacobian(tree.graph, force, position_seeds(tree)), "force by z along the rates"),
         Output("by_z_dot", jacobian(tree.graph, force, seeds_of(tree.graph, list(tree.v))), "force by z_dot"),
@@ -96,7 +103,7 @@ def derivatives(tree: TreeTerms) -> list[Output]:
 
 def sensitivity(tree: TreeTerms) -> list[Output]:
     """Return the derivatives of the forces of a motion by parameters."""
-    force = inverse_dynamics(tree, tree.v, tree.a, joints_of(tree))
+    force = needed_forces(tree, joints_of(tree))
     by = jacobian(tree.graph, force, seeds_of(tree.graph, tree.parameters))
     return [Output("by_parameters", by, "force by parameters, (rates, parameters)")]
 

@@ -46,7 +46,11 @@ def c_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
     comment = "/*\n" + "".join(f" * {note}".rstrip() + "\n" for note in notes) + " */\n"
     comment = comment.replace("*/", "* /").removesuffix("* /\n") + "*/\n"
     guard = f"{routine.name.upper()}_H"
-    header = f"{comment}#ifndef {guard}\n#define {guard}\n\n{head};\n\n#endif\n"
+    sizes = [(name, n) for name, n, _ in routine.inputs]
+    sizes += [(output.name, output.values.size) for output in routine.outputs]
+    counts = "enum {\n" + ",\n".join(f"    {routine.name}_n_{name} = {n}" for name, n in sizes) + "\n};"
+    declared = f"{counts}\n\n{use_of(routine.name, sizes)}\n{head};"
+    header = f"{comment}#ifndef {guard}\n#define {guard}\n\n{declared}\n\n#endif\n"
     both = f"{routine.name}_sine_cosine"
     body = statements(lines, both)
     for output, results in zip(routine.outputs, lines.results, strict=True):
@@ -54,6 +58,14 @@ def c_files(routine: Routine, notes: Sequence[str]) -> dict[str, str]:
     own = SINE_COSINE.format(name=both) if lines.turns else ""
     source = f'{comment}#include <math.h>\n\n#include "{routine.name}.h"\n\n{own}{head}\n{{\n' + "\n".join(body)
     return {f"{routine.name}.c": source + "\n}\n", f"{routine.name}.h": header}
+
+
+def use_of(name: str, sizes: Sequence[tuple[str, int]]) -> str:
+    """Return how the function is called, as a comment."""
+    arrays = ", ".join(f"{each}[{name}_n_{each}]" for each, _ in sizes)
+    call = f"{name}({', '.join(each for each, _ in sizes)});"
+    lines = [f"double {arrays};", call, f"cc -O2 main.c {name}.c -lm"]
+    return "/* matrices row by row; outputs last:\n" + "".join(f" *     {line}\n" for line in lines) + " */"
 
 
 def statements(lines: Lines, both: str) -> list[str]:

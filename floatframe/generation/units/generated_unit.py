@@ -16,12 +16,13 @@ from floatframe.cosimulation.model_description import Description, model_descrip
 from floatframe.errors import ModelError
 from floatframe.generation.generate import identifier, notes_of
 from floatframe.generation.graph import SYMBOL, Scalar, reachable
+from floatframe.generation.joint_forces import model_terms
 from floatframe.generation.languages.c import c_files
-from floatframe.generation.links import TreeTerms, tree_terms
+from floatframe.generation.links import TreeTerms
 from floatframe.generation.routines import Routine, routine_of
 from floatframe.generation.units.compiler import compiled_library, platform_folder
 from floatframe.relative.recursion.nodes import ROTATION
-from floatframe.relative.recursive import RelativeModel, relative_model
+from floatframe.relative.recursive import RelativeModel
 from floatframe.system import System
 
 __all__ = ["GeneratedUnit", "generate_fmu"]
@@ -79,11 +80,10 @@ def generate_fmu(
     if target.suffix.lower() != ".fmu" or target.is_dir() or not target.parent.is_dir():
         raise ModelError(f"generate_fmu: {target}: expected a file name that ends in .fmu, in a folder that exists")
     folder = platform_folder(fmi)
-    model = relative_model(system)
-    tree = tree_terms(model.expansion, parameters)
+    model, tree = model_terms(system, parameters)
     routine = routine_of(tree, "forward", identifier(f"{system.name}_forward"))
     variables = unit_variables(model, tree, routine, step)
-    notes = notes_of(system.name, routine, model.names, model.rate_names, tree.parameter_names, tree.parameter_values)
+    notes = notes_of(system, routine, model, tree)
     sources = {name: text.encode() for name, text in c_files(routine, notes).items()}
     for name in ("unit.h", "unit.c", f"fmi{fmi}.c"):
         sources[name] = files("floatframe.generation.units").joinpath("data", name).read_bytes()

@@ -37,7 +37,7 @@ def few():
 
 
 def wheels():
-    """A slider with two wheels, round and out of balance, and one that carries a body on a hinge of its own."""
+    """A slider with two wheels, round and out of balance, and a round one that carries a body on a hinge in line."""
     rng = np.random.default_rng(2)
     bodies = [ff.RigidBody("frame", 5.0, np.diag([0.3, 0.4, 0.5]), (0.1, 0.05, 0.0))]
     joints = [ff.PrismaticJoint("rail", ff.GROUND, ff.Marker("frame"), axis=(1, 0, 0))]
@@ -45,8 +45,8 @@ def wheels():
         at = ff.Marker("frame", position=rng.normal(size=3))
         bodies.append(ff.RigidBody(name, 2.0, np.diag([0.1, 0.15, 0.1]), center, position=at.position))
         joints.append(ff.RevoluteJoint(f"hub {name}", at, ff.Marker(name), axis=(0, 1, 0)))
-    swing = ff.RevoluteJoint("swing", ff.Marker("carrier", position=(0.2, 0, 0)), ff.Marker("bob"), axis=(0, 0, 1))
-    place = np.asarray(bodies[-1].position) + np.array([0.2, 0, 0])
+    swing = ff.RevoluteJoint("swing", ff.Marker("carrier", position=(0, 0.2, 0)), ff.Marker("bob"), axis=(0, 1, 0))
+    place = np.asarray(bodies[-1].position) + np.array([0, 0.2, 0])
     bodies.append(ff.RigidBody("bob", 0.5, np.diag([0.01, 0.02, 0.015]), (0.1, 0, 0.03), position=place))
     return ff.System(bodies, [*joints, swing], [ff.Gravity((0.2, -0.1, -9.81))], name="wheels")
 
