@@ -20,7 +20,7 @@ from floatframe.errors import ModelError
 from floatframe.identification.reaction_rules import silent_at_base
 from floatframe.identification.regressors import LinearForm
 from floatframe.identification.transfer_rules import common, silent_directions
-from floatframe.identification.tree_samples import TreeSamples, tree_samples
+from floatframe.identification.tree_samples import TreeSamples, as_placed
 
 __all__ = ["SOURCES", "BaseParameters", "base_parameters", "form_rows", "random_samples", "sampled_silence"]
 
@@ -28,6 +28,7 @@ SOURCES = ("torques", "reactions", "both")
 RANK = 1e-9  #: singular values below this times the largest are zero, of columns of length one
 SHOWN = 1e-9  #: factors of combinations below this times the largest are zero
 N_SAMPLES = 60  #: random instants for a body, at least
+LOOP_REACH = 0.3  #: rad, or of the length of the system, about where a system with loops is placed: they stay closed
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +93,11 @@ def base_parameters(form: LinearForm, *, source: str = "torques", by: str = "rul
 
 def silent_by_rules(form: LinearForm, source: str) -> Array:
     """Return the directions of the parameters, (p, k), that rules find without effect on what is measured."""
+    if form.independent is not None:
+        raise ModelError(
+            f"system {form.system.name!r}: rules of base parameters are those of trees, and its joints close loops; "
+            "find the base parameters by samples"
+        )
     if source == "torques":
         return silent_directions(form)
     if source == "reactions":
@@ -102,12 +108,16 @@ def silent_by_rules(form: LinearForm, source: str) -> Array:
 
 
 def random_samples(form: LinearForm, seed: int = 0) -> TreeSamples:
-    """Return random instants: angles over a full turn, lengths and rates of the order of the system."""
+    """Return random instants: angles over a turn (with loops near by), lengths and rates of the order of the system."""
     rng = np.random.default_rng(seed)
     is_length = np.array([column.unit == "m" for column in form.columns])
     size = np.where(is_length, compiled_system(form.system).length, 1.0)
-    x = rng.uniform(-np.pi, np.pi, (N_SAMPLES * len(form.system.bodies), len(size))) * size
-    return tree_samples(form.system, x, rng.normal(size=x.shape) * size, rng.normal(size=x.shape) * size)
+    if form.independent is None:
+        x = rng.uniform(-np.pi, np.pi, (N_SAMPLES * len(form.system.bodies), len(size))) * size
+    else:
+        x = rng.uniform(-LOOP_REACH, LOOP_REACH, (max(N_SAMPLES, 2 * len(form.names)), len(size))) * size
+        x += as_placed(form.system)[form.independent]
+    return form.samples(x, rng.normal(size=x.shape) * size, rng.normal(size=x.shape) * size)
 
 
 def form_rows(form: LinearForm, samples: TreeSamples, source: str) -> Array:

@@ -49,7 +49,7 @@ class Measured:
     used: slice = field(default_factory=lambda: slice(None))  #: instants that count, after it
 
     def __post_init__(self) -> None:
-        n, n_c = self.samples.x.shape
+        n, n_c = len(self.samples.x), self.samples.n_independent
         if self.torques is None and self.reactions is None:
             raise ModelError("identification: expected measured torques, reactions, or both; got none")
         for name, values, width in (("torques", self.torques, n_c), ("reactions", self.reactions, 6)):

@@ -24,7 +24,6 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.identification.base_parameters import BaseParameters, form_rows, typical
-from floatframe.identification.tree_samples import tree_samples
 
 __all__ = ["ExcitingMotion", "MotionLimits", "exciting_motion"]
 
@@ -126,7 +125,7 @@ def exciting_motion(
         key = x.tobytes()
         if key not in known:
             C = x.reshape(n_c, width)
-            samples = tree_samples(form.system, *(block @ C.T for block in blocks))
+            samples = form.samples(*(block @ C.T for block in blocks))
             s = la.svdvals(base.rows(form_rows(form, samples, base.source)) * size)
             room = np.inf
             if is_limited.any():

@@ -22,12 +22,13 @@ from fe_models.foundation.arrays import Array
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.identification.estimation import BASE, Measured
-from floatframe.identification.tree_samples import rigid_tree, tree_samples
+from floatframe.identification.regressors import LinearForm
+from floatframe.relative.topology import tree_of
 from floatframe.signals.read_signals import read_signals
 from floatframe.signals.signals import Signals
 from floatframe.system import System
 
-__all__ = ["MeasuredFile", "read_measured"]
+__all__ = ["MeasuredFile", "measured_coordinates", "read_measured"]
 
 LEAST_ROWS = 20  #: instants below which nothing is estimated
 #: noise that passes the filter has the band of a sharp one at 0.898 of its cut-off, the integral of 1/(1 + x⁸)²
@@ -45,16 +46,16 @@ class MeasuredFile:
 
 
 def read_measured(
-    path: str | os.PathLike[str], system: System, *, cutoff: float | None = None, thin: int | None = None
+    path: str | os.PathLike[str], form: LinearForm, *, cutoff: float | None = None, thin: int | None = None
 ) -> MeasuredFile:
-    """Read a measured motion of a tree of rigid bodies.
+    """Read a measured motion of a tree of rigid bodies, or of one with loops by its independent coordinates.
 
     Parameters
     ----------
     path
         A table of channels, see `floatframe.signals.read_signals`.
-    system
-        The tree; angles in rad, deg, lengths in any unit that the file states are turned into its units.
+    form
+        Of the tree; angles in rad, deg, lengths in any unit that the file states are turned into its units.
     cutoff
         Of the filter [Hz]; None: channels as they are.
     thin
@@ -68,7 +69,7 @@ def read_measured(
         If the file cannot be read.
     """
     where = str(path)
-    columns = rigid_tree(system, f"system {system.name!r}: identification").columns
+    columns = form.columns
     names = [column.name for column in columns]
     signals = read_signals(path)
     known = [name + suffix for name in names for suffix in KINDS] + list(BASE)
@@ -100,18 +101,27 @@ def read_measured(
             f"{where}: expected at least {LEAST_ROWS} rows at one rate, got {len(signals.time)} with steps of "
             f"{steps.min(initial=np.inf):.6g} to {steps.max(initial=0):.6g} s; resample it first (docs/signals.md)"
         )
-    return assembled(where, system, signals, columns, cutoff, thin, any(has_torque), any(has_base))
+    return assembled(where, form, signals, columns, cutoff, thin, any(has_torque), any(has_base))
+
+
+def measured_coordinates(path: str | os.PathLike[str], system: System) -> tuple[str, ...] | None:
+    """Return the coordinates whose positions a file has, those that move a system with loops; None: there are none."""
+    tree = tree_of(system)
+    if not tree.cut:
+        return None
+    names = read_signals(path).names
+    return tuple(column.name for column in tree.columns if column.name in names) or None
 
 
 def assembled(
-    where: str, system: System, signals: Signals, columns: tuple, cutoff: float | None, thin: int | None,
+    where: str, form: LinearForm, signals: Signals, columns: tuple, cutoff: float | None, thin: int | None,
     has_torque: bool, has_base: bool,
 ) -> MeasuredFile:  # fmt: skip
     """Return the motion of channels that are known to be there."""
     t = np.asarray(signals.time)
     h, notes = float(t[-1] - t[0]) / (len(t) - 1), list(signals.notes)
     smooth = filter_of(where, cutoff, 1.0 / h)
-    length, force, moment = units_of(system)
+    length, force, moment = units_of(form.system)
 
     def channel(name: str, unit: str) -> Array:
         signal = signals[name]
@@ -149,7 +159,7 @@ def assembled(
             f"{LEAST_ROWS}; measure longer, or raise the cut-off"
         )
     notes.append(f"{len(t[rows])} of {len(t)} rows used")
-    samples = tree_samples(system, x, rate, acceleration)
+    samples = form.samples(x, rate, acceleration)
     measured = Measured(
         samples, torque if has_torque else None, base, time=t, smooth=None if cutoff is None else smooth, used=rows
     )

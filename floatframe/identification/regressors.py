@@ -7,6 +7,7 @@ For a body, with a: acceleration of its origin less gravity, all in its axes,
     f = m a + (alpha~ + omega~ omega~) S,      n = -a~ S + (L(alpha) + omega~ L(omega)) J,      L(x) J = J x,
 
 and the equation of a column of a joint is the power of the wrenches of all bodies that it carries, at its unit rate.
+Where loops close, tau are the torques of the independent coordinates, Γᵀ Y phi (`loops`).
 """
 
 from collections.abc import Sequence
@@ -14,11 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import ModelError
 from floatframe.identification.inertial_parameters import INERTIAL, inertia_columns, parameters_of
-from floatframe.identification.tree_samples import TreeSamples, rigid_tree
+from floatframe.identification.loops import independent_columns, loop_samples, looped_tree
+from floatframe.identification.tree_samples import TreeSamples, rigid_tree, tree_samples
 from floatframe.relative.topology import CoordinateName, tree_of
 from floatframe.system import System
 
@@ -40,11 +42,19 @@ class LinearForm:
     system: System
     names: tuple[str, ...]  #: "m(link1)", ..., "viscous(hinge/angle)", (p,)
     terms: tuple[str, ...]  #: of `DRIVE_TERMS`, of each coordinate
+    independent: IntArray | None = None  #: columns of the tree that move independently, where loops close; None: all
 
     @property
     def columns(self) -> tuple[CoordinateName, ...]:
-        """The coordinates of the tree, in the order of torques."""
-        return tree_of(self.system).columns
+        """The coordinates that move independently, in the order of torques."""
+        every = tree_of(self.system).columns
+        return every if self.independent is None else tuple(every[k] for k in self.independent)
+
+    def samples(self, x: Array, rate: Array, acceleration: Array) -> TreeSamples:
+        """Return the motion at given coordinates, (n, n_c) each, in the order of `columns`."""
+        if self.independent is None:
+            return tree_samples(self.system, x, rate, acceleration)
+        return loop_samples(self.system, self.independent, x, rate, acceleration)
 
     @property
     def n_inertial(self) -> int:
@@ -58,7 +68,7 @@ class LinearForm:
         return np.concatenate([own, np.zeros(len(self.names) - len(own))])
 
     def torques(self, samples: TreeSamples) -> Array:
-        """Return Y, (n, n_c, p): forces and torques of the coordinates, in their order."""
+        """Return Y, (n, n_c, p): forces and torques of the coordinates, in the order of `columns`."""
         return torque_rows(self, samples)
 
     def reactions(self, samples: TreeSamples, point: Array | None = None) -> Array:
@@ -66,22 +76,28 @@ class LinearForm:
         return reaction_rows(self, samples, np.zeros(3) if point is None else np.asarray(point, dtype=float))
 
 
-def linear_form(system: System, terms: Sequence[str] = ()) -> LinearForm:
-    """Return the linear form of a tree of rigid bodies.
+def linear_form(system: System, terms: Sequence[str] = (), *, independent: Sequence[str] | None = None) -> LinearForm:
+    """Return the linear form of a tree of rigid bodies, or of one whose joints close loops.
 
     Parameters
     ----------
     system
-        Its bodies are rigid, its joints have coordinates and close no loop; forces but gravity are left out.
+        Its bodies are rigid; forces but gravity are left out.
     terms
-        Of `DRIVE_TERMS`, for each coordinate.
+        Of `DRIVE_TERMS`, for each coordinate, also those that loops make dependent, but not for joints that are cut.
+    independent
+        Where joints close loops: the coordinates that are driven and measured, as many as move independently. The
+        others follow, and torques are those that act on these (`floatframe.identification.loops`).
 
     Raises
     ------
     ModelError
-        If it is no tree of rigid bodies, or a term is not known.
+        If it is no tree of rigid bodies, a term is not known, or coordinates are not independent.
     """
-    tree = rigid_tree(system, f"system {system.name!r}: inertial parameters")
+    where = f"system {system.name!r}: inertial parameters"
+    has_loops = independent is not None or bool(tree_of(system).cut)
+    tree = looped_tree(system, where) if has_loops else rigid_tree(system, where)
+    columns = independent_columns(system, independent, where) if has_loops else None
     if not tree.columns:
         raise ModelError(
             f"system {system.name!r}: inertial parameters: no joint has a coordinate, so that nothing moves"
@@ -91,7 +107,7 @@ def linear_form(system: System, terms: Sequence[str] = ()) -> LinearForm:
             raise ModelError(f"linear_form: terms: no term {quoted(term)}{nearest(term, list(DRIVE_TERMS))}")
     names = [f"{name}({body.name})" for body in system.bodies for name in INERTIAL]
     names += [f"{term}({column.name})" for term in terms for column in tree.columns]
-    return LinearForm(system, tuple(names), tuple(terms))
+    return LinearForm(system, tuple(names), tuple(terms), columns)
 
 
 def body_wrenches(samples: TreeSamples) -> Array:
@@ -115,7 +131,7 @@ def tildes(x: Array) -> Array:
 
 def torque_rows(form: LinearForm, samples: TreeSamples) -> Array:
     """Return Y, (n, n_c, p)."""
-    tree = rigid_tree(form.system, f"system {form.system.name!r}").tree
+    tree = tree_of(form.system).tree
     n, n_b = samples.r.shape[:2]
     n_c = len(tree.side)
     A = body_wrenches(samples)
@@ -140,7 +156,7 @@ def torque_rows(form: LinearForm, samples: TreeSamples) -> Array:
         }[term]
         Y[:, np.arange(n_c), first + np.arange(n_c)] = what
         first += n_c
-    return Y
+    return Y if samples.gamma is None else np.einsum("ski,skp->sip", samples.gamma, Y)
 
 
 def reaction_rows(form: LinearForm, samples: TreeSamples, point: Array) -> Array:

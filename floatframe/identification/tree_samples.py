@@ -22,7 +22,10 @@ from floatframe.relative.topology import SystemTree, tree_of
 from floatframe.start.newton_equations import set_iterate
 from floatframe.system import System
 
-__all__ = ["TreeSamples", "as_placed", "gravity_of", "rigid_tree", "tree_samples"]
+__all__ = [
+    "TreeSamples", "as_placed", "distances", "gravity_of", "joints_as_placed", "motion_of_tree", "rigid_bodies",
+    "rigid_tree", "tree_samples",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,23 +43,37 @@ class TreeSamples:
     t: Array  #: velocity of the moved marker by unit rate, (n, n_c, 3)
     turn: Array  #: angular velocity by unit rate, (n, n_c, 3)
     point: Array  #: marker that the column moves, (n, n_c, 3) [m]
+    #: rates of all coordinates by those of the independent ones, (n, n_c, n_i); None: all are independent
+    gamma: Array | None = None
+
+    @property
+    def n_independent(self) -> int:
+        """Number of coordinates that move independently, whose torques are measured."""
+        return int(self.x.shape[1] if self.gamma is None else self.gamma.shape[2])
 
 
-def rigid_tree(system: System, where: str) -> SystemTree:
-    """Return the tree of a system of rigid bodies without loops; `ModelError` if it is not one."""
+def rigid_bodies(system: System, where: str) -> None:
+    """Raise `ModelError` if a body is flexible."""
     flexible = [body.name for body in system.bodies if isinstance(body, FlexibleBody)]
     if flexible:
         raise ModelError(
             f"{where}: expected rigid bodies, got the flexible {', '.join(quoted(name) for name in flexible)}; "
-            "inertial parameters are those of rigid bodies: replace it by a RigidBody"
+            "inertial parameters are those of rigid bodies: replace it by a RigidBody, or fit what sensors see "
+            "(fit_outputs)"
         )
+
+
+def rigid_tree(system: System, where: str) -> SystemTree:
+    """Return the tree of a system of rigid bodies without loops; `ModelError` if it is not one."""
+    rigid_bodies(system, where)
     tree = tree_of(system)
     loops = [*tree.cut, *tree.constrained, *(coupler.name for coupler in system.couplers)]
     if loops:
         raise ModelError(
             f"{where}: expected a tree, but {', '.join(quoted(name) for name in loops)} "
             f"{'is a constraint' if len(loops) == 1 else 'are constraints'} beside its joints (a loop, a joint without "
-            "coordinates of its own, or friction by normal force); leave it out, or identify the open tree"
+            "coordinates of its own, or friction by normal force); loops of joints: linear_form(independent=...); "
+            "for others leave it out, or identify the open tree"
         )
     return tree
 
@@ -78,16 +95,24 @@ def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> 
         the moved marker.
     """
     tree = rigid_tree(system, f"system {system.name!r}: samples").tree
-    compiled = compiled_system(system)
-    model, work, joints = compiled.model, new_work(compiled.model), joints_as_placed(system)
-    move, start = mover(model, work, tree, joints), distances(tree, joints)
-    n, n_c, n_b = len(x), len(tree.side), len(tree.parent)
+    n, n_c = len(x), len(tree.side)
     if not x.shape == rate.shape == acceleration.shape == (n, n_c):
         raise ModelError(
             f"system {system.name!r}: samples: expected three arrays (n, {n_c}), one column for each of "
             f"{', '.join(each.name for each in tree_of(system).columns)}; got {x.shape}, {rate.shape}, "
             f"{acceleration.shape}"
         )
+    return motion_of_tree(system, tree, x, rate, acceleration)
+
+
+def motion_of_tree(
+    system: System, tree: Tree, x: Array, rate: Array, acceleration: Array, gamma: Array | None = None
+) -> TreeSamples:
+    """Return the motion of a tree, or of what cut loops leave, by all its coordinates."""
+    compiled = compiled_system(system)
+    model, work, joints = compiled.model, new_work(compiled.model), joints_as_placed(system)
+    move, start = mover(model, work, tree, joints), distances(tree, joints)
+    n, n_c, n_b = len(x), len(tree.side), len(tree.parent)
     r, R = np.empty((n, n_b, 3)), np.empty((n, n_b, 3, 3))
     u, u_dot = np.empty((n, n_b, 6)), np.empty((n, n_b, 6))
     t, turn, point = np.empty((n, n_c, 3)), np.empty((n, n_c, 3)), np.empty((n, n_c, 3))
@@ -102,7 +127,7 @@ def tree_samples(system: System, x: Array, rate: Array, acceleration: Array) -> 
         m = markers[i]
         point[:, k] = r[:, i] if m < 0 else marker_places(model, m, r, R)
     a = np.einsum("sbij,sbi->sbj", R, u_dot[:, :, :3] - gravity_of(system))
-    return TreeSamples(x, rate, acceleration, r, R, u[:, :, 3:], a, u_dot[:, :, 3:], t, turn, point)
+    return TreeSamples(x, rate, acceleration, r, R, u[:, :, 3:], a, u_dot[:, :, 3:], t, turn, point, gamma)
 
 
 def marker_places(model: Model, m: int, r: Array, R: Array) -> Array:

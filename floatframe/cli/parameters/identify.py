@@ -23,7 +23,7 @@ def register(app: typer.Typer) -> None:
 
 @guarded
 def identify_command(
-    system: Annotated[Path, typer.Argument(help="System file (TOML) of a tree of rigid bodies.")],
+    system: Annotated[Path, typer.Argument(help="System file (TOML) of a tree of rigid bodies, or with loops.")],
     data: Annotated[Path, typer.Argument(help="Measured motion (.csv, .mat, ...), see docs/identification.md.")],
     outputs: Annotated[
         list[Path],
@@ -48,7 +48,8 @@ def identify_command(
 
     Columns of the data are the positions of all coordinates by their names in results (joint1/angle), their torques
     (joint1/angle torque) or the reactions at the base (base F_x to base M_z), or both; rates and accelerations
-    (joint1/angle rate, joint1/angle acceleration) if they were measured.
+    (joint1/angle rate, joint1/angle acceleration) if they were measured. Where joints close loops: the positions and
+    torques of as many coordinates as move independently.
 
     Example: floatframe identify robot.toml measured.csv --cutoff 10 -o report.html
     """
@@ -56,7 +57,7 @@ def identify_command(
     from floatframe.errors import ModelError
     from floatframe.identification.estimation import estimate
     from floatframe.identification.identify_report import identification_html, identification_record
-    from floatframe.identification.measured_file import read_measured
+    from floatframe.identification.measured_file import measured_coordinates, read_measured
     from floatframe.identification.physical import real_parameters
     from floatframe.identification.regressors import linear_form
     from floatframe.system_file.read_system import read_system
@@ -71,9 +72,9 @@ def identify_command(
     named = [term.strip() for term in terms.split(",") if term.strip() not in ("", "none")]
     with stages() as clock:
         with clock("measured motion"):
-            form = linear_form(described, named)
-            read = read_measured(data, described, cutoff=cutoff, thin=thin)
-            other = None if check is None else read_measured(check, described, cutoff=cutoff, thin=thin).measured
+            form = linear_form(described, named, independent=measured_coordinates(data, described))
+            read = read_measured(data, form, cutoff=cutoff, thin=thin)
+            other = None if check is None else read_measured(check, form, cutoff=cutoff, thin=thin).measured
         with clock("base parameters"):
             made = estimate(form, read.measured, method=method)
         bodies = None

@@ -53,6 +53,40 @@ def six_axes(angles=PUMA_ANGLES, along_x=PUMA_ALONG_X, along_z=PUMA_ALONG_Z, gra
     return System(bodies, joints, [Gravity(gravity)] if np.any(gravity) else [])
 
 
+def palletizer(gravity=DOWN, wrist=True, hinges="RRRR", seed=6, motions=None):
+    """A waist with a parallelogram: arm and lever on it, a rod from the lever to the forearm; a wrist of a hinge.
+
+    hinges: joints of arm and forearm, waist and lever, lever and rod, rod and forearm: R hinges, U and S hold less.
+    """
+    rng, bodies, joints = np.random.default_rng(seed), [], []
+    places = {"waist": (0, 0, 0), "arm": (0.1, 0, 0.4), "lever": (0.1, 0, 0.4), "forearm": (0.3, 0, 1.0)}
+    places |= {"rod": (-0.1, 0, 0.3), "hand": (1.0, 0, 1.1)}
+    places = {name: np.array(place) for name, place in places.items() if wrist or name != "hand"}
+    bodies = [some_body(name, rng, place) for name, place in places.items()]
+
+    def hinge(name, below, above, at, kind="R", axis=(0, 1, 0)):
+        at = np.array(at)
+        ends = Marker(below, position=at - places.get(below, np.zeros(3))), Marker(above, position=at - places[above])
+        moved = {"motions": {"angle": motions[name]}} if motions and name in motions else {}
+        joints.append(
+            {
+                "R": lambda: RevoluteJoint(name, *ends, axis=axis, **moved),
+                "U": lambda: UniversalJoint(name, *ends, axis=axis, axis_b=np.cross(axis, (0.6, 0, 0.8))),
+                "S": lambda: SphericalJoint(name, *ends),
+            }[kind]()
+        )
+
+    hinge("turn", "ground", "waist", (0, 0, 0), axis=(0, 0, 1))
+    hinge("shoulder", "waist", "arm", places["arm"], hinges[0])
+    hinge("crank", "waist", "lever", places["lever"], hinges[1])
+    hinge("elbow", "arm", "forearm", places["forearm"])
+    hinge("low", "lever", "rod", places["rod"], hinges[2])
+    hinge("high", "rod", "forearm", places["rod"] + places["forearm"] - places["arm"], hinges[3])
+    if wrist:
+        hinge("wrist", "forearm", "hand", places["hand"])
+    return System(bodies, joints, [Gravity(gravity)] if np.any(gravity) else [])
+
+
 def human(gravity=DOWN):
     """A free trunk with head, arms of two bodies and legs of three: 12 bodies, spherical joints and hinges."""
     rng = np.random.default_rng(12)

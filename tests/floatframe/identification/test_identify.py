@@ -101,8 +101,8 @@ def test_the_command_finds_the_parameters_and_writes_page_and_json(robot):
 def test_units_of_the_file_are_heeded(robot):
     written(robot, "rad.csv", 3, 0.0)
     written(robot, "deg.csv", 3, 0.0, degrees=True)
-    system = read_system(robot / "robot.toml")[0]
-    one, other = (read_measured(robot / name, system).measured.samples for name in ("rad.csv", "deg.csv"))
+    form = linear_form(read_system(robot / "robot.toml")[0])
+    one, other = (read_measured(robot / name, form).measured.samples for name in ("rad.csv", "deg.csv"))
     assert np.abs(one.x - other.x).max() < 1e-8
     assert np.abs(one.acceleration - other.acceleration).max() < 1e-3 * np.abs(one.acceleration).max()
 
@@ -120,17 +120,17 @@ def test_units_of_the_file_are_heeded(robot):
 def test_files_with_wrong_columns_or_units_are_refused_by_name(robot, heads, words):
     written(robot, "wrong.csv", 1, 0.0, heads=heads)
     with pytest.raises((ModelError, ValueError), match=words):
-        read_measured(robot / "wrong.csv", read_system(robot / "robot.toml")[0])
+        read_measured(robot / "wrong.csv", linear_form(read_system(robot / "robot.toml")[0]))
 
 
 def test_short_files_and_high_cut_offs_are_refused(robot):
     written(robot, "long.csv", 1, 0.0)
-    system = read_system(robot / "robot.toml")[0]
+    form = linear_form(read_system(robot / "robot.toml")[0])
     lines = (robot / "long.csv").read_text().splitlines()
     (robot / "short.csv").write_text("\n".join(lines[:15]))
     with pytest.raises(ModelError, match="at least 20 rows"):
-        read_measured(robot / "short.csv", system)
+        read_measured(robot / "short.csv", form)
     with pytest.raises(ModelError, match="below 90 Hz"):
-        read_measured(robot / "long.csv", system, cutoff=120.0)
+        read_measured(robot / "long.csv", form, cutoff=120.0)
     with pytest.raises(ModelError, match="measure longer"):
-        read_measured(robot / "long.csv", system, cutoff=0.5)
+        read_measured(robot / "long.csv", form, cutoff=0.5)
