@@ -33,6 +33,7 @@ from floatframe.kernels.work import Work, new_work
 from floatframe.motion.stop_events import require_off_stops
 from floatframe.motion.validity_watch import ValidityWatch
 from floatframe.relative.formulation import is_relative
+from floatframe.relative.topology import tree_of
 from floatframe.results.validity import ValidityNote
 from floatframe.rotations import rotation_matrix
 from floatframe.start.initial import (
@@ -228,7 +229,7 @@ def steady_rotation(
     given = compiled.placed if state is None else checked(compiled, state)
     state = assembled(compiled, work, given)
     require_placed_near(compiled, given, state)
-    require_independent_constraints(compiled, work, state)
+    require_independent_constraints(compiled, work, tree_of(system).tree, state)
     holds = held_rows(model)
     tau, last = 0.0, np.inf
     for iteration in range(max_iterations + 1):

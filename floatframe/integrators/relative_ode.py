@@ -72,7 +72,7 @@ class RelativeOde:
                     f"RelativeOde: element {each.element.name!r} has states or multipliers of its own, which this "
                     "scheme does not know; use GeneralizedAlpha"
                 )
-        made = consistent_motion(system, state, t=t, is_tree=tree_of(system).is_tree)
+        made = consistent_motion(system, state, t=t)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
 

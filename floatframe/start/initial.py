@@ -25,6 +25,8 @@ from floatframe.errors import ModelError
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.kernels.model import STIFFNESS, Model
 from floatframe.kernels.work import Work, new_work
+from floatframe.relative.kernels.tree import Tree
+from floatframe.relative.topology import tree_of
 from floatframe.start.constraint_words import conflict_of_drives, drive_name, open_joints
 from floatframe.start.far_drives import driven_angles, led_by, stages, way_of_drives
 from floatframe.start.freedoms import Mobility, constraint_mobility, scaled_constraints
@@ -41,6 +43,7 @@ from floatframe.start.newton_equations import (
     with_modal_weight,
 )
 from floatframe.start.placement import require_placed_near
+from floatframe.start.repeated_constraints import repeated_constraints
 from floatframe.state import State
 from floatframe.system import System
 
@@ -61,7 +64,7 @@ __all__ = [
 ASSEMBLED = 1e-12  #: largest |g| of an assembled system, points relative to its size
 MOST_ITERATIONS = 30
 NEAR_BY = 1e-3  #: rad, and part of the size of the system: a small way from a position
-REDUNDANT = 1e-10  #: smallest eigenvalue of G M⁻¹ Gᵀ, scaled to a unit diagonal, of independent constraints
+ALLOWED = 1e-10  #: singular value of what rigid bodies are held by, relative to the largest, of a motion that is free
 
 
 def mobility(system: System) -> Mobility:
@@ -109,12 +112,8 @@ def consistent_motion(
     *,
     t: float = 0.0,
     known: Array | None = None,
-    is_tree: bool = False,
 ) -> ConsistentState:
-    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files.
-
-    is_tree: joints close no loop, so that no constraint repeats others, and none is looked for.
-    """
+    """Return what `consistent_state` returns, in the frames of the engine; the given state is in those of the files."""
     compiled = compiled_system(system)
     given = compiled.placed if state is None else checked(compiled, state)
     known = known_of(compiled, state) if known is None else known
@@ -123,8 +122,7 @@ def consistent_motion(
     state = assembled(compiled, work, given, known)
     require_placed_near(compiled, given, state)
     require_no_half_turns(compiled, work, state)
-    if not is_tree:
-        require_independent_constraints(compiled, work, state)
+    require_independent_constraints(compiled, work, tree_of(system).tree, state)
     state = with_compatible_velocities(compiled, work, state, known)
     return ConsistentState(state, *solve_accelerations(compiled, work, state, known))
 
@@ -219,26 +217,26 @@ def refuse_open_joints(compiled: CompiledSystem, work: Work, state: State, error
     )
 
 
-def require_independent_constraints(compiled: CompiledSystem, work: Work, state: State) -> None:
+def require_independent_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state: State) -> None:
     """Raise `ModelError` naming the joints if some constraints repeat others, unless these are to share their load."""
     model = compiled.model
     holds = is_held(model.rows.kind)
     if not holds.any() or model.rows.soft.any():
         return
+    n_redundant = repeated_constraints(compiled, work, tree, state)
+    if n_redundant == 0:
+        return
     rows, _ = scaled_constraints(model, work, state)
     if not rows.any(axis=1).all():
         raise ModelError("a joint acts on the ground alone")
-    values, vectors = np.linalg.eigh(rows @ rows.T)
-    n_redundant = int((values < REDUNDANT).sum())
-    if n_redundant == 0:
-        return
+    vectors = np.linalg.svd(rows.T)[2][::-1].T  # columns, those of the smallest first
     conflict = conflict_of_drives(compiled, work, state)
     if conflict:
         raise ModelError(f"conflicting drives: {conflict}; take one away, or free what it drives against")
     share = (vectors[:, :n_redundant] ** 2).sum(axis=1)
     owner = np.repeat(np.arange(len(model.connections.size)), model.connections.size)[holds]
     involved = [name for c, name in enumerate(compiled.connection_names) if share[owner == c].sum() > 1e-6]
-    if is_singular_position(compiled, work, state, n_redundant):
+    if is_singular_position(compiled, work, tree, state, n_redundant):
         raise ModelError(
             f"a singular position: {n_redundant} of {int(holds.sum())} constraints repeat others here, but not a "
             f"little way along the motion (see joints {', '.join(repr(name) for name in involved)}), so that it could "
@@ -254,7 +252,7 @@ def require_independent_constraints(compiled: CompiledSystem, work: Work, state:
     )
 
 
-def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_redundant: int) -> bool:
+def is_singular_position(compiled: CompiledSystem, work: Work, tree: Tree, state: State, n_redundant: int) -> bool:
     """Whether fewer constraints repeat others a thousandth of a radian along the motions that the joints allow."""
     model = compiled.model
     holds = is_held(model.rows.kind)
@@ -265,7 +263,7 @@ def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_r
         modal[u0 : u0 + 6] = False
         G[:, u0 + 3 : u0 + 6] /= compiled.length
     _, values, right = np.linalg.svd(G[:, ~modal])
-    allowed = right[int((values > REDUNDANT * values.max(initial=0.0)).sum()) :]
+    allowed = right[int((values > ALLOWED * values.max(initial=0.0)).sum()) :]
     if not len(allowed):
         return False
     y = np.zeros(G.shape[1])
@@ -276,8 +274,7 @@ def is_singular_position(compiled: CompiledSystem, work: Work, state: State, n_r
         near = assembled(compiled, work, displaced(model, state, in_ground_axes(model, state, y)))
     except ModelError:
         return False
-    rows, _ = scaled_constraints(model, work, near)
-    return int((np.linalg.eigvalsh(rows @ rows.T) < REDUNDANT).sum()) < n_redundant
+    return repeated_constraints(compiled, work, tree, near) < n_redundant
 
 
 def with_compatible_velocities(compiled: CompiledSystem, work: Work, state: State, known: Array | None = None) -> State:

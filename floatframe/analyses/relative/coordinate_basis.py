@@ -17,16 +17,14 @@ import numpy as np
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.compiling.system import CompiledSystem, compiled_system
 from floatframe.joints.rows import is_held_length, is_held_position
-from floatframe.kernels.work import new_work
-from floatframe.relative.kernels.tree import Tree, new_joint_work
+from floatframe.relative.kernels.tree import Tree
 from floatframe.relative.topology import tree_of
+from floatframe.relative.tree_motions import coordinate_motions
 from floatframe.results.sensors.measurement import unit_words
-from floatframe.rotations import rotation_matrix
-from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
 from floatframe.system import System
 
-__all__ = ["CoordinateBasis", "coordinate_basis", "coordinate_motions", "coordinate_names", "dependent_coordinates"]
+__all__ = ["CoordinateBasis", "coordinate_basis", "coordinate_names", "dependent_coordinates"]
 
 RANK = 1e-10  #: of the largest row of what coordinates move, below which what is left repeats others
 NEARLY = 0.1  #: of the largest column that is left: one of these may be dependent
@@ -59,7 +57,7 @@ def coordinate_basis(system: System, state: State, G: Array, shown: tuple[Array,
         a body that hangs at nothing are named as its file has it.
     """
     compiled, tree = compiled_system(system), tree_of(system).tree
-    N, units = coordinate_motions(system, state), coordinate_units(system)
+    N, units = coordinate_motions(compiled, tree, state), coordinate_units(system)
     T = free_frames(compiled, tree, N, shown)
     if T is not None:
         N = np.asarray(np.linalg.solve(T.T, N.T).T, dtype=float)
@@ -79,31 +77,6 @@ def coordinate_basis(system: System, state: State, G: Array, shown: tuple[Array,
     return CoordinateBasis(
         tuple(names[k] for k in free), tuple(words.get(units[k], units[k]) for k in free), np.asarray(N)
     )
-
-
-def coordinate_motions(system: System, state: State) -> Array:
-    """Return N_s: motions of the bodies, body axes of the engine, by all coordinates that are unknown, (n_u, n_s)."""
-    from floatframe.relative.kernels.entry import motion_of_bodies, motion_of_joints
-
-    compiled, tree = compiled_system(system), tree_of(system).tree
-    model = compiled.model
-    work, joints = new_work(model), new_joint_work(model, tree)
-    set_iterate(work, State(state.r, state.p, state.q, np.zeros_like(state.u)))
-    motion_of_joints(model, work, tree, joints)
-    joints.rate[:], joints.acceleration[:] = 0.0, 0.0
-    turns = [rotation_matrix(p).T for p in state.p]
-    N = np.zeros((len(state.u), len(tree.slot)))
-    for k, (column, slot) in enumerate(zip(tree.column, tree.slot, strict=True)):
-        work.state.u[:] = 0.0
-        rates = joints.rate if column >= 0 else work.state.u
-        place = column if column >= 0 else slot
-        rates[place] = 1.0
-        motion_of_bodies(model, work, tree, joints)
-        N[:, k] = work.state.u
-        rates[place] = 0.0
-        for u0, turn in zip(model.bodies.u0[:-1], turns, strict=True):
-            N[u0 : u0 + 3, k] = turn @ N[u0 : u0 + 3, k]
-    return N
 
 
 def coordinate_names(system: System) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from floatframe import (
     steady_rotation,
     system_modes,
 )
-from floatframe.analyses.relative.coordinate_basis import coordinate_motions, coordinate_names, dependent_coordinates
+from floatframe.analyses.relative.coordinate_basis import coordinate_names, dependent_coordinates
 from floatframe.compiling.file_frames import motion_of_engine, small_motions_of_file
 from floatframe.compiling.system import compiled_system
 from floatframe.functions.time_functions import polynomial_of_time
@@ -31,6 +31,7 @@ from floatframe.mechanisms import double_pendulum, four_bar, rotating_blade, sat
 from floatframe.relative.kernels.entry import motion_of_joints, newton_matrix
 from floatframe.relative.kernels.tree import new_joint_work
 from floatframe.relative.topology import tree_of
+from floatframe.relative.tree_motions import coordinate_motions
 from floatframe.small_motions.joint_rates import coordinate_rows
 from floatframe.start.newton_equations import linearized, set_iterate
 from tests.floatframe.relative.mechanisms import beam, falling
@@ -107,7 +108,8 @@ def test_matrices_of_a_tree_are_those_of_its_newton_matrix(name):
     if name == "free":  # springs beside the tree: dw = -V⁻¹ C ds; the frame of its file, in body axes
         by_s = [-np.linalg.solve(part[n:, n:], part[n:, :n]) for part in (CK, K)]
         CK, K, M = CK[:n, :n] + CK[:n, n:] @ by_s[0], K[:n, :n] + K[:n, n:] @ by_s[1], M[:n, :n]
-        T = np.linalg.lstsq(coordinate_motions(system, state), engine_motions(compiled, state, both), rcond=None)[0]
+        by_tree = coordinate_motions(compiled, tree, state)
+        T = np.linalg.lstsq(by_tree, engine_motions(compiled, state, both), rcond=None)[0]
         M, CK, K = (T.T @ part @ T for part in (M, CK, K))
     relative = both["relative"]
     for own, expected in ((relative.M, M), (relative.C, CK - K), (relative.K, K)):
