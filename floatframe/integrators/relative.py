@@ -87,19 +87,23 @@ class RelativeGeneralizedAlpha:
         from floatframe.relative.kernels.entry import advance_tree_steps
 
         compiled, tree = compiled_system(system), tree_of(system).tree
-        model = compiled.model
+        model, kept = compiled.model, kept_of(work, compiled.model, tree)
+        if kept.after is not carry or work.solver.c_k == 0.0:  # a run that goes on from a file begins so too
+            kept.joints.is_known[...] = 0
+            kept.tangent.n_known[...] = 0
         carry = self.prepared(system, carry, h, t0 + first * h)
         memory = memory_of(carry)
         memory.a[:] = carry.a
         rows = new_rows(model, (first + n_steps) // every - first // every)
         iterations = int(work.counted.iterations)
         outcome = advance_tree_steps(
-            model, work, tree, new_joint_work(model, tree), factors_of(work, model, tree), memory, rows,
+            model, work, tree, kept.joints, kept.tangent, memory, rows,
             coefficients=self.absolute.coefficients, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
             tolerance=self.tolerance, max_iterations=self.max_iterations, length=compiled.length,
             most_error=self.error_tolerance or 0.0, h_min=self.absolute.least_step(h),
         )  # fmt: skip
         after = carry_of(memory, carry.n_iterations + int(work.counted.iterations) - iterations)
+        kept.after = after
         rows = Rows(*(array[: outcome.n_rows] for array in rows))
         return after, rows, outcome.n_steps, self.explain(system, work, outcome, h)
 
@@ -164,15 +168,24 @@ def in_formulation(integrator: Integrator, formulation: str | None) -> Integrato
     return RelativeGeneralizedAlpha(**asdict(integrator))
 
 
-#: factors that belong to working arrays, by the identity of an array of these; they live as long as it
-KEPT: dict[int, TangentWork] = {}
+@dataclass(eq=False)
+class Kept:
+    """What goes with working arrays beside them, and the memory that it led to."""
+
+    joints: JointWork
+    tangent: TangentWork
+    after: Carry | None = None
 
 
-def factors_of(work: Work, model: Model, tree: Tree) -> TangentWork:
-    """Return the factors of the Newton matrix that go with working arrays, as `work.solver` has the absolute ones."""
+#: by the identity of an array of the working arrays; they live as long as it
+KEPT: dict[int, Kept] = {}
+
+
+def kept_of(work: Work, model: Model, tree: Tree) -> Kept:
+    """Return what goes with working arrays: factors of the Newton matrix as `work.solver` has the absolute ones."""
     key = id(work.solver.pivot)
     if key not in KEPT:
-        KEPT[key] = new_tangent_work(model, tree)
+        KEPT[key] = Kept(new_joint_work(model, tree), new_tangent_work(model, tree))
         weakref.finalize(work.solver.pivot, KEPT.pop, key, None)
         work.solver.is_due[...] = 1
     return KEPT[key]

@@ -308,4 +308,5 @@ def tree_record(compiled: CompiledSystem, branches: list[Branch]) -> Tree:
         jet_s=[s for _, _, s in jets],
         own_jet=own_jet,
         l0=np.concatenate([[0], np.cumsum(np.diff(s0) ** 2)]),
+        front0=np.concatenate([[0], np.cumsum((np.diff(s0) + 6) ** 2)]),
     )

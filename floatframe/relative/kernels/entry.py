@@ -21,7 +21,6 @@ from floatframe.kernels.work import Work
 from floatframe.relative.kernels.accelerations import accelerate, constrain
 from floatframe.relative.kernels.evaluation import evaluate_tree
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
-from floatframe.relative.kernels.predictor import forget
 from floatframe.relative.kernels.projection import put_reactions
 from floatframe.relative.kernels.steps import SINGULAR, advance_tree, correct, renew, write_tree_row
 from floatframe.relative.kernels.tangent import assemble, write_tangent
@@ -61,7 +60,6 @@ def make_entry(digest):
         memory, rows = as_memory(memory_table), as_rows(rows_table)
         what = order.what
         if what == ADVANCE:
-            forget(tree, tangent, memory)
             return advance_tree(model, work, memory, rows, (tree, joints, tangent), order)
         if what == OBSERVE:
             work.counted.rows = 0
@@ -109,7 +107,21 @@ NOTHING = zeros(Order(), {})
 
 NO_TANGENT = zeros(
     TangentWork(),
-    dict.fromkeys(("n_b", "n_s", "jets", "n_q", "n_most", "kept rows", "numbers of L", "numbers of H", "n_dense"), 0),
+    dict.fromkeys(
+        (
+            "n_b",
+            "n_s",
+            "jets",
+            "n_q",
+            "n_most",
+            "kept rows",
+            "numbers of L",
+            "numbers of fronts",
+            "unknowns and motions",
+            "n_dense",
+        ),
+        0,
+    ),
 )
 
 

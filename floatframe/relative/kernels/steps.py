@@ -23,7 +23,6 @@ from floatframe.kernels.generalized_alpha import (
     time_loop,
     write_row,
 )
-from floatframe.kernels.vector import dot
 from floatframe.relative.kernels.evaluation import evaluate_placed, evaluate_tree
 from floatframe.relative.kernels.kept_factors import factorize_poses, keep_bodies, solve_kept
 from floatframe.relative.kernels.kinematics import joint_motion, move_joints, place_bodies
@@ -31,20 +30,30 @@ from floatframe.relative.kernels.predictor import learn, predict
 from floatframe.relative.kernels.projection import put_reactions
 from floatframe.relative.kernels.tangent import write_tangent
 from floatframe.relative.kernels.tree_factors import factorize_tree, solve_newton
-from floatframe.relative.kernels.weights import weigh
+from floatframe.relative.kernels.weights import sizes_of_step, squared_size, weigh
 
 __all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
 
 SINGULAR = 6  #: status: the Newton matrix is
-FAST = 0.1  # corrections that shrink this fast end where the next one would be as much below the one that is allowed
+FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
+SAFE = 0.5  # this much of the one that is allowed
 MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
 
 
 @inner
 def begin(model, work, tree, joints, memory):
-    """Take the iterate from the memory; write motion of the joints at the beginning of a step."""
+    """Take the iterate from the memory; write motion of the joints at the beginning of a step if it is not known."""
     load_state(work.state, memory)
-    joint_motion(model, work, tree, joints)
+    if joints.is_known == 0:
+        joint_motion(model, work, tree, joints)
+        start_here(tree, joints)
+    for k in range(joints.x.shape[0]):
+        joints.x[k] = 0.0
+
+
+@inner
+def start_here(tree, joints):
+    """Take the motion of the joints for that at the beginning of a step."""
     for i in range(tree.parent.shape[0]):
         for a in range(3):
             joints.d_start[i, a] = joints.d[i, a]
@@ -52,8 +61,7 @@ def begin(model, work, tree, joints, memory):
                 joints.Q_start[i, a, b] = joints.Q[i, a, b]
     copy(joints.rate, joints.rate_start)
     copy(joints.acceleration, joints.acceleration_start)
-    for k in range(joints.x.shape[0]):
-        joints.x[k] = 0.0
+    joints.is_known = 1
 
 
 @inner
@@ -101,26 +109,11 @@ def correct(model, work, tree, joints, tangent, c_k):
 
 
 @inner
-def sizes(model, work, tree, joints, tangent, gravity):
-    """Return the squared size of the accelerations and of the increments of a step."""
-    size, size_x, mass = 0.0, 0.0, 0.0
-    for s in range(tree.slot.shape[0]):
-        k = tree.column[s]
-        acceleration = joints.acceleration[k] if k >= 0 else work.state.u_dot[tree.slot[s]]
-        size += tangent.weight[s] * acceleration**2
-        size_x += tangent.weight[s] * joints.increment[s] ** 2
-    for i in range(model.bodies.kind.shape[0]):
-        mass += model.body_types.mass[model.bodies.kind[i]]
-    return size + mass * dot(gravity, gravity), size_x
-
-
-@inner
 def update(model, work, tree, joints, tangent, by_rate, by_acceleration, c_k):
     """Add the correction to the iterate; return its squared norm."""
-    total, step, state = 0.0, tangent.step, work.state
+    total, step, state = squared_size(model, work, tree, tangent), tangent.step, work.state
     for s in range(tree.slot.shape[0]):
         k, slot, x = tree.column[s], tree.slot[s], step[s]
-        total += tangent.weight[s] * x * x
         joints.increment[s] += x
         if k >= 0:
             joints.x[k] += x
@@ -189,7 +182,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
         tangent.left -= 1
     if tangent.exactly > 0:
         tangent.exactly -= 1
-    is_old, is_of_step = work.solver.is_due == 0, False
+    is_old, made = work.solver.is_due == 0, -1
     predict(model, work, tree, joints, tangent, memory, order, h)
     factorisations = work.counted.factorisations
     is_open = tangent.V.shape[0] == 0  # wrenches that are kept are not in the norm
@@ -197,8 +190,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
     while iteration < order.max_iterations:
         evaluate_placed(model, work, tree, joints, c_k)
         if work.solver.is_due == 1:
-            if tangent.is_exact == 0 and tangent.is_kept == 0:
-                is_of_step = True
+            made = iteration
             work.counted.factorisations += 1
             work.solver.is_due = 0
             solver.c_m, solver.c_d, solver.c_k = c_m, c_d, c_k
@@ -207,7 +199,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                 return SINGULAR, excess, -1.0
         correct(model, work, tree, joints, tangent, c_k)
         if iteration == 0:
-            size, size_x = sizes(model, work, tree, joints, tangent, model.gravity)
+            size, size_x = sizes_of_step(model, work, memory, h)
             allowed = order.tolerance * (c_k * math.sqrt(size) + 1e-3 * math.sqrt(size_x))
             allowed += math.sqrt(roundoff_floor(model, work, order.length))
         norm = math.sqrt(update(model, work, tree, joints, tangent, c_d / c_k, c_m / c_k, c_k))
@@ -223,7 +215,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             last, last_of_states = math.inf, math.inf
             iteration += 1
             continue
-        if tangent.is_exact == 0 and not norm <= last:
+        if tangent.is_exact == 0 and not norm <= last and (made != 0 or iteration < 2 or not math.isfinite(norm)):
             work.solver.is_due = 1
             tangent.exactly = MOST_PATIENCE
             tangent.n_known = 0
@@ -242,7 +234,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                 work.solver.is_due = 1
                 return DIVERGED, math.inf, -1.0
         is_enough = norm <= allowed or (
-            is_open and norm <= FAST * last and last < math.inf and norm * norm <= FAST * last * allowed
+            is_open and last < math.inf and norm <= FAST * last and norm * norm <= SAFE * last * allowed
         )
         is_small = is_enough or (norm <= 1e3 * allowed and norm > 0.5 * last and iteration > 2)
         if is_small and (of_states <= 1.0 or (of_states <= 1e3 and of_states > 0.5 * last_of_states and iteration > 2)):
@@ -257,10 +249,10 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             return DONE, excess, error
         if norm > SLOW * last and not is_small:
             work.solver.is_due = 1
-            if is_of_step:  # matrices of this step are not good enough either
-                tangent.exactly = MOST_PATIENCE
-            elif tangent.is_exact == 0:
+            if tangent.is_exact == 0:
                 tangent.is_kept = 0
+                if 0 < made < iteration:  # those of an iterate near to the solution are not good enough either
+                    tangent.exactly = MOST_PATIENCE
         if of_states > max(1.0, SLOW * last_of_states) or iteration >= MANY:
             work.solver.is_due = 1
         last, last_of_states = norm, of_states
@@ -281,6 +273,7 @@ def accept(model, work, memory, tree, joints, h, alpha_m, alpha_f):
     for i in range(model.bodies.kind.shape[0]):
         put_euler_parameters(work.state.R[i], memory.p[i])
     keep_iterate(model, work, memory, h)
+    start_here(tree, joints)
 
 
 @inner

@@ -60,6 +60,7 @@ class Tree(NamedTuple):
     jet_s: IntArray = integer(n_j)  #: number among the unknowns
     own_jet: IntArray = integer(n_s)  #: jet of each unknown at the joint of its own body, -1 for none
     l0: IntArray = integer(n_b + 1)  #: where the matrix of the unknowns of each body begins in a flat store
+    front0: IntArray = integer(n_b + 1)  #: where its front begins in one, see kernels/kept_factors.py
 
 
 class JointWork(NamedTuple):
@@ -74,6 +75,7 @@ class JointWork(NamedTuple):
     acceleration: Array = real(n_k, unit="m/s² or rad/s²")  #: z_ddot
     rate_start: Array = real(n_k, unit="m/s or rad/s")  #: z_dot at the beginning of a step
     acceleration_start: Array = real(n_k, unit="m/s² or rad/s²")
+    is_known: IntArray = integer()  #: whether the beginning of a step is the motion in the memory
     increment: Array = real(n_s)  #: of all unknowns since then
     t: Array = real(n_k, 3)  #: A_A tau, ground axes
     a: Array = real(n_k, 3)  #: rotation, ground axes
@@ -109,13 +111,15 @@ class TangentWork(NamedTuple):
     W: Array = real(n_s, 6)  #: force of a subtree by the unknowns of its first body
     b: Array = real(n_b, 6, unit="N, N m")  #: force of subtrees in a solution
     #: of kernels/kept_factors.py, in axes of each body about its origin
-    N: Array = real(Size("numbers of H"))  #: matrices of bodies with what hangs at them, flat as work.solver.H
-    S: Array = real(n_b, Size("n_most"), 6)  #: screws of the modes at the far marker
-    T: Array = real(n_b, Size("n_most"), 6)  #: those of the parent's modes at the near, less those at its far marker
+    front: Array = real(Size("numbers of fronts"))  #: matrices of modes, columns and motion, then their factors, flat
+    S: Array = real(n_b, 6, Size("n_most"))  #: screws of the modes at the far marker
+    T: Array = real(n_b, 6, Size("n_most"))  #: those of the parent's modes at the near, less those at its far marker
     Z: Array = real(6, Size("n_most"))
     J: Array = real(n_s, 6)  #: screws of columns
-    U: Array = real(n_s, 6)  #: unknowns of a body by the motion of what holds it
-    P: Array = real(n_b, 6, 6)  #: force of a subtree by it
+    P: Array = real(6, 6)  #: force of a subtree by the motion of what holds it
+    z: Array = real(
+        Size("unknowns and motions")
+    )  #: modes, columns and motion of what holds a body, one body after the other
     turn: Array = real(n_b, 3, 3)  #: axes of a body in those of its parent
     shift: Array = real(n_b, 3, unit="m")  #: its origin
     is_exact: IntArray = integer()  #: whether the factors are those of the exact matrix
@@ -126,8 +130,9 @@ class TangentWork(NamedTuple):
     a_before: Array = real(n_s)
     a_first: Array = real(n_s)
     n_known: IntArray = integer()  #: how many of the three are there
-    X: Array = real(n_b, 18)  #: jets of bodies in a solution
-    Y: Array = real(18)
+    degree: IntArray = integer()  #: of the polynomial through them that would have led nearest to the last
+    X: Array = real(n_b, 18)  #: jets of bodies in a solution; of kept factors their motion, axes of each
+    Y: Array = real(n_b, 18)  #: of what holds them
     patience: IntArray = integer()  #: steps that make their own factors after the next that finds old ones too old
     left: IntArray = integer()  #: of them, still to come
     mass: Array = real(n_b, 6, 6, unit="kg, kg m, kg m²")  #: of subtrees
@@ -162,7 +167,8 @@ def new_tangent_work(model: Model, tree: Tree, *, is_dense: bool = False) -> Tan
         "n_s": n_s,
         "kept rows": n_rows,
         "numbers of L": int(tree.l0[-1]),
-        "numbers of H": int(model.bodies.h0[-1]),
+        "numbers of fronts": int(tree.front0[-1]),
+        "unknowns and motions": n_s + 6 * len(tree.parent),
         "n_dense": n_s + n_rows if is_dense else 0,
     }
     return zeros(TangentWork(), sizes)

@@ -177,7 +177,7 @@ def add_to_parent(model, work, tree, tangent, i, c_k):
 @inner
 def solve_tree(tree, tangent, x):
     """Overwrite x, (n_s,), by the solution for the right side in it."""
-    b, X, Y = tangent.b, tangent.X, tangent.Y
+    b, X = tangent.b, tangent.X
     for i in range(b.shape[0]):
         for r in range(6):
             b[i, r] = 0.0
@@ -201,7 +201,7 @@ def solve_tree(tree, tangent, x):
                     x[tree.jet_s[j]] -= inner_product(tangent.screw[j], b[i])
     for place in range(tree.order.shape[0]):
         i = tree.order[place]
-        parent = tree.parent[i]
+        parent, Y = tree.parent[i], tangent.Y[i]
         for e in range(18):
             Y[e] = X[parent, e] if parent >= 0 else 0.0
         for j in range(tree.jet0[i], tree.jet0[i + 1]):

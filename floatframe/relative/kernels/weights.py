@@ -1,4 +1,8 @@
-"""Weights of the norm of unknowns in relative coordinates: the mass that a unit of each moves."""
+"""Norms in relative coordinates: of corrections that of the bodies, and of unknowns by the mass that a unit moves.
+
+Corrections are measured as in absolute coordinates, by how bodies and modes move, so that a tolerance means the same: a
+turn of a joint near the root that those behind it take back is no large one.
+"""
 
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.vector import (
@@ -16,10 +20,11 @@ from floatframe.kernels.vector import (
     tilde,
     transposed,
     turned,
+    turned_back,
     vector,
 )
 
-__all__ = ["weigh"]
+__all__ = ["sizes_of_step", "squared_size", "weigh"]
 
 
 @inner
@@ -63,3 +68,47 @@ def weigh(model, work, tree, joints, tangent):
     for i in range(tree.parent.shape[0]):
         for k in range(model.bodies.n_q[i]):
             tangent.weight[tree.m0[i] + k] = work.solver.weight[model.bodies.u0[i] + 6 + k]
+
+
+@inner
+def squared_size(model, work, tree, tangent):
+    """Return the squared norm of the correction in tangent.step by what it moves, in the weights of `work.solver`."""
+    if tangent.is_exact != 0:
+        move_by_screws(work, tree, tangent)
+    total, weight, step = 0.0, work.solver.weight, tangent.step
+    for i in range(tree.parent.shape[0]):
+        u0, X = model.bodies.u0[i], tangent.X[i]
+        for k in range(6):
+            total += weight[u0 + k] * X[k] * X[k]
+        for k in range(model.bodies.n_q[i]):
+            x = step[tree.m0[i] + k]
+            total += weight[u0 + 6 + k] * x * x
+    return total
+
+
+@inner
+def move_by_screws(work, tree, tangent):
+    """Write how bodies move by the correction, axes of each about its origin, into tangent.X; Y: about one point."""
+    for place in range(tree.order.shape[0]):
+        i = tree.order[place]
+        parent, Y = tree.parent[i], tangent.Y[i]
+        for r in range(6):
+            Y[r] = tangent.Y[parent, r] if parent >= 0 else 0.0
+        for j in range(tree.jet0[i], tree.jet0[i + 1]):
+            for r in range(6):
+                Y[r] += tangent.screw[j, r] * tangent.step[tree.jet_s[j]]
+        R, arm = work.state.R[i], sub(vector(work.state.r[i]), vector(tangent.origin))
+        put(tangent.X[i], 0, turned_back(R, add(vector(Y), cross(vector(Y[3:]), arm))))
+        put(tangent.X[i], 3, turned_back(R, Y[3:]))
+
+
+@inner
+def sizes_of_step(model, work, memory, h):
+    """Return the squared size of the accelerations of the iterate, gravity included, and of the way of a step."""
+    size, size_x, mass = 0.0, 0.0, 0.0
+    for k in range(memory.u.shape[0]):
+        size += work.solver.weight[k] * work.state.u_dot[k] ** 2
+        size_x += work.solver.weight[k] * (h * memory.u[k]) ** 2
+    for i in range(model.bodies.kind.shape[0]):
+        mass += model.body_types.mass[model.bodies.kind[i]]
+    return size + mass * dot(model.gravity, model.gravity), size_x
