@@ -3,6 +3,7 @@
     python -m benchmarks.interface_rich                    # 40 rigid interfaces and one of 601 nodes, all variants
     python -m benchmarks.interface_rich small              # 10 and one of 153 nodes
     python -m benchmarks.interface_rich plain reduced      # some variants
+    python -m benchmarks.interface_rich error              # of frequencies by the number of interface modes kept (small)
 
 A steel block of hex20 cells. Its end x = 0 is an interface of kind "nodes", single faces of its top are rigid
 interfaces; Craig-Bampton with 20 fixed-interface modes. Variants: "plain" all constraint modes without stress and
@@ -135,6 +136,27 @@ def bare(size):
     }  # fmt: skip
 
 
+def error():
+    """Print the largest relative error of eight free-free frequencies by the number of interface modes, small body."""
+    import cms
+    from cms.jobs.body_of_job import job_body
+    from cms.jobs.job import read_job
+    from fe_models.foundation.stages import Stages
+
+    mesh_file("small")
+    with tempfile.TemporaryDirectory(dir=OUT) as folder:
+        body = job_body(read_job(job_file("small", "plain", folder)), Stages())
+    whole = cms.craig_bampton(body, 20)
+
+    def frequencies(modes):
+        return cms.reduce(body, modes, geometric=False, stress=False).free_frequencies[:8]
+
+    exact = frequencies(whole)
+    for n in (0, 5, 10, 20, 40, 80):
+        errors = frequencies(cms.with_characteristic_modes(whole, body, n)) / exact - 1
+        print(f"{n:3} modes kept: {errors.max():.1e} (least {errors.min():.1e})", flush=True)
+
+
 def main():
     size = "small" if "small" in sys.argv else "full"
     chosen = [name for name in VARIANTS if name in sys.argv[1:]] or list(VARIANTS)
@@ -160,5 +182,7 @@ def main():
 if __name__ == "__main__":
     if sys.argv[1:2] == ["bare"]:
         print("RECORD " + json.dumps(bare(sys.argv[2])))
+    elif sys.argv[1:] == ["error"]:
+        error()
     else:
         main()

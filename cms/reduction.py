@@ -1,5 +1,6 @@
 """Reduce: a coupled FEBody and a mode set become a ReducedBody in a body frame."""
 
+import logging
 import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -29,6 +30,7 @@ from cms.reduced_body.nodal_sums import NodalSums
 from cms.reduced_body.reduced_body import BodyFrame, ReducedBody, ReducedInterface
 from cms.second_order.geometric_reduction import stiffness_of_states
 from cms.second_order.quadratic_modes import quadratic_modes
+from cms.second_order.room_for_stiffness import left_out_words, require_room_for_stiffness
 from cms.second_order.unit_states import UnitStates, has_geometric_stiffness, require_geometric_stiffness, states_of
 from fe_models.body.fe_body import FEBody, Interface
 from fe_models.body.kept_nodes import keep_nodes
@@ -36,6 +38,8 @@ from fe_models.body.load_cases import LoadCase, ReducedLoadCase
 from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["assembled", "reduce"]
+
+log = logging.getLogger(__name__)
 
 SHAPES_AT_ONCE = 64  #: whose displacements of all nodes are held at once
 
@@ -69,7 +73,8 @@ def reduce(
     geometric
         Whether to add the geometric stiffness of the unit loads (`cms.GeometricStiffness`), with which a multibody
         system stiffens the body by its spin, accelerations and interface loads; by default where the elements are
-        known. It costs a factorisation, if `source` does not bring one, the static solution of 12 + 6 n_interfaces
+        known and it has 2 GB at most (`cms.second_order.room_for_stiffness`; a warning and the provenance tell if it is
+        left out). It costs a factorisation, if `source` does not bring one, the static solution of 12 + 6 n_interfaces
         loads and one pass over the elements. Or the static states of the unit loads in this frame (`unit_states`), so
         that no factorisation is needed any more.
     quadratic
@@ -89,21 +94,27 @@ def reduce(
         If the set does not belong to the body, or nothing elastic is left.
     BodyError
         If the body is a mechanism, the frame cannot be attached, or geometric stiffness is asked of a body without an
-        element model.
+        element model, or does not fit into the memory of this machine.
     RecoveryError
         If a recovery row is asked for that the body does not know.
     """
     body = body_of(source)
     states = geometric if isinstance(geometric, UnitStates) else None
+    left_out = ""
     if geometric or quadratic:
         require_geometric_stiffness(body)
+        require_room_for_stiffness(body, modes.columns.shape[1])
     elif geometric is None:
         geometric = has_geometric_stiffness(body)
+        left_out = left_out_words(body, modes.columns.shape[1]) if geometric else ""
     if modes.columns.shape[0] != body.n_dof:
         raise ModeSetError(
             f"reduce: mode set {modes.name!r} has columns of {modes.columns.shape[0]} dofs, body "
             f"{body.name!r} has {body.n_dof}; make the set from this body"
         )
+    if left_out:
+        log.warning("body %r: %s", body.name, left_out)
+        geometric = False
     frame = frame or (HeldFrame() if body.is_held else TisserandFrame())
     condition = frame_condition(body, frame)
     if states is not None:
@@ -120,6 +131,7 @@ def reduce(
     reduced = assembled(keeping, modes, finished, condition, kept=kept, moments=moments, damping=damping)
     return replace(
         reduced,
+        provenance={**reduced.provenance, **({"geometric stiffness": left_out} if left_out else {})},
         recovery=recovery_of_model(source, finished.Phi, condition, reduced, recovery),
         stress=nodal_stress_modes(body, finished.Phi, kept, axes) if stress else None,
         point_stress=point_stress_modes(body, finished.Phi, origin, axes) if stress else None,

@@ -11,6 +11,7 @@ import numpy as np
 from cms.errors import BodyError, ModeSetError
 from cms.families.fixed_interface import FixedInterfaceBody, fix_interfaces
 from cms.families.flexibility import BoundaryConditions, CondensedBody, Flexibility
+from cms.families.interface_cost import large_interfaces
 from cms.families.rigid_modes import determinate_partition, independent_rigid_modes
 from cms.families.static_modes import (
     attachment_modes,
@@ -36,7 +37,6 @@ GROUNDED = 1e-6  #: |K Psi_R| / (|K| |Psi_R|) above which a body is not free
 
 
 log = logging.getLogger(__name__)
-MANY = 600  #: boundary dofs of one interface from which its cost is announced
 
 
 class Families:
@@ -50,8 +50,15 @@ class Families:
     follow by the condensed stiffness S of h.
     """
 
-    def __init__(self, body: FEBody) -> None:
+    def __init__(self, body: FEBody, *, announce: bool = True) -> None:
         """Prepare the families of a coupled body; nothing is computed yet.
+
+        Parameters
+        ----------
+        body
+            A coupled body.
+        announce
+            Whether a warning says, before the work, what interfaces with very many dofs cost and what is cheaper.
 
         Raises
         ------
@@ -60,6 +67,7 @@ class Families:
         """
         body.require_coupled()
         self.body = body
+        self._announces = announce
         self._stack = ExitStack()
         self._is_open = True
         self._modes: dict[bytes, list[_Found]] = {}
@@ -111,7 +119,7 @@ class Families:
         """Interior partition and its factorisation."""
         if not self._is_open:
             raise ModeSetError(f"families of body {self.body.name!r}: closed; make new ones")
-        for words in large_interfaces(self.body):
+        for words in large_interfaces(self.body) if self._announces else ():
             log.warning(words)
         return self._stack.enter_context(fix_interfaces(self.body, self._partition[1]))
 
@@ -262,21 +270,6 @@ class Families:
         modes = compute(wanted)
         self._modes[key] = [_Found(modes, wanted.cutoff)]
         return modes
-
-
-def large_interfaces(body: FEBody) -> list[str]:
-    """Say what interfaces with very many boundary dofs cost, one text for each."""
-    texts = []
-    for interface in body.interfaces:
-        n_b = 0 if interface.dofs is None else len(interface.dofs)
-        if n_b >= MANY:
-            texts.append(
-                f"body {body.name!r}: interface {interface.name!r} of {len(interface.nodes)} nodes has {n_b} boundary "
-                f"dofs: as many static solves, {8e-9 * body.n_dof * n_b:.2g} GB of constraint modes, and as many modes "
-                "of the reduced body; interface_modes = 20 in [reduction] (with_characteristic_modes) keeps the "
-                "softest of these modes; kind rigid or distributing has 6"
-            )
-    return texts
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 
 __all__ = ["reduce_job"]
 
+#: mode sets with a column for each boundary dof
+OF_INTERFACES = (
+    "craig-bampton", "craig-bampton-ir", "guyan", "herting", "benfield-hruda", "rubin", "macneal", "craig-chang",
+    "dual-craig-bampton", "attachment", "unrestrained-attachment",
+)  # fmt: skip
+
 
 def reduce_job(
     job: Job | Path | str, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None
@@ -44,6 +50,7 @@ def reduce_job(
     >>> cms.write(body, "rod.h5")                                                  # doctest: +SKIP
     """
     from cms.families.families import Families
+    from cms.second_order.room_for_stiffness import require_room_for_stiffness
     from cms.second_order.unit_states import require_geometric_stiffness
 
     job = job if isinstance(job, Job) else read_job(Path(job))
@@ -51,8 +58,11 @@ def reduce_job(
     coupled = job_body(job, stages, on_report=on_report)
     if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
         require_geometric_stiffness(coupled)  # before the long work
+        require_room_for_stiffness(coupled, expected_columns(job, coupled))
     if job.recovery:
-        with Families(coupled) as families:  # the static part of recovery rows needs the factorisation
+        with Families(
+            coupled, announce=not reduces_interfaces(job)
+        ) as families:  # the static part of recovery rows needs the factorisation
             return reduced(job, families, stages, *modes_and_states(job, families, stages))
     return reduced(job, coupled, stages, *with_own_factorisation(job, coupled, stages))
 
@@ -73,7 +83,7 @@ def reduced(
             damping=None if job.damping is None else job.damping.damping,
             stress=job.reduction.stress is not False,
             quadratic=bool(job.reduction.quadratic_modes),
-            geometric=False if states is None else states,
+            geometric=job.reduction.geometric_stiffness if states is None else states,
             recovery=requests_of(job.recovery),
         )
 
@@ -82,7 +92,7 @@ def with_own_factorisation(job: Job, coupled: FEBody, stages: Stages) -> "tuple[
     """Make what needs the factorisation, which is freed before the reduction: that needs the memory."""
     from cms.families.families import Families
 
-    with Families(coupled) as families:
+    with Families(coupled, announce=not reduces_interfaces(job)) as families:
         return modes_and_states(job, families, stages)
 
 
@@ -92,14 +102,32 @@ def modes_and_states(job: Job, families: "Families", stages: Stages) -> "tuple[M
     These are for the geometric stiffness; None where it is left out or not known.
     """
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
+    from cms.second_order.room_for_stiffness import left_out_words
     from cms.second_order.unit_states import has_geometric_stiffness, unit_states
 
     wanted = job.reduction.geometric_stiffness
-    if wanted is None:
-        wanted = has_geometric_stiffness(families.body)
     with stages(f"mode set {job.reduction.set}"):
         modes = job_mode_set(families, reduction_of(job, families.body))
+    if wanted is None:  # of one that is too large `reduce` says that it is left out
+        wanted = has_geometric_stiffness(families.body) and not left_out_words(families.body, len(modes.labels))
     if not wanted and not job.reduction.quadratic_modes:
         return modes, None
     with stages("static states"):
         return modes, unit_states(families, frame=moving_frame_of(job), spread=job.reduction.spread_loads is not False)
+
+
+def reduces_interfaces(job: Job) -> bool:
+    """Return whether a job asks for fewer modes of all-node interfaces."""
+    return job.reduction.interface_modes is not None or job.reduction.interface_cutoff is not None
+
+
+def expected_columns(job: Job, body: FEBody) -> int:
+    """Return how many columns the mode set of a job has at least, before it is made."""
+    from cms.families.interface_cost import few_columns
+
+    found = len(body.b)
+    if reduces_interfaces(job):
+        found = few_columns(body, job.reduction.interface_modes or 0)
+    if job.reduction.set not in OF_INTERFACES:
+        found = 0
+    return found + (job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else 0)

@@ -8,7 +8,7 @@ import scipy.linalg as la
 from cms.errors import ModeSetError
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.mode_set import ModeSet
-from cms.reduced_basis.independent import gram
+from cms.reduced_basis.independent import gram_in_blocks
 from cms.solvers.mode_count import ModeCount, mode_count
 from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine
@@ -60,7 +60,12 @@ def with_characteristic_modes(
     wanted = mode_count(n_modes)
     Psi_R = geometric_rigid_modes(body, origin=body.nodes.mean(axis=0))
     parts = [
-        _Part((interface.name,), _columns_of(modes, interface), _rigid_motions(body, interface, Psi_R))
+        _Part(
+            (interface.name,),
+            np.asarray(interface.dofs),
+            _columns_of(modes, interface),
+            _rigid_motions(body, interface, Psi_R),
+        )
         for interface in body.interfaces
         if interface.kind == "nodes" and len(interface.nodes) > 1
     ]
@@ -75,9 +80,10 @@ def with_characteristic_modes(
     columns, labels, groups = [modes.columns[:, kept]], [modes.labels[k] for k in kept], [modes.groups[k] for k in kept]
     options, data = dict(modes.options), dict(modes.data)
     for part in parts:
-        Z, frequencies = _characteristic(body, modes.columns[:, part.columns], part, wanted)
+        Psi_C = _side_of(modes.columns, part.columns)
+        Z, frequencies = _characteristic(body, Psi_C, part, wanted)
         n_r, n_z, name = part.R.shape[1], Z.shape[1], " + ".join(part.names)
-        columns.append(combine(modes.columns[:, part.columns], np.hstack([part.R, Z])))
+        columns.append(combine(Psi_C, np.hstack([part.R, Z])))
         labels += [f"interface {name} rigid {k + 1}" for k in range(n_r)]
         labels += [f"interface {name} mode {k + 1}" for k in range(n_z)]
         groups += [f"interface {name} rigid"] * n_r + [f"interface {name} modes"] * n_z
@@ -103,6 +109,7 @@ class _Part:
     """Constraint modes that are treated together."""
 
     names: tuple[str, ...]  #: of the interfaces
+    dofs: IntArray  #: that the constraint modes move, one each, (n,)
     columns: IntArray  #: their constraint modes in the set, (n,)
     R: Array  #: rigid-body motions of each interface, (n, n_r)
 
@@ -127,9 +134,18 @@ def _rigid_motions(body: FEBody, interface: Interface, Psi_R: Array) -> Array:
     return U[:, size > DEPENDENT * size[0]]
 
 
+def _side_of(columns: Array, chosen: IntArray) -> Array:
+    """Return some columns, without a copy where they stand side by side."""
+    first, last = int(chosen[0]), int(chosen[-1]) + 1
+    if np.array_equal(chosen, np.arange(first, last)):
+        return columns[:, first:last]
+    return columns[:, chosen]
+
+
 def _side_by_side(parts: list[_Part]) -> _Part:
     return _Part(
         tuple(name for part in parts for name in part.names),
+        np.concatenate([part.dofs for part in parts]),
         np.concatenate([part.columns for part in parts]),
         la.block_diag(*[part.R for part in parts]),
     )
@@ -137,7 +153,10 @@ def _side_by_side(parts: list[_Part]) -> _Part:
 
 def _characteristic(body: FEBody, Psi_C: Array, part: _Part, wanted: ModeCount) -> tuple[Array, Array]:
     """Lowest deforming modes of the constraint modes and their frequencies: (1) to (3)."""
-    K_c, M_c = (gram(Psi_C, SymmetricProduct(A) @ Psi_C) for A in (body.K, body.M))
+    # K Psi_C is zero inside, and Psi_C the identity on its own dofs and zero on the others
+    K_c = np.asarray(body.K[:, part.dofs].T @ Psi_C)
+    K_c = (K_c + K_c.T) / 2
+    M_c = gram_in_blocks(Psi_C, SymmetricProduct(body.M))
     n, n_r = part.R.shape
     Q, _ = la.qr(M_c @ part.R)
     X = Q[:, n_r:]  # Rᵀ M_c X = 0

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 import cms
 import fe_models as fm
 from cms.errors import ModeSetError
-from cms.families import families
-from cms.families.families import large_interfaces
+from cms.families import families, interface_cost
+from cms.families.interface_cost import few_columns, large_interfaces, reduction_cost
 from tests.bodies import box_mesh
 from tests.fe_models.small_shells import SI, STEEL
 
@@ -65,13 +65,42 @@ def test_an_interface_of_very_many_dofs_announces_its_cost_before_the_work(monke
     left = fm.nodes_interface(mesh, "left", fm.NodeSet("left"))
     body = cms.couple(fm.solid_body(mesh, STEEL, name="block", units=SI, interfaces=[left]))
     assert large_interfaces(body) == []
-    monkeypatch.setattr(families, "MANY", 45)
+    monkeypatch.setattr(interface_cost, "MANY", 45)
     (words,) = large_interfaces(body)
     assert "interface 'left' of 15 nodes has 45 boundary dofs" in words
     assert "interface_modes = 20" in words
-    assert f"{8e-9 * body.n_dof * 45:.2g} GB" in words
+    assert "45 columns, about" in words
+    assert "26 columns, about" in words
     order = []
     monkeypatch.setattr(families, "fix_interfaces", lambda *_: order.append(len(caplog.records)) or 1 / 0)
     with caplog.at_level(logging.WARNING), pytest.raises(ZeroDivisionError):
         cms.craig_bampton(body, n_modes=2)
     assert order == [1]  # told before the factorisation
+
+
+def test_the_cost_of_a_reduction_grows_as_its_arrays_do():
+    mesh = box_mesh(4, 4, 2)
+    sides = [
+        fm.nodes_interface(mesh, "left", fm.NodeSet("left")),
+        fm.rigid_interface(mesh, "right", fm.NodeSet("right")),
+    ]
+    body = cms.couple(fm.solid_body(mesh, STEEL, name="block", units=SI, interfaces=sides))
+    assert (few_columns(body, 20), few_columns(body, 100)) == (32, 51)
+    bare, whole = (reduction_cost(body, 51, stress=stress) for stress in (False, True))
+    n_kept = len(np.unique(np.concatenate([body.surface.ravel(), *(each.nodes for each in body.interfaces)])))
+    assert whole.file - bare.file == 8 * 6 * n_kept * 51
+    assert 8 * 9 * 51**2 < bare.file < 8 * (27 * 51**2 + 3 * n_kept * 51)
+    assert bare.memory > bare.file + 8 * 2 * body.n_dof * 51
+    assert "51 columns" in bare.words
+
+
+def test_the_file_of_a_reduction_is_as_large_as_was_said(tmp_path):
+    """Numbers that deflate leaves as they are: M, K and D, which are diagonal, are small here."""
+    mesh = box_mesh(8, 6, 6)
+    body = cms.couple(
+        fm.solid_body(mesh, STEEL, name="b", units=SI, interfaces=[fm.nodes_interface(mesh, "l", fm.NodeSet("left"))])
+    )
+    modes = cms.craig_bampton(body, n_modes=3)
+    cms.write(cms.reduce(body, modes, geometric=False), tmp_path / "b.h5")
+    said = reduction_cost(body, modes.columns.shape[1]).file
+    assert 0.8 < (tmp_path / "b.h5").stat().st_size / said < 1.1

@@ -1,14 +1,17 @@
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import scipy.linalg as la
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from cms.errors import ModeSetError
 from cms.families.rigid_modes import geometric_rigid_modes
 from cms.mode_sets import craig_bampton, craig_bampton_ir, guyan, rubin
 from cms.mode_sets.characteristic_modes import with_characteristic_modes
+from cms.reduced_basis.finishing import finish
+from cms.reduced_basis.frames import TisserandFrame, frame_condition
 from cms.reduction import reduce
 from cms.solvers.mode_count import ModeCount
 from fe_models.body.couplings import couple
@@ -123,3 +126,49 @@ def test_sets_and_bodies_without_such_modes_are_refused(body):
     rigid = body_of(["rigid", "rigid"])
     with pytest.raises(ModeSetError, match="no interface of kind 'nodes'"):
         with_characteristic_modes(guyan(rigid), rigid, n_modes=3)
+
+
+def free_body_load(body, f):
+    """The load with the rigid-body acceleration it causes: what a free body answers by deformation alone."""
+    R = geometric_rigid_modes(body)
+    return f - body.M @ (R @ np.linalg.solve(R.T @ (body.M @ R), R.T @ f))
+
+
+def test_static_answers_are_exact_to_loads_whose_motion_is_kept_and_improve_for_others():
+    """Loads that hold a kept shape of the interface against its stiffness; unit loads at the rigid one from below."""
+    body = body_of(["nodes", "rigid"])
+    whole = guyan(body)
+    few = with_characteristic_modes(whole, body, n_modes=5)
+    u = few.columns @ np.random.default_rng(0).normal(size=few.columns.shape[1])
+    f = body.K @ u  # on boundary dofs alone
+    assert np.abs(f[body.i]).max() < 1e-8 * np.abs(f).max()
+    found = finish(body, few, frame_condition(body, TisserandFrame()))
+    answer = found.Phi @ (found.Phi.T @ f / np.diag(found.K))
+    rest = u - answer
+    R = geometric_rigid_modes(body)
+    rest -= R @ np.linalg.lstsq(R, rest, rcond=None)[0]
+    assert_allclose(rest, 0, rtol=0, atol=1e-8 * np.abs(answer).max())
+
+    F = np.eye(body.n_dof)[:, body.interface("right").dofs]
+    F = free_body_load(body, F)
+    compliance = []
+    for n in (0, 3, 10, 1000):
+        modes = with_characteristic_modes(whole, body, n_modes=n)
+        Phi = finish(body, modes, frame_condition(body, TisserandFrame()))
+        H = Phi.Phi.T @ F
+        compliance.append(np.einsum("kj,kj->j", H, H / np.diag(Phi.K)[:, None]))
+    size = compliance[-1]
+    for fewer, more in itertools.pairwise(compliance):
+        assert (fewer <= more + 1e-9 * size).all()
+    full = finish(body, whole, frame_condition(body, TisserandFrame()))
+    H = full.Phi.T @ F
+    assert_allclose(size, np.einsum("kj,kj->j", H, H / np.diag(full.K)[:, None]), rtol=1e-7)
+
+
+def test_constraint_modes_of_rigid_interfaces_stay_as_they_are():
+    body = body_of(["nodes", "rigid"])
+    whole = craig_bampton_ir(body, n_modes=2)
+    few = with_characteristic_modes(whole, body, n_modes=3)
+    rows = [[k for k, group in enumerate(modes.groups) if group == "constraint right"] for modes in (whole, few)]
+    assert len(rows[0]) == 6
+    assert_array_equal(few.columns[:, rows[1]], whole.columns[:, rows[0]])

@@ -1,0 +1,104 @@
+"""Jobs with interfaces of very many dofs: what they cost is said before the work, and what does not fit is refused."""
+
+import logging
+
+import meshio
+import numpy as np
+import pytest
+
+from cms.errors import BodyError
+from cms.families import families, interface_cost
+from cms.jobs.job import read_job
+from cms.jobs.reduce_job import expected_columns, reduce_job
+from cms.second_order import room_for_stiffness
+from tests.bodies import box_mesh
+
+JOB = """
+[body]
+name = "block"
+mesh = "block.vtu"
+units = "m-kg-s"
+[materials.steel]
+young = 2.1e11
+poisson = 0.3
+density = 7850.0
+[interfaces.end]
+kind = "nodes"
+plane = {point = [0, 0, 0], normal = [1, 0, 0]}
+[interfaces.other]
+kind = "rigid"
+plane = {point = [1, 0, 0], normal = [1, 0, 0]}
+[reduction]
+n_modes = 2
+"""
+
+
+@pytest.fixture
+def job(tmp_path, monkeypatch):
+    """A function that writes the job with more lines and reads it; 45 dofs are many."""
+    mesh = box_mesh(4, 4, 2, kind="hexahedron")
+    meshio.Mesh(np.asarray(mesh.nodes), {kind: np.asarray(rows) for kind, rows in mesh.cells.items()}).write(
+        tmp_path / "block.vtu"
+    )
+    monkeypatch.setattr(interface_cost, "MANY", 45)
+
+    def made(lines=""):
+        path = tmp_path / "block.toml"
+        path.write_text(JOB + lines)
+        return read_job(path)
+
+    return made
+
+
+def test_the_cost_of_all_constraint_modes_is_told_once_before_the_work(job, monkeypatch, caplog):
+    told = []
+    fix = families.fix_interfaces
+    monkeypatch.setattr(families, "fix_interfaces", lambda *given: told.append(caplog.text) or fix(*given))
+    with caplog.at_level(logging.WARNING):
+        reduce_job(job("geometric_stiffness = false\n"))
+    assert len(told) == 1
+    assert "interface 'end' of 15 nodes has 45 boundary dofs" in told[0]
+    assert "Consider interface reduction: interface_modes = 20 in [reduction]" in told[0]
+    assert caplog.text == told[0]
+
+
+def test_who_reduces_the_interface_is_told_nothing(job, caplog):
+    with caplog.at_level(logging.WARNING):
+        body = reduce_job(job("interface_modes = 4\n"))
+    assert not caplog.records
+    assert body.n_q == 10 + 6 + 2 - 6
+    assert body.geometric.interfaces.shape == (2, 6, 12, 12)
+
+
+def test_geometric_stiffness_without_room_is_refused_before_the_work(job, monkeypatch):
+    monkeypatch.setattr(room_for_stiffness, "machine_memory", lambda: 1e6)
+    monkeypatch.setattr(families, "fix_interfaces", lambda *_: pytest.fail("worked before it looked"))
+    with pytest.raises(BodyError, match=r"over about 53 modes.*interface_modes = 20 in \[reduction\]"):
+        reduce_job(job("geometric_stiffness = true\n"))
+
+
+def test_geometric_stiffness_that_is_very_large_is_left_out_with_a_note(job, monkeypatch, caplog):
+    monkeypatch.setattr(room_for_stiffness, "UNASKED", 8.0 * 30 * 40**2)
+    with caplog.at_level(logging.WARNING):
+        body = reduce_job(job())
+    assert body.geometric is None
+    assert "left out: 30 unit loads over 53 modes" in body.provenance["geometric stiffness"]
+    assert caplog.text.count("left out") == 1
+    assert reduce_job(job("interface_modes = 4\n")).geometric is not None
+
+
+def test_columns_are_counted_before_they_are_made(job):
+    class Body:
+        b = np.arange(51)
+
+        class Nodes:
+            kind, dofs = "nodes", np.arange(45)
+
+        class Rigid:
+            kind, dofs = "rigid", np.arange(6)
+
+        interfaces = (Nodes, Rigid)
+
+    assert expected_columns(job(), Body) == 53
+    assert expected_columns(job("interface_modes = 20\n"), Body) == 34
+    assert expected_columns(job('set = "normal"\n'), Body) == 2

@@ -1,0 +1,97 @@
+"""Bases of mode sets: columns in blocks, the half of each Gram matrix, shapes in the place of the columns."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from cms.mode_sets.attachment import unrestrained_attachment
+from cms.mode_sets.craig_bampton import craig_bampton
+from cms.reduced_basis import finishing, independent
+from cms.reduced_basis.finishing import finish
+from cms.reduced_basis.frames import NodalFrame, TisserandFrame, frame_condition
+from cms.reduced_basis.independent import Products, gram_in_blocks, independent_basis
+from cms.solvers.sparse_product import SymmetricProduct
+from cms.solvers.tall import combined
+from fe_models.body.couplings import couple
+from tests.bodies import bar
+
+ROUNDOFF = 1e-12
+
+
+@pytest.fixture(scope="module")
+def body():
+    return couple(bar(4, 2, 2, length=0.2, width=0.1, height=0.1))
+
+
+@pytest.fixture(scope="module")
+def modes(body):
+    return craig_bampton(body, n_modes=15)
+
+
+def test_a_gram_matrix_in_blocks_is_that_at_once(body, modes, monkeypatch):
+    V = modes.columns
+    monkeypatch.setattr(independent, "PRODUCT_BYTES", 1.0)  # 16 columns at a time
+    for A in (body.K, body.M):
+        G = gram_in_blocks(V, SymmetricProduct(A))
+        assert_array_equal(G, G.T)
+        size = np.sqrt(np.diag(G))
+        assert_allclose(G / np.outer(size, size), V.T @ (A @ V) / np.outer(size, size), rtol=0, atol=1e3 * ROUNDOFF)
+
+
+@pytest.mark.parametrize("frame", [TisserandFrame(), NodalFrame("left")], ids=["mean axes", "nodal"])
+def test_shapes_of_the_columns_and_of_an_orthonormal_basis_are_the_same(body, modes, frame, monkeypatch):
+    condition = frame_condition(body, frame)
+    formed = []
+    make = independent.orthonormal_basis
+    for place in (independent, finishing):
+        monkeypatch.setattr(place, "orthonormal_basis", lambda *given: formed.append(1) or make(*given))
+    kept = modes.columns.copy()
+    at_once = finish(body, modes, condition)
+    assert not formed
+    monkeypatch.setattr(independent, "TRUSTED_CONDITION", 0.0)
+    twice = finish(body, modes, condition)
+    assert len(formed) == 1
+    assert_array_equal(modes.columns, kept)  # they belong to the set
+    assert_allclose(np.diag(at_once.K), np.diag(twice.K), rtol=1e-9)
+    for found in (at_once, twice):
+        Phi = found.Phi
+        assert_allclose(Phi.T @ (body.M @ Phi), np.eye(Phi.shape[1]), rtol=0, atol=1e-10)
+        assert np.abs(condition.rigid_part(Phi)).max() < 1e-9 * np.abs(Phi).max()
+    assert_allclose(np.abs(np.einsum("nk,nk->k", at_once.Phi, body.M @ twice.Phi)), 1.0, rtol=0, atol=1e-6)
+
+
+def test_rounding_that_counts_has_the_basis_formed(body, modes, monkeypatch):
+    condition = frame_condition(body, TisserandFrame())
+    formed = []
+    make = finishing.orthonormal_basis
+    monkeypatch.setattr(finishing, "orthonormal_basis", lambda *given: formed.append(1) or make(*given))
+    monkeypatch.setattr(finishing, "TRUSTED_ROUNDING", 1e-30)
+    assert_allclose(finish(body, modes, condition).Phi.shape, (body.n_dof, modes.columns.shape[1] - 6))
+    assert len(formed) == 1
+
+
+def test_a_basis_with_redundant_columns_is_orthonormal_and_spans_them(body):
+    modes = unrestrained_attachment(body, n_modes=30)
+    V = np.hstack([modes.columns, modes.columns[:, 7:9] @ np.array([[1.0], [1e-6]])])
+    products = Products.of_body(body)
+    omega2 = 1e9
+    basis, redundant = independent_basis(V, *products.grams(V), products, body, omega2)
+    assert len(redundant) >= 1
+    Q = basis.combine(np.eye(basis.Z.shape[1]))
+    W = body.K + omega2 * body.M
+    assert_allclose(Q.T @ (W @ Q), np.eye(Q.shape[1]), rtol=0, atol=1e-9)
+    assert_allclose(basis.G_K + omega2 * basis.G_M, np.eye(Q.shape[1]), rtol=0, atol=1e-9)
+    assert_allclose(V @ basis.T, Q, rtol=0, atol=1e-6 * np.abs(Q).max())
+    for column in V.T:
+        rest = column - Q @ (Q.T @ (W @ column))
+        assert rest @ (W @ rest) < 1e-16 * (column @ (W @ column))
+
+
+@pytest.mark.parametrize("m", [3, 6, 9, 10])
+def test_a_product_in_the_place_of_its_factor(m):
+    rng = np.random.default_rng(0)
+    X, C = rng.normal(size=(50, 10)), rng.normal(size=(10, m))
+    expected = X @ C
+    found = combined(X, C)
+    assert np.shares_memory(found, X) == (m >= 5)
+    assert_allclose(found, expected, rtol=0, atol=ROUNDOFF * np.abs(expected).max())
