@@ -3,7 +3,7 @@
     python -m benchmarks.interface_rich                    # 40 rigid interfaces and one of 601 nodes, all variants
     python -m benchmarks.interface_rich small              # 10 and one of 153 nodes
     python -m benchmarks.interface_rich plain reduced      # some variants
-    python -m benchmarks.interface_rich error              # of frequencies by the number of interface modes kept (small)
+    python -m benchmarks.interface_rich error              # of frequencies by the number of interface modes (small)
 
 A steel block of hex20 cells. Its end x = 0 is an interface of kind "nodes", single faces of its top are rigid
 interfaces; Craig-Bampton with 20 fixed-interface modes. Variants: "plain" all constraint modes without stress and
