@@ -14,6 +14,7 @@ from .fe_names import ReducedLoadCase as ReducedLoadCase
 from .fe_names import Units as Units
 from .fe_names import couple as couple
 from .fe_names import unit_system as unit_system
+from .fleets.fleet import reduce_fleet as reduce_fleet
 from .frame_conversion import convert_frame as convert_frame
 from .importers.import_body import import_body as import_body
 from .importers.inertia import FullMass as FullMass

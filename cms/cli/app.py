@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from cms.cli.arguments import ModalFile, Output
+from cms.cli.arguments import ModalFile, Output, Workers
 from cms.cli.console import commands, guarded, say
 from cms.cli.info import info_command, print_body
-from cms.cli.reduce import reduce_and_write, reduce_command
+from cms.cli.reduce import Fleet, reduce_and_write_fleet, reduce_command
 from cms.cli.view import view_command
 
 __all__ = ["app"]
@@ -465,6 +465,7 @@ def split_command(
     cut: Annotated[str, typer.Option(help="Interfaces at the cuts: rigid or distributing.")] = "rigid",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write to.")] = None,
     reduce: Annotated[bool, typer.Option("--reduce", help="Reduce the parts at once.")] = False,
+    workers: Workers = None,
 ) -> None:
     """Split a body into parts with an interface at each cut, so that large deflections are carried by several frames.
 
@@ -473,16 +474,16 @@ def split_command(
     Example: cms split blade.toml -n 4 --reduce
 
     Example: cms split rod.toml --at 40,80 --axis x
+
+    Example: cms split wing.toml -n 8 --reduce --workers dask
     """
     from cms.cli.split import SplitRequest, direction_of, places_of, split_job
-    from cms.jobs.job import read_job
 
     files = split_job(SplitRequest(job, n, places_of(at), direction_of(axis), cut, output))
     for path in files:
         say(f"wrote {path}")
     if reduce:
-        for path in files[:-1]:
-            reduce_and_write(read_job(path), path.with_suffix(".h5"))
+        reduce_and_write_fleet(Fleet(files[:-1], None, workers, None))
 
 
 @app.command("demo")

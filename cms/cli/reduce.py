@@ -1,12 +1,15 @@
-"""`cms reduce`: a job becomes a modal file."""
+"""`cms reduce`: a job becomes a modal file, many jobs many."""
 
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.arguments import Output
-from cms.cli.console import guarded, output_path, print_table, say, stages
+from cms.cli.arguments import Workers
+from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 from cms.cli.info import print_body
 
 if TYPE_CHECKING:
@@ -14,7 +17,7 @@ if TYPE_CHECKING:
     from cms.reduced_body.reduced_body import ReducedBody
     from fe_models.foundation.stages import Stages
 
-__all__ = ["reduce_and_write", "reduce_command"]
+__all__ = ["Fleet", "reduce_and_write", "reduce_and_write_fleet", "reduce_command"]
 
 
 def reduce_and_write(job: "Job", path: Path) -> "ReducedBody":
@@ -43,31 +46,94 @@ def print_times(clock: "Stages") -> None:
     print_table("Time", ("stage", "s>"), [*rows, ("all", f"{sum(clock.seconds.values()):.2f}")])
 
 
-def inputs_of(path: Path, job: "Job") -> "list[Path]":
-    """Return the job file and all files it names: meshes, tables, matrices, columns, and those of neighbours' jobs."""
-    from cms.jobs.job import read_job
-    from fe_models.foundation.toml_file import files_named
+@dataclass(frozen=True)
+class Fleet:
+    """Several jobs, and where and how they are run."""
 
-    found = [path]
-    for each in files_named(job):
-        found += inputs_of(each, read_job(each)) if each.suffix == ".toml" and each not in found else [each]
-    return found
+    jobs: Sequence[Path]
+    output: Path | None  #: folder of the modal files, or the file of one job; None: beside the jobs
+    workers: str | None
+    journal: Path | None  #: None: beside the modal files
+
+    def journal_path(self, outputs: Sequence[Path]) -> Path:
+        """Return where the journal is by default: in the folder that holds all modal files."""
+        if self.journal is not None:
+            return self.journal
+        return Path(os.path.commonpath([os.path.abspath(path.parent) for path in outputs])) / "reduce.journal"
+
+
+def reduce_and_write_fleet(fleet: Fleet) -> None:
+    """Run several jobs by workers, write their modal files, and print what became of each.
+
+    Raises
+    ------
+    JobError, WorkerError
+        Before any work: if a job, an output or the workers do not do.
+    typer.Exit
+        If a job failed.
+    """
+    from cms.errors import JobError
+    from cms.fleets.fleet import reduce_fleet
+
+    made = [job.with_suffix(".h5") for job in fleet.jobs]
+    if fleet.output is not None and fleet.output.is_dir():
+        made = [fleet.output / path.name for path in made]
+    elif fleet.output is not None:
+        if len(fleet.jobs) > 1:
+            raise JobError(f"--output {fleet.output}: expected a folder that is there, for the files of several jobs")
+        made = [fleet.output]
+    outputs = [output_path(path, None, JobError, needs_file=True) for path in made]
+    journal = output_path(fleet.journal_path(outputs), None, JobError, overwrite_of=fleet.jobs, needs_file=True)
+    with stages(remaining=True) as clock, clock(f"{len(fleet.jobs)} jobs") as advance:
+        rows = reduce_fleet(
+            fleet.jobs, outputs, workers=fleet.workers, journal=journal,
+            progress=lambda done, all_: advance(done / all_),
+        )  # fmt: skip
+    for job, output, row in zip(fleet.jobs, outputs, rows, strict=True):
+        for note in row.notes:
+            typer.echo(f"note: {job}: {note}", err=True)
+        if not row.error:
+            megabytes = f"{output.stat().st_size / 1e6:.2f} MB"
+            before = "done before" if row.is_known else f"{row.seconds:.2f} s"
+            say(f"{'kept' if row.is_known else 'wrote'} {output} ({megabytes}, {row.n_modes} modes, {before})")
+    failed = [(job, row.error) for job, row in zip(fleet.jobs, rows, strict=True) if row.error]
+    n_known = sum(row.is_known for row in rows)
+    say(f"{len(rows)} jobs: {len(rows) - n_known - len(failed)} done, {n_known} done before, {len(failed)} failed")
+    for job, error in failed:
+        print_error(f"{job}: {error}")
+    if failed:
+        raise typer.Exit(USER_ERROR)
 
 
 @guarded
 def reduce_command(
-    job: Annotated[Path, typer.Argument(help="Job file (TOML), see docs/job_file.md.")],
-    output: Output = None,
+    jobs: Annotated[list[Path], typer.Argument(help="Job files (TOML), see docs/job_file.md.", metavar="JOB...")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Modal file to write; of several jobs their folder.")
+    ] = None,
+    journal: Annotated[
+        Path | None,
+        typer.Option("--journal", help="Of several jobs: file that keeps which are done; default: beside the files."),
+    ] = None,
+    workers: Workers = None,
 ) -> None:
-    """Reduce a finite element body to a modal file.
+    """Reduce finite element bodies to modal files.
 
-    Without -o the modal file stands beside the job file: rod.toml gives rod.h5.
+    Without -o the modal file stands beside the job file: rod.toml gives rod.h5. Several jobs, or --workers: each is a
+    task, what is done is kept in a journal (reduce.journal), and the same command goes on from there.
 
     Example: cms reduce rod.toml -o rod.h5
+
+    Example: cms reduce jobs/*.toml --workers 4
     """
     from cms.errors import JobError
+    from cms.fleets.inputs import inputs_of
     from cms.jobs.job import read_job
 
+    if len(jobs) > 1 or workers is not None:
+        reduce_and_write_fleet(Fleet(jobs, output, workers, journal))
+        return
+    job = jobs[0]
     read = read_job(job)
     inputs = inputs_of(job, read)
     path = output_path(output, job.with_suffix(".h5"), JobError, overwrite_of=inputs)

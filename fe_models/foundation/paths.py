@@ -6,11 +6,12 @@ import secrets
 import stat
 import sys
 from collections.abc import Mapping
+from glob import escape
 from pathlib import Path
 
 from fe_models.foundation.words import nearest
 
-__all__ = ["is_stream", "near_file", "replace_file", "replace_files", "same_file", "sync_folder"]
+__all__ = ["is_stream", "near_file", "remove_parts", "replace_file", "replace_files", "same_file", "sync_folder"]
 
 OWN_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,6})")
 STANDARD = {"/dev/stdout": 1, "/dev/stderr": 2}
@@ -104,6 +105,12 @@ def replace_files(contents: Mapping[Path, bytes]) -> None:
 def part_of(path: Path) -> Path:
     """Return the name beside a file under which its new content is written."""
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+
+
+def remove_parts(path: Path) -> None:
+    """Remove what processes that were killed while they wrote a file have left beside it."""
+    for part in path.parent.glob(f".{escape(path.name)}.????????.part"):
+        part.unlink(missing_ok=True)
 
 
 def write_part(part: Path, *parts: bytes | memoryview) -> None:

@@ -1,0 +1,125 @@
+"""A fleet of jobs: each is reduced to a modal file of its own by one of many workers."""
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from cms.errors import JobError
+from cms.fleets.fleet_job import FleetJob, FleetRow, failed_row, reduce_and_write_one
+from cms.fleets.inputs import digest_of_inputs, inputs_of
+from cms.jobs.job import read_job
+from fe_models.foundation.digest import file_digest
+from fe_models.foundation.paths import remove_parts, same_file
+from fe_models.foundation.tasks.installation import source_mark
+from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
+from fe_models.foundation.tasks.workers import Workers, tasks_of
+
+__all__ = ["reduce_fleet"]
+
+KIND = "cms reduce journal 1"
+
+
+def reduce_fleet(
+    jobs: Sequence[str | os.PathLike[str]],
+    outputs: Sequence[str | os.PathLike[str]] | None = None,
+    *,
+    workers: Workers = None,
+    journal: str | os.PathLike[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[FleetRow]:
+    """Reduce many jobs, each to a modal file; one that fails is a row with its reason, the others go on.
+
+    Parameters
+    ----------
+    jobs
+        Job files.
+    outputs
+        Modal files, one a job; default: beside the jobs, rod.toml gives rod.h5.
+    workers
+        Where jobs are run (docs/cluster.md), by default one process a processor. Processes of this machine share its
+        processors evenly.
+    journal
+        A file that every job that is done is appended to: it is not run again while the files it depends on, the
+        program, and its modal file are the same. None: nothing is written.
+    progress
+        Called with the numbers of jobs done and of all.
+
+    Raises
+    ------
+    JobError
+        Before any work: if a job file cannot be read, or an output is an input, or that of another job.
+    WorkerError
+        If no workers can be had.
+    """
+    paths = [Path(path) for path in jobs]
+    made = [path.with_suffix(".h5") for path in paths] if outputs is None else [Path(path) for path in outputs]
+    fleet = fleet_of(paths, made)
+    kept = None if journal is None else open_task_journal(Path(journal), KIND, source_mark(), "this call", JobError)
+    rows = {} if kept is None else known_rows(kept, fleet)
+    missing = [k for k in range(len(fleet)) if k not in rows]
+
+    def keep(i: int, row: FleetRow) -> None:
+        rows[missing[i]] = row
+        if kept is not None and not row.error:
+            kept.append(record_of(row))
+        if progress is not None:
+            progress(len(rows), len(fleet))
+
+    try:
+        if missing:
+            files = sorted({str(folder) for k in missing for folder in (fleet[k].job, fleet[k].output.parent)})
+            with tasks_of(workers, len(missing), threads=None) as tasks:
+                tasks.map(
+                    reduce_and_write_one, [fleet[k] for k in missing], failed=failed_row, done=keep, files=files
+                )
+    finally:  # a worker that was killed at its writing could not clean up
+        for k in missing:
+            remove_parts(fleet[k].output)
+    return [rows[k] for k in range(len(fleet))]
+
+
+def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path]) -> list[FleetJob]:
+    """Return the jobs of a fleet, all checked; `JobError` if two files are one."""
+    found = []
+    all_inputs: list[Path] = []
+    for path, output in zip(jobs, outputs, strict=True):
+        inputs = inputs_of(path, read_job(path))
+        all_inputs += inputs
+        found.append(FleetJob(Path(os.path.abspath(path)), Path(os.path.abspath(output)), digest_of_inputs(inputs)))
+    for k, job in enumerate(found):
+        for other in found[:k]:
+            if same_file(job.output, other.output):
+                raise JobError(f"{job.job} and {other.job} would both be written to {job.output}; rename one")
+        for each in all_inputs:
+            if same_file(job.output, each):
+                raise JobError(f"{job.job}: {job.output} is an input of a job; choose another folder or name")
+    return found
+
+
+def known_rows(journal: TaskJournal, fleet: Sequence[FleetJob]) -> dict[int, FleetRow]:
+    """Return number of the job -> row, for those whose inputs and modal file are as the journal says."""
+    records = {}
+    for record in journal.records:
+        try:
+            records[str(record["job"]), str(record["output"])] = record
+            FleetRow(fleet[0], str(record["name"]), int(record["n_modes"]), float(record["seconds"]))
+        except (KeyError, TypeError, ValueError):
+            continue
+    rows = {}
+    for k, job in enumerate(fleet):
+        found = records.get((str(job.job), str(job.output)))
+        if found is None or found.get("digest") != job.digest or found.get("made") != file_digest(job.output):
+            continue
+        size = int(found["n_modes"])
+        notes = tuple(str(note) for note in found.get("notes", ()))
+        rows[k] = FleetRow(job, str(found["name"]), size, float(found["seconds"]), notes, is_known=True)
+    return rows
+
+
+def record_of(row: FleetRow) -> dict[str, object]:
+    """Return a row as a line of the journal."""
+    return {
+        "job": str(row.job.job), "output": str(row.job.output), "digest": row.job.digest,
+        "made": file_digest(row.job.output), "name": row.name, "n_modes": row.n_modes, "seconds": row.seconds,
+        "notes": row.notes,
+    }  # fmt: skip

@@ -1,0 +1,72 @@
+"""One job of a fleet: what a worker is told, what it does, and what it answers."""
+
+import logging
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from fe_models.foundation.errors import ReportedError
+from fe_models.foundation.tasks.task_map import ProcessError
+
+__all__ = ["FleetJob", "FleetRow", "failed_row", "reduce_and_write_one"]
+
+
+@dataclass(frozen=True)
+class FleetJob:
+    """A job and the modal file it makes, both by their full paths, and a mark of all files the job depends on."""
+
+    job: Path
+    output: Path
+    digest: str
+
+
+@dataclass(frozen=True)
+class FleetRow:
+    """What became of a job."""
+
+    job: FleetJob
+    name: str = ""  #: of the body
+    n_modes: int = 0
+    seconds: float = 0.0
+    notes: tuple[str, ...] = ()  #: warnings on the way
+    error: str = ""  #: why there is no file
+    is_lasting: bool = True  #: another try would give the same error
+    is_known: bool = False  #: from the journal
+
+
+class Kept(logging.Handler):
+    """Keeps the warnings of one thread."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.thread = threading.get_ident()
+        self.notes: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep one warning."""
+        if record.thread == self.thread and not record.name.startswith("distributed"):
+            self.notes.append(record.getMessage())
+
+
+def reduce_and_write_one(job: FleetJob) -> FleetRow:
+    """Run a job and write its modal file; runs in a worker."""
+    from cms.jobs.reduce_job import reduce_job
+    from cms.modal_file.file import write
+
+    began = time.perf_counter()
+    kept = Kept()
+    logging.getLogger().addHandler(kept)
+    try:
+        reduced = reduce_job(job.job)
+        write(reduced, job.output)
+    finally:
+        logging.getLogger().removeHandler(kept)
+    return FleetRow(job, reduced.name, reduced.n_q, time.perf_counter() - began, tuple(kept.notes))
+
+
+def failed_row(job: FleetJob, error: Exception) -> FleetRow:
+    """Return the row of a job that went wrong, its error in words."""
+    words = str(error) if isinstance(error, ReportedError) else f"{type(error).__name__}: {error}"
+    is_lasting = isinstance(error, ReportedError) and not isinstance(error, ProcessError)
+    return FleetRow(job, error=" ".join(words.split()) or type(error).__name__, is_lasting=is_lasting)
