@@ -46,7 +46,7 @@ def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
 
     modal = folder / "rod.h5"
     step(folder, "cms reduce rod.toml -o rod.h5")
-    reduce_command(folder / "rod.toml", modal)
+    reduce_command([folder / "rod.toml"], modal)
     step(folder, "cms info rod.h5")
     info_command(modal)
     step(folder, "cms info rod.h5 --json > rod.json")
