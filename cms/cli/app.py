@@ -401,6 +401,15 @@ def compare_command(
         Path | None, typer.Option(help="Reference motion instead of the pulse: .npz with u (n_dof, n_t) and t in s.")
     ] = None,
     stills: Annotated[int, typer.Option(min=0, help="Still pictures of mode shapes in the report.")] = 4,
+    workers: Annotated[
+        str | None,
+        typer.Option(
+            "--workers",
+            "-j",
+            help="Where sets and numbers of modes are judged: a number of processes, dask (dask:4), "
+            "dask://host:port, see docs/cluster.md; default: one after the other with one factorisation.",
+        ),
+    ] = None,
 ) -> None:
     """Compare mode sets with the full model: which one is good enough, with how few modes, and why.
 
@@ -409,12 +418,16 @@ def compare_command(
 
     Example: cms compare rod.toml --sets craig-bampton,craig-bampton-ir,rubin --modes 0:30 -o compare
 
+    Example: cms compare rod.toml --sets rubin,krylov,macneal --workers 3
+
     Example: cms compare rod.toml --sets rubin,benfield-hruda --load small_end:mass=1e-3 --band 5000
     """
     from cms.cli.verdicts.compare import CompareRequest, run_compare
 
     run_compare(
-        CompareRequest(job, sets, modes, output, band, reference_modes, tuple(load or ()), pulse_at, motion, stills)
+        CompareRequest(
+            job, sets, modes, output, band, reference_modes, tuple(load or ()), pulse_at, motion, stills, workers
+        )
     )
 
 

@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from cms.compare.comparison import Comparison
-from cms.compare.coordinates import ReferenceBasis
 from cms.compare.drawing import draw_modes
 from cms.compare.pulse import default_pulse
 from cms.compare.reference import Question, full_results, reference_of, solution
 from cms.compare.set_result import set_result
+from cms.compare.set_tasks import SetJudge, reference_basis, set_results
 from cms.compare.verdicts import answer, ranking
 from cms.errors import CompareError
 from cms.families.families import Families
 from cms.mode_sets import MODE_SETS
 from cms.quality.of_reduction.frf import DAMPING
-from cms.quality.reference.ports import Ports
 from cms.quality.reference.transient import Snapshots
 from fe_models.body.fe_body import FEBody
+from fe_models.foundation.tasks.workers import Workers
 from fe_models.foundation.words import nearest, quoted
 
 __all__ = ["compare"]
@@ -41,6 +41,8 @@ def compare(
     motion: Snapshots | None = None,
     cache: Path | None = None,
     stage: Stage | None = None,
+    workers: Workers = None,
+    source: Callable[[], FEBody] | None = None,
 ) -> Comparison:
     """Judge mode sets with several numbers of vibration modes against the full model.
 
@@ -71,6 +73,11 @@ def compare(
         File that keeps the solution of the full model for the next comparison; None: nothing is kept.
     stage
         Called with the name of each stage, gives a context manager around it.
+    workers
+        Where sets and numbers of modes are judged (docs/cluster.md), with a factorisation in every worker; None: here,
+        with the one that solved the full model.
+    source
+        Makes the body; sent to the workers, which need it and a cache.
 
     Raises
     ------
@@ -79,7 +86,11 @@ def compare(
         result says why.
     BodyError
         If the body is a mechanism or not free.
+    WorkerError
+        If no workers can be had.
     """
+    if workers is not None and (source is None or cache is None):
+        raise CompareError("workers: they need source, a function that makes the body, and a cache")
     options = {name: dict(sets[name]) if isinstance(sets, Mapping) else {} for name in sets}
     check_request(options, counts)
     question = Question(default_pulse(body, pulse_at), damping, band, n_reference, motion)
@@ -89,13 +100,15 @@ def compare(
             solved = solution(families, question, n_expected=max(counts), cache=cache)
             full = solved.full
             reference = reference_of(families, full, damping)
-            basis = ReferenceBasis(
-                families, Ports.of_body(body), full.columns, full.rigid.shape[1], float(full.omega2[0])
-            )
+            basis = reference_basis(families, full) if workers is None else None
         results = []
-        for name, extra in options.items():
+        for name, extra in options.items() if basis is not None else ():
             with clock(name):
                 results.append(set_result(name, extra, counts, families, basis, reference))
+    if source is not None and cache is not None and workers is not None:
+        judge = SetJudge(source, str(cache.absolute()), solved.digest, question.key, damping)
+        with clock("mode sets") as advance:
+            results = set_results(judge, options, counts, workers, progress_of(advance))
     order = ranking(results)
     with clock("surface"):
         drawing = draw_modes(body, full.Phi)
@@ -126,6 +139,11 @@ def check_request(options: Mapping[str, Any], counts: Sequence[int]) -> None:
         raise CompareError(f"modes: expected numbers of modes, 0 or more, got {list(counts)}")
 
 
+def progress_of(advance: Any) -> Callable[[int, int], None] | None:
+    """Return what shows the progress of a stage that takes the finished fraction, if it takes one."""
+    return (lambda done, all_: advance(done / all_)) if callable(advance) else None
+
+
 def provenance(body: FEBody) -> dict[str, str]:
     """Record where the body came from, and versions."""
     versions = {f"version {name}": metadata.version(name) for name in ("numpy", "scipy")}
@@ -151,9 +169,9 @@ class _Timed:
     def __init__(self, clock: _Clock, name: str, inner: AbstractContextManager[Any]) -> None:
         self._clock, self._name, self._inner = clock, name, inner
 
-    def __enter__(self) -> None:
+    def __enter__(self) -> Any:
         self._began = time.perf_counter()
-        self._inner.__enter__()
+        return self._inner.__enter__()
 
     def __exit__(self, *failure: Any) -> None:
         self._inner.__exit__(*failure)

@@ -3,7 +3,7 @@
 import inspect
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,24 @@ from cms.compare.evaluation import Reference, judge_subset
 from cms.compare.free_shapes import judged_subset
 from cms.compare.subsets import SUBSETS
 from cms.compare.verdicts import is_good, set_sentence, severity, shown_point
-from cms.errors import CmsError, ModeSetError
+from cms.errors import CmsError
 from cms.families.families import Families
 from cms.mode_set import ModeSet
 from cms.mode_sets import MODE_SETS
 from fe_models.foundation.arrays import Array
 
-__all__ = ["set_result"]
+__all__ = ["SetPart", "counts_of_parts", "joined_parts", "set_part", "set_result"]
+
+
+@dataclass(frozen=True, eq=False)
+class SetPart:
+    """A mode set with some of the numbers of modes."""
+
+    points: tuple[Point, ...]  #: by ascending number of modes
+    columns: tuple[dict[str, int], ...]  #: family -> number of columns, of each point
+    refused: Mapping[int, str]  #: number of modes -> why it cannot be had
+    error: str  #: why the set cannot be judged at all
+    seconds: float
 
 
 def set_result(
@@ -32,19 +43,51 @@ def set_result(
     reference: Reference,
 ) -> SetResult:
     """Return the result of one set; where it cannot be made, its sentence says why."""
-    began = time.perf_counter()
+    return joined_parts(name, [set_part(name, options, counts, families, basis, reference)])
+
+
+def joined_parts(name: str, parts: Sequence[SetPart]) -> SetResult:
+    """Return the result of one set from its parts, which hold all numbers of modes."""
     words = first_sentence(MODE_SETS[name].__doc__)
+    refused = {n_modes: why for part in parts for n_modes, why in part.refused.items()}
+    found = [pair for part in parts for pair in zip(part.points, part.columns, strict=True)]
+    found.sort(key=lambda pair: pair[0].n_modes)
+    points, columns = [point for point, _ in found], [each for _, each in found]
+    errors = [part.error for part in parts if part.error]
+    if errors or not points:
+        reasons = [refused[n_modes] for n_modes in sorted(refused, reverse=True)]
+        told = errors[0] if errors else "; ".join(dict.fromkeys(reasons))
+        return SetResult(name, words, (), None, "error", f"could not be made: {told}")
+    shown = shown_point(points)
+    kept = tuple(point if k == shown else without_curves(point) for k, point in enumerate(points))
+    chosen = columns[shown] if shown is not None else {}
+    sentence = set_sentence(points) + refused_words(refused)
+    seconds = sum(part.seconds for part in parts)
+    return SetResult(name, words, kept, shown, severity(points), sentence, chosen, seconds)
+
+
+def counts_of_parts(name: str, counts: Sequence[int]) -> list[tuple[int, ...]]:
+    """Return numbers of modes that are judged together: all, where sets with fewer modes are columns of the largest."""
+    asked = tuple(sorted(set(counts)))
+    is_one = name in SUBSETS or "n_modes" not in inspect.signature(MODE_SETS[name]).parameters
+    return [asked] if is_one else [(n_modes,) for n_modes in asked]
+
+
+def set_part(
+    name: str,
+    options: Mapping[str, Any],
+    counts: Sequence[int],
+    families: Families,
+    basis: ReferenceBasis,
+    reference: Reference,
+) -> SetPart:
+    """Return the points of one set, the number of columns of each family in each, and which are refused."""
+    began = time.perf_counter()
     try:
         points, columns, refused = judged_points(name, options, counts, families, basis, reference)
     except (CmsError, np.linalg.LinAlgError) as error:
-        return SetResult(name, words, (), None, "error", f"could not be made: {error}")
-    shown = shown_point(points)
-    kept = tuple(point if k == shown else without_curves(point) for k, point in enumerate(points))
-    verdict = severity(points)
-    chosen = columns[shown] if shown is not None else {}
-    return SetResult(
-        name, words, kept, shown, verdict, set_sentence(points) + refused, chosen, time.perf_counter() - began
-    )
+        return SetPart((), (), {}, str(error), time.perf_counter() - began)
+    return SetPart(tuple(points), tuple(columns), refused, "", time.perf_counter() - began)
 
 
 def judged_points(
@@ -54,8 +97,8 @@ def judged_points(
     families: Families,
     basis: ReferenceBasis,
     reference: Reference,
-) -> tuple[list[Point], list[dict[str, int]], str]:
-    """Return the points of one set, the number of columns of each family in each, and words about those refused."""
+) -> tuple[list[Point], list[dict[str, int]], dict[int, str]]:
+    """Return the points of one set, the number of columns of each family in each, and why others are refused."""
     make = MODE_SETS[name]
     takes = inspect.signature(make).parameters
     body = families.body
@@ -90,9 +133,7 @@ def judged_points(
                 judge(n_modes, c, c.columns, modes.labels, modes.groups)
         except CmsError as error:
             refused[n_modes] = str(error)
-    if not points:
-        raise ModeSetError("; ".join(dict.fromkeys(refused.values())))
-    return points[::-1], families_of_columns[::-1], refused_words(refused)
+    return points[::-1], families_of_columns[::-1], refused
 
 
 def refused_words(refused: Mapping[int, str]) -> str:

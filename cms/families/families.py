@@ -84,6 +84,10 @@ class Families:
         self._is_open = False
         self._stack.close()
 
+    def forget_vibration_modes(self) -> None:
+        """Search vibration modes anew when they are asked for; how many were asked for before changes roundoff."""
+        self._modes.clear()
+
     # -- partition -------------------------------------------------------------------------------------------------
 
     @property

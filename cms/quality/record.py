@@ -5,7 +5,7 @@ Tests, command line, reports and plots read the same record; every threshold of 
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -36,6 +36,11 @@ class QualityRecord:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "data", MappingProxyType(dict(self.data)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A view of a dict cannot be sent to another process; the dict can."""
+        values = (getattr(self, each.name) for each in fields(self))
+        return type(self), tuple(dict(value) if isinstance(value, MappingProxyType) else value for value in values)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the record in plain types, ready for JSON; numbers that are not finite become None."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +46,7 @@ class CompareRequest:
     pulse_at: str | None
     motion: Path | None
     stills: int
+    workers: str | None = None
 
 
 def run_compare(request: CompareRequest) -> None:
@@ -58,6 +60,7 @@ def run_compare(request: CompareRequest) -> None:
     from cms.compare.compare import compare
     from cms.compare.mode_counts import mode_counts
     from cms.jobs.job import read_job
+    from fe_models.foundation.tasks.workers import checked_workers
 
     require_job(request.job)
     counts = mode_counts(request.modes)
@@ -67,6 +70,7 @@ def run_compare(request: CompareRequest) -> None:
     if request.n_reference < 1:
         raise CompareError(f"--reference-modes {request.n_reference}: expected 1 or more")
     loads = [parse_load(text) for text in request.loads]
+    workers = None if request.workers is None else checked_workers(request.workers)
     job = read_job(request.job)
     folder = output_folder(request.output or request.job.with_name(f"{request.job.stem}_comparison"))
     reports: list[Any] = []
@@ -77,7 +81,8 @@ def run_compare(request: CompareRequest) -> None:
             motion = None if request.motion is None else read_motion(request.motion, body)
             comparison = compare(
                 body, options, counts, band=request.band, n_reference=request.n_reference, pulse_at=request.pulse_at,
-                motion=motion, cache=folder / CACHE, stage=clock,
+                motion=motion, cache=folder / CACHE, stage=clock, workers=workers,
+                source=partial(body_of_file, request.job.absolute()),
             )  # fmt: skip
             with clock("report"):
                 written = write_report(folder, comparison, request.stills)
@@ -172,6 +177,14 @@ def body_of(job: "Job", clock: Any, reports: list[Any]) -> "FEBody":
     from cms.jobs.body_of_job import job_body
 
     return job_body(job, clock, on_report=reports.append)
+
+
+def body_of_file(path: Path) -> "FEBody":
+    """Return the coupled body of a job file; runs in a worker."""
+    from cms.jobs.body_of_job import job_body
+    from cms.jobs.job import read_job
+
+    return job_body(read_job(path))
 
 
 def options_of(job: "Job", body: "FEBody", names: tuple[str, ...], loads: list[Any]) -> Mapping[str, dict[str, Any]]:

@@ -419,9 +419,35 @@ def test_the_command_writes_table_page_and_numbers_that_agree(folder):
     assert "full model taken from an earlier comparison" in again.stdout
 
 
+def test_a_cluster_judges_as_processes_do_and_both_as_this_process(folder):
+    """Bit for bit, but for the seconds; against the factorisation that all sets share, to rounding."""
+    pytest.importorskip("distributed")
+    found = {}
+    for name, workers in (("alone", []), ("two", ["-j", "2"]), ("dask", ["--workers", "dask:2"])):
+        result = run(
+            folder / "bar.toml", "--sets", "guyan,rubin,craig-chang", "--modes", "2,5", "-o", folder / name, "--stills",
+            "0", "--reference-modes", "5", *workers,
+        )  # fmt: skip
+        assert result.exit_code == 0, result.output
+        found[name] = json.loads((folder / name / "comparison.json").read_text())
+        for each in found[name]["sets"]:
+            del each["seconds"]
+    assert found["two"]["sets"] == found["dask"]["sets"]
+    for one, other in zip(found["alone"]["sets"], found["two"]["sets"], strict=True):
+        assert (one["name"], one["verdict"]) == (other["name"], other["verdict"])
+        assert [p["n_modes"] for p in one["points"]] == [p["n_modes"] for p in other["points"]]
+        for p, q in zip(one["points"], other["points"], strict=True):
+            assert_allclose(errors_of(q), errors_of(p), rtol=1e-6, atol=1e-10)
+
+
+def errors_of(point):
+    return [record["value"] for record in point["records"] if record["name"] in ("frequency-error", "static-interface")]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["--workers", "dsak"], ["expected a number of processes, dask"]),
         (["--sets", "craig-bamton"], ["unknown mode set 'craig-bamton'", "did you mean 'craig-bampton'"]),
         (["--sets", "rubin,rubin"], ["twice"]),
         (["--sets", ","], ["expected names"]),
