@@ -100,11 +100,12 @@ def compare(
             solved = solution(families, question, n_expected=max(counts), cache=cache)
             full = solved.full
             reference = reference_of(families, full, damping)
-            basis = reference_basis(families, full) if workers is None else None
         results = []
-        for name, extra in options.items() if basis is not None else ():
-            with clock(name):
-                results.append(set_result(name, extra, counts, families, basis, reference))
+        if workers is None:
+            basis = reference_basis(families, full)
+            for name, extra in options.items():
+                with clock(name):
+                    results.append(set_result(name, extra, counts, families, basis, reference))
     if source is not None and cache is not None and workers is not None:
         judge = SetJudge(source, str(cache.absolute()), solved.digest, question.key, damping)
         with clock("mode sets") as advance:
