@@ -13,13 +13,12 @@ from floatframe.errors import FloatframeError, ModelError
 from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
 from floatframe.joints.rows import is_held, is_held_length, is_held_position
 from floatframe.kernels.memory import Rows, new_rows
-from floatframe.kernels.model import COUPLER, USER_FORCE
 from floatframe.kernels.work import Work, new_work
 from floatframe.relative.kernels.tree import new_joint_work, new_tangent_work
 from floatframe.relative.partition import partition_of
 from floatframe.relative.topology import SystemTree, tree_of
 from floatframe.rotations import euler_parameters, right_jacobian
-from floatframe.start.initial import consistent_motion
+from floatframe.start.initial import consistent_motion, has_normal_friction
 from floatframe.start.newton_equations import set_iterate
 from floatframe.state import State
 from floatframe.system import System
@@ -30,6 +29,8 @@ METHODS = ("BDF", "Radau", "LSODA", "DOP853", "RK45")  #: of SciPy
 TURN = 2.0  #: rad: a rotation vector further from its beginning is counted from anew
 CLOSED = 1e-13  #: of lengths and angles, of loops at each evaluation
 MOST = 20  #: iterations
+COUNTED = 0.1  #: absolute tolerance of coordinates that only say which turn an angle is in
+SETTLED = 1e-12  #: last change of reactions and the like, relative to the largest
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,9 @@ class RelativeOde:
 
     so that constraints hold to rounding at any tolerance. Steps and orders are the solver's; `h` of `integrate` is the
     distance of outputs. Rotations are counted from the beginning of a batch of steps, anew after two radians. Work and
-    dissipation are summed by the trapezoidal rule over the outputs. Friction of the kind that sticks, couplers and
-    user forces, which have a memory of their own, are for `RelativeGeneralizedAlpha`.
+    dissipation are summed by the trapezoidal rule over the outputs. States of elements and user forces are unknowns of
+    the solver beside coordinates and rates; multipliers of elements, and friction by the force in its joint, are found
+    with the reactions by Newton's method. Elements that feel accelerations are for `RelativeGeneralizedAlpha`.
     """
 
     method: str = "BDF"  #: "BDF", "Radau" or "LSODA" for stiff systems; "DOP853", "RK45" for others
@@ -60,19 +62,14 @@ class RelativeOde:
     def start(self, system: System, t: float, state: State | None = None, before: Carry | None = None) -> Carry:
         """Return the memory at the beginning, from a state made consistent."""
         compiled = compiled_system(system)
-        for c, name in enumerate(compiled.connection_names):
-            if compiled.model.connections.law[c] in (COUPLER, USER_FORCE):
-                raise ModelError(
-                    f"RelativeOde: {name!r} has a memory of its own, which this scheme does not know; use "
-                    "GeneralizedAlpha"
-                )
         for each in compiled.laws:
-            if each.law.states or each.law.multipliers:
+            if each.law.accelerations:
                 raise ModelError(
-                    f"RelativeOde: element {each.element.name!r} has states or multipliers of its own, which this "
-                    "scheme does not know; use GeneralizedAlpha"
+                    f"RelativeOde: element {each.element.name!r} feels accelerations, which this scheme does not know; "
+                    "use GeneralizedAlpha"
                 )
-        made = consistent_motion(system, state, t=t)
+        known = None if before is None else before.w
+        made = consistent_motion(system, state, t=t, known=known)
         carry = Carry(made.state, made.u_dot, np.zeros(0), 0.0, made.w, np.zeros(2), np.zeros(2))
         return with_angles(system, t, carry, before)
 
@@ -91,7 +88,7 @@ class RelativeOde:
         """Advance by n_steps output times, the first of them number `first` from t0; see `carry.Integrator`."""
         times: Array = t0 + h * np.arange(first, first + n_steps + 1, dtype=float)
         rows, n_good, failure = [new_rows(compiled_system(system).model, 0)], 0, None
-        motion = Motion(system, carry.state, float(times[0]))
+        motion = Motion(system, carry.state, float(times[0]), carry.w)
         try:
             for t, state, u_dot, w in motion.outputs(self, times):
                 carry = replace(carry, state=state, u_dot=u_dot, w=w, h=h, n_steps=carry.n_steps + 1)
@@ -110,9 +107,9 @@ class RelativeOde:
 
 
 class Motion:
-    """A system along a motion: y = (independent increments x, independent rates) to their derivatives."""
+    """A system along a motion: y = (independent x, independent rates, states, counted coordinates) and its rates."""
 
-    def __init__(self, system: System, state: State, t: float) -> None:
+    def __init__(self, system: System, state: State, t: float, w: Array) -> None:
         self.compiled: CompiledSystem = compiled_system(system)
         self.parts: SystemTree = tree_of(system)
         self.model, self.tree = self.compiled.model, self.parts.tree
@@ -128,6 +125,13 @@ class Motion:
         self.groups = groups_of(self.parts)
         self.n_evaluations = 0
         self.p = state.p
+        states = self.model.states
+        self.n_states, self.own = len(states.row), np.concatenate([states.row, self.model.coordinates.row])
+        self.z, self.w = w[self.own].copy(), w.copy()  #: states, counted coordinates; unknowns of the last evaluation
+        self.z_size = np.concatenate([states.size, np.full(len(self.own) - self.n_states, np.inf)])
+        self.work.states.kappa[:], self.work.states.rho[...] = 0.0, 1.0
+        own_equations = any(each.law.multipliers for each in self.compiled.laws)
+        self.is_linear = not (self.n_states or has_normal_friction(self.model) or own_equations)
         self.begin(state, t)
 
     def begin(self, state: State, t: float) -> None:
@@ -160,6 +164,8 @@ class Motion:
         tree, joints, state = self.tree, self.joints, self.work.state
         state.time[...] = t
         state.w[:] = 0.0
+        state.w[self.own] = self.z  # angles are those next to it
+        self.work.states.base[:] = self.z[: self.n_states]
         joints.x[tree.column[~self.is_mode]] = x[~self.is_mode]
         joints.rate[tree.column[~self.is_mode]] = rates[~self.is_mode]
         joints.acceleration[:] = 0.0
@@ -183,9 +189,9 @@ class Motion:
     def closed_at(self, t: float, y: Array) -> tuple[Array, Array]:
         """(2): return increments and rates of all unknowns that belong to the independent ones."""
         places, speeds = self.of_places, self.of_rates
-        n = len(places.independent)
-        x, rates = self.x.copy(), np.zeros_like(self.x)
-        x[places.independent], rates[speeds.independent] = y[:n], y[n:]
+        n, m = len(places.independent), len(y) - len(self.own)
+        x, rates, self.z = self.x.copy(), np.zeros_like(self.x), y[m:].copy()
+        x[places.independent], rates[speeds.independent] = y[:n], y[n:m]
         for _ in range(MOST if len(places.dependent) else 0):
             self.constrain(t, x, rates, by_increments=True)
             g = self.work.connections.g[self.rows[self.closed]]
@@ -216,7 +222,8 @@ class Motion:
         x_dot = rates.copy()
         for columns in self.groups:
             x_dot[columns] = np.linalg.solve(right_jacobian(x[columns]), rates[columns])
-        return np.concatenate([x_dot[self.of_places.independent], accelerations[self.of_rates.independent]])
+        z_dot = self.work.state.w[self.own + 1]
+        return np.concatenate([x_dot[self.of_places.independent], accelerations[self.of_rates.independent], z_dot])
 
     def accelerations(self, t: float, x: Array, rates: Array) -> Array:
         """(3): return accelerations of all unknowns; bodies and wrenches are written."""
@@ -224,12 +231,32 @@ class Motion:
 
         self.n_evaluations += 1
         self.put(t, x, rates)
-        if not accelerations(self.model, self.work, self.tree, self.joints, self.tangent):
-            raise ModelError(
-                f"the equations of motion are singular at t = {t:.9g}: a mode or a coordinate without mass, or "
-                "constraints that depend on each other; use GeneralizedAlpha for modes without mass"
-            )
-        return self.tangent.step.copy()
+        if not self.is_linear:
+            self.work.state.w[self.rows] = self.w[self.rows]
+            self.work.state.w[self.own] = self.z
+        for _ in range(1 if self.is_linear else MOST):
+            if not accelerations(self.model, self.work, self.tree, self.joints, self.tangent):
+                raise ModelError(
+                    f"the equations of motion are singular at t = {t:.9g}: a mode or a coordinate without mass, or "
+                    "constraints that depend on each other; use GeneralizedAlpha for modes without mass"
+                )
+            raise_errors_of(self.compiled.callbacks)
+            found = self.tangent.step.copy()
+            change = np.abs(self.tangent.mu).max(initial=0.0)
+            if change <= SETTLED * np.abs(self.work.state.w[self.rows]).max(initial=0.0):
+                break
+            if not self.is_linear:  # joints have moved to where x leads
+                w = self.work.state.w.copy()
+                self.put(t, x, rates)
+                self.work.state.w[self.rows] = w[self.rows]
+        else:
+            if not self.is_linear:
+                raise ModelError(
+                    f"reactions, friction and multipliers of elements did not settle at t = {t:.9g}: their equations "
+                    "have no solution near by, or several; use GeneralizedAlpha"
+                )
+        self.w = self.work.state.w.copy()
+        return found
 
     def outputs(self, method: RelativeOde, times: Array) -> Iterator[tuple[float, State, Array, Array]]:
         """Yield time, state, u_dot and w at each time but the first."""
@@ -237,10 +264,12 @@ class Motion:
 
         k = 1
         while k < len(times):
-            y = np.concatenate([self.x[self.of_places.independent], self.rates[self.of_rates.independent]])
+            own = self.x[self.of_places.independent], self.rates[self.of_rates.independent]
+            y, n_own = np.concatenate([*own, self.z]), len(own[0]) + len(own[1])
+            atol = np.minimum(method.atol * np.concatenate([np.ones(n_own), self.z_size]), COUNTED)
             solution = solve_ivp(
                 self.derivative, (self.t_start, times[-1]), y, method=method.method, rtol=method.rtol,
-                atol=method.atol, t_eval=times[k:], events=self.events(),
+                atol=atol, t_eval=times[k:], events=self.events(),
             )  # fmt: skip
             if solution.status < 0:
                 raise ModelError(solution.message)

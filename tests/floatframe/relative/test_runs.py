@@ -130,8 +130,8 @@ def test_loops_are_cut_where_the_fewest_constraints_are_left():
         assert_array_equal(one, other)
 
 
-def test_friction_by_the_normal_force_keeps_a_joint_a_constraint_and_others_not():
-    """A block pushed along a rail: both formulations brake it alike."""
+def rubbed_block():
+    """A block with an arm, pushed along a rail that rubs by its normal force."""
     block = RigidBody("block", 2.0, np.eye(3), velocity=(1.0, 0.0, 0.0))
     arm = RigidBody("arm", 0.5, 0.1 * np.eye(3), position=(0.3, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
     joints = [
@@ -139,7 +139,12 @@ def test_friction_by_the_normal_force_keeps_a_joint_a_constraint_and_others_not(
         RevoluteJoint("hinge", Marker("block"), Marker("arm", position=(-0.3, 0.0, 0.0))),
     ]
     friction = JointForce("rub", "rail", "distance", friction_coefficient=0.2, friction_speed=1e-2)
-    system = System([block, arm], joints, [DOWN, friction])
+    return System([block, arm], joints, [DOWN, friction])
+
+
+def test_friction_by_the_normal_force_keeps_a_joint_a_constraint_and_others_not():
+    """A block pushed along a rail: both formulations brake it alike."""
+    system = rubbed_block()
     assert tree_of(system).constrained == ("rail",)
     assert tree_of(system).coordinates[-1] == "hinge/angle"
     motions = [
