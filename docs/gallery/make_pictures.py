@@ -339,6 +339,14 @@ def road_car_study(journal: Path | None = None) -> None:
         figure.savefig(HERE.parent / "road_car_before_after.png", dpi=80)
 
 
+def flexible_arm() -> None:
+    """The flexible arm under its three controllers."""
+    from floatframe.machines.flexible_arm import compared, links, moves, plot_motions
+
+    parts = links()
+    plot_motions(compared(parts, moves(parts))).savefig(HERE.parent / "flexible_arm.png", dpi=80)
+
+
 MECHANISMS: dict[str, Callable[[], None]] = {
     "slider_crank": slider_crank,
     "antenna": antenna,
@@ -347,6 +355,7 @@ MECHANISMS: dict[str, Callable[[], None]] = {
     "bogie_film": bogie,
     "landing_gear_film": landing_gear,
     "road_car_film": road_car,
+    "flexible_arm": flexible_arm,
     "road_car_plots": road_car_plots,
     "road_car_study": road_car_study,
     "landing_gear_braking": partial(landing_gear_running, "braking", 1.9, 2.4, magnification=5.0, speed=0.1),

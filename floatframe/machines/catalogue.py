@@ -55,6 +55,11 @@ MACHINES: dict[str, Machine] = {
     "absorber": Machine(
         "an absorber on an oscillator", "absorber", "optimised by its frequency response and by eigenvalues"
     ),
+    "flexible-arm": Machine(
+        "a flexible arm of two links",
+        "flexible_arm",
+        "a fast move: computed torque of a rigid model beside a move optimised with its modes (CasADi)",
+    ),
     "road-car": Machine(
         "a road car", "road_car", "hydraulic roll control, roll and warp, sine steer, lane change, suspension optimised"
     ),

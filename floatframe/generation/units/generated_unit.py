@@ -9,6 +9,8 @@ from importlib.resources import files
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import numpy as np
+
 from fe_models.foundation.paths import replace_file
 from floatframe.cosimulation.archive import identifier_of, release, zipped
 from floatframe.cosimulation.interface import Variable
@@ -30,6 +32,7 @@ __all__ = ["GeneratedUnit", "generate_fmu"]
 VERSIONS = (2, 3)
 WORDS = "Multibody system {}: equations of motion as generated C, without needs where it runs."
 STEP = "step"  #: the parameter of the unit
+STABLE = 2.6  #: step times the fastest frequency
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,7 @@ def generate_fmu(
         raise ModelError(f"generate_fmu: {target}: expected a file name that ends in .fmu, in a folder that exists")
     folder = platform_folder(fmi)
     model, tree = model_terms(system, parameters)
+    require_stable(model, step / system.units.time)
     routine = routine_of(tree, "forward", identifier(f"{system.name}_forward"))
     variables = unit_variables(model, tree, routine, step)
     notes = notes_of(system, routine, model, tree)
@@ -108,6 +112,28 @@ def generate_fmu(
     except OSError as error:
         raise ModelError(f"generate_fmu: {target}: cannot be written: {error.strerror}") from error
     return GeneratedUnit(target, variables, folder)
+
+
+def require_stable(model: RelativeModel, step: float) -> None:
+    """Raise `ModelError` if steps of the Runge-Kutta method are too long for the fastest mode of flexible bodies.
+
+    step: in units of time of the system. The method is stable up to 2.785 along the negative and 2.83 along the
+    imaginary axis; frequencies are those of small motions about the system as placed.
+    """
+    if all(not name.rsplit("/", 1)[1].startswith("mode ") for name in model.names):
+        return
+    z, rest = model.positions()[0], np.zeros(model.n_rates)
+    K, D, M = model.derivatives(z, rest, rest)
+    n = len(rest)
+    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, np.hstack([K, D]))]])
+    fastest = float(np.abs(np.linalg.eigvals(matrix)).max())
+    if step * fastest > STABLE:
+        unit = model.expansion.system.units
+        raise ModelError(
+            f"generate_fmu: step: {step * unit.time:g} s is too long for the fastest mode, {fastest:.4g} rad/"
+            f"{unit.time_symbol}; expected {0.9 * STABLE / fastest * unit.time:.2g} s or less, or bodies with fewer "
+            "modes (modes, with_modes)"
+        )
 
 
 def rotations(tree: TreeTerms) -> list[tuple[int, int]]:

@@ -1,6 +1,7 @@
 """FMUs of generated C: the motion of the engine by FMPy, derivatives of the model, and what cannot be made."""
 
 import subprocess
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from zipfile import ZipFile
@@ -17,6 +18,7 @@ import floatframe as ff
 from floatframe.cli.app import app
 from floatframe.errors import ModelError
 from floatframe.identification.inertial_parameters import parameters_of
+from floatframe.machines import flexible_arm
 from tests.floatframe.generation.calls import ROUNDOFF, Case, all_charts, puma
 from tests.floatframe.generation.test_generate_command import PENDULUM
 
@@ -161,6 +163,23 @@ def test_derivatives_are_those_of_the_model_with_parameters_as_set(folder):
     assert_allclose(difference, weight, rtol=0, atol=atol * 10)
     one.unit.terminate()
     one.unit.freeInstance()
+
+
+def test_a_flexible_arm_moves_as_in_the_engine_and_steps_follow_its_modes(folder):
+    """Its states are hinges and modes; torques act at the hinges."""
+    parts = flexible_arm.links()
+    system = flexible_arm.arm(parts, modes=flexible_arm.BENDING)
+    made = ff.generate_fmu(system, folder / "arm.fmu", fmi=3, step=1e-4)
+    torques = {"shoulder": 1.0, "elbow": -0.3}
+    forces = {f"{name}.angle.force": torque for name, torque in torques.items()}
+    values = states_at_the_end(made, "CoSimulation", start_values=forces)
+    motors = [ff.JointForce(f"motor {name}", name, "angle", preload=torque) for name, torque in torques.items()]
+    motion = ff.integrate(replace(system, forces=motors), ff.trapezoidal(), T_END, 1e-4, formulation="relative")
+    z = ff.relative_model(system).positions(motion.state(-1))[0]
+    sizes = np.array([1.0, 1e-3, 1e-4, 1.0, 1e-3, 1e-4])  # of hinges and modes
+    assert (np.abs(values[: len(z)] - z) < 2e-3 * sizes).all()
+    with pytest.raises(ModelError, match=r"step: 0.001 s is too long for the fastest mode.*expected .* s or less"):
+        ff.generate_fmu(flexible_arm.arm(parts), folder / "stiff.fmu", step=1e-3)
 
 
 def test_dependencies_are_those_of_the_equations(folder):

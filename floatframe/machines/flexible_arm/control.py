@@ -1,0 +1,132 @@
+"""Controllers of the arm as user forces: generated equations of the rigid arm as expressions in the loop.
+
+Computed torque: the inverse dynamics of the rigid arm at the measured angles and rates, for accelerations
+
+    a = phi_aim'' + 2 w (phi_aim' - phi_dot) + w² (phi_aim - phi)
+
+which is exact for a rigid arm. Following an optimal move: its torques, and the same feedback times the mass matrix of
+the rigid arm. Both know angles and rates of the hinges alone, and stop at the largest torques of the motors.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from floatframe.bodies.coordinates import JointCoordinate
+from floatframe.errors import ModelError
+from floatframe.forces import UserForce
+from floatframe.functions.time_functions import TimeFunction
+from floatframe.generation.graph import ADD, CONSTANT, COS, DIV, MUL, NEG, SIN, SUB, SYMBOL, Scalar, Terms
+from floatframe.generation.links import terms, tree_terms
+from floatframe.generation.recursions import inverse_dynamics, joints_of
+from floatframe.machines.flexible_arm.collocation import OptimalMove
+from floatframe.relative.recursive import relative_model
+from floatframe.system import System
+
+__all__ = ["computed_torque", "following", "rate_of"]
+
+SIGNS = {ADD: "+", SUB: "-", MUL: "*", DIV: "/"}
+
+
+def rate_of(function: TimeFunction) -> TimeFunction:
+    """Return the rate of a function of polynomials; `ModelError` if it has a sine."""
+    if function.pieces[:, 6].any():
+        raise ModelError("rate_of: expected a function of polynomials, got one with a sine")
+    pieces = np.zeros_like(function.pieces)
+    pieces[:, :5] = function.pieces[:, 1:6] * np.arange(1, 6)
+    return TimeFunction(function.begins, pieces)
+
+
+def expression(term: Scalar, names: Mapping[str, str]) -> str:
+    """Return a term as an expression of a user force; names: of the symbols."""
+    if term.kind == CONSTANT:
+        return f"({term.value!r})"
+    if term.kind == SYMBOL:
+        return names[term.name]
+    args = [expression(arg, names) for arg in term.args]
+    if term.kind in (SIN, COS):
+        return f"{'sin' if term.kind == SIN else 'cos'}({args[0]})"
+    return f"(-{args[0]})" if term.kind == NEG else f"({args[0]} {SIGNS[term.kind]} {args[1]})"
+
+
+def rigid_torques(rigid: System, accelerations: Sequence[str], *, is_turning: bool) -> list[str]:
+    """Return the torques of the rigid arm for accelerations, as expressions of angles and rates by joint names.
+
+    is_turning: whether rates count; without them M a is left.
+    """
+    model = relative_model(rigid)
+    if any(not name.endswith("/angle") for name in model.names):
+        raise ModelError(f"rigid: expected a tree of rigid bodies on hinges, got {', '.join(model.names)}")
+    tree = tree_terms(model.expansion)
+    rates: Terms = tree.v if is_turning else terms(tree.graph, np.zeros(len(tree.v)))
+    names: dict[str, str] = {}
+    for k, joint in enumerate(name.split("/")[0] for name in model.names):
+        names |= {f"z[{k}]": joint, f"z_dot[{k}]": f"{joint}_dot", f"z_ddot[{k}]": f"({accelerations[k]})"}
+    force = inverse_dynamics(tree, rates, tree.a, joints_of(tree))
+    return [expression(term, names) for term in force]
+
+
+def limited(torque: str, largest: float) -> str:
+    """Return a torque between its limits."""
+    return f"max(-{largest!r}, min({largest!r}, {torque}))"
+
+
+def user_force(name: str, torques: Mapping[str, str], functions: Mapping[str, TimeFunction]) -> UserForce:
+    """Return torques at hinges as a user force that sees their angles and rates."""
+    seen = {joint: JointCoordinate(joint, "angle") for joint in torques}
+    return UserForce(name, seen, forces=dict(torques), functions=dict(functions))
+
+
+def computed_torque(
+    rigid: System, aims: Mapping[str, TimeFunction], bandwidth: float, torque: Sequence[float]
+) -> UserForce:
+    """Return the computed-torque control of the arm by its rigid model.
+
+    Parameters
+    ----------
+    rigid
+        The arm without modes.
+    aims
+        Angle of each hinge over time, by its name, in the order of the arm.
+    bandwidth
+        w [rad/s].
+    torque
+        The largest of each motor [N m].
+    """
+    functions: dict[str, TimeFunction] = {}
+    commands = []
+    for joint, aim in aims.items():
+        parts = {f"{joint}_aim": aim, f"{joint}_aim_rate": rate_of(aim), f"{joint}_aim_rise": rate_of(rate_of(aim))}
+        functions |= parts
+        commands.append(f"{joint}_aim_rise(t) + {feedback(joint, bandwidth)}")
+    torques = rigid_torques(rigid, commands, is_turning=True)
+    limits = [limited(text, float(most)) for text, most in zip(torques, torque, strict=True)]
+    return user_force("computed torque", dict(zip(aims, limits, strict=True)), functions)
+
+
+def feedback(joint: str, bandwidth: float) -> str:
+    """Return the acceleration by which a hinge is led back to its aim."""
+    w = float(bandwidth)
+    return f"{2 * w!r}*({joint}_aim_rate(t) - {joint}_dot) + {w * w!r}*({joint}_aim(t) - {joint})"
+
+
+def following(rigid: System, move: OptimalMove, bandwidth: float, torque: Sequence[float]) -> UserForce:
+    """Return the control that follows an optimal move: its torques, and feedback of the hinges times the rigid M.
+
+    Parameters as in `computed_torque`.
+    """
+    functions: dict[str, TimeFunction] = {}
+    commands = []
+    joints = [name.split("/")[0] for name in move.driven]
+    for joint, name in zip(joints, move.driven, strict=True):
+        aim = move.aim(name)
+        functions |= {
+            f"{joint}_aim": aim, f"{joint}_aim_rate": rate_of(aim), f"{joint}_torque": move.torque_function(name)
+        }  # fmt: skip
+        commands.append(feedback(joint, bandwidth))
+    torques = rigid_torques(rigid, commands, is_turning=False)
+    limits = {
+        joint: limited(f"{joint}_torque(t) + {text}", float(most))
+        for joint, text, most in zip(joints, torques, torque, strict=True)
+    }
+    return user_force("optimal move", limits, functions)

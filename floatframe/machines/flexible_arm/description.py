@@ -1,0 +1,66 @@
+"""The arm as a system: two strips of aluminium on hinges in a level plane, motor of the elbow and load as masses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import cms
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import Marker
+from floatframe.bodies.mode_choice import frozen_to_rigid, with_modes
+from floatframe.joints import RevoluteJoint
+from floatframe.results.sensors import CoordinateSensor, PlaceSensor
+from floatframe.system import System
+
+__all__ = ["BENDING", "LENGTH", "FlexibleLinks", "arm", "links"]
+
+FILES = Path(__file__).parent / "files"
+LENGTH = 0.5  #: of each link [m]
+BENDING = (0, 1)  #: the two lowest modes of a link as its job reduces it
+TIP = Marker("forearm", "tip")
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleLinks:
+    """The links as their jobs reduce them."""
+
+    upper: cms.ReducedBody
+    forearm: cms.ReducedBody
+
+
+def links(folder: Path = FILES) -> FlexibleLinks:
+    """Reduce both links by their jobs in a folder; default: those that are shipped."""
+    return FlexibleLinks(*(cms.reduce_job(folder / f"{name}.toml") for name in ("upper", "forearm")))
+
+
+def arm(parts: FlexibleLinks, *, modes: Sequence[int] | None = None, is_rigid: bool = False) -> System:
+    """Return the arm stretched along x, at rest, free in its hinges `shoulder` and `elbow`, without gravity.
+
+    Parameters
+    ----------
+    parts
+        The links.
+    modes
+        Of each link, numbers from zero; None: all.
+    is_rigid
+        Without any mode.
+    """
+    bodies = []
+    for name, x in (("upper", 0.0), ("forearm", LENGTH)):
+        part = getattr(parts, name)
+        if is_rigid:
+            part = frozen_to_rigid(part)
+        elif modes is not None:
+            part = with_modes(part, modes)
+        bodies.append(FlexibleBody(name, part, position=np.array([x, 0.0, 0.0])))
+    axis = np.array([0.0, 0.0, 1.0])
+    joints = (
+        RevoluteJoint("shoulder", Marker(GROUND), Marker("upper", "shoulder"), axis=axis),
+        RevoluteJoint("elbow", Marker("upper", "elbow"), Marker("forearm", "elbow"), axis=axis),
+    )
+    sensors: list[PlaceSensor | CoordinateSensor] = [PlaceSensor("tip", TIP)]
+    sensors += [CoordinateSensor(joint, joint, "angle") for joint in ("shoulder", "elbow")]
+    return System(tuple(bodies), joints, name="flexible arm", sensors=tuple(sensors))
