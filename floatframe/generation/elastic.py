@@ -54,6 +54,16 @@ def mean_summed(q: Terms, A: Terms, B: Terms) -> Terms:
     return np.array(out, dtype=object)
 
 
+def quadratic(x: Terms, A: Terms) -> Terms:
+    """Return Σ A_kl x_k x_l of symmetric A, (n, n, 3): each product of two coordinates is one term for all of them."""
+    n = len(x)
+    total = A[0, 0] * (x[0] * x[0])
+    for k in range(n):
+        for m in range(max(k, 1), n):
+            total = total + (A[k, m] if k == m else 2.0 * A[k, m]) * (x[k] * x[m])
+    return total
+
+
 class MarkerPlace:
     """Where a marker stands in its flexible body, frame of the node."""
 
@@ -97,11 +107,10 @@ class MarkerRates:
 
     def __init__(self, place: MarkerPlace, v: Terms, a: Terms) -> None:
         marker, q_dot, q_ddot = place.marker, v[place.rates], a[place.rates]
-        bent = summed(q_dot, marker.shift_bend), summed(q_dot, marker.turn_bend)
         self.d_dot = summed(q_dot, place.shift)
-        self.d_ddot = summed(q_ddot, place.shift) - summed(q_dot, bent[0])
+        self.d_ddot = summed(q_ddot, place.shift) - quadratic(q_dot, marker.shift_bend)
         th, w = place.th, summed(q_dot, place.turn)
-        g = summed(q_ddot, place.turn) - summed(q_dot, bent[1])
+        g = summed(q_ddot, place.turn) - quadratic(q_dot, marker.turn_bend)
         _, _, c2, c3, c4, c5 = place.c
         x = cross(th, w)
         self.nu = w + cross(th, c2 * w + c3 * x)
@@ -147,10 +156,10 @@ class ModalForces:
     def wrench(self, omega: Terms) -> tuple[Terms, Terms]:
         """Return force and moment beside those of the moments, frame of the node."""
         modes, moments, q_dot, q_ddot = self.modes, self.moments, self.q_dot, self.q_ddot
-        f = summed(q_ddot, moments.first) + summed(q_dot, summed(q_dot, modes.K_t))
+        f = summed(q_ddot, moments.first) + quadratic(q_dot, modes.K_t)
         f = f + 2.0 * cross(omega, summed(q_dot, moments.first))
         Q = summed(q_dot, moments.P)
-        t = summed(q_ddot, moments.B) + summed(q_dot, summed(q_dot, modes.K_r))
+        t = summed(q_ddot, moments.B) + quadratic(q_dot, modes.K_r)
         return f, t + 2.0 * ((Q[0, 0] + Q[1, 1] + Q[2, 2]) * omega - Q @ omega)
 
     def modal(self, acc: Terms, omega: Terms, U: Terms) -> Terms:

@@ -13,11 +13,14 @@ SLENDER = cms.BeamLine(1.0, 4.7, 1.26e8, 4.2e3, 9.5e3, 3.8e3, rho_Iy=1.6e-4, rho
 METRES = cms.unit_system("m-kg-s")
 
 
-def beam(*, is_clamped, n_axial=0, n_bending=2, n_torsion=0):
-    """Return a beam in mean axes with geometric stiffness, or clamped at its start without."""
+def beam(*, is_clamped, n_axial=0, n_bending=2, n_torsion=0, is_nodal=False):
+    """Return a beam in mean axes with geometric stiffness, or clamped at its start without.
+
+    is_nodal: with geometric stiffness too the file has the frame of the start, which the engine changes.
+    """
     return cms.beam_from_assumed_modes(
         SLENDER, name="beam", units=METRES, n_axial=n_axial, n_bending=n_bending, n_torsion=n_torsion, n_shear=0,
-        stations={"start": 0.0, "end": 1.0}, frame=NodalFrame("start") if is_clamped else None,
+        stations={"start": 0.0, "end": 1.0}, frame=NodalFrame("start") if is_clamped or is_nodal else None,
         geometric=not is_clamped, damping=cms.ModalDamping(0.02),
     )  # fmt: skip
 
@@ -35,7 +38,7 @@ def two_link_arm():
 def flexible_in_the_middle():
     """Return a rigid link, a beam in mean axes between two interfaces, and a rigid tool; axes in space."""
     rigid = ff.RigidBody("base link", 3.0, np.diag([0.2, 0.3, 0.25]), (0.1, 0.05, -0.02))
-    middle = ff.FlexibleBody("middle", beam(is_clamped=False), position=(0.9, 0.0, 0.1))
+    middle = ff.FlexibleBody("middle", beam(is_clamped=False, is_nodal=True), position=(0.4, 0.0, 0.1))
     tool = ff.RigidBody("tool", 0.7, np.diag([0.02, 0.03, 0.01]), (0.05, 0.0, 0.1), position=(1.4, 0.0, 0.1))
     at = ff.Marker("base link", position=(0.4, 0.0, 0.1))
     joints = [
@@ -46,10 +49,22 @@ def flexible_in_the_middle():
     return ff.System([rigid, middle, tool], joints, [ff.Gravity((0.3, -0.2, -9.81))], name="middle")
 
 
+def held_at_the_free_end():
+    """Return a beam in the frame of its start that hangs at its end, and a rigid body on a hinge at the start."""
+    link = ff.FlexibleBody("link", beam(is_clamped=True), position=(-1.0, 0.0, 0.0))
+    weight = ff.RigidBody("weight", 0.7, np.diag([0.02, 0.03, 0.01]), (0.05, 0.0, 0.1), position=(-1.0, 0.0, 0.0))
+    joints = [
+        ff.RevoluteJoint("upper", ff.GROUND, ff.Marker("link", "end"), axis=(0, 1, 0)),
+        ff.RevoluteJoint("lower", ff.Marker("link", "start"), ff.Marker("weight"), axis=(0.6, 0, 0.8)),
+    ]
+    return ff.System([link, weight], joints, [ff.Gravity((0.3, -0.2, -9.81))], name="held")
+
+
 SYSTEMS = {
     "pendulum": pendulum,
     "two-link arm": two_link_arm,
     "flexible in the middle": flexible_in_the_middle,
+    "held at the free end": held_at_the_free_end,
     "mixed tree": lambda: flexible_tree(n=2, seed=4, is_free=True),
 }
 
