@@ -16,11 +16,12 @@ METRES = cms.unit_system("m-kg-s")
 def beam(*, is_clamped, n_axial=0, n_bending=2, n_torsion=0, is_nodal=False):
     """Return a beam in mean axes with geometric stiffness, or clamped at its start without.
 
-    is_nodal: with geometric stiffness too the file has the frame of the start, which the engine changes.
+    is_nodal: with geometric stiffness too the file has a frame that goes with the start, which the engine changes.
     """
+    frame = NodalFrame("start", origin=(0.2, 0.1, 0.0)) if is_nodal else NodalFrame("start") if is_clamped else None
     return cms.beam_from_assumed_modes(
         SLENDER, name="beam", units=METRES, n_axial=n_axial, n_bending=n_bending, n_torsion=n_torsion, n_shear=0,
-        stations={"start": 0.0, "end": 1.0}, frame=NodalFrame("start") if is_clamped or is_nodal else None,
+        stations={"start": 0.0, "end": 1.0}, frame=frame,
         geometric=not is_clamped, damping=cms.ModalDamping(0.02),
     )  # fmt: skip
 
@@ -38,7 +39,7 @@ def two_link_arm():
 def flexible_in_the_middle():
     """Return a rigid link, a beam in mean axes between two interfaces, and a rigid tool; axes in space."""
     rigid = ff.RigidBody("base link", 3.0, np.diag([0.2, 0.3, 0.25]), (0.1, 0.05, -0.02))
-    middle = ff.FlexibleBody("middle", beam(is_clamped=False, is_nodal=True), position=(0.4, 0.0, 0.1))
+    middle = ff.FlexibleBody("middle", beam(is_clamped=False, is_nodal=True), position=(0.6, 0.1, 0.1))
     tool = ff.RigidBody("tool", 0.7, np.diag([0.02, 0.03, 0.01]), (0.05, 0.0, 0.1), position=(1.4, 0.0, 0.1))
     at = ff.Marker("base link", position=(0.4, 0.0, 0.1))
     joints = [
