@@ -1,25 +1,27 @@
 """What generated code costs: `python -m benchmarks.generated` (a C compiler as `cc`; SymPy from the extra `test`).
 
-Two trees: a robot of six axes with the geometry of a PUMA 560 and general links, and the road car with rigid bodies,
-its mounts fixed, its rods left out and its loops cut where the relative formulation cuts them. Operations; processor
-time of an evaluation of the C code, compiled by `cc -O2` and by `cc -O2 -march=native`, beside the general routine,
-which is compiled for this processor, each in a loop of its own; single calls of inverse dynamics one after the other
-by the clock, among all else that the machine does. Operations of the robot beside those of SymPy's common
-subexpressions, and of a robot with the geometry of a Staubli RX 90 whose moments stay symbols, without gravity, beside
-those of the equations that OpenSYMORO printed for it.
+Trees: a robot of six axes with the geometry of a PUMA 560 and general links; the road car with rigid bodies, its mounts
+fixed, its rods left out and its loops cut where the relative formulation cuts them; flexible arms. Operations;
+processor time of an evaluation of the C code, compiled by `cc -O2` and by `cc -O2 -march=native`, beside the general
+routine, which is compiled for this processor, each in a loop of its own; single calls of inverse dynamics one after the
+other by the clock, among all else that the machine does, and by that of the processor, whose reading takes longer.
+Operations of the robot beside those of SymPy's common subexpressions, and of a robot with the geometry of a Staubli
+RX 90 whose moments stay symbols, without gravity, beside those of the equations that OpenSYMORO printed for it.
 """
 
 import argparse
 import ctypes
 import subprocess
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 import floatframe as ff
-from benchmarks.recursive import compiled, moving, shortest
+from benchmarks.recursive import moving, shortest
 from floatframe.generation.generate import GeneratedCode
 from floatframe.machines.road_car import RoadCar
 from floatframe.machines.road_car.systems import base, written
@@ -44,14 +46,17 @@ void loop(long times, double *in, double *out)
     }
 }
 
-/* the time of each call in nanoseconds */
-void clocked(long times, double *in, double *out, double *took)
+/* the time of each call in nanoseconds, by the clock or by that of the processor; is_idle: of none */
+void clocked(int is_processor, int is_idle, long times, double *in, double *out, double *took)
 {
+    const clockid_t clock = is_processor ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC;
     struct timespec a, b;
     for (long k = 0; k < times; k++) {
-        clock_gettime(CLOCK_MONOTONIC, &a);
-        %(name)s(%(arguments)s);
-        clock_gettime(CLOCK_MONOTONIC, &b);
+        clock_gettime(clock, &a);
+        if (!is_idle) {
+            %(name)s(%(arguments)s);
+        }
+        clock_gettime(clock, &b);
         took[k] = 1e9 * (double)(b.tv_sec - a.tv_sec) + (double)(b.tv_nsec - a.tv_nsec);
         in[0] += 1e-12 * out[0];
     }
@@ -59,6 +64,7 @@ void clocked(long times, double *in, double *out, double *took)
 """
 
 
+TURNS = 3  #: in which all are measured one after the other, since others compute meanwhile
 SWITCHES = (("-O2",), ("-O2", "-march=native"))
 RX_90 = {"angles": (0, 90, 0, -90, 90, -90), "along_x": (0, 0, 0.45, 0, 0, 0), "along_z": (0, 0, 0, 0.45, 0, 0)}
 
@@ -100,6 +106,11 @@ def pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
+def looped(made: ctypes.CDLL, given: np.ndarray, out: np.ndarray, times: int) -> None:
+    """Call so many times."""
+    made.loop(ctypes.c_long(times), pointer(given), pointer(out))
+
+
 def bent(model: ff.RelativeModel) -> ff.RelativeModel:
     """Return a model of flexible bodies with a motion in its working arrays, elastic rotations of half a radian."""
     model.take(*bent_motion(model, 0, angle=0.5))
@@ -118,22 +129,36 @@ def costs(model: ff.RelativeModel, calls: int, folder: Path) -> None:
         code = ff.generate(system, what=what, name=f"tree_{what}")
         out = np.zeros(sum(outputs[what]))
         sizes = [len(each) for each in inputs[what]], outputs[what]
-        times = []
+        runs: list[Callable[[int], object]] = [partial(model.run, task)]
         for switches in SWITCHES:
             made, given = library(code, *sizes, folder, *switches), np.concatenate(inputs[what])
-            times.append(shortest(lambda n: made.loop(ctypes.c_long(n), pointer(given), pointer(out))))  # noqa: B023
+            runs.append(partial(looped, made, given, out))
             if what == "inverse" and switches == ("-O2",):
-                took = np.zeros(calls)
-                made.clocked(ctypes.c_long(calls), pointer(given), pointer(out), pointer(took))
-        general = compiled(model, task)
+                single = single_calls(made, calls, given, out)
+        turns = [[shortest(run) for run in runs] for _ in range(TURNS)]
+        general, *times = (min(each) for each in zip(*turns, strict=True))
         count = code.operations
         print(
             f"{what:11s} {count.additions:<8d} {count.multiplications:<10d} {code.general[0]:<8d} "
             f"{code.general[1]:<11d} {times[0]:<8.3f} {times[1]:<8.3f} {general:<14.3f} {general / times[0]:<5.1f} "
             f"{general / times[1]:.1f}"
         )
-    quantiles = np.median(took), np.quantile(took, 0.999), took.max()
-    print(f"inverse, {calls} calls by the clock: median, 99.9 %, worst [ns]:", *(f"{q:.0f}" for q in quantiles))
+    print(f"inverse by -O2, {calls} single calls, median, 99.9 %, worst [ns]; of them the median without a call")
+    for clock, took, idle in single:
+        quantiles = np.median(took), np.quantile(took, 0.999), took.max(), np.median(idle)
+        print(f"{clock:22s}" + "".join(f"{q:10.0f}" for q in quantiles))
+
+
+def single_calls(made: ctypes.CDLL, calls: int, given: np.ndarray, out: np.ndarray) -> list[tuple]:
+    """Return the times of single calls by the clock and by that of the processor, and those of none [ns]."""
+    result = []
+    for is_processor, words in enumerate(("by the clock", "by the processor's")):
+        times = np.zeros((2, calls))
+        for is_idle, took in enumerate(times):
+            arrays = (pointer(each) for each in (given, out, took))
+            made.clocked(is_processor, is_idle, ctypes.c_long(calls), *arrays)
+        result.append((words, *times))
+    return result
 
 
 def beside_others() -> None:

@@ -7,8 +7,8 @@ from floatframe.generation.routines import Routine
 
 __all__ = ["c_files"]
 
-#: Sine and cosine of one angle: k quarter turns, of pi/2 in three parts whose first two have 33 bits (so that k times
-#: them is exact), then polynomials in r², |r| <= pi/4, through the Chebyshev points: 1.4e-17 off the functions.
+#: Sine and cosine of one angle: k quarter turns, of pi/2 in two parts of which the first has 33 bits (so that k times
+#: it is exact), then polynomials in r², |r| <= pi/4, through the Chebyshev points: 1.4e-17 off the functions.
 SINE_COSINE = """\
 /* sine and cosine of x, to 2e-16; far from zero those of the library */
 static inline void {name}(double x, double *sine, double *cosine)
@@ -17,7 +17,7 @@ static inline void {name}(double x, double *sine, double *cosine)
         const double turns = x * 0.6366197723675814;
         const int k = (int)(turns + (turns < 0.0 ? -0.5 : 0.5));
         const double n = (double)k;
-        const double r = ((x - n * 1.5707963267341256) - n * 6.077100506303966e-11) - n * 2.0222662487959506e-21;
+        const double r = (x - n * 1.5707963267341256) - n * 6.077100506506192e-11;
         const double q = r * r, q2 = q * q;
         const double s = r + (r * q) * ((-0.16666666666666666 + q * 0.008333333333330948)
             + q2 * ((-0.00019841269836758395 + q * 2.755731610245899e-06)

@@ -37,18 +37,34 @@ def few():
 
 
 def wheels():
-    """A slider with two wheels, round and out of balance, and a round one that carries a body on a hinge in line."""
+    """A frame on a hinge with wheels: round, out of balance, oval, and a round one that carries a body on a hinge in line."""
     rng = np.random.default_rng(2)
     bodies = [ff.RigidBody("frame", 5.0, np.diag([0.3, 0.4, 0.5]), (0.1, 0.05, 0.0))]
-    joints = [ff.PrismaticJoint("rail", ff.GROUND, ff.Marker("frame"), axis=(1, 0, 0))]
-    for name, center in (("round", (0, 0.02, 0)), ("unbalanced", (0.01, 0, 0)), ("carrier", (0, 0, 0))):
+    joints = [ff.RevoluteJoint("roll", ff.GROUND, ff.Marker("frame"), axis=(1, 0, 0))]
+    for name, center, J_x in (  # P of the unbalanced one is round, m c cᵀ with it
+        ("round", (0, 0.02, 0), 0.1), ("unbalanced", (0.01, 0, 0), 0.1002), ("oval", (0, 0, 0), 0.13),
+        ("carrier", (0, 0, 0), 0.1),
+    ):  # fmt: skip
         at = ff.Marker("frame", position=rng.normal(size=3))
-        bodies.append(ff.RigidBody(name, 2.0, np.diag([0.1, 0.15, 0.1]), center, position=at.position))
+        bodies.append(ff.RigidBody(name, 2.0, np.diag([J_x, 0.15, 0.1]), center, position=at.position))
         joints.append(ff.RevoluteJoint(f"hub {name}", at, ff.Marker(name), axis=(0, 1, 0)))
     swing = ff.RevoluteJoint("swing", ff.Marker("carrier", position=(0, 0.2, 0)), ff.Marker("bob"), axis=(0, 1, 0))
     place = np.asarray(bodies[-1].position) + np.array([0, 0.2, 0])
     bodies.append(ff.RigidBody("bob", 0.5, np.diag([0.01, 0.02, 0.015]), (0.1, 0, 0.03), position=place))
     return ff.System(bodies, [*joints, swing], [ff.Gravity((0.2, -0.1, -9.81))], name="wheels")
+
+
+def balls():
+    """Two bodies on spherical joints that are given from the body to what carries it."""
+    rng = np.random.default_rng(6)
+    bodies, joints, below = [], [], "ground"
+    for name in ("upper", "lower"):
+        J = np.diag([0.2, 0.3, 0.25])
+        bodies.append(ff.RigidBody(name, 1.5, J, 0.2 * rng.normal(size=3), orientation=(0.8, 0.6, 0, 0)))
+        own, other = ff.Marker(name, position=0.2 * rng.normal(size=3)), ff.Marker(below, position=rng.normal(size=3))
+        joints.append(ff.SphericalJoint(f"ball {name}", own, other))
+        below = name
+    return ff.System(bodies, joints, [ff.Gravity((0.2, -0.1, -9.81))], name="balls")
 
 
 SYSTEMS = {
@@ -57,6 +73,7 @@ SYSTEMS = {
     "parallel axes": lambda: random_tree(4, 6, "RPCU"),
     "screws": screws,
     "wheels": wheels,
+    "balls": balls,
 }
 
 
