@@ -169,6 +169,8 @@ def beside_others() -> None:
     print(f"PUMA 560, SymPy's cse              {row}")
     rx_90 = ff.generate(six_axes(**RX_90, gravity=(0, 0, 0)), parameters=["link*"]).operations
     print(f"RX 90, moments symbols, OpenSYMORO {rx_90.additions:<4d} {rx_90.multiplications:<12d} {276:<4d} {325}")
+    rx_90 = ff.generate(six_axes(**RX_90, gravity=(0, 0, 0))).operations
+    print(f"RX 90, moments numbers             {rx_90.additions:<4d} {rx_90.multiplications}")
 
 
 def main() -> None:

@@ -37,7 +37,7 @@ def few():
 
 
 def wheels():
-    """A frame on a hinge with wheels: round, out of balance, oval, and a round one that carries a body on a hinge in line."""
+    """A frame on a hinge with wheels: round, out of balance, oval, and one that carries a body on a hinge in line."""
     rng = np.random.default_rng(2)
     bodies = [ff.RigidBody("frame", 5.0, np.diag([0.3, 0.4, 0.5]), (0.1, 0.05, 0.0))]
     joints = [ff.RevoluteJoint("roll", ff.GROUND, ff.Marker("frame"), axis=(1, 0, 0))]
