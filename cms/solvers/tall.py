@@ -57,7 +57,13 @@ def combined(X: Array, C: Array) -> Array:
             X[part, :m] = X[part] @ C
 
     _by_rows(len(X), update)
-    return X[:, :m]
+    if m == k or not X.flags.c_contiguous:
+        return X[:, :m]
+    whole = X.reshape(-1)  # rows close up, so that what is left lies in one piece, as sparse products want it
+    for first in range(0, len(X), SLICE):
+        last = min(first + SLICE, len(X))
+        whole[first * m : last * m] = X[first:last, :m].ravel()
+    return whole[: len(X) * m].reshape(-1, m)
 
 
 def subtract(Y: Array, X: Array, C: Array) -> None:

@@ -10,8 +10,8 @@ from cms.reduced_basis import finishing, independent
 from cms.reduced_basis.finishing import finish
 from cms.reduced_basis.frames import NodalFrame, TisserandFrame, frame_condition
 from cms.reduced_basis.independent import Products, gram_in_blocks, independent_basis
+from cms.solvers import tall
 from cms.solvers.sparse_product import SymmetricProduct
-from cms.solvers.tall import combined
 from fe_models.body.couplings import couple
 from tests.bodies import bar
 
@@ -87,11 +87,14 @@ def test_a_basis_with_redundant_columns_is_orthonormal_and_spans_them(body):
         assert rest @ (W @ rest) < 1e-16 * (column @ (W @ column))
 
 
+@pytest.mark.parametrize("order", ["C", "F"])
 @pytest.mark.parametrize("m", [3, 6, 9, 10])
-def test_a_product_in_the_place_of_its_factor(m):
+def test_a_product_in_the_place_of_its_factor_lies_in_one_piece(m, order, monkeypatch):
+    monkeypatch.setattr(tall, "SLICE", 7)
     rng = np.random.default_rng(0)
-    X, C = rng.normal(size=(50, 10)), rng.normal(size=(10, m))
+    X, C = np.asarray(rng.normal(size=(50, 10)), order=order), rng.normal(size=(10, m))
     expected = X @ C
-    found = combined(X, C)
+    found = tall.combined(X, C)
     assert np.shares_memory(found, X) == (m >= 5)
+    assert found.flags[f"{order}_CONTIGUOUS"]
     assert_allclose(found, expected, rtol=0, atol=ROUNDOFF * np.abs(expected).max())
