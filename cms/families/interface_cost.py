@@ -13,7 +13,7 @@ MANY = 600  #: boundary dofs of one interface from which its cost is announced
 PROPOSED = 20  #: modes of a large interface that the announcement proposes
 SQUARES = 26  #: matrices over the modes in a modal file: moments, invariants, M, K, D, columns
 TALL = 3  #: arrays over all dofs and all columns that are held at once: columns, shapes, displacement of the mesh
-TALL_PRODUCTS = 7.0  #: of two such arrays: Gram matrices, shapes, moments
+TALL_PRODUCTS = 10.0  #: of two such arrays: Gram matrices, shapes, moments
 CUBES = 100.0  #: operations in eigenproblems and products of matrices over the columns, by the cube of their number
 
 
@@ -35,7 +35,7 @@ class ReductionCost:
         )
 
 
-def reduction_cost(body: FEBody, n_columns: int, *, stress: bool = True) -> ReductionCost:
+def reduction_cost(body: FEBody, n_columns: int, *, stress: bool = True, n_constraint_modes: int = 0) -> ReductionCost:
     """Estimate what a mode set of so many columns costs from the columns to the file.
 
     Parameters
@@ -46,13 +46,16 @@ def reduction_cost(body: FEBody, n_columns: int, *, stress: bool = True) -> Redu
         Of the mode set.
     stress
         Whether the file holds the stress of the modes.
+    n_constraint_modes
+        From which a few columns are combined: they are held twice, and one Gram matrix of them is formed.
     """
     n, k = body.n_dof, n_columns
     n_kept = len(np.unique(np.concatenate([body.surface.ravel(), *(each.nodes for each in body.interfaces)])))
     moments = 2 * (3 * k + 4) ** 2
-    operations = TALL_PRODUCTS * 2 * n * k**2 + CUBES * k**3
+    operations = TALL_PRODUCTS * 2 * n * k**2 + CUBES * k**3 + 2 * n * n_constraint_modes**2
     file = 8.0 * (SQUARES * k**2 + (9 if stress else 3) * n_kept * k)
-    return ReductionCost(k, 8.0 * (TALL * n * k + moments) + file, file, operations / operations_per_second())
+    memory = max(8.0 * (TALL * n * k + moments) + file, 8.0 * 2 * n * n_constraint_modes)
+    return ReductionCost(k, memory, file, operations / operations_per_second())
 
 
 def few_columns(body: FEBody, interface_modes: int) -> int:
@@ -70,7 +73,7 @@ def large_interfaces(body: FEBody) -> list[str]:
     if not large:
         return []
     whole = reduction_cost(body, len(body.b)).words
-    fewer = reduction_cost(body, few_columns(body, PROPOSED)).words
+    fewer = reduction_cost(body, few_columns(body, PROPOSED), n_constraint_modes=len(body.b)).words
     return [
         f"body {body.name!r}: interface {interface.name!r} of {len(interface.nodes)} nodes has "
         f"{n_boundary(interface)} boundary dofs: as many static solves and modes of the body. With all of them: "

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 
 from cms.errors import ModeSetError
 from cms.families.rigid_modes import geometric_rigid_modes
@@ -17,6 +18,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["with_characteristic_modes"]
 
+COLUMNS_AT_ONCE = 64  #: that a sparse product copies
 DEPENDENT = 1e-9  #: part of a rigid-body motion of an interface, below which it is one of the others
 
 
@@ -154,7 +156,9 @@ def _side_by_side(parts: list[_Part]) -> _Part:
 def _characteristic(body: FEBody, Psi_C: Array, part: _Part, wanted: ModeCount) -> tuple[Array, Array]:
     """Lowest deforming modes of the constraint modes and their frequencies: (1) to (3)."""
     # K Psi_C is zero inside, and Psi_C the identity on its own dofs and zero on the others
-    K_c = np.asarray(body.K[:, part.dofs].T @ Psi_C)
+    rows = sp.csr_array(body.K[:, part.dofs].T)
+    blocks = range(0, len(part.dofs), COLUMNS_AT_ONCE)
+    K_c = np.hstack([rows @ Psi_C[:, first : first + COLUMNS_AT_ONCE] for first in blocks])
     K_c = (K_c + K_c.T) / 2
     M_c = gram_in_blocks(Psi_C, SymmetricProduct(body.M))
     n, n_r = part.R.shape
