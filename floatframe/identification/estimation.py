@@ -28,6 +28,9 @@ __all__ = ["METHODS", "Estimate", "Measured", "estimate"]
 
 METHODS = ("ordinary", "weighted", "robust")
 HUBER = 1.345  #: sigma from which a residual counts less; 95 % efficient where there are no outliers
+UNFIT = 0.3  #: misfit of a channel above which the model is not that of the measurement
+SURE = 4.0  #: deviations below zero by which a parameter that cannot be negative is so for sure
+POSITIVE = ("motor-inertia(", "viscous(", "coulomb(")  #: parameters of drives that cannot be negative
 POOR = 1e4  #: condition number of the weighted rows, columns scaled, above which a motion does not excite
 #: times 1/sqrt(n) that neighbouring residuals of white noise correlate at most, 99.5 %; the fit itself makes it less
 WHITE = 2.6
@@ -131,6 +134,25 @@ class Estimate:
                 f"the motion excites poorly: condition number {self.condition:.2g}, least known {worst}; measure "
                 "another motion (exciting_motion finds one)"
             )
+        unfit = [
+            f"{name} by {share:.0%}"
+            for name, share in zip(self.channels, self.misfit(self.measured), strict=True)
+            if share > UNFIT
+        ]
+        if unfit:
+            said.append(
+                f"the model misses {', '.join(unfit)} of what was measured: look at friction, units (degrees said "
+                "to be rad), signs, the zero of angles (as the system is placed), gravity, exchanged columns, noise"
+            )
+        negative = [
+            name
+            for name, value, deviation in zip(self.base.names, self.values, self.deviations, strict=True)
+            if name.startswith(POSITIVE) and value < -SURE * deviation
+        ]
+        if negative:
+            said.append(
+                f"{', '.join(negative)} came out negative, which no drive is: look at the signs of torques, positions"
+            )
         n = len(self.residuals)
         coloured = [name for name, r in zip(self.channels, self.whiteness, strict=True) if r > WHITE / np.sqrt(n)]
         if coloured:
@@ -191,6 +213,8 @@ def estimate(
         raise ModelError(
             f"estimate: {n} instants of {n_channels} channels cannot tell {n_base} parameters; measure longer"
         )
+    if not y.any():
+        raise ModelError("estimate: all measured torques and reactions are zero: nothing was measured")
     require_excited(base, W)
     sigma, weights = np.ones(n_channels), np.ones((n, n_channels))
     beta = solved(W, y, sigma, weights)

@@ -34,6 +34,7 @@ class RealParameters:
     system: System  #: with these bodies
     excess: float  #: squared weighted misfit over that of the base parameters, less one
     least: Array  #: smallest eigenvalue of the pseudo-inertia over its largest, of each body
+    is_fit: bool  #: whether the misfit is one that noise makes: within 5 sigma of chi-squared of the base parameters
 
 
 def real_parameters(estimate: Estimate, *, prior: Array | None = None, weight: float = 1e-2) -> RealParameters:
@@ -94,7 +95,7 @@ def real_parameters(estimate: Estimate, *, prior: Array | None = None, weight: f
     spectrum = np.linalg.eigvalsh(P)
     return RealParameters(
         phi, system_with(form.system, phi[: 10 * n_b]), extra / max(best, np.finfo(float).tiny),
-        spectrum[:, 0] / spectrum[:, -1],
+        spectrum[:, 0] / spectrum[:, -1], extra < len(aim) + 5 * np.sqrt(2 * len(aim)),
     )  # fmt: skip
 
 

@@ -9,7 +9,8 @@ import typer
 from cms.cli.console import guarded, output_path, print_table, say, stages
 
 if TYPE_CHECKING:
-    from floatframe.identification.estimation import Estimate
+    from floatframe.identification.excitation import ExcitingMotion
+    from floatframe.identification.regressors import LinearForm
 
 __all__ = ["register"]
 
@@ -42,6 +43,9 @@ def identify_command(
     real: Annotated[
         bool, typer.Option("--real/--no-real", help="Find real bodies (positive masses and inertias) too.")
     ] = True,
+    motion: Annotated[
+        Path | None, typer.Option("--motion", help="Write the motion that would tell more, a .csv of positions.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Write the result as JSON, for other programs.")] = False,
 ) -> None:
     """Find the inertial parameters of a robot from a measured motion: base parameters with their deviations.
@@ -58,6 +62,7 @@ def identify_command(
     from floatframe.identification.estimation import estimate
     from floatframe.identification.identify_report import identification_html, identification_record
     from floatframe.identification.measured_file import measured_coordinates, read_measured
+    from floatframe.identification.next_motion import next_motion
     from floatframe.identification.physical import real_parameters
     from floatframe.identification.regressors import linear_form
     from floatframe.system_file.read_system import read_system
@@ -69,6 +74,8 @@ def identify_command(
     for path in paths:
         if path.suffix.lower().removeprefix(".") not in KINDS:
             raise ModelError(f"--output {path}: expected a file name that ends in {', '.join('.' + k for k in KINDS)}")
+    if motion is not None:
+        motion = output_path(motion, None, ModelError, overwrite_of=inputs)
     named = [term.strip() for term in terms.split(",") if term.strip() not in ("", "none")]
     with stages() as clock:
         with clock("measured motion"):
@@ -81,12 +88,19 @@ def identify_command(
         if real:
             with clock("real bodies"):
                 bodies = real_parameters(made)
+        better, notes = None, read.notes
+        if paths or motion is not None:
+            with clock("motion that would help"):
+                try:
+                    better = next_motion(made)
+                except ModelError as error:
+                    notes = (*notes, f"no motion that would tell more was found: {error}")
         with clock("record"):
-            record = identification_record(made, bodies, other, read.notes)
+            record = identification_record(made, bodies, other, notes, better)
     if json:
         typer.echo(json_module.dumps(record, indent=2))
     else:
-        print_estimate(made, record)
+        print_estimate(record)
     for path in paths:
         if path.suffix.lower() == ".json":
             replace_file(path, (json_module.dumps(record, indent=2) + "\n").encode())
@@ -94,22 +108,38 @@ def identify_command(
             replace_file(path, identification_html(made, record, other).encode())
         if not json:
             say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    if motion is not None and better is not None:
+        replace_file(motion, motion_table(better.motion, form).encode())
+        if not json:
+            say(f"wrote {motion}")
 
 
-def print_estimate(made: "Estimate", record: dict[str, Any]) -> None:
+def motion_table(motion: "ExcitingMotion", form: "LinearForm") -> str:
+    """Return positions of one period at 100 instants of the fastest harmonic, as a table."""
+    import numpy as np
+
+    n = 100 * ((motion.coefficients.shape[1] - 1) // 2)
+    t = np.arange(n + 1) * motion.period / n
+    units = [form.system.units.length_symbol if column.unit == "m" else "rad" for column in form.columns]
+    heads = ["time [s]", *(f"{name} [{unit}]" for name, unit in zip(motion.names, units, strict=True))]
+    rows = np.column_stack([t, motion.at(t)[0]])
+    return "\n".join([",".join(heads), *(",".join(f"{x:.9g}" for x in row) for row in rows)]) + "\n"
+
+
+def print_estimate(record: dict[str, Any]) -> None:
     """Print combinations, channels, and what is doubtful."""
     rows = [
-        (each["name"], f"{each['value']:.5g}", f"{each['deviation']:.2g}", f"{each['relative']:.1%}")
+        (each["name"], f"{each['value']:.5g}", f"{each['deviation']:.2g}", each["unit"], each["verdict"])
         for each in record["parameters"]
     ]
-    print_table("Base parameters", ("combination", "value>", "deviation>", "relative>"), rows)
-    channels = [(each["name"], f"{each['noise']:.4g}", f"{each['misfit']:.2%}") for each in record["channels"]]
-    print_table("Channels", ("channel", "noise>", "misfit>"), channels)
+    print_table("Base parameters", ("combination", "value>", "deviation>", "", ""), rows)
+    channels = [(c["name"], f"{c['noise']:.4g}", c["unit"], f"{c['misfit']:.2%}") for c in record["channels"]]
+    print_table("Channels", ("channel", "noise>", "", "misfit>"), channels)
     if record["validation"] is not None:
         print_table(
             "Another motion", ("channel", "misfit>"), [(k, f"{v:.2%}") for k, v in record["validation"].items()]
         )
     if record["without_effect"]:
         say(f"without effect on what was measured: {', '.join(record['without_effect'])}")
-    for words in (*record["notes"], *made.warnings):
+    for words in (*record["notes"], *record["warnings"]):
         say(words)

@@ -71,9 +71,7 @@ def sweep_command(
             with clock("compiled code (made at first use)"):
                 prepare()  # once, before many processes want it
         with clock(f"{n} points") as advance:
-            table = run_study(
-                described, workers=tasks, journal=kept, progress=lambda done, all_: advance(done / all_)
-            )
+            table = run_study(described, workers=tasks, journal=kept, progress=lambda done, all_: advance(done / all_))
     record = study_record(table)
     if json:
         typer.echo(json_module.dumps(record, indent=2))

@@ -168,6 +168,7 @@ def test_friction_that_the_model_lacks_is_told_by_residuals_that_correlate(robot
     measured = Measured(samples, noisy(truth, np.random.default_rng(6))[0])
     whole, lacking = estimate(form, measured), estimate(linear_form(form.system), measured)
     assert not whole.warnings
-    (words,) = lacking.warnings
+    misses, words = lacking.warnings
+    assert misses.startswith("the model misses ")
     assert "joint1/angle" in words
     assert "are not white: the model lacks something there" in words

@@ -1,15 +1,20 @@
 """The command: a measured motion in, base parameters, report and JSON out; what a file lacks is said."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from floatframe import ModelError, linear_form, read_system, tree_samples
 from floatframe.cli.app import app
+from floatframe.identification.estimation import Measured, estimate
 from floatframe.identification.excitation import ExcitingMotion
 from floatframe.identification.measured_file import read_measured
+from floatframe.identification.next_motion import next_motion
+from floatframe.identification.physical import real_parameters
 
 ROBOT = """
 [system]
@@ -77,8 +82,9 @@ def written(folder, name, seed, noise, *, heads=None, degrees=False):
 def test_the_command_finds_the_parameters_and_writes_page_and_json(robot):
     _, phi = written(robot, "measured.csv", 1, 0.5)
     written(robot, "other.csv", 2, 0.5, degrees=True)
-    page, record = robot / "report.html", robot / "report.json"
+    page, record, motion = robot / "report.html", robot / "report.json", robot / "next.csv"
     words = [str(robot / "robot.toml"), str(robot / "measured.csv"), "-o", str(page), "-o", str(record)]
+    words += ["--motion", str(motion)]
     made = CliRunner().invoke(app, ["identify", *words, "--cutoff", "10", "--check", str(robot / "other.csv")])
     assert made.exit_code == 0, made.output
     found = json.loads(record.read_text())
@@ -93,9 +99,58 @@ def test_the_command_finds_the_parameters_and_writes_page_and_json(robot):
     assert max(each["whiteness"] for each in found["channels"]) < 2.6 / np.sqrt(found["n_instants"])
     assert found["real_bodies"]["least"][0] > 0
     assert "m(upper)" in found["without_effect"]
+    verdicts = {each["name"]: each["verdict"] for each in found["parameters"]}
+    assert verdicts["J_zz(upper) + 0.25 m(lower)"] == "well known"
+    assert verdicts["S_y(lower)"] in ("zero within its deviation", "not known")  # it is zero
+    assert {each["unit"] for each in found["parameters"]} == {"kg m", "kg m²", "N m s/rad", "N m"}
+    assert max(abs(each["off"]) for each in found["parameters"] if each["off"] is not None) < 4
+    assert [each["off"] for each in found["parameters"]][-4:] == [None] * 4  # the file knows no friction
+    table = np.loadtxt(motion, delimiter=",", skiprows=1)
+    assert motion.read_text().startswith("time [s],shoulder/angle [rad],elbow/angle [rad]")
+    assert_allclose(table[-1, 1:], table[0, 1:], rtol=0, atol=1e-7)  # periodic
     html = page.read_text()
+    assert "Which motion would help" in html
     assert "J_zz(upper) + 0.25 m(lower)" in html
     assert "https://" not in html.split("<script>")[0]
+
+
+def test_the_motion_that_would_help_tells_as_well_as_it_says(robot):
+    """Of a lazy measurement; the motion found is made, with the same noise, and estimated."""
+    form = linear_form(read_system(robot / "robot.toml")[0], ("viscous",))
+    t, rng = np.arange(150) * 0.04, np.random.default_rng(2)
+    lazy = ExcitingMotion(NAMES, 6.0, np.array([[0.2, 1.0, 0, 0, 0.3], [0.1, 1.0, 0.05, 0, 0.3]]), np.nan)
+
+    def noisy(motion):
+        samples = form.samples(*motion.at(t))
+        return Measured(samples, form.torques(samples) @ form.values + 0.3 * rng.normal(size=(150, 2)), time=t)
+
+    made = estimate(form, noisy(lazy))
+    better = next_motion(made)
+    then = estimate(form, noisy(better.motion))
+    assert_allclose(then.deviations, better.deviations, rtol=0.2)  # the noise is estimated twice
+    assert_allclose(then.condition, better.condition, rtol=0.2)
+    assert (better.deviations / made.deviations).min() < 0.5
+    assert better.condition < 0.5 * made.condition
+    x = better.motion.at(t)
+    assert all(np.abs(a).max() < 1.2 * np.abs(b).max() for a, b in zip(x, lazy.at(t), strict=True))
+
+
+def test_wrong_signs_and_units_that_can_be_fitted_are_told(robot):
+    form, _ = written(robot, "right.csv", 1, 0.5)
+    form = linear_form(form.system, ("viscous", "coulomb"))
+    right = read_measured(robot / "right.csv", form, cutoff=10.0).measured
+    made = estimate(form, right)
+    assert not made.warnings
+    assert real_parameters(made).is_fit
+    turned = estimate(form, replace(right, torques=-right.torques))
+    assert "viscous(shoulder/angle), " in turned.warnings[0]
+    assert "came out negative" in turned.warnings[0]
+    assert not real_parameters(turned).is_fit
+    x, rate, acceleration = (np.rad2deg(getattr(right.samples, n)) for n in ("x", "rate", "acceleration"))
+    degrees = estimate(form, replace(right, samples=form.samples(x, rate, acceleration)))
+    assert "the model misses shoulder/angle by " in degrees.warnings[0]
+    with pytest.raises(ModelError, match="nothing was measured"):
+        estimate(form, replace(right, torques=0 * right.torques))
 
 
 def test_units_of_the_file_are_heeded(robot):

@@ -20,6 +20,7 @@ from floatframe import (
 from floatframe.functions.time_functions import harmonic
 from floatframe.identification.base_parameters import base_parameters, random_samples
 from floatframe.identification.estimation import Measured, estimate
+from floatframe.identification.measured_file import measured_coordinates, read_measured
 from floatframe.identification.regressors import linear_form
 from tests.floatframe.identification.robots import palletizer, some_body
 
@@ -102,6 +103,20 @@ def test_parameters_of_a_robot_with_loops_are_estimated(form):
     z = la.solve_triangular(la.cholesky(made.covariance, lower=True), made.values - base.values(phi), lower=True)
     assert abs((z**2).sum() - len(z)) < 4.5 * np.sqrt(2 * len(z))
     assert "viscous(elbow/angle)" in " ".join(base.names)
+
+
+def test_files_have_the_coordinates_that_move_the_loops(form, tmp_path):
+    samples = driven_samples(form)
+    x, tau = samples.x[:, form.independent], form.torques(samples) @ form.values
+    heads = ["time [s]", *(f"{name} [rad]" for name in ANGLES), *(f"{name} torque [N m]" for name in ANGLES)]
+    rows = np.repeat(np.column_stack([x, tau]), 10, axis=0)  # 40 rows of four places
+    table = np.column_stack([np.arange(len(rows)) * 0.01, rows])
+    file = tmp_path / "measured.csv"
+    np.savetxt(file, table, delimiter=",", header=",".join(heads), comments="", fmt="%.12g")
+    assert set(measured_coordinates(file, form.system)) == set(ANGLES)
+    read = read_measured(file, form).measured
+    assert_allclose(read.torques[::10], tau, rtol=1e-9)
+    assert_allclose(read.samples.x[::10], samples.x, rtol=0, atol=1e-9)
 
 
 def test_what_does_not_move_a_loop_is_refused_by_name(form):
