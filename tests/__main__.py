@@ -1,7 +1,8 @@
 """The checks of the project, in named groups: `python -m tests` runs the group `ci`.
 
     python -m tests              # lint, types, tests, notebooks, documentation: what every change has to pass
-    python -m tests --long       # studies of minutes
+    python -m tests --long       # studies of minutes, and those of --relative
+    python -m tests --relative   # tests of the engine again, in the coordinates of joints
     python -m tests --external   # beside other programs; those that are not there are skipped, visibly
     python -m tests --campaign   # seeded bad inputs and kills
 
@@ -22,6 +23,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.floatframe.formulations import SHORT
+
 ROOT = Path(__file__).resolve().parent.parent
 MOST_WORKERS = 4  #: each takes up to 3 GB
 
@@ -33,6 +36,11 @@ TYPES = ("types", "mypy")
 KERNELS = ("kernels", "floatframe.cli.compile_kernels", "relative")  # each worker would compile them otherwise
 TESTS = ("tests", "pytest", "-q", *SPREAD, "-m", "not long and not external", "tests")
 LONG = ("long tests", "pytest", "-q", "--durations=0", "-m", "long and not external", "tests")
+RELATIVE = (
+    "engine in joint coordinates", "pytest", "-q", *SPREAD, "--formulation", "relative",
+    "-m", "not long and not external", "tests/floatframe",
+)  # fmt: skip
+RELATIVE_IN_SHORT = ("some in joint coordinates", "pytest", "-q", *SPREAD, "--formulation", "relative", *SHORT)
 EXTERNAL = ("tests beside other programs", "pytest", "-q", "-rs", "-m", "external", "tests")
 NOTEBOOKS = (
     "notebooks", "pytest", "-q", *SPREAD, "--nbmake", "--nbmake-timeout=300", "-o", "filterwarnings=", "notebooks",
@@ -51,8 +59,9 @@ class Group:
 
 
 GROUPS = {
-    "ci": Group(((LINT,), (TYPES, KERNELS, DOCUMENTATION), (TESTS,), (NOTEBOOKS,)), 20),
-    "long": Group(((LONG,),), 90),
+    "ci": Group(((LINT,), (TYPES, KERNELS, DOCUMENTATION), (TESTS,), (RELATIVE_IN_SHORT,), (NOTEBOOKS,)), 20),
+    "long": Group(((LONG,), (RELATIVE,)), 90),
+    "relative": Group(((KERNELS,), (RELATIVE,)), 15),
     "external": Group(((EXTERNAL,),), 10),
 }
 

@@ -10,6 +10,7 @@ import textwrap
 import pytest
 
 from tests.__main__ import GROUPS, Group, main, run
+from tests.floatframe.formulations import EXCEPTIONS, ROOMS, SHORT
 from tests.root import ROOT
 
 
@@ -28,7 +29,7 @@ def test_a_test_of_any_markers_is_in_one_check_of_one_group():
 
 def test_an_unknown_group_is_refused_with_the_choices(capsys):
     assert main(["--slow"]) == 2
-    assert "expected one of --ci, --long, --external, --campaign" in capsys.readouterr().out
+    assert "expected one of --ci, --long, --relative, --external, --campaign" in capsys.readouterr().out
 
 
 def test_the_first_check_that_fails_ends_a_group_with_its_exit_code(capfd, monkeypatch):
@@ -79,3 +80,27 @@ def test_nothing_skips_where_everything_is_required(tmp_path, name, counts):
             text=True, env=os.environ | {"FLOATFRAME_REQUIRE_ALL": required}, check=False,
         )  # fmt: skip
         assert re.search(expected, done.stdout.splitlines()[-1]), done.stdout
+
+
+def test_exceptions_of_the_relative_formulation_name_tests_that_exist():
+    """That each of them fails there is seen where they run: they are expected to, strictly."""
+    folder = ROOT / "tests" / "floatframe"
+    for name, reason in EXCEPTIONS.items():
+        file, _, test = name.partition("::")
+        assert file.split("/")[0] in ROOMS
+        assert f"def {test.partition('[')[0]}(" in (folder / file).read_text(), name
+        assert len(reason) > 20
+    for file in SHORT:
+        assert (ROOT / file).is_file()
+        assert file.split("/")[2] in ROOMS
+
+
+def test_a_run_in_relative_coordinates_keeps_the_tests_of_the_engine_alone():
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--formulation", "relative", "--collect-only",
+         "tests/test_errors.py", "tests/floatframe/forces/test_joint_forces.py"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert "test_errors.py::" not in done.stdout
+    assert "test_joint_forces.py::" in done.stdout
+    assert "deselected" in done.stdout

@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array, IntArray
 from floatframe.compiling.system import compiled_system
@@ -127,7 +126,7 @@ class TreeFlow:
         K[:, :n_s] += (CK - K)[:, :n_s] @ S + M[:, :n_s] @ S_dot
         K[:n_s, :n_s] += M[:n_s, :n_s] / tau
         try:
-            solution = la.solve(K, right)
+            solution = np.linalg.solve(K, right)
         except np.linalg.LinAlgError:
             solution = np.full(len(right), np.nan)
         return solution[:n_s], solution[n_s:]
