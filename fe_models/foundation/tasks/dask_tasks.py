@@ -86,6 +86,7 @@ def dask_at(host: str, port: int) -> "DaskTasks":
     told = f"workers = dask://{host}:{port}"
     try:
         listen(host.strip("[]"), port)
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told here, in one line
         client = distributed.Client(f"tcp://{host}:{port}", timeout=CONNECT, set_as_default=False)
     except Exception as error:
         raise WorkerError(

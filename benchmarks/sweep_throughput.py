@@ -1,0 +1,117 @@
+"""Points of a parameter sweep by workers of every kind, beside the same runs in one warm process.
+
+    python -m benchmarks.sweep_throughput                        # 1000 points; some ten minutes on two cores
+    python -m benchmarks.sweep_throughput --points 40 --warm 10
+
+The shipped slider-crank of `cms demo`: crank, flexible rod and slider, 800 steps a point; the mass of the slider varies
+and the largest deflection of the rod is taken. A point reads the system and its modal file, runs, and is written to the
+journal. Processor time is that of the command and all its workers: on a machine that others use it is the number to
+look at. Each kind of workers sweeps a quarter of the points and then, started anew, all of them: the slope is the cost
+of a point, the rest that of the start (processes, imports, loading of compiled code). Tables of all kinds of workers
+must be the same bit for bit.
+"""
+
+import argparse
+import resource
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from cms.fleets.fleet import reduce_fleet
+from fe_models.foundation.threads import bounded_threads
+from floatframe.kernels.entry import prepare
+from floatframe.studies.study import StudyPoint, run_study
+from floatframe.studies.study_file import read_study
+
+PACKAGES = Path(__file__).parents[1]
+STUDY = """
+system = "crank.toml"
+
+[parameters.slider]
+path = "bodies.slider.mass"
+first = 1e-5
+last = 3.5e-5
+number = {n}
+
+[outputs.deflection]
+of = "middle size"
+take = "greatest"
+"""
+
+
+def files(folder: Path, n: int) -> Path:
+    """Write the shipped case and the study; return the path of the study."""
+    data = PACKAGES / "cms" / "cli" / "data"
+    shutil.copy(data / "rod.toml", folder / "rod.toml")
+    (folder / "crank.toml").write_text((data / "crank.toml").read_text().replace("t_end = 0.16 ", "t_end = 0.04 "))
+    shutil.copy(PACKAGES / "fe_models" / "parts" / "data" / "slender_rod.msh", folder / "rod.msh")
+    reduce_fleet([folder / "rod.toml"], workers=1)
+    (folder / "study.toml").write_text(STUDY.format(n=n))
+    return folder / "study.toml"
+
+
+def processor_seconds() -> float:
+    """Return the processor time of this process and of those that it started and that have ended."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--points", type=int, default=1000, help="points of each sweep")
+    parser.add_argument("--warm", type=int, default=50, help="runs in one warm process, before and after the sweeps")
+    parser.add_argument("--workers", default="1,2,4", help="numbers of workers")
+    parser.add_argument("--no-dask", action="store_true", help="processes alone")
+    arguments = parser.parse_args()
+    prepare()
+    numbers = [int(word) for word in arguments.workers.split(",")]
+    kinds = [*map(str, numbers), *([] if arguments.no_dask else [f"dask:{n}" for n in numbers])]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        study = read_study(files(folder, arguments.points))
+        points = list(study.points())
+        warm = StudyPoint(study)
+        warm(points[0])
+        spent = wall = 0.0
+
+        def run_warm() -> None:
+            nonlocal spent, wall
+            with bounded_threads(1):
+                begin, before = perf_counter(), processor_seconds()
+                for point in points[: arguments.warm]:
+                    warm(point)
+            spent, wall = spent + processor_seconds() - before, wall + perf_counter() - begin
+
+        run_warm()
+        rows, tables = [], {}
+        (quarter,) = study.parameters
+        fewer = replace(study, parameters=(replace(quarter, values=quarter.values[: len(points) // 4]),))
+        for workers in kinds:
+            spent_on = []
+            for k, each_study in enumerate((fewer, study)):
+                begin, before = perf_counter(), processor_seconds()
+                table = run_study(each_study, workers=workers, journal=folder / f"{len(rows)}-{k}.journal")
+                spent_on.append((len(table.rows), processor_seconds() - before))
+            rows.append((workers, spent_on, perf_counter() - begin))
+            tables[workers] = table.column("deflection").tobytes()
+        run_warm()
+    n_warm = 2 * min(arguments.warm, len(points))
+    each, lasts = spent / n_warm, wall / n_warm
+    print(f"one run in a warm process: {1e3 * each:.1f} ms of processor time, {1e3 * lasts:.1f} ms on the clock\n")
+    print("| workers | start | a point | over a warm run | 1000 points with their start | throughput on the clock |")
+    print("|---|---|---|---|---|---|")
+    for workers, ((n_few, few), (n_all, all_)), elapsed in rows:
+        a_point = (all_ - few) / (n_all - n_few)
+        start = all_ - n_all * a_point
+        whole = (start / 1000 + a_point) / each
+        speed = len(points) / elapsed * lasts
+        costs = f"{start:.1f} s | {1e3 * a_point:.1f} ms | {a_point / each:.2f} | {whole:.2f}"
+        print(f"| {workers} | {costs} | {speed:.2f} |")
+    same = len(set(tables.values())) == 1
+    print(f"\n{len(points)} points each; tables {'the same bit for bit' if same else 'DIFFER'}")
+
+
+if __name__ == "__main__":
+    main()
