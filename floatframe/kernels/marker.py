@@ -9,7 +9,7 @@ derivative (t: rows of rho, r: rows of th), E = exp(th), T' = left Jacobian at t
     wrench (f, m in body axes)  ->  f;  rho × f + m;  Psi_t(q)ᵀ f + (T' Psi_r(q))ᵀ m
 """
 
-from floatframe.kernels.compiler.compilation import inner, small
+from floatframe.kernels.compiler.compilation import loops, small
 from floatframe.kernels.dense import add_products
 from floatframe.kernels.rotation import exp_matrix, left_jacobian, left_jacobian_derivative
 from floatframe.kernels.vector import (
@@ -35,7 +35,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-@inner
+@loops
 def marker_motion(model, work, m):
     """Write place and motion of marker m."""
     i, markers, own = model.markers.body[m], work.markers, model.markers
@@ -57,7 +57,7 @@ def body_omega(bodies, state, i):
     return vector(state.u[bodies.u0[i] + 3 :])
 
 
-@inner
+@loops
 def pose_on_body(model, work, m):
     """Write place, axes and velocities of marker m in ground axes from its motion in its body."""
     i, markers, triad = model.markers.body[m], work.markers, model.markers.triad[m]
@@ -73,7 +73,7 @@ def pose_on_body(model, work, m):
     put(markers.omega[m], 0, turned(R, add(omega, vector(markers.spin[m]))))
 
 
-@inner
+@loops
 def elastic_motion(model, work, m, i):
     """Add the elastic displacement to rho and write elastic rotation, rates and the left Jacobian."""
     n, q0, u0, o = model.bodies.n_q[i], model.bodies.q0[i], model.bodies.u0[i], model.markers.psi0[m]
@@ -104,7 +104,7 @@ def elastic_motion(model, work, m, i):
     put(work.markers.spin[m], 0, turned(work.markers.T_left[m], vector(work.markers.angle_dot[m])))
 
 
-@inner
+@loops
 def bent_shapes(model, work, m, i):
     """Write Psi(q) = Psi - K_P q."""
     n, q0, o, first = model.bodies.n_q[i], model.bodies.q0[i], model.markers.psi0[m], model.markers.bend0[m]
@@ -116,14 +116,14 @@ def bent_shapes(model, work, m, i):
         psi[j] = -psi[j]
 
 
-@inner
+@loops
 def bent_rate(model, work, m, i, out):
     """Write K_P q_dot [6, k], minus the rate of Psi(q), into out, (6 n_q,)."""
     n, u0 = model.bodies.n_q[i], model.bodies.u0[i]
     bent_by(model, m, n, work.state.u[u0 + 6 : u0 + 6 + n], out)
 
 
-@inner
+@loops
 def bent_by(model, m, n, factors, out):
     """Write Σ_l K_P,l factors_l [6, k] into out, (6 n_q,)."""
     first = model.markers.bend0[m]
@@ -132,7 +132,7 @@ def bent_by(model, m, n, factors, out):
     add_products(model.markers.bend[first : first + 6 * n * n], factors, out)
 
 
-@inner
+@loops
 def bent_bias(model, work, m, i):
     """Return -q_dotᵀ K_P q_dot of marker m, its parts of displacement and rotation."""
     if model.markers.bend0[m] < 0:
@@ -144,7 +144,7 @@ def bent_bias(model, work, m, i):
     return scaled(-1.0, d), scaled(-1.0, th)
 
 
-@inner
+@loops
 def marker_acceleration_bias(model, work, m, out):
     """Write the acceleration (3) and angular acceleration (3) of marker m at zero u_dot, ground axes, into out.
 
@@ -167,7 +167,7 @@ def marker_acceleration_bias(model, work, m, out):
         put(out, 3, turned(R, add(cross(omega, nu), own)))
 
 
-@inner
+@loops
 def marker_acceleration(model, work, m, out):
     """Write the acceleration (3) and angular acceleration (3) of marker m at the iterate, ground axes, into out."""
     marker_acceleration_bias(model, work, m, out)
@@ -181,7 +181,7 @@ def marker_acceleration(model, work, m, out):
     put_sum(out, 3, turned(R, add(omega_dot, turn)))
 
 
-@inner
+@loops
 def elastic_acceleration(model, work, m, i):
     """Return what q_ddot adds to acceleration and angular acceleration of marker m of body i, body axes."""
     o = model.markers.psi0[m]
@@ -192,7 +192,7 @@ def elastic_acceleration(model, work, m, i):
     return d, turned(work.markers.T_left[m], th)
 
 
-@inner
+@loops
 def acceleration_columns(model, work, m, c_m, c_d, c_k, turning, row):
     """Write c_k times the derivatives of the acceleration of marker m by the unknowns of a step, body axes.
 
@@ -246,7 +246,7 @@ def shape(psi, n, k):
     return (psi[k], psi[n + k], psi[2 * n + k]), (psi[3 * n + k], psi[4 * n + k], psi[5 * n + k])
 
 
-@inner
+@loops
 def shape_sum(psi, n, factors):
     """Return Σ_k factors_k of displacement and rotation of shape k, (6 n,)."""
     d, th = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -263,7 +263,7 @@ def wrench_in_body(work, m, i):
     return turned_back(R, vector(wrench)), turned_back(R, vector(wrench[3:]))
 
 
-@inner
+@loops
 def wrench_to_body(model, work, m):
     """Subtract the generalised forces of the wrench on marker m from the residual of its body."""
     i = model.markers.body[m]
@@ -283,7 +283,7 @@ def wrench_to_body(model, work, m):
             residual[u0 + 6 + k] -= dot(d, f) + dot(th, s)
 
 
-@inner
+@loops
 def marker_columns(model, work, m, rate, turning, column, row):
     """Write the derivatives of the motion of marker m by the body unknowns (dx, dtheta, dq), in body axes.
 
@@ -346,7 +346,7 @@ def take_column(matrix, first, k, x):
     matrix[first + 2, k] -= x[2]
 
 
-@inner
+@loops
 def marker_stiffness(model, work, m, c_k, H, turn):
     """Add the derivative of minus the generalised forces of a held wrench on marker m to H and turn.
 

@@ -3,7 +3,7 @@
 from floatframe.kernels.compiler.compilation import inner
 from floatframe.kernels.connections.connection import connection_rows
 from floatframe.kernels.evaluation import evaluate_bodies, evaluate_markers, slide_markers
-from floatframe.kernels.marker import marker_motion, pose_on_body
+from floatframe.kernels.marker import marker_motion
 from floatframe.relative.kernels.projection import project
 
 __all__ = ["evaluate_placed", "evaluate_tree"]
@@ -27,8 +27,6 @@ def evaluate_placed(model, work, tree, joints, c_k):
         c, i = model.markers.connection[m], model.markers.body[m]
         if c < 0 or tree.is_kept[c] != 0 or i < 0:
             marker_motion(model, work, m)
-        elif tree.far[i] == m:
-            pose_on_body(model, work, m)
     slide_markers(model, work)
     project_residuals(model, work, tree, joints, c_k)
 

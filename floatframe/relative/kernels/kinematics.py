@@ -11,7 +11,7 @@ and from a marker to its body as in `kernels.marker`, solved for the motion of t
 at A. Deformations of both bodies, their rates and accelerations are those of `state.q`, `state.u`, `state.u_dot`.
 """
 
-from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.compiler.compilation import inner, loops
 from floatframe.kernels.marker import (
     elastic_acceleration,
     elastic_motion,
@@ -40,7 +40,7 @@ from floatframe.kernels.vector import (
 __all__ = ["end_acceleration", "end_motion", "joint_motion", "move_joints", "place_bodies"]
 
 
-@inner
+@loops
 def end_motion(model, work, m, i):
     """Return r, A, v, omega of marker m, of the frame of body i for m = -1, of the ground for i = -1 too."""
     zero = (0.0, 0.0, 0.0)
@@ -54,7 +54,7 @@ def end_motion(model, work, m, i):
     return vector(work.state.r[i]), R, vector(u), turned(R, u[3:])
 
 
-@inner
+@loops
 def end_acceleration(model, work, m, i):
     """Return acceleration and angular acceleration as `end_motion` does."""
     zero = (0.0, 0.0, 0.0)
@@ -68,7 +68,7 @@ def end_acceleration(model, work, m, i):
     return vector(u_dot), turned(work.state.R[i], u_dot[3:])
 
 
-@inner
+@loops
 def put_columns(tree, joints, i, A_a, A_b):
     """Write directions of the columns of the joint of body i, ground axes."""
     for k in range(tree.column0[i], tree.column0[i + 1]):
@@ -80,7 +80,7 @@ def put_columns(tree, joints, i, A_a, A_b):
             put(joints.a[k], 0, turned(A_b, alpha))
 
 
-@inner
+@loops
 def sums(tree, joints, i, x):
     """Return Σ t_k x_k and Σ a_k x_k of the joint of body i."""
     s, w = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -90,7 +90,7 @@ def sums(tree, joints, i, x):
     return s, w
 
 
-@inner
+@loops
 def turning_of_columns(tree, joints, i, omega_a, omega_b):
     """Return Σ omega_side × a_k z_dot_k."""
     total = (0.0, 0.0, 0.0)
@@ -107,7 +107,7 @@ def place_bodies(model, work, tree, joints):
         place_body(model, work, tree, joints, tree.order[place])
 
 
-@inner
+@loops
 def place_body(model, work, tree, joints, i):
     """Write the motion of the frame of body i, that of its parent being known."""
     near, parent = tree.near[i], tree.parent[i]
@@ -143,7 +143,7 @@ def place_body(model, work, tree, joints, i):
         put_body(model, work, tree, i, sub(r, D), A_a, v, spin, a, alpha)
 
 
-@inner
+@loops
 def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
     """Write the motion of body i whose far marker moves as given."""
     state, u0, m = work.state, model.bodies.u0[i], tree.far[i]
@@ -156,6 +156,10 @@ def put_body(model, work, tree, i, r, A, v, omega, a, alpha):
         put(u_dot, 0, a)
         put(u_dot, 3, turned_back(A, alpha))
         return
+    put(work.markers.r[m], 0, r)
+    put_matrix(work.markers.A[m], A)
+    put(work.markers.v[m], 0, v)
+    put(work.markers.omega[m], 0, omega)
     triad, zero = matrix(model.markers.triad[m]), (0.0, 0.0, 0.0)
     put(work.markers.rho[m], 0, vector(model.markers.position[m]))
     rho_dot, nu = zero, zero
