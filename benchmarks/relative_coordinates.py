@@ -1,8 +1,10 @@
 """Cost of a step in absolute and in relative coordinates: chains of rigid and of flexible links.
 
-    python benchmarks/relative_coordinates.py [--most 1000]
+    python benchmarks/relative_coordinates.py [--most 1000] [--precision]
 
-Processor time of a step of 1 ms and Newton's iterations in it, both formulations one after the other.
+Processor time of a step of 1 ms and Newton's iterations in it, both formulations one after the other. With --precision
+also what a motion costs by its error: 30 flexible links fall for 0.384 s with several steps; rms errors of body frames
+and of modal coordinates (over the rms of these) against steps of 25 us, both formulations of which are compared first.
 """
 
 import argparse
@@ -18,6 +20,8 @@ from floatframe.errors import FloatframeError
 from floatframe.integrators import in_formulation
 from floatframe.kernels.work import new_work
 from floatframe.mechanisms import chain
+
+FORMULATIONS = ("absolute", "relative")
 
 
 def cost(system: System, formulation: str, n_steps: int, h: float = 1e-3) -> tuple[float, float]:
@@ -44,11 +48,50 @@ def beam(n_modes: int) -> cms.ReducedBody:
     return cms.reduce(body, cms.craig_bampton(body, n_modes=n_modes), geometric=True)
 
 
+def motion(system: System, formulation: str, h: float, tolerance: float, t_end: float = 0.384, every: float = 0.024):
+    """Return places of body frames, modal coordinates, the processor time [s] and iterations of a step."""
+    method = in_formulation(GeneralizedAlpha(tolerance=tolerance), formulation)
+    work = new_work(compiled_system(system).model)
+    carry, n_steps = method.start(system, 0.0), round(t_end / h)
+    began = time.process_time()
+    carry, rows, _, failure = method.advance(
+        system, carry, work, t0=0.0, h=h, first=0, n_steps=n_steps, every=round(every / h)
+    )
+    seconds = time.process_time() - began
+    assert failure is None, failure
+    return rows.r, rows.q, seconds, carry.n_iterations / n_steps
+
+
+def rms(x: np.ndarray) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def precision(system: System) -> None:
+    """Print what a motion costs by its error, both formulations in turn, the better of three runs."""
+    fine = {each: motion(system, each, 2.5e-5, 1e-9) for each in FORMULATIONS}
+    (r, q, *_), (r_other, q_other, *_) = fine["relative"], fine["absolute"]
+    print(f"references differ by {rms(r - r_other):.1e} m, modes by {rms(q - q_other) / rms(q):.1e}")
+    print(f"{'h':>8s} {'tolerance':>10s}" + "".join(f"{each:>44s}" for each in FORMULATIONS))
+    for tolerance in (1e-8, 1e-6):
+        for h in (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4):
+            told = []
+            runs = [[motion(system, each, h, tolerance) for each in FORMULATIONS] for _ in range(3)]
+            for one in zip(*runs, strict=True):
+                r_h, q_h, _, iterations = one[0]
+                seconds = min(run[2] for run in one)
+                errors = f"{rms(r_h - r):.1e} m {rms(q_h - q) / rms(q):.1e}"
+                told.append(f"{errors} {1e3 * seconds:7.0f} ms {iterations:4.1f} it")
+            print(f"{1e3 * h:5.2f} ms {tolerance:10.0e}" + "".join(f"{each:>44s}" for each in told), flush=True)
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--most", type=int, default=300, help="bodies of the longest chain")
-    most = parser.parse_args().most
+    parser.add_argument("--precision", action="store_true", help="also what a motion costs by its error")
+    asked = parser.parse_args()
+    most = asked.most
     rng = np.random.default_rng(0)
     link = beam(2)
     print(f"{'chain':>20s} {'absolute':>20s} {'relative':>20s}")
@@ -58,7 +101,7 @@ def main() -> None:
                 continue
             system = chain(n, angles=tuple(0.3 * rng.normal(size=n)), rod=rod)
             told = []
-            for formulation in ("absolute", "relative"):
+            for formulation in FORMULATIONS:
                 try:
                     seconds, iterations = cost(system, formulation, 50)
                     told.append(f"{1e6 * seconds:9.0f} us {iterations:5.1f} it")
@@ -68,6 +111,8 @@ def main() -> None:
                 f"{n:4d} x {'rigid' if rod is None else f'{rod.n_q} modes':>12s} {told[0]:>20s} {told[1]:>20s}",
                 flush=True,
             )
+    if asked.precision:
+        precision(chain(30, angles=tuple(0.3 * np.random.default_rng(0).normal(size=30)), rod=link))
 
 
 if __name__ == "__main__":

@@ -232,9 +232,7 @@ class Search:
                 break
             N, _, X = self.rows(state)
             y = N @ np.linalg.lstsq(X[beyond != 0], -beyond[beyond != 0], rcond=1e-9)[0]
-            state = assembled(
-                self.compiled, self.work, displaced(model, state, in_ground_axes(model, state, y))
-            )
+            state = assembled(self.compiled, self.work, displaced(model, state, in_ground_axes(model, state, y)))
         return state
 
     def run(self, tolerance: float, most: int) -> ReachedPose:

@@ -70,9 +70,7 @@ def off_at_start(events: Sequence[Any]) -> frozenset[str]:
     return frozenset(name for name, is_off in first.items() if is_off)
 
 
-def times_off(
-    events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: Array, name: str
-) -> NDArray[np.bool_]:
+def times_off(events: Sequence[Any], happened: Sequence[Mapping[str, Any]], t: Array, name: str) -> NDArray[np.bool_]:
     """Return at which times t, (n_t,), the events of a system that have happened have an element switched off."""
     is_off = np.full(len(t), name in off_at_start(events))
     for event in happened:

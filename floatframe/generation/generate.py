@@ -103,7 +103,7 @@ def generate(
     if what == "forward" and driven:
         raise ModelError(
             f"generate: coordinate {quoted(driven[0])} is prescribed by a function of time, which forward does not "
-            "know; leave out the motion of its joint, or take what = \"residual\""
+            'know; leave out the motion of its joint, or take what = "residual"'
         )
     routine = routine_of(tree, what, function)
     notes = notes_of(system, routine, model, tree)

@@ -469,9 +469,7 @@ class Builder:
         if not joint.has_value or joint.name in self.drives or not (joint.damping or joint.friction):
             return None
         coordinate = coordinate_of(self.robot, joint.name)
-        return JointForce(
-            f"{joint.name} drag", joint.name, coordinate, damping=joint.damping, friction=joint.friction
-        )
+        return JointForce(f"{joint.name} drag", joint.name, coordinate, damping=joint.damping, friction=joint.friction)
 
     def couplers(self, joint: RobotJoint) -> list[CoordinateCoupler]:
         """(5): return what couples a joint to the one that it follows, or stops it at its limits."""

@@ -331,4 +331,3 @@ def turn_to(axis: Array) -> Array:
 def pose_of(frame: Frame) -> Pose:
     """Return a frame as URDF writes it."""
     return Pose(frame.x, rpy_of(frame.R))
-

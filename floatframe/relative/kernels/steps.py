@@ -37,6 +37,7 @@ __all__ = ["SINGULAR", "advance_tree", "correct", "renew", "write_tree_row"]
 SINGULAR = 6  #: status: the Newton matrix is
 FAST = 0.1  # corrections that shrink this fast end a step where the next one is expected to be small enough:
 SAFE = 0.5  # this much of the one that is allowed
+EXACT_STEPS = 4  # steps that take exact matrices after those that are kept have failed
 MOST_PATIENCE = 31  # steps that make their own factors before older ones are tried again
 
 
@@ -93,7 +94,7 @@ def renew(model, work, tree, joints, tangent, c_m, c_d, c_k):
         tangent.is_kept = 1
     if factorize_poses(model, work, tree, joints, tangent, c_d, c_k):
         return True
-    tangent.exactly = MOST_PATIENCE
+    tangent.exactly = EXACT_STEPS
     tangent.is_exact, tangent.is_kept = 1, 0
     write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k)
     return factorize_tree(model, work, tree, tangent, c_d, c_k)
@@ -182,7 +183,7 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
         tangent.left -= 1
     if tangent.exactly > 0:
         tangent.exactly -= 1
-    is_old, made = work.solver.is_due == 0, -1
+    is_old, made, begun = work.solver.is_due == 0, -1, 0  # iterations at which factors were made, the step begun anew
     predict(model, work, tree, joints, tangent, memory, order, h)
     factorisations = work.counted.factorisations
     is_open = tangent.V.shape[0] == 0  # wrenches that are kept are not in the norm
@@ -214,14 +215,20 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
             predict(model, work, tree, joints, tangent, memory, order, h)
             last, last_of_states = math.inf, math.inf
             iteration += 1
+            begun = iteration
             continue
-        if tangent.is_exact == 0 and not norm <= last and (made != 0 or iteration < 2 or not math.isfinite(norm)):
+        if (
+            tangent.is_exact == 0
+            and not norm <= last
+            and (begun < made < iteration or iteration < begun + 2 or not math.isfinite(norm))
+        ):
             work.solver.is_due = 1
-            tangent.exactly = MOST_PATIENCE
+            tangent.exactly = EXACT_STEPS
             tangent.n_known = 0
             predict(model, work, tree, joints, tangent, memory, order, h)
             last, last_of_states = math.inf, math.inf
             iteration += 1
+            begun = iteration
             continue
         if not math.isfinite(norm):
             work.solver.is_due = 1
@@ -247,12 +254,12 @@ def one_step(model, work, memory, tree, joints, tangent, order, h):
                     return INACCURATE, excess, error
             accept(model, work, memory, tree, joints, h, alpha_m, alpha_f)
             return DONE, excess, error
-        if norm > SLOW * last and not is_small:
+        if norm > SLOW * last and not is_small and (tangent.is_exact != 0 or made < iteration):
             work.solver.is_due = 1
             if tangent.is_exact == 0:
                 tangent.is_kept = 0
-                if 0 < made < iteration:  # those of an iterate near to the solution are not good enough either
-                    tangent.exactly = MOST_PATIENCE
+                if begun < made < iteration:  # those of an iterate near to the solution are not good enough either
+                    tangent.exactly = EXACT_STEPS
         if of_states > max(1.0, SLOW * last_of_states) or iteration >= MANY:
             work.solver.is_due = 1
         last, last_of_states = norm, of_states
