@@ -25,8 +25,10 @@ class NextMotion:
     condition: float  #: of these rows over the noise, columns of length one; compare `Estimate.condition`
 
 
-def next_motion(made: Estimate, *, seed: int = 0) -> NextMotion:
+def next_motion(made: Estimate, *, seed: int = 0) -> NextMotion | None:
     """Return an exciting motion within the positions, rates and accelerations of the one that was measured.
+
+    None: none that was tried has a lower condition number than that one.
 
     It lasts as long as what was measured, and is judged with as many rows and the noise that was found. Torques are not
     limited: those of the estimate stay near what was measured, as accelerations do.
@@ -60,4 +62,5 @@ def next_motion(made: Estimate, *, seed: int = 0) -> NextMotion:
     size = np.linalg.norm(A, axis=0)
     s, Vt = la.svd(A / size, full_matrices=False)[1:]
     deviations = np.linalg.norm(Vt.T / s, axis=1) / size
-    return NextMotion(motion, deviations, float(s[0] / s[-1]))
+    condition = float(s[0] / s[-1])
+    return NextMotion(motion, deviations, condition) if condition < made.condition else None

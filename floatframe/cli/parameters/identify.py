@@ -93,6 +93,11 @@ def identify_command(
             with clock("motion that would help"):
                 try:
                     better = next_motion(made)
+                    if better is None:
+                        notes = (
+                            *notes,
+                            "of other motions within its range, rates and accelerations none excites better",
+                        )
                 except ModelError as error:
                     notes = (*notes, f"no motion that would tell more was found: {error}")
         with clock("record"):
@@ -108,6 +113,8 @@ def identify_command(
             replace_file(path, identification_html(made, record, other).encode())
         if not json:
             say(f"wrote {path} ({path.stat().st_size / 1e6:.2f} MB)")
+    if motion is not None and better is None and not json:
+        say(f"{motion} is not written: no better motion was found")
     if motion is not None and better is not None:
         replace_file(motion, motion_table(better.motion, form).encode())
         if not json:
