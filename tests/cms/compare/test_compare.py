@@ -419,6 +419,7 @@ def test_the_command_writes_table_page_and_numbers_that_agree(folder):
     assert "full model taken from an earlier comparison" in again.stdout
 
 
+@pytest.mark.long
 def test_a_cluster_judges_as_processes_do_and_both_as_this_process(folder):
     """Bit for bit, but for the seconds; against the factorisation that all sets share, to rounding."""
     pytest.importorskip("distributed")

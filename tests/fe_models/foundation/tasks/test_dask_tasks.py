@@ -181,6 +181,7 @@ SLEEPS = """
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
 def test_workers_end_with_the_process_that_started_them(tmp_path, name):
