@@ -28,7 +28,13 @@ from floatframe.machines.road_car.systems import base, written
 from floatframe.relative.recursion.entry import FORWARD, INVERSE, MASS, TANGENTS
 from floatframe.relative.topology import tree_of
 from floatframe.system_file.read_system import read_system
-from tests.floatframe.generation.flexible_systems import bent_motion, flexible_in_the_middle, pendulum, two_link_arm
+from tests.floatframe.generation.flexible_systems import (
+    bent_motion,
+    dense_body,
+    flexible_in_the_middle,
+    pendulum,
+    two_link_arm,
+)
 from tests.floatframe.generation.sympy_count import sympy_operations
 from tests.floatframe.identification.robots import six_axes
 
@@ -184,6 +190,7 @@ def main() -> None:
         "arm of two clamped beams, 4 modes each": bent(ff.relative_model(two_link_arm())),
         "beam in mean axes on a hinge, 6 modes, geometric stiffness": bent(ff.relative_model(pendulum())),
         "rigid link, such a beam with 4 modes, rigid tool": bent(ff.relative_model(flexible_in_the_middle())),
+        "body on a hinge, 8 modes without a zero in its invariants": bent(ff.relative_model(dense_body())),
     }
     for title, model in models.items():
         print(f"\n{title}")

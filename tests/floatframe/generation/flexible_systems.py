@@ -7,6 +7,7 @@ import floatframe as ff
 from cms.reduced_basis.frames import NodalFrame
 from floatframe.mechanisms import chain
 from floatframe.relative.recursion.expansion import marker_shape
+from tests.floatframe.point_masses import random_point_masses, reduced_body, stiffness
 from tests.floatframe.relative.plain_kinematics import flexible_tree
 
 SLENDER = cms.BeamLine(1.0, 4.7, 1.26e8, 4.2e3, 9.5e3, 3.8e3, rho_Iy=1.6e-4, rho_Iz=3.5e-4)
@@ -59,6 +60,12 @@ def held_at_the_free_end():
         ff.RevoluteJoint("lower", ff.Marker("link", "start"), ff.Marker("weight"), axis=(0.6, 0, 0.8)),
     ]
     return ff.System([link, weight], joints, [ff.Gravity((0.3, -0.2, -9.81))], name="held")
+
+
+def dense_body(n=8):
+    """Return a body on a hinge whose invariants have no zeros."""
+    rod = reduced_body(random_point_masses(n, softness=0.1), stiffness(n))
+    return chain(1, rod=rod, ends=("end_b", "end_a"))
 
 
 SYSTEMS = {
