@@ -9,10 +9,11 @@
 import logging
 import os
 import pickle
+import signal
 import socket
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from typing import Any, Self
 
@@ -53,7 +54,7 @@ def dask_here(n: int, threads: int = 1) -> "DaskTasks":
         "distributed.nanny.pre-spawn-environ": thread_environment(threads),
         "distributed.comm.timeouts.connect": START,
     }
-    with dask.config.set(settings):
+    with dask.config.set(settings), interrupts_ignored():
         try:
             cluster = distributed.LocalCluster(
                 n_workers=n, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
@@ -70,6 +71,19 @@ def dask_here(n: int, threads: int = 1) -> "DaskTasks":
                 raise
             raise WorkerError(f"workers = dask: no cluster can be started here: {error}") from error
     return DaskTasks(client, "workers = dask", cluster)
+
+
+@contextmanager
+def interrupts_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C, as do the processes that begin now: this one ends them, and tells it in one line."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def dask_at(host: str, port: int) -> "DaskTasks":
