@@ -29,7 +29,6 @@ SHORT = tuple(
 INTEGRATOR = "its bound is what absolute coordinates leave: formulations differ by the error of the integrator"
 OLD_FACTORS = "compares bit for bit over blocks of steps, each of which begins with factors of its own here"
 CLOSED = "measures how joints drift, and those of the tree are closed to rounding"
-FEELS = "elements that feel accelerations have no part in the Newton matrix of the tree, and a mass as large diverges"
 ZEROS = "counts zero eigenvalues, of which pairs that rounding splits are told once"
 NEAR = "compares at once and later by small motions: rounding of the equilibrium is another"
 
@@ -49,8 +48,6 @@ EXCEPTIONS: dict[str, str] = {
     "compiling/test_spinning_beams.py::test_spin_up_bends_and_shortens_as_the_exact_beam[tangent]": INTEGRATOR,
     "compiling/test_spinning_beams.py::test_spin_up_bends_and_shortens_as_the_exact_beam[mean axis]": INTEGRATOR,
     "compiling/test_spinning_beams.py::test_spin_up_of_a_body_of_solids": INTEGRATOR,
-    "elements/test_element_accelerations.py::test_an_added_mass_moves_as_the_body_it_stands_for[rigid]": FEELS,
-    "elements/test_element_accelerations.py::test_an_added_mass_moves_as_the_body_it_stands_for[flexible]": FEELS,
     "elements/test_public_elements.py::test_three_multipliers_hold_a_flexible_pendulum_as_a_spherical_joint_does":
         INTEGRATOR,
     "integrators/test_pendulum.py::test_joint_stays_closed_to_roundoff_and_its_velocity_to_second_order[rho_inf=0]":

@@ -29,7 +29,7 @@ from floatframe.relative.kernels.spatial import (
 )
 from floatframe.relative.kernels.tree import COLUMN, FAR_MODE, NEAR_MODE
 
-__all__ = ["mode_rate", "mode_screw", "put_jets", "write_jets"]
+__all__ = ["carrier", "mode_rate", "mode_screw", "mode_screws", "put_jets", "put_mode_jet", "write_jets"]
 
 
 @inner
@@ -112,30 +112,51 @@ def mode_jets(model, work, tree, tangent, i, kind, m, sign, c_m, c_d, c_k, rate)
     """Write screws, jets and reaches of the modes at marker m of the joint of body i."""
     if m < 0 or model.markers.psi0[m] < 0:
         return
-    body, origin = model.markers.body[m], vector(tangent.origin)
-    r, R, v, omega = end_motion(model, work, -1, body)
-    a, alpha = end_acceleration(model, work, -1, body)
-    p = sub(r, origin)
-    V, V_dot = spatial_motion(p, v, omega, a, alpha)
-    rho_2, angle_2 = deformation_accelerations(model, work, m, body)
-    if model.markers.bend0[m] >= 0:
-        n, u0 = model.bodies.n_q[body], model.bodies.u0[body] + 6
-        bent_rate(model, work, m, body, work.markers.bend_dot[: 6 * n])
-        bent_by(model, m, n, work.state.u_dot[u0 : u0 + n], work.markers.bend_ddot[: 6 * n])
+    body = model.markers.body[m]
+    held = carrier(model, work, tangent, m, body)
     for j in range(tree.jet0[i], tree.jet0[i + 1]):
         if tree.jet_kind[j] != kind:
             continue
-        k = tree.jet_item[j]
-        s, s_1 = mode_rate(model, work, m, body, k)
-        s_2 = mode_second_rate(model, work, m, body, k, s, s_1, rho_2, angle_2)
-        S = scaled_pair(sign, world_screw(R, p, s))
-        S_1 = scaled_pair(sign, world_screw(R, p, s_1))
-        S_2 = scaled_pair(sign, world_screw(R, p, s_2))
+        s, s_1, s_2 = mode_screws(model, work, m, body, tree.jet_item[j], held)
+        S, S_1, S_2 = scaled_pair(sign, s), scaled_pair(sign, s_1), scaled_pair(sign, s_2)
         put_pair_of(tangent.screw[j], 0, S)
-        by_rate = pair_sum(scaled_pair(c_d, S), scaled_pair(c_k, S_1))
-        by_second = pair_sum(scaled_pair(c_m, S), pair_sum(scaled_pair(2 * c_d, S_1), scaled_pair(c_k, S_2)))
-        put_jets(tangent.jet[j], scaled_pair(c_k, S), by_rate, by_second, V, V_dot)
-        put_reach(tangent.reach[j], S, pair_sum(scaled_pair(rate, S), S_1), V)
+        put_mode_jet(tangent.jet[j], S, S_1, S_2, held, c_m, c_d, c_k)
+        put_reach(tangent.reach[j], S, pair_sum(scaled_pair(rate, S), S_1), held[2])
+
+
+@inner
+def carrier(model, work, tangent, m, i):
+    """Return R, p, V, V' of the frame of body i, which carries marker m, and the second rates of its deformation there.
+
+    What `mode_screws` asks for has been written for the marker then.
+    """
+    r, R, v, omega = end_motion(model, work, -1, i)
+    a, alpha = end_acceleration(model, work, -1, i)
+    p = sub(r, vector(tangent.origin))
+    V, V_dot = spatial_motion(p, v, omega, a, alpha)
+    rho_2, angle_2 = deformation_accelerations(model, work, m, i)
+    if model.markers.bend0[m] >= 0:
+        n, u0 = model.bodies.n_q[i], model.bodies.u0[i] + 6
+        bent_rate(model, work, m, i, work.markers.bend_dot[: 6 * n])
+        bent_by(model, m, n, work.state.u_dot[u0 : u0 + n], work.markers.bend_ddot[: 6 * n])
+    return R, p, V, V_dot, rho_2, angle_2
+
+
+@inner
+def mode_screws(model, work, m, i, k, held):
+    """Return the screw of mode k at marker m and its rates as body i sees them, ground axes; held: its `carrier`."""
+    R, p, _, _, rho_2, angle_2 = held
+    s, s_1 = mode_rate(model, work, m, i, k)
+    s_2 = mode_second_rate(model, work, m, i, k, s, s_1, rho_2, angle_2)
+    return world_screw(R, p, s), world_screw(R, p, s_1), world_screw(R, p, s_2)
+
+
+@inner
+def put_mode_jet(out, S, S_1, S_2, held, c_m, c_d, c_k):
+    """Write the jet of a mode with the screws that `mode_screws` returns."""
+    by_rate = pair_sum(scaled_pair(c_d, S), scaled_pair(c_k, S_1))
+    by_second = pair_sum(scaled_pair(c_m, S), pair_sum(scaled_pair(2 * c_d, S_1), scaled_pair(c_k, S_2)))
+    put_jets(out, scaled_pair(c_k, S), by_rate, by_second, held[2], held[3])
 
 
 @inner

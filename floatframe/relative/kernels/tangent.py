@@ -35,7 +35,7 @@ from floatframe.kernels.vector import (
     unit_matrix,
     vector,
 )
-from floatframe.relative.kernels.jets import mode_rate, write_jets
+from floatframe.relative.kernels.jets import carrier, mode_rate, mode_screws, put_mode_jet, write_jets
 from floatframe.relative.kernels.projection import force_slopes
 from floatframe.relative.kernels.spatial import pair, pair_sum, scaled_pair, spatial_cross, turned_power, world_screw
 from floatframe.relative.kernels.tree import COLUMN, NEAR_MODE
@@ -114,7 +114,10 @@ def write_tangent(model, work, tree, joints, tangent, c_m, c_d, c_k):
     for m in range(model.markers.body.shape[0]):
         c = model.markers.connection[m]
         if c >= 0 and model.markers.body[m] >= 0 and tree.is_kept[c] != 0 and model.connections.size[c] > 0:
-            kept_marker(model, work, tree, tangent, m, tree.kept_row[model.connections.w0[c]], rate)
+            first = tree.kept_row[model.connections.w0[c]]
+            kept_marker(model, work, tree, tangent, m, first, rate)
+            if model.markers.accelerated[m] >= 0:
+                accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k)
 
 
 @inner
@@ -375,3 +378,38 @@ def kept_pair(model, work, tangent, m, c, first, s, xi, xi_dot, unit, p, v, omeg
         o = first + model.markers.moment[m]
         for a in range(3):
             B[o + a, s] -= sign * unit[1][a]
+
+
+@inner
+def accelerated_marker(model, work, tree, tangent, m, first, c_m, c_d, c_k):
+    """Add to the rows of the connection of marker m, from `first` on, what they change by its acceleration."""
+    i = model.markers.body[m]
+    b = i
+    while b >= 0:
+        for j in range(tree.jet0[b], tree.jet0[b + 1]):
+            accelerated_pair(model, work, tangent, m, first, tree.jet_s[j], tangent.jet[j])
+        b = tree.parent[b]
+    if model.markers.psi0[m] < 0:
+        return
+    held = carrier(model, work, tangent, m, i)
+    for k in range(model.bodies.n_q[i]):
+        S, S_1, S_2 = mode_screws(model, work, m, i, k, held)
+        put_mode_jet(tangent.own, S, S_1, S_2, held, c_m, c_d, c_k)
+        accelerated_pair(model, work, tangent, m, first, tree.m0[i] + k, tangent.own)
+
+
+@inner
+def accelerated_pair(model, work, tangent, m, first, s, jet):
+    """Add P_a times the change of the acceleration of marker m by the jet (xi, xi_dot, xi_ddot) of unknown s.
+
+        da = xi_ddot_v + xi_ddot_w × p + 2 xi_dot_w × v + xi_w × a
+        dalpha = xi_ddot_w + xi_dot_w × omega + xi_w × alpha
+    """
+    accelerated = model.markers.accelerated[m]
+    P_a, now = work.connections.P_a[accelerated], work.markers.acceleration[accelerated]
+    p, v = sub(vector(work.markers.r[m]), vector(tangent.origin)), vector(work.markers.v[m])
+    xi_w, xi_dot_w, xi_ddot_w = vector(jet[3:]), vector(jet[9:]), vector(jet[15:])
+    da = add(add(vector(jet[12:]), cross(xi_ddot_w, p)), add(scaled(2.0, cross(xi_dot_w, v)), cross(xi_w, vector(now))))
+    dalpha = add(xi_ddot_w, add(cross(xi_dot_w, vector(work.markers.omega[m])), cross(xi_w, vector(now[3:]))))
+    for r in range(model.connections.size[model.markers.connection[m]]):
+        tangent.C[first + r, s] += dot(da, P_a[r]) + dot(dalpha, P_a[r, 3:])

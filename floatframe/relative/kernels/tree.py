@@ -100,6 +100,7 @@ class TangentWork(NamedTuple):
     by_jet: Array = real(Size("n_most") + 6)
     f: Array = real(6)
     motion: Array = real(12)
+    own: Array = real(18)  #: jet of a mode at a marker of its body
     C: Array = real(n_rows, n_s)  #: rows that are kept by unknowns
     B: Array = real(n_rows, n_s)  #: equations of unknowns by wrenches that are kept, transposed; then K⁻¹ of them
     V: Array = real(n_rows, n_rows)  #: rows that are kept by their wrenches; then the factors of V - C K⁻¹ B

@@ -1,5 +1,7 @@
 """The Newton matrix in relative coordinates is the derivative of its residual, that of the projection included."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -8,6 +10,7 @@ from floatframe import Marker, SpringDamper
 from floatframe.compiling.system import compiled_system
 from floatframe.relative.kernels.entry import moved, newton_matrix, newton_step
 from floatframe.start.initial import consistent_motion
+from tests.floatframe.elements.test_element_accelerations import Heavy
 from tests.floatframe.kernels.test_tangent import C_D, C_K, C_M, system_with_everything
 from tests.floatframe.relative.pairs import RelativeIterate, pair
 from tests.floatframe.relative.test_kinematics import CASES
@@ -76,6 +79,15 @@ def test_newton_matrix_is_the_derivative_of_the_residual(make, is_apart, n_free,
 
 def test_newton_matrix_is_exact_with_loops_and_force_elements():
     exact, approximate = matrices(system_with_everything(), is_closed=False)
+    assert_allclose(exact, approximate, rtol=0, atol=1e-8 * np.abs(approximate).max())
+
+
+@pytest.mark.parametrize("case", ["revolute", "spherical swapped"])
+def test_newton_matrix_is_exact_with_an_element_that_feels_accelerations(case):
+    """A mass at the outer end of two stiffened flexible bodies, many times as heavy as they are."""
+    make, is_apart, _, swap = next(each.values for each in CASES if each.id == case)
+    system = replace(pair(make, is_apart=is_apart, swap=swap), elements=[Heavy("heavy", Marker("first", "end_b"))])
+    exact, approximate = matrices(system)
     assert_allclose(exact, approximate, rtol=0, atol=1e-8 * np.abs(approximate).max())
 
 
