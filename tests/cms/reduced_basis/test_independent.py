@@ -1,5 +1,7 @@
 """Bases of mode sets: columns in blocks, the half of each Gram matrix, shapes in the place of the columns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -68,6 +70,33 @@ def test_rounding_that_counts_has_the_basis_formed(body, modes, monkeypatch):
     monkeypatch.setattr(finishing, "TRUSTED_ROUNDING", 1e-30)
     assert_allclose(finish(body, modes, condition).Phi.shape, (body.n_dof, modes.columns.shape[1] - 6))
     assert len(formed) == 1
+
+
+@pytest.mark.parametrize("condition", [1e1, 1e2, 1e3, 1e4, 1e5])
+def test_the_estimate_of_rounding_bounds_what_ill_conditioned_columns_lose(body, modes, condition, monkeypatch):
+    """Mixed columns whose Gram matrix is trusted all the same: G_M within the shapes is 1 to rounding, Phi is not."""
+    frame = frame_condition(body, TisserandFrame())
+    monkeypatch.setattr(independent, "TRUSTED_CONDITION", np.inf)
+    monkeypatch.setattr(independent, "TRUSTED_PIVOT", 1e-7)
+    rng, k = np.random.default_rng(0), modes.columns.shape[1]
+    turns = [np.linalg.qr(rng.normal(size=(k, k)))[0] for _ in range(2)]
+    unit = modes.columns / np.sqrt(np.einsum("nk,nk->k", modes.columns, (body.K + 1e9 * body.M) @ modes.columns))
+    mixed = replace(modes, columns=unit @ (turns[0] * np.geomspace(1.0, 1 / condition, k)) @ turns[1])
+    pencil, pencils = finishing.elastic_pencil, []
+    monkeypatch.setattr(finishing, "elastic_pencil", lambda *given: pencils.append(pencil(*given)) or pencils[-1])
+
+    def defect():
+        Phi = finish(body, mixed, frame).Phi
+        return np.abs(Phi.T @ (body.M @ Phi) - np.eye(Phi.shape[1])).max()
+
+    found = defect()
+    estimate = pencils[0].rounding
+    assert found < finishing.TRUSTED_ROUNDING
+    assert len(pencils) == (2 if estimate > finishing.TRUSTED_ROUNDING else 1)
+    monkeypatch.setattr(finishing, "TRUSTED_ROUNDING", np.inf)
+    lost = defect()
+    assert lost < estimate < 1e3 * max(lost, ROUNDOFF)
+    assert lost > 1e-9 or condition < 1e5
 
 
 def test_columns_that_differ_by_little_and_redundant_ones_are_told_apart(body):
