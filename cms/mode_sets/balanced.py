@@ -16,9 +16,8 @@ from cms.mode_sets.balancing import balance
 from cms.mode_sets.blocks import mode_set, rigid_block, static_block
 from cms.mode_sets.selection import require_interfaces
 from cms.reduced_basis.finishing import elastic_eigenvectors
-from cms.reduced_basis.independent import Columns, gram, independent_columns
+from cms.reduced_basis.independent import gram, independent_columns
 from cms.solvers.eigen import EigenResult
-from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
@@ -190,9 +189,7 @@ def rich_basis(families: Families, n_asked: int | None, n_default: int) -> RichB
     is_left = _stiffness(body, residual) > NOTHING_LEFT**2 * _stiffness(body, families.Psi_U)
     V = np.hstack([modes.Phi, residual[:, is_left]])
     omega2_1 = float(modes.omega2[0])
-    Q, _ = independent_columns(
-        Columns(V, SymmetricProduct(body.K) @ V, SymmetricProduct(body.M) @ V, np.eye(V.shape[1])), body, omega2_1
-    )
+    Q, _ = independent_columns(V, body, omega2_1)
     G_K = gram(Q.X, Q.KX)
     Z, is_massive = elastic_eigenvectors(G_K, gram(Q.X, Q.MX), omega2_1)
     Z = Z[:, is_massive]

@@ -9,7 +9,14 @@ from cms.errors import BodyError, ModeSetError
 from cms.families.fixed_interface import moving_nodes
 from cms.mode_set import ModeSet
 from cms.reduced_basis.frames import FrameCondition
-from cms.reduced_basis.independent import Basis, Products, gram_in_blocks, independent_basis, orthonormal_basis
+from cms.reduced_basis.independent import (
+    Basis,
+    Products,
+    gram_in_blocks,
+    independent_basis,
+    orthonormal_basis,
+    within,
+)
 from cms.reduced_basis.rigid_content import elastic_directions, orthonormal_motions
 from cms.reduced_body.source_columns import SourceColumns, source_columns
 from cms.solvers.orientation import orientation
@@ -176,12 +183,6 @@ def elastic_part(body: FEBody, Q: Basis, condition: FrameCondition, omega2_1: fl
 def diagonal_within(G: Array, Z: Array) -> Array:
     """Return the diagonal of Zᵀ G Z, (k,)."""
     return np.asarray(np.einsum("kq,kq->q", Z, G @ Z))
-
-
-def within(G: Array, directions: Array) -> Array:
-    """Return a Gram matrix in given directions, dᵀ G d, symmetric."""
-    H = directions.T @ G @ directions
-    return (H + H.T) / 2
 
 
 def rounding_of_energy(body: FEBody, u: Array) -> Array:

@@ -21,7 +21,7 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = [
     "Basis", "Columns", "Products", "gram", "gram_in_blocks", "independent_basis", "independent_columns",
-    "orthonormal_basis",
+    "orthonormal_basis", "within",
 ]  # fmt: skip
 
 RANK_TOLERANCE = 1e-10  #: remainder of a unit column below which it is redundant (docs/theory.md §3)
@@ -115,6 +115,12 @@ class Basis:
         """Return Q C, (n_dof, n)."""
         return combine(self.X, self.Z @ C)
 
+    def columns(self, products: Products) -> Columns:
+        """Return Q with its products, (n_dof, k)."""
+        Q = products.beside(self.combine(np.eye(self.Z.shape[1])))
+        Q.T = self.T
+        return Q
+
     def with_columns(self, new: Columns) -> "Basis":
         """Return the basis with W-orthonormal columns beside it that are W-orthogonal to it."""
         sides = []
@@ -128,13 +134,13 @@ class Basis:
         return Basis(np.hstack([self.X, new.X]), Z, np.hstack([self.T, new.T]), G_K, G_M)
 
 
-def independent_columns(columns: Columns, body: FEBody, omega2: float) -> tuple[Columns, IntArray]:
+def independent_columns(V: Array, body: FEBody, omega2: float) -> tuple[Columns, IntArray]:
     """W-orthonormal columns of the same span with their products, and the indices of the redundant columns.
 
     Parameters
     ----------
-    columns
-        The columns of a mode set with their products.
+    V
+        The columns of a mode set, (n_dof, n_columns).
     omega2
         omega_1² of W = K + omega_1² M [1/s²].
 
@@ -145,12 +151,9 @@ def independent_columns(columns: Columns, body: FEBody, omega2: float) -> tuple[
     redundant
         Indices of columns whose remainder against the others is below the tolerance, ascending.
     """
-    G_K, G_M = gram(columns.X, columns.KX), gram(columns.X, columns.MX)
     products = Products.of_body(body)
-    basis, redundant = independent_basis(columns.X, G_K, G_M, products, body, omega2)
-    Q = products.beside(basis.combine(np.eye(basis.Z.shape[1])))
-    Q.T = columns.T @ basis.T
-    return Q, redundant
+    basis, redundant = independent_basis(V, *products.grams(V), products, body, omega2)
+    return basis.columns(products), redundant
 
 
 def independent_basis(
@@ -186,7 +189,7 @@ def independent_basis(
     Z = np.zeros((V.shape[1], len(taken)))
     Z[index[taken]] = factor / size[taken, None]
     if not len(left) and np.linalg.cond(W) < TRUSTED_CONDITION:  # (2)
-        return Basis(V, Z, Z, _within(G_K, Z), _within(G_M, Z), is_formed=False), np.asarray(redundant, dtype=np.int64)
+        return Basis(V, Z, Z, within(G_K, Z), within(G_M, Z), is_formed=False), np.asarray(redundant, dtype=np.int64)
     basis = orthonormal_basis(combine(V, Z), Z, products, omega2)  # (3)
     rest = products.beside(V[:, index[left]] / size[left])
     rest.T = np.zeros((V.shape[1], len(left)))
@@ -233,10 +236,10 @@ def orthonormal_basis(Q: Array, T: Array, products: Products, omega2: float) -> 
     """Return columns that are nearly W-orthonormal as a basis that is so to rounding."""
     G_K, G_M = products.grams(Q)
     Z = la.solve_triangular(la.cholesky(G_K + omega2 * G_M), np.eye(len(G_K)))
-    return Basis(Q, Z, T @ Z, _within(G_K, Z), _within(G_M, Z))
+    return Basis(Q, Z, T @ Z, within(G_K, Z), within(G_M, Z))
 
 
-def _within(G: Array, Z: Array) -> Array:
+def within(G: Array, Z: Array) -> Array:
     """Return a Gram matrix over other columns, Zᵀ G Z, symmetric."""
     H = Z.T @ G @ Z
     return np.asarray((H + H.T) / 2)

@@ -5,8 +5,8 @@ import numpy as np
 from cms.mode_set import ModeSet
 from cms.quality.record import QualityRecord, judge
 from cms.quality.reference.free_basis import FreeBasis
-from cms.reduced_basis.independent import Columns, independent_columns
-from cms.solvers.sparse_product import SymmetricProduct
+from cms.reduced_basis.independent import independent_columns
+from cms.solvers.tall import inner
 from fe_models.body.fe_body import FEBody
 
 __all__ = ["column_condition", "conditioning_record", "dropped_record"]
@@ -19,10 +19,9 @@ def column_condition(body: FEBody, modes: ModeSet, omega2: float) -> tuple[float
     of V would show only up to its root.
     """
     V = modes.columns
-    columns = Columns(V, SymmetricProduct(body.K) @ V, SymmetricProduct(body.M) @ V, np.eye(V.shape[1]))
-    Q, redundant = independent_columns(columns, body, omega2)
+    Q, redundant = independent_columns(V, body, omega2)
     kept = np.setdiff1d(np.arange(V.shape[1]), redundant)
-    T = Q.inner(columns, omega2)[:, kept]
+    T = inner(Q.KX + omega2 * Q.MX, V)[:, kept]
     T = T / np.linalg.norm(T, axis=0)
     return float(np.linalg.cond(T)), tuple(modes.labels[k] for k in redundant)
 

@@ -9,9 +9,8 @@ from cms.families.families import Families
 from cms.mode_set import ModeSet
 from cms.reduced_basis.finishing import finish
 from cms.reduced_basis.frames import FrameCondition
-from cms.reduced_basis.independent import Columns, gram, independent_columns
+from cms.reduced_basis.independent import Products, gram, gram_in_blocks, independent_basis
 from cms.reduced_body.reduced_body import BodyFrame
-from cms.solvers.sparse_product import SymmetricProduct
 from cms.solvers.tall import combine, inner
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, frozen
@@ -87,14 +86,15 @@ def ritz_basis(body: FEBody, X: Array, N: Array) -> FreeBasis:
     N
         M-orthonormal rigid-body motions, (n_dof, n_r).
     """
-    columns = Columns(X, SymmetricProduct(body.K) @ X, SymmetricProduct(body.M) @ X, np.eye(X.shape[1]))
-    stiffness = np.einsum("nk,nk->k", X, columns.KX)
-    mass = np.einsum("nk,nk->k", X, columns.MX)
+    products = Products.of_body(body)
+    G_K, G_M = products.grams(X)
+    stiffness, mass = np.diag(G_K), np.diag(G_M)
     has_mass = mass > 0
     omega2_1 = float((stiffness[has_mass] / mass[has_mass]).min())
-    Q, _ = independent_columns(columns, body, omega2_1)  # (1)
+    basis, _ = independent_basis(X, G_K, G_M, products, body, omega2_1)  # (1)
+    Q = basis.columns(products)
     E = Q.X - combine(N, inner(N, Q.MX))
-    G_M = gram(E, SymmetricProduct(body.M) @ E)
+    G_M = gram_in_blocks(E, products.M)
     mu, Y = la.eigh(G_M, gram(E, Q.KX) + omega2_1 * G_M)  # (2)
     mu, Y = mu[::-1], Y[:, ::-1]
     is_massive = mu * omega2_1 > MASSLESS
