@@ -62,7 +62,7 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         ("kept nodes", f"{record['kept_nodes']}, {record['surface_triangles']} triangles of surface"),
         *numbering_rows(record["numbering"]),
         ("stress of modes", stress_words(record["stress"])),
-        ("geometric stiffness", "spin, accelerations, interface loads" if record["geometric_stiffness"] else "none"),
+        ("geometric stiffness", stiffening_words(record)),
         *([("quadratic modes", "second order at the kept nodes")] if record["quadratic_modes"] else []),
     ]
     print_table("Body", ("", ""), rows)
@@ -78,6 +78,8 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
     say(f"{'Frequencies as held' if body.is_held else 'Free-free frequencies'} [Hz]: {free or 'none'}\n")
     if selected := record["provenance"].get("mode set selected"):
         say(f"Selected: {selected}\n")
+    if left_out := record["provenance"].get("geometric stiffness"):
+        say(f"{left_out[0].upper()}{left_out[1:]}\n")
     print_table(
         "Interfaces",
         ("name", "kind", "nodes>", f"position in B [{length}]"),
@@ -112,6 +114,13 @@ def print_body(body: "ReducedBody", *, everything: bool = False) -> None:
         )
     if everything:
         print_table("Provenance", ("", ""), list(record["provenance"].items()))
+
+
+def stiffening_words(record: Any) -> str:
+    """Say what stiffens the body, or why nothing does."""
+    if record["geometric_stiffness"]:
+        return "spin, accelerations, interface loads"
+    return "none: left out for its size, see below" if "geometric stiffness" in record["provenance"] else "none"
 
 
 def numbering_rows(record: Any) -> list[tuple[str, str]]:

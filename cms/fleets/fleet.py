@@ -98,21 +98,17 @@ def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path]) -> list[FleetJob]:
 
 def known_rows(journal: TaskJournal, fleet: Sequence[FleetJob]) -> dict[int, FleetRow]:
     """Return number of the job -> row, for those whose inputs and modal file are as the journal says."""
-    records = {}
-    for record in journal.records:
-        try:
-            records[str(record["job"]), str(record["output"])] = record
-            FleetRow(fleet[0], str(record["name"]), int(record["n_modes"]), float(record["seconds"]))
-        except (KeyError, TypeError, ValueError):
-            continue
+    records = {(str(record.get("job")), str(record.get("output"))): record for record in journal.records}
     rows = {}
     for k, job in enumerate(fleet):
-        found = records.get((str(job.job), str(job.output)))
-        if found is None or found.get("digest") != job.digest or found.get("made") != file_digest(job.output):
+        found = records.get((str(job.job), str(job.output)), {})
+        try:
+            if found["digest"] == job.digest and found["made"] == file_digest(job.output):
+                notes = tuple(str(note) for note in found["notes"])
+                name, n_modes, seconds = str(found["name"]), int(found["n_modes"]), float(found["seconds"])
+                rows[k] = FleetRow(job, name, n_modes, seconds, notes, is_known=True)
+        except (KeyError, TypeError, ValueError):
             continue
-        size = int(found["n_modes"])
-        notes = tuple(str(note) for note in found.get("notes", ()))
-        rows[k] = FleetRow(job, str(found["name"]), size, float(found["seconds"]), notes, is_known=True)
     return rows
 
 

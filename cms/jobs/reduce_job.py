@@ -102,14 +102,13 @@ def modes_and_states(job: Job, families: "Families", stages: Stages) -> "tuple[M
     These are for the geometric stiffness; None where it is left out or not known.
     """
     from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
-    from cms.second_order.room_for_stiffness import left_out_words
-    from cms.second_order.unit_states import has_geometric_stiffness, unit_states
+    from cms.second_order.room_for_stiffness import makes_stiffness
+    from cms.second_order.unit_states import unit_states
 
-    wanted = job.reduction.geometric_stiffness
     with stages(f"mode set {job.reduction.set}"):
         modes = job_mode_set(families, reduction_of(job, families.body))
-    if wanted is None:  # of one that is too large `reduce` says that it is left out
-        wanted = has_geometric_stiffness(families.body) and not left_out_words(families.body, len(modes.labels))
+    # of one that is too large `reduce` says that it is left out
+    wanted = makes_stiffness(job.reduction.geometric_stiffness, families.body, len(modes.labels))
     if not wanted and not job.reduction.quadratic_modes:
         return modes, None
     with stages("static states"):

@@ -8,9 +8,10 @@ interfaces and two thousand modes that is 9 GB, which nobody asked for.
 import os
 
 from cms.errors import BodyError
+from cms.second_order.unit_states import has_geometric_stiffness
 from fe_models.body.fe_body import FEBody
 
-__all__ = ["UNASKED", "left_out_words", "require_room_for_stiffness", "stiffness_bytes"]
+__all__ = ["UNASKED", "left_out_words", "makes_stiffness", "require_room_for_stiffness", "stiffness_bytes"]
 
 UNASKED = 2e9  #: bytes of geometric stiffness up to which it is made without being asked for
 HELD = 4.0  #: times its size: what is held at once while it is made
@@ -19,6 +20,13 @@ HELD = 4.0  #: times its size: what is held at once while it is made
 def stiffness_bytes(body: FEBody, n_modes: int) -> float:
     """Return the size of the geometric stiffness of a body over so many modes [bytes]."""
     return 8.0 * (18 + 6 * len(body.interfaces)) * n_modes**2
+
+
+def makes_stiffness(asked: bool | None, body: FEBody, n_modes: int) -> bool:
+    """Return whether the geometric stiffness is made: as asked, else where the elements know it and it is not large."""
+    if asked is not None:
+        return asked
+    return has_geometric_stiffness(body) and not left_out_words(body, n_modes)
 
 
 def left_out_words(body: FEBody, n_modes: int) -> str:

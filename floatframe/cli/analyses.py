@@ -274,10 +274,21 @@ def read_in_formulation(path: Path, formulation: str | None) -> "tuple[System, s
     from floatframe.system_file.run_section import formulation_of
 
     system, run = read_system(path)
+    tell_left_out(system)
     if system.fmus:
         names = ", ".join(unit.name for unit in system.fmus)
         typer.echo(f"note: units of other programs (fmus: {names}) act in runs only; they are left out here", err=True)
     return system, formulation_of(run) if formulation is None else formulation
+
+
+def tell_left_out(system: "System") -> None:
+    """Tell which bodies came without geometric stiffness because nobody asked for one so large."""
+    from floatframe.bodies.flexible_body import FlexibleBody
+
+    for body in system.bodies:
+        if isinstance(body, FlexibleBody) and body.stiffening == "auto":
+            if why := body.reduced.provenance.get("geometric stiffness"):
+                typer.echo(f"note: body {body.name!r}: {why}", err=True)
 
 
 def linearized(

@@ -61,6 +61,7 @@ def run_command(
     from floatframe.system_file.run_section import required_run
 
     model, given = read_system(system)
+    analyses.tell_left_out(model)
     options = required_run(given, system)
     integrator = options.integrator if formulation is None else in_formulation(options.integrator, formulation)
     inputs = (system, *model.files)

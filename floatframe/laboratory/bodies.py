@@ -14,7 +14,8 @@ from cms.jobs.mode_set_of_job import job_mode_set, reduction_of
 from cms.jobs.parts_of_job import moving_frame_of
 from cms.jobs.reduce_job import reduced
 from cms.reduced_body.reduced_body import ReducedBody
-from cms.second_order.unit_states import UnitStates, has_geometric_stiffness, require_geometric_stiffness, unit_states
+from cms.second_order.room_for_stiffness import makes_stiffness
+from cms.second_order.unit_states import UnitStates, require_geometric_stiffness, unit_states
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.errors import ReportedError
 from fe_models.foundation.stages import Stages
@@ -100,18 +101,16 @@ class BodyShelf:
             with suppress(ReportedError):  # found once, the others are its first ones; too many are told where they are
                 job_mode_set(families, reduction_of(largest, families.body))
         modes = job_mode_set(families, reduction_of(job, families.body))
-        return reduced(job, families, Stages(), modes, self._states_of(path, job, families))
+        return reduced(job, families, Stages(), modes, self._states_of(path, job, families, len(modes.labels)))
 
     def _families_of(self, path: Path) -> Families:
         if path not in self._families:
             self._families[path] = self._stack.enter_context(Families(job_body(read_job(path))))
         return self._families[path]
 
-    def _states_of(self, path: Path, job: Job, families: Families) -> UnitStates | None:
+    def _states_of(self, path: Path, job: Job, families: Families, n_modes: int) -> UnitStates | None:
         """Return the static states of the unit loads, which differ by the frame alone; None where none are wanted."""
-        wanted = job.reduction.geometric_stiffness
-        if wanted is None:
-            wanted = has_geometric_stiffness(families.body)
+        wanted = makes_stiffness(job.reduction.geometric_stiffness, families.body, n_modes)
         if not wanted and not job.reduction.quadratic_modes:
             return None
         require_geometric_stiffness(families.body)

@@ -6,6 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
+from cms.cli.info import print_body
 from cms.errors import BodyError
 from cms.families import families, interface_cost
 from cms.jobs.job import read_job
@@ -77,13 +78,17 @@ def test_geometric_stiffness_without_room_is_refused_before_the_work(job, monkey
         reduce_job(job("geometric_stiffness = true\n"))
 
 
-def test_geometric_stiffness_that_is_very_large_is_left_out_with_a_note(job, monkeypatch, caplog):
+def test_geometric_stiffness_that_is_very_large_is_left_out_with_a_note(job, monkeypatch, caplog, capsys):
     monkeypatch.setattr(room_for_stiffness, "UNASKED", 8.0 * 30 * 40**2)
     with caplog.at_level(logging.WARNING):
         body = reduce_job(job())
     assert body.geometric is None
     assert "left out: 30 unit loads over 53 modes" in body.provenance["geometric stiffness"]
     assert caplog.text.count("left out") == 1
+    print_body(body)
+    told = " ".join(capsys.readouterr().out.split())
+    assert "none: left out for its size, see below" in told
+    assert "Geometric stiffness left out: 30 unit loads over 53 modes would be" in told
     assert reduce_job(job("interface_modes = 4\n")).geometric is not None
 
 

@@ -10,6 +10,7 @@ import cms
 from floatframe import GROUND, GeneralizedAlpha, Marker, RevoluteJoint, integrate
 from floatframe.analyses.snapshot import snapshot
 from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.cli.analyses import read_in_formulation
 from floatframe.compiling.system import compiled_system
 from floatframe.errors import ModelError, SystemFileError
 from floatframe.forces import Gravity, PointForce
@@ -396,3 +397,19 @@ def test_stiffening_in_a_system_file(tmp_path):
     rigid = "mass = 1.0\ninertia = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
     with pytest.raises(SystemFileError, match="stiffening: a rigid body has none"):
         read(rigid, "stiffening = true")
+
+
+def test_a_body_without_stiffness_for_its_size_is_told_where_it_is_used(tmp_path, capsys):
+    """As `cms reduce` has said it; not where nobody wants the stiffness."""
+    reduced = replace(stiffened_body(random_point_masses(2, 3), stiffness(2)), geometric=None)
+    why = "geometric stiffness left out: 9 GB"
+    cms.write(replace(reduced, provenance={**reduced.provenance, "geometric stiffness": why}), tmp_path / "part.h5")
+
+    def told(key=""):
+        text = f'[system]\nunits = "m-kg-s"\n[bodies.arm]\nfile = "part.h5"\n{key}\n'
+        (tmp_path / "system.toml").write_text(text)
+        read_in_formulation(tmp_path / "system.toml", None)
+        return capsys.readouterr().err
+
+    assert told() == f"note: body 'arm': {why}\n"
+    assert told("stiffening = false") == ""
