@@ -3,6 +3,8 @@
 import logging
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,20 +51,27 @@ class Kept(logging.Handler):
             self.notes.append(record.getMessage())
 
 
+@contextmanager
+def notes_kept() -> Iterator[list[str]]:
+    """Keep warnings for the row, which tells them with the name of the job, from all that would tell them at once."""
+    root, kept = logging.getLogger(), Kept()
+    before, root.handlers = root.handlers, [kept]
+    try:
+        yield kept.notes
+    finally:
+        root.handlers = before
+
+
 def reduce_and_write_one(job: FleetJob) -> FleetRow:
     """Run a job and write its modal file; runs in a worker."""
     from cms.jobs.reduce_job import reduce_job
     from cms.modal_file.file import write
 
     began = time.perf_counter()
-    kept = Kept()
-    logging.getLogger().addHandler(kept)
-    try:
+    with notes_kept() as notes:
         reduced = reduce_job(job.job)
         write(reduced, job.output)
-    finally:
-        logging.getLogger().removeHandler(kept)
-    return FleetRow(job, reduced.name, reduced.n_q, time.perf_counter() - began, tuple(kept.notes))
+    return FleetRow(job, reduced.name, reduced.n_q, time.perf_counter() - began, tuple(notes))
 
 
 def failed_row(job: FleetJob, error: Exception) -> FleetRow:
