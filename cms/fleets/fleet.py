@@ -1,15 +1,16 @@
 """A fleet of jobs: each is reduced to a modal file of its own by one of many workers."""
 
+import hashlib
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from cms.errors import JobError
 from cms.fleets.fleet_job import FleetJob, FleetRow, failed_row, reduce_and_write_one
-from cms.fleets.inputs import digest_of_inputs, inputs_of
+from cms.fleets.inputs import inputs_of
 from cms.jobs.job import read_job
 from fe_models.foundation.digest import file_digest
-from fe_models.foundation.paths import remove_parts, same_file
+from fe_models.foundation.paths import file_identity, remove_parts
 from fe_models.foundation.tasks.installation import source_mark
 from fe_models.foundation.tasks.journal import TaskJournal, open_task_journal
 from fe_models.foundation.tasks.workers import Workers, tasks_of
@@ -80,19 +81,20 @@ def reduce_fleet(
 
 def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path]) -> list[FleetJob]:
     """Return the jobs of a fleet, all checked; `JobError` if two files are one."""
+    inputs = [inputs_of(path, read_job(path)) for path in jobs]
+    digests = {each: file_digest(each) for each in {each for files in inputs for each in files}}  # meshes serve many
+    read = {file_identity(each) for each in digests}
+    made: dict[object, Path] = {}
     found = []
-    all_inputs: list[Path] = []
-    for path, output in zip(jobs, outputs, strict=True):
-        inputs = inputs_of(path, read_job(path))
-        all_inputs += inputs
-        found.append(FleetJob(Path(os.path.abspath(path)), Path(os.path.abspath(output)), digest_of_inputs(inputs)))
-    for k, job in enumerate(found):
-        for other in found[:k]:
-            if same_file(job.output, other.output):
-                raise JobError(f"{job.job} and {other.job} would both be written to {job.output}; rename one")
-        for each in all_inputs:
-            if same_file(job.output, each):
-                raise JobError(f"{job.job}: {job.output} is an input of a job; choose another folder or name")
+    for path, output, files in zip(jobs, outputs, inputs, strict=True):
+        where = file_identity(output)
+        if where in read:
+            raise JobError(f"{path}: {output} is an input of a job; choose another folder or name")
+        if where in made:
+            raise JobError(f"{path} and {made[where]} would both be written to {output}; rename one")
+        made[where] = path
+        mark = hashlib.sha256(" ".join(digests[each] for each in files).encode()).hexdigest()
+        found.append(FleetJob(Path(os.path.abspath(path)), Path(os.path.abspath(output)), mark))
     return found
 
 

@@ -1,13 +1,11 @@
 """The files that a job depends on."""
 
-import hashlib
 from pathlib import Path
 
 from cms.jobs.job import Job, read_job
-from fe_models.foundation.digest import file_digest
 from fe_models.foundation.toml_file import files_named
 
-__all__ = ["digest_of_inputs", "inputs_of"]
+__all__ = ["inputs_of"]
 
 
 def inputs_of(path: Path, job: Job) -> list[Path]:
@@ -16,11 +14,3 @@ def inputs_of(path: Path, job: Job) -> list[Path]:
     for each in files_named(job):
         found += inputs_of(each, read_job(each)) if each.suffix == ".toml" and each not in found else [each]
     return found
-
-
-def digest_of_inputs(inputs: list[Path]) -> str:
-    """Return the SHA-256 of the contents of files, in their order."""
-    digest = hashlib.sha256()
-    for path in inputs:
-        digest.update(file_digest(path).encode() + b" ")
-    return digest.hexdigest()

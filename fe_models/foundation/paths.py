@@ -11,7 +11,10 @@ from pathlib import Path
 
 from fe_models.foundation.words import nearest
 
-__all__ = ["is_stream", "near_file", "remove_parts", "replace_file", "replace_files", "same_file", "sync_folder"]
+__all__ = [
+    "file_identity", "is_stream", "near_file", "remove_parts", "replace_file", "replace_files", "same_file",
+    "sync_folder",
+]  # fmt: skip
 
 OWN_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,6})")
 STANDARD = {"/dev/stdout": 1, "/dev/stderr": 2}
@@ -43,11 +46,18 @@ def is_stream(path: Path) -> bool:
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
 
 
+def file_identity(path: Path) -> tuple[int, int] | Path:
+    """Return what all paths of one file have in common, through links too, also where it is not there yet."""
+    try:
+        found = path.stat()
+    except OSError:
+        return path.resolve()
+    return found.st_dev, found.st_ino
+
+
 def same_file(path: Path, other: Path) -> bool:
     """Whether two paths are one file, through links too, or would be one if they were there."""
-    if path.exists() and other.exists():
-        return path.samefile(other)
-    return path.resolve() == other.resolve()
+    return file_identity(path) == file_identity(other)
 
 
 def replace_file(path: Path, *parts: bytes | memoryview) -> None:

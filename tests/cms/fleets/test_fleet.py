@@ -1,6 +1,7 @@
 """Fleets: files of the single command, what is done is not done again, one bad job takes no other along."""
 
 import hashlib
+import logging
 import os
 import signal
 
@@ -94,6 +95,16 @@ def test_a_job_that_fails_takes_no_other_along(jobs):
     assert f"{jobs[1]}: " in result.stderr
     assert "99" in result.stderr
     assert [job.with_suffix(".h5").is_file() for job in jobs] == [True, False, True]
+
+
+def test_warnings_of_a_job_are_told_once_with_its_row(jobs, monkeypatch, caplog):
+    monkeypatch.setattr("cms.families.interface_cost.MANY", 3)
+    rows = reduce_fleet(jobs[:2], workers=1)
+    assert [len(row.notes) for row in rows] == [1, 1]
+    assert "interface 'foot' of 1 nodes has 6 boundary dofs" in rows[0].notes[0]
+    assert not caplog.records
+    logging.getLogger("later").warning("told as ever")
+    assert caplog.messages == ["told as ever"]
 
 
 def test_bad_fleets_are_refused_before_any_work(jobs, tmp_path):
