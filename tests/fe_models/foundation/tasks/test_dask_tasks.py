@@ -6,7 +6,6 @@ import signal
 import socket
 import subprocess
 import sys
-import textwrap
 import threading
 import time
 from contextlib import suppress
@@ -19,8 +18,8 @@ from fe_models.foundation.tasks.installation import differences, installation
 from fe_models.foundation.tasks.task_map import ProcessError, WorkerError
 from fe_models.foundation.tasks.workers import checked_workers, tasks_of
 from fe_models.foundation.threads import n_threads
-from tests.fe_models.foundation.tasks.test_processes import answer, is_running, row
-from tests.root import ROOT, heed_interrupts
+from tests.fe_models.foundation.tasks.test_processes import answer, require_workers_to_end, row
+from tests.root import ROOT
 
 pytest.importorskip("distributed")
 
@@ -185,22 +184,5 @@ SLEEPS = """
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
 def test_workers_end_with_the_process_that_started_them(tmp_path, name):
-    script = tmp_path / "script.py"
-    script.write_text(textwrap.dedent(SLEEPS))
-    with subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path)], env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts,
-    ) as process:  # fmt: skip
-        deadline = time.monotonic() + 120
-        while len(list(tmp_path.glob("*.pid"))) < 2 and time.monotonic() < deadline:
-            time.sleep(0.05)
-        pids = [int(path.stem) for path in tmp_path.glob("*.pid")]
-        assert len(pids) == 2
-        if name == "SIGINT":
-            os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-        else:
-            process.kill()
-        process.wait(60)
-        while any(map(is_running, pids)) and time.monotonic() < deadline:
-            time.sleep(0.05)
-        assert not any(map(is_running, pids))
+    send = os.killpg if name == "SIGINT" else os.kill  # a terminal interrupts the whole group
+    require_workers_to_end(tmp_path, SLEEPS, lambda process: send(process.pid, signal.Signals[name]), 120)

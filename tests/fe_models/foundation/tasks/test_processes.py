@@ -6,7 +6,6 @@ import subprocess
 import sys
 import textwrap
 import time
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -108,23 +107,27 @@ def is_running(pid):
         return False
 
 
-@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL", "SIGINT"])
-def test_workers_end_with_the_process_that_started_them(tmp_path, name):
-    assert partial(note_and_sleep, tmp_path)  # what the script sends
-    script = tmp_path / "script.py"
-    script.write_text(textwrap.dedent(SLEEPS))
+def require_workers_to_end(folder, text, end, seconds):
+    """Run a script whose two workers sleep (`note_and_sleep`), end it while they do, and see that they end too."""
+    script = folder / "script.py"
+    script.write_text(textwrap.dedent(text))
     with subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path)], env=os.environ | {"PYTHONPATH": str(ROOT)},
+        [sys.executable, str(script), str(folder)], env=os.environ | {"PYTHONPATH": str(ROOT)},
         stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts,
     ) as process:  # fmt: skip
-        deadline = time.monotonic() + 60
-        while len(list(tmp_path.glob("*.pid"))) < 2 and time.monotonic() < deadline:
+        deadline = time.monotonic() + seconds
+        while len(list(folder.glob("*.pid"))) < 2 and time.monotonic() < deadline:
             time.sleep(0.05)
-        pids = [int(path.stem) for path in tmp_path.glob("*.pid")]
+        pids = [int(path.stem) for path in folder.glob("*.pid")]
         assert len(pids) == 2
-        process.send_signal(signal.Signals[name])
-        process.wait(30)
+        end(process)
+        process.wait(seconds / 2)
         while any(map(is_running, pids)) and time.monotonic() < deadline:
             time.sleep(0.05)
         assert not any(map(is_running, pids))
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL", "SIGINT"])
+def test_workers_end_with_the_process_that_started_them(tmp_path, name):
+    require_workers_to_end(tmp_path, SLEEPS, lambda process: process.send_signal(signal.Signals[name]), 60)
