@@ -12,8 +12,7 @@ import scipy.linalg as la
 
 from cms.families.families import Families
 from cms.quality.reference.ports import Ports
-from cms.reduced_basis.independent import Columns, gram, independent_columns
-from cms.solvers.sparse_product import SymmetricProduct
+from cms.reduced_basis.independent import Columns, Products, gram, independent_columns
 from cms.solvers.tall import inner, subtract
 from fe_models.foundation.arrays import Array
 
@@ -58,9 +57,9 @@ class ReferenceBasis:
         body = families.body
         self.body, self.families, self.ports = body, families, ports
         self.n_rigid, self.omega2 = n_rigid, omega2
-        self._K, self._M = SymmetricProduct(body.K), SymmetricProduct(body.M)
+        self._products = Products.of_body(body).beside
         given = self._products(columns)
-        self._Q, _ = independent_columns(given, body, omega2)
+        self._Q, _ = independent_columns(columns, body, omega2)
         self._reference = self._inner(self._Q, given)
         self._GM = families.flexibility(self._Q.MX)
         self._nodal = self._translations(self._Q.X)
@@ -79,7 +78,7 @@ class ReferenceBasis:
         if left.shape[1]:
             # nearly dependent columns lose their orthogonality to the reference when they are brought to unit length
             basis, _ = independent_columns(self._without_reference(basis), self.body, self.omega2)
-            basis = self._without_reference(basis)
+            basis = self._products(self._without_reference(basis))
         if basis.X.shape[1]:  # a small body may have no dof that the reference does not span
             G = self._inner(basis, basis)
             basis = basis @ la.solve_triangular(la.cholesky((G + G.T) / 2), np.eye(len(G)))
@@ -104,9 +103,6 @@ class ReferenceBasis:
         """Return the translations of all nodes, those of rigid interfaces among them, (3 n_nodes, k)."""
         return self.body.translations(X).reshape(3 * len(self.body.nodes), X.shape[1])
 
-    def _products(self, X: Array) -> Columns:
-        return Columns(X, self._K @ X, self._M @ X, np.eye(X.shape[1]))
-
     def _inner(self, Q: Columns, V: Columns) -> Array:
         return inner(Q.KX, V.X) + self.omega2 * inner(Q.MX, V.X)
 
@@ -119,10 +115,10 @@ class ReferenceBasis:
         is_new = (left > NOISE) & (length > 0)
         return np.ascontiguousarray(rest[:, is_new] / left[is_new])
 
-    def _without_reference(self, V: Columns) -> Columns:
+    def _without_reference(self, V: Columns) -> Array:
         rest = V.X.copy()
         subtract(rest, self._Q.X, self._inner(self._Q, V))
-        return self._products(rest)
+        return rest
 
     def _length2(self, V: Columns) -> Array:
         return np.einsum("nk,nk->k", V.X, V.KX) + self.omega2 * np.einsum("nk,nk->k", V.X, V.MX)

@@ -78,7 +78,8 @@ class BodyShelf:
         families = self._families_of(self.job)
         modes = all_dofs(families.body, asked.most_dofs)
         job = changed_job(read_job(self.job), Case(frame="tisserand"))
-        return reduced(job, families, Stages(), modes, self._states_of(self.job, job, families))
+        states = self._states_of(self.job, job, families, 0)  # of a reference however many modes there are
+        return reduced(job, families, Stages(), modes, states)
 
     def model(self) -> FEBody:
         """Return the coupled finite element model of the whole body."""
