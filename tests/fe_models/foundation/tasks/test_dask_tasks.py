@@ -1,6 +1,7 @@
 """The same map on a Dask cluster: the same answers, and a worker that is killed loses nothing."""
 
 import os
+import re
 import shutil
 import signal
 import socket
@@ -166,6 +167,30 @@ def test_a_worker_with_another_version_of_the_project_is_refused_before_any_work
     finally:
         worker.kill()
         worker.wait()
+
+
+@pytest.mark.long
+def test_a_scheduler_that_is_lost_at_work_ends_the_map_with_one_line():
+    def started(*words, **more):
+        command = [sys.executable, "-m", *words, "--no-dashboard"]
+        return subprocess.Popen(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True, **more)
+
+    scheduler = started(
+        "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", stderr=subprocess.PIPE
+    )  # fmt: skip
+    running = [scheduler]
+    try:
+        found = next(filter(None, (re.search(r"tcp://127.0.0.1:(\d+)", line) for line in scheduler.stderr)))
+        running.append(started("distributed.cli.dask_worker", found[0], "--no-nanny", stderr=subprocess.DEVNULL))
+        with dask_at("127.0.0.1", int(found[1])) as tasks:
+            tasks.client.wait_for_workers(1, timeout=60)
+            with pytest.raises(WorkerError, match=r"the scheduler was lost.*start the same command again") as caught:
+                tasks.map(time.sleep, [0.2] * 100, done=lambda k, _: scheduler.kill())
+        assert "\n" not in str(caught.value)
+    finally:
+        for process in running:
+            process.kill()
+            process.communicate()
 
 
 SLEEPS = """
