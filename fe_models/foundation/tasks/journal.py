@@ -29,9 +29,7 @@ class TaskJournal:
             os.fsync(file.fileno())
 
 
-def open_task_journal(
-    path: Path, kind: str, digest: str, source: str, error: type[ReportedError]
-) -> TaskJournal:
+def open_task_journal(path: Path, kind: str, digest: str, source: str, error: type[ReportedError]) -> TaskJournal:
     """Return the journal at a path, new or with what it holds.
 
     Parameters

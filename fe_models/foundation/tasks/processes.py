@@ -13,19 +13,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from fe_models.foundation.tasks.answers import answer, read_answer
 from fe_models.foundation.tasks.task_map import Done, Failed, ProcessError, Progress, WorkerError
 from fe_models.foundation.threads import bounded_threads, thread_environment
 
-__all__ = ["MOST_TRIES", "WorkerPool", "map_in_processes"]
+__all__ = ["MOST_TRIES", "WorkerPool"]
 
 MOST_FALSE_STARTS = 3  #: workers that end before their first value
 MOST_TRIES = 3  #: of one value whose worker ends
-
-Value = TypeVar("Value")
-Result = TypeVar("Result")
 
 
 class Worker:
@@ -72,19 +69,6 @@ def environment(variables: dict[str, str]) -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-
-
-def map_in_processes(
-    function: Callable[[Value], Result],
-    values: Sequence[Value],
-    n: int,
-    *,
-    failed: Callable[[Value, Exception], Result] | None = None,
-    progress: Progress | None = None,
-) -> list[Result]:
-    """Return function(value) for every value, by n processes that end with the call; see `TaskMap.map`."""
-    with WorkerPool(n) as pool:
-        return pool.map(function, values, failed=failed, progress=progress)
 
 
 class WorkerPool:

@@ -193,21 +193,9 @@ def test_a_scheduler_that_is_lost_at_work_ends_the_map_with_one_line():
             process.communicate()
 
 
-SLEEPS = """
-    import sys
-    from functools import partial
-    from pathlib import Path
-    from fe_models.foundation.tasks.workers import tasks_of
-    from tests.fe_models.foundation.tasks.test_processes import note_and_sleep
-    if __name__ == "__main__":
-        with tasks_of("dask:2") as tasks:
-            tasks.map(partial(note_and_sleep, Path(sys.argv[1])), [1, 2, 3])
-"""
-
-
 @pytest.mark.long
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
 def test_workers_end_with_the_process_that_started_them(tmp_path, name):
     send = os.killpg if name == "SIGINT" else os.kill  # a terminal interrupts the whole group
-    require_workers_to_end(tmp_path, SLEEPS, lambda process: send(process.pid, signal.Signals[name]), 120)
+    require_workers_to_end(tmp_path, "dask:2", lambda process: send(process.pid, signal.Signals[name]), 120)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fe_models.foundation.tasks.processes import map_in_processes
 from fe_models.foundation.tasks.task_map import ProcessError
+from fe_models.foundation.tasks.workers import tasks_of
 from tests.root import ROOT, heed_interrupts
 
 
@@ -62,7 +62,8 @@ def row(value, error):
 @pytest.mark.parametrize("n", [2, 3])
 def test_one_bad_value_never_loses_the_others(n):
     values, seen = [1, "killed", 2, *BAD, 3, "segfault", 4, 5], []
-    found = map_in_processes(answer, values, n, failed=row, progress=lambda *told: seen.append(told))
+    with tasks_of(n) as tasks:
+        found = tasks.map(answer, values, failed=row, progress=lambda *told: seen.append(told))
     for value, got in zip(values, found, strict=True):
         if isinstance(value, int):
             assert got == value * value
@@ -73,15 +74,16 @@ def test_one_bad_value_never_loses_the_others(n):
 
 
 def test_without_a_place_for_failures_the_first_error_in_order_is_raised():
-    with pytest.raises(KeyError, match="a bad one"):
-        map_in_processes(answer, [1, "raise", 2, "killed"], 2)
-    with pytest.raises(ProcessError, match="SIGKILL"):
-        map_in_processes(answer, ["killed"] * 3, 2)
+    with tasks_of(2) as tasks:
+        with pytest.raises(KeyError, match="a bad one"):
+            tasks.map(answer, [1, "raise", 2, "killed"])
+        with pytest.raises(ProcessError, match="SIGKILL"):
+            tasks.map(answer, ["killed"] * 3)
 
 
 def test_a_function_that_cannot_be_sent_is_refused_before_any_work():
-    with pytest.raises(ProcessError, match="top level of a module"):
-        map_in_processes(lambda value: value, [1, 2], 2)
+    with tasks_of(2) as tasks, pytest.raises(ProcessError, match="top level of a module"):
+        tasks.map(lambda value: value, [1, 2])
 
 
 def note_and_sleep(folder, value):
@@ -93,10 +95,11 @@ SLEEPS = """
     import sys
     from functools import partial
     from pathlib import Path
-    from fe_models.foundation.tasks.processes import map_in_processes
+    from fe_models.foundation.tasks.workers import tasks_of
     from tests.fe_models.foundation.tasks.test_processes import note_and_sleep
     if __name__ == "__main__":
-        map_in_processes(partial(note_and_sleep, Path(sys.argv[1])), [1, 2], 2)
+        with tasks_of({workers!r}) as tasks:
+            tasks.map(partial(note_and_sleep, Path(sys.argv[1])), [1, 2, 3])
 """
 
 
@@ -107,10 +110,10 @@ def is_running(pid):
         return False
 
 
-def require_workers_to_end(folder, text, end, seconds):
-    """Run a script whose two workers sleep (`note_and_sleep`), end it while they do, and see that they end too."""
+def require_workers_to_end(folder, workers, end, seconds):
+    """Run a script whose two workers sleep, end it while they do, and see that they end too."""
     script = folder / "script.py"
-    script.write_text(textwrap.dedent(text))
+    script.write_text(textwrap.dedent(SLEEPS).format(workers=workers))
     with subprocess.Popen(
         [sys.executable, str(script), str(folder)], env=os.environ | {"PYTHONPATH": str(ROOT)},
         stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed_interrupts,
@@ -130,4 +133,4 @@ def require_workers_to_end(folder, text, end, seconds):
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="processes are looked up in /proc")
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL", "SIGINT"])
 def test_workers_end_with_the_process_that_started_them(tmp_path, name):
-    require_workers_to_end(tmp_path, SLEEPS, lambda process: process.send_signal(signal.Signals[name]), 60)
+    require_workers_to_end(tmp_path, 2, lambda process: process.send_signal(signal.Signals[name]), 60)
