@@ -28,6 +28,13 @@ PACKAGES = {2: "pythonfmu", 3: "pythonfmu3"}  #: whose binaries and classes an F
 VERSIONS = tuple(PACKAGES)
 #: module in the resources: its own for each version, since a process that loads both imports each once
 SCRIPT = "floatframe_unit_fmi{}"
+#: on the page of documentation
+PAGE = """<p>The first run compiles code, a minute or less, once for each installation. Its binary is that of
+{package}.</p>
+<p>Time is in seconds. Force inputs are held over a communication step; a drive takes its value, rate and
+acceleration, and follows them without jumps. The motion is that of the system file alone where the communication step
+is a multiple of its step, {step!r} s, and inputs are held. Parameters are set before the initialisation ends.
+States can be kept, restored and serialised.</p>"""
 EPOCH = (1980, 1, 1, 0, 0, 0)  #: of all files in an FMU: the same system makes the same bytes
 
 
@@ -110,8 +117,9 @@ def write_fmu(
         files[f"{package_folder.name}/{each.name}"] = each.read_bytes()
     binaries = binaries_of(package_folder, about.identifier)
     archive = {"modelDescription.xml": model_description(about, variables, fmi)} | binaries
+    page = PAGE.format(package=package_folder.name, step=about.step)
     archive |= {f"resources/{name}": data for name, data in files.items()}
-    archive["documentation/index.html"] = documentation(about, variables, package_folder.name).encode()
+    archive["documentation/index.html"] = documentation(about, variables, page).encode()
     archive |= licences(package_folder.name)
     replace_file(path, zipped(archive))
     return WrittenFmu(path, variables, tuple(sorted({name.split("/")[1] for name in binaries})))
@@ -175,8 +183,8 @@ def licences(package: str) -> dict[str, bytes]:
     return {f"documentation/licenses/{package}-{each.name}.txt": each.locate().read_bytes() for each in texts}  # type: ignore[attr-defined]
 
 
-def documentation(about: Description, variables: Sequence[Variable], package: str) -> str:
-    """Return the page of documentation in an FMU."""
+def documentation(about: Description, variables: Sequence[Variable], page: str) -> str:
+    """Return the page of documentation in an FMU; page: paragraphs of its own, HTML."""
     rows = "\n".join(
         "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in (v.name, v.causality, v.unit, v.words)) + "</tr>"
         for v in variables
@@ -184,12 +192,8 @@ def documentation(about: Description, variables: Sequence[Variable], package: st
     return f"""<!DOCTYPE html>
 <html><head><meta charset="utf-8"><title>{html.escape(about.name)}</title></head><body>
 <h1>{html.escape(about.name)}</h1>
-<p>A flexible multibody system, written by {html.escape(about.tool)}. {html.escape(NEEDS)}</p>
-<p>The first run compiles code, a minute or less, once for each installation. Its binary is that of {package}.</p>
-<p>Time is in seconds. Force inputs are held over a communication step; a drive takes its value, rate and
-acceleration, and follows them without jumps. The motion is that of the system file alone where the communication step
-is a multiple of its step, {about.step!r} s, and inputs are held. Parameters are set before the initialisation ends.
-States can be kept, restored and serialised.</p>
+<p>{html.escape(about.words)} Written by {html.escape(about.tool)}.</p>
+{page}
 <table><tr><th>variable</th><th>kind</th><th>unit</th><th>what</th></tr>
 {rows}
 </table></body></html>

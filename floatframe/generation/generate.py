@@ -99,12 +99,8 @@ def generate(
     if function != re.sub(r"\W", "", function, flags=re.ASCII) or not function[:1].isalpha():
         raise ModelError(f"generate: name: expected letters, digits and underscores, got {quoted(function)}")
     model, tree = model_terms(system, ("*",) if what == "sensitivity" and not parameters else parameters)
-    driven = [each.name for each in model.expansion.tree.columns if each.is_driven]
-    if what == "forward" and driven:
-        raise ModelError(
-            f"generate: coordinate {quoted(driven[0])} is prescribed by a function of time, which forward does not "
-            'know; leave out the motion of its joint, or take what = "residual"'
-        )
+    if what == "forward":
+        require_free(model)
     routine = routine_of(tree, what, function)
     notes = notes_of(system, routine, model, tree)
     files = LANGUAGES[language](routine, notes)
@@ -114,6 +110,15 @@ def generate(
         function, what, language, files, inputs, outputs, routine.operations, routine.asked, tree.parameter_names,
         np.array(tree.parameter_values),
     )  # fmt: skip
+
+
+def require_free(model: RelativeModel) -> None:
+    """Raise `ModelError` if a coordinate is prescribed, which accelerations under forces do not know."""
+    if model.driven:
+        raise ModelError(
+            f"generate: coordinate {quoted(model.driven[0])} is prescribed by a function of time, which forward does "
+            'not know; leave out the motion of its joint, or take what = "residual"'
+        )
 
 
 def notes_of(system: System, routine: Routine, model: RelativeModel, tree: TreeTerms) -> list[str]:

@@ -86,6 +86,11 @@ class RelativeModel:
         """Names of the rates, accelerations and forces."""
         return self.named(is_position=False)
 
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Names of the coordinates that are prescribed by functions of time."""
+        return tuple(each.name for each in self.expansion.tree.columns if each.is_driven)
+
     def named(self, *, is_position: bool) -> tuple[str, ...]:
         """Return the names of positions or rates."""
         expansion = self.expansion
@@ -186,10 +191,9 @@ class RelativeModel:
         ModelError
             If a coordinate is prescribed by a function of time, or what hangs at a joint has no inertia along it.
         """
-        driven = [each.name for each in self.expansion.tree.columns if each.is_driven]
-        if driven:
+        if self.driven:
             raise ModelError(
-                f"forward_dynamics: coordinate {quoted(driven[0])} is prescribed by a function of time; "
+                f"forward_dynamics: coordinate {quoted(self.driven[0])} is prescribed by a function of time; "
                 "leave out the motion of its joint, or integrate the system"
             )
         given = np.zeros(self.n_rates) if force is None else checked("forward_dynamics: force", force, self.n_rates)

@@ -1,7 +1,6 @@
 """A system as an FMU of generated C: model exchange and co-simulation, and nothing that it needs where it runs."""
 
 import hashlib
-import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,11 +11,11 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from fe_models.foundation.paths import replace_file
-from floatframe.cosimulation.archive import identifier_of, release, zipped
+from floatframe.cosimulation.archive import documentation, identifier_of, release, zipped
 from floatframe.cosimulation.interface import Variable
 from floatframe.cosimulation.model_description import Description, model_description
 from floatframe.errors import ModelError
-from floatframe.generation.generate import identifier, notes_of
+from floatframe.generation.generate import identifier, notes_of, require_free
 from floatframe.generation.graph import SYMBOL, Scalar, reachable
 from floatframe.generation.joint_forces import model_terms
 from floatframe.generation.languages.c import c_files
@@ -32,6 +31,10 @@ __all__ = ["GeneratedUnit", "generate_fmu"]
 VERSIONS = (2, 3)
 WORDS = "Multibody system {}: equations of motion as generated C, without needs where it runs."
 STEP = "step"  #: the parameter of the unit
+#: on the page of documentation
+PAGE = """<p>The sources are in the folder sources.</p>
+<p>Time is in seconds. In co-simulation forces are held over a communication step, which is taken by the classical
+Runge-Kutta method in equal steps of at most the parameter {}. States can be kept, restored and serialised.</p>"""
 STABLE = 2.6  #: step times the fastest frequency
 
 
@@ -57,7 +60,7 @@ def generate_fmu(
     Parameters
     ----------
     system
-        As for `generate`: a tree; of forces, gravity counts.
+        As for `generate`: a tree, gravity and linear joint forces.
     path
         The FMU; it holds its sources too, so that other machines can compile it.
     fmi
@@ -72,7 +75,8 @@ def generate_fmu(
     Raises
     ------
     ModelError
-        If the system is no such tree, a value is impossible, there is no C compiler, or the file cannot be written.
+        If the system is no such tree, a coordinate is prescribed, a value is impossible, there is no C compiler, or the
+        file cannot be written.
     """
     if fmi not in VERSIONS:
         raise ModelError(f"generate_fmu: fmi: expected one of {', '.join(map(str, VERSIONS))}, got {fmi!r}")
@@ -84,8 +88,9 @@ def generate_fmu(
         raise ModelError(f"generate_fmu: {target}: expected a file name that ends in .fmu, in a folder that exists")
     folder = platform_folder(fmi)
     model, tree = model_terms(system, parameters)
-    require_stable(model, step / system.units.time)
+    require_free(model)
     routine = routine_of(tree, "forward", identifier(f"{system.name}_forward"))
+    require_stable(model, tree, step / system.units.time)
     variables = unit_variables(model, tree, routine, step)
     notes = notes_of(system, routine, model, tree)
     sources = {name: text.encode() for name, text in c_files(routine, notes).items()}
@@ -106,7 +111,7 @@ def generate_fmu(
         archive["sources/buildDescription.xml"] = build_description(about)
     archive["modelDescription.xml"] = model_description(about, variables, fmi)
     archive[f"binaries/{folder}/{name}{suffix}"] = library
-    archive["documentation/index.html"] = documentation(about, variables).encode()
+    archive["documentation/index.html"] = documentation(about, variables, PAGE.format(STEP)).encode()
     try:
         replace_file(target, zipped(archive))
     except OSError as error:
@@ -114,16 +119,19 @@ def generate_fmu(
     return GeneratedUnit(target, variables, folder)
 
 
-def require_stable(model: RelativeModel, step: float) -> None:
-    """Raise `ModelError` if steps of the Runge-Kutta method are too long for the fastest mode of flexible bodies.
+def require_stable(model: RelativeModel, tree: TreeTerms, step: float) -> None:
+    """Raise `ModelError` if steps of the Runge-Kutta method are too long for flexible bodies and springs of joints.
 
     step: in units of time of the system. The method is stable up to 2.785 along the negative and 2.83 along the
     imaginary axis; frequencies are those of small motions about the system as placed.
     """
-    if all(not name.rsplit("/", 1)[1].startswith("mode ") for name in model.names):
+    if not tree.springs and all(link.modes is None for link in tree.links):
         return
     z, rest = model.positions()[0], np.zeros(model.n_rates)
-    K, D, M = model.derivatives(z, rest, rest)
+    K, D, M = (each.copy() for each in model.derivatives(z, rest, rest))
+    for spring in tree.springs:
+        K[spring.rate, spring.rate] += spring.stiffness
+        D[spring.rate, spring.rate] += spring.damping
     n = len(rest)
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, np.hstack([K, D]))]])
     fastest = float(np.abs(np.linalg.eigvals(matrix)).max())
@@ -131,8 +139,8 @@ def require_stable(model: RelativeModel, step: float) -> None:
         unit = model.expansion.system.units
         raise ModelError(
             f"generate_fmu: step: {step * unit.time:g} s is too long for the fastest mode, {fastest:.4g} rad/"
-            f"{unit.time_symbol}; expected {0.9 * STABLE / fastest * unit.time:.2g} s or less, or bodies with fewer "
-            "modes (modes, with_modes)"
+            f"{unit.time_symbol}; expected {0.9 * STABLE / fastest * unit.time:.2g} s or less, bodies with fewer "
+            "modes (modes, with_modes), or softer springs and dampers of joints"
         )
 
 
@@ -154,15 +162,14 @@ def dotted(name: str) -> str:
     return name.replace("/", ".")
 
 
-def unit_variables(
-    model: RelativeModel, tree: TreeTerms, routine: Routine, step: float
-) -> tuple[Variable, ...]:  # fmt: skip
+def unit_variables(model: RelativeModel, tree: TreeTerms, routine: Routine, step: float) -> tuple[Variable, ...]:
     """Return the variables in the order of their value references (unit.h)."""
     units = model.expansion.system.units
     z, z_dot = model.positions()
-    quaternion = {x0 + k for x0, _ in rotations(tree) for k in range(4)}
-    place = ["" if k in quaternion else unit_of(name, units.length_symbol) for k, name in enumerate(model.names)]
-    rate = [unit_of(name, units.length_symbol) for name in model.rate_names]
+    symbols = {"rad": "rad", "m": units.length_symbol}
+    unit_of = {each.name: symbols[each.unit] for each in model.expansion.tree.columns}
+    place = [unit_of.get(name, "") for name in model.names]  # of modes and Euler parameters none
+    rate = [unit_of.get(name, "") for name in model.rate_names]
     forces = {"rad": f"{units.force_symbol} {units.length_symbol}", units.length_symbol: units.force_symbol}
     force = [forces.get(unit, "") for unit in rate]
     z_names = [f"{dotted(name)}.value" for name in model.names]
@@ -214,14 +221,6 @@ def needed(term: Scalar, names: dict[str, list[str]], whole: dict[int, list[str]
             four = next((group for group in whole.values() if own in group), [own])
             found |= dict.fromkeys(four)
     return list(found)
-
-
-def unit_of(name: str, length: str) -> str:
-    """Return the unit of a coordinate by its name: angles, distances, modes without one."""
-    own = name.rsplit("/", 1)[1]
-    if own.startswith("mode "):
-        return ""
-    return "rad" if own.startswith(("angle", "turn")) else length
 
 
 def per(unit: str, time: str) -> str:
@@ -281,21 +280,3 @@ def build_description(about: Description) -> bytes:
         SubElement(group, "SourceFile", {"name": name})
     indent(root)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"
-
-
-def documentation(about: Description, variables: Sequence[Variable]) -> str:
-    """Return the page of documentation in the unit."""
-    rows = "\n".join(
-        "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in (v.name, v.causality, v.unit, v.words)) + "</tr>"
-        for v in variables
-    )
-    return f"""<!DOCTYPE html>
-<html><head><meta charset="utf-8"><title>{html.escape(about.name)}</title></head><body>
-<h1>{html.escape(about.name)}</h1>
-<p>{html.escape(about.words)} Written by {html.escape(about.tool)}; the sources are in the folder sources.</p>
-<p>Time is in seconds. In co-simulation forces are held over a communication step, which is taken by the classical
-Runge-Kutta method in equal steps of at most the parameter {STEP}. States can be kept, restored and serialised.</p>
-<table><tr><th>variable</th><th>kind</th><th>unit</th><th>what</th></tr>
-{rows}
-</table></body></html>
-"""

@@ -161,7 +161,7 @@ def optimal_move(
     options = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": tolerance, "max_iter": 200}}
     solver = casadi.nlpsol("move", "ipopt", {"x": unknowns, "f": cost, "g": held}, options)
 
-    s = np.linspace(0.0, 1.0, n_intervals + 1)  # a first guess: straight lines
+    s = np.linspace(0.0, 1.0, n_intervals + 1)  # a first guess: quintics from rest to rest
     guess = begin[:, None] + (end - begin)[:, None] * (10 * s**3 - 15 * s**4 + 6 * s**5)
     first = np.concatenate([guess.ravel(order="F"), np.zeros(unknowns.numel() - guess.size)])
     free = unknowns.numel() - U.numel()

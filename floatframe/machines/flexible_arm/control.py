@@ -16,8 +16,8 @@ from floatframe.bodies.coordinates import JointCoordinate
 from floatframe.errors import ModelError
 from floatframe.forces import UserForce
 from floatframe.functions.time_functions import TimeFunction
-from floatframe.generation.graph import ADD, CONSTANT, COS, DIV, MUL, NEG, SIN, SUB, SYMBOL, Scalar, Terms
-from floatframe.generation.links import terms, tree_terms
+from floatframe.generation.graph import ADD, CONSTANT, COS, DIV, MUL, NEG, SIN, SUB, SYMBOL, Scalar, Terms, terms
+from floatframe.generation.links import tree_terms
 from floatframe.generation.recursions import inverse_dynamics, joints_of
 from floatframe.machines.flexible_arm.collocation import OptimalMove
 from floatframe.relative.recursive import relative_model
@@ -49,21 +49,24 @@ def expression(term: Scalar, names: Mapping[str, str]) -> str:
     return f"(-{args[0]})" if term.kind == NEG else f"({args[0]} {SIGNS[term.kind]} {args[1]})"
 
 
-def rigid_torques(rigid: System, accelerations: Sequence[str], *, is_turning: bool) -> list[str]:
-    """Return the torques of the rigid arm for accelerations, as expressions of angles and rates by joint names.
+def rigid_torques(rigid: System, accelerations: Mapping[str, str], *, is_turning: bool) -> dict[str, str]:
+    """Return the torques of the rigid arm for accelerations, both by hinge, as expressions of angles and rates.
 
     is_turning: whether rates count; without them M a is left.
     """
     model = relative_model(rigid)
     if any(not name.endswith("/angle") for name in model.names):
         raise ModelError(f"rigid: expected a tree of rigid bodies on hinges, got {', '.join(model.names)}")
+    joints = [name.split("/")[0] for name in model.names]
+    if set(joints) != set(accelerations):
+        raise ModelError(f"rigid: expected its hinges {', '.join(joints)}, got {', '.join(accelerations)}")
     tree = tree_terms(model.expansion)
     rates: Terms = tree.v if is_turning else terms(tree.graph, np.zeros(len(tree.v)))
     names: dict[str, str] = {}
-    for k, joint in enumerate(name.split("/")[0] for name in model.names):
-        names |= {f"z[{k}]": joint, f"z_dot[{k}]": f"{joint}_dot", f"z_ddot[{k}]": f"({accelerations[k]})"}
+    for k, joint in enumerate(joints):
+        names |= {f"z[{k}]": joint, f"z_dot[{k}]": f"{joint}_dot", f"z_ddot[{k}]": f"({accelerations[joint]})"}
     force = inverse_dynamics(tree, rates, tree.a, joints_of(tree))
-    return [expression(term, names) for term in force]
+    return {joint: expression(term, names) for joint, term in zip(joints, force, strict=True)}
 
 
 def limited(torque: str, largest: float) -> str:
@@ -87,21 +90,21 @@ def computed_torque(
     rigid
         The arm without modes.
     aims
-        Angle of each hinge over time, by its name, in the order of the arm.
+        Angle of each hinge over time, by its name.
     bandwidth
         w [rad/s].
     torque
-        The largest of each motor [N m].
+        The largest of each motor, in the order of the aims [N m].
     """
     functions: dict[str, TimeFunction] = {}
-    commands = []
+    commands = {}
     for joint, aim in aims.items():
         parts = {f"{joint}_aim": aim, f"{joint}_aim_rate": rate_of(aim), f"{joint}_aim_rise": rate_of(rate_of(aim))}
         functions |= parts
-        commands.append(f"{joint}_aim_rise(t) + {feedback(joint, bandwidth)}")
+        commands[joint] = f"{joint}_aim_rise(t) + {feedback(joint, bandwidth)}"
     torques = rigid_torques(rigid, commands, is_turning=True)
-    limits = [limited(text, float(most)) for text, most in zip(torques, torque, strict=True)]
-    return user_force("computed torque", dict(zip(aims, limits, strict=True)), functions)
+    limits = {joint: limited(torques[joint], float(most)) for joint, most in zip(aims, torque, strict=True)}
+    return user_force("computed torque", limits, functions)
 
 
 def feedback(joint: str, bandwidth: float) -> str:
@@ -116,17 +119,17 @@ def following(rigid: System, move: OptimalMove, bandwidth: float, torque: Sequen
     Parameters as in `computed_torque`.
     """
     functions: dict[str, TimeFunction] = {}
-    commands = []
+    commands = {}
     joints = [name.split("/")[0] for name in move.driven]
     for joint, name in zip(joints, move.driven, strict=True):
         aim = move.aim(name)
         functions |= {
             f"{joint}_aim": aim, f"{joint}_aim_rate": rate_of(aim), f"{joint}_torque": move.torque_function(name)
         }  # fmt: skip
-        commands.append(feedback(joint, bandwidth))
+        commands[joint] = feedback(joint, bandwidth)
     torques = rigid_torques(rigid, commands, is_turning=False)
     limits = {
-        joint: limited(f"{joint}_torque(t) + {text}", float(most))
-        for joint, text, most in zip(joints, torques, torque, strict=True)
+        joint: limited(f"{joint}_torque(t) + {torques[joint]}", float(most))
+        for joint, most in zip(joints, torque, strict=True)
     }
     return user_force("optimal move", limits, functions)

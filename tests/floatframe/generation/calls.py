@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import operator
 import re
 import subprocess
 
@@ -10,6 +11,7 @@ from numpy.testing import assert_allclose
 
 import floatframe as ff
 from floatframe.generation.generate import generate
+from floatframe.generation.graph import ADD, CONSTANT, COS, DIV, MUL, NEG, SIN, SUB, SYMBOL, reachable
 from floatframe.generation.routines import ROUTINES
 from tests.floatframe.identification.robots import random_tree, six_axes
 from tests.floatframe.relative.random_trees import KINDS, system_of
@@ -205,6 +207,25 @@ def matlab_function(text):
         return [np.array(space[name]) for name in outs.split(", ")]
 
     return call
+
+
+OPERATIONS = {
+    ADD: operator.add, SUB: operator.sub, MUL: operator.mul, DIV: operator.truediv, NEG: operator.neg, SIN: np.sin,
+    COS: np.cos,
+}  # fmt: skip
+
+
+def values_of(outputs, inputs):
+    """Evaluate terms, operation by operation; inputs: name of a symbol -> number, complex ones too."""
+    value = {}
+    for term in reachable(outputs):
+        if term.kind == CONSTANT:
+            value[term.index] = term.value
+        elif term.kind == SYMBOL:
+            value[term.index] = inputs[term.name]
+        else:
+            value[term.index] = OPERATIONS[term.kind](*(value[each.index] for each in term.args))
+    return np.array([value[term.index] for term in outputs])
 
 
 CALLS = {"c": c_call, "python": python_call, "casadi": casadi_call, "matlab": matlab_call}

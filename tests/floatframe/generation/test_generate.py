@@ -1,11 +1,14 @@
 """Generated code against the recursive model: the same numbers to rounding, from every language."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import floatframe as ff
 from floatframe.errors import ModelError
+from floatframe.functions.time_functions import harmonic
 from floatframe.generation.generate import LANGUAGES, generate
 from floatframe.generation.grouping import carried_inwards
 from floatframe.generation.links import GRAVITY, tree_terms
@@ -153,6 +156,16 @@ def test_no_link_on_a_hinge_keeps_more_than_seven_numbers():
 def test_specialised_code_needs_far_fewer_operations_than_the_general_recursion():
     code = generate(puma())
     assert code.operations.total < 0.3 * sum(code.general)
+
+
+def test_prescribed_coordinates_are_coordinates_as_any_but_in_accelerations():
+    case = Case(puma())
+    joints = [replace(case.system.joints[0], motions={"angle": harmonic(1.0, 1.0)}), *case.system.joints[1:]]
+    driven = replace(case.system, joints=joints)
+    motion = case.z, case.z_dot, case.z_ddot
+    near(python_function(driven, "inverse")(*motion), case.model.inverse_dynamics(*motion))
+    with pytest.raises(ModelError, match=r"coordinate 'joint1/angle' is prescribed .* or take what = \"residual\""):
+        generate(driven, what="forward")
 
 
 @pytest.mark.parametrize(

@@ -111,6 +111,16 @@ def test_computed_torque_leads_a_rigid_arm_exactly(parts):
     assert_allclose(np.log2(coarse / fine), 2, rtol=0, atol=0.15)
 
 
+def test_torques_belong_to_the_hinges_of_their_aims_in_any_order(parts):
+    rigid, largest = flexible_arm.arm(parts, is_rigid=True), {"shoulder": 8.0, "elbow": 3.0}
+    aims = {joint: quintic(0.0, 0.8, 0.0, value) for joint, value in study.TARGET.items()}
+    first, second = (
+        flexible_arm.computed_torque(rigid, {joint: aims[joint] for joint in order}, 10.0, [largest[j] for j in order])
+        for order in (("shoulder", "elbow"), ("elbow", "shoulder"))
+    )
+    assert first.forces == second.forces
+
+
 def test_the_optimal_move_with_modes_leaves_a_hundredth_of_the_vibration(motions):
     rigid, optimal_rigid, flexible = motions.values()
     assert flexible.residual < 1e-3
@@ -135,5 +145,7 @@ def test_what_cannot_be_is_told(parts):
         move(rigid, {"shoulder/angle": 1.0, "elbow/angle": 0.0}, 0.2, torque=[1.0, 1.0], n_intervals=10)
     with pytest.raises(ff.ModelError, match=r"expected a tree of rigid bodies on hinges, got .*mode 1"):
         flexible_arm.computed_torque(flexible_arm.arm(parts), {}, 1.0, ())
+    with pytest.raises(ff.ModelError, match="expected its hinges shoulder, elbow, got elbow"):
+        flexible_arm.computed_torque(rigid, {"elbow": quintic(0.0, 1.0, 0.0, 1.0)}, 1.0, (1.0,))
     with pytest.raises(ff.ModelError, match="expected a function of polynomials"):
         control.rate_of(harmonic(1.0, 1.0))
