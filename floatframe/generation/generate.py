@@ -71,7 +71,7 @@ def generate(
     ----------
     system
         A tree of rigid and flexible bodies. Of its forces, gravity and linear joint forces (stiffness, damping,
-        preload) are in the code; what else acts is given as `force`.
+        preload; angles counted without end) are in the code; what else acts is given as `force`.
     what
         "inverse" (forces of a motion), "residual" (those less given forces), "mass" (matrix), "forward"
         (accelerations), "kinematics" (places and velocities of all bodies), "jacobian" (derivatives of the forces of a

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from fe_models.foundation.paths import replace_file
+from fe_models.foundation.words import quoted
 from floatframe.cosimulation.archive import documentation, identifier_of, release, zipped
 from floatframe.cosimulation.interface import Variable
 from floatframe.cosimulation.model_description import Description, model_description
@@ -75,8 +76,8 @@ def generate_fmu(
     Raises
     ------
     ModelError
-        If the system is no such tree, a coordinate is prescribed, a value is impossible, there is no C compiler, or the
-        file cannot be written.
+        If the system is no such tree, a coordinate is prescribed, it holds events or units, a value is impossible,
+        there is no C compiler, or the file cannot be written.
     """
     if fmi not in VERSIONS:
         raise ModelError(f"generate_fmu: fmi: expected one of {', '.join(map(str, VERSIONS))}, got {fmi!r}")
@@ -89,6 +90,12 @@ def generate_fmu(
     folder = platform_folder(fmi)
     model, tree = model_terms(system, parameters)
     require_free(model)
+    for kind, named in (("event", system.events), ("unit", system.fmus)):
+        if named:
+            raise ModelError(
+                f"generate_fmu: expected bodies, joints, gravity and linear joint forces, got {kind} "
+                f"{quoted(named[0].name)}, of which the unit would know nothing; leave it out"
+            )
     routine = routine_of(tree, "forward", identifier(f"{system.name}_forward"))
     require_stable(model, tree, step / system.units.time)
     variables = unit_variables(model, tree, routine, step)

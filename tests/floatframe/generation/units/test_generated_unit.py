@@ -295,6 +295,13 @@ def test_prescribed_coordinates_are_refused(robot, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_events_are_refused(robot, tmp_path):
+    event = ff.Event("end", "joint1.angle", 1.0, stop=True)
+    with pytest.raises(ModelError, match=r"got event 'end', of which the unit would know nothing; leave it out"):
+        ff.generate_fmu(replace(robot.system, events=[event]), tmp_path / "robot.fmu")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("compiler", "message"),
     [("no-such-compiler", "there is no C compiler 'no-such-compiler'; install one"), ("false", "failed: no message")],
