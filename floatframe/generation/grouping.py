@@ -13,7 +13,7 @@ and second moment m, s, P = ∫ c cᵀ dm of a node these are
 and what comes to the ground vanishes. Seven numbers are left of the ten of a body on a hinge. Reactions in joints are
 others than before: only the forces along the rates are the same, and all that follows from them.
 
-What hangs at the tip of the tree on a hinge or screw and is the same all around its axis, as a wheel or a rotor,
+A rigid body that hangs at the tip of the tree on a hinge or screw and is the same all around its axis, as a wheel,
 
     s_x = s_y = 0,  P_xx = P_yy,  P_xy = P_xz = P_yz = 0,
 
@@ -91,12 +91,12 @@ def values_of(numbers: Terms) -> Array:
 
 
 def rounded(links: list[Link]) -> tuple[Link, ...]:
-    """Return nodes with those marked that are round and carry no other that moves or weighs."""
+    """Return nodes with those marked that are round, rigid, and carry no other that moves or weighs."""
     counts = [False] * len(links)
     out = list(links)
     for k in range(len(links) - 1, -1, -1):
         link = links[k]
-        if link.kind == SCREW and not counts[k] and link.own is None and is_round(link):
+        if link.kind == SCREW and not counts[k] and link.modes is None and is_round(link):
             out[k] = replace(link, is_round=True)
         if link.parent >= 0 and (counts[k] or link.n_z or link.has_moments or link.modes is not None):
             counts[link.parent] = True

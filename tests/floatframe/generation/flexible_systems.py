@@ -1,5 +1,7 @@
 """Trees with flexible bodies for the tests of generated code, and motions in which these are bent a good deal."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import cms
@@ -60,6 +62,17 @@ def held_at_the_free_end():
         ff.RevoluteJoint("lower", ff.Marker("link", "start"), ff.Marker("weight"), axis=(0.6, 0, 0.8)),
     ]
     return ff.System([link, weight], joints, [ff.Gravity((0.3, -0.2, -9.81))], name="held")
+
+
+def spun_about_its_length():
+    """Return a beam clamped to a hinge along it: undeformed it is the same all around that."""
+    line = replace(SLENDER, rho_Iz=SLENDER.rho_Iy)
+    shaft = cms.beam_from_assumed_modes(
+        line, name="shaft", units=METRES, n_axial=0, n_bending=1, n_torsion=0, n_shear=0,
+        stations={"start": 0.0, "end": 1.0}, frame=NodalFrame("start"), geometric=False,
+    )  # fmt: skip
+    spin = ff.RevoluteJoint("spin", ff.GROUND, ff.Marker("shaft", "start"), axis=(1, 0, 0))
+    return ff.System([ff.FlexibleBody("shaft", shaft)], [spin], [ff.Gravity((0.3, -0.2, -9.81))], name="shaft")
 
 
 def dense_body(n=8):

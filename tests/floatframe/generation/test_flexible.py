@@ -14,7 +14,7 @@ from floatframe.mechanisms import chain
 from floatframe.relative.recursion.expansion import expansion_of
 from floatframe.rotations import rotation_matrix
 from tests.floatframe.generation.calls import ROUNDOFF, c_function, matlab_function, near, python_function
-from tests.floatframe.generation.flexible_systems import SYSTEMS, beam, bent_motion, two_link_arm
+from tests.floatframe.generation.flexible_systems import SYSTEMS, beam, bent_motion, spun_about_its_length, two_link_arm
 
 STATES = range(3)
 
@@ -170,6 +170,17 @@ def test_numbers_of_symmetric_beams_that_are_rounding_vanish():
             assert value.value == 0.0 or abs(value.value) > 1e-9
         assert [sum(not x.is_constant(0.0) for x in row) for row in modes.C1] == [1] * modes.n
     assert tree.links[1].own is None  # clamped: the frame of the body is that of its joint
+
+
+def test_a_body_with_modes_turns_with_its_hinge_even_if_it_is_round():
+    """Its modes bend to one side each, which weights and spin tell apart."""
+    system = spun_about_its_length()
+    model = ff.relative_model(system)
+    z, z_dot, z_ddot = bent_motion(model, 0)
+    expected, turned = (model.inverse_dynamics(each, z_dot, z_ddot) for each in (z, z + np.eye(3)[0]))
+    assert np.abs(turned - expected).max() > 1
+    near(python_function(system, "inverse")(z, z_dot, z_ddot), expected)
+    near(python_function(system, "mass")(z), model.mass_matrix(z))
 
 
 def test_rotations_in_space_are_told_to_be_good_up_to_some_angle_and_those_about_an_axis_not():
