@@ -25,7 +25,7 @@ from floatframe.mechanisms import chain, double_pendulum, four_bar, slider_crank
 from floatframe.relative.topology import tree_of
 from floatframe.system_file.read_system import read_system
 from tests.floatframe.motion.test_restart import StopHereError
-from tests.floatframe.relative.mechanisms import DOWN, falling
+from tests.floatframe.relative.mechanisms import DOWN, beam, falling
 
 
 def test_a_stop_is_found_where_it_is_in_both_formulations():
@@ -57,6 +57,22 @@ def test_controlled_steps_keep_the_error_that_is_asked_for():
     assert counts[1] > 3 * counts[0]
     assert errors[1] < 0.2 * errors[0]
     assert errors[1] < 1e-4
+
+
+def test_a_loose_tolerance_leaves_far_less_than_the_error_of_the_step():
+    """Links with modes that the step does not resolve, where it ends early by what the next correction should be."""
+    system, h, t_end = chain(5, angles=(0.3, -0.2, 0.1, 0.4, -0.3), rod=beam()), 2e-3, 0.2
+
+    def places(tolerance, every=1, formulation="relative"):
+        method = GeneralizedAlpha(tolerance=tolerance)
+        motion = integrate(system, method, t_end, h / every, output_every=10 * every, formulation=formulation)
+        return np.hstack([motion.body(body.name).r for body in system.bodies])
+
+    fine, tight, loose = places(1e-10, 8), places(1e-12), places(1e-6)
+    error = np.sqrt(np.mean((tight - fine) ** 2))
+    assert np.sqrt(np.mean((loose - tight) ** 2)) < 0.1 * error
+    absolute = places(1e-6, formulation="absolute")
+    assert np.sqrt(np.mean((loose - fine) ** 2)) < 1.2 * np.sqrt(np.mean((absolute - fine) ** 2))
 
 
 @pytest.mark.parametrize("name", ["chain", "loop"])
