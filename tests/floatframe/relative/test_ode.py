@@ -120,9 +120,10 @@ def test_flexible_bodies_move_as_generalized_alpha_says_with_small_steps(name):
     for body in system.bodies:
         for part in ("r", "q"):
             coarse, close, own = (getattr(each.body(body.name), part) for each in (*fine, motion))
-            error = np.abs(coarse - close).max(initial=0.0)
-            assert_allclose(own, close, rtol=0, atol=0.5 * error + 1e-7)
-    assert np.abs(motion.body("rod 1" if name == "pendulum" else "coupler").q[-1]).max() > 1e-4  # allowed: 1e-7
+            allowed = 0.5 * np.abs(coarse - close).max(initial=0.0) + 1e-7
+            assert_allclose(own, close, rtol=0, atol=allowed)
+            if part == "q" and close.size:  # they bend, and what is allowed is little beside it
+                assert allowed < 0.01 * np.abs(close).max()
 
 
 def test_a_clamped_beam_swings_about_its_sag_as_its_modes_say():
