@@ -164,19 +164,22 @@ class Estimate:
 
     def predicted(self, measured: Measured) -> Array:
         """Return the channels of another motion as the estimate has them, (n, channels): for validation."""
+        return self.compared(measured)[0]
+
+    def misfit(self, measured: Measured) -> Array:
+        """Return the rms of measured less predicted over the rms of measured, of each channel of another motion."""
+        predicted, y = self.compared(measured)
+        size = np.sqrt((y**2).mean(axis=0))
+        return np.sqrt(((y - predicted) ** 2).mean(axis=0)) / np.where(size > 0, size, 1.0)
+
+    def compared(self, measured: Measured) -> tuple[Array, Array]:
+        """Return the channels of another motion, predicted and measured, (n, channels) each."""
         if measured.source != self.measured.source:
             raise ModelError(
                 f"identification: estimated from {self.measured.source}, but the other motion has {measured.source}"
             )
-        W, _ = measured.rows(self.base.form)
-        return self.base.rows(W) @ self.values
-
-    def misfit(self, measured: Measured) -> Array:
-        """Return the rms of measured less predicted over the rms of measured, of each channel of another motion."""
-        _, y = measured.rows(self.base.form)
-        error = y - self.predicted(measured)
-        size = np.sqrt((y**2).mean(axis=0))
-        return np.sqrt((error**2).mean(axis=0)) / np.where(size > 0, size, 1.0)
+        W, y = measured.rows(self.base.form)
+        return self.base.rows(W) @ self.values, y
 
 
 def estimate(

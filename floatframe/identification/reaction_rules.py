@@ -27,14 +27,12 @@ from floatframe.identification.transfer_rules import (
     SAME,
     Move,
     chain,
-    common,
     dipole,
-    line_masses,
     moves_of,
+    passing,
     rotations,
     square_to,
     tensor_row,
-    tensors,
 )
 from floatframe.identification.tree_samples import as_placed, gravity_of, rigid_tree, tree_samples
 
@@ -61,7 +59,7 @@ def silent_at_base(form: LinearForm) -> Array:
     for i in range(n_b):
         parent = int(tree.parent[i])
         before = [move for j in chain(tree, parent) for move in moves[j]]
-        for phi in passing_momentum(moves[i], before, size):
+        for phi in passing(moves[i], before, size, still_dipoles):
             direction = np.zeros((n_b, 10))
             direction[i] = phi
             if parent >= 0:
@@ -91,22 +89,12 @@ def unseen(weights: Array, least: np.floating) -> Array:
     return Vt[int((s > least).sum()) :].T
 
 
-def passing_momentum(own: list[Move], before: list[Move], size: float) -> Array:
-    """(1) Return what passes from a body to its parent, rows of 10."""
-    if not own:
-        return np.eye(10)
-    scale = np.array([1.0] + [size] * 3 + [size**2] * 6)
-    spaces = []
-    for k, move in enumerate(own):
-        if move.shift.any():
-            e, are_several = rotations(before + own[:k])
-            space = tensors()
-            if not are_several and (e is None or np.linalg.norm(np.cross(e, move.shift)) < SAME):
-                space = np.vstack([space, dipole(np.zeros(3), move.shift)])
-        else:
-            space = line_masses(move)
-        spaces.append(space / scale)
-    return common(spaces) * scale
+def still_dipoles(before: list[Move], shift: Array) -> Array:
+    """(1) Return the first moment along a translation, (1, 10), if all rotations before it have its direction."""
+    e, are_several = rotations(before)
+    if are_several or (e is not None and np.linalg.norm(np.cross(e, shift)) >= SAME):
+        return np.zeros((0, 10))
+    return dipole(np.zeros(3), shift)[None]
 
 
 def without_momentum(way: list[Move]) -> list[Array]:

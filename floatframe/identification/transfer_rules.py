@@ -26,6 +26,7 @@ References
 .. [1] Gautier & Khalil (1990), IEEE Transactions on Robotics and Automation 6, 368-373.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,8 +41,8 @@ from floatframe.identification.tree_samples import TreeSamples, as_placed, gravi
 from floatframe.relative.kernels.tree import Tree
 
 __all__ = [
-    "SAME", "Move", "chain", "common", "dipole", "line_masses", "moves_of", "rotations",
-    "silent_directions", "square_to", "tensor_row", "tensors",
+    "SAME", "Move", "chain", "common", "dipole", "moves_of", "passing", "rotations", "silent_directions", "square_to",
+    "tensor_row",
 ]  # fmt: skip
 
 SAME = 1e-9  #: sine of an angle, or distance over the size of the system, that is none
@@ -89,7 +90,7 @@ def silent_directions(form: LinearForm) -> Array:
         parent = int(tree.parent[i])
         way = [move for j in chain(tree, i) for move in moves[j]]
         before = [move for j in chain(tree, parent) for move in moves[j]]
-        for phi in passing(moves[i], before, size):
+        for phi in passing(moves[i], before, size, unweighed_dipoles):
             note(i, phi, parent)
         for phi in without_effect(way, gravity, size):
             note(i, phi)
@@ -162,22 +163,31 @@ def common(spaces: list[Array]) -> Array:
     return kept
 
 
-def passing(own: list[Move], before: list[Move], size: float) -> Array:
-    """(1) Return what passes from a body to its parent, rows of 10."""
+def passing(own: list[Move], before: list[Move], size: float, dipoles: Callable[[list[Move], Array], Array]) -> Array:
+    """(1) Return what passes from a body to its parent, rows of 10.
+
+    dipoles: the first moments without mass, (k, 10), that a translation lets through, by the moves before it and its
+    direction.
+    """
     if not own:
         return np.eye(10)
     scale = np.array([1.0] + [size] * 3 + [size**2] * 6)
     spaces = []
     for k, move in enumerate(own):
         if move.shift.any():
-            space = tensors()
-            e, _ = rotations(before + own[:k])
-            if e is not None and np.linalg.norm(np.cross(e, move.shift)) < SAME:
-                space = np.vstack([space, *(dipole(np.zeros(3), d) for d in square_to(e))])
+            space = np.vstack([tensors(), dipoles(before + own[:k], move.shift)])
         else:
             space = line_masses(move)
         spaces.append(space / scale)
     return common(spaces) * scale
+
+
+def unweighed_dipoles(before: list[Move], shift: Array) -> Array:
+    """Return the first moments square to a translation along the common axis of all rotations before it."""
+    e, _ = rotations(before)
+    if e is None or np.linalg.norm(np.cross(e, shift)) >= SAME:
+        return np.zeros((0, 10))
+    return np.array([dipole(np.zeros(3), d) for d in square_to(e)])
 
 
 def rotations(moves: list[Move]) -> tuple[Array | None, bool]:
