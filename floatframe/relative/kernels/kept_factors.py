@@ -17,8 +17,10 @@ Fronts are upper halves, their rows Uᵀ of the factors with inverse diagonals.
 
 import math
 
+from floatframe.kernels.body import put_block, put_column
 from floatframe.kernels.compiler.compilation import inner, loops, matrix_loops, view
 from floatframe.kernels.evaluation import tangent_of_body
+from floatframe.kernels.marker import shape
 from floatframe.kernels.vector import (
     add,
     cross,
@@ -109,7 +111,7 @@ def front(tree, tangent, i):
 
 @loops
 def put_screws(model, work, m, n, S):
-    """Write the screws of all modes of its body at marker m, (6, n), body axes about its origin."""
+    """Write the screws, as of `jets.mode_screw`, of all modes of its body at marker m, (6, n), body axes."""
     if m < 0 or model.markers.psi0[m] < 0:
         for r in range(6):
             for k in range(n):
@@ -118,10 +120,10 @@ def put_screws(model, work, m, n, S):
     psi = work.markers.psi[model.markers.psi0[m] : model.markers.psi0[m] + 6 * n]
     T, rho = matrix(work.markers.T_left[m]), vector(work.markers.rho[m])
     for k in range(n):
-        b = turned(T, (psi[3 * n + k], psi[4 * n + k], psi[5 * n + k]))
-        d = cross(rho, b)
-        S[0, k], S[1, k], S[2, k] = psi[k] + d[0], psi[n + k] + d[1], psi[2 * n + k] + d[2]
-        S[3, k], S[4, k], S[5, k] = b
+        d, th = shape(psi, n, k)
+        b = turned(T, th)
+        put_column(S, 0, k, add(d, cross(rho, b)))
+        put_column(S, 3, k, b)
 
 
 @loops
@@ -240,14 +242,6 @@ def upper_part(F, row, column):
 
 
 @loops
-def put_part(P, row, column, A):
-    """Write a block of a matrix."""
-    put(P[row], column, A[0])
-    put(P[row + 1], column, A[1])
-    put(P[row + 2], column, A[2])
-
-
-@loops
 def move_inwards(F, turn, shift, P):
     """Write Adᵀ P Ad of what is left of a front, in axes and about the origin of the parent."""
     o, R, arm = F.shape[0] - 6, matrix(turn), tilde(vector(shift))
@@ -256,10 +250,10 @@ def move_inwards(F, turn, shift, P):
     vw = product(product(R, upper_part(F, o, o + 3)), back)
     ww = product(product(R, upper_part(F, o + 3, o + 3)), back)
     wv = matrix_sum(transposed(vw), product(arm, vv))
-    put_part(P, 0, 0, vv)
-    put_part(P, 3, 0, wv)
-    put_part(P, 0, 3, transposed(wv))
-    put_part(P, 3, 3, matrix_sum(ww, matrix_sum(product(arm, vw), product(wv, minus))))
+    put_block(P, 0, 0, vv)
+    put_block(P, 3, 0, wv)
+    put_block(P, 0, 3, transposed(wv))
+    put_block(P, 3, 3, matrix_sum(ww, matrix_sum(product(arm, vw), product(wv, minus))))
 
 
 @matrix_loops

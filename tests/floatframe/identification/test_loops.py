@@ -81,6 +81,7 @@ def test_loops_leave_fewer_combinations_than_the_tree_they_close(form):
     cut = System(palletizer().bodies, [j for j in palletizer().joints if j.name != "high"], palletizer().forces)
     tree, looped = (base_parameters(each, by="samples") for each in (linear_form(cut), form))
     assert len(looped.kept) < len(tree.kept)
+    assert (len(looped.kept), len(base_parameters(form, source="reactions", by="samples").kept)) == (25, 30)
     # what no torque of the open tree shows, none of the closed one does
     both = la.orth(np.hstack([looped.silent, tree.silent]), rcond=1e-8)
     assert both.shape[1] == looped.silent.shape[1]
