@@ -8,7 +8,8 @@ coordinates of the tree, spans all that they allow. So the rank of all constrain
 where a chain of any length has no G_c at all, though the least singular value of G, scaled by the masses, falls with
 the square of the number of its links. Rows of G_c N are scaled to length one, coordinates by the mass that they move.
 Its small singular values belong to repeated constraints if there is a gap above them, or if they are rounding; those of
-long trusses fall without a gap.
+long trusses fall without a gap. Few constraints that are well conditioned as they are, which is the rule, are not
+looked at so closely: N would want the kernels of relative coordinates, compiled at their first use.
 """
 
 import numpy as np
@@ -19,11 +20,14 @@ from floatframe.joints.rows import is_held
 from floatframe.kernels.work import Work
 from floatframe.relative.kernels.tree import Tree
 from floatframe.relative.tree_motions import coordinate_motions
+from floatframe.start.freedoms import scaled_constraints
 from floatframe.start.newton_equations import linearized, set_iterate, with_mass_for_all
 from floatframe.state import State
 
 __all__ = ["repeated_constraints"]
 
+FEW = 200  #: rows, up to which all are looked at first: that takes milliseconds
+WELL = 1e-6  #: least eigenvalue of G M⁻¹ Gᵀ, rows scaled to length one, of constraints none of which repeats others
 SMALL = 1e-5  #: singular value by the largest, below which constraints may repeat others
 GAP = 1e-3  #: of the next larger one, if they do
 ROUNDING = 1e-11  #: singular value by the largest, or row by what it holds of bodies alone, that is none
@@ -35,6 +39,10 @@ def repeated_constraints(compiled: CompiledSystem, work: Work, tree: Tree, state
     closing = is_held(model.rows.kind) & (tree.kept_row >= 0)
     if not closing.any():
         return 0
+    if is_held(model.rows.kind).sum() <= FEW:
+        rows, _ = scaled_constraints(model, work, state)
+        if np.linalg.eigvalsh(rows @ rows.T)[0] > WELL:
+            return 0
     set_iterate(work, state)
     parts = linearized(model, work, 1.0, 0.0, 0.0)
     G, N = parts.G[closing], coordinate_motions(compiled, tree, state)

@@ -25,9 +25,10 @@ from floatframe import (
 )
 from floatframe.compiling.system import compiled_system
 from floatframe.kernels.work import new_work
-from floatframe.mechanisms import chain
+from floatframe.mechanisms import chain, four_bar
 from floatframe.relative.topology import tree_of
 from floatframe.rotations import euler_parameters_of_rotation_vector
+from floatframe.start import repeated_constraints as repeated_constraints_module
 from floatframe.start.freedoms import scaled_constraints
 from floatframe.start.repeated_constraints import dependent_count, repeated_constraints
 
@@ -105,6 +106,16 @@ def test_a_ring_with_a_ball_and_a_sleeve_repeats_none(n):
     assert count(system) == 0
     assert mobility(system).mobility == 6 * n - 5 * (n - 1) - 4 - 3
     consistent_state(system)
+
+
+def test_loops_that_are_well_conditioned_begin_without_the_kernels_of_the_tree(monkeypatch):
+    def none(*words):
+        raise AssertionError("motions of the tree were asked for")
+
+    monkeypatch.setattr(repeated_constraints_module, "coordinate_motions", none)
+    consistent_state(four_bar(angle=0.3))
+    with pytest.raises(AssertionError, match="were asked for"):
+        count(ring(4))
 
 
 def test_a_chain_locked_by_rods_is_poorly_conditioned_but_repeats_nothing():
