@@ -58,6 +58,7 @@ def dask_here(n: int, threads: int = 1) -> "DaskTasks":
         try:
             cluster = distributed.LocalCluster(
                 n_workers=n, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0,
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else two clusters want port 8787
                 silence_logs=logging.CRITICAL,
             )  # fmt: skip
         except Exception as error:

@@ -45,6 +45,12 @@ def test_results_and_errors_are_those_of_processes_in_the_order_of_the_values(da
     assert dask.map(partial(pow, 2), range(4)) == [1, 2, 4, 8]
 
 
+def test_two_clusters_stand_beside_each_other(dask):
+    """Without a word about ports: warnings are errors here."""
+    with dask_here(1) as other:
+        assert other.map(partial(pow, 3), [2]) == [9]
+
+
 def threads_of(value):
     from threadpoolctl import threadpool_info
 
