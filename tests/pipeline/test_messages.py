@@ -15,7 +15,7 @@ from tests.root import ROOT
 PROGRAMS = {"cms": typer.main.get_command(cms_app), "floatframe": typer.main.get_command(floatframe_app)}
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*\w")
 CALL = re.compile(r"\b(cms|floatframe) ([a-z][a-z-]+)((?: [^\s`'\"]+)*)")
-FOREIGN = {"--no-deps"}  # of other programs
+FOREIGN = {"--no-deps", "--nthreads", "--install"}  # of other programs: pip, dask worker, xcode-select
 
 
 def options_of(command: click.Command) -> set[str]:

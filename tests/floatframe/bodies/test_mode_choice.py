@@ -1,7 +1,7 @@
 """Bodies with some of their modes only."""
 
 import numpy as np
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose
 
 import cms
 from floatframe.bodies.mode_choice import with_modes
@@ -17,7 +17,6 @@ def test_recovery_rows_of_fewer_modes_are_those_of_a_motion_in_these_modes():
     only = np.zeros_like(z)
     only[:, kept] = z[:, kept]
     fewer = with_modes(reduced, [4, 1])
-    assert_array_equal(
-        fewer.recovery["loads"].values(z[:, kept], z_ddot=z[:, kept]),
-        reduced.recovery["loads"].values(only, z_ddot=only),
-    )
+    expected = reduced.recovery["loads"].values(only, z_ddot=only)
+    got = fewer.recovery["loads"].values(z[:, kept], z_ddot=z[:, kept])
+    assert_allclose(got, expected, rtol=1e-14, atol=1e-14 * np.abs(expected).max())  # products of another width

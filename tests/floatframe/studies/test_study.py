@@ -145,10 +145,10 @@ take = "mean"
 
 
 def test_what_nobody_foresaw_is_a_row_too(folder, monkeypatch):
-    def fails_once(system):
+    def fails_once(system, **options):
         if system.bodies[0].mass == 2.0:
             raise RuntimeError("a fault\nof the program")
-        return found(system)
+        return found(system, **options)
 
     import floatframe.studies.study as study
 
