@@ -5,9 +5,9 @@ import logging
 import os
 import signal
 
-import numpy as np
+import h5py
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_equal
 from typer.testing import CliRunner
 
 import cms
@@ -56,23 +56,29 @@ def files_of(jobs):
     return {job.stem: hashlib.sha256(job.with_suffix(".h5").read_bytes()).hexdigest() for job in jobs}
 
 
+def arrays_of(job):
+    """Return every array of a modal file by its name; what it says of the solver's threads stands beside them."""
+    found = {}
+    with h5py.File(job.with_suffix(".h5")) as file:
+        file.visititems(lambda name, it: found.update({name: it[()]}) if isinstance(it, h5py.Dataset) else None)
+    return found
+
+
 def test_files_are_the_same_by_processes_by_a_cluster_and_here(jobs):
-    """Bit for bit where workers have as many threads; here, where one job has all of them, to rounding."""
+    """Byte for byte where workers have as many threads; here, where a job has all of them, every array bit for bit."""
     pytest.importorskip("distributed")
     rows = reduce_fleet(jobs, workers=1)
-    here = [cms.read(job.with_suffix(".h5")) for job in jobs]
-    assert [row.n_modes for row in rows] == [body.n_q for body in here]
+    assert [row.n_modes for row in rows] == [cms.read(job.with_suffix(".h5")).n_q for job in jobs]
+    here = [arrays_of(job) for job in jobs]
     found = []
     for workers in (2, "dask:2"):
         for job in jobs:
             job.with_suffix(".h5").unlink()
         reduce_fleet(jobs, workers=workers)
         found.append(files_of(jobs))
+        for job, arrays in zip(jobs, here, strict=True):
+            assert_equal(arrays_of(job), arrays)
     assert found[0] == found[1]
-    for job, body in zip(jobs, here, strict=True):
-        other = cms.read(job.with_suffix(".h5"))
-        assert_allclose(other.frequencies, body.frequencies, rtol=1e-9)
-        assert_allclose(other.Phi, body.Phi, rtol=0, atol=1e-9 * np.abs(body.Phi).max())
 
 
 def test_what_is_done_is_not_done_again_until_something_changes(jobs, monkeypatch):

@@ -7,6 +7,8 @@ import cms
 from floatframe.bodies.mode_choice import with_modes
 from tests.bodies import bar
 
+EPS = np.finfo(float).eps
+
 
 def test_recovery_rows_of_fewer_modes_are_those_of_a_motion_in_these_modes():
     part = cms.couple(bar(nx=2))
@@ -19,4 +21,4 @@ def test_recovery_rows_of_fewer_modes_are_those_of_a_motion_in_these_modes():
     fewer = with_modes(reduced, [4, 1])
     expected = reduced.recovery["loads"].values(only, z_ddot=only)
     got = fewer.recovery["loads"].values(z[:, kept], z_ddot=z[:, kept])
-    assert_allclose(got, expected, rtol=1e-14, atol=1e-14 * np.abs(expected).max())  # products of another width
+    assert_allclose(got, expected, rtol=0, atol=4 * EPS * np.abs(expected).max())  # sums over fewer products
