@@ -4,6 +4,9 @@ import math
 import shutil
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
+from ctypes import byref
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +15,13 @@ from fe_models.foundation.words import nearest, quoted
 from floatframe.errors import CosimulationError, ModelError
 from floatframe.motion.foreign_units import ForeignUnit
 
-__all__ = ["ForeignSlave"]
+__all__ = ["ForeignSlave", "callbacks"]
 
 REAL = ("Real", "Float64")
 VERSIONS = ("2.0", "3.0")
 DISCARD, ERROR, FATAL = 2, 3, 4  #: status of a call that failed
+
+words_of_call: list[str] = []  #: what units have logged since a function of one of them was called
 
 
 class ForeignSlave:
@@ -55,7 +60,6 @@ class ForeignSlave:
         for part, causality in (("inputs", "input"), ("outputs", "output"), ("parameters", "parameter")):
             for name in getattr(unit, part):
                 self.require_variable(part, name, causality)
-        self.log: list[str] = []
         self.folder = Path(tempfile.mkdtemp(prefix="floatframe-fmu-"))
         self.instance: Any = None
         self.worst = 0  #: status of its worst failure: 3 error, 4 fatal
@@ -103,28 +107,19 @@ class ForeignSlave:
 
     def call(self, what: str, function: Any, *values: Any, **named: Any) -> Any:
         """Call a function of the FMU; `CosimulationError` with the words of its log if it fails."""
-        told = len(self.log)
+        words_of_call.clear()
         try:
             return function(*values, **named)
         except Exception as error:  # FMICallException, or what a library that cannot be loaded raises
             self.worst = max(self.worst, getattr(error, "status", None) or ERROR)
-            words = "; ".join([one_line(error), *self.log[told:]])
+            words = "; ".join([one_line(error), *words_of_call])
             raise CosimulationError(f"{self.where}: {what} failed: {words}") from error
 
     def begin(self, t: float, inputs: Mapping[str, float]) -> None:
         """Instantiate it, set parameters and inputs, and initialise it at t."""
-
-        def note(*values: Any) -> None:
-            text = values[-1]
-            self.log.append(one_line(text.decode("utf-8", "replace") if isinstance(text, bytes) else text))
-
         fmpy = self.fmpy
         self.call("its extraction", fmpy.extract, self.unit.file, unzipdir=str(self.folder))
-        simulation = extra_module("fmpy.simulation", extra="fmi", purpose="units of other programs")
-        self.instance = self.call(
-            "its instantiation", simulation.instantiate_fmu, str(self.folder), self.description, "CoSimulation",
-            debug_logging=True, logger=note,
-        )  # fmt: skip
+        self.instance = self.call("its instantiation", self.instantiated)
         seconds = t * self.seconds
         if self.is_fmi_2:
             self.call("its set-up", self.instance.setupExperiment, startTime=seconds)
@@ -133,6 +128,22 @@ class ForeignSlave:
         self.call("its initialisation", self.instance.enterInitializationMode, *start)
         self.set(inputs)
         self.call("its initialisation", self.instance.exitInitializationMode)
+
+    def instantiated(self) -> Any:
+        """Return an instance of it that logs to `words_of_call`."""
+        if not self.is_fmi_2:
+            simulation = extra_module("fmpy.simulation", extra="fmi", purpose="units of other programs")
+            return simulation.instantiate_fmu(
+                str(self.folder), self.description, "CoSimulation", debug_logging=True, logger=note
+            )
+        fmi2 = extra_module("fmpy.fmi2", extra="fmi", purpose="units of other programs")
+        about = self.description
+        instance = fmi2.FMU2Slave(
+            guid=about.guid, unzipDirectory=str(self.folder), modelIdentifier=about.coSimulation.modelIdentifier,
+            instanceName=None,
+        )  # fmt: skip
+        instance.instantiate(callbacks=callbacks(), loggingOn=True)
+        return instance
 
     def set(self, values: Mapping[str, float]) -> None:
         """Set variables."""
@@ -189,6 +200,35 @@ class ForeignSlave:
                     continue
         self.instance = None
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def note(*values: Any) -> None:
+    """Keep what a unit logs."""
+    text = values[-1]
+    words_of_call.append(one_line(text.decode("utf-8", "replace") if isinstance(text, bytes) else text))
+
+
+@cache
+def logger() -> Any:
+    """Return `note` behind a C function, one for all units of version 2."""
+    return extra_module("fmpy.fmi2", extra="fmi", purpose="units of other programs").fmi2CallbackLoggerTYPE(note)
+
+
+def callbacks() -> Any:
+    """Return the callbacks of a unit of version 2.
+
+    FMPy puts texts together in a function of C that knows one logger, the last it was given, and calls it for all units
+    of the process: a logger of one of them would hear the others, and be called when it has gone.
+    """
+    fmpy = extra_module("fmpy", extra="fmi", purpose="units of other programs")
+    fmi2 = extra_module("fmpy.fmi2", extra="fmi", purpose="units of other programs")
+    made = fmi2.fmi2CallbackFunctions()
+    made.logger = logger()
+    made.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    made.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    with suppress(OSError):  # no such library for this machine: texts stay as the unit wrote them
+        extra_module("fmpy.logging", extra="fmi", purpose="units of other programs").addLoggerProxy(byref(made))
+    return made
 
 
 def one_line(text: Any) -> str:

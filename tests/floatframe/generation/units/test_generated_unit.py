@@ -1,5 +1,6 @@
 """FMUs of generated C: the motion of the engine by FMPy, derivatives of the model, and what cannot be made."""
 
+import gc
 import re
 import subprocess
 from dataclasses import replace
@@ -10,7 +11,6 @@ from zipfile import ZipFile
 import fmpy
 import numpy as np
 import pytest
-from fmpy import calloc, fmi2, free
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.validation import validate_fmu
 from numpy.testing import assert_allclose, assert_array_equal
@@ -18,10 +18,12 @@ from typer.testing import CliRunner
 
 import floatframe as ff
 from floatframe.cli.app import app
-from floatframe.errors import ModelError
+from floatframe.cosimulation.foreign_slave import ForeignSlave, callbacks
+from floatframe.errors import CosimulationError, ModelError
 from floatframe.functions.time_functions import harmonic
 from floatframe.identification.inertial_parameters import parameters_of
 from floatframe.machines import flexible_arm
+from floatframe.motion.foreign_units import ForeignUnit
 from tests.floatframe.generation.calls import ROUNDOFF, Case, all_charts, puma
 from tests.floatframe.generation.test_generate_command import PENDULUM
 
@@ -119,15 +121,6 @@ def test_a_tree_on_a_free_base_keeps_its_energy_and_moves_as_in_the_engine(folde
             assert_allclose(np.linalg.norm(z[k : k + 4]), 1, rtol=0, atol=ROUNDOFF)
 
 
-def own_callbacks():
-    """Return callbacks with a logger of their own: those of FMPy call the last one used, which may be gone."""
-    made = fmi2.fmi2CallbackFunctions()
-    made.logger = fmi2.fmi2CallbackLoggerTYPE(lambda *words: None)
-    made.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-    made.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
-    return made
-
-
 class Instance:
     """A unit of FMI 2.0 for model exchange, by the functions of the standard."""
 
@@ -140,7 +133,7 @@ class Instance:
             instanceName="one",
         )  # fmt: skip
         self.place = {v.name: v.valueReference for v in self.description.modelVariables}
-        self.unit.instantiate(callbacks=own_callbacks())
+        self.unit.instantiate(callbacks=callbacks())
         self.unit.setupExperiment()
         self.unit.enterInitializationMode()
 
@@ -339,3 +332,19 @@ def test_the_command_writes_one(tmp_path):
     made = CliRunner().invoke(app, [*words, "--language", "python"])
     assert made.exit_code != 0
     assert "leave out --what" in " ".join(made.output.split())
+
+
+def test_each_of_two_units_beside_a_system_tells_its_own_words_also_when_the_other_has_gone(robot, folder):
+    path = ff.generate_fmu(robot.system, folder / "told.fmu").path
+    torque = "joint1.angle.force"
+    first, second = (ForeignSlave(ForeignUnit(name, str(path), {torque: "sensor"}), 1.0) for name in ("one", "two"))
+    for each in (first, second):
+        each.begin(0.0, {torque: 0.0})
+    with pytest.raises(CosimulationError, match=r"fmus\.one: setting its inputs failed: .*values that are not finite"):
+        first.set({torque: np.nan})
+    second.close()
+    del second, each
+    gc.collect()
+    with pytest.raises(CosimulationError, match=r"fmus\.one: setting its inputs failed: .*values that are not finite"):
+        first.set({torque: np.inf})
+    first.close()
