@@ -143,7 +143,7 @@ def against_job(
         body = coupled_body(job, uncoupled)
     name = f"the full model of {path}, {body.n_dof} dofs"
     if reduced.provenance.get("mode set") == job.reduction.set and is_of_one_model(body, reduced):
-        with Families(body) as families:
+        with Families(body, solver=job.reduction.solver) as families:
             with stages(f"mode set {job.reduction.set}"):
                 modes = job_mode_set(families, reduction_of(job, body))
             top = usable_band(modes, reduced) if band is None else band

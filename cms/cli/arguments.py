@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["Journal", "ModalFile", "Output", "Workers"]
+__all__ = ["Journal", "ModalFile", "Output", "Solver", "Workers"]
 
 ModalFile = Annotated[Path, typer.Argument(help="A modal file, as cms reduce writes it.")]
 
@@ -20,6 +20,14 @@ Workers = Annotated[
         "-j",
         help="Where tasks are computed: a number of processes, dask (dask:4), or dask://host:port, see "
         "docs/cluster.md; default: one process a processor.",
+    ),
+]
+
+Solver = Annotated[
+    str | None,
+    typer.Option(
+        "--solver",
+        help="What factorises: pardiso, superlu, ... (docs/cluster.md); default: as the job says, else the fastest.",
     ),
 ]
 

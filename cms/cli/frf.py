@@ -136,7 +136,7 @@ def full_model(request: FrfRequest, reduced: ReducedBody, highest: float) -> tup
             body = coupled_body(job, uncoupled)
         names = tuple(dict.fromkeys((request.excited, request.answering)))
         ports = Ports.of_body(body, names)
-        with clock("full model"), Families(body) as families:
+        with clock("full model"), Families(body, solver=job.reduction.solver) as families:
             known = reference_response(families, ports, highest * body.units.time)
     return known.model, body.units.time
 

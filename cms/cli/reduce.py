@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.arguments import Workers
+from cms.cli.arguments import Solver, Workers
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 from cms.cli.info import print_body
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Fleet", "reduce_and_write", "reduce_and_write_fleet", "reduce_command"]
 
 
-def reduce_and_write(job: "Job", path: Path) -> "ReducedBody":
+def reduce_and_write(job: "Job", path: Path, solver: str | None = None) -> "ReducedBody":
     """Run a job, write its modal file, and print what was done."""
     from cms.jobs.reduce_job import reduce_job
     from cms.modal_file.file import write
@@ -28,7 +28,7 @@ def reduce_and_write(job: "Job", path: Path) -> "ReducedBody":
     reports: list[Any] = []
     try:
         with stages() as clock:
-            reduced = reduce_job(job, clock, on_report=reports.append)
+            reduced = reduce_job(job, clock, solver=solver, on_report=reports.append)
             with clock("write"):
                 write(reduced, path)
     finally:  # a mesh that is refused is better understood with its numbers
@@ -54,6 +54,7 @@ class Fleet:
     output: Path | None  #: folder of the modal files, or the file of one job; None: beside the jobs
     workers: str | None
     journal: Path | None  #: None: beside the modal files
+    solver: str | None = None
 
     def journal_path(self, outputs: Sequence[Path]) -> Path:
         """Return where the journal is by default: in the folder that holds all modal files."""
@@ -86,7 +87,7 @@ def reduce_and_write_fleet(fleet: Fleet) -> None:
     journal = output_path(fleet.journal_path(outputs), None, JobError, overwrite_of=fleet.jobs, needs_file=True)
     with stages(remaining=True) as clock, clock(f"{len(fleet.jobs)} jobs") as advance:
         rows = reduce_fleet(
-            fleet.jobs, outputs, workers=fleet.workers, journal=journal,
+            fleet.jobs, outputs, workers=fleet.workers, journal=journal, solver=fleet.solver,
             progress=lambda done, all_: advance(done / all_),
         )  # fmt: skip
     for job, output, row in zip(fleet.jobs, outputs, rows, strict=True):
@@ -116,6 +117,7 @@ def reduce_command(
         typer.Option("--journal", help="Of several jobs: file that keeps which are done; default: beside the files."),
     ] = None,
     workers: Workers = None,
+    solver: Solver = None,
 ) -> None:
     """Reduce finite element bodies to modal files.
 
@@ -131,10 +133,10 @@ def reduce_command(
     from cms.jobs.job import read_job
 
     if len(jobs) > 1 or workers is not None:
-        reduce_and_write_fleet(Fleet(jobs, output, workers, journal))
+        reduce_and_write_fleet(Fleet(jobs, output, workers, journal, solver))
         return
     job = jobs[0]
     read = read_job(job)
     inputs = inputs_of(job, read)
     path = output_path(output, job.with_suffix(".h5"), JobError, overwrite_of=inputs)
-    reduce_and_write(read, path)
+    reduce_and_write(read, path, solver)

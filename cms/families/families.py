@@ -26,10 +26,12 @@ from cms.families.static_modes import (
 from cms.families.vibration_modes import elastic_modes, fixed_interface_modes, no_modes
 from cms.solvers.eigen import EigenResult
 from cms.solvers.mode_count import ModeCount, mode_count
+from cms.solvers.registry import solver_of
 from cms.solvers.tall import combine
 from fe_models.body.fe_body import FEBody
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.components import MOTION_COMPONENTS
+from fe_models.foundation.solver import Solver
 
 __all__ = ["Families"]
 
@@ -50,7 +52,7 @@ class Families:
     follow by the condensed stiffness S of h.
     """
 
-    def __init__(self, body: FEBody, *, announce: bool = True) -> None:
+    def __init__(self, body: FEBody, *, announce: bool = True, solver: str | Solver | None = None) -> None:
         """Prepare the families of a coupled body; nothing is computed yet.
 
         Parameters
@@ -59,14 +61,19 @@ class Families:
             A coupled body.
         announce
             Whether a warning says, before the work, what interfaces with very many dofs cost and what is cheaper.
+        solver
+            What factorises, one of `cms.solvers.registry.SOLVERS` by name; by default the fastest installed.
 
         Raises
         ------
         BodyError
             If the interfaces of the body have no boundary dofs yet.
+        FactorizationError
+            If the solver is unknown or not installed.
         """
         body.require_coupled()
         self.body = body
+        self.solver = solver_of(solver)
         self._announces = announce
         self._stack = ExitStack()
         self._is_open = True
@@ -125,7 +132,7 @@ class Families:
             raise ModeSetError(f"families of body {self.body.name!r}: closed; make new ones")
         for words in large_interfaces(self.body) if self._announces else ():
             log.warning(words)
-        return self._stack.enter_context(fix_interfaces(self.body, self._partition[1]))
+        return self._stack.enter_context(fix_interfaces(self.body, self._partition[1], solver=self.solver))
 
     # -- static families -------------------------------------------------------------------------------------------
 

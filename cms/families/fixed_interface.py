@@ -7,9 +7,11 @@ import scipy.sparse as sp
 
 from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
 from cms.solvers.factorization import EmptyFactor, Factorization, factorize
+from cms.solvers.registry import solver_of
 from fe_models.body.fe_body import MULTIPLIER, FEBody
 from fe_models.body.submatrix import principal_block
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.solver import Solver
 from fe_models.foundation.words import node_list
 
 __all__ = ["FixedInterfaceBody", "fix_interfaces"]
@@ -40,13 +42,17 @@ class FixedInterfaceBody:
         return int((self.body.dofs[:, 1] == MULTIPLIER).sum())
 
 
-def fix_interfaces(body: FEBody, extra: IntArray | None = None) -> FixedInterfaceBody:
+def fix_interfaces(
+    body: FEBody, extra: IntArray | None = None, *, solver: str | Solver | None = None
+) -> FixedInterfaceBody:
     """Hold all boundary dofs of a coupled body and factorise its interior stiffness.
 
     Parameters
     ----------
     extra
         More dofs to hold, where the interfaces alone leave a rigid-body motion free (`determinate_partition`).
+    solver
+        What factorises (`cms.solvers.registry`); by default the fastest installed.
 
     Raises
     ------
@@ -56,6 +62,7 @@ def fix_interfaces(body: FEBody, extra: IntArray | None = None) -> FixedInterfac
         If it moves without energy while its interfaces are held: a mechanism; the text says where.
     """
     body.require_coupled()
+    chosen = solver_of(solver)
     b = body.b if extra is None else np.concatenate([body.b, np.setdiff1d(extra, body.b)])
     i = np.setdiff1d(np.arange(body.n_dof), b)
     if len(b) == 0:
@@ -63,22 +70,22 @@ def fix_interfaces(body: FEBody, extra: IntArray | None = None) -> FixedInterfac
     K_ii = principal_block(body.K, i)
     M_ii = principal_block(body.M, i)
     if not len(i):
-        return FixedInterfaceBody(body, i, b, K_ii, M_ii, Factorization(EmptyFactor()))
+        return FixedInterfaceBody(body, i, b, K_ii, M_ii, Factorization(EmptyFactor(), chosen))
     is_definite = not (body.dofs[:, 1] == MULTIPLIER).any()
     try:
-        factorization = factorize(K_ii, definite=is_definite)
+        factorization = factorize(K_ii, definite=is_definite, solver=chosen)
     except FactorizationError as error:
-        raise BodyError(_mechanism_message(body, i, K_ii, M_ii)) from error
+        raise BodyError(_mechanism_message(body, i, K_ii, M_ii, chosen)) from error
     return FixedInterfaceBody(body, i, b, K_ii, M_ii, factorization)
 
 
-def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array) -> str:
+def _mechanism_message(body: FEBody, i: IntArray, K_ii: sp.csc_array, M_ii: sp.csc_array, solver: Solver) -> str:
     """Say which nodes move without energy while the interfaces are held."""
     from cms.solvers.eigen import eigenmodes
 
     start = f"body {body.name!r}: with all interfaces held its stiffness is singular"
     try:
-        modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1))
+        modes = eigenmodes(K_ii, M_ii, n_modes=min(7, len(i) - 1), solver=solver)
     except (EigenError, FactorizationError):  # the message about the mechanism matters more than why its picture failed
         return f"{start}; it has a mechanism, or a part that no interface holds"
     energy = np.abs(K_ii @ modes.Phi).max(axis=0) / (np.abs(K_ii.data).max() * np.abs(modes.Phi).max(axis=0))

@@ -18,6 +18,7 @@ from cms.solvers.tall import combine, inner
 from fe_models.body.fe_body import FEBody
 from fe_models.body.submatrix import principal_block
 from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.solver import Solver
 
 __all__ = ["BoundaryConditions", "CondensedBody", "Flexibility"]
 
@@ -99,6 +100,11 @@ class Flexibility:
         return f"{self.condensed.fixed.factorization.description}, boundary by its condensed stiffness"
 
     @property
+    def solver(self) -> Solver:
+        """What factorised the interior stiffness."""
+        return self.condensed.fixed.factorization.solver
+
+    @property
     def inertia(self) -> Inertia:
         """Of K - sigma M at a shift between the rigid-body motions and the first elastic mode."""
         n_negative = self.condensed.fixed.n_multipliers + self.n_rigid
@@ -151,7 +157,7 @@ class Flexibility:
         for load, factor in ((conditions.K_load, 1.0), (conditions.M_load, -sigma)):
             if load is not None:
                 A_zz = A_zz + factor * (Z.T @ load @ Z)
-        with factorize(sp.csc_array(fixed.K_ii - sigma * fixed.M_ii), definite=False) as shifted:
+        with factorize(sp.csc_array(fixed.K_ii - sigma * fixed.M_ii), definite=False, solver=self.solver) as shifted:
             inertia = shifted.inertia
             A_zz = A_zz - A_hz[i].T @ shifted.solve(A_hz[i]) if A_zz.size else A_zz
         size = 1 / np.sqrt(np.where(np.diag(A_zz) != 0, np.abs(np.diag(A_zz)), 1.0))

@@ -9,6 +9,7 @@ from cms.errors import JobError
 from cms.fleets.fleet_job import FleetJob, FleetRow, failed_row, reduce_and_write_one
 from cms.fleets.inputs import inputs_of
 from cms.jobs.job import read_job
+from cms.solvers.registry import solver_of
 from fe_models.foundation.digest import file_digest
 from fe_models.foundation.paths import file_identity, remove_parts
 from fe_models.foundation.tasks.installation import source_mark
@@ -26,6 +27,7 @@ def reduce_fleet(
     *,
     workers: Workers = None,
     journal: str | os.PathLike[str] | None = None,
+    solver: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[FleetRow]:
     """Reduce many jobs, each to a modal file; one that fails is a row with its reason, the others go on.
@@ -42,6 +44,8 @@ def reduce_fleet(
     journal
         A file that every job that is done is appended to: it is not run again while the files it depends on, the
         program, and its modal file are the same. None: nothing is written.
+    solver
+        What factorises (`cms.solvers.registry`); goes before those of the jobs.
     progress
         Called with the numbers of jobs done and of all.
 
@@ -49,12 +53,16 @@ def reduce_fleet(
     ------
     JobError
         Before any work: if a job file cannot be read, or an output is an input, or that of another job.
+    FactorizationError
+        If the solver is unknown or not installed.
     WorkerError
         If no workers can be had.
     """
+    if solver is not None:
+        solver_of(solver)
     paths = [Path(path) for path in jobs]
     made = [path.with_suffix(".h5") for path in paths] if outputs is None else [Path(path) for path in outputs]
-    fleet = fleet_of(paths, made)
+    fleet = fleet_of(paths, made, solver)
     kept = None if journal is None else open_task_journal(Path(journal), KIND, source_mark(), "this call", JobError)
     rows = {} if kept is None else known_rows(kept, fleet)
     missing = [k for k in range(len(fleet)) if k not in rows]
@@ -70,16 +78,14 @@ def reduce_fleet(
         if missing:
             files = sorted({str(folder) for k in missing for folder in (fleet[k].job, fleet[k].output.parent)})
             with tasks_of(workers, len(missing), threads=None) as tasks:
-                tasks.map(
-                    reduce_and_write_one, [fleet[k] for k in missing], failed=failed_row, done=keep, files=files
-                )
+                tasks.map(reduce_and_write_one, [fleet[k] for k in missing], failed=failed_row, done=keep, files=files)
     finally:  # a worker that was killed at its writing could not clean up
         for k in missing:
             remove_parts(fleet[k].output)
     return [rows[k] for k in range(len(fleet))]
 
 
-def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path]) -> list[FleetJob]:
+def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path], solver: str | None = None) -> list[FleetJob]:
     """Return the jobs of a fleet, all checked; `JobError` if two files are one."""
     inputs = [inputs_of(path, read_job(path)) for path in jobs]
     digests = {each: file_digest(each) for each in {each for files in inputs for each in files}}  # meshes serve many
@@ -93,8 +99,8 @@ def fleet_of(jobs: Sequence[Path], outputs: Sequence[Path]) -> list[FleetJob]:
         if where in made:
             raise JobError(f"{path} and {made[where]} would both be written to {output}; rename one")
         made[where] = path
-        mark = hashlib.sha256(" ".join(digests[each] for each in files).encode()).hexdigest()
-        found.append(FleetJob(Path(os.path.abspath(path)), Path(os.path.abspath(output)), mark))
+        mark = hashlib.sha256(" ".join([*(digests[each] for each in files), solver or ""]).strip().encode()).hexdigest()
+        found.append(FleetJob(Path(os.path.abspath(path)), Path(os.path.abspath(output)), mark, solver))
     return found
 
 

@@ -21,6 +21,7 @@ class FleetJob:
     job: Path
     output: Path
     digest: str
+    solver: str | None = None  #: instead of that of the job
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def reduce_and_write_one(job: FleetJob) -> FleetRow:
 
     began = time.perf_counter()
     with notes_kept() as notes:
-        reduced = reduce_job(job.job)
+        reduced = reduce_job(job.job, solver=job.solver)
         write(reduced, job.output)
     return FleetRow(job, reduced.name, reduced.n_q, time.perf_counter() - began, tuple(notes))
 

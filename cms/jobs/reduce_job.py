@@ -8,7 +8,9 @@ from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
 from cms.jobs.parts_of_job import frame_of, moving_frame_of
 from cms.reduced_body.reduced_body import ReducedBody
+from cms.solvers.registry import solver_of
 from fe_models.body.fe_body import FEBody
+from fe_models.foundation.solver import Solver
 from fe_models.foundation.stages import Stages
 
 if TYPE_CHECKING:
@@ -26,7 +28,11 @@ OF_INTERFACES = (
 
 
 def reduce_job(
-    job: Job | Path | str, stages: Stages | None = None, *, on_report: Callable[[Any], None] | None = None
+    job: Job | Path | str,
+    stages: Stages | None = None,
+    *,
+    solver: str | Solver | None = None,
+    on_report: Callable[[Any], None] | None = None,
 ) -> ReducedBody:
     """Run a job up to the reduced body.
 
@@ -36,13 +42,16 @@ def reduce_job(
         A job file, or a job that was read.
     stages
         Takes the time of each stage and shows its progress; none by default.
+    solver
+        What factorises, by name (`cms.solvers.registry`); goes before the one of the job, whose default is the fastest
+        that is installed.
     on_report
         Called with the mesh report, before it is judged.
 
     Raises
     ------
     CmsError, FeModelsError
-        If the job, the mesh, a material, an interface or the mode set does not do.
+        If the job, the mesh, a material, an interface, the mode set or the solver does not do.
 
     Examples
     --------
@@ -55,16 +64,17 @@ def reduce_job(
 
     job = job if isinstance(job, Job) else read_job(Path(job))
     stages = stages or Stages()
+    chosen = solver_of(solver or job.reduction.solver)  # one that is not installed is told before the work
     coupled = job_body(job, stages, on_report=on_report)
     if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
         require_geometric_stiffness(coupled)  # before the long work
         require_room_for_stiffness(coupled, expected_columns(job, coupled))
     if job.recovery:
         with Families(
-            coupled, announce=not reduces_interfaces(job)
+            coupled, announce=not reduces_interfaces(job), solver=chosen
         ) as families:  # the static part of recovery rows needs the factorisation
             return reduced(job, families, stages, *modes_and_states(job, families, stages))
-    return reduced(job, coupled, stages, *with_own_factorisation(job, coupled, stages))
+    return reduced(job, coupled, stages, *with_own_factorisation(job, coupled, chosen, stages))
 
 
 def reduced(
@@ -88,11 +98,13 @@ def reduced(
         )
 
 
-def with_own_factorisation(job: Job, coupled: FEBody, stages: Stages) -> "tuple[ModeSet, UnitStates | None]":
+def with_own_factorisation(
+    job: Job, coupled: FEBody, solver: Solver, stages: Stages
+) -> "tuple[ModeSet, UnitStates | None]":
     """Make what needs the factorisation, which is freed before the reduction: that needs the memory."""
     from cms.families.families import Families
 
-    with Families(coupled, announce=not reduces_interfaces(job)) as families:
+    with Families(coupled, announce=not reduces_interfaces(job), solver=solver) as families:
         return modes_and_states(job, families, stages)
 
 

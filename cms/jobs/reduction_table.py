@@ -12,6 +12,7 @@ from cms.mode_sets.axis_functions import AXIS_FUNCTIONS
 from cms.mode_sets.extra_columns import EXTRA_COLUMNS
 from cms.mode_sets.given_columns import OVER
 from cms.solvers.mode_count import ModeCount
+from cms.solvers.registry import SOLVERS
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.paths import near_file
 from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
@@ -242,6 +243,9 @@ class ReductionSection(Table):
         None, description="a number above 0, the highest frequency of interface modes [Hz]"
     )
     interfaces_together: bool | None = Field(None, description="true or false: one problem for all all-node interfaces")
+    solver: choice("solver", lambda: tuple(SOLVERS)) | None = Field(  # type: ignore[valid-type]
+        None, description=f"what factorises, one of {', '.join(SOLVERS)}; default: the fastest that is installed"
+    )
     frame: choice("frame", lambda: FRAMES) = Field(  # type: ignore[valid-type]
         "tisserand", description=f"one of {', '.join(FRAMES)}"
     )

@@ -91,7 +91,7 @@ def krylov(
     with ExitStack() as stack:
         families = stack.enter_context(families_of(source))
         expansions = [
-            _static_expansion(families, F_extra) if shift == 0 else _shifted_expansion(body, shift, F_extra, stack)
+            _static_expansion(families, F_extra) if shift == 0 else _shifted_expansion(families, shift, F_extra, stack)
             for shift in dict.fromkeys(map(float, shifts))
         ]
         span = _Span(families, deflation=DEFLATION if tolerance is None or band is not None else tolerance)
@@ -214,11 +214,13 @@ def _static_expansion(families: Families, F_extra: Array) -> _Expansion:
     return _Expansion("0 Hz", first_block, families.flexibility)
 
 
-def _shifted_expansion(body: FEBody, shift: float, F_extra: Array, stack: ExitStack) -> _Expansion:
+def _shifted_expansion(families: Families, shift: float, F_extra: Array, stack: ExitStack) -> _Expansion:
     """Return the expansion at a shift; the stack holds its factorisation."""
+    body = families.body
     sigma = (2 * np.pi * shift) ** 2
+    A = sp.csc_array(body.K - sigma * body.M)
     try:
-        factor = stack.enter_context(factorize(sp.csc_array(body.K - sigma * body.M), definite=False))
+        factor = stack.enter_context(factorize(A, definite=False, solver=families.solver))
     except FactorizationError as error:
         raise ModeSetError(
             f"krylov: shift = {shift:g}: K - (2 pi shift)² M of body {body.name!r} is singular: a natural frequency of "

@@ -16,6 +16,7 @@ from cms.solvers.orientation import orientation
 from cms.solvers.shift_inverted import Modes, ShiftInverted, Wanted
 from cms.solvers.tall import combine
 from fe_models.foundation.arrays import Array, frozen
+from fe_models.foundation.solver import Solver
 from fe_models.foundation.threads import one_blas_thread
 
 __all__ = ["EigenResult", "eigenmodes"]
@@ -54,6 +55,7 @@ def eigenmodes(
     n_modes: int | ModeCount,
     *,
     factorization: Inverse | None = None,
+    solver: str | Solver | None = None,
     shift: float | None = None,
     tolerance: float = 1e-5,
     progress: Callable[[int, int], None] | None = None,
@@ -76,6 +78,8 @@ def eigenmodes(
         Number of modes, or a `ModeCount`: all modes up to a frequency [Hz]; proof that none was missed.
     factorization
         Of K - shift M if it exists already; made and freed here by default.
+    solver
+        What factorises (`cms.solvers.registry`), where no factorisation is given; by default the fastest installed.
     shift
         sigma [1/s²], below all omega²; 0 with a factorisation, otherwise a small negative one that also serves a free
         body.
@@ -111,7 +115,7 @@ def eigenmodes(
     with ExitStack() as stack:
         stack.enter_context(one_blas_thread())
         if factorization is None:
-            factorization = stack.enter_context(_factorize_shifted(K, M, shift))
+            factorization = stack.enter_context(_factorize_shifted(K, M, shift, solver))
         if factorization.n != n:
             raise EigenError(f"eigenmodes: factorization: expected order {n}, got {factorization.n}")
         operator = ShiftInverted(M, shift, factorization, tolerance, progress)
@@ -178,14 +182,14 @@ def counting_shift(omega2: Array, k: int, wanted: Wanted, shift: float) -> tuple
     return len(omega2), levels[-1] + GAP * (levels[-1] - shift)
 
 
-def _factorize_shifted(K: sp.csc_array, M: sp.csc_array, sigma: float) -> Factorization:
+def _factorize_shifted(K: sp.csc_array, M: sp.csc_array, sigma: float, solver: str | Solver | None) -> Factorization:
     A = K if sigma == 0 else sp.csc_array(K - sigma * M)
-    return factorize(A, definite=sigma <= 0 and bool((A.diagonal() > 0).all()))
+    return factorize(A, definite=sigma <= 0 and bool((A.diagonal() > 0).all()), solver=solver)
 
 
 def _count_below(K: sp.csc_array, M: sp.csc_array, sigma: float, at_shift: Inverse) -> int:
     """Modes between the shift and sigma, by Sylvester's law: K - sigma M has one more negative eigenvalue for each."""
-    with _factorize_shifted(K, M, sigma) as factorization:
+    with _factorize_shifted(K, M, sigma, at_shift.solver) as factorization:
         inertia = factorization.inertia
     if inertia.n_zero or at_shift.inertia.n_zero:
         raise EigenError(

@@ -6,15 +6,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from cms.errors import FactorizationError
-from cms.solvers.pardiso import PardisoFactor, mkl_runtime
-from cms.solvers.superlu import SuperLuFactor
+from cms.solvers.registry import solver_of
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.solver import Factor, Solver
 
 __all__ = ["EmptyFactor", "Factorization", "Inertia", "factorize"]
 
 SINGULAR = 1e-3  #: relative residual after two solves; a regular matrix of condition 1e12 leaves 1e-4
-
-Backend = type[PardisoFactor] | type[SuperLuFactor]
 
 
 @dataclass(frozen=True)
@@ -47,8 +45,9 @@ class EmptyFactor:
 class Factorization:
     """A factorised symmetric matrix; a context manager that frees the factor at its end."""
 
-    def __init__(self, factor: PardisoFactor | SuperLuFactor | EmptyFactor) -> None:
+    def __init__(self, factor: Factor, solver: Solver) -> None:
         self._factor = factor
+        self.solver = solver  #: which made it, for further matrices of the same body
 
     @property
     def n(self) -> int:
@@ -72,13 +71,13 @@ class Factorization:
         Raises
         ------
         FactorizationError
-            If SuperLU had to leave the diagonal for a pivot, so that their signs say nothing.
+            If the solver had to leave the diagonal for a pivot, as SuperLU may, so that their signs say nothing.
         """
         factor = self._factor
         if factor.n_negative < 0:
             raise FactorizationError(
-                "inertia: SuperLU took pivots off the diagonal, so that their signs do not count eigenvalues; "
-                "install pypardiso (x86-64), or do without the proof"
+                f"inertia: {self.description}: pivots are off the diagonal, so that their signs do not count "
+                "eigenvalues; install pypardiso (x86-64), or do without the proof"
             )
         return Inertia(factor.n_negative, factor.n_perturbed, factor.n_positive)
 
@@ -102,11 +101,11 @@ class Factorization:
         self.close()
 
 
-def factorize(A: sp.csc_array, *, definite: bool = True, backend: Backend | None = None) -> Factorization:
+def factorize(A: sp.csc_array, *, definite: bool = True, solver: str | Solver | None = None) -> Factorization:
     """Factorise a symmetric sparse matrix.
 
     (1) lower triangle, every diagonal entry stored
-    (2) factor; PARDISO where it exists, SuperLU elsewhere
+    (2) factor by the solver asked for; PARDISO where it exists, SuperLU elsewhere
     (3) proof by two solves from a fixed random column: an (almost) singular matrix is refused
 
     Parameters
@@ -115,14 +114,16 @@ def factorize(A: sp.csc_array, *, definite: bool = True, backend: Backend | None
         Symmetric, (n, n); only its lower triangle is read.
     definite
         Whether A must be positive definite (Cholesky); False: any symmetric regular matrix.
-    backend
-        `PardisoFactor` or `SuperLuFactor`; by default the first that exists here.
+    solver
+        One of `SOLVERS` by name, or a `Solver`; by default the fastest that is installed.
 
     Raises
     ------
     FactorizationError
-        If A is not square or not finite, singular, not definite although `definite`, or too large for the memory.
+        If A is not square or not finite, singular, not definite although `definite`, or too large for the memory, or if
+        the solver is unknown or not installed.
     """
+    chosen = solver_of(solver)
     A = sp.csc_array(A)
     if A.shape[0] != A.shape[1] or A.shape[0] == 0:
         raise FactorizationError(f"factorize: expected a square matrix with at least one row, got {A.shape}")
@@ -131,10 +132,8 @@ def factorize(A: sp.csc_array, *, definite: bool = True, backend: Backend | None
     lower = lower_triangle(A)
     if definite:
         _require_positive_diagonal(lower)
-    if backend is None:
-        backend = PardisoFactor if mkl_runtime() is not None else SuperLuFactor
     try:
-        factorization = Factorization(backend(lower, definite=definite))
+        factorization = Factorization(chosen.factor(lower, definite=definite), chosen)
     except FactorizationError as error:
         hint = "; it is singular or not positive definite" if definite else "; it is singular"
         raise FactorizationError(f"factorize: {error}{hint}") from error

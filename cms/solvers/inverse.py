@@ -4,6 +4,7 @@ from typing import Protocol
 
 from cms.solvers.factorization import Inertia
 from fe_models.foundation.arrays import Array
+from fe_models.foundation.solver import Solver
 
 __all__ = ["Inverse"]
 
@@ -18,6 +19,10 @@ class Inverse(Protocol):
     @property
     def description(self) -> str:
         """Solver in words for the provenance."""
+
+    @property
+    def solver(self) -> Solver:
+        """What factorised, for further matrices of the same pencil."""
 
     @property
     def inertia(self) -> Inertia:

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from cms.errors import FactorizationError
 from fe_models.foundation.arrays import Array
 
-__all__ = ["PardisoFactor", "mkl_runtime"]
+__all__ = ["PardisoFactor", "missing_pardiso", "mkl_runtime"]
 
 POSITIVE_DEFINITE, INDEFINITE = 2, -2  # mtype: real symmetric
 ANALYSE_AND_FACTORIZE, SOLVE, RELEASE = 12, 33, -1  # phase
@@ -54,6 +54,11 @@ def mkl_runtime() -> ctypes.CDLL | None:
         return None
 
 
+def missing_pardiso() -> str:
+    """Return in words what PARDISO lacks here, "" where it can be used."""
+    return "" if mkl_runtime() is not None else "needs MKL, which is not installed; pip install pypardiso (x86-64 only)"
+
+
 def installed_mkl() -> str | None:
     """Return the path of the runtime library in the installed package `mkl`, if there is one."""
     try:
@@ -75,7 +80,7 @@ class PardisoFactor:
         """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices."""
         library = mkl_runtime()
         if library is None:
-            raise FactorizationError("PARDISO is not available here; install pypardiso (x86-64), or take SuperLU")
+            raise FactorizationError(f"PARDISO {missing_pardiso()}")
         self._pardiso = library["pardiso"]  # a handle of our own: pypardiso's carries its argument types
         self._pardiso.restype = None
         self.n = lower.shape[0]

@@ -52,7 +52,7 @@ def check_against(reduced: ReducedBody, path: Path, band: float | None) -> tuple
         require_same_units(uncoupled, reduced)
         with clock("couple interfaces"):
             body = coupled_body(job, uncoupled)
-        with Families(body) as families:
+        with Families(body, solver=job.reduction.solver) as families:
             with clock(f"mode set {job.reduction.set}"):
                 modes = job_mode_set(families, reduction_of(job, body))
             top = usable_band(modes, reduced) if band is None else band

@@ -1,0 +1,43 @@
+"""The solvers by name, as `--solver`, `solver` in job files and `solver=` choose them.
+
+Another one is a line of `SOLVERS`: its name, what makes a factor (`MakeFactor` of
+`fe_models.foundation.solver`), and what says in words what is missing here, "" where nothing is.
+"""
+
+from cms.errors import FactorizationError
+from cms.solvers.pardiso import PardisoFactor, missing_pardiso
+from cms.solvers.superlu import SuperLuFactor
+from fe_models.foundation.solver import Solver
+from fe_models.foundation.words import nearest, quoted
+
+__all__ = ["SOLVERS", "solver_of"]
+
+SOLVERS = {
+    solver.name: solver
+    for solver in (
+        Solver("pardiso", PardisoFactor, missing_pardiso),
+        Solver("superlu", SuperLuFactor),
+    )
+}
+DEFAULTS = ("pardiso", "superlu")  #: the first that is installed, where none is asked for
+
+
+def solver_of(choice: str | Solver | None = None) -> Solver:
+    """Return the solver of a name, or one given as such; None: the fastest one that is installed.
+
+    Raises
+    ------
+    FactorizationError
+        If there is no solver of that name, or it is not installed: the text says what to install.
+    """
+    if isinstance(choice, Solver):
+        return choice
+    if choice is None:
+        return next(SOLVERS[name] for name in DEFAULTS if not SOLVERS[name].missing())
+    if choice not in SOLVERS:
+        raise FactorizationError(f"unknown solver {quoted(choice)}{nearest(str(choice), SOLVERS)}")
+    solver = SOLVERS[choice]
+    if missing := solver.missing():
+        usable = ", ".join(name for name, other in SOLVERS.items() if not other.missing())
+        raise FactorizationError(f"solver {choice}: {missing}; installed here: {usable}")
+    return solver
