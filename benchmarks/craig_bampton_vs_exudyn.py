@@ -102,19 +102,37 @@ def measure(side, folder):
     print("RECORD " + json.dumps(record))
 
 
+def both(name):
+    """Return the records of both sides, ours first, and the number of dofs."""
+    with tempfile.TemporaryDirectory() as folder:
+        n_dof = make(BARS[name], Path(folder))
+        record = {}
+        for side in ("own", "exudyn"):
+            command = [sys.executable, "-m", "benchmarks.craig_bampton_vs_exudyn", side, folder]
+            out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+            record[side] = json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0])
+    ours, theirs = record["own"], record["exudyn"]
+    np.testing.assert_allclose(ours["Hz"], sorted(theirs["Hz"])[:N_MODES], rtol=1e-6)
+    return ours, theirs, n_dof
+
+
+def figures(short):
+    """Return what the watch keeps."""
+    name = "48k" if short else "149k"
+    ours, theirs, _ = both(name)
+    return {
+        f"against exudyn, {name} dofs, speedup": theirs["s"] / ours["s"],
+        f"against exudyn, {name} dofs, processor time, speedup": theirs["cpu"] / ours["cpu"],
+        f"memory beside exudyn, {name} dofs, saving": theirs["GB"] / ours["GB"],
+        f"{name} dofs [s]": ours["s"],
+    }
+
+
 def main():
     names = list(BARS) if "--large" in sys.argv else ["48k"]
     print("| dofs | floatframe | exudyn 1.13.6 | time | memory |\n|---|---|---|---|---|")
     for name in names:
-        with tempfile.TemporaryDirectory() as folder:
-            n_dof = make(BARS[name], Path(folder))
-            record = {}
-            for side in ("own", "exudyn"):
-                command = [sys.executable, "-m", "benchmarks.craig_bampton_vs_exudyn", side, folder]
-                out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-                record[side] = json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0])
-        ours, theirs = record["own"], record["exudyn"]
-        np.testing.assert_allclose(ours["Hz"], sorted(theirs["Hz"])[:N_MODES], rtol=1e-6)
+        ours, theirs, n_dof = both(name)
         print(
             f"| {n_dof} | {ours['s']:.2f} s, cpu {ours['cpu']:.1f} s (+ reduce {ours['more']:.2f} s), "
             f"{ours['GB']:.2f} GB "

@@ -154,16 +154,33 @@ def measure_peer(run, n_steps):
     return best[name], name
 
 
+def both(n_bodies, n_q, n_own, n_peer):
+    """Return our time of a step and the peer's with its solver, the body, and what runs either side."""
+    part = m_orthonormal_body(n_q, 3)
+    system, run = own(part, n_bodies), peer(part, n_bodies)
+    ours = measure([system], n_own, 5)[0][0]
+    theirs, solver = measure_peer(run, n_peer if n_bodies == 1 else max(n_peer // 8, 10))
+    return ours, theirs, solver, part, system, run
+
+
+def figures(short):
+    """Return what the watch keeps."""
+    told = {}
+    for n_bodies in (1, 10):
+        for n_q in (8, 20) if short else (8, 20, 50):
+            ours, theirs, *_ = both(n_bodies, n_q, 500, 80 if short else 200)
+            told[f"against exudyn, bodies: {n_bodies}, modes: {n_q}, speedup"] = theirs / ours
+            told[f"a step, bodies: {n_bodies}, modes: {n_q} [µs]"] = 1e6 * ours
+    return told
+
+
 def main():
     n_own = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
     n_peer = int(sys.argv[2]) if len(sys.argv) > 2 else 400
     print("bodies  modes   floatframe       exudyn   ratio  solver         tip: apart  half steps")
     for n_bodies in (1, 10):
         for n_q in (8, 20, 50):
-            part = m_orthonormal_body(n_q, 3)
-            system, run = own(part, n_bodies), peer(part, n_bodies)
-            ours = measure([system], n_own, 5)[0][0]
-            theirs, solver = measure_peer(run, n_peer if n_bodies == 1 else max(n_peer // 8, 10))
+            ours, theirs, solver, part, system, run = both(n_bodies, n_q, n_own, n_peer)
             n_tip = round(T_TIP / H)
             own_r, own_fine = (own_tip(system, part, n_bodies, h) for h in (H, H / 2))
             peer_r, peer_fine = run(H, n_tip, solver)[1], run(H / 2, 2 * n_tip, solver)[1]

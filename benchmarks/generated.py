@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import floatframe as ff
-from benchmarks.recursive import moving, shortest
+from benchmarks.recursive import compiled, moving, shortest
 from floatframe.generation.generate import GeneratedCode
 from floatframe.machines.road_car import RoadCar
 from floatframe.machines.road_car.systems import base, written
@@ -177,6 +177,24 @@ def beside_others() -> None:
     print(f"RX 90, moments symbols, OpenSYMORO {rx_90.additions:<4d} {rx_90.multiplications:<12d} {276:<4d} {325}")
     rx_90 = ff.generate(six_axes(**RX_90, gravity=(0, 0, 0))).operations
     print(f"RX 90, moments numbers             {rx_90.additions:<4d} {rx_90.multiplications}")
+
+
+def figures(short: bool) -> dict[str, float]:
+    """Return what the watch keeps: of the robot of six axes."""
+    model = moving(ff.relative_model(six_axes()))
+    z, v, a = model.work.x.copy(), model.work.v.copy(), model.work.a.copy()
+    code = ff.generate(model.expansion.system, what="inverse", name="robot")
+    n, out = model.n_rates, np.zeros(model.n_rates)
+    with tempfile.TemporaryDirectory() as folder:
+        made = library(code, [len(z), n, n], [n], Path(folder), "-O2")
+        given = np.concatenate([z, v, a])
+        turns = [(compiled(model, INVERSE), shortest(partial(looped, made, given, out))) for _ in range(TURNS)]
+    general, generated = (min(each) for each in zip(*turns, strict=True))
+    count = code.operations
+    return {
+        "generated inverse dynamics of a 6R robot (-O2) against the general routine, speedup": general / generated,
+        "operations of it over those without generation": (count.additions + count.multiplications) / sum(code.general),
+    }
 
 
 def main() -> None:

@@ -157,6 +157,19 @@ def error():
         print(f"{n:3} modes kept: {errors.max():.1e} (least {errors.min():.1e})", flush=True)
 
 
+def figures(short):
+    """Return what the watch keeps."""
+    size, name = ("small", "reduced") if short else ("full", "plain")
+    mesh_file(size)
+    solver = json.loads(measured(["-m", "benchmarks.interface_rich", "bare", size])["output"].partition("RECORD ")[2])
+    made = command(size, name)
+    return {
+        f"cms reduce over the bare solver, {solver['n_b']} boundary dofs, {name}": made["cpu"] / solver["cpu"],
+        f"peak of memory, {solver['n_b']} boundary dofs, {name} [GB]": made["GB"],
+        f"modal file, {solver['n_b']} boundary dofs, {name} [MB]": made["MB"],
+    }
+
+
 def main():
     size = "small" if "small" in sys.argv else "full"
     chosen = [name for name in VARIANTS if name in sys.argv[1:]] or list(VARIANTS)

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 OUT = Path(__file__).parent / "out"
-SIZES = {"0.5": 1.62, "1.0": 1.24}  # million dofs -> element size [mm]
+SIZES = {"0.1": 3.0, "0.5": 1.62, "1.0": 1.24}  # million dofs -> element size [mm]
 N_MODES = 50
 
 
@@ -90,15 +90,32 @@ def bare(path):
     return {"s": solved - start, "stages": {"factor": factored - start, "solve": solved - factored}}
 
 
+def measured(million):
+    """Return the record of the line and those of the bare solver before and after it: the machine drifts."""
+    path = mesh_file(million)
+    record = {}
+    for what in ("bare", "line", "bare"):
+        command = [sys.executable, "-m", "benchmarks.large_solid", what, str(path)]
+        out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+        record.setdefault(what, []).append(json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0]))
+    return record["line"][0], record["bare"]
+
+
+def figures(short):
+    """Return what the watch keeps."""
+    million = "0.1" if short else "0.5"
+    whole, bares = measured(million)
+    bare_s = np.mean([b["s"] for b in bares])
+    return {
+        f"mesh file to modal file over the bare solver, {million} M dofs": whole["s"] / bare_s,
+        f"mesh file to modal file, {million} M dofs [s]": whole["s"],
+        f"peak of memory, {million} M dofs [GB]": whole["GB"],
+    }
+
+
 def main():
     for million in [a for a in sys.argv[1:] if a in SIZES] or ["0.5"]:
-        path = mesh_file(million)
-        record = {}
-        for what in ("bare", "line", "bare"):  # bare before and after: the machine drifts
-            command = [sys.executable, "-m", "benchmarks.large_solid", what, str(path)]
-            out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
-            record.setdefault(what, []).append(json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0]))
-        (whole,), bares = record["line"], record["bare"]
+        whole, bares = measured(million)
         seconds = [b["s"] for b in bares]
         print(
             f"{whole['n_dof']} dofs: line {whole['s']:.1f} s, peak {whole['GB']:.1f} GB; bare "

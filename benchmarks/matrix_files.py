@@ -57,16 +57,39 @@ def best(action: Callable[[], Any]) -> tuple[float, float]:
     return min(walls), min(works)
 
 
-def report(name: str, files: list[Path], action: Callable[[], Any]) -> None:
-    """Print one line of the table."""
+def measured(files: list[Path], action: Callable[[], Any]) -> tuple[float, float, float, float]:
+    """Return megabytes, the time of reading the bytes, that of the reader and its processor time [s]."""
     size = sum(path.stat().st_size for path in files) / 1e6
     action()  # compiled code, and the pages of the files
     bytes_wall, _ = best(lambda: [path.read_bytes() for path in files])
-    wall, work = best(action)
+    return size, bytes_wall, *best(action)
+
+
+def report(name: str, files: list[Path], action: Callable[[], Any]) -> None:
+    """Print one line of the table."""
+    size, bytes_wall, wall, work = measured(files, action)
     print(
         f"| {name} | {size:.0f} MB | {bytes_wall:.2f} s | {wall:.2f} s, cpu {work:.2f} s | {wall / bytes_wall:.1f} "
         f"| {size / wall:.0f} MB/s |"
     )
+
+
+def figures(short: bool) -> dict[str, float]:
+    """Return what the watch keeps."""
+    K, M = block_pattern(20_000 if short else 100_000)
+    with tempfile.TemporaryDirectory() as folder:
+        texts = [Path(folder) / "block_STIF1.mtx", Path(folder) / "block_MASS1.mtx"]
+        for path, matrix in zip(texts, (K, M), strict=True):
+            write_mtx(path, matrix)
+        size, bytes_wall, wall, _ = measured(texts, lambda: fe_models.read_matrices(texts))
+        pair = Path(folder) / "pair.op4"
+        write_op4(pair, {"KAA": K, "MAA": M})
+        _, pair_bytes, pair_wall, _ = measured([pair], lambda: read_op4(pair))
+    return {
+        "text matrices over their bytes": wall / bytes_wall,
+        "text matrices [s/GB]": 1e3 * wall / size,
+        "OP4 over its bytes": pair_wall / pair_bytes,
+    }
 
 
 def main() -> None:

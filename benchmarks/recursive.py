@@ -50,20 +50,28 @@ def compiled(model: ff.RelativeModel, what: int) -> float:
     return shortest(lambda n: model.run(what, n))
 
 
+def times_of_chains(sizes: tuple[int, ...], tasks: dict[str, int] = TASKS) -> dict[str, list[float]]:
+    """Return times over the length of a chain of rigid bodies on hinges [µs]."""
+    models = [moving(ff.relative_model(chain(n))) for n in sizes]
+    return {name: [compiled(model, what) for model in models] for name, what in tasks.items()}
+
+
+def exponent(sizes: tuple[int, ...], times: list[float]) -> float:
+    """Return the power of the size with which times grow."""
+    return float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
+
+
 def growth() -> None:
     """Print times over the length of a chain, and the exponent over the last decade."""
     sizes = (10, 30, 100, 300, 1000)
     print("chain of rigid bodies on hinges, µs")
     print(f"{'':20s}" + "".join(f"{n:>10d}" for n in sizes) + "  exponent from 100 on")
-    models = [moving(ff.relative_model(chain(n))) for n in sizes]
-    for name, what in TASKS.items():
-        times = [compiled(model, what) for model in models]
-        exponent = np.polyfit(np.log(sizes[2:]), np.log(times[2:]), 1)[0]
-        print(f"{name:20s}" + "".join(f"{t:10.1f}" for t in times) + f"  {exponent:.2f}")
+    for name, times in times_of_chains(sizes).items():
+        print(f"{name:20s}" + "".join(f"{t:10.1f}" for t in times) + f"  {exponent(sizes[2:], times[2:]):.2f}")
 
 
-def beside_pinocchio() -> None:
-    """Print times beside Pinocchio's for trees of 30 bodies on hinges."""
+def pairs_of_times(branching: float) -> dict[str, tuple[float, float]]:
+    """Return our time and Pinocchio's of each task for a tree of 30 bodies on hinges [µs]."""
     import pinocchio as pin
 
     from tests.floatframe.relative.random_trees import PinocchioTree, random_state, random_tree, system_of
@@ -76,24 +84,43 @@ def beside_pinocchio() -> None:
         "forward dynamics": lambda m, d, x, v, a: pin.aba(m, d, x, v, a),
         "derivatives": lambda m, d, x, v, a: pin.computeRNEADerivatives(m, d, x, v, a),
     }
+    rng = np.random.default_rng(1)
+    links = random_tree(30, rng, kinds=("revolute",), branching=branching, reverse=False)
+    model, other = ff.relative_model(system_of(links)), PinocchioTree(links)
+    z, z_dot, z_ddot = random_state(links, rng)
+    model.take(z, z_dot, z_ddot)
+    theirs = other.model, other.data, other.x(z), other.v(z_dot), other.v(z_ddot)
+    pairs = {}
+    for name, what in TASKS.items():
+        call = functions[name]
+
+        def repeated(n: int, call=call) -> None:
+            for _ in range(n):
+                call(*theirs)
+
+        bare = shortest(lambda n, call=call: [call(empty, nothing, none, none, none) for _ in range(n)])
+        pairs[name] = compiled(model, what), shortest(repeated) - bare
+    return pairs
+
+
+def beside_pinocchio() -> None:
+    """Print times beside Pinocchio's for trees of 30 bodies on hinges."""
+    import pinocchio as pin
+
     print(f"\n30 rigid bodies on hinges, µs: ours, Pinocchio {pin.__version__} from PyPI, ratio")
     for words, branching in (("chain", 0.0), ("tree", 0.3), ("bushy tree", 0.7)):
-        rng = np.random.default_rng(1)
-        links = random_tree(30, rng, kinds=("revolute",), branching=branching, reverse=False)
-        model, other = ff.relative_model(system_of(links)), PinocchioTree(links)
-        z, z_dot, z_ddot = random_state(links, rng)
-        model.take(z, z_dot, z_ddot)
-        theirs = other.model, other.data, other.x(z), other.v(z_dot), other.v(z_ddot)
-        for name, what in TASKS.items():
-            call = functions[name]
-
-            def repeated(n: int, call=call, arguments=theirs) -> None:
-                for _ in range(n):
-                    call(*arguments)
-
-            bare = shortest(lambda n, call=call: [call(empty, nothing, none, none, none) for _ in range(n)])
-            ours, beside = compiled(model, what), shortest(repeated) - bare
+        for name, (ours, beside) in pairs_of_times(branching).items():
             print(f"{words:12s}{name:20s}{ours:10.2f}{beside:10.2f}{ours / beside:8.2f}")
+
+
+def figures(short: bool) -> dict[str, float]:
+    """Return what the watch keeps."""
+    told = {f"{name}, chain of 30, over Pinocchio": a / b for name, (a, b) in pairs_of_times(0.0).items()}
+    sizes = (100, 1000)
+    linear = {name: TASKS[name] for name in ("inverse dynamics", "forward dynamics")}
+    for name, times in times_of_chains(sizes, linear).items():
+        told[f"{name}, exponent of growth from 100 to 1000 bodies"] = exponent(sizes, times)
+    return told
 
 
 def against_factorisation() -> None:

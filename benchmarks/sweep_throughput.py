@@ -15,7 +15,7 @@ import argparse
 import resource
 import shutil
 import tempfile
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
@@ -58,19 +58,23 @@ def processor_seconds() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--points", type=int, default=1000, help="points of each sweep")
-    parser.add_argument("--warm", type=int, default=50, help="runs in one warm process, before and after the sweeps")
-    parser.add_argument("--workers", default="1,2,4", help="numbers of workers")
-    parser.add_argument("--no-dask", action="store_true", help="processes alone")
-    arguments = parser.parse_args()
+@dataclass(frozen=True)
+class Sweeps:
+    """What sweeps with workers of every kind took."""
+
+    n: int  #: points of a sweep
+    warm: float  #: processor time of a run in a warm process [s]
+    warm_clock: float  #: the same by the clock
+    rows: list[tuple[str, float, float, float]]  #: workers; start, a point [s of processor]; the whole by the clock [s]
+    is_same: bool  #: whether all tables are the same bit for bit
+
+
+def measured(n_points: int, n_warm: int, kinds: list[str]) -> Sweeps:
+    """Sweep with workers of every kind."""
     prepare()
-    numbers = [int(word) for word in arguments.workers.split(",")]
-    kinds = [*map(str, numbers), *([] if arguments.no_dask else [f"dask:{n}" for n in numbers])]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        study = read_study(files(folder, arguments.points))
+        study = read_study(files(folder, n_points))
         points = list(study.points())
         warm = StudyPoint(study)
         warm(points[0])
@@ -80,7 +84,7 @@ def main() -> None:
             nonlocal spent, wall
             with bounded_threads(1):
                 begin, before = perf_counter(), processor_seconds()
-                for point in points[: arguments.warm]:
+                for point in points[:n_warm]:
                     warm(point)
             spent, wall = spent + processor_seconds() - before, wall + perf_counter() - begin
 
@@ -94,23 +98,46 @@ def main() -> None:
                 begin, before = perf_counter(), processor_seconds()
                 table = run_study(each_study, workers=workers, journal=folder / f"{len(rows)}-{k}.journal")
                 spent_on.append((len(table.rows), processor_seconds() - before))
-            rows.append((workers, spent_on, perf_counter() - begin))
+            (n_few, few), (n_all, all_) = spent_on
+            a_point = (all_ - few) / (n_all - n_few)
+            rows.append((workers, all_ - n_all * a_point, a_point, perf_counter() - begin))
             tables[workers] = table.column("deflection").tobytes()
         run_warm()
-    n_warm = 2 * min(arguments.warm, len(points))
-    each, lasts = spent / n_warm, wall / n_warm
+    runs = 2 * min(n_warm, len(points))
+    return Sweeps(len(points), spent / runs, wall / runs, rows, len(set(tables.values())) == 1)
+
+
+def figures(short: bool) -> dict[str, float]:
+    """Return what the watch keeps."""
+    found = measured(*((48, 12) if short else (1000, 50)), ["1", "2"])
+    if not found.is_same:
+        raise RuntimeError("tables of a sweep differ between workers")
+    return {
+        f"point of a sweep over a run in a warm process, workers: {workers}": a_point / found.warm
+        for workers, _, a_point, _ in found.rows
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--points", type=int, default=1000, help="points of each sweep")
+    parser.add_argument("--warm", type=int, default=50, help="runs in one warm process, before and after the sweeps")
+    parser.add_argument("--workers", default="1,2,4", help="numbers of workers")
+    parser.add_argument("--no-dask", action="store_true", help="processes alone")
+    arguments = parser.parse_args()
+    numbers = [int(word) for word in arguments.workers.split(",")]
+    kinds = [*map(str, numbers), *([] if arguments.no_dask else [f"dask:{n}" for n in numbers])]
+    found = measured(arguments.points, arguments.warm, kinds)
+    each, lasts = found.warm, found.warm_clock
     print(f"one run in a warm process: {1e3 * each:.1f} ms of processor time, {1e3 * lasts:.1f} ms on the clock\n")
     print("| workers | start | a point | over a warm run | 1000 points with their start | throughput on the clock |")
     print("|---|---|---|---|---|---|")
-    for workers, ((n_few, few), (n_all, all_)), elapsed in rows:
-        a_point = (all_ - few) / (n_all - n_few)
-        start = all_ - n_all * a_point
+    for workers, start, a_point, elapsed in found.rows:
         whole = (start / 1000 + a_point) / each
-        speed = len(points) / elapsed * lasts
+        speed = found.n / elapsed * lasts
         costs = f"{start:.1f} s | {1e3 * a_point:.1f} ms | {a_point / each:.2f} | {whole:.2f}"
         print(f"| {workers} | {costs} | {speed:.2f} |")
-    same = len(set(tables.values())) == 1
-    print(f"\n{len(points)} points each; tables {'the same bit for bit' if same else 'DIFFER'}")
+    print(f"\n{found.n} points each; tables {'the same bit for bit' if found.is_same else 'DIFFER'}")
 
 
 if __name__ == "__main__":

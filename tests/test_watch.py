@@ -1,0 +1,77 @@
+"""The watch over benchmarks: what counts as worse, what a page tells, numbers that texts quote from kept results."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks import watch
+from benchmarks.watch import Change, Results
+
+
+def results(**figures: float) -> Results:
+    """Return results of one benchmark."""
+    return Results("abc", "2026-01-01", watch.this_machine(), 0.1, {"recursive": dict(figures)}, {"recursive": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("name", "now", "last", "is_regression"),
+    [
+        ("ours over theirs", 1.2, 1.0, True),
+        ("ours over theirs", 1.1, 1.0, False),
+        ("ours over theirs", 0.5, 1.0, False),
+        ("against theirs, speedup", 0.8, 1.0, True),
+        ("against theirs, speedup", 2.0, 1.0, False),
+        ("memory, saving", 1.0, 1.2, True),
+        ("a step [µs]", 9.0, 1.0, False),  # of the machine, not judged
+        ("ours over theirs", 9.0, None, False),
+    ],
+)
+def test_a_ratio_that_grew_by_more_than_15_percent_is_a_regression(name, now, last, is_regression):
+    assert Change("m", name, now, last).is_regression is is_regression
+
+
+def test_results_come_back_as_written(tmp_path):
+    made = results(**{"a over b": 1.25})
+    made.write(tmp_path / "results.json")
+    assert Results.read(tmp_path / "results.json") == made
+    assert Results.read(tmp_path / "none.json") is None
+    assert [path.name for path in tmp_path.iterdir()] == ["results.json"]
+
+
+def test_the_page_tells_both_runs_and_names_what_became_worse():
+    now, last = results(**{"a over b": 1.5, "a step [µs]": 12.0}), results(**{"a over b": 1.0})
+    now.failed["shells"] = "no module named x"
+    rows = watch.page(now, last).splitlines()
+    assert "| a over b | 1.5 | 1 | +50 % **regression** |" in rows
+    assert "| a step [µs] | 12 | – |  |" in rows
+    assert "- `shells`: no module named x" in rows
+
+
+def test_quoted_figures_are_renewed_with_their_decimals(tmp_path, monkeypatch):
+    text = tmp_path / "page.md"
+    text.write_text(
+        "ratio 3.1<!-- recursive: a over b -->x, step 7<!--recursive: c--> ms, old 2<!-- recursive: gone -->"
+    )
+    monkeypatch.setattr(watch, "texts", lambda: [text])
+    assert watch.quote(results(**{"a over b": 2.46, "c": 12.4})) == [text]
+    assert text.read_text() == (
+        "ratio 2.5<!-- recursive: a over b -->x, step 12<!--recursive: c--> ms, 2<!-- recursive: gone -->"
+    )
+
+
+def test_a_benchmark_that_fails_says_why(monkeypatch, tmp_path):
+    with pytest.raises(RuntimeError, match=r"No module named .benchmarks\.none."):
+        watch.measured("none", short=True, limit=60.0)
+
+
+def test_names_are_those_of_benchmarks_that_take_part():
+    names = watch.modules()
+    assert "recursive" in names
+    assert "watch" not in names
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks", "nothing"], cwd=Path(__file__).parents[1], capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert "no benchmark nothing; known: " in done.stderr
