@@ -9,6 +9,7 @@ from cms.errors import BodyError, EigenError, FactorizationError, ModeSetError
 from cms.solvers.factorization import EmptyFactor, Factorization, factorize
 from cms.solvers.registry import solver_of
 from fe_models.body.fe_body import MULTIPLIER, FEBody
+from fe_models.body.nearby import nearby_order
 from fe_models.body.submatrix import principal_block
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.solver import Solver
@@ -24,7 +25,7 @@ class FixedInterfaceBody:
     """Interior partition of a coupled body and the factorisation of K_II; use as a context manager to free it."""
 
     body: FEBody
-    i: IntArray  #: interior dofs: all others, ascending, (n_i,)
+    i: IntArray  #: interior dofs: all others, in an order in which neighbours are near, (n_i,)
     b: IntArray  #: held dofs: the boundary dofs in the order of `body.b`, then extra ones, (n_b,)
     K_ii: sp.csc_array  #: (n_i, n_i) [N/m]
     M_ii: sp.csc_array  #: (n_i, n_i) [kg]
@@ -67,6 +68,7 @@ def fix_interfaces(
     i = np.setdiff1d(np.arange(body.n_dof), b)
     if len(b) == 0:
         raise ModeSetError(f"body {body.name!r} has no interface; give it at least one, or take free modes")
+    i = nearby_order(body.K, body.dofs, i)
     K_ii = principal_block(body.K, i)
     M_ii = principal_block(body.M, i)
     if not len(i):

@@ -1,12 +1,14 @@
 """Products of a large symmetric sparse matrix with blocks of columns, in threads (SciPy's own use one)."""
 
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
 
 from cms.solvers.tall import ordered
+from fe_models.body.submatrix import scalar_part
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.threads import n_threads
 
@@ -17,14 +19,24 @@ COLUMNS = 16  #: columns per pass over the matrix; the rows of x it touches then
 
 
 class SymmetricProduct:
-    """The map x -> A x of a symmetric matrix A; its compressed columns are read as rows, nothing is copied."""
+    """The map x -> A x of a symmetric matrix A; its compressed columns are read as rows, nothing is copied.
+
+    Where A begins with S ⊗ 1₃ (`scalar_part`), as the mass of a solid does, columns x of three components a node are
+    rows of S three times as wide: a third of the entries is read, and the rows of x come in longer pieces. With
+    B = A[:, 3p:] for what else there is (reference nodes, multipliers)
+
+        (A x)_lead = (S ⊗ 1₃) x_lead + B_lead x_rest,   (A x)_rest = Bᵀ x
+    """
 
     def __init__(self, A: sp.csc_array) -> None:
-        n = A.shape[0]
+        self._A = A
+        S = scalar_part(A) if A.nnz > SMALL else sp.csr_array((0, 0))
+        self._n_lead = 3 * S.shape[0] if 6 * S.shape[0] > A.shape[0] else 0
+        rows = S if self._n_lead else sp.csr_array((A.data, A.indices, A.indptr), shape=A.shape)
         n_parts = max(1, min(n_threads(), A.nnz // SMALL))
-        cuts = np.searchsorted(A.indptr, np.linspace(0, A.nnz, n_parts + 1)[1:-1])
-        self._bounds = np.concatenate([[0], cuts, [n]]).astype(int)
-        self._parts = [_rows(A, *bounds) for bounds in zip(self._bounds[:-1], self._bounds[1:], strict=True)]
+        cuts = np.searchsorted(rows.indptr, np.linspace(0, rows.nnz, n_parts + 1)[1:-1])
+        self._bounds = np.concatenate([[0], cuts, [rows.shape[0]]]).astype(int)
+        self._parts = [_rows(rows, *bounds) for bounds in zip(self._bounds[:-1], self._bounds[1:], strict=True)]
         self._pool = ThreadPoolExecutor(n_parts) if n_parts > 1 else None
 
     def __matmul__(self, x: Array) -> Array:
@@ -34,18 +46,42 @@ class SymmetricProduct:
         for first in range(0, x.shape[1], COLUMNS):
             block = np.ascontiguousarray(ordered(x[:, first : first + COLUMNS], "C"))
             target = result[:, first : first + COLUMNS]
-
-            def multiply(k: int, block: Array = block, target: Array = target) -> None:
-                target[self._bounds[k] : self._bounds[k + 1]] = self._parts[k] @ block
-
-            if self._pool is None:
-                multiply(0)
+            if self._n_lead:
+                self._multiply(block[: self._n_lead], target[: self._n_lead], 3)
+                self._add_rest(block, target)
             else:
-                list(self._pool.map(multiply, range(len(self._parts))))
+                self._multiply(block, target, 1)
         return ordered(result, order)
 
+    def _multiply(self, block: Array, target: Array, n_components: int) -> None:
+        """Write the product by the rows in parts; rows of so many components lie in one row of the block."""
+        wide = block.reshape(-1, n_components * block.shape[1])
 
-def _rows(A: sp.csc_array, first: int, last: int) -> sp.csr_array:
+        def multiply(k: int) -> None:
+            rows = slice(n_components * self._bounds[k], n_components * self._bounds[k + 1])
+            target[rows] = (self._parts[k] @ wide).reshape(-1, block.shape[1])
+
+        if self._pool is None:
+            multiply(0)
+        else:
+            list(self._pool.map(multiply, range(len(self._parts))))
+
+    def _add_rest(self, block: Array, target: Array) -> None:
+        """Add what the columns after those of S have."""
+        rest, (rows, B_rows) = self._rest
+        target[rows] += B_rows @ block[self._n_lead :]
+        target[self._n_lead :] = rest @ block
+
+    @cached_property
+    def _rest(self) -> tuple[sp.csr_array, tuple[Array, sp.csr_array]]:
+        """Bᵀ, and the rows of B_lead that are not empty with their numbers."""
+        B = sp.csc_array(self._A[:, self._n_lead :])
+        rows = np.unique(B.indices)
+        rows = rows[rows < self._n_lead]
+        return sp.csr_array(B.T), (rows, sp.csr_array(B)[rows])
+
+
+def _rows(A: sp.csr_array, first: int, last: int) -> sp.csr_array:
     entries = slice(A.indptr[first], A.indptr[last])
     indptr = A.indptr[first : last + 1] - A.indptr[first]
-    return sp.csr_array((A.data[entries], A.indices[entries], indptr), shape=(last - first, A.shape[0]))
+    return sp.csr_array((A.data[entries], A.indices[entries], indptr), shape=(last - first, A.shape[1]))

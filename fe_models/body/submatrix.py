@@ -1,27 +1,65 @@
-"""Principal submatrices of large sparse matrices in one pass, where SciPy's indexing takes several."""
+"""Parts of large sparse matrices in one pass over them, where SciPy's indexing takes several."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from fe_models.foundation.arrays import IntArray
+from fe_models.foundation.threads import n_threads
 
-__all__ = ["principal_block"]
+__all__ = ["principal_block", "scalar_part"]
+
+SMALL = 200_000  #: stored entries below which compiled loops cost more than they bring
 
 
 def principal_block(A: sp.csc_array, index: IntArray) -> sp.csc_array:
-    """Return A[index][:, index] for ascending indices, (n, n), with sorted row indices if A has them."""
+    """Return A[index][:, index], (n, n), with sorted row indices; the index may have any order."""
     n = len(index)
-    if n == A.shape[0]:
+    if n == A.shape[0] and (index[1:] > index[:-1]).all():
         return A
-    if n and index[-1] == n - 1:
-        return sp.csc_array(A[:n, :n])
+    if A.nnz < SMALL:
+        block = sp.csc_array(A[:, index])[index]
+        block.sort_indices()
+        return block
+    from fe_models.body.sparse_kernels import column_counts, column_entries
+
     new_row = np.full(A.shape[0], -1, A.indices.dtype)
     new_row[index] = np.arange(n)
-    rows = new_row[A.indices]
-    is_in = rows >= 0
-    is_in &= np.repeat(new_row >= 0, np.diff(A.indptr))
-    per_column = np.add.reduceat(np.append(is_in, False), A.indptr[:-1], dtype=A.indptr.dtype)
-    per_column[np.diff(A.indptr) == 0] = 0  # reduceat takes one entry where a column has none
+    counts = np.empty(n, A.indptr.dtype)
+    in_threads(column_counts, (A.indptr, A.indices, index, new_row), (counts,))
     indptr = np.zeros(n + 1, A.indptr.dtype)
-    np.cumsum(per_column[index], out=indptr[1:])
-    return sp.csc_array((A.data[is_in], rows[is_in], indptr), shape=(n, n))
+    np.cumsum(counts, out=indptr[1:])
+    indices, data = np.empty(indptr[-1], A.indices.dtype), np.empty(indptr[-1])
+    in_threads(column_entries, (A.indptr, A.indices, A.data, index, new_row), (indptr, indices, data))
+    block = sp.csc_array((data, indices, indptr), shape=(n, n))
+    block.has_sorted_indices = True
+    return block
+
+
+def scalar_part(A: sp.csc_array) -> sp.csr_array:
+    """Return the largest S, (p, p), with A[:3p, :3p] = S ⊗ 1₃ bit for bit, such as the scalar mass of a solid.
+
+    Parameters
+    ----------
+    A
+        Symmetric, (n, n), dofs node by node; p is 0 where the first three are no such block already, or its row
+        indices are not sorted.
+    """
+    from fe_models.body.sparse_kernels import n_scalar_nodes, scalar_entries
+
+    p = n_scalar_nodes(A.indptr, A.indices, A.data) if A.has_sorted_indices else 0
+    indptr = np.zeros(p + 1, A.indptr.dtype)
+    scalar_entries(A.indptr, A.indices, A.data, p, indptr, A.indices[:0], A.data[:0])
+    indices, data = np.empty(indptr[-1], A.indices.dtype), np.empty(indptr[-1])
+    scalar_entries(A.indptr, A.indices, A.data, p, indptr, indices, data)
+    return sp.csr_array((data, indices, indptr), shape=(p, p))
+
+
+def in_threads(kernel: Callable[..., Any], inputs: tuple[Any, ...], outputs: tuple[Any, ...]) -> None:
+    """Run kernel(*inputs, part, n_parts, *outputs) for every part in threads."""
+    n_parts = n_threads()
+    with ThreadPoolExecutor(n_parts) as pool:
+        list(pool.map(lambda part: kernel(*inputs, part, n_parts, *outputs), range(n_parts)))

@@ -1,0 +1,91 @@
+"""Compiled loops over large sparse matrices in compressed columns; imported where they are used.
+
+A kernel works on a share of the columns, `part` of `n_parts`, and writes nothing outside it.
+"""
+
+import numpy as np
+from numba import njit
+
+__all__ = ["column_counts", "column_entries", "n_scalar_nodes", "scalar_entries"]
+
+jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@jit
+def column_counts(indptr, indices, index, new_row, part, n_parts, counts):
+    """Count the entries of column index[k] whose rows stay, into counts, (n,); new_row: -1 where a row leaves."""
+    for k in range(part * index.size // n_parts, (part + 1) * index.size // n_parts):
+        count = 0
+        for e in range(indptr[index[k]], indptr[index[k] + 1]):
+            if new_row[indices[e]] >= 0:
+                count += 1
+        counts[k] = count
+
+
+@jit
+def column_entries(indptr, indices, data, index, new_row, part, n_parts, new_indptr, new_indices, new_data):
+    """Write the entries that `column_counts` counted, the rows of every column ascending.
+
+    Rows that follow each other, such as those of a node, keep to each other: (1) runs of them are put in order, (2)
+    written.
+    """
+    first_k, last_k = part * index.size // n_parts, (part + 1) * index.size // n_parts
+    longest = 0
+    for k in range(first_k, last_k):
+        longest = max(longest, new_indptr[k + 1] - new_indptr[k])
+    run_row, run_entry = np.empty(longest, np.int64), np.empty(longest, np.int64)
+    for k in range(first_k, last_k):
+        n_runs, next_row = 0, -1
+        for e in range(indptr[index[k]], indptr[index[k] + 1]):  # (1)
+            row = new_row[indices[e]]
+            if row >= 0 and row != next_row:
+                m = n_runs
+                while m > 0 and run_row[m - 1] > row:
+                    run_row[m], run_entry[m] = run_row[m - 1], run_entry[m - 1]
+                    m -= 1
+                run_row[m], run_entry[m] = row, e
+                n_runs += 1
+            next_row = row + 1 if row >= 0 else -1
+        at, end = new_indptr[k], indptr[index[k] + 1]
+        for run in range(n_runs):  # (2)
+            row, e = run_row[run], run_entry[run]
+            while e < end and new_row[indices[e]] == row:
+                new_indices[at], new_data[at] = row, data[e]
+                at, e, row = at + 1, e + 1, row + 1
+
+
+@jit
+def n_scalar_nodes(indptr, indices, data):
+    """Return the largest p for which the first 3 p rows and columns of a symmetric matrix are S ⊗ 1₃, bit for bit.
+
+    Entries beyond the diagonal block of a node are judged with the node they lead to: the matrix is symmetric.
+    """
+    n_nodes = (indptr.size - 1) // 3
+    for node in range(n_nodes):
+        first = indptr[3 * node]
+        count = 0
+        while first + count < indptr[3 * node + 1] and indices[first + count] < 3 * node + 3:
+            if indices[first + count] % 3 != 0:
+                return node
+            count += 1
+        for c in range(1, 3):
+            at, end = indptr[3 * node + c], indptr[3 * node + c + 1]
+            if end - at < count or (end - at > count and indices[at + count] < 3 * node + 3):
+                return node
+            for e in range(count):
+                if indices[at + e] != indices[first + e] + c or data[at + e] != data[first + e]:
+                    return node
+    return n_nodes
+
+
+@jit
+def scalar_entries(indptr, indices, data, p, new_indptr, new_indices, new_data):
+    """Write S, (p, p), of the first 3 p columns S ⊗ 1₃; with empty arrays for its entries count them only."""
+    at = 0
+    for node in range(p):
+        for e in range(indptr[3 * node], indptr[3 * node + 1]):
+            if indices[e] < 3 * p:
+                if new_indices.size:
+                    new_indices[at], new_data[at] = indices[e] // 3, data[e]
+                at += 1
+        new_indptr[node + 1] = at
