@@ -46,6 +46,7 @@ class DiscreteSystem:
     cases: tuple[tuple[int, ...], ...]  #: load cases on each body
     n_held: int
     length: float
+    markers: tuple[BodyMarker, ...]  #: all
 
     def own_loads(self, i: int, step: BodyStep, load: Load, span: Span) -> Given:
         """Add gravity, point forces and load cases on body i; gravity has a potential and gives no work."""
@@ -116,23 +117,24 @@ def discrete_system(system: System, scheme: str) -> DiscreteSystem:
         if not all(kind_of(k).in_steps for k in model.rows.kind[model.connections.w0[c] : model.connections.w0[c + 1]]):
             raise ModelError(f"{scheme}: joint {name!r} is of a kind that is not known to it; use generalized-alpha")
     bodies = central_bodies(model, compiled.body_names, scheme)
+    markers = tuple(body_marker(model, bodies, m) for m in range(len(model.markers.body)))
     connections, n_held = [], 0
     for c in range(len(model.connections.size)):
         rows = range(int(model.connections.w0[c]), int(model.connections.w0[c + 1]))
         held = tuple(k for k in rows if kind_of(model.rows.kind[k]).holds)
         loaded = tuple(k for k in rows if kind_of(model.rows.kind[k]).is_loaded)
-        a, b = (body_marker(model, bodies, int(m)) for m in (model.connections.a[c], model.connections.b[c]))
-        connections.append(Connection(c, a, b, held, loaded, n_held))
+        a, b = int(model.connections.a[c]), int(model.connections.b[c])
+        connections.append(Connection(c, markers[a], markers[b], held, loaded, n_held))
         n_held += len(held)
     point_forces: list[list[tuple[int, BodyMarker]]] = [[] for _ in bodies]
     cases: list[list[int]] = [[] for _ in bodies]
     for k, m in enumerate(model.loads.marker):
-        marker = body_marker(model, bodies, int(m))
+        marker = markers[int(m)]
         if marker.body >= 0:
             point_forces[marker.body].append((k, marker))
     for k, i in enumerate(model.body_loads.body):
         cases[int(i)].append(k)
     return DiscreteSystem(
         model, bodies, tuple(connections), tuple(map(tuple, point_forces)), tuple(map(tuple, cases)), n_held,
-        compiled.length,
+        compiled.length, markers,
     )  # fmt: skip

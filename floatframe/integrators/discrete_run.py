@@ -6,12 +6,13 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.system import compiled_system
-from floatframe.discrete.bodies import Placed, placed_bodies, state_of
+from floatframe.discrete.bodies import Placed
+from floatframe.discrete.compiled import kept_of
 from floatframe.discrete.constraints import Span
-from floatframe.discrete.newton import StepError
 from floatframe.discrete.system import DiscreteSystem, discrete_system
 from floatframe.errors import ModelError
-from floatframe.integrators.carry import Carry, Failure, observed, one_step_of, turned_on, with_angles
+from floatframe.integrators.carry import Carry, Failure, carry_of, memory_of, observed, one_step_of, with_angles
+from floatframe.kernels.entry import Outcome
 from floatframe.kernels.memory import Rows, new_rows
 from floatframe.kernels.work import Work
 from floatframe.start.initial import consistent_motion, solve_accelerations, with_compatible_velocities
@@ -36,6 +37,16 @@ class DiscreteScheme:
 
     tolerance: float
     max_iterations: int
+
+    @property
+    def equations(self) -> int:
+        """Which equations: `CONSERVING` or `VARIATIONAL`."""
+        raise NotImplementedError
+
+    @property
+    def damping(self) -> float:
+        """Spectral radius of modes far above 1/h; 1 without dissipation."""
+        return 1.0
 
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """Return the bodies, multipliers and work after a step; `StepError` if it fails."""
@@ -67,33 +78,41 @@ class DiscreteScheme:
         self, system: System, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int, every: int
     ) -> tuple[Carry, Rows, int, Failure | None]:
         """Advance by n_steps of size h, the first of them number `first` from t0; see `carry.Integrator`."""
+        from floatframe.discrete.kernels.entry import advance_discrete_steps
+
+        model = compiled_system(system).model
         ds = discrete_system(system, type(self).__name__)
-        rows = [new_rows(compiled_system(system).model, 0)]
-        n_good, failure = 0, None
-        for k in range(first, first + n_steps):
-            placed = placed_bodies(ds.bodies, ds.model, carry.state)
-            t_0, t_1 = t0 + k * h, t0 + (k + 1) * h
-            try:
-                result = self.one_step(ds, placed, Span(t_0, t_1, 0.5 * (t_0 + t_1)), carry.a)
-            except StepError as error:
-                failure = Failure(f"{error}; choose a smaller h, or look for a singular position", error.excess)
-                break
-            carry = replace(
-                carry,
-                state=state_of(ds.bodies, result.placed),
-                a=result.f,
-                h=h,
-                work=carry.work + np.array(result.work),
-                n_iterations=carry.n_iterations + result.n_iterations,
-                n_steps=carry.n_steps + 1,
-            )
-            carry = turned_on(system, carry, h)
-            n_good += 1
-            if (k + 1) % every == 0:
-                carry, row = self.observe(system, t_1, carry, work)
-                rows.append(row)
-        joined = Rows(*(np.concatenate([getattr(part, name) for part in rows]) for name in Rows._fields))
-        return carry, joined, n_good, failure
+        kept = kept_of(work, ds, self.equations, h, self.damping)
+        step = kept.step
+        kept.go_on_from(carry, carry.a, is_anew=bool(work.solver.c_k == 0.0))
+        work.solver.c_k[...] = 1.0
+        memory = memory_of(carry)
+        rows = new_rows(model, (first + n_steps) // every - first // every)
+        iterations = int(step.n_iterations)
+        outcome = advance_discrete_steps(
+            model, work, kept.discrete, step, memory, rows, t0=t0, h=h, first=first, n_steps=n_steps, every=every,
+            tolerance=self.tolerance, max_iterations=self.max_iterations, length=ds.length,
+        )  # fmt: skip
+        memory.h[...] = h
+        n_iterations = carry.n_iterations + int(step.n_iterations) - iterations
+        after = replace(carry_of(memory, n_iterations), a=step.f_kept.copy(), power=carry.power)
+        kept.after = after
+        rows = Rows(*(array[: outcome.n_rows] for array in rows))
+        return after, rows, outcome.n_steps, explained(outcome, self.max_iterations)
+
+
+def explained(outcome: Outcome, max_iterations: int) -> Failure | None:
+    """Say why a step failed; None if none did."""
+    from floatframe.discrete.kernels.newton import CONVERGED, SINGULAR
+
+    if outcome.status == CONVERGED:
+        return None
+    words = f"Newton's method did not converge in {max_iterations} iterations"
+    if outcome.status == SINGULAR:
+        words = "the matrix of Newton's method is singular"
+    elif not np.isfinite(outcome.excess):
+        words = "Newton's method diverged"
+    return Failure(f"{words}; choose a smaller h, or look for a singular position", outcome.excess)
 
 
 def check_options(scheme: DiscreteScheme) -> None:

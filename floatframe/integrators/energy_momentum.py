@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as la
 
 from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, step_of
+from floatframe.discrete.compiled import Filter, filter_of
 from floatframe.discrete.constraints import Span
+from floatframe.discrete.kernels.records import CONSERVING
 from floatframe.discrete.newton import solve_step, work_of
 from floatframe.discrete.system import DiscreteSystem
 from floatframe.errors import ModelError
@@ -51,6 +52,11 @@ class EnergyMomentum(DiscreteScheme):
     def __post_init__(self) -> None:
         check_options(self)
 
+    @property
+    def equations(self) -> int:
+        """Which equations: `CONSERVING`."""
+        return CONSERVING
+
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """Return the bodies, multipliers and work after a step."""
         return conserving_step(ds, placed, span, f, 1.0, self.tolerance, self.max_iterations)
@@ -85,28 +91,19 @@ class EnergyDecaying(DiscreteScheme):
         if not 0.0 <= self.rho_inf <= 1.0:
             raise ModelError(f"EnergyDecaying: rho_inf: expected 0 <= rho_inf <= 1, got {self.rho_inf}")
 
+    @property
+    def equations(self) -> int:
+        """Which equations: `CONSERVING`."""
+        return CONSERVING
+
+    @property
+    def damping(self) -> float:
+        """Spectral radius of modes far above 1/h."""
+        return self.rho_inf
+
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """Return the bodies, multipliers and work after a step."""
         return conserving_step(ds, placed, span, f, self.rho_inf, self.tolerance, self.max_iterations)
-
-
-@dataclass(frozen=True, eq=False)
-class Filter:
-    """Dissipation of the modes of one body."""
-
-    G: Array  #: Phi chi Phiᵀ, (n, n)
-    X: Array  #: (n, n)
-
-
-def filter_of(body: CentralBody, h: float, rho_inf: float) -> Filter:
-    """Return the dissipation of the modes of a body for steps of size h."""
-    M = body.mass_matrix(np.zeros(body.n))
-    effective = M[3:, 3:] - M[3:, :3] @ np.linalg.solve(M[:3, :3], M[:3, 3:])
-    squares, Phi = la.eigh(body.K, 0.5 * (effective + effective.T))
-    x = h**2 * np.maximum(squares, 0.0)
-    chi = 0.5 * (1 - rho_inf) / (1 + rho_inf) * x / (1 + x)
-    G = (Phi * chi) @ Phi.T
-    return Filter(G, G @ effective)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ import numpy as np
 from fe_models.foundation.arrays import Array
 from floatframe.discrete.bodies import BodyStep, CentralBody, Placed, moved, still
 from floatframe.discrete.constraints import Span, add_reaction, rate_in_time
+from floatframe.discrete.kernels.records import VARIATIONAL
 from floatframe.discrete.markers import Load
 from floatframe.discrete.newton import Solution, StepError, pair_of, solve_step, work_of
 from floatframe.discrete.system import DiscreteSystem
@@ -62,6 +63,11 @@ class Variational(DiscreteScheme):
                     "scheme does not know; use energy-momentum or generalized-alpha"
                 )
         return super().start(system, t, state, before)
+
+    @property
+    def equations(self) -> int:
+        """Which equations: `VARIATIONAL`."""
+        return VARIATIONAL
 
     def one_step(self, ds: DiscreteSystem, placed: list[Placed], span: Span, f: Array) -> StepResult:
         """(1), (2): return the bodies, multipliers and work after a step."""

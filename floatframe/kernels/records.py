@@ -78,10 +78,16 @@ def zeros(declaration: Record, sizes: Mapping[str, int]) -> Record:
 
 
 def filled(declaration: Record, **values: Any) -> Record:
-    """Return a record with arrays made of lists of entries; of an array of one number, made of that."""
+    """Return a record with arrays made of lists of entries; of an array of one number, made of that.
+
+    A record in it is given as it is.
+    """
     made: dict[str, Any] = {}
     for name, declared in zip(declaration._fields, declaration, strict=True):
-        array = np.array(values.pop(name), declared.dtype, order="C")
+        if not isinstance(declared, Declared):
+            made[name] = values.pop(name)
+            continue
+        array: Array = np.array(values.pop(name), declared.dtype, order="C")
         made[name] = array.reshape(-1, *declared.shape[1:]) if declared.shape else array
     if values:
         raise TypeError(f"{type(declaration).__name__} has no arrays {', '.join(values)}")

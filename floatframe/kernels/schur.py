@@ -13,13 +13,19 @@ from floatframe.kernels.dense import lu_factor, lu_solve, lu_solve_columns
 from floatframe.kernels.evaluation import linearize
 from floatframe.kernels.vector import add, put, put_sum, scaled, turned, turned_back
 
-__all__ = ["correction", "factorize_bodies"]
+__all__ = ["assemble", "correction", "factorize_bodies", "factorize_connections", "factorize_tangents"]
 
 
 @inner
 def factorize_bodies(model, work, c_m, c_d, c_k):
     """Linearise at the iterate, factorise H and write X, Z. Return the body whose H is singular, or -1."""
     linearize(model, work, c_m, c_d, c_k)
+    return factorize_tangents(model, work)
+
+
+@inner
+def factorize_tangents(model, work):
+    """Factorise H of every body and write X, Z. Return the body whose H is singular, or -1."""
     work.counted.factorisations += 1
     for i in range(model.bodies.kind.shape[0]):
         n = 6 + model.bodies.n_q[i]

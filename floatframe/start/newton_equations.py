@@ -20,6 +20,7 @@ __all__ = [
     "linearized",
     "modal_diagonals",
     "modal_matrix",
+    "modal_weight",
     "set_iterate",
     "solve",
     "with_mass_for_all",
@@ -140,15 +141,20 @@ def highest_frequency(model: Model) -> float:
     return highest
 
 
+def modal_weight(model: Model, i: int) -> float:
+    """Return the factor s of the modal stiffness of a body in W of the module docstring."""
+    M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
+    elastic = (M > 0) & (K > 0)
+    softest = np.min(K[elastic] / M[elastic]) if elastic.any() else (K.max() if K.size and K.max() > 0 else 1.0)
+    return float(STIFF / softest)
+
+
 def with_modal_weight(model: Model, H: tuple[Array, ...]) -> tuple[Array, ...]:
     """Return mass matrices with the modal stiffness added, scaled (W of the module docstring)."""
     weighted = []
     for i, block in enumerate(H):
         block = block.copy()
-        M, K = modal_diagonals(model, i, MASS), modal_diagonals(model, i, STIFFNESS)
-        elastic = (M > 0) & (K > 0)
-        softest = np.min(K[elastic] / M[elastic]) if elastic.any() else (K.max() if K.size and K.max() > 0 else 1.0)
-        block[6:, 6:] += STIFF / softest * modal_matrix(model, i, STIFFNESS)
+        block[6:, 6:] += modal_weight(model, i) * modal_matrix(model, i, STIFFNESS)
         weighted.append(block)
     return tuple(weighted)
 

@@ -1,0 +1,235 @@
+"""The steps of the conserving and variational schemes in a compiled loop; formulas in `floatframe.integrators`."""
+
+from floatframe.discrete.kernels.bodies import begin_bodies, end_rates, interval, keep_bodies, move_bodies
+from floatframe.discrete.kernels.markers import begin_markers, marker_loads
+from floatframe.discrete.kernels.newton import CONVERGED, SINGULAR, add_loads, move, solve
+from floatframe.discrete.kernels.observation import observe
+from floatframe.discrete.kernels.records import CONSERVING, DAMPING
+from floatframe.discrete.kernels.rows import row_change
+from floatframe.kernels.body import block
+from floatframe.kernels.compiler.compilation import inner
+from floatframe.kernels.generalized_alpha import load_state
+from floatframe.kernels.turns import count_turns
+from floatframe.kernels.vector import add, cross, dot, matrix, put, scaled, sub, turned, turned_back, vector
+
+__all__ = ["advance"]
+
+
+@inner
+def guess(model, step):
+    """Write the increments and multipliers from which Newton's method sets out: those of steady accelerations."""
+    h, n_u = step.h, step.load.shape[0]
+    for k in range(n_u):
+        step.z[k] = h * (step.w_0[k] + 0.5 * h * step.acceleration[k])
+    for i in range(model.bodies.kind.shape[0]):
+        u0, R = model.bodies.u0[i], matrix(step.R_0[i])
+        v = scaled(h, turned_back(R, vector(step.w_0[u0:])))
+        put(step.z, u0, add(v, scaled(0.5 * h * h, vector(step.acceleration[u0:]))))
+    for j in range(step.f.shape[0]):
+        step.z[n_u + j] = 0.5 * h * h * step.f_kept[j]
+
+
+@inner
+def learn(model, step):
+    """Take the change of velocities over the step for the next guess; v in body axes."""
+    for i in range(model.bodies.kind.shape[0]):
+        u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
+        dv = turned_back(R, sub(vector(step.w_1[u0:]), vector(step.w_0[u0:])))
+        put(step.acceleration, u0, scaled(1.0 / step.h, dv))
+        for k in range(u0 + 3, u0 + 6 + n):
+            step.acceleration[k] = (step.w_1[k] - step.w_0[k]) / step.h
+    for j in range(step.f.shape[0]):
+        step.f_kept[j] = step.f[j]
+
+
+@inner
+def work_of_dampers(model, discrete, step):
+    """Return the work that modal damping takes."""
+    total = 0.0
+    for i in range(model.bodies.kind.shape[0]):
+        t, n, q0 = model.bodies.kind[i], model.bodies.n_q[i], model.bodies.q0[i]
+        D = block(discrete, t, DAMPING, n * n)
+        for k in range(n):
+            for j in range(n):
+                total += step.dq[q0 + k] * D[k * n + j] * step.dq[q0 + j]
+    return total / step.h
+
+
+@inner
+def add_drives(model, discrete, step):
+    """Add to the work that is given that of prescribed motions: of their multipliers."""
+    for c in range(model.connections.size.shape[0]):
+        a, b = model.connections.a[c], model.connections.b[c]
+        for j in range(discrete.first[c], discrete.first[c + 1]):
+            k = discrete.row[j]
+            if model.rows.motion[k] >= 0:
+                step.given += step.f[j] * row_change(model, discrete, step, k, a, b)
+
+
+@inner
+def begin(model, discrete, step, memory):
+    """Write what is known where the step begins."""
+    begin_bodies(model, discrete, step, memory)
+    begin_markers(model, discrete, step)
+
+
+@inner
+def solve_both_ways(model, discrete, step, order, stage):
+    """Find the unknowns with the factors that are kept, or else with new ones in each iteration."""
+    guess(model, step)
+    status = solve(model, discrete, step, order, stage, False)
+    if status != CONVERGED:
+        guess(model, step)
+        status = solve(model, discrete, step, order, stage, True)
+    return status
+
+
+@inner
+def conserving_step(model, discrete, step, memory, order):
+    """Advance the memory by one step of the conserving or decaying scheme; return the status."""
+    step.t_force, step.is_still, step.is_closing = 0.5 * (step.t_0 + step.t_1), 0, 0
+    begin(model, discrete, step, memory)
+    status = solve_both_ways(model, discrete, step, order, 0)
+    if status != CONVERGED:
+        return status
+    take_multipliers(step)
+    move(model, discrete, step)
+    step.given, step.taken = 0.0, 0.0
+    if discrete.is_loaded:
+        add_loads(model, discrete, step)
+        add_drives(model, discrete, step)
+    for i in range(model.bodies.kind.shape[0]):
+        end_rates(model, discrete, step, i)
+    memory.work_given += step.given
+    memory.work_taken += step.taken + work_of_dampers(model, discrete, step)
+    learn(model, step)
+    move_bodies(model, step)
+    keep_bodies(model, discrete, step, memory)
+    return status
+
+
+@inner
+def take_multipliers(step):
+    """Write the multipliers of the unknowns."""
+    n_u = step.load.shape[0]
+    for j in range(step.f.shape[0]):
+        step.f[j] = 2.0 * step.z[n_u + j] / (step.h * step.h)
+
+
+@inner
+def variational_step(model, discrete, step, memory, order):
+    """Advance the memory by one step of the variational scheme; return the status."""
+    step.t_force, step.is_still, step.is_closing = step.t_0, 1, 0
+    h = step.h
+    begin(model, discrete, step, memory)
+    status = solve_both_ways(model, discrete, step, order, 0)
+    if status != CONVERGED:
+        return status
+    take_multipliers(step)
+    move(model, discrete, step)
+    add_loads(model, discrete, step)
+    add_drives(model, discrete, step)
+    dampers = work_of_dampers(model, discrete, step)
+    given, taken = step.given, step.taken
+    learn_multipliers(step)
+    for i in range(model.bodies.kind.shape[0]):
+        interval(model, discrete, step, i)
+        put_elastic(model, step, i)
+    move_bodies(model, step)
+    begin_markers(model, discrete, step)
+    step.t_force = step.t_1
+    step.is_closing = 1
+    move(model, discrete, step)
+    add_loads(model, discrete, step)
+    for m in range(model.markers.body.shape[0]):
+        marker_loads(model, discrete, step, m)
+    given, taken = given + step.given, taken + step.taken
+    for j in range(step.f.shape[0]):
+        step.f[j] = 0.0
+    for c in range(model.connections.size.shape[0]):
+        for j in range(discrete.first[c], discrete.first[c + 1]):
+            k = discrete.row[j]
+            if model.rows.motion[k] >= 0:
+                a, b = model.connections.a[c], model.connections.b[c]
+                step.change[j] = row_change(model, discrete, step, k, a, b)
+    for i in range(model.bodies.kind.shape[0]):
+        u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
+        m, theta, Pi = model.body_types.mass[model.bodies.kind[i]], vector(step.z[u0 + 3 :]), vector(step.P_1[u0 + 3 :])
+        force, torque = vector(step.load[u0:]), turned_back(R, vector(step.load[u0 + 3 :]))
+        put(step.P_0, u0, add(scaled(m / h, vector(step.d[i])), scaled(0.5 * h, force)))
+        turning = add(sub(Pi, scaled(0.5, cross(theta, Pi))), scaled(0.25 * dot(theta, Pi), theta))
+        put(step.P_0, u0 + 3, add(turning, scaled(0.5 * h, torque)))
+        for k in range(u0 + 6, u0 + 6 + n):
+            step.P_0[k] = step.P_1[k] + 0.5 * h * (step.elastic[k] + step.load[k])
+    status = solve(model, discrete, step, order, 1, False)
+    if status != CONVERGED:
+        for k in range(step.z.shape[0]):
+            step.z[k] = 0.0
+        status = solve(model, discrete, step, order, 1, True)
+        if status != CONVERGED:
+            return status
+    take_multipliers(step)
+    for j in range(step.f.shape[0]):
+        if model.rows.motion[discrete.row[j]] >= 0:
+            given += step.f[j] * step.change[j]
+    for i in range(model.bodies.kind.shape[0]):
+        u0, n, R = model.bodies.u0[i], model.bodies.n_q[i], matrix(step.R_0[i])
+        put(step.w_1, u0, scaled(1.0 / h, turned(R, vector(step.z[u0:]))))
+        for k in range(u0 + 3, u0 + 6 + n):
+            step.w_1[k] = step.z[k] / h
+    memory.work_given += 0.5 * given
+    memory.work_taken += 0.5 * taken + dampers
+    learn(model, step)
+    for j in range(step.f.shape[0]):
+        step.f_kept[j] = step.kept[j]
+    keep_bodies(model, discrete, step, memory)
+    return status
+
+
+@inner
+def learn_multipliers(step):
+    """Keep the multipliers of positions, from which those of the next step set out."""
+    for j in range(step.f.shape[0]):
+        step.kept[j] = step.f[j]
+
+
+@inner
+def put_elastic(model, step, i):
+    """Keep the modal forces of the middle of the step."""
+    u0, n = model.bodies.u0[i], model.bodies.n_q[i]
+    for k in range(n):
+        step.elastic[u0 + 6 + k] = step.force[k]
+
+
+@inner
+def advance(model, work, discrete, step, memory, rows, order):
+    """Advance by n_steps of size h, the first of them number `first` from t0; keep the state after every `every`-th.
+
+    Return (status, steps done, rows written).
+    """
+    h = order.h
+    step.h = h
+    work.counted.rows = 0
+    for k in range(order.n_steps):
+        step.t_0, step.t_1 = order.t0 + (order.first + k) * h, order.t0 + (order.first + k + 1) * h
+        if discrete.scheme == CONSERVING:
+            status = conserving_step(model, discrete, step, memory, order)
+        else:
+            status = variational_step(model, discrete, step, memory, order)
+        if status != CONVERGED:
+            return status, k, work.counted.rows
+        count_angles(model, work, memory, h)
+        memory.n_accepted += 1
+        if (order.first + k + 1) % order.every == 0:
+            if not observe(model, work, discrete, memory, step.t_1, rows):
+                return SINGULAR, k + 1, work.counted.rows
+    return CONVERGED, order.n_steps, work.counted.rows
+
+
+@inner
+def count_angles(model, work, memory, h):
+    """Count turns of angles on."""
+    if memory.angle.shape[0] == 0:
+        return
+    load_state(work.state, memory)
+    count_turns(model, work, memory, h)

@@ -1,0 +1,78 @@
+"""Compiled steps are those of the readable Python version, step by step."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from floatframe import (
+    EnergyDecaying,
+    EnergyMomentum,
+    Gravity,
+    JointForce,
+    Marker,
+    PointForce,
+    SpringDamper,
+    Variational,
+)
+from floatframe.compiling.system import compiled_system
+from floatframe.discrete.bodies import placed_bodies, state_of
+from floatframe.discrete.constraints import Span
+from floatframe.discrete.system import discrete_system
+from floatframe.functions.time_functions import cycloidal_spin_up
+from floatframe.functions.time_functions import table as table_function
+from floatframe.kernels.work import new_work
+from tests.floatframe.integrators.test_conserving import floating_pair
+from tests.floatframe.point_masses import random_point_masses, stiffened_body, stiffness
+
+SCHEMES = {"momentum": EnergyMomentum(), "decaying": EnergyDecaying(0.3), "variational": Variational()}
+
+
+def loaded(joint, body=None, **options):
+    """Return a pair with gravity, a damped spring, forces that follow, forces along the joint and friction."""
+    forces = [
+        Gravity((0.0, -0.4, -1.0)),
+        SpringDamper("damper", Marker("soft", "end_b"), Marker("block", position=(0.1, 0.2, 0.1)), 3.0, 0.4,
+                     free_length=0.8, preload=0.3),
+        PointForce("push", Marker("soft", "end_a"), (0.2, 0.1, 0.0), (0.1, 0.0, 0.05), is_follower=True),
+    ]  # fmt: skip
+    name = {"revolute": "angle", "prismatic": "distance"}.get(joint)
+    if name and not options:
+        table = table_function([-4.0, -2.0, 0.0, 2.0, 4.0], [0.9, 0.3, 0.0, -0.3, -0.7])
+        forces.append(JointForce("spring", "joint", name, stiffness=0.8, damping=0.1, friction=0.05, friction_speed=0.2,
+                                 characteristic=table))  # fmt: skip
+    return floating_pair(joint, forces, body, **options)
+
+
+def bent():
+    """Return the pair with a body whose interfaces bend with its modes."""
+    return loaded("universal", stiffened_body(random_point_masses(3, 3), stiffness(3, omega=6.0), size=0.2))
+
+
+SYSTEMS = {
+    "revolute": lambda: loaded("revolute"),
+    "driven": lambda: loaded("revolute", motions={"angle": cycloidal_spin_up(4.0, 0.3)}),
+    "prismatic": lambda: loaded("prismatic"),
+    "screw": lambda: loaded("screw"),
+    "distance": lambda: loaded("distance"),
+    "universal, stiffened": bent,
+}
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize("name", SCHEMES)
+def test_compiled_steps_are_those_of_the_python_version(kind, name):
+    """Eight steps, each from where the compiled one before ended: state, multipliers and work."""
+    system, method, h = SYSTEMS[kind](), SCHEMES[name], 0.04
+    ds = discrete_system(system, name)
+    carry, work, f = method.start(system, 0.0), new_work(compiled_system(system).model), np.zeros(ds.n_held)
+    for k in range(8):
+        placed = placed_bodies(ds.bodies, ds.model, carry.state)
+        expected = method.one_step(ds, placed, Span(k * h, (k + 1) * h, (k + 0.5) * h), f)
+        before = carry.work
+        carry, _, _, failure = method.advance(system, carry, work, t0=0.0, h=h, first=k, n_steps=1, every=100)
+        assert failure is None
+        state = state_of(ds.bodies, expected.placed)
+        for field in ("r", "p", "q", "u"):
+            assert_allclose(getattr(carry.state, field), getattr(state, field), rtol=0, atol=1e-11)
+        assert_allclose(carry.work - before, expected.work, rtol=0, atol=1e-11)
+        f = expected.f
