@@ -105,7 +105,7 @@ def factorize(A: sp.csc_array, *, definite: bool = True, solver: str | Solver | 
     """Factorise a symmetric sparse matrix.
 
     (1) lower triangle, every diagonal entry stored
-    (2) factor by the solver asked for; PARDISO where it exists, SuperLU elsewhere
+    (2) factor by the solver asked for; PARDISO where it exists, our Cholesky factorisation elsewhere
     (3) proof by two solves from a fixed random column: an (almost) singular matrix is refused
 
     Parameters

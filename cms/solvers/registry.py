@@ -5,6 +5,7 @@ Another one is a line of `SOLVERS`: its name, what makes a factor (`MakeFactor` 
 """
 
 from cms.errors import FactorizationError
+from cms.solvers.cholesky import cholesky_or_superlu
 from cms.solvers.pardiso import PardisoFactor, missing_pardiso
 from cms.solvers.superlu import SuperLuFactor
 from fe_models.foundation.solver import Solver
@@ -16,10 +17,11 @@ SOLVERS = {
     solver.name: solver
     for solver in (
         Solver("pardiso", PardisoFactor, missing_pardiso),
+        Solver("cholesky", cholesky_or_superlu),
         Solver("superlu", SuperLuFactor),
     )
 }
-DEFAULTS = ("pardiso", "superlu")  #: the first that is installed, where none is asked for
+DEFAULTS = ("pardiso", "cholesky")  #: the first that is installed, where none is asked for
 
 
 def solver_of(choice: str | Solver | None = None) -> Solver:

@@ -6,9 +6,12 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from cms.errors import FactorizationError
+from cms.sparse_cholesky.analysis import dissection_order
 from fe_models.foundation.arrays import Array
 
 __all__ = ["SuperLuFactor"]
+
+SMALL = 3000  #: rows below which minimum degree is good enough, and done before compiled loops are loaded
 
 
 class SuperLuFactor:
@@ -17,11 +20,15 @@ class SuperLuFactor:
     def __init__(self, lower: sp.csc_array, *, definite: bool) -> None:
         """Factorise the matrix with this lower triangle, (n, n), every diagonal entry stored, sorted row indices."""
         self.n = lower.shape[0]
-        A = lower + sp.tril(lower, k=-1, format="csc").T
+        A = sp.csc_matrix(lower + sp.tril(lower, k=-1, format="csc").T)
+        is_small = self.n < SMALL
+        self._order = None if is_small else dissection_order(lower)
+        if self._order is not None:
+            A = A[self._order][:, self._order].tocsc()
         try:
             self._lu = splu(
-                sp.csc_matrix(A),
-                permc_spec="MMD_AT_PLUS_A",
+                A,
+                permc_spec="MMD_AT_PLUS_A" if is_small else "NATURAL",
                 diag_pivot_thresh=0.0 if definite else 1e-3,
                 options={"SymmetricMode": True},
             )
@@ -40,7 +47,8 @@ class SuperLuFactor:
                 f"SuperLU: {self.n_negative} pivots are negative: the matrix is not positive definite"
             )
         kind = "definite" if definite else "indefinite"
-        self.description = f"SuperLU (SciPy {scipy.__version__}; L U, {kind}, minimum degree)"
+        order = "minimum degree" if is_small else "nested dissection"
+        self.description = f"SuperLU (SciPy {scipy.__version__}; L U, {kind}, {order})"
 
     @property
     def n_factor_entries(self) -> int:
@@ -49,7 +57,11 @@ class SuperLuFactor:
 
     def solve(self, b: Array) -> Array:
         """Return A⁻¹ b for b (n, k), any order; the result is in Fortran order."""
-        return np.asfortranarray(self._lu.solve(np.asfortranarray(b)))
+        if self._order is None:
+            return np.asfortranarray(self._lu.solve(np.asfortranarray(b)))
+        x = np.empty(b.shape, order="F")
+        x[self._order] = self._lu.solve(np.asfortranarray(b[self._order]))
+        return x
 
     def close(self) -> None:
         """Free the factor."""

@@ -49,9 +49,9 @@ def registered(monkeypatch):
 
 
 def test_the_fastest_that_is_installed_is_the_default(monkeypatch):
-    assert solver_of().name == ("pardiso" if mkl_runtime() is not None else "superlu")
+    assert solver_of().name == ("pardiso" if mkl_runtime() is not None else "cholesky")
     monkeypatch.setitem(SOLVERS, "pardiso", Solver("pardiso", DenseFactor, lambda: "needs MKL"))
-    assert solver_of().name == "superlu"
+    assert solver_of().name == "cholesky"
 
 
 def test_defaults_are_registered_under_their_names():

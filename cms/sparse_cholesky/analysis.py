@@ -1,0 +1,166 @@
+"""Analysis of a sparse symmetric matrix before its numbers: order of elimination, fronts, and what they will cost."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.foundation.arrays import IntArray
+
+if TYPE_CHECKING:
+    from fe_models.foundation.arrays import Array
+
+__all__ = ["Fronts", "analyse", "dissection_order"]
+
+LEAF = 24  #: vertices, mostly nodes of the mesh, below which a part is not dissected further
+FEW = 24  #: columns up to which small fronts are joined whatever zeros that brings
+SHARE = 0.5  #: of zeros that is allowed in a front of about so many columns; less in larger ones
+
+
+@dataclass(frozen=True, eq=False)
+class Fronts:
+    """Dense fronts of a multifrontal factorisation, each after its children; rows and columns in the new order."""
+
+    order: IntArray  #: the row of the matrix that comes k-th, (n,)
+    first: IntArray  #: first column of each front, (n_fronts + 1,)
+    begin: IntArray  #: where the rows below a front begin in `rows`, (n_fronts + 1,)
+    rows: IntArray  #: rows below the columns of all fronts, ascending in each
+    above: IntArray  #: parent of each front, -1: none, (n_fronts,)
+
+    @property
+    def width(self) -> IntArray:
+        """Columns of each front, (n_fronts,)."""
+        return np.diff(self.first)
+
+    @property
+    def below(self) -> IntArray:
+        """Rows below the columns of each front, (n_fronts,)."""
+        return np.diff(self.begin)
+
+    @property
+    def n_entries(self) -> int:
+        """Entries of the factor."""
+        w, u = self.width, self.below
+        return int((w * (w + 1) // 2 + w * u).sum())
+
+    @property
+    def n_stored(self) -> int:
+        """Numbers that are stored for it: diagonal blocks as squares."""
+        return int((self.width * (self.width + self.below)).sum())
+
+    @property
+    def n_working(self) -> int:
+        """Most numbers that the factorisation holds at once beside the factor: what fronts leave, and one front."""
+        w, u = self.width, self.below
+        held = most = 0
+        waiting = np.zeros(len(w), np.int64)  # left by the children of each front
+        for f in range(len(w)):
+            most = max(most, held + int((w[f] + u[f]) ** 2))
+            held += int(u[f] ** 2) - int(waiting[f])
+            if self.above[f] >= 0:
+                waiting[self.above[f]] += u[f] ** 2
+        return most
+
+    @property
+    def operations(self) -> float:
+        """Multiplications and additions of the factorisation."""
+        w, u = self.width.astype(float), self.below.astype(float)
+        return float((w**3 / 3 + u * w**2 + u**2 * w).sum())
+
+
+def analyse(lower: sp.csc_array) -> Fronts:
+    """Return the fronts of the symmetric matrix with this lower triangle.
+
+    (1) rows with the same neighbours, such as the dofs of a node, are one vertex
+    (2) nested dissection of the vertices
+    (3) elimination tree, in postorder; columns of the factor with nearly the same rows are one front
+    """
+    from cms.sparse_cholesky import kernels
+
+    start, neighbours, weight, group = quotient(lower)  # (1)
+    order = kernels.dissection(start, neighbours, weight, LEAF)  # (2)
+    start, neighbours = renumbered(start, neighbours, order)
+    parent = kernels.elimination_tree(start, neighbours)  # (3)
+    post = kernels.postorder(parent)
+    start, neighbours = renumbered(start, neighbours, post)
+    order = order[post]
+    rank = inverse(post)
+    parent = np.where(parent[post] >= 0, rank[parent[post]], -1)
+    sizes = weight[order]
+    count = kernels.weighted_counts(start, neighbours, parent, sizes)
+    front, above = kernels.amalgamate(parent, count, sizes, FEW, SHARE)
+    by_front = np.argsort(front, kind="stable")
+    start, neighbours = renumbered(start, neighbours, by_front)
+    order, sizes = order[by_front], sizes[by_front]
+    first = np.searchsorted(front[by_front], np.arange(len(above) + 1))
+    begin, rows = kernels.front_rows(start, neighbours, first, above)
+    at = np.concatenate([[0], np.cumsum(sizes)])  # from vertices to rows of the matrix
+    members = np.argsort(inverse(order)[group], kind="stable")
+    lengths = sizes[rows]
+    ends = np.concatenate([[0], np.cumsum(lengths)])
+    expanded = np.repeat(at[rows] - ends[:-1], lengths) + np.arange(ends[-1])
+    return Fronts(members, at[first], ends[begin], expanded.astype(np.int32), above)
+
+
+def dissection_order(lower: sp.csc_array) -> IntArray:
+    """Return an order of elimination by nested dissection, (n,): the row that comes k-th."""
+    from cms.sparse_cholesky import kernels
+
+    start, neighbours, weight, group = quotient(lower)
+    order = kernels.dissection(start, neighbours, weight, LEAF)
+    return np.argsort(inverse(order)[group], kind="stable")
+
+
+def quotient(lower: sp.csc_array) -> "tuple[IntArray, IntArray, IntArray, IntArray]":
+    """Return the graph of a matrix with rows of equal neighbours as one vertex.
+
+    Returns
+    -------
+    start, neighbours
+        Its compressed rows, the vertex itself left out.
+    weight
+        Rows of the matrix in each vertex, (n_v,).
+    group
+        Vertex of each row, (n,).
+    """
+    n = lower.shape[0]
+    indices, indptr = lower.indices, lower.indptr
+    columns = np.repeat(np.arange(n, dtype=indices.dtype), np.diff(indptr))
+    is_off = indices != columns
+    i, j = indices[is_off], columns[is_off]
+    keys = np.random.default_rng(0).integers(1, 2**63, size=n, dtype=np.uint64)
+    # equal sums of random numbers over a row and its neighbours: equal rows, but for one case in 2**64
+    total = keys.copy()
+    for a, b in ((i, j), (j, i)):
+        order = np.argsort(a, kind="stable")
+        sums = np.concatenate([[np.uint64(0)], np.cumsum(keys[b[order]], dtype=np.uint64)])
+        ends = np.searchsorted(a[order], np.arange(n + 1))
+        total += sums[ends[1:]] - sums[ends[:-1]]
+    _, representative, group = np.unique(total, return_index=True, return_inverse=True)
+    rank = inverse(np.argsort(representative, kind="stable"))  # vertices in the order of their first rows
+    group = rank[group].astype(np.int32)
+    weight = np.bincount(group)
+    n_v = len(weight)
+    gi, gj = group[i], group[j]
+    is_between = gi != gj
+    gi, gj = gi[is_between], gj[is_between]
+    graph = sp.csr_array((np.ones(len(gi), np.int8), (gi, gj)), shape=(n_v, n_v))
+    graph = graph + graph.T
+    return graph.indptr.astype(np.int64), graph.indices, weight, group
+
+
+def renumbered(start: IntArray, neighbours: IntArray, order: IntArray) -> "tuple[IntArray, IntArray]":
+    """Return the graph with the vertices in another order: order[k] becomes k."""
+    rank = inverse(order).astype(np.int32)
+    lengths = np.diff(start)[order]
+    begin = np.concatenate([[0], np.cumsum(lengths)])
+    places = np.repeat(start[:-1][order] - begin[:-1], lengths) + np.arange(begin[-1])
+    return begin, rank[neighbours[places]]
+
+
+def inverse(order: "Array | IntArray") -> IntArray:
+    """Return the place of each element of an order."""
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    return rank
