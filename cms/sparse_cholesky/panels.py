@@ -83,7 +83,7 @@ class PanelsInFile:
         """Write the panel of the next front."""
         try:
             for part in (diagonal, below):
-                left = memoryview(part.ravel(order="K")).cast("B")
+                left = part.ravel(order="K").data.cast("B")
                 while len(left):
                     left = left[self._file.write(left) :]
         except OSError as error:
@@ -96,7 +96,7 @@ class PanelsInFile:
             w, u = self._shapes[f]
             numbers_of = self._buffer[: w * (w + u)]
             self._file.seek(int(self._ends[f]))
-            left = memoryview(numbers_of).cast("B")
+            left = numbers_of.data.cast("B")
             while len(left):
                 got = self._file.readinto(left)
                 if not got:
