@@ -8,7 +8,8 @@ from fe_models.foundation.arrays import Array, IntArray
 
 __all__ = ["nodal_stress_modes", "point_stress_modes", "turned_stress"]
 
-COLUMNS_AT_ONCE = 16  #: stress is known at all nodes before it is cut to the kept ones
+FEWEST = 16  #: columns at a time, however large the body
+BYTES_AT_ONCE = 512e6  #: of stress, which is known at all nodes before it is cut to the kept ones
 
 
 def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -> Array | None:
@@ -29,8 +30,9 @@ def nodal_stress_modes(body: FEBody, Phi: Array, nodes: IntArray, axes: Array) -
     if model is None or not model.has_nodal_stress:
         return None
     modes = np.zeros((len(nodes), 6, Phi.shape[1]))
-    for begin in range(0, Phi.shape[1], COLUMNS_AT_ONCE):
-        columns = slice(begin, begin + COLUMNS_AT_ONCE)
+    width = max(FEWEST, int(BYTES_AT_ONCE / (48 * len(body.nodes))))  # wide: the geometry is worked out once for all
+    for begin in range(0, Phi.shape[1], width):
+        columns = slice(begin, begin + width)
         everywhere = model.nodal_stress(body.mesh_displacement(Phi[:, columns]), nodes=nodes)
         on_mesh = nodes < len(everywhere)
         modes[on_mesh, :, columns] = everywhere[nodes[on_mesh]]

@@ -27,6 +27,8 @@ from fe_models.shells.strains import inverse_2x2, jacobians
 __all__ = ["cell_geometric_stiffness"]
 
 N_FIELDS = 15  #: u,1 u,2 theta,1 theta,2 theta, three components each
+FIRST, SECOND = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])  #: components xx yy zz yz xz xy
+PRODUCT_BYTES = 1.5e6  #: of the products held at once by a thread: they shall stay in its cache
 
 
 def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: MassLoads, Phi: Array) -> Array:
@@ -58,15 +60,15 @@ def cell_geometric_stiffness(cells: ShellCells, rows: slice, u: Array, loads: Ma
     couples = couples + force[..., :, None] * cells.mass_arms(rows)[:, None, None]
     fields = _fields(cells, rows) @ columns[:, None]  # (m, p, 15, n)
     theta = slices.motion[:, :, 3:] @ columns[:, None]
-    turns = columns.reshape(len(dofs), -1, 6, Phi.shape[1])[:, :, 3:]
-    K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
-    for j in range(loads.k):
-        W = _work(resultants[..., :8, j], second[..., j])
-        K[j] += _contracted(fields, W)
-        K[j] += _contracted(theta, -rotation_work(couples[j]))
-        at_corners = forces[:, :, j].reshape(len(dofs), -1, 6)[:, :, :3, None]
-        K[j] += _contracted(turns, rotation_work(at_corners * cells.planes.levers[rows][:, :, None]))
-    return (K + K.transpose(0, 2, 1)) / 2
+    K = _contracted(fields, _unit_work(), np.concatenate([resultants[:, :, :8], second], axis=2))
+    K += _contracted(theta, _symmetric_units(), _symmetric_parts(-rotation_work(couples)))
+    levers = cells.planes.levers[rows]
+    if levers.any():
+        turns = columns.reshape(len(dofs), -1, 6, Phi.shape[1])[:, :, 3:]
+        at_corners = np.moveaxis(forces, 2, 0).reshape(loads.k, len(dofs), -1, 6)[..., :3, None]
+        works = rotation_work(at_corners * levers[:, :, None])
+        K += _contracted(turns, _symmetric_units(), _symmetric_parts(works))
+    return K
 
 
 def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weights: Array) -> Array:
@@ -87,10 +89,54 @@ def _missing_shear(cells: ShellCells, rows: slice, forces: Array, Q: Array, weig
     return np.asarray(weights[:, :, None, None] * gradient)
 
 
-def _contracted(fields: Array, W: Array) -> Array:
-    """Sum of fieldsᵀ W fields over all points, (n, n)."""
-    n = fields.shape[-1]
-    return np.asarray(fields.reshape(-1, n).T @ (W @ fields).reshape(-1, n))
+def _contracted(fields: Array, units: Array, weights: Array) -> Array:
+    """Sum of weights_r,j fieldsᵀ U_r fields over all points and unit works r, (k, n, n) for k states j.
+
+    The products of the fields do not depend on the state: they are formed once, for some points at a time, and one
+    matrix product with the weights of all states does the sum.
+
+    Parameters
+    ----------
+    fields
+        (n_cells, n_points, c, n).
+    units
+        Symmetric, (n_units, c, c).
+    weights
+        (n_cells, n_points, n_units, k).
+    """
+    from fe_models.body.work_kernels import work_products
+
+    n_units, c, _ = units.shape
+    n, k = fields.shape[-1], weights.shape[-1]
+    fields, weights = np.ascontiguousarray(fields).reshape(-1, c, n), weights.reshape(-1, n_units, k)
+    unit, row, column = np.nonzero(np.triu(units))
+    value = units[unit, row, column]
+    at_once = max(1, int(PRODUCT_BYTES / (8 * n_units * n * (n + 1) / 2 + 1)))
+    products = np.empty((min(at_once, len(fields)), n_units, n * (n + 1) // 2))
+    pairs = np.zeros((k, n * (n + 1) // 2))
+    for begin in range(0, len(fields), at_once):
+        some = slice(begin, min(begin + at_once, len(fields)))
+        out = products[: some.stop - begin]
+        work_products(fields[some], unit, row, column, value, out)
+        pairs += weights[some].reshape(-1, k).T @ out.reshape(-1, pairs.shape[1])
+    K = np.empty((k, n, n))
+    first, second = np.triu_indices(n)
+    K[:, first, second] = pairs
+    K[:, second, first] = pairs
+    return K
+
+
+def _symmetric_parts(W: Array) -> Array:
+    """Return the components of symmetric matrices W, (k, n_cells, n_points, 3, 3), as weights of `_symmetric_units`."""
+    return np.moveaxis(W[..., FIRST, SECOND], 0, -1)
+
+
+@cache
+def _symmetric_units() -> Array:
+    """Return the symmetric matrices of one component each, (6, 3, 3)."""
+    units = np.zeros((6, 3, 3))
+    units[np.arange(6), FIRST, SECOND] = units[np.arange(6), SECOND, FIRST] = 1.0
+    return frozen(units)
 
 
 def _fields(cells: ShellCells, rows: slice) -> Array:
@@ -117,12 +163,6 @@ def _fields(cells: ShellCells, rows: slice) -> Array:
 def stress_second_moments(cells: ShellCells, rows: slice) -> Array:
     """P = ∫ z² sigma dz by eps and kappa, (m, 3, 6)."""
     return cells.by_law(lambda law: np.hstack([law.D, law.third]), rows)
-
-
-def _work(resultants: Array, second: Array) -> Array:
-    """Second derivative of the work by the fields, (m, p, 15, 15), of weighted N M Q, (m, p, 8), and P, (m, p, 3)."""
-    W = np.concatenate([resultants, second], axis=-1) @ _unit_work().reshape(-1, N_FIELDS**2)
-    return np.asarray(W.reshape(*resultants.shape[:2], N_FIELDS, N_FIELDS))
 
 
 @cache

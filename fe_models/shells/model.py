@@ -1,6 +1,7 @@
 """The elements behind a shell body: integrals over mass, stress at the faces, geometric stiffness."""
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +12,7 @@ from fe_models.beams.geometric import slice_forces
 from fe_models.body.mass_loads import MassLoads
 from fe_models.foundation.arrays import Array, IntArray
 from fe_models.foundation.errors import BodyError
+from fe_models.foundation.threads import n_threads, one_blas_thread
 from fe_models.shells.elements import ShellCells
 from fe_models.shells.geometric import cell_geometric_stiffness
 from fe_models.shells.skin import ShellSkin
@@ -118,10 +120,12 @@ class ShellModel:
         """Return Phiᵀ K_geo(sigma_j) Phi, (k, n, n), of states u under these loads (`fe_models.shells.geometric`)."""
         for columns in (u, Phi):
             self._require_rows("geometric_stiffness", columns)
+        u, Phi = np.asarray(u), np.asarray(Phi)
         K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
-        for group in self.groups:
-            for rows in group.chunks():
-                K += cell_geometric_stiffness(group, rows, np.asarray(u), loads, np.asarray(Phi))
+        chunks = [(group, rows) for group in self.groups for rows in group.chunks()]
+        with one_blas_thread(), ThreadPoolExecutor(n_threads()) as pool:
+            for part in pool.map(lambda chunk: cell_geometric_stiffness(*chunk, u, loads, Phi), chunks):
+                K += part  # in their order: results repeat bit for bit
         return K
 
     @cached_property

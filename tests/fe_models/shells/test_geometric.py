@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import cms
 import fe_models as fm
@@ -270,3 +270,20 @@ def test_a_rotation_and_a_smooth_motion_meet_in_the_turned_forces_as_cells_get_s
         errors.append(abs(K[0, 1] - work) / abs(work))
     assert errors[2] < 2e-3
     assert errors[2] < errors[1] / 3
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.04])
+def test_the_stiffness_of_many_states_repeats_bit_for_bit_whatever_the_threads_and_is_theirs_alone(monkeypatch, offset):
+    """Chunks are summed in their order; a state by itself has the stiffness it has among others."""
+    monkeypatch.setattr("fe_models.shells.elements.CHUNK", 5)
+    body = bent_strip("quad", offset=offset)
+    model, rng = body.element_model, np.random.default_rng(0)
+    u, Phi = (rng.standard_normal((model.n_mesh_dof, k)) for k in (3, 4))
+    loads = MassLoads(rng.standard_normal((3, 3, 3)), rng.standard_normal((3, 3)))
+    found = []
+    for n in (1, 3):
+        monkeypatch.setattr("fe_models.shells.model.n_threads", lambda n=n: n)
+        found.append(model.geometric_stiffness(u, loads, Phi))
+    assert_array_equal(found[0], found[1])
+    alone = model.geometric_stiffness(u[:, 1:2], MassLoads(loads.A[1:2], loads.b[1:2]), Phi[:, 2:])
+    assert_allclose(alone[0], found[0][1, 2:, 2:], rtol=0, atol=1e-12 * np.abs(found[0]).max())
