@@ -1,6 +1,5 @@
 """Compiled products of fields at points; imported where they are used."""
 
-import numpy as np
 from numba import njit
 
 __all__ = ["work_products"]
