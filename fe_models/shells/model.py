@@ -124,7 +124,7 @@ class ShellModel:
         K = np.zeros((loads.k, Phi.shape[1], Phi.shape[1]))
         chunks = [(group, rows) for group in self.groups for rows in group.chunks()]
         with one_blas_thread(), ThreadPoolExecutor(n_threads()) as pool:
-            for part in pool.map(lambda chunk: cell_geometric_stiffness(*chunk, u, loads, Phi), chunks):
+            for part in pool.map(lambda chunk: cell_geometric_stiffness(chunk[0], chunk[1], u, loads, Phi), chunks):
                 K += part  # in their order: results repeat bit for bit
         return K
 
