@@ -2,8 +2,9 @@
 
     OMP_NUM_THREADS=1 python -m benchmarks.conserving_step
 
-A flexible body alone, on a spherical joint, and chains of bodies. Processor time of a long run less that of a short
-one, so that other work on the machine and what is done once count little; runs take turns, the best of each counts.
+A flexible body alone and on a spherical joint; a linkage of rigid bodies with an event. Processor time of a long run
+less that of a short one, so that other work on the machine and what is done once count little; runs take turns, the
+best of each counts.
 """
 
 import argparse
@@ -12,7 +13,17 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from floatframe import EnergyDecaying, EnergyMomentum, Event, GeneralizedAlpha, System, Variational, integrate
+from floatframe import (
+    EnergyDecaying,
+    EnergyMomentum,
+    Event,
+    GeneralizedAlpha,
+    Gravity,
+    System,
+    Variational,
+    integrate,
+)
+from floatframe.mechanisms import four_bar
 from tests.floatframe.bodies.test_free_body import spinning
 from tests.floatframe.integrators.test_pendulum import pendulum
 
@@ -48,20 +59,21 @@ def times_of_a_step(runs: dict, n_steps: int, n_turns: int, every: int = EVERY) 
     return {name: ((long - short) / n, count / n_steps) for name, (short, long, count) in best.items()}
 
 
-def watched(system: System, name: str) -> dict[str, System]:
-    """Return the system without an event, with one that never happens, and with one that happens now and then."""
-    never = Event("never", watch=name, level=1e9)
-    often = Event("often", watch=name, level=0.0, direction="rising", record=True)
+def watched() -> dict[str, System]:
+    """Return a four-bar linkage without an event, with one that never happens, and with one that happens at times."""
+    plain = four_bar()
+    system = System(plain.bodies, plain.joints, [Gravity((0, -9.81, 0))], redundant="minimum-norm")
+    angle = f"{system.joints[0].name}.angle"
     return {
         "no event": system,
-        "an event that never happens": replace(system, events=(never,)),
-        "an event that happens now and then": replace(system, events=(often,)),
+        "an event that never happens": replace(system, events=(Event("never", angle, level=1e9, stop=True),)),
+        "an event that happens at times": replace(system, events=(Event("often", angle, level=0.5, record=True),)),
     }
 
 
-def figures(short: bool = True) -> dict[str, float]:
+def figures(short: bool) -> dict[str, float]:
     """Return ratios of times of a step."""
-    n_steps, n_turns = (1500, 3) if short else (6000, 5)
+    n_steps, n_turns = (2000, 3) if short else (8000, 5)
     found = {}
     for title, made in SYSTEMS.items():
         system = made()
@@ -70,6 +82,13 @@ def figures(short: bool = True) -> dict[str, float]:
             found[f"{name}, {title}, a step [us]"] = times[name][0] * 1e6
             if name != GIVEN:
                 found[f"{name} by {GIVEN}, {title}"] = times[name][0] / times[GIVEN][0]
+    for every in (1, EVERY):
+        runs = {name: (system, SCHEMES[GIVEN]) for name, system in watched().items()}
+        times = times_of_a_step(runs, n_steps, n_turns, every)
+        first, *others = times
+        found[f"linkage, output every {every}, {first}, a step [us]"] = times[first][0] * 1e6
+        for name in others:
+            found[f"linkage, output every {every}, {name}, by {first}"] = times[name][0] / times[first][0]
     return found
 
 

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-
 from fe_models.foundation.arrays import Array
 from floatframe.compiling.markers import MarkerData, joint_markers, marker_pose, n_q_of
 from floatframe.functions.time_functions import TimeFunction
@@ -36,9 +34,8 @@ class CountedAngle:
     def is_same(self, angle: "CountedAngle") -> bool:
         """Whether another one measures the same."""
         own, others = ((a.holder, a.other, a.sign) for a in (self, angle))
-        return own == others and bool(
-            np.allclose([self.x, self.y, self.z], [angle.x, angle.y, angle.z], rtol=0.0, atol=SAME)
-        )
+        directions = ((*a.x, *a.y, *a.z) for a in (self, angle))
+        return own == others and all(abs(p - q) <= SAME for p, q in zip(*directions, strict=True))
 
 
 @runtime_checkable

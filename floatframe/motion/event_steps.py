@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.foundation.arrays import Array
+from fe_models.foundation.arrays import Array, IntArray
 from floatframe.compiling.file_frames import rows_of_file, state_of_file
 from floatframe.compiling.public_elements import PlacedLaw
 from floatframe.compiling.system import compiled_system
@@ -45,7 +45,7 @@ from floatframe.system import System
 
 __all__ = ["EventWatch"]
 
-BLOCK = 32  #: most steps between which what is watched is not measured; blocks end where a multiple of it does
+BLOCK = 400  #: most steps between which what is watched is not measured; blocks end where a multiple of it does
 STANDS = 1e-9  #: change of what is watched in a step, relative to its level or 1, below which it is held or at rest
 SHUT = 1e-6  #: of the length of the system, or rad: what a coupler may close that takes hold of a value
 MOST_IN_A_STEP = 100  #: events in one step; more mean that events switch each other without end
@@ -70,6 +70,8 @@ class EventWatch:
     recorded: list[Rows] = field(default_factory=list)  #: results at events since they were last taken
     has_stopped: bool = False
     due: int = -1  #: number of the step in which something is known to happen
+    #: working arrays, those that are not empty, and what they were where the present block began
+    held: tuple[Work, list[Array], list[Array]] | None = field(init=False, default=None)
     calm: int = BLOCK  #: most steps of the next block: few after an event, which may be one of many
 
     def __post_init__(self) -> None:
@@ -146,6 +148,16 @@ class EventWatch:
         changes = bool(self.off.intersection(event.switch_on)) or not self.off.issuperset(event.switch_off)
         return changes or not only_switches or abs(after - before) > STANDS * max(1.0, abs(event.level_passed))
 
+    def near_levels(self, values: Array) -> IntArray:
+        """Return the steps in which a value, (n_times, n_events), may pass its level: it is not on one side of it."""
+        beyond = values - np.array([event.level_passed for event in self.events])
+        return np.flatnonzero(~(beyond[1:] * beyond[:-1] > 0.0).all(axis=1))
+
+    def any_happens(self, before: Array, after: Array) -> bool:
+        """Whether an event happens from values to the next, (n_events,)."""
+        each = zip(self.events, before, after, strict=True)
+        return any(self.happens(event, float(first), float(then)) for event, first, then in each)
+
     def steps(
         self, integrator: Integrator, carry: Carry, work: Work, *, t0: float, h: float, first: int, n_steps: int
     ) -> tuple[Carry, Rows, Work, int, Failure | None]:
@@ -164,21 +176,21 @@ class EventWatch:
             carry, row, work, failure = self.step(integrator, carry, work, t0=t0, h=h, k=first)
             self.calm = min(2 * self.calm, BLOCK) if len(self.happened) == n_before else 1
             return carry, row, work, int(failure is None), failure
-        begin, kept = carry, tuple(array.copy() for _, array in leaves(work))
+        if self.held is None or self.held[0] is not work:
+            arrays = [array for _, array in leaves(work) if array.size]
+            self.held = work, arrays, [np.empty_like(array) for array in arrays]
+        _, arrays, kept = self.held
+        begin = carry
+        for array, value in zip(arrays, kept, strict=True):
+            value[...] = array
         carry, rows, n_good, failure = integrator.advance(
             self.system, begin, work, t0=t0, h=h, first=first, n_steps=n, every=1
         )
         assert self.row is not None
         values = np.concatenate([self.values[None], self.measured(self.row, rows)[1:]])
-        passed = (
-            k
-            for k in range(n_good)
-            for event, before, after in zip(self.events, values[k], values[k + 1], strict=True)
-            if self.happens(event, float(before), float(after))
-        )
-        n_free = next(passed, n_good)
+        n_free = next((k for k in self.near_levels(values) if self.any_happens(values[k], values[k + 1])), n_good)
         if n_free < n_good:
-            for (_, array), value in zip(leaves(work), kept, strict=True):
+            for array, value in zip(arrays, kept, strict=True):
                 array[...] = value
             self.due = first + n_free
             carry = begin

@@ -45,7 +45,7 @@ __all__ = ["Progress", "integrate", "resume"]
 
 log = logging.getLogger(__name__)
 
-BATCH_STEPS = 200  #: steps per call of the compiled loop
+BATCH_STEPS = 400  #: steps per call of the compiled loop
 SEGMENT_SECONDS = 2.0  #: a segment of the results is closed after this time
 TIMES = ("t_start", "t_end", "h", "output_every")  #: of the run, in the head
 MOST_STEPS = 1e12  #: of a run: months of computing

@@ -22,7 +22,7 @@ from floatframe.system import System
 
 __all__ = ["RESTART_STEPS", "carry_of_record", "restart_record", "system_digest"]
 
-RESTART_STEPS = 200
+RESTART_STEPS = 400
 STATE = ("r", "p", "q", "u")
 ARRAYS = ("u_dot", "a", "w", "work", "power", "angle", "angle_rate")
 STEPS = ("h", "h_next")

@@ -1,6 +1,7 @@
 """Joint coordinates over a motion: value, rate, and the force along them."""
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -63,10 +64,10 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
             f"joint_coordinate: joint {joint!r} has no coordinate {coordinate!r}"
             f"{nearest(coordinate, list(found.coordinates))}"
         )
-    ends = joint_markers(system, found, compiled_system(system).placed)
+    ends, own = as_placed(system, found, coordinate)
     if isinstance(found, SlidingJoint):
         return sliding_motion(system, trajectory, found, ends[1])
-    own = row_coordinate(system, found, ends, coordinate)
+    assert own is not None
     a, b = (end_motion(system, trajectory, end) for end in ends)
     place = RelativePlace(a.axes, b.axes, b.position - a.position)
     slip = b.velocity - a.velocity - cross(a.omega, place.d)
@@ -76,6 +77,23 @@ def joint_coordinate(system: System, trajectory: Trajectory, joint: str, coordin
     if own.is_angle:
         value = through_turns(trajectory, f"coordinate {joint}.{coordinate}", angle_of(own, *ends), value, rate)
     return CoordinateMotion(a.t, value, rate, own.force(place, w), own.is_angle)
+
+
+#: markers and coordinates by joint and name: runs with events ask for them again and again
+PLACED: WeakKeyDictionary[System, dict[tuple[str, str], tuple]] = WeakKeyDictionary()
+
+
+def as_placed(
+    system: System, joint: Joint, name: str
+) -> tuple[tuple[MarkerData, MarkerData], RowCoordinate | None]:  # fmt: skip
+    """Return the markers of a joint, and a coordinate of it; None along a deformed line."""
+    known = PLACED.setdefault(system, {})
+    key = joint.name, name
+    if key not in known:
+        ends = joint_markers(system, joint, compiled_system(system).placed)
+        own = None if isinstance(joint, SlidingJoint) else row_coordinate(system, joint, ends, name)
+        known[key] = ends, own
+    return known[key]
 
 
 def row_coordinate(system: System, joint: Joint, ends: tuple[MarkerData, MarkerData], name: str) -> RowCoordinate:

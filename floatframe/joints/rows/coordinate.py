@@ -20,7 +20,7 @@ import numpy as np
 
 from fe_models.foundation.arrays import Array
 from floatframe.joints.rows.kinds import FORCE, PUSH, SPAN, TWIST_B, kind_of
-from floatframe.rotations import dot
+from floatframe.rotations import cross, dot
 
 __all__ = ["ZERO", "RelativePlace", "RowCoordinate"]
 
@@ -57,7 +57,7 @@ class RowCoordinate:
             return place.A_a @ self.x
         if self.kind == SPAN:
             return place.d / np.sqrt(dot(place.d, place.d))[..., None]
-        return (place.A_b if self.kind == TWIST_B else place.A_a) @ np.cross(self.x, self.z)
+        return (place.A_b if self.kind == TWIST_B else place.A_a) @ cross(self.x, self.z)
 
     def value(self, place: RelativePlace) -> Array:
         """Return the value, (...,); an angle between -pi and pi."""
