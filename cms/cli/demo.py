@@ -5,9 +5,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 import typer
 
@@ -19,6 +22,7 @@ __all__ = ["run_demo"]
 
 JOBS = ("rod.toml", "crank.toml")  #: shipped beside this file
 MODE = 3
+FPS = 15  #: of the film of the motion, 8 s long: its drawing is most of the work of the demo
 
 
 def run_demo(folder: Path) -> None:
@@ -38,42 +42,80 @@ def run_demo(folder: Path) -> None:
 
 
 def run_steps(folder: Path, wait_for_kernels: Callable[[], None]) -> None:
-    """Run every command, each announced."""
+    """Run every command, each announced; those that do not need each other at the same time."""
     from cms.cli.info import info_command, info_record
     from cms.cli.reduce import reduce_command
-    from cms.cli.view import view_command
     from fe_models.foundation.paths import replace_file
 
     modal = folder / "rod.h5"
-    step(folder, "cms reduce rod.toml -o rod.h5")
+    announce(folder, "cms reduce rod.toml -o rod.h5")
     reduce_command([folder / "rod.toml"], modal)
-    step(folder, "cms info rod.h5")
-    info_command(modal)
-    step(folder, "cms info rod.h5 --json > rod.json")
-    replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
-    step(folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
-    view_command(modal, MODE, folder / f"m{MODE}.png", folder / f"m{MODE}.gif")
-    wait_for_kernels()
-    run_floatframe(folder, "run crank.toml -o crank.h5")
-    run_floatframe(folder, "plot crank.h5 -o crank.png")
-    run_floatframe(folder, "animate crank.h5 -o crank.mp4")
+    with ExitStack() as running:
+        view = begun(running, folder, f"cms view rod.h5 --mode {MODE} -o m{MODE}.png --animate m{MODE}.gif")
+        announce(folder, "cms info rod.h5")
+        info_command(modal)
+        announce(folder, "cms info rod.h5 --json > rod.json")
+        replace_file(folder / "rod.json", info_record(modal).encode("utf-8"))
+        wait_for_kernels()
+        run = begun(running, folder, "floatframe run crank.toml -o crank.h5")
+        run.worker.wait()
+        later = [
+            begun(running, folder, words)
+            for words in (
+                "floatframe plot crank.h5 -o crank.png",
+                f"floatframe animate crank.h5 --fps {FPS} -o crank.mp4",
+            )
+            if run.worker.returncode == 0
+        ]
+        for each in (view, run, *later):
+            finish(folder, each)
 
 
-def run_floatframe(folder: Path, words: str) -> None:
-    """Run a command of `floatframe` in the folder, as a user does: this package does not know that one.
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A command that runs in a process of its own, and the file that takes what it prints."""
+
+    words: str
+    worker: subprocess.Popen[bytes]
+    said: IO[bytes]
+
+
+def begun(running: ExitStack, folder: Path, words: str) -> Begun:
+    """Begin a command, `cms ...` or `floatframe ...`, in the folder, as a user does; the stack ends it.
+
+    This package does not know `floatframe` otherwise.
+    """
+    program, *arguments = words.split()
+    said = running.enter_context(TemporaryFile())
+    worker = subprocess.Popen(
+        [sys.executable, "-P", "-m", f"{program}.cli", *arguments], cwd=folder, env=environment(),
+        stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+    running.callback(ended, worker)
+    return Begun(words, worker, said)
+
+
+def finish(folder: Path, command: Begun) -> None:
+    """Announce a command that was begun, wait for its end and print what it said.
 
     Raises
     ------
     typer.Exit
         With the exit code of the command, which has said what is wrong.
     """
-    step(folder, f"floatframe {words}")
+    announce(folder, command.words)
     sys.stdout.flush()
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", "floatframe.cli", *words.split()], cwd=folder, env=environment(), check=False
-    )
-    if done.returncode:
-        raise typer.Exit(done.returncode)
+    command.worker.wait()
+    command.said.seek(0)
+    typer.echo(command.said.read().decode(errors="replace"), nl=False)
+    if command.worker.returncode:
+        raise typer.Exit(command.worker.returncode)
+
+
+def ended(worker: subprocess.Popen[bytes]) -> None:
+    """End a process that still runs."""
+    worker.kill()
+    worker.wait()
 
 
 def environment() -> dict[str, str]:
@@ -120,8 +162,7 @@ def kernels_compiled_beside() -> Iterator[Callable[[], None]]:
     try:
         yield wait
     finally:
-        worker.kill()
-        worker.wait()
+        ended(worker)
 
 
 def put_inputs(folder: Path) -> None:
@@ -145,7 +186,7 @@ def put_inputs(folder: Path) -> None:
     replace_file(folder / "rod.msh", shipped_mesh("slender_rod").read_bytes())
 
 
-def step(folder: Path, command: str) -> None:
+def announce(folder: Path, command: str) -> None:
     """Announce a step by the command that does the same."""
     typer.echo()
     typer.secho(f"{folder}$ {command}", bold=True)

@@ -14,6 +14,7 @@ from floatframe.cli import (
     fatigue,
     linear,
     machine,
+    prepare,
     shake,
     spectra,
     view,
@@ -515,6 +516,7 @@ gradient.register(app)
 fatigue.register(app)
 cosimulation.register(app)
 machine.register(app)
+prepare.register(app)
 robot.register(app)
 generate.register(app)
 view.register(app)

@@ -63,16 +63,20 @@ def direction(x: Sequence[float] | Array) -> Direction:
 def counted_angles(system: System, placed: State) -> list[tuple[CountedAngle, TimeFunction | None]]:
     """Return the angles of a system, each once, with the motion that prescribes it or None."""
     found: list[tuple[CountedAngle, TimeFunction | None]] = []
+    between: dict[tuple[int, int, float], list[CountedAngle]] = {}  # the same two bodies
+    n_q = n_q_of(system)
 
     def add(angle: CountedAngle, motion: TimeFunction | None) -> None:
-        if not any(angle.is_same(known) for known, _ in found):
+        alike = between.setdefault((angle.holder, angle.other, angle.sign), [])
+        if not any(angle.is_same(known) for known in alike):
+            alike.append(angle)
             found.append((angle, motion))
 
     for joint in system.joints:
         if isinstance(joint, SlidingJoint) or not joint.coordinates:
             continue
         a, b = joint_markers(system, joint, placed)
-        (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q_of(system)) for end in (a, b))
+        (r_a, A_a), (r_b, A_b) = (marker_pose(end, placed, n_q) for end in (a, b))
         for row in joint.rows(A_a, A_b, r_b - r_a):
             if row.coordinate is not None and row.coordinate.is_angle:
                 add(angle_of(row.coordinate, a, b), row.motion if row.kind in (TURN, TURN_B) else None)

@@ -1,5 +1,7 @@
 """Order and fill of the block elimination of connections that share bodies; done once per system."""
 
+from heapq import heapify, heappop, heappush
+
 from fe_models.foundation.arrays import IntArray
 from floatframe.kernels.model import Elimination
 from floatframe.kernels.records import filled
@@ -49,15 +51,20 @@ def plan_elimination(sizes: list[int], ends_of_bodies: list[list[int]], connecti
     upper: list[int] = []
     update: list[int] = []
     after0, update0 = [0], [0]
-    left = set(range(n))
-    while left:
-        j = min(left, key=lambda c: (len(neighbours[c]), c))
-        left.remove(j)
+    waiting = [(len(neighbours[j]), j) for j in range(n)]  # those whose number has changed since are passed over
+    heapify(waiting)
+    is_left = [True] * n
+    while waiting:
+        n_neighbours, j = heappop(waiting)
+        if not is_left[j] or n_neighbours != len(neighbours[j]):
+            continue
+        is_left[j] = False
         later = sorted(neighbours[j])
         order.append(j)
         for i in later:
             neighbours[i] |= neighbours[j] - {i}
             neighbours[i].discard(j)
+            heappush(waiting, (len(neighbours[i]), i))
             after.append(i)
             lower.append(block(i, j))
             upper.append(block(j, i))

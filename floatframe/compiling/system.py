@@ -145,9 +145,14 @@ def compile_system(system: System) -> CompiledSystem:
     load_marker = []
     for load in loads:
         load_marker.append(made.add_marker(find_marker(system, f"force {load.name!r}: marker", load.marker)))
-    ends_of = [
-        [m for m, data in enumerate(markers) if data.body == i and made.connection_of[m] >= 0] for i in range(len(n_q))
-    ]
+    ends_of: list[list[int]] = [[] for _ in n_q]
+    for m, data in enumerate(markers):
+        if data.body >= 0 and made.connection_of[m] >= 0:
+            ends_of[data.body].append(m)
+    loaded_of: list[list[int]] = [[] for _ in n_q]
+    for m in load_marker:
+        if markers[m].body >= 0:
+            loaded_of[markers[m].body].append(m)
     angles = counted_angles(system, placed)
     row_motion = [functions.index(row.motion) for row in rows]
     forces, force0 = joint_forces(system, rows, made.owner, functions)
@@ -162,6 +167,8 @@ def compile_system(system: System) -> CompiledSystem:
             h0=offsets((n_q + 6) ** 2),
             end0=offsets(integers([len(group) for group in ends_of])),
             ends=[m for group in ends_of for m in group],
+            load0=offsets(integers([len(group) for group in loaded_of])),
+            loaded=integers([m for group in loaded_of for m in group]),
         ),
         body_types=type_arrays(types),
         markers=marker_record(made, ends_of, lines, load_marker, [load.is_follower for load in loads]),

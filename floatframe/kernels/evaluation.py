@@ -93,10 +93,8 @@ def tangent_of_body(model, work, i, c_m, c_d, c_k, H, turning):
     body_tangent(model, work, i, c_m, c_d, c_k, H, turn)
     for e in range(model.bodies.end0[i], model.bodies.end0[i + 1]):
         marker_stiffness(model, work, model.bodies.ends[e], c_k, H, turn)
-    for k in range(model.loads.marker.shape[0]):
-        m = model.loads.marker[k]
-        if model.markers.body[m] == i:
-            marker_stiffness(model, work, m, c_k, H, turn)
+    for e in range(model.bodies.load0[i], model.bodies.load0[i + 1]):
+        marker_stiffness(model, work, model.bodies.loaded[e], c_k, H, turn)
     for r in range(6 + n):
         put_sum(H[r], 3, scaled(c_k, turned_back(turning, turn[r])))
 

@@ -77,6 +77,8 @@ class Bodies(NamedTuple):
     h0: IntArray = integer(n_b + 1)  #: of its matrix in the store of matrices
     end0: IntArray = integer(n_b + 1)  #: in `ends`
     ends: IntArray = integer(n_ends)  #: markers of the bodies that are ends of connections
+    load0: IntArray = integer(n_b + 1)  #: in `loaded`
+    loaded: IntArray = integer(Size("loaded"))  #: markers of the bodies that carry loads
 
 
 class BodyTypes(NamedTuple):

@@ -5,22 +5,30 @@ with each caller; it also looks up what an operator means for numbers at every s
 for closures, generators, parallel loops and array expressions. All this is three quarters of the time of a
 compilation. Inner functions are never called from Python and own no memory, so that here
 
-(1) the library of an inner function stops before optimisation and machine code;
+(1) the library of an inner function stops before optimisation and machine code: its module is read once, and linked by
+    the entries as it is;
 (2) the library of an entry links all of them and is optimised once;
 (3) while an entry is compiled, the meaning of an operator or built-in function for given types is looked up once, and
-    Python does not look for garbage;
+    Python does not look for garbage; numba does not collect warnings about each statement, nor look for `with` and
+    dictionaries of arguments, and finds the variables of a statement by the exact types of its parts;
 (4) the passes of numba are those that kernels need (no closures, lists, array expressions, `raise`), see
     kernels/compiler/passes.py;
 (5) variables, operations and calls become lean code of LLVM, see kernels/compiler/lowering.py.
 """
 
 import gc
+import types
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
+from llvmlite.binding import Linkage, parse_assembly
 from numba import njit
+from numba.core import cgutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
+from numba.core.errors import WarningsFixer
+from numba.core.interpreter import Interpreter
+from numba.core.ir import Inst, Loc, Var
 from numba.core.types.functions import BaseFunction
 
 from floatframe.kernels.compiler.block import Block, make_block
@@ -41,6 +49,22 @@ class WithoutEngine:
 class InnerLibrary(JITCodeLibrary):
     """The intermediate code of an inner function (1)."""
 
+    def add_ir_module(self, ir_module):
+        """Read the code of the function, the only module here: it is not linked into an empty one first."""
+        self._raise_if_finalized()
+        module = parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
+        module.name = ir_module.name
+        module.data_layout = self._codegen._data_layout
+        self._final_module = module
+
+    def _get_module_for_linking(self):
+        """Return the code itself, no copy: an entry links it once."""
+        self._ensure_finalized()
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == Linkage.external:
+                function.linkage = "linkonce_odr"
+        return self._final_module
+
     def finalize(self):
         """Take note of what is called: no linking, no optimisation, no machine code."""
         self._raise_if_finalized()
@@ -48,9 +72,6 @@ class InnerLibrary(JITCodeLibrary):
             self._reload_init.update(library._reload_init)
         self._finalize_dynamic_globals()
         self._finalized = True
-
-    def _optimize_functions(self, ll_module):
-        ll_module.data_layout = self._codegen._data_layout
 
     def get_pointer_to_function(self, name):
         """Return zero: there is no machine code."""
@@ -85,6 +106,58 @@ def with_callees(library, known):
         known[library] = None
         for other in library._linking_libraries:
             with_callees(other, known)
+
+
+def variables_in(self, part):
+    """Return the variables in a part of a statement of numba, as `Inst._rec_list_vars` does."""
+    kind = type(part)
+    if kind is Var:
+        return [part]
+    if kind in PLAIN:
+        return []
+    if isinstance(part, Inst):
+        return part.list_vars()
+    if kind is list or kind is tuple:
+        return [each for one in part for each in variables_in(self, one)]
+    if kind is dict:
+        return [each for one in part.values() for each in variables_in(self, one)]
+    return plain_variables_in(self, part)
+
+
+PLAIN = frozenset({str, int, float, bool, type(None), Loc, types.BuiltinFunctionType, types.FunctionType})
+plain_variables_in = Inst._rec_list_vars
+
+
+def without_warnings(self, filename=None, lineno=None):
+    """Return a context that does nothing, in the place of one that keeps the warnings of a statement."""
+    return nullcontext()
+
+
+def needed_rewrites(self, rewrites, code):
+    """Apply the rewrites of byte code that kernels may need: none of those of `with` and of keyword dictionaries."""
+    return plain_rewrites(self, [each for each in rewrites if each.__name__ not in NOT_NEEDED], code)
+
+
+NOT_NEEDED = ("peep_hole_delete_with_exit", "peep_hole_fuse_dict_add_updates")
+plain_rewrites = Interpreter.post_process
+
+
+@contextmanager
+def shorter_ways() -> Iterator[None]:
+    """(3), within the compiler's lock."""
+    replaced = (
+        (Inst, "_rec_list_vars", variables_in),
+        (WarningsFixer, "catch_warnings", without_warnings),
+        (Interpreter, "post_process", needed_rewrites),
+    )
+    plain = [getattr(owner, name) for owner, name, _ in replaced]
+    for owner, name, function in replaced:
+        setattr(owner, name, function)
+    try:
+        yield
+    finally:
+        for (owner, name, _), function in zip(replaced, plain, strict=True):
+            setattr(owner, name, function)
 
 
 @contextmanager
@@ -146,7 +219,7 @@ class EntryCompiler(CompilerBase):
         """Compile into an `EntryLibrary`."""
         self.state.library = EntryLibrary(self.state.targetctx.codegen(), func.__qualname__)
         self.state.library.enable_object_caching()
-        with remembered_calls(), without_garbage_collection():
+        with remembered_calls(), shorter_ways(), without_garbage_collection():
             return super().compile_extra(func)
 
 

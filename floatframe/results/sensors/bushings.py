@@ -11,7 +11,6 @@ the distance of their points, theta the rotation vector of A^T B, C half way bet
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.copies import frozen_copies
@@ -47,6 +46,8 @@ class BushingSensor:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return deformations and rates over time."""
+        from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+
         a, b = (end_motion(system, trajectory, end) for end in self.ends(system))
         theta = Rotation.from_matrix(np.swapaxes(a.axes, -1, -2) @ b.axes).as_rotvec()
         C = a.axes @ Rotation.from_rotvec(theta / 2).as_matrix()
@@ -62,6 +63,8 @@ class BushingSensor:
 
     def linear(self, small: SmallMotions) -> LinearColumns:
         """Return de = Cᵀ dd + e × dc and dtheta = S u, rates as theirs."""
+        from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+
         a, b = (small.place(end, self.of) for end in self.ends(small.system))
         theta = Rotation.from_matrix(a.axes.T @ b.axes).as_rotvec()
         C = a.axes @ Rotation.from_rotvec(theta / 2).as_matrix()

@@ -6,7 +6,6 @@ As outputs they are sensors of one column, named "value".
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from fe_models.foundation.arrays import Array
 from fe_models.foundation.components import STRESS_COMPONENTS
@@ -64,6 +63,8 @@ class Channel:
 
     def measure(self, system: System, trajectory: Trajectory) -> Measurement:
         """Return the motion along the direction over time; displacements and rotations since the first time."""
+        from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+
         total = np.zeros(len(trajectory.t))
         for sign, marker in self.markers:
             where = f"channel {self.name!r}: marker"

@@ -7,7 +7,6 @@ of the nodes of an element or set.
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cms.errors import BodyError
 from cms.reduced_body.address import Address, FoundNodes
@@ -250,6 +249,8 @@ def relative_rows(place: SmallPlace, other: SmallPlace, quantity: str) -> Rows:
 
 def absolute(place: PlaceMotion, quantity: str) -> Array:
     """Return a quantity of a place in ground axes, (n_t, 3)."""
+    from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+
     if quantity == "rotation-vector":
         return np.asarray(Rotation.from_matrix(place.axes).as_rotvec())
     return np.asarray(
@@ -264,6 +265,8 @@ def absolute(place: PlaceMotion, quantity: str) -> Array:
 
 def relative(place: PlaceMotion, other: PlaceMotion, quantity: str) -> Array:
     """Return a quantity of a place as another place sees it, in the axes of that, (n_t, 3)."""
+    from scipy.spatial.transform import Rotation  # late: what moves a system does without scipy.spatial
+
     d = place.position - other.position
     if quantity == "position":
         seen = d

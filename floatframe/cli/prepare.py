@@ -1,0 +1,84 @@
+"""The command prepare: compile all kernels after an installation, in processes beside each other."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from typing import Annotated
+
+import typer
+
+from cms.cli.console import guarded, print_table, say, stages
+from cms.cli.demo import environment
+
+__all__ = ["prepare_parts", "register"]
+
+RUN = "import sys; from floatframe.cli.compile_kernels import main; main(sys.argv[1:])"
+LATER = {"relative": "motion"}  #: a part that needs what another compiles begins after it
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    app.command("prepare")(prepare_command)
+
+
+@guarded
+def prepare_command(
+    workers: Annotated[int, typer.Option(min=0, help="Processes at a time; 0: one a processor.")] = 0,
+) -> None:
+    """Compile the code of motions and reductions ahead; otherwise that happens when each is first used.
+
+    Done once after an installation; what is ready already is left as it is.
+
+    Example: floatframe prepare
+    """
+    from floatframe.cli.compile_kernels import PARTS
+    from floatframe.errors import FloatframeError
+    from floatframe.kernels.compiler.choice import words
+
+    began = time.perf_counter()
+    with stages() as clock, clock("compile"):
+        done = prepare_parts(tuple(PARTS), workers or os.cpu_count() or 1)
+    rows = [
+        (name, PARTS[name][0], f"compiled in {each['seconds']:.0f} s" if each.get("compiled") else "was ready")
+        for name, each in done.items()
+        if "failed" not in each
+    ]
+    print_table(f"Compiled code ({words()})", ("part", "for", "now"), rows)
+    say(f"{time.perf_counter() - began:.0f} s")
+    failed = {name: each["failed"] for name, each in done.items() if "failed" in each}
+    if failed:
+        name, why = next(iter(failed.items()))
+        raise FloatframeError(f"prepare: the code of {name!r} could not be compiled: {why}; the other parts are ready")
+
+
+def prepare_parts(parts: tuple[str, ...], workers: int) -> dict[str, dict]:
+    """Return for each part what its process said, or why it failed; at most so many processes at a time."""
+    waiting, running, done = list(parts), {}, {}  # type: ignore[var-annotated]
+    try:
+        while waiting or running:
+            ready = [part for part in waiting if LATER.get(part) not in (*waiting, *running)]
+            for part in ready[: workers - len(running)]:
+                waiting.remove(part)
+                running[part] = subprocess.Popen(
+                    [sys.executable, "-P", "-c", RUN, part], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE, text=True, env=environment(),
+                )  # fmt: skip
+            for part, process in list(running.items()):
+                try:
+                    said, errors = process.communicate(timeout=0.1)
+                except subprocess.TimeoutExpired:
+                    continue
+                del running[part]
+                lines = errors.strip().splitlines()
+                done[part] = (
+                    json.loads(said.splitlines()[-1])
+                    if process.returncode == 0
+                    else {"failed": lines[-1] if lines else f"exit code {process.returncode}"}
+                )
+    finally:
+        for process in running.values():
+            process.kill()
+            process.wait()
+    return {part: done[part] for part in parts}
