@@ -86,8 +86,11 @@ class ValidityWatch:
         new = []
         for part in self.bodies:
             for kind, values in self.measures(part, rows, told):
+                limit = getattr(part.limits, kind)
+                if not (values > limit).any():
+                    continue
                 k = int(np.nanargmax(values)) if np.isfinite(values).any() else 0
-                largest, limit = float(values[k]), getattr(part.limits, kind)
+                largest = float(values[k])
                 if not largest > limit:
                     continue
                 key, t = (part.body.name, kind), float(rows.t[k])
@@ -148,7 +151,9 @@ class ValidityWatch:
             o = N_INERTIAL + 6 * load.interface
             lam[:, o : o + 6] += amplitudes(load, rows.t, R)
         values = np.full(len(rows.t), -1.0)
-        bound = np.nan_to_num(np.abs(lam)) @ part.norms
+        bound = np.abs(lam) @ part.norms
+        if not np.isfinite(bound).all():
+            bound = np.nan_to_num(np.abs(lam)) @ part.norms
         k = int(np.argmax(bound))
         seen = self.found.get((part.body.name, "load"))
         if bound[k] > max(part.limits.load, seen.largest if seen else 0.0) and np.isfinite(lam[k]).all():
@@ -281,10 +286,8 @@ def estimated_interface_loads(reduced: ReducedBody) -> Array:
 def rotations(p: Array) -> Array:
     """Return R_GB of Euler parameters over time, (n_t, 3, 3)."""
     w, x, y, z = p.T
-    return np.moveaxis(
-        np.array([
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]), 2, 0,
-    )  # fmt: skip
+    return np.stack([
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    ], axis=1).reshape(-1, 3, 3)  # fmt: skip

@@ -1,7 +1,9 @@
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+import typer
 
 from cms.cli import demo
 from cms.errors import JobError
@@ -53,3 +55,16 @@ def test_the_compiling_process_compiles(monkeypatch, tmp_path):
     compile_kernels.main(["relative"])
     assert steps[1:] == ["absolute", "relative"]
     assert Path(compile_kernels.__file__).name == "compile_kernels.py"
+
+
+def test_what_a_command_of_the_demo_says_is_shown_and_its_failure_ends_the_demo(tmp_path, capfd):
+    with ExitStack() as running:
+        good = demo.begun(running, tmp_path, "cms --version")
+        bad = demo.begun(running, tmp_path, "cms info missing.h5")
+        demo.finish(tmp_path, good)
+        with pytest.raises(typer.Exit) as ended:
+            demo.finish(tmp_path, bad)
+    said = capfd.readouterr().out
+    assert "$ cms --version\n" in said
+    assert "missing.h5" in said
+    assert ended.value.exit_code == 2
