@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numba.core.event import install_recorder
 
-from floatframe import GeneralizedAlpha, RigidBody, System, integrate
+from floatframe import EnergyMomentum, GeneralizedAlpha, RigidBody, System, integrate
 
 __all__ = ["PARTS", "main"]
 
@@ -29,6 +29,11 @@ def make_relative() -> None:
     """Move it in the coordinates of joints too; these kernels come after those of the motion, which they need."""
     make_motion()
     integrate(block(), GeneralizedAlpha(), 1e-3, 1e-3, formulation="relative")
+
+
+def make_schemes() -> None:
+    """Move it by a conserving scheme, whose loop serves the variational one as well."""
+    integrate(block(), EnergyMomentum(), 1e-3, 1e-3)
 
 
 def make_reduction() -> None:
@@ -50,6 +55,7 @@ def block() -> System:
 PARTS: dict[str, tuple[str, Callable[[], None]]] = {
     "motion": ("motions, equilibria, linearisation", make_motion),
     "relative": ("motions in the coordinates of joints", make_relative),
+    "schemes": ("conserving, decaying and variational schemes", make_schemes),
     "reduction": ("finite element bodies: assembly, stress, geometric stiffness", make_reduction),
 }
 

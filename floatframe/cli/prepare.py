@@ -15,7 +15,7 @@ from cms.cli.demo import environment
 __all__ = ["prepare_parts", "register"]
 
 RUN = "import sys; from floatframe.cli.compile_kernels import main; main(sys.argv[1:])"
-LATER = {"relative": "motion"}  #: a part that needs what another compiles begins after it
+LATER = {"relative": "motion", "schemes": "motion"}  #: a part that needs what another compiles begins after it
 
 
 def register(app: typer.Typer) -> None:

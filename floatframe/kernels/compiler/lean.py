@@ -26,7 +26,7 @@ from numba import njit
 from numba.core import cgutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
-from numba.core.errors import WarningsFixer
+from numba.core.errors import WarningsFixer  # type: ignore[attr-defined]
 from numba.core.interpreter import Interpreter
 from numba.core.ir import Inst, Loc, Var
 from numba.core.types.functions import BaseFunction
