@@ -83,6 +83,7 @@ from .fatigue.surface_damage import spectral_damage as spectral_damage
 from .flexible_parts import FlexiblePart as FlexiblePart
 from .flexible_parts import corotational as corotational
 from .flexible_parts import finite_segments as finite_segments
+from .flexible_parts import floating_parts as floating_parts
 from .flexible_parts.exact_beams import exact_beams as exact_beams
 from .forces import BodyLoad as BodyLoad
 from .forces import Bushing as Bushing

@@ -1,5 +1,18 @@
 """Ready systems, each a function that returns a `System`: rigid by default, flexible with reduced bodies."""
 
+from floatframe.mechanisms.beam_benchmarks import (
+    buckling_beam,
+    loaded_cantilever,
+    misaligned_four_bar,
+    unbalanced_shaft,
+)
+from floatframe.mechanisms.iftomm import (
+    andrews_mechanism,
+    bricard_mechanism,
+    flyball_governor,
+    n_four_bar,
+    point_pendulum,
+)
 from floatframe.mechanisms.linkages import four_bar, slider_crank
 from floatframe.mechanisms.pendulums import chain, double_pendulum, pendulum
 from floatframe.mechanisms.satellite import satellite
@@ -8,10 +21,18 @@ from floatframe.mechanisms.telescopic import telescopic_slider_crank
 from floatframe.mechanisms.top import spinning_top
 
 __all__ = [
+    "andrews_mechanism",
+    "bricard_mechanism",
+    "buckling_beam",
     "chain",
     "double_pendulum",
+    "flyball_governor",
     "four_bar",
+    "loaded_cantilever",
+    "misaligned_four_bar",
+    "n_four_bar",
     "pendulum",
+    "point_pendulum",
     "rotating_blade",
     "satellite",
     "slider_crank",
@@ -19,4 +40,5 @@ __all__ = [
     "spinning_shaft",
     "spinning_top",
     "telescopic_slider_crank",
+    "unbalanced_shaft",
 ]

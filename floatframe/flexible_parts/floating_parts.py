@@ -1,0 +1,98 @@
+"""A slender body in parts: reduced bodies in a row, each in a floating frame of its own."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cms.reduced_body.reduced_body import ReducedBody
+from fe_models.foundation.arrays import Array
+from floatframe.bodies.flexible_body import FlexibleBody
+from floatframe.bodies.markers import Marker
+from floatframe.bodies.rigid_body import euler_parameters_from_user
+from floatframe.checked_values import array_of_shape
+from floatframe.errors import ModelError
+from floatframe.flexible_parts.flexible_part import FlexiblePart
+from floatframe.joints import FixedJoint, Joint
+from floatframe.rotations import rotation_matrix
+
+__all__ = ["floating_parts"]
+
+
+def floating_parts(
+    name: str,
+    reduced: Sequence[ReducedBody],
+    *,
+    position: Array | None = None,
+    orientation: Array | None = None,
+    velocity: Array | None = None,
+    omega_B: Array | None = None,
+    ends: tuple[str, str] = ("start", "end"),
+    stiffening: bool = True,
+) -> FlexiblePart:
+    """Return reduced bodies in a row, fixed to each other at their ends.
+
+    The whole may bend and turn as far as it likes; what has to stay small is the bending of a part in its own frame
+    (docs/multibody.md, The range of a linear frame), which falls with the square of its length.
+
+    Parameters
+    ----------
+    name
+        Of the part; its bodies are "name 1", "name 2", ..., its joints "name joint 1", ....
+    reduced
+        Bodies in a row, instances of one where they are equal: each lies with its first interface on the second one of
+        that before it.
+    position, orientation
+        Of the mesh axes of the first body in ground axes, (3,) [m], and Euler parameters, (4,); all mesh axes are
+        parallel.
+    velocity, omega_B
+        Velocity of that origin in ground axes, (3,) [m/s], and angular velocity in mesh axes, (3,) [rad/s]: the part
+        begins to move as one rigid body.
+    ends
+        Interfaces of every body, with rotations.
+    stiffening
+        Whether their geometric stiffness is used; they have to have it.
+
+    Returns
+    -------
+    FlexiblePart
+        Markers "start", "end" and "node 1", "node 2", ... on the interfaces.
+
+    Raises
+    ------
+    ModelError
+        If there is no body, or one has no geometric stiffness and is to be stiffened.
+    """
+    where = f"floating_parts {name!r}"
+    if not reduced:
+        raise ModelError(f"{where}: expected a reduced body or several, got none")
+    r = array_of_shape(f"{where}: position", np.zeros(3) if position is None else position, (3,))
+    p = euler_parameters_from_user(f"{where}: orientation", np.eye(4)[0] if orientation is None else orientation)
+    v = array_of_shape(f"{where}: velocity", np.zeros(3) if velocity is None else velocity, (3,))
+    omega = array_of_shape(f"{where}: omega_B", np.zeros(3) if omega_B is None else omega_B, (3,))
+    R, origin = rotation_matrix(p), r
+    bodies, joints, markers = [], [], {}
+    for number, body in enumerate(reduced, start=1):
+        if stiffening and body.geometric is None:
+            raise ModelError(
+                f"{where}: body {body.name!r} has no geometric stiffness; reduce it with geometric=True, or ask for "
+                "stiffening=False"
+            )
+        a, b = (body.frame.origin + body.frame.axes @ body.interface(end).position for end in ends)
+        if number > 1:
+            r = r + R @ (last - a)
+        last = b
+        called = f"{name} {number}"
+        moving = v + R @ np.cross(omega, R.T @ (r - origin))
+        bodies.append(
+            FlexibleBody(
+                called, body, position=r, orientation=p, velocity=moving, omega_B=omega, stiffening=stiffening
+            )
+        )
+        markers[f"node {number}"] = Marker(called, ends[0])
+        if number > 1:
+            before = Marker(f"{name} {number - 1}", ends[1])
+            joints.append(FixedJoint(f"{name} joint {number - 1}", before, Marker(called, ends[0])))
+    markers |= {"start": markers["node 1"], "end": Marker(bodies[-1].name, ends[1])}
+    markers[f"node {len(bodies) + 1}"] = markers["end"]
+    made: tuple[Joint, ...] = tuple(joints)
+    return FlexiblePart(name, tuple(bodies), made, (), markers)

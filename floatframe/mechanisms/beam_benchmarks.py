@@ -1,0 +1,213 @@
+"""The four benchmark problems of flexible beams of Bauchau, Betsch, Cardona and others (2016).
+
+Every beam is a `BeamLine`, the numbers per length of the problem; `describe` says as what it moves: a function from the
+line to what places it, such as `lambda line: partial(finite_segments, line=line, n=9, stations=...)`. Parts have the
+places "start" and "end", those of the shaft and of the beam that buckles "middle" as well. Local y and z of a line
+begin along those of its orientation.
+
+References: Bauchau and others (2016) and Masarati and others (MBDyn), docs/bibliography.md.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fe_models.body.beam_line import BeamLine
+from fe_models.foundation.arrays import Array
+from fe_models.foundation.units import unit_system
+from floatframe.bodies.ground import GROUND
+from floatframe.bodies.markers import Marker
+from floatframe.bodies.rigid_body import RigidBody
+from floatframe.flexible_parts.flexible_part import FlexiblePart, PartMaker
+from floatframe.forces import Force, Gravity, PointForce
+from floatframe.functions.time_functions import TimeFunction, harmonic, one_piece, piecewise, polynomial_of_time
+from floatframe.joints import CylindricalJoint, FixedJoint, Joint, RevoluteJoint, SphericalJoint
+from floatframe.rotations import euler_parameters
+from floatframe.system import Body, System
+
+__all__ = [
+    "BUCKLING_LINES",
+    "FOUR_BAR_LINES",
+    "PRINCETON_LINE",
+    "SHAFT_LINE",
+    "buckling_beam",
+    "crank_turn",
+    "loaded_cantilever",
+    "misaligned_four_bar",
+    "shaft_turn",
+    "unbalanced_shaft",
+]
+
+Describe = Callable[[BeamLine], PartMaker]
+X, Y, Z = np.eye(3)
+UNITS = "m-kg-s"
+
+#: the beam of Princeton's experiment: stiff bending in the x-y plane; it is statics, the mass is that of aluminium
+PRINCETON_LINE = BeamLine(
+    0.508, rho_A=0.1070, EA=2.84191e6, EIy=2.42873, EIz=36.2794, GJ=3.10338, rho_Iy=9.147e-8, rho_Iz=1.3664e-6,
+    GAy=9.03881e5, GAz=6.40131e5,
+)  # fmt: skip
+
+
+def square(length: float, **values: float) -> BeamLine:
+    """Return a line that is the same in both planes."""
+    EI, GA, rho_I = values.pop("EI"), values.pop("GA"), values.pop("rho_I")
+    return BeamLine(length, EIy=EI, EIz=EI, GAy=GA, GAz=GA, rho_Iy=rho_I, rho_Iz=rho_I, **values)
+
+
+#: bars 1 and 2 of steel, 16 mm square, and 3, 8 mm square
+FOUR_BAR_LINES = (
+    square(0.12, rho_A=1.997, EA=52.99e6, EI=1131.0, GJ=733.5, GA=16.88e6, rho_I=42.6e-6),
+    square(0.24, rho_A=1.997, EA=52.99e6, EI=1131.0, GJ=733.5, GA=16.88e6, rho_I=42.6e-6),
+    square(0.12, rho_A=0.4992, EA=13.25e6, EI=70.66, GJ=45.84, GA=4.22e6, rho_I=2.662e-6),
+)
+#: a steel tube of 100 mm and 5 mm
+SHAFT_LINE = square(6.0, rho_A=11.64, EA=313.4e6, EI=354.5e3, GJ=272.7e3, GA=60.5e6, rho_I=13.17e-3)
+#: aluminium: the beam, 100 mm high and 10 mm wide, the link and the crank, steel tubes
+BUCKLING_LINES = (
+    BeamLine(
+        1.0, rho_A=2.68, EA=73e6, EIy=60830.0, EIz=608.3, GJ=877.2, rho_Iy=2233e-6, rho_Iz=22.33e-6, GAy=5.025e6,
+        GAz=23.40e6,
+    ),
+    square(0.25, rho_A=1.212, EA=33.02e6, EI=1189.0, GJ=914.5, GA=10.81e6, rho_I=43.65e-6),
+    square(0.05, rho_A=4.85, EA=132.1e6, EI=19020.0, GJ=14630.0, GA=43.22e6, rho_I=698.3e-6),
+)  # fmt: skip
+
+
+def loaded_cantilever(
+    describe: Describe, *, load: float, angle: float, line: BeamLine = PRINCETON_LINE, ramp: TimeFunction | None = None
+) -> System:
+    """Return a beam along x, clamped at the origin, with a dead load at its end: the Princeton experiment.
+
+    Body parts "beam ...", joint "clamp", force "load" [N], at an angle from -y towards z [rad]: at zero the beam bends
+    about its stiff axis.
+    """
+    beam = placed(describe(line), "beam", np.zeros(3), X, Y)
+    clamp = FixedJoint("clamp", Marker(GROUND), beam.marker("start"))
+    force = load * (-np.cos(angle) * Y + np.sin(angle) * Z)
+    weight = PointForce("load", beam.marker("end"), force=force, amplitude=ramp)
+    return made([beam], [], [clamp], [weight], "Princeton beam")
+
+
+def misaligned_four_bar(describe: Describe, *, defect: float = np.deg2rad(5.0), speed: float = 0.6) -> System:
+    """Return three bars on four hinges, of which that at C is out of line by `defect` [rad].
+
+    A = 0, B = (0, 0.12, 0), C = (0.24, 0.12, 0), D = (0.24, 0, 0). Rigid bars would be locked. Parts "bar 1" to "bar
+    3", joints "A" (driven, clockwise with `speed` [rad/s]), "B", "C", "D".
+    """
+    A, B, C, D = np.zeros(3), 0.12 * Y, 0.24 * X + 0.12 * Y, 0.24 * X
+    lines = FOUR_BAR_LINES
+    bars = [
+        placed(describe(line), f"bar {k + 1}", start, direction, across)
+        for k, (line, start, direction, across) in enumerate(
+            zip(lines, (A, B, C), (Y, X, -Y), (-X, Y, X), strict=True)
+        )
+    ]
+    turn = polynomial_of_time([0.0, -speed])
+    # axes in those of the marker they belong to: z of all bars begins along z, x and y do not
+    tilted = np.sin(defect) * X + np.cos(defect) * Z
+    joints: list[Joint] = [
+        RevoluteJoint("A", Marker(GROUND), bars[0].marker("start"), axis=Z, motions={"angle": turn}),
+        RevoluteJoint("B", bars[0].marker("end"), bars[1].marker("start"), axis=Z),
+        RevoluteJoint("C", bars[1].marker("end"), bars[2].marker("start"), axis=tilted),
+        RevoluteJoint("D", Marker(GROUND, position=D), bars[2].marker("end"), axis=Z),
+    ]
+    return made(bars, [], joints, [], "four-bar with a misaligned joint")
+
+
+def unbalanced_shaft(describe: Describe, *, turn: TimeFunction, gravity: float = 9.81) -> System:
+    """Return a shaft along x on two bearings with a disk, 50 mm out of its axis, in the middle.
+
+    Part "shaft", body "disk"; joints "drive" (angle over time prescribed by `turn`), "bearing" (it slides), "seat".
+    Gravity acts along -z, where the centre of the disk lies above the shaft at the start.
+    """
+    mass, radius, width = 70.573, 0.24, 0.05
+    across = mass * (radius**2 / 4 + width**2 / 12)
+    middle = SHAFT_LINE.length / 2 * X
+    disk = RigidBody("disk", mass, np.diag([mass * radius**2 / 2, across, across]), position=middle + 0.05 * Z)
+    shaft = placed(describe(SHAFT_LINE), "shaft", np.zeros(3), X, Y)
+    joints: list[Joint] = [
+        RevoluteJoint("drive", Marker(GROUND), shaft.marker("start"), axis=X, motions={"angle": turn}),
+        CylindricalJoint("bearing", Marker(GROUND, position=2 * middle), shaft.marker("end"), axis=X),
+        FixedJoint("seat", shaft.marker("middle"), Marker("disk", position=-0.05 * Z)),
+    ]
+    return made([shaft], [disk], joints, [Gravity(-gravity * Z)] if gravity else [], "unbalanced shaft")
+
+
+def shaft_turn(omega: float = 60.0) -> TimeFunction:
+    """Return the angle of the shaft: to 0.8 omega within 0.5 s, from 1 s to 1.25 s on to 1.2 omega [rad]."""
+    first, last = 0.8 * omega, 1.2 * omega
+
+    def rise(begin: float, rate: float, by: float, T: float) -> TimeFunction:
+        """From an angle on, the rate raised by (1 - cos(pi t/T))/2 times a step."""
+        return one_piece([begin, rate + by / 2], (-by / 2 * T / np.pi, np.pi / T, 0.0))
+
+    at = (0.0, first * 0.25, first * 0.75, first * 0.75 + (first + last) / 2 * 0.25)
+    pieces = [
+        rise(at[0], 0.0, first, 0.5),
+        one_piece([at[1], first]),
+        rise(at[2], first, last - first, 0.25),
+        one_piece([at[3], last]),
+    ]
+    return piecewise([0.0, 0.5, 1.0, 1.25], pieces)
+
+
+def buckling_beam(describe: Describe, *, turn: TimeFunction, gap: float = 1e-4) -> System:
+    """Return a thin cantilever whose end a crank pushes upwards through a link, until it buckles sideways.
+
+    Parts "beam", "link", "crank"; joints "root", "ball" (the link hangs `gap` [m] beside the line of the beam), "pin",
+    "crank": its angle over time is prescribed by `turn`, half a turn lifts the end by 0.1 m.
+    """
+    beam_line, link_line, crank_line = BUCKLING_LINES
+    tip = X + gap * Y
+    low = tip - link_line.length * Z
+    beam = placed(describe(beam_line), "beam", np.zeros(3), X, Y)
+    link = placed(describe(link_line), "link", low, Z, Y)
+    crank = placed(describe(crank_line), "crank", low - crank_line.length * X, X, Y)
+    at_end = beam.marker("end")
+    carrier, fixed = carried(at_end, gap * Y, X)
+    joints: list[Joint] = [
+        FixedJoint("root", Marker(GROUND), beam.marker("start")),
+        *fixed,
+        SphericalJoint("ball", carrier, link.marker("end")),
+        RevoluteJoint("pin", crank.marker("end"), link.marker("start"), axis=Y),
+        RevoluteJoint(
+            "crank",
+            Marker(GROUND, position=low - crank_line.length * X),
+            crank.marker("start"),
+            axis=Y,
+            motions={"angle": turn},
+        ),
+    ]
+    lug = [RigidBody("lug", 1e-3, 1e-7 * np.eye(3), position=tip)] if fixed else []
+    return made([beam, link, crank], lug, joints, [], "lateral buckling")
+
+
+def crank_turn(duration: float = 0.4) -> TimeFunction:
+    """Return the angle of the crank: half a turn, -pi/2 (1 - cos(pi t/duration)), then rest [rad]."""
+    rising = harmonic(np.pi / 2, np.pi / duration, np.pi / 2, -np.pi / 2)
+    return piecewise([0.0, duration], [rising, one_piece([-np.pi])])
+
+
+def carried(marker: Marker, offset: Array, place: Array) -> tuple[Marker, list[Joint]]:
+    """Return a place beside a marker: of its rigid body, or of a small one fixed to an interface."""
+    if marker.interface is None:
+        at = np.zeros(3) if marker.position is None else marker.position
+        return Marker(marker.body, position=at + offset), []
+    return Marker("lug", position=np.zeros(3)), [FixedJoint("seat", marker, Marker("lug", position=-offset))]
+
+
+def placed(maker: PartMaker, name: str, start: Array, direction: Array, across: Array) -> FlexiblePart:
+    """Return a part from a place on along a direction, its y axis along another."""
+    R = np.column_stack([direction, across, np.cross(direction, across)])
+    return maker(name, position=start, orientation=euler_parameters(R))
+
+
+def made(
+    parts: list[FlexiblePart], bodies: list[RigidBody], joints: list[Joint], forces: list[Force], name: str
+) -> System:
+    """Return the system of parts and what is between them."""
+    all_bodies: list[Body] = [body for part in parts for body in part.bodies] + list(bodies)
+    all_joints = [joint for part in parts for joint in part.joints] + joints
+    all_forces = [force for part in parts for force in part.forces] + forces
+    return System(all_bodies, all_joints, all_forces, unit_system(UNITS), name)
