@@ -20,7 +20,7 @@ from floatframe.bodies.markers import Marker
 from floatframe.bodies.rigid_body import RigidBody
 from floatframe.flexible_parts.flexible_part import FlexiblePart, PartMaker
 from floatframe.forces import Force, Gravity, PointForce
-from floatframe.functions.time_functions import TimeFunction, harmonic, one_piece, piecewise, polynomial_of_time
+from floatframe.functions.time_functions import TimeFunction, harmonic, one_piece, piecewise
 from floatframe.joints import CylindricalJoint, FixedJoint, Joint, RevoluteJoint, SphericalJoint
 from floatframe.rotations import euler_parameters
 from floatframe.system import Body, System
@@ -89,11 +89,11 @@ def loaded_cantilever(
     return made([beam], [], [clamp], [weight], "Princeton beam")
 
 
-def misaligned_four_bar(describe: Describe, *, defect: float = np.deg2rad(5.0), speed: float = 0.6) -> System:
+def misaligned_four_bar(describe: Describe, *, turn: TimeFunction, defect: float = np.deg2rad(5.0)) -> System:
     """Return three bars on four hinges, of which that at C is out of line by `defect` [rad].
 
     A = 0, B = (0, 0.12, 0), C = (0.24, 0.12, 0), D = (0.24, 0, 0). Rigid bars would be locked. Parts "bar 1" to "bar
-    3", joints "A" (driven, clockwise with `speed` [rad/s]), "B", "C", "D".
+    3", joints "A" (its angle over time is prescribed by `turn`, about z), "B", "C", "D".
     """
     A, B, C, D = np.zeros(3), 0.12 * Y, 0.24 * X + 0.12 * Y, 0.24 * X
     lines = FOUR_BAR_LINES
@@ -103,7 +103,6 @@ def misaligned_four_bar(describe: Describe, *, defect: float = np.deg2rad(5.0), 
             zip(lines, (A, B, C), (Y, X, -Y), (-X, Y, X), strict=True)
         )
     ]
-    turn = polynomial_of_time([0.0, -speed])
     # axes in those of the marker they belong to: z of all bars begins along z, x and y do not
     tilted = np.sin(defect) * X + np.cos(defect) * Z
     joints: list[Joint] = [

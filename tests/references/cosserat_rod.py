@@ -4,16 +4,20 @@ With n and m the force and moment in a section, ground axes, R its axes, c_n and
 
     r' = R (e_x + c_n Rᵀ n),   R' = R tilde(c_m Rᵀ m),   m' = n x r',   n' = 0 between loads
 
-No elements, no interpolation: DOP853 to 1e-11.
+No elements, no interpolation: Runge and Kutta's method of order four in 200 steps, Newton's method over what is not
+known at the first end, with the derivatives by steps along the imaginary axis.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import root
 
 from fe_models.body.beam_line import BeamLine
+
+STEPS = 200
+Z = np.array([0.0, 0.0, 1.0])
+E_X = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -26,72 +30,96 @@ class Section:
     m: np.ndarray
 
 
-def along(line: BeamLine, first: Section, *, rtol: float = 1e-11) -> Section:
+def skew(a: np.ndarray) -> np.ndarray:
+    """Return the matrix of a x, (3, 3)."""
+    x, y, z = a
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def turned(axis: np.ndarray, angle: complex) -> np.ndarray:
+    """Rodrigues' formula about a unit vector, (3, 3)."""
+    K = skew(axis)
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+def along(line: BeamLine, first: Section, *, steps: int = STEPS) -> Section:
     """The last section of a uniform rod from its first one."""
     c_n = 1 / np.array([line.EA, line.GAy, line.GAz])
     c_m = 1 / np.array([line.GJ, line.EIy, line.EIz])
-    n = first.n
+    h, N = line.length / steps, skew(first.n)
 
-    def rates(_: float, y: np.ndarray) -> np.ndarray:
-        R, m = y[3:12].reshape(3, 3), y[12:]
-        tangent = R @ (c_n * (R.T @ n) + np.array([1.0, 0, 0]))
-        x, y_, z = c_m * (R.T @ m)
-        return np.concatenate([tangent, (R @ [[0, -z, y_], [z, 0, -x], [-y_, x, 0]]).ravel(), np.cross(n, tangent)])
+    def rates(y: np.ndarray) -> np.ndarray:
+        R = y[3:12].reshape(3, 3)
+        tangent = R @ (c_n * (R.T @ first.n) + E_X)
+        return np.concatenate([tangent, (R @ skew(c_m * (R.T @ y[12:]))).ravel(), N @ tangent])
 
-    y0 = np.concatenate([first.r, first.R.ravel(), first.m])
-    y = solve_ivp(rates, (0.0, line.length), y0, method="DOP853", rtol=rtol, atol=1e-13).y[:, -1]
-    return Section(y[:3], y[3:12].reshape(3, 3), n, y[12:])
-
-
-def cantilever(line: BeamLine, force: np.ndarray, guess: np.ndarray | None = None) -> tuple[Section, np.ndarray]:
-    """End of a rod along x that is clamped at the origin, under a dead force there, and the moment at the clamp."""
-    scale = np.linalg.norm(force) * line.length
-
-    def left(m: np.ndarray) -> np.ndarray:
-        return along(line, Section(np.zeros(3), np.eye(3), force, m * scale)).m / scale
-
-    start = np.cross([line.length, 0, 0], force) / scale if guess is None else guess / scale
-    found = root(left, start, tol=1e-11)
-    assert np.abs(found.fun).max() < 1e-9, found.message
-    return along(line, Section(np.zeros(3), np.eye(3), force, found.x * scale)), found.x * scale
+    y = np.concatenate([first.r, first.R.ravel(), first.m])
+    for _ in range(steps):
+        a = rates(y)
+        b = rates(y + h / 2 * a)
+        c = rates(y + h / 2 * b)
+        y = y + h / 6 * (a + 2 * b + 2 * c + rates(y + h * c))
+    return Section(y[:3], y[3:12].reshape(3, 3), first.n, y[12:])
 
 
-def four_bar(lines, angle: float, defect: float, guess: np.ndarray) -> tuple[Section, np.ndarray, Section]:
-    """Joint C of bar 2 of the misaligned four-bar, its crank turned by an angle about z, and the unknowns.
+def solved(residual: Callable[[np.ndarray], np.ndarray], x: np.ndarray, *, tolerance: float = 1e-10) -> np.ndarray:
+    """Root of a residual of order one by Newton's method; an assertion fails if it is not found."""
+    for _ in range(30):
+        value = residual(x)
+        if np.abs(value).max() < tolerance:
+            return x
+        J = np.column_stack([residual(x + 1e-30j * e).imag / 1e-30 for e in np.eye(len(x))])
+        x = x - np.linalg.solve(J, value)
+    raise AssertionError(f"residual {np.abs(residual(x)).max():.1e}")
 
-    Unknown: force and moment at A over their sizes, angles of B and C; known: no moment about B, C, D, the place of D
-    and its axis.
+
+def cantilever(line: BeamLine, force: np.ndarray, parts: int = 8) -> Section:
+    """End of a rod along x that is clamped at the origin, under a dead force there, raised in so many parts."""
+    scale, m = np.linalg.norm(force) * line.length, np.zeros(3)
+    for k in range(1, parts + 1):
+        here = force * k / parts
+
+        def left(m: np.ndarray, here: np.ndarray = here) -> np.ndarray:
+            return along(line, Section(np.zeros(3), np.eye(3), here, m * scale)).m / scale
+
+        m = solved(left, m)
+    return along(line, Section(np.zeros(3), np.eye(3), force, m * scale))
+
+
+@dataclass(frozen=True)
+class FourBar:
+    """A position of the misaligned four-bar: what was unknown, and the place of C."""
+
+    unknown: np.ndarray  #: force [N] / 1e4 and moment [N m] / 1e2 at A, angles of B and C [rad], (8,)
+    C: np.ndarray  #: (3,) [m]
+
+    @property
+    def torque(self) -> float:
+        """Of the drive about z [N m]."""
+        return float(-1e2 * self.unknown[5])
+
+
+def four_bar(lines, angle: float, guess: np.ndarray, *, defect: float = np.deg2rad(5.0), steps: int = 40) -> FourBar:
+    """The misaligned four-bar with its crank turned by an angle about z.
+
+    Known: no moment about B, C, D, the place of D and its axis.
     """
-    z = np.array([0.0, 0.0, 1.0])
     tilted = np.array([np.sin(defect), 0.0, np.cos(defect)])
-
-    def turned(axis: np.ndarray, x: float) -> np.ndarray:
-        a, b, c = axis
-        K = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])
-        return np.eye(3) + np.sin(x) * K + (1 - np.cos(x)) * K @ K
+    up = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
     def ends(x: np.ndarray) -> tuple[Section, Section, Section]:
-        n, m = 1e3 * x[:3], 1e2 * x[3:6]
-        up = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-        one = along(lines[0], Section(np.zeros(3), turned(z, angle) @ up, n, m))
-        # bars 1 and 3 lie across bar 2 as placed: axes of bar 2 are those of 1, turned back and by the angle of B
-        two = along(lines[1], Section(one.r, one.R @ up.T @ turned(z, x[6]), n, one.m))
-        down = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
-        three = along(lines[2], Section(two.r, two.R @ turned(tilted, x[7]) @ down, n, two.m))
+        n, m = 1e4 * x[:3], 1e2 * x[3:6]
+        one = along(lines[0], Section(np.zeros(3), turned(Z, angle) @ up, n, m), steps=steps)
+        # bars 1 and 3 lie across bar 2 as placed
+        two = along(lines[1], Section(one.r, one.R @ up.T @ turned(Z, x[6]), n, one.m), steps=steps)
+        three = along(lines[2], Section(two.r, two.R @ turned(tilted, x[7]) @ up.T, n, two.m), steps=steps)
         return one, two, three
 
     def residual(x: np.ndarray) -> np.ndarray:
         one, two, three = ends(x)
         axis = three.R[:, 2]
-        return np.concatenate(
-            [
-                [one.m @ one.R[:, 2] / 1e2, two.m @ (two.R @ tilted) / 1e2, three.m @ axis / 1e2],
-                (three.r - [0.24, 0, 0]) / 0.1,
-                axis[:2],
-            ]
-        )
+        moments = one.m @ one.R[:, 2], two.m @ (two.R @ tilted), three.m @ axis
+        return np.concatenate([np.array(moments) / 1e2, (three.r - [0.24, 0, 0]) / 0.1, axis[:2]])
 
-    found = root(residual, guess, tol=1e-11)
-    assert np.abs(found.fun).max() < 1e-8, found.message
-    one, two, _ = ends(found.x)
-    return two, found.x, one
+    x = solved(residual, guess)
+    return FourBar(x, ends(x)[1].r)

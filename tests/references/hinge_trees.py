@@ -9,7 +9,6 @@ acceleration for q'' = 0, and G, g likewise of what closes loops,
 is solved by least squares, so that constraints may repeat others, and integrated by DOP853 to 1e-13.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,8 +41,6 @@ class Tree:
     links: list[Link]
     closed: list[tuple[tuple[int, np.ndarray], tuple[int, np.ndarray]]]
     gravity: np.ndarray
-    #: generalised forces of the angles by their poses: (tree, poses) -> (n,)
-    forces: Callable[["Tree", list], np.ndarray] | None = None
 
     def poses(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """R and r of each link: a place p of it, as placed, lies at R p + r."""
@@ -59,46 +56,44 @@ class Tree:
         return point if link < 0 else poses[link][0] @ point + poses[link][1]
 
     def motion(self, poses, u: np.ndarray, link: int, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Columns J of a point at p, (3, n), and its acceleration for q'' = 0."""
-        J, path = np.zeros((3, len(self.links))), []
+        """Columns J of points at p, (n_p, 3, n), and their accelerations for q'' = 0, (n_p, 3)."""
+        J, path = np.zeros((len(p), 3, len(self.links))), []
         while link >= 0:
             path.append(link)
             link = self.links[link].parent
-        omega, alpha, v, a, at = (np.zeros(3) for _ in range(5))
+        omega, alpha, a, at = (np.zeros(3) for _ in range(4))
         for j in reversed(path):
             parent = self.links[j].parent
             R = np.eye(3) if parent < 0 else poses[parent][0]
             o, axis = self.place(poses, parent, self.links[j].hinge), R @ self.links[j].axis
             arm = o - at
-            v, a = v + np.cross(omega, arm), a + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
-            alpha, omega, at = alpha + np.cross(omega, axis) * u[j], omega + axis * u[j], o
-            J[:, j] = np.cross(axis, p - o)
+            a = a + cross(alpha, arm) + cross(omega, cross(omega, arm))
+            alpha, omega, at = alpha + cross(omega, axis) * u[j], omega + axis * u[j], o
+            J[:, :, j] = cross(axis, p - o)
         arm = p - at
-        return J, a + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
+        return J, a + cross(alpha, arm) + cross(omega, cross(omega, arm))
 
     def accelerations(self, q: np.ndarray, u: np.ndarray) -> np.ndarray:
         """q'', (n,)."""
         n, poses = len(q), self.poses(q)
         M, f = np.zeros((n, n)), np.zeros(n)
         for k, link in enumerate(self.links):
-            for point in link.points:
-                J, c = self.motion(poses, u, k, self.place(poses, k, point))
-                M += link.mass / 6 * J.T @ J
-                f += link.mass / 6 * J.T @ (self.gravity - c)
-        if self.forces is not None:
-            f += self.forces(self, poses)
+            R, r = poses[k]
+            J, c = self.motion(poses, u, k, link.points @ R.T + r)
+            M += link.mass / 6 * np.einsum("pia,pib->ab", J, J)
+            f += link.mass / 6 * np.einsum("pia,pi->a", J, self.gravity - c)
         rows, right = [], []
         for (a, p), (b, s) in self.closed:
-            J_a, c_a = self.motion(poses, u, a, self.place(poses, a, p))
-            J_b, c_b = self.motion(poses, u, b, self.place(poses, b, s))
-            rows.append(J_a - J_b)
-            right.append(c_b - c_a)
+            J_a, c_a = self.motion(poses, u, a, self.place(poses, a, p)[None])
+            J_b, c_b = self.motion(poses, u, b, self.place(poses, b, s)[None])
+            rows.append(J_a[0] - J_b[0])
+            right.append(c_b[0] - c_a[0])
         G, g = np.vstack(rows), np.concatenate(right)
         # q'' = M⁻¹ (f - Gᵀ lam): the least change of M⁻¹ f, in the norm of M, that closes the loops
         L = np.linalg.cholesky(M)
         free = np.linalg.solve(L, f)
         H = np.linalg.solve(L, G.T).T
-        return np.linalg.solve(L.T, free + np.linalg.lstsq(H, g - H @ free, rcond=1e-9)[0])
+        return np.linalg.solve(L.T, free + np.linalg.lstsq(H, g - H @ free, rcond=1e-6)[0])
 
     def integrate(self, t: np.ndarray, q: np.ndarray, u: np.ndarray, *, rtol: float = 1e-13) -> np.ndarray:
         """Angles at the times t, (n_t, n), from q and u on."""
@@ -114,6 +109,13 @@ class Tree:
         )
         assert found.success, found.message
         return found.y[:n].T
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a x b for vectors (3,) and one or many b, (..., 3)."""
+    x, y, z = a
+    b = b.T
+    return np.array([y * b[2] - z * b[1], z * b[0] - x * b[2], x * b[1] - y * b[0]]).T
 
 
 def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
