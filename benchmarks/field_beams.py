@@ -49,19 +49,17 @@ def superelements(n: int) -> Describe:
     return describe
 
 
-def parts(n: int, *, n_bending: int = 4, stiffening: bool = True) -> Describe:
+def parts(n: int, *, n_torsion: int = 3, stiffening: bool = True) -> Describe:
     """Reduced bodies in floating frames, n even for a middle."""
 
     def describe(line: BeamLine) -> PartMaker:
         piece = replace(line, length=line.length / n)
         body = cms.beam_from_assumed_modes(
-            piece, name="piece", units=UNITS, n_axial=1, n_bending=n_bending, n_torsion=1
+            piece, name="piece", units=UNITS, n_axial=1, n_bending=4, n_torsion=n_torsion
         )
 
         def make(name: str, *, position: np.ndarray, orientation: np.ndarray) -> FlexiblePart:
-            part = floating_parts(
-                name, [body] * n, position=position, orientation=orientation, stiffening=stiffening
-            )
+            part = floating_parts(name, [body] * n, position=position, orientation=orientation, stiffening=stiffening)
             return with_middle(part, f"node {n // 2 + 1}")
 
         return make
@@ -75,9 +73,7 @@ def exact(n: int) -> Describe:
     def describe(line: BeamLine) -> PartMaker:
         E, G = 1e11, 1e11 / 2.6
         A = line.EA / E
-        section = fm.GeneralSection(
-            A, line.EIy / E, line.EIz / E, line.GJ / G, A_sy=line.GAy / G, A_sz=line.GAz / G
-        )
+        section = fm.GeneralSection(A, line.EIy / E, line.EIz / E, line.GJ / G, A_sy=line.GAy / G, A_sz=line.GAz / G)
         material = fm.Material("of the line", E=E, nu=0.3, rho=line.rho_A / A)
         mesh = fm.straight_line((0, 0, 0), (line.length, 0, 0), 2)
         kept = [

@@ -69,8 +69,10 @@ def floating_parts(
     p = euler_parameters_from_user(f"{where}: orientation", np.eye(4)[0] if orientation is None else orientation)
     v = array_of_shape(f"{where}: velocity", np.zeros(3) if velocity is None else velocity, (3,))
     omega = array_of_shape(f"{where}: omega_B", np.zeros(3) if omega_B is None else omega_B, (3,))
-    R, origin = rotation_matrix(p), r
-    bodies, joints, markers = [], [], {}
+    R, origin, last = rotation_matrix(p), r, np.zeros(3)
+    bodies: list[FlexibleBody] = []
+    joints: list[Joint] = []
+    markers: dict[str, Marker] = {}
     for number, body in enumerate(reduced, start=1):
         if stiffening and body.geometric is None:
             raise ModelError(
@@ -84,9 +86,7 @@ def floating_parts(
         called = f"{name} {number}"
         moving = v + R @ np.cross(omega, R.T @ (r - origin))
         bodies.append(
-            FlexibleBody(
-                called, body, position=r, orientation=p, velocity=moving, omega_B=omega, stiffening=stiffening
-            )
+            FlexibleBody(called, body, position=r, orientation=p, velocity=moving, omega_B=omega, stiffening=stiffening)
         )
         markers[f"node {number}"] = Marker(called, ends[0])
         if number > 1:
@@ -94,5 +94,4 @@ def floating_parts(
             joints.append(FixedJoint(f"{name} joint {number - 1}", before, Marker(called, ends[0])))
     markers |= {"start": markers["node 1"], "end": Marker(bodies[-1].name, ends[1])}
     markers[f"node {len(bodies) + 1}"] = markers["end"]
-    made: tuple[Joint, ...] = tuple(joints)
-    return FlexiblePart(name, tuple(bodies), made, (), markers)
+    return FlexiblePart(name, tuple(bodies), tuple(joints), (), markers)

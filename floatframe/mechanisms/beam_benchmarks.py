@@ -99,9 +99,7 @@ def misaligned_four_bar(describe: Describe, *, turn: TimeFunction, defect: float
     lines = FOUR_BAR_LINES
     bars = [
         placed(describe(line), f"bar {k + 1}", start, direction, across)
-        for k, (line, start, direction, across) in enumerate(
-            zip(lines, (A, B, C), (Y, X, -Y), (-X, Y, X), strict=True)
-        )
+        for k, (line, start, direction, across) in enumerate(zip(lines, (A, B, C), (Y, X, -Y), (-X, Y, X), strict=True))
     ]
     # axes in those of the marker they belong to: z of all bars begins along z, x and y do not
     tilted = np.sin(defect) * X + np.cos(defect) * Z

@@ -108,10 +108,8 @@ def andrews_mechanism(*, torque: float = 0.033) -> System:
     "A 1", "A 2" are hinges, "F", "G", "H" balls, "E 1", "E 2", "E 3" universal joints; force "spring", "torque".
     """
     beta, theta, gamma, phi, delta, omega, epsilon = ANDREWS_START
-    O, A, B, C = (np.array([*p, 0.0]) for p in ((0, 0), (-0.06934, -0.00227), (-0.03635, 0.03273), (0.014, 0.072)))
-    angles = dict(
-        zip(ANDREWS, (beta, beta + theta, gamma, delta + phi, delta, epsilon + omega, epsilon), strict=True)
-    )
+    origin, A, B, C = (np.array([*p, 0.0]) for p in ((0, 0), (-0.06934, -0.00227), (-0.03635, 0.03273), (0.014, 0.072)))
+    angles = dict(zip(ANDREWS, (beta, beta + theta, gamma, delta + phi, delta, epsilon + omega, epsilon), strict=True))
     ends = {"OF": (0.007, 0), "FE": (-0.028, 0), "BDE": (0, -0.035), "GE": (0, -0.02), "HE": (0.02, 0)}
     ends |= {"AG": (0.04, 0), "AH": (0, -0.04)}
 
@@ -120,7 +118,7 @@ def andrews_mechanism(*, torque: float = 0.033) -> System:
         x, y = ends[link]
         return np.array([c * x - s * y, s * x + c * y, 0.0])
 
-    at = {"OF": O, "BDE": B, "AG": A, "AH": A, "FE": end("OF"), "GE": A + end("AG"), "HE": A + end("AH")}
+    at = {"OF": origin, "BDE": B, "AG": A, "AH": A, "FE": end("OF"), "GE": A + end("AG"), "HE": A + end("AH")}
     bodies = [
         RigidBody(
             link,
@@ -139,7 +137,7 @@ def andrews_mechanism(*, torque: float = 0.033) -> System:
     def near(link: str) -> Marker:
         return Marker(link, position=np.zeros(3))
 
-    grounds = (("motor", O, "OF"), ("B", B, "BDE"), ("A 1", A, "AG"), ("A 2", A, "AH"))
+    grounds = (("motor", origin, "OF"), ("B", B, "BDE"), ("A 1", A, "AG"), ("A 2", A, "AH"))
     joints: list[Joint] = [
         RevoluteJoint(name, Marker(GROUND, position=p), near(link), axis=Z) for name, p, link in grounds
     ]
@@ -166,8 +164,7 @@ def bricard_mechanism(*, length: float = 1.0, mass: float = 1.0, side: float = 0
     axes = (Y, Z, X, Y, Z, X)
     slender = mass / 12 * np.array([2 * side**2, length**2 + side**2, length**2 + side**2])
     bodies: list[Body] = [
-        rod(f"rod {k + 1}", mass, slender, length, corners[k], (corners[k + 1] - corners[k]) / length)
-        for k in range(5)
+        rod(f"rod {k + 1}", mass, slender, length, corners[k], (corners[k + 1] - corners[k]) / length) for k in range(5)
     ]
     joints: list[Joint] = []
     for k in range(5):

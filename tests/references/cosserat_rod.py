@@ -4,7 +4,7 @@ With n and m the force and moment in a section, ground axes, R its axes, c_n and
 
     r' = R (e_x + c_n Rᵀ n),   R' = R tilde(c_m Rᵀ m),   m' = n x r',   n' = 0 between loads
 
-No elements, no interpolation: Runge and Kutta's method of order four in 200 steps, Newton's method over what is not
+No elements, no interpolation: Runge and Kutta's method of order four in 60 steps, Newton's method over what is not
 known at the first end, with the derivatives by steps along the imaginary axis.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from fe_models.body.beam_line import BeamLine
 
-STEPS = 200
+STEPS = 60
 Z = np.array([0.0, 0.0, 1.0])
 E_X = np.array([1.0, 0.0, 0.0])
 
@@ -73,7 +73,7 @@ def solved(residual: Callable[[np.ndarray], np.ndarray], x: np.ndarray, *, toler
     raise AssertionError(f"residual {np.abs(residual(x)).max():.1e}")
 
 
-def cantilever(line: BeamLine, force: np.ndarray, parts: int = 8) -> Section:
+def cantilever(line: BeamLine, force: np.ndarray, parts: int = 4) -> Section:
     """End of a rod along x that is clamped at the origin, under a dead force there, raised in so many parts."""
     scale, m = np.linalg.norm(force) * line.length, np.zeros(3)
     for k in range(1, parts + 1):

@@ -4,7 +4,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from floatframe.results.trajectory import Trajectory
-from floatframe.rotations import rotation_matrix
 from tests.references.hinge_trees import Link, Tree
 
 X, Y, Z = np.eye(3)

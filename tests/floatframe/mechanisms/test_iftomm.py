@@ -37,8 +37,8 @@ def test_a_point_mass_on_a_rod_moves_as_elliptic_functions_say(formulation):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("n", [1, 4])
-def test_windows_of_four_bars_pass_their_singular_positions_and_stay_one_pendulum(n, formulation):
+def test_windows_of_four_bars_pass_their_singular_positions_and_stay_one_pendulum(formulation):
+    n = 3
     motion = moved(n_four_bar(n), 3.0, 5e-4, formulation, 100)
     top = point_motion(motion, f"crank {n}", np.array([1.0, 0, 0])).position - [n, 0, 0]
     theta = four_bar_angle(n, motion.t)
@@ -48,7 +48,7 @@ def test_windows_of_four_bars_pass_their_singular_positions_and_stay_one_pendulu
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_andrews_mechanism_ends_where_the_test_set_of_initial_value_problems_says(formulation):
-    motion = moved(andrews_mechanism(), 0.03, 5e-6, formulation, 1000)
+    motion = moved(andrews_mechanism(), 0.03, 5e-6, formulation, 2000)
     found = andrews_angles(motion)[-1]
     # beta makes two and a half turns: angles are told within one
     off = np.abs(np.exp(1j * found) - np.exp(1j * ANDREWS_END))
@@ -67,7 +67,7 @@ def test_bricards_mechanism_moves_as_mass_points_with_least_squares(formulation)
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_the_stiff_governor_rises_as_its_two_coordinates_say(formulation):
-    motion = moved(flyball_governor(), 1.0, 5e-4, formulation, 100)
+    motion = moved(flyball_governor(), 0.5, 5e-4, formulation, 100)
     assert_allclose(motion.body("slider").r[:, 2], governor(motion.t), rtol=0, atol=1e-5)
     assert_allclose(motion.angular_momentum[:, 2], motion.angular_momentum[0, 2], rtol=1e-6)
 
