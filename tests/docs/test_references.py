@@ -104,8 +104,8 @@ def sources():
 
 
 def plain(name):
-    """Return a name without the two spellings of an umlaut, and without an apostrophe."""
-    return name.replace("ü", "ue").replace("'", "").lower()
+    """Return a name without the two spellings of an umlaut, without an accent and an apostrophe."""
+    return name.replace("ü", "ue").replace("á", "a").replace("'", "").lower()
 
 
 def test_the_bibliography_has_an_anchor_for_each_source():
