@@ -49,10 +49,11 @@ PRINCETON_LINE = BeamLine(
 )  # fmt: skip
 
 
-def square(length: float, **values: float) -> BeamLine:
+def square(length: float, *, rho_A: float, EA: float, EI: float, GJ: float, GA: float, rho_I: float) -> BeamLine:
     """Return a line that is the same in both planes."""
-    EI, GA, rho_I = values.pop("EI"), values.pop("GA"), values.pop("rho_I")
-    return BeamLine(length, EIy=EI, EIz=EI, GAy=GA, GAz=GA, rho_Iy=rho_I, rho_Iz=rho_I, **values)
+    return BeamLine(
+        length, rho_A=rho_A, EA=EA, EIy=EI, EIz=EI, GJ=GJ, rho_Iy=rho_I, rho_Iz=rho_I, GAy=GA, GAz=GA
+    )  # fmt: skip
 
 
 #: bars 1 and 2 of steel, 16 mm square, and 3, 8 mm square
