@@ -11,6 +11,7 @@ __all__ = [
     "FactorizationError",
     "ForeignBodyError",
     "JobError",
+    "MemoryBudgetError",
     "ModalFileError",
     "ModeSetError",
     "RecoveryError",
@@ -40,6 +41,10 @@ class EigenError(CmsError, RuntimeError):
 
 class JobError(CmsError, ValueError):
     """A job file is not valid; the text names the key, the value and the choices."""
+
+
+class MemoryBudgetError(CmsError, ValueError):
+    """A reduction does not fit into the memory it may take, or that is no size; the text says what would help."""
 
 
 class ExportError(CmsError, ValueError):

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["Journal", "ModalFile", "Output", "Solver", "Workers"]
+__all__ = ["Journal", "Memory", "ModalFile", "Output", "Solver", "Workers"]
 
 ModalFile = Annotated[Path, typer.Argument(help="A modal file, as cms reduce writes it.")]
 
@@ -28,6 +28,14 @@ Solver = Annotated[
     typer.Option(
         "--solver",
         help="What factorises: pardiso, superlu, ... (docs/cluster.md); default: as the job says, else the fastest.",
+    ),
+]
+
+Memory = Annotated[
+    str | None,
+    typer.Option(
+        "--memory",
+        help="Most memory the process may take, such as 8GB: above it the factor goes to disk (docs/memory.md).",
     ),
 ]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cms.cli.arguments import Solver, Workers
+from cms.cli.arguments import Memory, Solver, Workers
 from cms.cli.console import USER_ERROR, guarded, output_path, print_error, print_table, say, stages
 from cms.cli.info import print_body
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Fleet", "reduce_and_write", "reduce_and_write_fleet", "reduce_command"]
 
 
-def reduce_and_write(job: "Job", path: Path, solver: str | None = None) -> "ReducedBody":
+def reduce_and_write(job: "Job", path: Path, solver: str | None = None, memory: str | None = None) -> "ReducedBody":
     """Run a job, write its modal file, and print what was done."""
     from cms.jobs.reduce_job import reduce_job
     from cms.modal_file.file import write
@@ -28,7 +28,7 @@ def reduce_and_write(job: "Job", path: Path, solver: str | None = None) -> "Redu
     reports: list[Any] = []
     try:
         with stages() as clock:
-            reduced = reduce_job(job, clock, solver=solver, on_report=reports.append)
+            reduced = reduce_job(job, clock, solver=solver, memory=memory, on_report=reports.append)
             with clock("write"):
                 write(reduced, path)
     finally:  # a mesh that is refused is better understood with its numbers
@@ -118,6 +118,7 @@ def reduce_command(
     ] = None,
     workers: Workers = None,
     solver: Solver = None,
+    memory: Memory = None,
 ) -> None:
     """Reduce finite element bodies to modal files.
 
@@ -132,6 +133,8 @@ def reduce_command(
     from cms.fleets.inputs import inputs_of
     from cms.jobs.job import read_job
 
+    if memory is not None and (len(jobs) > 1 or workers is not None):
+        raise JobError('--memory: belongs to one job; several have memory = "8GB" in their tables [reduction]')
     if len(jobs) > 1 or workers is not None:
         reduce_and_write_fleet(Fleet(jobs, output, workers, journal, solver))
         return
@@ -139,4 +142,4 @@ def reduce_command(
     read = read_job(job)
     inputs = inputs_of(job, read)
     path = output_path(output, job.with_suffix(".h5"), JobError, overwrite_of=inputs)
-    reduce_and_write(read, path, solver)
+    reduce_and_write(read, path, solver, memory)

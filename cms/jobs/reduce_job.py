@@ -4,9 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cms.errors import MemoryBudgetError
 from cms.jobs.body_of_job import job_body
 from cms.jobs.job import Job, read_job
 from cms.jobs.parts_of_job import frame_of, moving_frame_of
+from cms.memory.budget import ReductionShape, solver_within
+from cms.memory.size import memory_bytes, resident_bytes
 from cms.reduced_body.reduced_body import ReducedBody
 from cms.solvers.registry import solver_of
 from fe_models.body.fe_body import FEBody
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["reduce_job"]
 
+GUESSED_MODES = 50  #: where a cutoff or "auto" says how many, for the forecast of memory
+
 #: mode sets with a column for each boundary dof
 OF_INTERFACES = (
     "craig-bampton", "craig-bampton-ir", "guyan", "herting", "benfield-hruda", "rubin", "macneal", "craig-chang",
@@ -32,6 +37,7 @@ def reduce_job(
     stages: Stages | None = None,
     *,
     solver: str | Solver | None = None,
+    memory: str | float | None = None,
     on_report: Callable[[Any], None] | None = None,
 ) -> ReducedBody:
     """Run a job up to the reduced body.
@@ -45,6 +51,9 @@ def reduce_job(
     solver
         What factorises, by name (`cms.solvers.registry`); goes before the one of the job, whose default is the fastest
         that is installed.
+    memory
+        The most memory the process may take, such as "8GB", or bytes: above it the factor goes to disk, and what does
+        not fit even then is refused before the factorisation. Goes before the one of the job; no bound by default.
     on_report
         Called with the mesh report, before it is judged.
 
@@ -65,16 +74,30 @@ def reduce_job(
     job = job if isinstance(job, Job) else read_job(Path(job))
     stages = stages or Stages()
     chosen = solver_of(solver or job.reduction.solver)  # one that is not installed is told before the work
+    allowed = memory if memory is not None else job.reduction.memory
+    budget = None if allowed is None else memory_bytes(allowed)
+    if budget is not None and (asked := solver or job.reduction.solver) not in (None, "cholesky"):
+        raise MemoryBudgetError(
+            f"memory = {allowed}: belongs to solver cholesky, whose memory is known before; got solver {asked!r}"
+        )
     coupled = job_body(job, stages, on_report=on_report)
     if job.reduction.geometric_stiffness or job.reduction.quadratic_modes:
         require_geometric_stiffness(coupled)  # before the long work
         require_room_for_stiffness(coupled, expected_columns(job, coupled))
+    if budget is not None:
+        chosen = solver_within(budget, shape_of(job, coupled))
     if job.recovery:
         with Families(
             coupled, announce=not reduces_interfaces(job), solver=chosen
         ) as families:  # the static part of recovery rows needs the factorisation
             return reduced(job, families, stages, *modes_and_states(job, families, stages))
     return reduced(job, coupled, stages, *with_own_factorisation(job, coupled, chosen, stages))
+
+
+def shape_of(job: Job, body: FEBody) -> ReductionShape:
+    """Return what the peak of memory of a job follows from."""
+    n_modes = job.reduction.n_modes if isinstance(job.reduction.n_modes, int) else GUESSED_MODES
+    return ReductionShape(body.n_dof, len(body.b) + n_modes, n_modes, resident_bytes())
 
 
 def reduced(

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
+from cms.memory.size import memory_bytes
 from cms.mode_sets import MODE_SETS
 from cms.mode_sets.axis_functions import AXIS_FUNCTIONS
 from cms.mode_sets.extra_columns import EXTRA_COLUMNS
@@ -115,6 +116,17 @@ CountOrAuto = Annotated[int | str, BeforeValidator(count_or_auto)]
 Count = Annotated[int, Field(ge=0)]
 Shifts = Annotated[tuple[float, ...], BeforeValidator(shift_list)]
 Places = Annotated[tuple[str, ...], BeforeValidator(places)]
+
+
+def memory_size(value: Any) -> Any:
+    """Return a size of memory with its unit, checked."""
+    if not isinstance(value, str):
+        raise ValueError('expected a number with a unit, text, such as "8GB"')
+    memory_bytes(value)
+    return value
+
+
+Memory = Annotated[str, BeforeValidator(memory_size)]
 Extras = Annotated[tuple[str, ...], BeforeValidator(extras)]
 
 
@@ -246,6 +258,7 @@ class ReductionSection(Table):
     solver: choice("solver", lambda: tuple(SOLVERS)) | None = Field(  # type: ignore[valid-type]
         None, description=f"what factorises, one of {', '.join(SOLVERS)}; default: the fastest that is installed"
     )
+    memory: Memory | None = Field(None, description='the most memory the process may take, such as "8GB"')
     frame: choice("frame", lambda: FRAMES) = Field(  # type: ignore[valid-type]
         "tisserand", description=f"one of {', '.join(FRAMES)}"
     )

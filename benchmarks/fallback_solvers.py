@@ -1,0 +1,100 @@
+"""Solvers for processors without MKL beside PARDISO: one thread, processor time, one process each.
+
+python -m benchmarks.fallback_solvers          # 160 818 interior dofs of the tet10 connecting rod
+python -m benchmarks.fallback_solvers small    # 33 882
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+OUT = Path(__file__).parent / "out"
+SIZES = {"small": 5.0, "large": 2.5}  #: element size [mm]
+NAMES = ("pardiso", "cholesky", "cholesky on disk", "superlu", "superlu, minimum degree")
+
+
+def mesh_file(size):
+    from fe_models.parts import mesh_connecting_rod
+
+    path = OUT / f"rod_fallback_{size}.msh"
+    if not path.is_file():
+        OUT.mkdir(exist_ok=True)
+        mesh_connecting_rod(size=SIZES[size], path=path)
+    return path
+
+
+def one(name, path):
+    """Analysis and factorisation, a solve of 60 columns, their processor times; peak above what was held before."""
+    import numpy as np
+    import scipy.sparse as sp
+
+    from benchmarks.large_solid import solid
+    from cms.solvers import superlu
+    from cms.solvers.factorization import lower_triangle
+    from cms.solvers.registry import SOLVERS
+    from cms.sparse_cholesky.factor import CholeskyFactor
+    from fe_models.body.submatrix import principal_block
+
+    *_, (_, body) = solid(Path(path))
+    lower = lower_triangle(principal_block(body.K, body.i))
+    b = np.random.default_rng(0).standard_normal((lower.shape[0], 60))
+    tiny = lower_triangle(sp.csc_array(3 * sp.eye_array(4000)))
+    make = SOLVERS[name.split()[0].rstrip(",")].factor
+    if name.endswith("degree"):
+        superlu.SMALL = 10**9
+    if name.endswith("disk"):
+        make = lambda lower, *, definite: CholeskyFactor(lower, on_disk=True)  # noqa: E731
+    make(tiny, definite=True).solve(b[:4000, :2])  # compiled loops are loaded
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.process_time()
+    factor = make(lower, definite=True)
+    made = time.process_time()
+    x = factor.solve(b)
+    solved = time.process_time()
+    A = lower + sp.tril(lower, k=-1).T
+    return {
+        "n": lower.shape[0], "factor": made - start, "solve": solved - made, "entries": factor.n_factor_entries / 1e6,
+        "GB": (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1e6,
+        "residual": float(abs(A @ x - b).max()),
+    }  # fmt: skip
+
+
+def measured(name, path):
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, "-m", "benchmarks.fallback_solvers", "one", name, str(path)]
+    out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=environment).stdout
+    return json.loads(out[out.index("RECORD ") + 7 :].splitlines()[0])
+
+
+def figures(short):
+    """Return the time of `cholesky` by that of PARDISO: factorisation and 60 columns."""
+    path = mesh_file("small" if short else "large")
+    ours, bare = (measured(name, path) for name in ("cholesky", "pardiso"))
+    return {
+        f"cholesky over PARDISO, {ours['n'] // 1000}k dofs, factorisation and 60 columns": (
+            (ours["factor"] + ours["solve"]) / (bare["factor"] + bare["solve"])
+        )
+    }
+
+
+def main():
+    size = "small" if "small" in sys.argv else "large"
+    path = mesh_file(size)
+    for name in NAMES if size == "small" else NAMES[:-1]:
+        row = measured(name, path)
+        print(
+            f"{name:24} n {row['n']}: factor {row['factor']:6.2f} s, 60 columns {row['solve']:6.2f} s, "
+            f"{row['entries']:6.1f} million entries, peak {row['GB']:5.2f} GB more, residual {row['residual']:.0e}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["one"]:
+        print("RECORD " + json.dumps(one(*sys.argv[2:])))
+    else:
+        main()

@@ -1,0 +1,132 @@
+"""A solver that keeps a reduction within a budget: its factor in memory, on disk, or a refusal before the work.
+
+The peak is the largest of three stages. n: dofs, c: columns of the mode set, m: vibration modes, b: their block,
+h: what the process holds when the stage begins.
+
+(1) factorisation: h + permuted matrix + fronts (`Fronts.n_working`) + factor, if that is in memory
+(2) vibration and static modes: h + factor, or its largest panel + 8 n (4 m + 8 b + c) bytes; basis: 3 m + 6 b columns
+(3) finish, moments and stress, the factor freed: what the coupled body held + 6.2 arrays of (n, c)
+
+The numbers 3 m + 6 b and 6.2 are measured (docs/memory.md); all else follows from shapes.
+"""
+
+import logging
+import tempfile
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import MemoryBudgetError
+from cms.memory.size import resident_bytes
+from cms.solvers.superlu import SuperLuFactor
+from cms.sparse_cholesky.analysis import Fronts, analyse
+from cms.sparse_cholesky.factor import CholeskyFactor
+from fe_models.foundation.solver import Factor, Solver
+
+__all__ = ["Peak", "ReductionShape", "peak_of", "solver_within"]
+
+log = logging.getLogger(__name__)
+
+PERMUTED = 44.0  #: bytes an entry of the lower triangle while it is brought into the new order
+TALL = 6.2  #: arrays of all columns that are held in the third stage
+
+
+@dataclass(frozen=True)
+class ReductionShape:
+    """What the peak of a reduction follows from, beside the matrix."""
+
+    n_dof: int
+    n_columns: int  #: of the mode set
+    n_modes: int  #: vibration modes among them
+    held: float  #: by the process with the coupled body [bytes]
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Peaks of memory of the three stages [bytes]."""
+
+    factorisation: float
+    modes: float
+    reduction: float
+
+    @property
+    def most(self) -> float:
+        """The largest [bytes]."""
+        return max(self.factorisation, self.modes, self.reduction)
+
+
+def peak_of(shape: ReductionShape, fronts: Fronts, n_entries: int, held: float, *, on_disk: bool) -> Peak:
+    """Return the peaks of a reduction.
+
+    Parameters
+    ----------
+    shape
+        Of the reduction.
+    fronts
+        Of the interior stiffness.
+    n_entries
+        Of its lower triangle.
+    held
+        By the process before the factorisation [bytes].
+    on_disk
+        Whether the factor is.
+    """
+    w, u = fronts.width, fronts.below
+    factor = 8.0 * (int((w * (w + u)).max(initial=0)) if on_disk else fronts.n_stored)
+    block = 16 if shape.n_modes >= 32 else 8
+    columns = 4 * shape.n_modes + 8 * block + shape.n_columns
+    return Peak(
+        held + PERMUTED * n_entries + 8.0 * fronts.n_working + factor,
+        held + factor + 8.0 * shape.n_dof * columns,
+        shape.held + 8.0 * TALL * shape.n_dof * shape.n_columns,
+    )
+
+
+def solver_within(budget: float, shape: ReductionShape) -> Solver:
+    """Return the solver of a reduction that may take `budget` bytes, the process and all it holds included.
+
+    Its `factor` raises `MemoryBudgetError` before any factorisation where neither way fits.
+    """
+
+    def factor(lower: sp.csc_array, *, definite: bool) -> Factor:
+        if not definite:
+            log.warning(
+                "memory: the matrix is not positive definite (multipliers): SuperLU, whose memory is not bounded"
+            )
+            return SuperLuFactor(lower, definite=False)
+        held = resident_bytes()
+        fronts = analyse(lower)
+        inside, outside = (peak_of(shape, fronts, lower.nnz, held, on_disk=on_disk) for on_disk in (False, True))
+        if inside.most <= budget:
+            log.info("memory: this needs %s of %s; in core", gigabytes(inside.most), gigabytes(budget))
+            return CholeskyFactor(lower, fronts=fronts)
+        if outside.most > budget:
+            raise MemoryBudgetError(refusal(budget, inside, outside))
+        log.warning(
+            "memory: this needs %s, more than %s; it runs out of core: %s, and %s on disk in %s",
+            gigabytes(inside.most), gigabytes(budget), gigabytes(outside.most), gigabytes(8.0 * fronts.n_stored),
+            tempfile.gettempdir(),
+        )  # fmt: skip
+        return CholeskyFactor(lower, on_disk=True, fronts=fronts)
+
+    return Solver("cholesky", factor)
+
+
+def refusal(budget: float, inside: Peak, outside: Peak) -> str:
+    """Say what is missing, and what would help."""
+    stages = {
+        "the factorisation": (outside.factorisation, "fewer dofs (a coarser mesh), or cms split"),
+        "the modes": (outside.modes, "fewer modes, or fewer columns (interface_modes for interfaces of many nodes)"),
+        "the reduction": (outside.reduction, "fewer columns: fewer modes, interface_modes, rigid interfaces"),
+    }
+    name = max(stages, key=lambda each: stages[each][0])
+    return (
+        f"memory = {gigabytes(budget)}: this needs {gigabytes(inside.most)}, and {gigabytes(outside.most)} with its "
+        f"factor on disk, which is {name}; allow that much, or take {stages[name][1]}"
+    )
+
+
+def gigabytes(size: float) -> str:
+    """Return a size in words."""
+    return f"{size / 1e9:.3g} GB" if size >= 1e9 else f"{np.ceil(size / 1e6):.0f} MB"

@@ -1,0 +1,128 @@
+"""Budgets of memory: sizes in words, the forecast, and jobs that are held to one."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from typer.testing import CliRunner
+
+import cms
+from cms.cli.app import app
+from cms.errors import FactorizationError, MemoryBudgetError
+from cms.memory import budget
+from cms.memory.budget import Peak, ReductionShape, peak_of, solver_within
+from cms.memory.size import memory_bytes
+from cms.solvers.factorization import factorize, lower_triangle
+from cms.sparse_cholesky.analysis import analyse
+from tests.bodies import bar
+from tests.cms.sparse_cholesky.test_factor import grid
+
+
+@pytest.mark.parametrize(
+    ("text", "size"),
+    [("8GB", 8e9), ("800 MB", 8e8), ("1.5gb", 1.5e9), ("7.5GiB", 7.5 * 2**30), (3e9, 3e9), ("2e9", 2e9)],
+)
+def test_sizes_are_read_with_their_units(text, size):
+    assert memory_bytes(text) == size
+
+
+@pytest.mark.parametrize("text", ["8 G", "eight", "", "-2GB", "8GB 3", "8Gbit", "inf", "nan", True])
+def test_what_is_no_size_is_refused(text):
+    with pytest.raises(MemoryBudgetError, match=r"memory = .*(expected a number with a unit|unknown unit)"):
+        memory_bytes(text)
+
+
+def test_a_size_without_its_unit_is_taken_for_a_slip():
+    with pytest.raises(MemoryBudgetError, match=r"is 8 bytes, less than any run takes; did you mean"):
+        memory_bytes("8")
+
+
+def test_the_working_memory_of_fronts_is_what_the_factorisation_holds():
+    """Fronts counted by hand: those that wait for their parents, and the one at work."""
+    fronts = analyse(lower_triangle(grid(10)))
+    squares = [int(u) ** 2 for u in fronts.below]
+    most = 0
+    for f in range(len(squares)):
+        waiting = sum(squares[c] for c in range(f) if fronts.above[c] >= f)
+        most = max(most, waiting + int(fronts.width[f] + fronts.below[f]) ** 2)
+    assert fronts.n_working == most
+
+
+@pytest.fixture
+def peaks(monkeypatch):
+    """Matrix and shape of a reduction, and its peaks in memory and on disk, of a process that holds 100 MB."""
+    monkeypatch.setattr(budget, "resident_bytes", lambda: 1e8)
+    A = lower_triangle(grid(16))
+    shape = ReductionShape(n_dof=16**3, n_columns=20, n_modes=8, held=1e8)
+    fronts = analyse(A)
+    return shape, *(peak_of(shape, fronts, A.nnz, 1e8, on_disk=on_disk).most for on_disk in (False, True))
+
+
+def test_the_factor_goes_to_disk_where_the_budget_says_so(peaks, caplog):
+    shape, inside, outside = peaks
+    assert outside < inside
+    b = np.random.default_rng(0).standard_normal((16**3, 3))
+    with factorize(grid(16), solver=solver_within(inside, shape)) as held:
+        assert "factor in memory" in held.description
+        x = held.solve(b)
+    assert not caplog.records
+    with factorize(grid(16), solver=solver_within((inside + outside) / 2, shape)) as held:
+        assert "factor on disk" in held.description
+        assert_allclose(held.solve(b), x, rtol=0, atol=1e-12 * np.abs(x).max())
+    assert re.search(
+        r"this needs \d+ MB, more than \d+ MB; it runs out of core: \d+ MB, and \d+ MB on disk", caplog.text
+    )
+    with pytest.raises(MemoryBudgetError, match="with its factor on disk"):
+        factorize(grid(16), solver=solver_within(0.999 * outside, shape))
+
+
+def test_what_fits_neither_way_is_refused_with_what_would_help(peaks):
+    shape, _, _ = peaks
+    with pytest.raises(
+        MemoryBudgetError, match=r"memory = 60 MB: this needs .* with its factor on disk, .*or take fewer"
+    ):
+        factorize(grid(16), solver=solver_within(6e7, shape))
+    assert not issubclass(MemoryBudgetError, FactorizationError)  # which bodies would take for a mechanism
+
+
+def test_the_largest_stage_is_the_peak():
+    assert Peak(1.0, 3.0, 2.0).most == 3.0
+
+
+def write_job(folder, line=""):
+    body = bar(nx=6, ny=2, nz=2)
+    ends = {f"interface/{end.name}/nodes": end.nodes for end in body.interfaces}
+    np.savez(folder / "bar.npz", M=body.M.toarray(), K=body.K.toarray(), nodes=body.nodes, dofs=body.dofs, **ends)
+    path = folder / "job.toml"
+    path.write_text(f'[body]\nmatrices = "bar.npz"\nunits = "m-kg-s"\n[reduction]\nn_modes = 2\n{line}\n')
+    return path
+
+
+def test_a_job_takes_a_budget_and_gives_the_same_body(tmp_path):
+    free = cms.reduce_job(write_job(tmp_path), solver="superlu")
+    kept = cms.reduce_job(write_job(tmp_path, 'memory = "20GB"'))
+    assert kept.provenance["mode set solver"].startswith("Cholesky")
+    assert_allclose(kept.K, free.K, rtol=1e-8, atol=1e-8 * np.abs(free.K).max())
+    with pytest.raises(MemoryBudgetError, match="this needs"):
+        cms.reduce_job(write_job(tmp_path), memory=5.1e7)
+
+
+@pytest.mark.parametrize(
+    ("line", "arguments", "words"),
+    [
+        ('memory = "8 Gigs"', [], "unknown unit"),
+        ("memory = 8", [], "expected a number with a unit"),
+        ("", ["--memory", "lots"], "expected a number with a unit"),
+        ("", ["--memory", "60MB"], "memory = 60 MB: this needs"),
+        ("", ["--memory", "8GB", "--solver", "superlu"], "belongs to solver cholesky"),
+        ("", ["--memory", "8GB", "--workers", "2"], "--memory: belongs to one job"),
+    ],
+)
+def test_the_command_refuses_budgets_that_do_not_do_and_writes_nothing(tmp_path, line, arguments, words):
+    job = write_job(tmp_path, line)
+    before = sorted(tmp_path.iterdir())
+    result = CliRunner().invoke(app, ["reduce", str(job), *arguments])
+    assert result.exit_code == 2, result.output
+    assert re.search(re.escape(words), " ".join(result.output.split()))
+    assert sorted(tmp_path.iterdir()) == before
