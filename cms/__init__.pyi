@@ -39,6 +39,7 @@ from .mode_sets import guyan as guyan
 from .mode_sets import herting as herting
 from .mode_sets import krylov as krylov
 from .mode_sets import macneal as macneal
+from .mode_sets import multilevel as multilevel
 from .mode_sets import normal_modes as normal_modes
 from .mode_sets import rubin as rubin
 from .mode_sets import unrestrained_attachment as unrestrained_attachment

@@ -71,6 +71,7 @@ SUBSETS: dict[str, Subset] = {
     "guyan": whole_set,
     "craig-bampton": column_subset,
     "craig-bampton-ir": column_subset,
+    "multilevel": column_subset,
     "benfield-hruda": column_subset,
     "attachment": column_subset,
     "unrestrained-attachment": column_subset,

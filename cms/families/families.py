@@ -134,6 +134,11 @@ class Families:
             log.warning(words)
         return self._stack.enter_context(fix_interfaces(self.body, self._partition[1], solver=self.solver))
 
+    def adopt(self, fixed: FixedInterfaceBody) -> None:
+        """Take an interior factorisation that exists, unless there is one here; it ends with these families."""
+        if "fixed" not in vars(self):
+            vars(self)["fixed"] = self._stack.enter_context(fixed)
+
     # -- static families -------------------------------------------------------------------------------------------
 
     @cached_property

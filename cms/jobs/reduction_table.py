@@ -16,6 +16,8 @@ from cms.solvers.mode_count import ModeCount
 from cms.solvers.registry import SOLVERS
 from fe_models.foundation.components import MOTION_COMPONENTS
 from fe_models.foundation.paths import near_file
+from fe_models.foundation.tasks.task_map import WorkerError
+from fe_models.foundation.tasks.workers import WORKERS_HELP, checked_workers
 from fe_models.foundation.toml_file import Matrix3, Range, Table, Vector3, choice, is_no_number
 from fe_models.foundation.words import nearest, quoted
 
@@ -34,7 +36,8 @@ MEASURE_NAMES = ("frequency", "frf")  #: of `cms.compare.mode_selection`, whose 
 SET_OPTIONS = (
     "n_modes", "cutoff", "verify", "free", "loads", "neighbours", "n_blocks", "shifts", "tolerance", "band",
     "load_cases", "damping_ratio", "n_rich", "functions", "n_axial", "n_bending", "n_torsion", "axis", "point",
-    "poisson", "columns", "columns_over", "inputs", "outputs",
+    "poisson", "columns", "columns_over", "inputs", "outputs", "inertia_relief", "cutoff_factor",
+    "workers",
 )  # fmt: skip
 #: keys that belong to some mode sets
 AUTO = "auto"  #: instead of a number of modes: as few as meet error over band
@@ -109,6 +112,17 @@ def extras(value: Any) -> tuple[str, ...]:
     return tuple(words)
 
 
+def workers_key(value: Any) -> int | str:
+    """Return a number of processes, or words about a Dask cluster."""
+    if isinstance(value, bool) or not isinstance(value, int | str):
+        raise ValueError(f"expected {WORKERS_HELP}")
+    try:
+        return checked_workers(value)
+    except WorkerError as error:
+        raise ValueError(str(error).partition(": ")[2]) from None
+
+
+WorkersKey = Annotated[int | str, BeforeValidator(workers_key)]
 Components = Annotated[tuple[str, ...], BeforeValidator(components)]
 Amount = Annotated[tuple[float, float, float], BeforeValidator(amount)]
 AmountOrMatrix = Annotated[Rows, BeforeValidator(amount_or_matrix)]
@@ -223,6 +237,11 @@ class ReductionSection(Table):
     )
     shifts: Shifts | None = Field(None, description="a list of frequencies, 0 or more, in Hz")
     tolerance: Annotated[float, Field(gt=0, lt=1)] | None = Field(None, description="a number between 0 and 1")
+    inertia_relief: bool | None = Field(None, description="true or false: whether multilevel has inertia-relief modes")
+    cutoff_factor: Annotated[float, Field(ge=1.2, le=100)] | None = Field(
+        None, description="a number, 1.2 to 100: substructures keep modes up to so many times the cutoff"
+    )
+    workers: WorkersKey | None = Field(None, description=f"where subtrees are eliminated: {WORKERS_HELP}")
     load_cases: bool | None = Field(None, description="true or false: whether load cases are among the Krylov loads")
     damping_ratio: Annotated[float, Field(ge=0)] | None = Field(
         None, description="a number, 0 or more, of critical damping, for balancing"

@@ -10,6 +10,7 @@ from cms.mode_sets.craig_bampton import craig_bampton, craig_bampton_ir, guyan
 from cms.mode_sets.free_interface import craig_chang, dual_craig_bampton, herting, macneal, normal_modes, rubin
 from cms.mode_sets.krylov import krylov
 from cms.mode_sets.loaded_interface import benfield_hruda
+from cms.mode_sets.multilevel import multilevel
 from cms.mode_sets.user_basis import user_basis
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "herting",
     "krylov",
     "macneal",
+    "multilevel",
     "normal_modes",
     "rubin",
     "unrestrained_attachment",
@@ -36,6 +38,7 @@ MODE_SETS: dict[str, Callable[..., ModeSet]] = {
     "guyan": guyan,
     "craig-bampton": craig_bampton,
     "craig-bampton-ir": craig_bampton_ir,
+    "multilevel": multilevel,
     "herting": herting,
     "benfield-hruda": benfield_hruda,
     "rubin": rubin,

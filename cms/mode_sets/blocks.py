@@ -84,6 +84,7 @@ def mode_set(
     modes: EigenResult | None = None,
     wanted: ModeCount | None = None,
     options: Mapping[str, str] | None = None,
+    data: Mapping[str, Array] | None = None,
 ) -> ModeSet:
     """Put blocks side by side, and record what was asked for and which solver ran."""
     recorded = {"solver": families.fixed.factorization.description}
@@ -100,4 +101,5 @@ def mode_set(
         np.concatenate([block.frequencies for block in blocks]),
         {**recorded, **(options or {})},
         tuple(group for block in blocks for group in block.groups),
+        data or {},
     )

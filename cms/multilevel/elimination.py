@@ -1,0 +1,227 @@
+"""One substructure after the other: its own modes, and what it leaves to the separators that enclose it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from cms.errors import FactorizationError
+from cms.multilevel.dense import (
+    add_product,
+    add_rank_2k,
+    cholesky,
+    congruent,
+    largest_eigenpairs,
+    multiply_symmetric,
+    solve_triangular,
+)
+from fe_models.foundation.arrays import Array, IntArray
+
+__all__ = ["Part", "Reduced", "Remainder", "Substructure", "eliminate_part"]
+
+
+DEPENDENT = 1e-10  #: of a tie against the strongest one, below which it repeats others
+
+
+@dataclass(frozen=True, eq=False)
+class Substructure:
+    """An eliminated substructure with s dofs, inside b dofs of the separators that enclose it."""
+
+    start: int  #: first dof in the order of elimination
+    boundary: IntArray  #: dofs of enclosing separators that it moves with, ascending, (b,)
+    L: Array  #: lower triangle: Cholesky factor of its condensed stiffness, (s, s)
+    Psi: Array  #: its own constraint modes, -K_ss⁻¹ K_sb, (s, b)
+    Phi: Array  #: its own modes with all separators around it held, orthonormal in its condensed mass, (s, m)
+    omega2: Array  #: of these modes, ascending, (m,) [1/s²]
+    coupling: Array  #: their mass with the modes of all substructures below, in order, (m_below, m)
+    children: tuple[int, ...]
+    pivots: Array | None = None  #: of a root with multipliers: L holds the factors of SciPy's `lu_factor` instead
+
+    @property
+    def stop(self) -> int:
+        """The dof after its last one."""
+        return self.start + len(self.L)
+
+    @property
+    def n_numbers(self) -> int:
+        """Stored numbers."""
+        return self.L.size + self.Psi.size + self.Phi.size + self.coupling.size
+
+    def solve_own(self, f: Array) -> None:
+        """Put K_ss⁻¹ f into f, (s, k) in C order."""
+        if self.pivots is not None:
+            f[:] = la.lu_solve((self.L, self.pivots), f, check_finite=False)
+            return
+        solve_triangular(self.L, f.T, transposed=True, right=True)
+        solve_triangular(self.L, f.T, right=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """What eliminated substructures leave on the separators around them."""
+
+    boundary: IntArray  #: dofs, ascending, (b,)
+    K: Array  #: condensed stiffness, lower triangle, (b, b)
+    M: Array  #: condensed mass, lower triangle, (b, b)
+    rows: Array  #: mass of all modes below with the boundary, (m_below, b)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A run of substructures to be eliminated, a task of its own: the subtree of the last one, or the top of the tree.
+
+    K and M hold the columns of its dofs of the lower triangles in the order of elimination; rows and dofs are numbered
+    over the whole body.
+    """
+
+    starts: IntArray  #: of its substructures and their end, (n + 1,)
+    children: tuple[tuple[int, ...], ...]  #: of each, in the numbers of this part; below 0: `remainders` from the end
+    K: sp.csc_array
+    M: sp.csc_array
+    omega2: float  #: modes of substructures are kept up to this [1/s²]
+    multipliers: IntArray  #: dofs that are Lagrange multipliers; all in the root
+    remainders: tuple[Remainder, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """A part that was eliminated."""
+
+    substructures: tuple[Substructure, ...]
+    remainder: Remainder
+
+
+def eliminate_part(part: Part) -> Reduced:
+    """Eliminate all substructures of a part, children first.
+
+    Raises
+    ------
+    FactorizationError
+        If a condensed stiffness is not positive definite.
+    """
+    done: list[Substructure] = []
+    left: dict[int, Remainder] = {k - len(part.remainders): r for k, r in enumerate(part.remainders)}
+    for t, children in enumerate(part.children):
+        below = [left.pop(child) for child in children]
+        substructure, left[t] = eliminate(part, t, below, children)
+        done.append(substructure)
+    return Reduced(tuple(done), left[len(done) - 1])
+
+
+def eliminate(
+    part: Part, t: int, below: Sequence[Remainder], children: tuple[int, ...]
+) -> tuple[Substructure, Remainder]:
+    """Eliminate substructure t of a part; s are its own dofs, b those of separators around it.
+
+    (1) K and M of s and b: entries of the body in the columns of s, and what is left of the substructures below
+    (2) K_ss = L Lᵀ,  W = L⁻¹ K_sb,  Psi = -L⁻ᵀ W;  K_bb <- K_bb - Wᵀ W
+    (3) modes with b held: K_ss phi = omega² M_ss phi up to the bound; none if K_ss - bound M_ss is positive definite
+    (4) M_bb <- Psi_ᵀ M Psi_ of Psi_ = [Psi; 1]: M_bb + Psiᵀ X + Xᵀ Psi,  X = M_sb + M_ss Psi / 2
+    (5) mass of own modes with b: phiᵀ (M_sb + M_ss Psi);  of modes below: D_b + D_s Psi with b, D_s phi with own modes
+    """
+    start, stop = int(part.starts[t]), int(part.starts[t + 1])
+    s = stop - start
+    first = int(part.starts[0])
+    entries = slice(part.K.indptr[start - first], part.K.indptr[stop - first])
+    outside = part.K.indices[entries]
+    boundary = np.unique(np.concatenate([outside[outside >= stop], *[r.boundary[r.boundary >= stop] for r in below]]))
+    b = len(boundary)
+    K_ss, K_sb, K_bb = _assembled(part.K, start - first, start, stop, boundary)  # (1)
+    M_ss, M_sb, M_bb = _assembled(part.M, start - first, start, stop, boundary)
+    m_below = sum(len(r.rows) for r in below)
+    D = np.zeros((m_below, s + b))
+    row = 0
+    for r in below:
+        p = int(np.searchsorted(r.boundary, stop))
+        own, out = r.boundary[:p] - start, np.searchsorted(boundary, r.boundary[p:])
+        for (A_ss, A_sb, A_bb), A in (((K_ss, K_sb, K_bb), r.K), ((M_ss, M_sb, M_bb), r.M)):
+            A_ss[np.ix_(own, own)] += A[:p, :p]
+            A_sb[np.ix_(own, out)] += A[p:, :p].T
+            A_bb[np.ix_(out, out)] += A[p:, p:]
+        D[row : row + len(r.rows), own] = r.rows[:, :p]
+        D[row : row + len(r.rows), s + out] = r.rows[:, p:]
+        row += len(r.rows)
+    if len(part.multipliers) and part.multipliers[-1] < stop:
+        return _root_with_multipliers(part, start, K_ss, M_ss, D, children)
+    L = K_ss.copy(order="F")
+    if (failed := cholesky(L)) != 0:  # (2)
+        raise FactorizationError(
+            f"substructures: a pivot is zero or negative (dof {start + failed} in the order of elimination)"
+        )
+    Psi = K_sb
+    solve_triangular(L, Psi)
+    add_product(K_bb, Psi, -1.0)
+    solve_triangular(L, Psi, transposed=True)
+    np.negative(Psi, out=Psi)
+    omega2, Phi = own_modes(K_ss, M_ss, L, part.omega2)  # (3)
+    M_Psi = multiply_symmetric(M_ss, Psi)
+    X = M_sb + M_Psi / 2
+    add_rank_2k(M_bb, Psi, X)  # (4)
+    M_Psi += M_sb
+    rows = np.empty((m_below + len(omega2), b))  # (5)
+    np.matmul(D[:, :s], Psi, out=rows[:m_below])
+    rows[:m_below] += D[:, s:]
+    np.matmul(Phi.T, M_Psi, out=rows[m_below:])
+    done = Substructure(start, boundary, L, Psi, Phi, omega2, D[:, :s] @ Phi, children)
+    return done, Remainder(boundary, K_bb, M_bb, rows)
+
+
+def _root_with_multipliers(
+    part: Part, start: int, K_ss: Array, M_ss: Array, D: Array, children: tuple[int, ...]
+) -> tuple[Substructure, Remainder]:
+    """Eliminate the root where it holds multipliers and all dofs that they tie: K_ss = [K Cᵀ; C 0].
+
+    Its modes are those of K and M in the null space of C, whose columns Z are orthonormal.
+    """
+    K_ss, M_ss = (np.tril(A) + np.tril(A, -1).T for A in (K_ss, M_ss))
+    is_tie = np.zeros(len(K_ss), dtype=bool)
+    is_tie[part.multipliers - start] = True
+    C = K_ss[np.ix_(is_tie, ~is_tie)]
+    Q, R, _ = la.qr(C.T, pivoting=True)
+    size = np.abs(np.diag(R))
+    if not (len(size) and size[-1] > DEPENDENT * size[0]) or len(size) < len(C):
+        raise FactorizationError("substructures: ties of distributing interfaces depend on each other")
+    Z = Q[:, len(C) :]
+    K, M = (np.asfortranarray(Z.T @ A[np.ix_(~is_tie, ~is_tie)] @ Z) for A in (K_ss, M_ss))
+    L = K.copy(order="F")
+    if cholesky(L) != 0:
+        raise FactorizationError("substructures: a pivot of the root is zero or negative")
+    omega2, Phi_z = own_modes(K, M, L, part.omega2)
+    Phi = np.zeros((len(K_ss), len(omega2)), order="F")
+    Phi[~is_tie] = Z @ Phi_z
+    factors, pivots = la.lu_factor(K_ss)
+    none = np.zeros(0, dtype=np.int64)
+    empty = np.zeros((0, 0), order="F")
+    Psi = np.zeros((len(K_ss), 0), order="F")
+    done = Substructure(start, none, factors, Psi, Phi, omega2, D @ Phi, children, pivots)
+    return done, Remainder(none, empty, empty, np.zeros((len(D) + len(omega2), 0)))
+
+
+def own_modes(K: Array, M: Array, L: Array, bound: float) -> tuple[Array, Array]:
+    """(3) Return omega² up to a bound, ascending, and modes, M-orthonormal, by the lower triangles; K and M may be lost.
+
+    M may be semidefinite: A = L⁻¹ M L⁻ᵀ has theta = 1 / omega², and 0 for what has no mass.
+    """
+    s = len(K)
+    K -= bound * M
+    if cholesky(K) == 0:
+        return np.zeros(0), np.zeros((s, 0), order="F")
+    theta, Q = largest_eigenpairs(congruent(M, L), 1 / bound)
+    solve_triangular(L, Q, transposed=True)
+    Q /= np.sqrt(theta)
+    return 1 / theta, Q
+
+
+def _assembled(A: sp.csc_array, first: int, start: int, stop: int, boundary: IntArray) -> tuple[Array, Array, Array]:
+    """(1) Return the entries of the body: A_ss (lower triangle), A_sb, and an empty A_bb."""
+    s, b = stop - start, len(boundary)
+    A_ss, A_sb, A_bb = (np.zeros(shape, order="F") for shape in ((s, s), (s, b), (b, b)))
+    entries = slice(A.indptr[first], A.indptr[first + s])
+    rows, values = A.indices[entries], A.data[entries]
+    columns = np.repeat(np.arange(s), np.diff(A.indptr[first : first + s + 1]))
+    own = rows < stop
+    A_ss[rows[own] - start, columns[own]] = values[own]
+    A_sb[columns[~own], np.searchsorted(boundary, rows[~own])] = values[~own]
+    return A_ss, A_sb, A_bb

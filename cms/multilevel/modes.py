@@ -1,0 +1,208 @@
+"""Fixed-interface modes of a large body by multilevel substructures (docs/theory.md §2)."""
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.errors import EigenError
+from cms.multilevel.dissection import Dissection, dissect, node_graph
+from cms.multilevel.frequency_guess import guessed_omega2
+from cms.multilevel.improvement import COLUMNS, SLICE, ApproximateModes
+from cms.multilevel.reduced_modes import reduced_modes
+from cms.multilevel.tree import SubstructureTree, substructure_tree
+from cms.solvers.eigen import EigenResult, counting_shift
+from cms.solvers.factorization import factorize
+from cms.solvers.mode_count import ModeCount
+from cms.solvers.orientation import orientation
+from cms.solvers.shift_inverted import Wanted
+from fe_models.foundation.arrays import Array, IntArray, frozen
+from fe_models.foundation.tasks.task_map import TaskMap
+from fe_models.foundation.threads import one_blas_thread
+
+__all__ = ["Interior", "MultilevelResult", "multilevel_modes"]
+
+log = logging.getLogger(__name__)
+
+LEAF = 300  #: dofs of a part: larger ones cost more arithmetic, smaller ones more calls
+GUARDS, GUARD_SHARE = 12, 0.08  #: modes beyond the wanted ones that take part: a number, and a share of these
+MOST_STEPS = 5  #: of inverse iteration
+MARGIN = 1.1  #: of a cutoff: reduced frequencies lie above the true ones
+
+
+@dataclass(frozen=True, eq=False)
+class Interior:
+    """The interior of a body with its boundary held."""
+
+    K: sp.csc_array  #: (n, n) [N/m]
+    M: sp.csc_array  #: (n, n) [kg]
+    nodes: IntArray  #: node of every dof, (n,)
+    points: Array  #: of all nodes of the body, (n_nodes, 3) [m]
+    is_multiplier: Array  #: which dofs are Lagrange multipliers, (n,)
+
+    def dissection(self, leaf: int) -> Dissection:
+        """Return the tree of the dofs; multipliers and the nodes that they tie are in its root."""
+        graph, node = node_graph(self.K, self.M, self.nodes)
+        tied = np.zeros(graph.shape[0], dtype=bool)
+        tied[node[self.is_multiplier]] = True
+        tied |= np.asarray(graph @ tied.astype(np.int64)) > 0
+        points = self.points[np.unique(self.nodes)]
+        found = dissect(graph, points, np.bincount(node), leaf=leaf, last=np.flatnonzero(tied))
+        rank = np.empty(len(points), dtype=np.int64)
+        rank[found.order] = np.arange(len(points))
+        order = np.argsort(rank[node], kind="stable")
+        return Dissection(order, np.searchsorted(rank[node][order], found.starts), found.parents)
+
+
+@dataclass(frozen=True, eq=False)
+class MultilevelResult:
+    """Modes, the errors that are left in them, and the tree, which solves for other columns too."""
+
+    modes: EigenResult
+    errors: Array  #: estimated relative error of each frequency, from above, (k,)
+    n_steps: int  #: of inverse iteration
+    n_reduced: int  #: modes of all substructures
+    cutoff_factor: float  #: modes of substructures up to so many times the highest wanted frequency
+    tree: SubstructureTree
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "errors", frozen(self.errors))
+
+
+def multilevel_modes(
+    interior: Interior,
+    wanted: ModeCount,
+    *,
+    tolerance: float = 1e-3,
+    cutoff_factor: float = 3.0,
+    tasks: TaskMap | None = None,
+    rows: tuple[int, IntArray] | None = None,
+) -> MultilevelResult:
+    """Lowest vibration modes by automated multilevel substructuring.
+
+    (1) nested dissection: parts of some hundred dofs, and separators
+    (2) bound: `cutoff_factor` times the cutoff; of a number of modes, times an estimate of its highest frequency
+    (3) every substructure is reduced to its own modes up to the bound, and eliminated from those above it
+    (4) the reduced pencil: its lowest modes, expanded down the tree
+    (5) steps of inverse iteration by the tree, until the error that is left is below the tolerance
+    (6) the error that is left: |r|²_K / (2 omega² (1 - omega² / omega_next²)), r = x - omega² K⁻¹ M x, omega_next that of
+        the first mode that does not take part
+
+    Frequencies are those of a Rayleigh-Ritz basis: never below the true ones.
+
+    Parameters
+    ----------
+    interior
+        With a definite stiffness but for multipliers.
+    wanted
+        A number of modes, or all up to a cutoff; proven to be all by the inertia of a factorisation, or not.
+    tolerance
+        Largest relative error of a frequency. What stays above it after some steps is told, not raised.
+    cutoff_factor
+        Larger: more modes of substructures, fewer steps (5).
+    tasks
+        Where subtrees are eliminated; None: in threads of this process.
+    rows
+        Over how many dofs the modes are told, and which of these are the interior; None: over the interior.
+
+    Raises
+    ------
+    EigenError
+        If the substructures have fewer modes than are wanted, or the inertia counts others.
+    FactorizationError
+        If the stiffness is singular.
+    """
+    n = interior.K.shape[0]
+    dissection = interior.dissection(LEAF)  # (1)
+    multipliers = np.flatnonzero(interior.is_multiplier[dissection.order])
+    K, M = (dissection.in_order(A) for A in (interior.K, interior.M))
+    if wanted.cutoff is not None:  # (2)
+        highest = (2 * np.pi * wanted.cutoff) ** 2
+    else:
+        highest = guessed_omega2(dissection, interior.K, interior.M, int(wanted.n or 0))
+    bound = cutoff_factor**2 * highest
+    tree = substructure_tree(dissection, K, M, bound, multipliers=multipliers, tasks=tasks)  # (3)
+    own = tree.omega2
+    count = wanted.n if wanted.n is not None else 0
+    if wanted.cutoff is not None:
+        reduced, Z = reduced_modes(own, tree.mass(), _most_below(own, MARGIN**2 * highest))  # (4)
+        count = int((reduced <= MARGIN**2 * highest).sum())
+    p = min(count + GUARDS + int(GUARD_SHARE * count), len(own))
+    if wanted.cutoff is None:
+        if count > len(own):
+            raise EigenError(
+                f"multilevel: {wanted.words}, but the substructures have {len(own)} modes up to {cutoff_factor:g} times "
+                "the estimated frequency; choose a larger cutoff_factor, or fewer modes"
+            )
+        reduced, Z = reduced_modes(own, tree.mass(), p)
+    elif p > len(reduced):
+        reduced, Z = reduced_modes(own, tree.mass(), p)
+    reduced, Z = reduced[:p], Z[:, :p]
+    blocks = [tree.expand(Z[:, a : a + COLUMNS]) for a in range(0, p, COLUMNS)]
+    modes = ApproximateModes(tree, K, M, reduced, blocks)
+    del Z, reduced
+    with one_blas_thread():
+        errors, n_steps = _improved(modes, count, tolerance)  # (5), (6)
+    k = count if wanted.n is not None else int((modes.omega2[:count] <= highest).sum())
+    errors = errors[:k]
+    if (worst := errors > tolerance).any():
+        log.warning(
+            "multilevel: %d of %d frequencies may be more than %g too high after %d steps, first mode %d (%.1e); raise "
+            "cutoff_factor (%g)", worst.sum(), k, tolerance, n_steps, np.argmax(worst) + 1, errors.max(), cutoff_factor,
+        )  # fmt: skip
+    if wanted.verify:
+        _require_all(interior, modes.omega2, k, wanted)
+    omega2 = np.array(modes.omega2[:k])
+    n_rows, of_interior = rows or (n, np.arange(n))
+    Phi = np.zeros((n_rows, k))
+    modes.into(Phi, of_interior[dissection.order])
+    modes.blocks.clear()
+    turn(Phi, omega2)
+    method = (
+        f"multilevel substructures: {dissection.n} in a tree, {len(own)} modes up to {cutoff_factor:g} times the "
+        f"highest wanted frequency, {n_steps} steps of inverse iteration"
+    )
+    found = EigenResult(
+        omega2, np.sqrt(omega2) / (2 * np.pi), Phi, modes.residuals[:k], modes.n_solves, method, is_proven=wanted.verify
+    )
+    return MultilevelResult(found, errors, n_steps, len(own), cutoff_factor, tree)
+
+
+def turn(Phi: Array, omega2: Array) -> None:
+    """Turn modes into their standard basis, in place."""
+    Z = orientation(Phi, omega2)
+    for first in range(0, len(Phi), SLICE):
+        Phi[first : first + SLICE] = Phi[first : first + SLICE] @ Z
+
+
+def _improved(modes: ApproximateModes, count: int, tolerance: float) -> tuple[Array, int]:
+    """(5), (6) Improve modes until the error that is left in the wanted ones is below the tolerance."""
+    errors = np.zeros(0)
+    for n_steps in range(1, MOST_STEPS + 1):
+        modes.improve()
+        apart = 1 - modes.omega2[:count] / modes.omega2[-1]
+        squared = modes.measured(count) ** 2
+        errors = squared / (2 * np.maximum(apart, np.finfo(float).eps))
+        if (errors <= tolerance).all():
+            break
+    return errors, n_steps
+
+
+def _most_below(own: Array, omega2: float) -> int:
+    """Return how many modes of the reduced pencil are computed at first, where all below a bound are wanted."""
+    return min(len(own), int(2 * (own <= omega2).sum()) + GUARDS + 20)
+
+
+def _require_all(interior: Interior, omega2: Array, k: int, wanted: ModeCount) -> None:
+    """Count the modes below a gap after the wanted ones by Sylvester's law of inertia."""
+    last, sigma = counting_shift(omega2[: k + GUARDS], k, Wanted.of(wanted), 0.0)
+    A = sp.csc_array(interior.K - sigma * interior.M)
+    with factorize(A, definite=False) as factorization:
+        inertia = factorization.inertia
+    n_below = inertia.n_negative - int(interior.is_multiplier.sum())
+    if inertia.n_zero or n_below != last:
+        raise EigenError(
+            f"multilevel: found {last} modes below {np.sqrt(sigma) / (2 * np.pi):.6g} Hz, but the inertia counts "
+            f"{n_below}; choose a larger cutoff_factor"
+        )

@@ -1,0 +1,240 @@
+"""The tree of eliminated substructures: solves by all of it, and the motions that its modes span."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from cms.multilevel.dissection import Dissection
+from cms.multilevel.elimination import Part, Reduced, Remainder, Substructure, eliminate_part
+from fe_models.foundation.arrays import Array, IntArray
+from fe_models.foundation.tasks.task_map import Progress, TaskMap
+from fe_models.foundation.threads import bounded_threads, n_threads
+
+__all__ = ["SubstructureTree", "substructure_tree"]
+
+COLUMNS = 64  #: that go through the whole tree at once in one thread
+BLOCK = 256  #: columns that are put into the order of elimination at once
+PARTS = 16  #: tasks are no larger than the body over so many for each processor
+
+
+class SubstructureTree:
+    """A body as a tree of substructures, each with its factor, constraint modes and own modes.
+
+    It is a factorisation of K as well, to `cms.solvers` (`fe_models.foundation`): rows of what it takes and gives are in
+    the order of the body.
+    """
+
+    def __init__(self, dissection: Dissection, substructures: list[Substructure], n_multipliers: int) -> None:
+        self.dissection, self.substructures = dissection, substructures
+        counts = [len(each.omega2) for each in substructures]
+        self.mode_starts = np.concatenate([[0], np.cumsum(counts)])  #: of the modes of each, (n_substructures + 1,)
+        self.n = len(dissection.order)
+        self.n_negative, self.n_perturbed, self.n_positive = n_multipliers, 0, self.n - n_multipliers
+        self.n_factor_entries = sum(each.n_numbers for each in substructures)
+        self.is_open = True
+        self.description = f"tree of {len(substructures)} substructures (dense Cholesky; {n_threads()} threads)"
+
+    @property
+    def words(self) -> str:
+        """How the body was divided."""
+        levels = np.zeros(self.dissection.n, dtype=int)
+        for t in range(self.dissection.n - 2, -1, -1):
+            levels[t] = levels[self.dissection.parents[t]] + 1
+        sizes = np.diff(self.dissection.starts)
+        return (
+            f"{len(sizes)} in {levels.max(initial=0) + 1} levels, the largest of {sizes.max()} dofs, "
+            f"{self.mode_starts[-1]} modes"
+        )
+
+    def close(self) -> None:
+        """Free all substructures."""
+        self.is_open = False
+        self.substructures = []
+
+    @property
+    def omega2(self) -> Array:
+        """Of the modes of all substructures in their order, (n_modes,) [1/s²]: the reduced stiffness, a diagonal."""
+        return np.concatenate([each.omega2 for each in self.substructures])
+
+    def mass(self) -> sp.csc_array:
+        """Return the reduced mass, (n_modes, n_modes): 1 on the diagonal, blocks of each with all below it."""
+        first = self.dissection.first_of_subtrees()
+        rows, columns, values = [], [], []
+        for t, each in enumerate(self.substructures):
+            below, own = self.mode_starts[first[t]], self.mode_starts[t]
+            k, m = each.coupling.shape
+            rows.append(np.repeat(np.arange(below, below + k), m))
+            columns.append(np.tile(np.arange(own, own + m), k))
+            values.append(each.coupling.ravel())
+        n = int(self.mode_starts[-1])
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        upper = sp.csc_array(sp.coo_array(entries, shape=(n, n)))
+        return sp.csc_array(upper + upper.T + sp.eye_array(n))
+
+    def expand(self, Z: Array) -> Array:
+        """Return the motion of all dofs in the order of elimination, (n, k), for amplitudes of the modes, (n_modes, k).
+
+        From the root down: u_s = Phi z_s + Psi u_b.
+        """
+        X = np.empty((self.n, Z.shape[1]))
+
+        def part(columns: slice) -> None:
+            u = X[:, columns]
+            z = np.ascontiguousarray(Z[:, columns])
+            for t in range(len(self.substructures) - 1, -1, -1):
+                each = self.substructures[t]
+                own = u[each.start : each.stop]
+                own[:] = each.Phi @ z[self.mode_starts[t] : self.mode_starts[t + 1]]
+                if len(each.boundary):
+                    own += each.Psi @ u[each.boundary]
+
+        _by_columns(Z.shape[1], part)
+        return X
+
+    def solve(self, b: Array) -> Array:
+        """Return K⁻¹ b, (n, k), rows in the order of the body."""
+        x = np.empty(b.shape, order="F")
+        for first in range(0, b.shape[1], BLOCK):
+            columns = slice(first, first + BLOCK)
+            u = np.ascontiguousarray(b[self.dissection.order, columns])
+            self.solve_ordered(u)
+            x[self.dissection.order, columns] = u
+        return x
+
+    def solve_ordered(self, b: Array) -> None:
+        """Put K⁻¹ b into b, (n, k) in C order, rows in the order of elimination.
+
+        (1) up: f_b <- f_b + Psiᵀ f_s of all substructures below;  u_s = K_ss⁻¹ f_s
+        (2) down: u_s <- u_s + Psi u_b
+        """
+
+        def part(columns: slice) -> None:
+            u = np.ascontiguousarray(b[:, columns])
+            left: dict[int, Array] = {}
+            for t, each in enumerate(self.substructures):  # (1)
+                own = u[each.start : each.stop]
+                out = np.zeros((len(each.boundary), u.shape[1]))
+                for child in each.children:
+                    below = self.substructures[child].boundary
+                    f = left.pop(child)
+                    p = int(np.searchsorted(below, each.stop))
+                    own[below[:p] - each.start] += f[:p]
+                    out[np.searchsorted(each.boundary, below[p:])] += f[p:]
+                if len(out):
+                    out += each.Psi.T @ own
+                left[t] = out
+                each.solve_own(own)
+            for each in reversed(self.substructures):  # (2)
+                if len(each.boundary):
+                    u[each.start : each.stop] += each.Psi @ u[each.boundary]
+            if u is not b:
+                b[:, columns] = u
+
+        _by_columns(b.shape[1], part)
+        return X
+
+
+def substructure_tree(
+    dissection: Dissection,
+    K: sp.csc_array,
+    M: sp.csc_array,
+    omega2: float,
+    *,
+    multipliers: IntArray,
+    tasks: TaskMap | None = None,
+    progress: Progress | None = None,
+) -> SubstructureTree:
+    """Eliminate all substructures: subtrees as tasks beside each other, then the separators above them.
+
+    Parameters
+    ----------
+    dissection
+        Of the dofs.
+    K, M
+        Symmetric, in the order of elimination (`in_order`), (n, n).
+    omega2
+        Modes of substructures are kept up to this [1/s²].
+    multipliers
+        Dofs in the order of elimination that are Lagrange multipliers, which the root owns with all that they tie.
+    tasks
+        Where subtrees are eliminated; None: in threads of this process.
+    progress
+        Called with the numbers of tasks done and of all.
+
+    Raises
+    ------
+    FactorizationError
+        If K is not positive definite (but for multipliers).
+    """
+    lower = [sp.csc_array(sp.tril(A, format="csc")) for A in (K, M)]
+    body = _Body(dissection, *lower, omega2, multipliers)
+    runs, is_top = body.runs()
+    parts = [body.part(run) for run in runs]
+    reduced: list[Reduced]
+    if tasks is not None:
+        reduced = tasks.map(eliminate_part, parts, progress=progress)
+    else:
+        with bounded_threads(1), ThreadPoolExecutor(body.n_threads) as pool:
+            reduced = list(pool.map(eliminate_part, parts))
+    found: dict[int, Substructure] = {}
+    left: dict[int, Remainder] = {}
+    for run, each in zip(runs, reduced, strict=True):
+        for t, x in zip(run, each.substructures, strict=True):
+            found[t] = replace(x, children=tuple(body.children[t]))
+        left[run[-1]] = each.remainder
+    del reduced
+    for t in np.flatnonzero(is_top).tolist():
+        below = tuple(left.pop(c) for c in body.children[t])
+        one = eliminate_part(body.part(range(t, t + 1), below))
+        found[t] = replace(one.substructures[0], children=tuple(body.children[t]))
+        left[t] = one.remainder
+    return SubstructureTree(dissection, [found[t] for t in range(dissection.n)], len(multipliers))
+
+
+class _Body:
+    """The matrices in the order of elimination, cut into parts."""
+
+    def __init__(
+        self, dissection: Dissection, K: sp.csc_array, M: sp.csc_array, omega2: float, multipliers: IntArray
+    ) -> None:
+        self.dissection, self.K, self.M, self.omega2, self.multipliers = dissection, K, M, omega2, multipliers
+        self.children: list[list[int]] = [[] for _ in range(dissection.n)]
+        for t, parent in enumerate(dissection.parents[:-1].tolist()):
+            self.children[parent].append(t)
+        self.n_threads = n_threads()
+
+    def runs(self) -> tuple[list[range], Array]:
+        """Return the subtrees that become tasks, and which substructures are above all of them."""
+        starts, parents = self.dissection.starts, self.dissection.parents
+        first = self.dissection.first_of_subtrees()
+        limit = starts[-1] // (PARTS * self.n_threads)
+        is_top = (starts[1:] - starts[first] > limit) & np.array([bool(c) for c in self.children])
+        is_top[-1] = True
+        return [range(first[t], t + 1) for t in np.flatnonzero(~is_top & is_top[parents]).tolist()], is_top
+
+    def part(self, run: range, below: tuple[Remainder, ...] = ()) -> Part:
+        """Return a run of substructures with their columns; or one of them, above what is left of its children."""
+        starts = self.dissection.starts[run.start : run.stop + 1]
+        numbers = tuple(tuple(c - run.start for c in self.children[t]) for t in run)
+        if len(run) == 1:
+            numbers = (tuple(range(-len(below), 0)),)
+        K, M = (_columns(A, int(starts[0]), int(starts[-1])) for A in (self.K, self.M))
+        return Part(starts, numbers, K, M, self.omega2, self.multipliers, below)
+
+
+def _columns(A: sp.csc_array, first: int, last: int) -> sp.csc_array:
+    entries = slice(A.indptr[first], A.indptr[last])
+    indptr = A.indptr[first : last + 1] - A.indptr[first]
+    return sp.csc_array((A.data[entries], A.indices[entries], indptr), shape=(A.shape[0], last - first))
+
+
+def _by_columns(k: int, work: Callable[[slice], None]) -> None:
+    """Call with slices of k columns, in threads."""
+    n = n_threads()
+    width = max(1, min(COLUMNS, -(-k // n)))
+    slices = [slice(a, min(a + width, k)) for a in range(0, k, width)]
+    with bounded_threads(1), ThreadPoolExecutor(n) as pool:
+        list(pool.map(work, slices))
